@@ -1,0 +1,1 @@
+//! In situ adaptor: watch a running simulation in a browser and change the shape of its domain while it runs.

@@ -1,0 +1,1 @@
+//! Catalyst 2 compatibility: the C interface of Tombolo.

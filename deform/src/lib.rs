@@ -1,0 +1,7 @@
+//! Surface shaping and volume mesh motion: the geometry kernel of Tombolo.
+//!
+//! This crate has no input or output, knows no MPI and insists on no threads, so that the same code runs inside a solver and,
+//! as WebAssembly, in a browser.
+#![warn(missing_docs)]
+
+pub mod mesh;

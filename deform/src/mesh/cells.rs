@@ -1,0 +1,215 @@
+//! Cells of any linear type, owned.
+
+use super::{CellType, MeshError};
+
+/// Cells of any mix of linear types, as compressed rows of vertex numbers.
+///
+/// A polyhedron's row lists its distinct vertices; its faces are kept beside it.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Cells {
+    types: Vec<CellType>,
+    offsets: Vec<usize>,
+    connectivity: Vec<u32>,
+    polyhedra: Vec<PolyhedronFaces>,
+}
+
+/// The faces of one polyhedral cell.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct PolyhedronFaces {
+    cell: usize,
+    faces: Vec<Vec<u32>>,
+}
+
+impl Cells {
+    /// No cells.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { types: Vec::new(), offsets: vec![0], connectivity: Vec::new(), polyhedra: Vec::new() }
+    }
+
+    /// Cells that are all of one type with a fixed number of vertices.
+    ///
+    /// # Errors
+    /// [`MeshError::CellType`] for a type whose vertex count varies; [`MeshError::VertexCount`] where `connectivity` is
+    /// not a whole number of cells.
+    pub fn uniform(cell_type: CellType, connectivity: Vec<u32>) -> Result<Self, MeshError> {
+        let size = cell_type.vertex_count().ok_or(MeshError::CellType {
+            cell: 0,
+            found: cell_type,
+            expected: "a type with a fixed vertex count",
+        })?;
+        if connectivity.len() % size != 0 {
+            return Err(MeshError::VertexCount {
+                cell: connectivity.len() / size,
+                cell_type,
+                found: connectivity.len() % size,
+            });
+        }
+        let count = connectivity.len() / size;
+        Ok(Self {
+            types: vec![cell_type; count],
+            offsets: (0..=count).map(|cell| cell * size).collect(),
+            connectivity,
+            polyhedra: Vec::new(),
+        })
+    }
+
+    /// Appends one cell.
+    ///
+    /// # Errors
+    /// [`MeshError::VertexCount`] where the type asks for another number of vertices; [`MeshError::CellType`] for a
+    /// polyhedron (use [`Cells::push_polyhedron`]).
+    pub fn push(&mut self, cell_type: CellType, vertices: &[u32]) -> Result<(), MeshError> {
+        let fits = match cell_type {
+            CellType::Polyhedron => {
+                return Err(MeshError::CellType {
+                    cell: self.len(),
+                    found: cell_type,
+                    expected: "a cell described by its vertices alone",
+                });
+            }
+            CellType::PolyVertex => !vertices.is_empty(),
+            CellType::PolyLine => vertices.len() >= 2,
+            CellType::TriangleStrip | CellType::Polygon => vertices.len() >= 3,
+            fixed => fixed.vertex_count() == Some(vertices.len()),
+        };
+        if !fits {
+            return Err(MeshError::VertexCount { cell: self.len(), cell_type, found: vertices.len() });
+        }
+        self.types.push(cell_type);
+        self.connectivity.extend_from_slice(vertices);
+        self.offsets.push(self.connectivity.len());
+        Ok(())
+    }
+
+    /// Appends a polyhedron given by its faces, each counter-clockwise seen from outside.
+    ///
+    /// # Errors
+    /// [`MeshError::VertexCount`] where there are fewer than four faces or a face has fewer than three vertices.
+    pub fn push_polyhedron(&mut self, faces: &[Vec<u32>]) -> Result<(), MeshError> {
+        let smallest = faces.iter().map(Vec::len).min().unwrap_or(0);
+        if faces.len() < 4 || smallest < 3 {
+            return Err(MeshError::VertexCount {
+                cell: self.len(),
+                cell_type: CellType::Polyhedron,
+                found: faces.iter().map(Vec::len).sum(),
+            });
+        }
+        let mut vertices: Vec<u32> = faces.concat();
+        vertices.sort_unstable();
+        vertices.dedup();
+        self.polyhedra.push(PolyhedronFaces { cell: self.len(), faces: faces.to_vec() });
+        self.types.push(CellType::Polyhedron);
+        self.connectivity.extend_from_slice(&vertices);
+        self.offsets.push(self.connectivity.len());
+        Ok(())
+    }
+
+    /// How many cells there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.types.len()
+    }
+
+    /// Whether there is no cell.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.types.is_empty()
+    }
+
+    /// The type of a cell.
+    ///
+    /// # Panics
+    /// Where `cell` is not below [`Cells::len`].
+    #[must_use]
+    pub fn cell_type(&self, cell: usize) -> CellType {
+        self.types[cell]
+    }
+
+    /// The types of all cells.
+    #[must_use]
+    pub fn types(&self) -> &[CellType] {
+        &self.types
+    }
+
+    /// The vertices of a cell, in VTK's order.
+    ///
+    /// # Panics
+    /// Where `cell` is not below [`Cells::len`].
+    #[must_use]
+    pub fn vertices(&self, cell: usize) -> &[u32] {
+        &self.connectivity[self.offsets[cell]..self.offsets[cell + 1]]
+    }
+
+    /// Row starts into [`Cells::connectivity`], `len() + 1` of them.
+    #[must_use]
+    pub fn offsets(&self) -> &[usize] {
+        &self.offsets
+    }
+
+    /// The vertices of all cells, row after row.
+    #[must_use]
+    pub fn connectivity(&self) -> &[u32] {
+        &self.connectivity
+    }
+
+    /// Each cell's type and vertices, in order.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = (CellType, &[u32])> {
+        (0..self.len()).map(|cell| (self.types[cell], self.vertices(cell)))
+    }
+
+    /// The one type all cells have, if there is one.
+    #[must_use]
+    pub fn uniform_type(&self) -> Option<CellType> {
+        let first = *self.types.first()?;
+        self.types.iter().all(|&other| other == first).then_some(first)
+    }
+
+    /// The highest dimension of any cell; 0 where there is none.
+    #[must_use]
+    pub fn dimension(&self) -> usize {
+        self.types.iter().map(|cell| cell.dimension()).max().unwrap_or(0)
+    }
+
+    /// Calls `visit` with each face of a volume cell: global vertex numbers, counter-clockwise seen from outside.
+    pub fn for_each_face(&self, cell: usize, mut visit: impl FnMut(&[u32])) {
+        if self.types[cell] == CellType::Polyhedron {
+            for face in self.polyhedron_faces(cell) {
+                visit(face);
+            }
+            return;
+        }
+        let vertices = self.vertices(cell);
+        let mut face_vertices = [0u32; 6];
+        for face in self.types[cell].faces() {
+            for (slot, &local) in face_vertices.iter_mut().zip(face.iter()) {
+                *slot = vertices[local];
+            }
+            visit(&face_vertices[..face.len()]);
+        }
+    }
+
+    /// The faces of a polyhedron; empty for any other cell.
+    #[must_use]
+    pub fn polyhedron_faces(&self, cell: usize) -> &[Vec<u32>] {
+        match self.polyhedra.binary_search_by_key(&cell, |entry| entry.cell) {
+            Ok(found) => &self.polyhedra[found].faces,
+            Err(_) => &[],
+        }
+    }
+
+    /// Refuses a vertex number at or above `vertex_count`.
+    ///
+    /// # Errors
+    /// [`MeshError::VertexNumber`] with the first such cell.
+    pub fn validate(&self, vertex_count: usize) -> Result<(), MeshError> {
+        for cell in 0..self.len() {
+            for &vertex in self.vertices(cell) {
+                if vertex as usize >= vertex_count {
+                    return Err(MeshError::VertexNumber { cell, vertex: u64::from(vertex), vertex_count });
+                }
+            }
+        }
+        Ok(())
+    }
+}

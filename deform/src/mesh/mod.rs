@@ -1,0 +1,180 @@
+//! Meshes: owned ([`Mesh`]) and borrowed from a solver ([`MeshView`]), of any mix of linear VTK cells.
+//!
+//! The kernel works on owned meshes in double precision. A solver's arrays are borrowed as they lie in its memory, strided,
+//! separate or interleaved, of any common number type ([`ArrayView`], [`CellsView`]); nothing is copied until something needs it.
+
+mod cell_type;
+mod cells;
+mod feature;
+mod view;
+
+pub use cell_type::CellType;
+pub use cells::Cells;
+pub use feature::{FeatureSource, TaggedFaces};
+pub use view::{ArrayView, CellsView, Indices, MeshView, Values};
+
+/// A point or vector in space.
+pub type Vector = [f64; 3];
+
+/// An unstructured mesh that owns its arrays.
+///
+/// Invariants, kept by [`Mesh::new`]: every coordinate is finite, every vertex number is in range.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mesh {
+    points: Vec<Vector>,
+    cells: Cells,
+    features: FeatureSource,
+}
+
+impl Mesh {
+    /// A mesh from its points (length units of the caller), its cells and where its features come from.
+    ///
+    /// # Errors
+    /// [`MeshError::NotFinite`] for a NaN or infinite coordinate, [`MeshError::VertexNumber`] for a vertex that does not exist,
+    /// [`MeshError::FeatureCount`] where the feature tags do not match the mesh.
+    pub fn new(points: Vec<Vector>, cells: Cells, features: FeatureSource) -> Result<Self, MeshError> {
+        check_finite(&points)?;
+        cells.validate(points.len())?;
+        features.validate(points.len())?;
+        Ok(Self { points, cells, features })
+    }
+
+    /// The coordinates of each vertex.
+    #[must_use]
+    pub fn points(&self) -> &[Vector] {
+        &self.points
+    }
+
+    /// The cells.
+    #[must_use]
+    pub fn cells(&self) -> &Cells {
+        &self.cells
+    }
+
+    /// Where the features come from.
+    #[must_use]
+    pub fn features(&self) -> &FeatureSource {
+        &self.features
+    }
+
+    /// The same cells at other coordinates.
+    ///
+    /// # Errors
+    /// [`MeshError::PointCount`] where there are more or fewer points than before; [`MeshError::NotFinite`].
+    pub fn with_points(&self, points: Vec<Vector>) -> Result<Self, MeshError> {
+        if points.len() != self.points.len() {
+            return Err(MeshError::PointCount { found: points.len(), expected: self.points.len() });
+        }
+        check_finite(&points)?;
+        Ok(Self { points, cells: self.cells.clone(), features: self.features.clone() })
+    }
+}
+
+fn check_finite(points: &[Vector]) -> Result<(), MeshError> {
+    for (vertex, point) in points.iter().enumerate() {
+        for (axis, value) in point.iter().enumerate() {
+            if !value.is_finite() {
+                return Err(MeshError::NotFinite { vertex, axis: ["x", "y", "z"][axis], value: *value });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Why a mesh was refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshError {
+    /// A coordinate is NaN or infinite.
+    #[error("vertex {vertex}: coordinate {axis} is {value}; every coordinate must be finite")]
+    NotFinite {
+        /// The vertex.
+        vertex: usize,
+        /// The axis: x, y or z.
+        axis: &'static str,
+        /// What was found.
+        value: f64,
+    },
+    /// A cell names a vertex that does not exist.
+    #[error("cell {cell}: vertex {vertex} does not exist; the mesh has {vertex_count} vertices, numbered from 0")]
+    VertexNumber {
+        /// The cell.
+        cell: usize,
+        /// The vertex it names.
+        vertex: u64,
+        /// How many there are.
+        vertex_count: usize,
+    },
+    /// A cell has a number of vertices that its type does not have.
+    #[error("cell {cell}: {found} vertices do not make a {cell_type}{}", expected_count(*cell_type))]
+    VertexCount {
+        /// The cell.
+        cell: usize,
+        /// Its type.
+        cell_type: CellType,
+        /// How many vertices were given.
+        found: usize,
+    },
+    /// A cell is of a type that cannot be used here.
+    #[error("cell {cell}: {found} found where {expected} is needed")]
+    CellType {
+        /// The cell.
+        cell: usize,
+        /// Its type.
+        found: CellType,
+        /// What is needed.
+        expected: &'static str,
+    },
+    /// A cell type number that is not a linear VTK cell.
+    #[error("cell {cell}: VTK cell type {number} is not a linear cell; the linear ones are 1 to 16 and 42")]
+    UnknownCellType {
+        /// The cell.
+        cell: usize,
+        /// The number.
+        number: u64,
+    },
+    /// Offsets that are not those of compressed rows.
+    #[error("cell {cell}: its connectivity would run from {start} to {end} in an array of {length}")]
+    Offsets {
+        /// The cell.
+        cell: usize,
+        /// Where it starts.
+        start: u64,
+        /// Where it ends.
+        end: u64,
+        /// The length of the connectivity.
+        length: usize,
+    },
+    /// Coordinates for another number of vertices.
+    #[error("{found} points given for a mesh of {expected}")]
+    PointCount {
+        /// How many were given.
+        found: usize,
+        /// How many the mesh has.
+        expected: usize,
+    },
+    /// Feature tags that match neither the faces nor the vertices they were given for.
+    #[error("{found} feature tags given for {expected} {what}")]
+    FeatureCount {
+        /// How many were given.
+        found: usize,
+        /// How many there should be.
+        expected: usize,
+        /// Faces or vertices.
+        what: &'static str,
+    },
+    /// An array is too short for the values that its stride asks for, or has another number of values than is needed.
+    #[error("array '{name}': {found} values where {expected} are needed")]
+    ArrayLength {
+        /// The array.
+        name: String,
+        /// How many values it has.
+        found: usize,
+        /// How many are needed.
+        expected: usize,
+    },
+}
+
+fn expected_count(cell_type: CellType) -> String {
+    cell_type.vertex_count().map_or_else(String::new, |count| format!(", which has {count}"))
+}

@@ -1,0 +1,1 @@
+//! Incompressible Navier-Stokes on moving tetrahedral meshes.
