@@ -1,0 +1,98 @@
+//! What is taken out of a running solver: surfaces, slices and fields, from borrowed arrays to compact copies.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use tombolo_deform::mesh::{ArrayView, Cells, MeshView, Vector};
+
+/// What a field has one value for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Association {
+    /// Each vertex.
+    Vertex,
+    /// Each cell.
+    Element,
+}
+
+impl std::fmt::Display for Association {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Association::Vertex => "vertex",
+            Association::Element => "element",
+        })
+    }
+}
+
+/// A field that owns its values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Field {
+    /// Its name.
+    pub name: String,
+    /// What it has one value for.
+    pub association: Association,
+    /// Components of each value: 1 for a scalar, 3 for a vector, up to 9.
+    pub components: usize,
+    /// The values, tuple after tuple: `components` times as many as there are vertices or cells.
+    pub values: Vec<f64>,
+}
+
+/// A field borrowed from the solver.
+#[derive(Debug, Clone, Copy)]
+pub struct FieldView<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// What it has one value for.
+    pub association: Association,
+    /// The values, one tuple for each vertex or cell of the channel's mesh.
+    pub values: ArrayView<'a>,
+}
+
+/// One mesh of the solver with its fields, borrowed for the length of one call.
+#[derive(Debug, Clone, Copy)]
+pub struct Channel<'a> {
+    /// The channel's name, by which pipelines choose it.
+    pub name: &'a str,
+    /// The mesh as it is now.
+    pub mesh: MeshView<'a>,
+    /// The fields on it.
+    pub fields: &'a [FieldView<'a>],
+}
+
+/// All that a solver shows of one step.
+#[derive(Debug, Clone, Copy)]
+pub struct Snapshot<'a> {
+    /// The step's number.
+    pub cycle: u64,
+    /// The simulated time.
+    pub time: f64,
+    /// The meshes and their fields; the first is the one that a pipeline without a `channel` reads.
+    pub channels: &'a [Channel<'a>],
+}
+
+/// The features that the cells of an extract belong to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ExtractFeatures {
+    /// The features' names.
+    pub names: Vec<String>,
+    /// For each cell, the index of its feature in `names`.
+    pub of_cells: Vec<u32>,
+}
+
+/// What a source stage took out of a channel: a copy of its own, small against the mesh unless it is the whole mesh.
+///
+/// Invariants: cells name only points that exist, fields have one tuple for each point or cell, every number is finite.
+/// What stays the same from step to step is shared, not copied.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Extract {
+    /// The coordinates of each point.
+    pub points: Vec<Vector>,
+    /// The vertex of the solver's mesh that each point is; `None` where points lie between vertices, as in a slice.
+    pub vertices: Option<Arc<[u32]>>,
+    /// The cells by the numbers of the points.
+    pub cells: Arc<Cells>,
+    /// The features of the cells, where the source knows them.
+    pub features: Option<Arc<ExtractFeatures>>,
+    /// The fields.
+    pub fields: Vec<Field>,
+}
