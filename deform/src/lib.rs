@@ -6,3 +6,4 @@
 
 pub mod mesh;
 pub mod shapes;
+pub mod surface;
