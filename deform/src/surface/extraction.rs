@@ -1,0 +1,254 @@
+//! The surface of a mesh.
+
+use super::faces::{self, FaceBuffer};
+use super::features::{FeatureSettings, Features};
+use crate::mesh::{CellType, Cells, Mesh, Vector};
+
+/// The surface of a mesh: its boundary faces, their vertices and their features.
+///
+/// Surface vertices are the mesh vertices on the boundary in rising order; faces are in the order of their cells. So the
+/// surface depends on the mesh alone, and two meshes with the same cells have the same surface topology.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Surface {
+    points: Vec<Vector>,
+    vertices: Vec<u32>,
+    faces: Cells,
+    owner_cells: Vec<u32>,
+    triangles: Vec<[u32; 3]>,
+    triangle_faces: Vec<u32>,
+    features: Features,
+}
+
+impl Surface {
+    /// The boundary of a mesh of volume cells of any linear types; a mesh whose highest dimension is 2 is its own surface.
+    ///
+    /// Only cells of the highest dimension count. A face belongs to the boundary when it belongs to one cell. Cells collapsed
+    /// by naming a vertex twice are taken with what is left of their faces. Time and memory are linear in the mesh.
+    ///
+    /// Edges with more than two faces, as where two blocks touch, are no error here: such a surface can be looked at. It
+    /// cannot be edited.
+    ///
+    /// # Errors
+    /// [`SurfaceError::NoFaces`] for a mesh without volume or surface cells, [`SurfaceError::SharedFace`] for a face of more than
+    /// two cells, [`SurfaceError::DuplicateCells`], [`SurfaceError::NoBoundary`], [`SurfaceError::SharpAngle`].
+    ///
+    /// ```
+    /// use tombolo_deform::{shapes, surface::{FeatureSettings, Surface}};
+    ///
+    /// let mesh = shapes::box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+    /// let surface = Surface::extract(&mesh, &FeatureSettings::default())?;
+    /// assert_eq!(surface.triangles().len(), 6 * 2 * 16);
+    /// assert_eq!(surface.features().names(), ["x-min", "x-max", "y-min", "y-max", "z-min", "z-max"]);
+    /// # Ok::<(), tombolo_deform::surface::SurfaceError>(())
+    /// ```
+    pub fn extract(mesh: &Mesh, settings: &FeatureSettings) -> Result<Self, SurfaceError> {
+        settings.validate()?;
+        let cells = mesh.cells();
+        let dimension = cells.dimension();
+        if dimension < 2 {
+            return Err(SurfaceError::NoFaces { cells: cells.len(), dimension });
+        }
+        let boundary = faces::boundary_faces(cells, mesh.points().len())?;
+        if boundary.is_empty() {
+            return Err(SurfaceError::NoBoundary);
+        }
+
+        let mut faces = Cells::new();
+        let mut owner_cells = Vec::with_capacity(boundary.len());
+        let mut buffer = FaceBuffer::default();
+        for same_cell in boundary.chunk_by(|a, b| a.cell == b.cell) {
+            let mut wanted = same_cell.iter().peekable();
+            buffer.for_each(cells, same_cell[0].cell as usize, dimension, |place, vertices| {
+                if wanted.next_if(|face| face.face == place).is_some() {
+                    let cell_type = match vertices.len() {
+                        3 => CellType::Triangle,
+                        4 => CellType::Quad,
+                        _ => CellType::Polygon,
+                    };
+                    // A face has three vertices at least, so that it is always taken.
+                    if faces.push(cell_type, vertices).is_ok() {
+                        owner_cells.push(same_cell[0].cell);
+                    }
+                }
+            });
+        }
+        let global_faces = faces;
+
+        let mut used = vec![false; mesh.points().len()];
+        for &vertex in global_faces.connectivity() {
+            used[vertex as usize] = true;
+        }
+        let vertices: Vec<u32> = (0..used.len()).filter(|&vertex| used[vertex]).map(|vertex| vertex as u32).collect();
+        let mut local = vec![0u32; used.len()];
+        for (number, &vertex) in vertices.iter().enumerate() {
+            local[vertex as usize] = number as u32;
+        }
+        let points: Vec<Vector> = vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect();
+        let mut faces = Cells::new();
+        let mut renumbered = Vec::new();
+        for (cell_type, vertices) in global_faces.iter() {
+            renumbered.clear();
+            renumbered.extend(vertices.iter().map(|&vertex| local[vertex as usize]));
+            let _ = faces.push(cell_type, &renumbered);
+        }
+
+        let (triangles, triangle_faces) = split_into_triangles(&points, &faces);
+        let features = Features::find(mesh.features(), &global_faces, &points, &faces, settings);
+        Ok(Self { points, vertices, faces, owner_cells, triangles, triangle_faces, features })
+    }
+
+    /// The coordinates of each surface vertex in the mesh the surface was taken from.
+    #[must_use]
+    pub fn points(&self) -> &[Vector] {
+        &self.points
+    }
+
+    /// The mesh vertex of each surface vertex, rising.
+    #[must_use]
+    pub fn vertices(&self) -> &[u32] {
+        &self.vertices
+    }
+
+    /// The faces (triangles, quadrilaterals and polygons) by surface vertex numbers, counter-clockwise seen from outside the
+    /// volume; those of a mesh of dimension 2 run as they were given.
+    #[must_use]
+    pub fn faces(&self) -> &Cells {
+        &self.faces
+    }
+
+    /// The cell each face belongs to.
+    #[must_use]
+    pub fn owner_cells(&self) -> &[u32] {
+        &self.owner_cells
+    }
+
+    /// The faces split into triangles, by surface vertex numbers.
+    #[must_use]
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// The face each triangle is part of.
+    #[must_use]
+    pub fn triangle_faces(&self) -> &[u32] {
+        &self.triangle_faces
+    }
+
+    /// The features.
+    #[must_use]
+    pub fn features(&self) -> &Features {
+        &self.features
+    }
+}
+
+fn split_into_triangles(points: &[Vector], faces: &Cells) -> (Vec<[u32; 3]>, Vec<u32>) {
+    let mut triangles = Vec::with_capacity(faces.len());
+    let mut triangle_faces = Vec::with_capacity(faces.len());
+    for (face, (_, vertices)) in faces.iter().enumerate() {
+        let count = vertices.len();
+        let start = if count == 3 { 0 } else { best_fan(points, vertices) };
+        for step in 1..count - 1 {
+            triangles.push([vertices[start], vertices[(start + step) % count], vertices[(start + step + 1) % count]]);
+            triangle_faces.push(face as u32);
+        }
+    }
+    (triangles, triangle_faces)
+}
+
+/// Where a fan of triangles over a polygon should start: where its smallest triangle is largest, so that a polygon that is
+/// not convex is still covered rightly wherever a fan can; the lowest vertex number where it makes no difference.
+fn best_fan(points: &[Vector], vertices: &[u32]) -> usize {
+    let count = vertices.len();
+    let point = |place: usize| points[vertices[place % count] as usize];
+    let normal = polygon_normal(points, vertices);
+    let length = dot(normal, normal);
+    let mut best: Option<(f64, u32, usize)> = None;
+    for (start, &vertex) in vertices.iter().enumerate() {
+        let smallest = (1..count - 1)
+            .map(|step| {
+                let apex = point(start);
+                let area = cross(subtract(point(start + step), apex), subtract(point(start + step + 1), apex));
+                dot(area, normal) / length
+            })
+            .fold(f64::INFINITY, f64::min);
+        let better = best
+            .is_none_or(|(value, number, _)| smallest > value + 1e-9 || (smallest > value - 1e-9 && vertex < number));
+        if better {
+            best = Some((smallest, vertex, start));
+        }
+    }
+    best.map_or(0, |(_, _, start)| start)
+}
+
+/// Twice the area of a polygon along its normal (Newell's method).
+pub(super) fn polygon_normal(points: &[Vector], vertices: &[u32]) -> Vector {
+    let origin = points[vertices[0] as usize];
+    let mut normal = [0.0; 3];
+    for pair in vertices[1..].windows(2) {
+        let [a, b] = [0, 1].map(|end| subtract(points[pair[end] as usize], origin));
+        let part = cross(a, b);
+        for axis in 0..3 {
+            normal[axis] += part[axis];
+        }
+    }
+    normal
+}
+
+pub(super) fn subtract(a: Vector, b: Vector) -> Vector {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+pub(super) fn cross(a: Vector, b: Vector) -> Vector {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+pub(super) fn dot(a: Vector, b: Vector) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Why a mesh has no surface that can be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SurfaceError {
+    /// No cell has faces.
+    #[error("the mesh has no surface: none of its {cells} cells has dimension 2 or 3, the highest is {dimension}")]
+    NoFaces {
+        /// How many cells there are.
+        cells: usize,
+        /// Their highest dimension.
+        dimension: usize,
+    },
+    /// Every face is shared by two cells.
+    #[error("the mesh has no boundary: every face with three distinct vertices belongs to two cells")]
+    NoBoundary,
+    /// More than two cells share a face.
+    #[error("cells {cells:?} share the face with vertices {vertices:?}; a face belongs to at most two cells")]
+    SharedFace {
+        /// The vertices of the face, by mesh vertex numbers.
+        vertices: Vec<u32>,
+        /// Its cells.
+        cells: Vec<u32>,
+    },
+    /// Two cells have the same vertices.
+    #[error("cells {first} and {second} have the same vertices; remove one of them")]
+    DuplicateCells {
+        /// The first of them.
+        first: u32,
+        /// The other.
+        second: u32,
+    },
+    /// An edge with more than two triangles.
+    #[error(
+        "the surface is not a manifold: the edge between the mesh vertices {} and {} belongs to {faces} faces; an edited surface has at most two at an edge",
+        edge[0], edge[1]
+    )]
+    NonManifoldEdge {
+        /// Its ends, by mesh vertex numbers.
+        edge: [u32; 2],
+        /// How many faces meet there.
+        faces: usize,
+    },
+    /// A sharp angle that is no angle between faces.
+    #[error("sharp_angle_degrees is {0}; expected an angle from 0 to 180 degrees")]
+    SharpAngle(f64),
+}

@@ -1,0 +1,291 @@
+//! Features: the named parts of a surface.
+
+use std::collections::{BTreeMap, HashMap};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::SurfaceError;
+use super::extraction::{cross, dot, polygon_normal};
+use super::faces::TagLookup;
+use crate::mesh::{Cells, FeatureSource, Vector};
+
+/// How features are found where the mesh does not name them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct FeatureSettings {
+    /// Two faces belong to different features where the angle between their normals is larger than this, in degrees.
+    #[schemars(range(min = 0.0, max = 180.0))]
+    pub sharp_angle_degrees: f64,
+}
+
+impl Default for FeatureSettings {
+    fn default() -> Self {
+        Self { sharp_angle_degrees: 30.0 }
+    }
+}
+
+impl FeatureSettings {
+    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
+        if (0.0..=180.0).contains(&self.sharp_angle_degrees) {
+            Ok(())
+        } else {
+            Err(SurfaceError::SharpAngle(self.sharp_angle_degrees))
+        }
+    }
+}
+
+/// The features of a surface: every face belongs to exactly one.
+///
+/// Features named by the mesh are in the order of their numbers, `untagged` last; those found at sharp edges are named
+/// `feature-1`, `feature-2` and so on in the order of their lowest faces. A feature has at least one face.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Features {
+    names: Vec<String>,
+    face_features: Vec<u32>,
+    offsets: Vec<usize>,
+    vertices: Vec<u32>,
+}
+
+/// The name of the feature of all faces that the mesh's tags leave out.
+const UNTAGGED: &str = "untagged";
+
+impl Features {
+    /// `mesh_faces` and `faces` are the same faces by the vertex numbers of the mesh and of the surface.
+    pub(super) fn find(
+        source: &FeatureSource,
+        mesh_faces: &Cells,
+        points: &[Vector],
+        faces: &Cells,
+        settings: &FeatureSettings,
+    ) -> Self {
+        let (names, face_features) = match source {
+            FeatureSource::SharpEdges => sharp_features(points, faces, settings),
+            FeatureSource::Faces(tagged) => {
+                let lookup = TagLookup::new(&tagged.faces, &tagged.tags);
+                let tags = mesh_faces.iter().map(|(_, vertices)| lookup.get(vertices)).collect();
+                named_features(tags, &tagged.names)
+            }
+            FeatureSource::Vertices(tags) => {
+                let tags = mesh_faces.iter().map(|(_, vertices)| majority(tags, vertices)).collect();
+                named_features(tags, &[])
+            }
+        };
+        let (offsets, vertices) = feature_vertices(names.len(), &face_features, faces);
+        Self { names, face_features, offsets, vertices }
+    }
+
+    /// The names, all different.
+    #[must_use]
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// The feature of each face of the surface, as an index into [`Features::names`].
+    #[must_use]
+    pub fn face_features(&self) -> &[u32] {
+        &self.face_features
+    }
+
+    /// The index of the feature with this name.
+    ///
+    /// # Errors
+    /// [`UnknownFeature`] with the near names and all the features there are.
+    ///
+    /// ```
+    /// use tombolo_deform::{shapes, surface::{FeatureSettings, Surface}};
+    ///
+    /// let mesh = shapes::box_of_tets([1, 1, 1], [0.0; 3], [1.0; 3]);
+    /// let surface = Surface::extract(&mesh, &FeatureSettings::default())?;
+    /// assert_eq!(surface.features().index("y-max")?, 3);
+    /// let error = surface.features().index("y_max").unwrap_err();
+    /// assert!(error.to_string().starts_with("there is no feature 'y_max'; did you mean 'y-max'"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn index(&self, name: &str) -> Result<u32, UnknownFeature> {
+        match self.names.iter().position(|known| known == name) {
+            Some(found) => Ok(found as u32),
+            None => Err(UnknownFeature {
+                name: name.to_string(),
+                near: near(name, &self.names),
+                features: self.names.clone(),
+            }),
+        }
+    }
+
+    /// The surface vertices of the faces of a feature, rising; none for a feature that does not exist.
+    #[must_use]
+    pub fn vertices(&self, feature: u32) -> &[u32] {
+        match self.offsets.get(feature as usize..).unwrap_or_default() {
+            [start, end, ..] => &self.vertices[*start..*end],
+            _ => &[],
+        }
+    }
+}
+
+/// A name that is no feature of the surface.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("there is no feature '{name}'{}; the features are {}", did_you_mean(near), listed(features))]
+pub struct UnknownFeature {
+    /// The name.
+    pub name: String,
+    /// Features with names like it, the nearest first; at most three.
+    pub near: Vec<String>,
+    /// All features.
+    pub features: Vec<String>,
+}
+
+fn did_you_mean(near: &[String]) -> String {
+    let quoted: Vec<String> = near.iter().map(|name| format!("'{name}'")).collect();
+    if quoted.is_empty() { String::new() } else { format!("; did you mean {}?", quoted.join(" or ")) }
+}
+
+fn listed(names: &[String]) -> String {
+    const SHOWN: usize = 40;
+    let shown = names.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
+    if names.len() > SHOWN { format!("{shown} and {} more", names.len() - SHOWN) } else { shown }
+}
+
+fn near(name: &str, names: &[String]) -> Vec<String> {
+    let wanted = name.to_lowercase();
+    let mut scored: Vec<(f64, &String)> = names
+        .iter()
+        .map(|known| (strsim::normalized_damerau_levenshtein(&wanted, &known.to_lowercase()), known))
+        .filter(|(score, _)| *score >= 0.5)
+        .collect();
+    scored.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(b.1)));
+    scored.into_iter().take(3).map(|(_, known)| known.clone()).collect()
+}
+
+/// The number that most of the vertices carry, the lowest on a tie.
+fn majority(tags: &[i64], vertices: &[u32]) -> Option<i64> {
+    let mut carried: Vec<i64> = vertices.iter().filter_map(|&vertex| tags.get(vertex as usize).copied()).collect();
+    carried.sort_unstable();
+    let mut best: Option<(usize, i64)> = None;
+    for same in carried.chunk_by(|a, b| a == b) {
+        if best.is_none_or(|(count, _)| same.len() > count) {
+            best = Some((same.len(), same[0]));
+        }
+    }
+    best.map(|(_, tag)| tag)
+}
+
+fn named_features(tags: Vec<Option<i64>>, names: &[(i64, String)]) -> (Vec<String>, Vec<u32>) {
+    let given: HashMap<i64, &String> = names.iter().rev().map(|(tag, name)| (*tag, name)).collect();
+    // In the order of the numbers, untagged last; numbers with one name are one feature.
+    let mut order: BTreeMap<(bool, i64), u32> = tags.iter().map(|tag| ((tag.is_none(), tag.unwrap_or(0)), 0)).collect();
+    let mut found: Vec<String> = Vec::new();
+    let mut indices: HashMap<String, u32> = HashMap::new();
+    for (&(untagged, tag), index) in &mut order {
+        let name = match given.get(&tag) {
+            _ if untagged => UNTAGGED.to_string(),
+            Some(name) => (*name).clone(),
+            None => format!("feature-{tag}"),
+        };
+        *index = *indices.entry(name.clone()).or_insert_with(|| {
+            found.push(name);
+            found.len() as u32 - 1
+        });
+    }
+    let face_features = tags.iter().map(|tag| order[&(tag.is_none(), tag.unwrap_or(0))]).collect();
+    (found, face_features)
+}
+
+/// Connected parts of the surface between edges where the normals turn by more than the angle, or where more or fewer than two
+/// faces meet. A face without area turns nothing.
+fn sharp_features(points: &[Vector], faces: &Cells, settings: &FeatureSettings) -> (Vec<String>, Vec<u32>) {
+    let scale = points.iter().flatten().fold(0.0f64, |largest, value| largest.max(value.abs()));
+    let scaled: Vec<Vector> = match scale {
+        0.0 => points.to_vec(),
+        scale => points.iter().map(|point| point.map(|value| value / scale)).collect(),
+    };
+    let normals: Vec<Vector> = faces.iter().map(|(_, vertices)| polygon_normal(&scaled, vertices)).collect();
+    let limit = settings.sharp_angle_degrees.to_radians();
+    let mut parts = Parts::new(faces.len());
+    for pair in edges(faces.iter().map(|(_, vertices)| vertices)).chunk_by(|a, b| a.ends == b.ends) {
+        if let [first, second] = pair {
+            let a = normals[first.face as usize];
+            // Faces that walk an edge the same way have opposite sides; their normals are compared as if they had not.
+            let b =
+                normals[second.face as usize].map(|part| if first.forward == second.forward { -part } else { part });
+            let turn = cross(a, b);
+            if dot(turn, turn).sqrt().atan2(dot(a, b)) <= limit {
+                parts.join(first.face, second.face);
+            }
+        }
+    }
+    let mut numbers: Vec<Option<u32>> = vec![None; faces.len()];
+    let mut count = 0;
+    let face_features = (0..faces.len() as u32)
+        .map(|face| {
+            *numbers[parts.root(face) as usize].get_or_insert_with(|| {
+                count += 1;
+                count - 1
+            })
+        })
+        .collect();
+    ((1..=count).map(|number| format!("feature-{number}")).collect(), face_features)
+}
+
+/// One face's side at an edge; `ends` rise, `forward` where the face walks from the lower to the higher.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct EdgeSide {
+    pub ends: [u32; 2],
+    pub face: u32,
+    pub forward: bool,
+}
+
+/// The sides of all edges, those of one edge together.
+pub(super) fn edges<'a>(faces: impl Iterator<Item = &'a [u32]>) -> Vec<EdgeSide> {
+    let mut sides = Vec::new();
+    for (face, vertices) in faces.enumerate() {
+        for (place, &a) in vertices.iter().enumerate() {
+            let b = vertices[(place + 1) % vertices.len()];
+            sides.push(EdgeSide { ends: [a.min(b), a.max(b)], face: face as u32, forward: a < b });
+        }
+    }
+    sides.sort_unstable();
+    sides
+}
+
+/// Disjoint sets of numbers; the root of a set is its lowest member.
+pub(super) struct Parts {
+    parents: Vec<u32>,
+}
+
+impl Parts {
+    pub fn new(count: usize) -> Self {
+        Self { parents: (0..count as u32).collect() }
+    }
+
+    pub fn root(&mut self, mut member: u32) -> u32 {
+        while self.parents[member as usize] != member {
+            let grandparent = self.parents[self.parents[member as usize] as usize];
+            self.parents[member as usize] = grandparent;
+            member = grandparent;
+        }
+        member
+    }
+
+    pub fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.parents[a.max(b) as usize] = a.min(b);
+    }
+}
+
+fn feature_vertices(count: usize, face_features: &[u32], faces: &Cells) -> (Vec<usize>, Vec<u32>) {
+    let mut pairs: Vec<(u32, u32)> = Vec::with_capacity(faces.connectivity().len());
+    for (&feature, (_, vertices)) in face_features.iter().zip(faces.iter()) {
+        pairs.extend(vertices.iter().map(|&vertex| (feature, vertex)));
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    let mut offsets = vec![0; count + 1];
+    for &(feature, _) in &pairs {
+        offsets[feature as usize + 1] += 1;
+    }
+    for feature in 0..count {
+        offsets[feature + 1] += offsets[feature];
+    }
+    (offsets, pairs.into_iter().map(|(_, vertex)| vertex).collect())
+}
