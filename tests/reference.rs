@@ -1,0 +1,212 @@
+//! `docs/json-reference.md` is what `tombolo schema` says, rendered; it is never written by hand.
+//!
+//! `TOMBOLO_UPDATE=1 cargo test -p tombolo-tests --test reference` writes the page anew.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::fmt::Write as _;
+
+use serde_json::Value;
+use tombolo_tests::{project, tombolo};
+
+const PAGE: &str = "docs/json-reference.md";
+
+#[test]
+fn the_reference_is_what_the_program_says() {
+    let mut page = String::from(
+        "# JSON reference\n\n\
+         Generated from the types of the program (`tombolo schema`); do not edit. A stage, an edit or a command is an object with\n\
+         exactly one key, its name. A key that is not listed is an error. Every number must be finite.\n\n",
+    );
+    for (title, arguments) in ROOTS {
+        let output = tombolo(arguments);
+        let schema: Value = serde_json::from_slice(&output.stdout).expect("`tombolo schema` prints JSON");
+        render(&mut page, title, &schema);
+    }
+    let path = project().join(PAGE);
+    if std::env::var_os("TOMBOLO_UPDATE").is_some() {
+        std::fs::write(&path, &page).expect("the page can be written");
+    }
+    let found = std::fs::read_to_string(&path).unwrap_or_default();
+    assert!(
+        found == page,
+        "{PAGE} is out of date; write it anew: TOMBOLO_UPDATE=1 cargo test -p tombolo-tests --test reference"
+    );
+}
+
+const ROOTS: [(&str, &[&str]); 1] = [("Pipelines", &["schema"])];
+
+/// Renders a schema and every definition it reaches, each once, in the order they are met.
+fn render(page: &mut String, title: &str, schema: &Value) {
+    let definitions: BTreeMap<&str, &Value> = schema["$defs"]
+        .as_object()
+        .map(|defs| defs.iter().map(|(name, def)| (name.as_str(), def)).collect())
+        .unwrap_or_default();
+    let mut renderer = Renderer { page, definitions, queue: VecDeque::new(), met: Vec::new() };
+    renderer.definition(title, schema);
+    while let Some(name) = renderer.queue.pop_front() {
+        let definition = renderer.definitions.get(name.as_str()).copied().unwrap_or(&Value::Null);
+        renderer.definition(&name, definition);
+    }
+}
+
+struct Renderer<'a> {
+    page: &'a mut String,
+    definitions: BTreeMap<&'a str, &'a Value>,
+    queue: VecDeque<String>,
+    met: Vec<String>,
+}
+
+impl Renderer<'_> {
+    fn definition(&mut self, name: &str, definition: &Value) {
+        self.line(&format!("## {name}\n"));
+        self.description(definition);
+        self.body(definition);
+    }
+
+    fn body(&mut self, definition: &Value) {
+        if let Some(variants) = definition["oneOf"].as_array().or(definition["anyOf"].as_array()) {
+            for variant in variants {
+                self.variant(variant);
+            }
+        }
+        if definition["properties"].is_object() {
+            self.properties(definition);
+        } else if definition["oneOf"].is_null() && definition["anyOf"].is_null() {
+            let kind = self.kind(definition);
+            self.line(&format!("{}.\n", capital(&kind)));
+        }
+    }
+
+    fn variant(&mut self, variant: &Value) {
+        if let Some(word) = variant["const"].as_str() {
+            self.line(&format!("- `\"{word}\"`: {}", sentence(variant)));
+            return;
+        }
+        if let Some(words) = variant["enum"].as_array() {
+            for word in words {
+                self.line(&format!("- `{word}`"));
+            }
+            return;
+        }
+        let tagged = variant["properties"].as_object().filter(|properties| properties.len() == 1);
+        match tagged.and_then(|properties| properties.iter().next()) {
+            Some((tag, content)) if variant["required"].as_array().is_some_and(|required| required.len() == 1) => {
+                let kind = self.kind(content);
+                self.line(&format!("- `{tag}`: {kind}. {}", sentence(variant)));
+            }
+            _ => {
+                let kind = self.kind(variant);
+                self.line(&format!("- {kind}. {}", sentence(variant)));
+                if variant["properties"].is_object() {
+                    self.line("");
+                    self.properties(variant);
+                }
+            }
+        }
+    }
+
+    fn properties(&mut self, definition: &Value) {
+        let Some(properties) = definition["properties"].as_object() else { return };
+        if properties.is_empty() {
+            self.line("An empty object: `{}`.\n");
+            return;
+        }
+        self.line("\n| key | value | default | meaning |\n|---|---|---|---|");
+        let required: Vec<&str> =
+            definition["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
+        for (key, value) in properties {
+            let default = match &value["default"] {
+                Value::Null if required.contains(&key.as_str()) => "required".to_owned(),
+                Value::Null => String::new(),
+                default => format!("`{default}`"),
+            };
+            let kind = self.kind(value);
+            self.line(&format!("| `{key}` | {kind} | {default} | {} |", sentence(value).replace('|', "\\|")));
+        }
+        self.line("");
+    }
+
+    /// A type in words, with links to definitions, which it notes as met.
+    fn kind(&mut self, value: &Value) -> String {
+        if let Some(reference) = value["$ref"].as_str() {
+            let name = reference.rsplit('/').next().unwrap_or(reference).to_owned();
+            if !self.met.contains(&name) {
+                self.met.push(name.clone());
+                self.queue.push_back(name.clone());
+            }
+            return format!("[{name}](#{})", name.to_lowercase());
+        }
+        if let Some(word) = value.get("const") {
+            return format!("`{word}`");
+        }
+        if let Some(words) = value["enum"].as_array() {
+            return words.iter().map(|word| format!("`{word}`")).collect::<Vec<_>>().join(" or ");
+        }
+        if let Some(all) = value["allOf"].as_array().filter(|all| all.len() == 1) {
+            return self.kind(&all[0]);
+        }
+        if let Some(any) = value["anyOf"].as_array().or(value["oneOf"].as_array()) {
+            let kinds: Vec<String> =
+                any.iter().filter(|one| one["type"] != "null").map(|one| self.kind(one)).collect();
+            return kinds.join(" or ");
+        }
+        let range = range(value);
+        match &value["type"] {
+            Value::String(kind) => self.simple(kind, value) + &range,
+            Value::Array(kinds) => {
+                let kinds: Vec<&str> = kinds.iter().filter_map(Value::as_str).filter(|kind| *kind != "null").collect();
+                kinds.iter().map(|kind| self.simple(kind, value)).collect::<Vec<_>>().join(" or ") + &range
+            }
+            _ => "any value".to_owned(),
+        }
+    }
+
+    fn simple(&mut self, kind: &str, value: &Value) -> String {
+        match kind {
+            "array" => {
+                let items = if value["items"].is_object() { self.kind(&value["items"]) } else { "any value".to_owned() };
+                match (value["minItems"].as_u64(), value["maxItems"].as_u64()) {
+                    (Some(least), Some(most)) if least == most => format!("{least} × {items}"),
+                    (Some(least), _) if least > 0 => format!("list of {items}, at least {least}"),
+                    _ => format!("list of {items}"),
+                }
+            }
+            "object" if value["additionalProperties"].is_object() => {
+                format!("object of {}", self.kind(&value["additionalProperties"]))
+            }
+            "integer" => "integer".to_owned(),
+            other => other.to_owned(),
+        }
+    }
+
+    fn description(&mut self, definition: &Value) {
+        if let Some(text) = definition["description"].as_str() {
+            self.line(&format!("{text}\n"));
+        }
+    }
+
+    fn line(&mut self, text: &str) {
+        let _ = writeln!(self.page, "{text}");
+    }
+}
+
+fn range(value: &Value) -> String {
+    let mut bounds = Vec::new();
+    for (key, word) in
+        [("minimum", "at least"), ("exclusiveMinimum", "above"), ("maximum", "at most"), ("exclusiveMaximum", "below")]
+    {
+        if let Some(bound) = value[key].as_f64() {
+            bounds.push(format!("{word} {bound}"));
+        }
+    }
+    if bounds.is_empty() { String::new() } else { format!(", {}", bounds.join(", ")) }
+}
+
+fn sentence(value: &Value) -> String {
+    value["description"].as_str().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().collect::<String>() + letters.as_str())
+}
