@@ -48,12 +48,7 @@ fn json_of_the_book_is_accepted() {
             let file = directory.path().join("snippet.json");
             fs::write(&file, &block).expect("a temporary file can be written");
             let output = tombolo(&["check".as_ref(), file.as_os_str()]);
-            assert!(
-                output.status.success(),
-                "{}:{line}: {}",
-                page.display(),
-                String::from_utf8_lossy(&output.stderr)
-            );
+            assert!(output.status.success(), "{}:{line}: {}", page.display(), String::from_utf8_lossy(&output.stderr));
             checked += 1;
         }
     }

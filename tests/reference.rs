@@ -146,8 +146,7 @@ impl Renderer<'_> {
             return self.kind(&all[0]);
         }
         if let Some(any) = value["anyOf"].as_array().or(value["oneOf"].as_array()) {
-            let kinds: Vec<String> =
-                any.iter().filter(|one| one["type"] != "null").map(|one| self.kind(one)).collect();
+            let kinds: Vec<String> = any.iter().filter(|one| one["type"] != "null").map(|one| self.kind(one)).collect();
             return kinds.join(" or ");
         }
         let range = range(value);
@@ -164,7 +163,8 @@ impl Renderer<'_> {
     fn simple(&mut self, kind: &str, value: &Value) -> String {
         match kind {
             "array" => {
-                let items = if value["items"].is_object() { self.kind(&value["items"]) } else { "any value".to_owned() };
+                let items =
+                    if value["items"].is_object() { self.kind(&value["items"]) } else { "any value".to_owned() };
                 match (value["minItems"].as_u64(), value["maxItems"].as_u64()) {
                     (Some(least), Some(most)) if least == most => format!("{least} × {items}"),
                     (Some(least), _) if least > 0 => format!("list of {items}, at least {least}"),
