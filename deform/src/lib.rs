@@ -4,6 +4,13 @@
 //! as WebAssembly, in a browser.
 #![warn(missing_docs)]
 
+pub mod linear;
 pub mod mesh;
+pub mod quality;
+pub mod schedule;
 pub mod shapes;
 pub mod surface;
+pub mod volume;
+
+mod parallel;
+mod vector;

@@ -1,0 +1,47 @@
+//! Loops that use threads where the feature `parallel` is on, and give the same bits where it is off.
+//!
+//! Work is cut into chunks whose size depends on the problem alone, and partial results are combined in the order of the
+//! chunks. So no result depends on how many threads there are.
+
+#[cfg(feature = "parallel")]
+use rayon::prelude::*;
+
+/// Calls `work` with the number of each chunk of `out` and the chunk.
+pub(crate) fn for_each_chunk<T: Send>(out: &mut [T], chunk: usize, work: impl Fn(usize, &mut [T]) + Sync) {
+    #[cfg(feature = "parallel")]
+    if out.len() > chunk {
+        out.par_chunks_mut(chunk).enumerate().for_each(|(index, part)| work(index, part));
+        return;
+    }
+    for (index, part) in out.chunks_mut(chunk).enumerate() {
+        work(index, part);
+    }
+}
+
+/// The results of `work` for each chunk of `0..count`, in order.
+pub(crate) fn map_chunks<R: Send>(
+    count: usize,
+    chunk: usize,
+    work: impl Fn(std::ops::Range<usize>) -> R + Sync,
+) -> Vec<R> {
+    let range = |index: usize| index * chunk..((index + 1) * chunk).min(count);
+    let chunks = count.div_ceil(chunk);
+    #[cfg(feature = "parallel")]
+    if chunks > 1 {
+        return (0..chunks).into_par_iter().map(|index| work(range(index))).collect();
+    }
+    (0..chunks).map(|index| work(range(index))).collect()
+}
+
+/// Whether `test` holds for any chunk of `0..count`.
+pub(crate) fn any_chunk(count: usize, chunk: usize, test: impl Fn(std::ops::Range<usize>) -> bool + Sync) -> bool {
+    let range = |index: usize| index * chunk..((index + 1) * chunk).min(count);
+    #[cfg(feature = "parallel")]
+    {
+        (0..count.div_ceil(chunk)).into_par_iter().any(|index| test(range(index)))
+    }
+    #[cfg(not(feature = "parallel"))]
+    {
+        (0..count.div_ceil(chunk)).any(|index| test(range(index)))
+    }
+}

@@ -1,0 +1,193 @@
+//! In how many shapes, and when, a new shape of the domain is reached.
+
+use std::num::{NonZeroU32, NonZeroU64};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How a change of shape is spread over the run: in `steps` shapes of equal distance, one `every` so many cycles or so much
+/// simulated time.
+///
+/// # Example
+/// ```
+/// use tombolo_deform::schedule::Schedule;
+///
+/// let schedule: Schedule = serde_json::from_str(r#"{"steps": 4, "every": {"steps": 10}}"#).unwrap();
+/// assert_eq!(schedule.fractions(), [0.25, 0.5, 0.75, 1.0]);
+/// assert!(schedule.is_due(2, 20, 0.0), "the third shape is due twenty cycles after the first");
+/// assert!(!schedule.is_due(2, 19, 0.0));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Schedule {
+    /// How many shapes lie between the present one (not counted) and the new one (counted). At least 1.
+    pub steps: NonZeroU32,
+    /// The distance between one shape and the next: solver steps, or simulated time.
+    pub every: Every,
+}
+
+/// The distance between two shapes of a [`Schedule`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Every {
+    /// This many solver steps. At least 1.
+    Steps(NonZeroU64),
+    /// This much simulated time, in the solver's unit. Above 0.
+    Time(Interval),
+}
+
+/// A length of simulated time: finite and above 0.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "f64", into = "f64")]
+#[schemars(extend("exclusiveMinimum" = 0))]
+pub struct Interval(f64);
+
+/// A length of time that is not above 0, or not a finite number.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("{0} is not a length of time; it must be a finite number above 0")]
+pub struct IntervalError(f64);
+
+impl Interval {
+    /// This length of time.
+    ///
+    /// # Errors
+    /// [`IntervalError`] unless it is finite and above 0.
+    pub fn new(time: f64) -> Result<Self, IntervalError> {
+        if time.is_finite() && time > 0.0 { Ok(Self(time)) } else { Err(IntervalError(time)) }
+    }
+
+    /// The length, in the solver's unit of time.
+    #[must_use]
+    pub fn get(self) -> f64 {
+        self.0
+    }
+}
+
+impl TryFrom<f64> for Interval {
+    type Error = IntervalError;
+
+    fn try_from(time: f64) -> Result<Self, IntervalError> {
+        Self::new(time)
+    }
+}
+
+impl From<Interval> for f64 {
+    fn from(interval: Interval) -> f64 {
+        interval.0
+    }
+}
+
+impl Default for Schedule {
+    /// The whole change at once.
+    fn default() -> Self {
+        Self { steps: NonZeroU32::MIN, every: Every::Steps(NonZeroU64::MIN) }
+    }
+}
+
+impl Schedule {
+    /// How far along the way from the present shape to the new one each shape lies: `k / steps` for `k` in `1..=steps`, the
+    /// last exactly 1.
+    #[must_use]
+    pub fn fractions(&self) -> Vec<f64> {
+        (1..=self.steps.get()).map(|step| self.fraction(step)).collect()
+    }
+
+    /// How far along the way shape `step` lies (from 1; 0 is the present shape, and beyond the last is the last).
+    #[must_use]
+    pub fn fraction(&self, step: u32) -> f64 {
+        f64::from(step.min(self.steps.get())) / f64::from(self.steps.get())
+    }
+
+    /// Whether the next shape is due when `shapes_taken` have been taken, and `cycles` and `time` have gone by since the first
+    /// could be taken. The first is due at once; nothing is due after the last. Time is compared with a slack of one part in
+    /// 10⁹ of the interval, so that adding up time steps does not make a shape a step late.
+    #[must_use]
+    pub fn is_due(&self, shapes_taken: u32, cycles: u64, time: f64) -> bool {
+        if shapes_taken >= self.steps.get() {
+            return false;
+        }
+        match self.every {
+            Every::Steps(steps) => cycles >= steps.get().saturating_mul(u64::from(shapes_taken)),
+            Every::Time(Interval(interval)) => time >= interval * (f64::from(shapes_taken) - 1e-9),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Schedule, String> {
+        serde_json::from_str(text).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn nothing_said_means_all_at_once() {
+        assert_eq!(parse("{}").unwrap(), Schedule::default());
+        assert_eq!(Schedule::default().fractions(), [1.0]);
+    }
+
+    #[test]
+    fn the_last_fraction_is_exactly_one() {
+        for steps in [1, 3, 7, 10, 49, 100, 1013] {
+            let schedule = Schedule { steps: NonZeroU32::new(steps).unwrap(), ..Schedule::default() };
+            let fractions = schedule.fractions();
+            assert_eq!(fractions.len(), steps as usize);
+            assert!(fractions.windows(2).all(|pair| pair[0] < pair[1]));
+            assert_eq!(fractions.last().unwrap().to_bits(), 1.0f64.to_bits());
+        }
+    }
+
+    #[test]
+    fn senseless_schedules_are_refused() {
+        for (text, named) in [
+            (r#"{"steps": 0}"#, "nonzero"),
+            (r#"{"every": {"steps": 0}}"#, "nonzero"),
+            (r#"{"every": {"time": 0}}"#, "above 0"),
+            (r#"{"every": {"time": -1.5}}"#, "-1.5"),
+            (r#"{"every": {"cycles": 3}}"#, "cycles"),
+            (r#"{"step": 3}"#, "step"),
+        ] {
+            let message = parse(text).unwrap_err();
+            assert!(message.contains(named), "{text}: {message}");
+        }
+        assert!(Interval::new(f64::NAN).is_err() && Interval::new(f64::INFINITY).is_err());
+    }
+
+    #[test]
+    fn shapes_fall_due_by_steps() {
+        let schedule = parse(r#"{"steps": 3, "every": {"steps": 5}}"#).unwrap();
+        let mut taken = 0;
+        let mut cycles = Vec::new();
+        for cycle in 0..50 {
+            if schedule.is_due(taken, cycle, 0.0) {
+                taken += 1;
+                cycles.push(cycle);
+            }
+        }
+        assert_eq!(cycles, [0, 5, 10]);
+    }
+
+    #[test]
+    fn shapes_fall_due_by_time_in_spite_of_rounding() {
+        let schedule = parse(r#"{"steps": 4, "every": {"time": 0.3}}"#).unwrap();
+        let (mut taken, mut time, mut cycles) = (0, 0.0, Vec::new());
+        for cycle in 0..20 {
+            if schedule.is_due(taken, cycle, time) {
+                taken += 1;
+                cycles.push(cycle);
+            }
+            time += 0.1;
+        }
+        assert_eq!(cycles, [0, 3, 6, 9]);
+    }
+
+    #[test]
+    fn round_trips_and_has_a_schema() {
+        let schedule = parse(r#"{"steps": 3, "every": {"time": 0.25}}"#).unwrap();
+        assert_eq!(parse(&serde_json::to_string(&schedule).unwrap()).unwrap(), schedule);
+        let schema = serde_json::to_string(&schemars::schema_for!(Schedule)).unwrap();
+        assert!(schema.contains("exclusiveMinimum"), "{schema}");
+        assert!(schema.contains("\"default\""), "{schema}");
+    }
+}
