@@ -26,7 +26,7 @@ impl Surface {
     /// by naming a vertex twice are taken with what is left of their faces. Time and memory are linear in the mesh.
     ///
     /// Edges with more than two faces, as where two blocks touch, are no error here: such a surface can be looked at. It
-    /// cannot be edited.
+    /// cannot be edited; see [`Editor::new`](super::Editor::new).
     ///
     /// # Errors
     /// [`SurfaceError::NoFaces`] for a mesh without volume or surface cells, [`SurfaceError::SharedFace`] for a face of more than

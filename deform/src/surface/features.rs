@@ -202,7 +202,7 @@ fn sharp_features(points: &[Vector], faces: &Cells, settings: &FeatureSettings) 
     let normals: Vec<Vector> = faces.iter().map(|(_, vertices)| polygon_normal(&scaled, vertices)).collect();
     let limit = settings.sharp_angle_degrees.to_radians();
     let mut parts = Parts::new(faces.len());
-    for pair in edges(faces.iter().map(|(_, vertices)| vertices)).chunk_by(|a, b| a.ends == b.ends) {
+    for pair in edges((0..faces.len()).map(|face| faces.vertices(face))).chunk_by(|a, b| a.ends == b.ends) {
         if let [first, second] = pair {
             let a = normals[first.face as usize];
             // Faces that walk an edge the same way have opposite sides; their normals are compared as if they had not.
@@ -235,16 +235,31 @@ pub(super) struct EdgeSide {
     pub forward: bool,
 }
 
-/// The sides of all edges, those of one edge together.
-pub(super) fn edges<'a>(faces: impl Iterator<Item = &'a [u32]>) -> Vec<EdgeSide> {
-    let mut sides = Vec::new();
+/// The sides of all edges, those of one edge together, in rising order.
+pub(super) fn edges<'a>(faces: impl Iterator<Item = &'a [u32]> + Clone) -> Vec<EdgeSide> {
+    let sides_of = |face: &'a [u32]| {
+        let next = face.iter().cycle().skip(1);
+        face.iter().zip(next).map(|(&a, &b)| (a.min(b), a.max(b), a < b))
+    };
+    let vertex_count = faces.clone().flatten().max().map_or(0, |&highest| highest as usize + 1);
+    let mut starts = vec![0usize; vertex_count + 1];
+    for (low, ..) in faces.clone().flat_map(sides_of) {
+        starts[low as usize + 1] += 1;
+    }
+    for vertex in 0..vertex_count {
+        starts[vertex + 1] += starts[vertex];
+    }
+    let mut sides = vec![EdgeSide { ends: [0; 2], face: 0, forward: false }; starts[vertex_count]];
+    let mut next = starts.clone();
     for (face, vertices) in faces.enumerate() {
-        for (place, &a) in vertices.iter().enumerate() {
-            let b = vertices[(place + 1) % vertices.len()];
-            sides.push(EdgeSide { ends: [a.min(b), a.max(b)], face: face as u32, forward: a < b });
+        for (low, high, forward) in sides_of(vertices) {
+            sides[next[low as usize]] = EdgeSide { ends: [low, high], face: face as u32, forward };
+            next[low as usize] += 1;
         }
     }
-    sides.sort_unstable();
+    for vertex in 0..vertex_count {
+        sides[starts[vertex]..starts[vertex + 1]].sort_unstable();
+    }
     sides
 }
 

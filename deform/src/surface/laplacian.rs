@@ -1,0 +1,334 @@
+//! The Laplacian of a surface, robust against bad triangles.
+
+use super::features::edges;
+use super::{Surface, SurfaceError};
+
+/// The cotangent Laplacian of a surface with its lumped mass, on the intrinsic Delaunay triangulation.
+///
+/// `(L u)_i = sum over j of w_ij (u_i - u_j)` with `w_ij = (cot a + cot b) / 2` for the angles opposite the edge. Where the sum of
+/// cotangents of an inner edge is negative, the edge is flipped within the surface, which changes no length and no angle of the
+/// surface itself but only what is a triangle (Bobenko and Springborn 2007); so the weights of inner edges are not negative.
+/// `L` is symmetric and positive semidefinite; its kernel are the constants on each component. At an open rim the natural
+/// boundary condition holds: no flux.
+///
+/// The mass of a vertex is its mixed Voronoi area (Meyer, Desbrun, Schröder and Barr 2003) divided by the mean of all, so that
+/// nothing here depends on the units of the mesh.
+///
+/// Triangles without area are given one by lengthening all edges by the same least amount (Sharp and Crane 2020); surfaces
+/// without such triangles are taken as they are.
+#[derive(Debug, Clone)]
+pub(super) struct Laplacian {
+    offsets: Vec<usize>,
+    columns: Vec<u32>,
+    weights: Vec<f64>,
+    mass: Vec<f64>,
+}
+
+impl Laplacian {
+    /// # Errors
+    /// [`SurfaceError::NonManifoldEdge`].
+    pub fn new(surface: &Surface) -> Result<Self, SurfaceError> {
+        let mut triangulation = Triangulation::new(surface)?;
+        triangulation.make_delaunay();
+        let (mass, sides) = triangulation.mass_and_weights(surface.points().len());
+        let (offsets, columns, weights) = compressed_rows(surface.points().len(), &sides);
+        Ok(Self { offsets, columns, weights, mass })
+    }
+
+    /// How many vertices the surface has.
+    pub fn len(&self) -> usize {
+        self.mass.len()
+    }
+
+    /// The mass of each vertex; their mean is 1.
+    pub fn mass(&self) -> &[f64] {
+        &self.mass
+    }
+
+    /// The neighbours of a vertex with their weights.
+    pub fn neighbours(&self, vertex: usize) -> impl Iterator<Item = (usize, f64)> {
+        let row = self.offsets[vertex]..self.offsets[vertex + 1];
+        self.columns[row.clone()].iter().zip(&self.weights[row]).map(|(&column, &weight)| (column as usize, weight))
+    }
+
+    /// The row of `L` of a vertex, its diagonal first.
+    pub fn row(&self, vertex: usize) -> impl Iterator<Item = (usize, f64)> {
+        let diagonal = self.neighbours(vertex).map(|(_, weight)| weight).sum();
+        std::iter::once((vertex, diagonal)).chain(self.neighbours(vertex).map(|(column, weight)| (column, -weight)))
+    }
+
+    /// `L u`. Constants give exact zeros.
+    pub fn apply(&self, values: &[f64]) -> Vec<f64> {
+        (0..self.len())
+            .map(|vertex| {
+                let own = values[vertex];
+                self.neighbours(vertex).map(|(column, weight)| weight * (own - values[column])).sum()
+            })
+            .collect()
+    }
+
+    /// `(L M^-1)^(order - 1) L u`.
+    pub fn apply_power(&self, order: usize, values: &[f64]) -> Vec<f64> {
+        let mut result = self.apply(values);
+        for _ in 1..order {
+            for (value, mass) in result.iter_mut().zip(&self.mass) {
+                *value /= mass;
+            }
+            result = self.apply(&result);
+        }
+        result
+    }
+}
+
+const OPEN: u32 = u32::MAX;
+
+/// A cotangent sum above this is no reason to flip: the four points lie on a circle up to rounding.
+const FLIP_BELOW: f64 = -1e-10;
+
+/// An intrinsic triangulation: side `3 t + s` of triangle `t` runs from its corner `s` to the next one.
+struct Triangulation {
+    corners: Vec<u32>,
+    lengths: Vec<f64>,
+    twins: Vec<u32>,
+}
+
+impl Triangulation {
+    fn new(surface: &Surface) -> Result<Self, SurfaceError> {
+        let triangles = surface.triangles();
+        let mut twins = vec![OPEN; 3 * triangles.len()];
+        let sides = edges(triangles.iter().map(|triangle| triangle.as_slice()));
+        for same in sides.chunk_by(|a, b| a.ends == b.ends) {
+            match same {
+                // Triangles that walk their edge the same way have no common side to flip in; both keep their weight.
+                [first, second] if first.forward != second.forward => {
+                    let [a, b] = [first, second].map(|side| {
+                        let [low, high] = side.ends;
+                        let from = if side.forward { low } else { high };
+                        let triangle = triangles[side.face as usize];
+                        3 * side.face + (0..3).find(|&corner| triangle[corner as usize] == from).unwrap_or(0)
+                    });
+                    twins[a as usize] = b;
+                    twins[b as usize] = a;
+                }
+                [_] | [_, _] | [] => {}
+                more => {
+                    return Err(SurfaceError::NonManifoldEdge {
+                        edge: more[0].ends.map(|vertex| surface.vertices()[vertex as usize]),
+                        faces: more.len(),
+                    });
+                }
+            }
+        }
+        Ok(Self { corners: triangles.concat(), lengths: edge_lengths(surface), twins })
+    }
+
+    /// The cotangent of the angle opposite a side.
+    fn cotangent(&self, side: usize) -> f64 {
+        let [a, b, c] = around(side).map(|side| self.lengths[side]);
+        cotangent(a, b, c)
+    }
+
+    /// Flips sides until no inner edge has a negative sum of cotangents.
+    fn make_delaunay(&mut self) {
+        let mut waiting: Vec<usize> = (0..self.twins.len())
+            .rev()
+            .filter(|&side| self.twins[side] != OPEN && self.twins[side] as usize > side)
+            .collect();
+        let mut is_waiting = vec![false; self.twins.len()];
+        for &side in &waiting {
+            is_waiting[side] = true;
+        }
+        // Flipping ends by itself; the bound is for rounding alone, and leaves a valid triangulation.
+        let mut flips_left = 64 * self.twins.len();
+        while let Some(side) = waiting.pop() {
+            is_waiting[side] = false;
+            let twin = self.twins[side];
+            if twin == OPEN || twin as usize / 3 == side / 3 {
+                continue;
+            }
+            let twin = twin as usize;
+            if self.cotangent(side) + self.cotangent(twin) >= FLIP_BELOW || flips_left == 0 || !self.flip(side, twin) {
+                continue;
+            }
+            flips_left -= 1;
+            for moved in [side, twin].into_iter().flat_map(|side| [around(side)[1], around(side)[2]]) {
+                let other = self.twins[moved];
+                if other != OPEN {
+                    let lower = moved.min(other as usize);
+                    if !std::mem::replace(&mut is_waiting[lower], true) {
+                        waiting.push(lower);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Replaces the common side of two triangles by the other diagonal; refuses where rounding leaves a triangle without area.
+    fn flip(&mut self, side: usize, twin: usize) -> bool {
+        let [h, h1, h2] = around(side);
+        let [g, g1, g2] = around(twin);
+        let length = self.lengths[h];
+        let (x, y) = apex(length, self.lengths[h2], self.lengths[h1]);
+        let (u, v) = apex(length, self.lengths[g1], self.lengths[g2]);
+        let diagonal = (x - u).hypot(y + v);
+        let [bc, ca, ad, db] = [h1, h2, g1, g2].map(|side| self.lengths[side]);
+        let has_area = |a, b, c| cotangent(a, b, c).is_finite() && area(a, b, c) > 0.0;
+        if !(has_area(diagonal, ca, ad) && has_area(diagonal, db, bc)) {
+            return false;
+        }
+        let [a, b, c, d] = [h, h1, h2, g2].map(|side| self.corners[side]);
+        let outer = [h1, h2, g1, g2].map(|side| self.twins[side]);
+        // Triangle h becomes d-c-a, triangle g becomes c-d-b.
+        for (slot, corner) in [(h, d), (h1, c), (h2, a), (g, c), (g1, d), (g2, b)] {
+            self.corners[slot] = corner;
+        }
+        for (slot, length) in [(h, diagonal), (h1, ca), (h2, ad), (g, diagonal), (g1, db), (g2, bc)] {
+            self.lengths[slot] = length;
+        }
+        // Outer sides have moved: b-c to g2, c-a to h1, a-d to h2, d-b to g1. Two of them may be twins of each other.
+        let moved = |old: u32| match old {
+            old if old == OPEN => OPEN,
+            old if old as usize == h1 => g2 as u32,
+            old if old as usize == h2 => h1 as u32,
+            old if old as usize == g1 => h2 as u32,
+            old if old as usize == g2 => g1 as u32,
+            old => old,
+        };
+        for (slot, old) in [(g2, outer[0]), (h1, outer[1]), (h2, outer[2]), (g1, outer[3])] {
+            let other = moved(old);
+            self.twins[slot] = other;
+            if other != OPEN {
+                self.twins[other as usize] = slot as u32;
+            }
+        }
+        true
+    }
+
+    fn mass_and_weights(&self, vertex_count: usize) -> (Vec<f64>, Vec<(u32, u32, f64)>) {
+        let mut mass = vec![0.0; vertex_count];
+        let mut sides = Vec::with_capacity(self.corners.len());
+        for triangle in 0..self.corners.len() / 3 {
+            let [a, b, c] = [0, 1, 2].map(|side| self.lengths[3 * triangle + side]);
+            let [i, j, k] = [0, 1, 2].map(|corner| self.corners[3 * triangle + corner]);
+            // The cotangents of the angles at k, i and j: opposite the sides i-j, j-k and k-i.
+            let opposite = [cotangent(a, b, c), cotangent(b, c, a), cotangent(c, a, b)];
+            for (from, to, cotangent) in [(i, j, opposite[0]), (j, k, opposite[1]), (k, i, opposite[2])] {
+                if from != to {
+                    sides.push((from, to, 0.5 * cotangent));
+                }
+            }
+            let area = area(a, b, c);
+            let corners = [
+                (i, opposite[1], a * a * opposite[0] + c * c * opposite[2]),
+                (j, opposite[2], a * a * opposite[0] + b * b * opposite[1]),
+                (k, opposite[0], b * b * opposite[1] + c * c * opposite[2]),
+            ];
+            let obtuse = opposite.iter().any(|&cotangent| cotangent < 0.0);
+            for (vertex, own, voronoi) in corners {
+                mass[vertex as usize] += match obtuse {
+                    false => voronoi / 8.0,
+                    true if own < 0.0 => area / 2.0,
+                    true => area / 4.0,
+                };
+            }
+        }
+        let mean = mass.iter().sum::<f64>() / vertex_count as f64;
+        for value in &mut mass {
+            *value = (*value / mean).max(1e-12);
+        }
+        (mass, sides)
+    }
+}
+
+/// The three sides of a triangle, from one of them on.
+fn around(side: usize) -> [usize; 3] {
+    let first = side - side % 3;
+    [side, first + (side + 1) % 3, first + (side + 2) % 3]
+}
+
+/// The cotangent of the angle opposite the side of length `a`.
+fn cotangent(a: f64, b: f64, c: f64) -> f64 {
+    (b * b + c * c - a * a) / (4.0 * area(a, b, c))
+}
+
+/// The area of a triangle from its sides, without loss of digits (Kahan 2014).
+fn area(a: f64, b: f64, c: f64) -> f64 {
+    let (a, b) = (a.max(b), a.min(b));
+    let (b, c) = (b.max(c), b.min(c));
+    let (a, b) = (a.max(b), a.min(b));
+    0.25 * ((a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c))).max(0.0).sqrt()
+}
+
+/// The place of a triangle's third corner when its first side lies on the x axis from the origin.
+fn apex(base: f64, from_origin: f64, from_end: f64) -> (f64, f64) {
+    let x = (base * base + from_origin * from_origin - from_end * from_end) / (2.0 * base);
+    (x, 2.0 * area(base, from_origin, from_end) / base)
+}
+
+/// The lengths of all sides, in units of their mean, lengthened where a triangle would have no area.
+fn edge_lengths(surface: &Surface) -> Vec<f64> {
+    let points = surface.points();
+    let scale = points.iter().flatten().fold(0.0f64, |largest, value| largest.max(value.abs()));
+    let scale = if scale > 0.0 { scale } else { 1.0 };
+    let mut lengths = Vec::with_capacity(3 * surface.triangles().len());
+    for triangle in surface.triangles() {
+        for side in 0..3 {
+            let [from, to] = [triangle[side], triangle[(side + 1) % 3]].map(|vertex| points[vertex as usize]);
+            let [x, y, z] = [0, 1, 2].map(|axis| to[axis] / scale - from[axis] / scale);
+            lengths.push(x.hypot(y).hypot(z));
+        }
+    }
+    let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;
+    if mean > 0.0 {
+        for length in &mut lengths {
+            *length /= mean;
+        }
+    }
+    let missing = lengths
+        .chunks_exact(3)
+        .map(|sides| {
+            let longest = sides.iter().copied().fold(0.0, f64::max);
+            let slack = sides.iter().sum::<f64>() - 2.0 * longest;
+            1e-9 * longest.max(1e-6) - slack
+        })
+        .fold(0.0, f64::max);
+    if missing > 0.0 {
+        for length in &mut lengths {
+            *length += missing;
+        }
+    }
+    lengths
+}
+
+fn compressed_rows(count: usize, sides: &[(u32, u32, f64)]) -> (Vec<usize>, Vec<u32>, Vec<f64>) {
+    let mut starts = vec![0usize; count + 1];
+    for &(from, to, _) in sides {
+        starts[from as usize + 1] += 1;
+        starts[to as usize + 1] += 1;
+    }
+    for row in 0..count {
+        starts[row + 1] += starts[row];
+    }
+    let mut entries = vec![(0u32, 0.0f64); 2 * sides.len()];
+    let mut next = starts.clone();
+    for &(from, to, weight) in sides {
+        for (row, column) in [(from, to), (to, from)] {
+            entries[next[row as usize]] = (column, weight);
+            next[row as usize] += 1;
+        }
+    }
+    let mut offsets = Vec::with_capacity(count + 1);
+    offsets.push(0);
+    let mut columns = Vec::with_capacity(sides.len());
+    let mut weights = Vec::with_capacity(sides.len());
+    for row in 0..count {
+        let entries = &mut entries[starts[row]..starts[row + 1]];
+        entries.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        for same in entries.chunk_by(|a, b| a.0 == b.0) {
+            columns.push(same[0].0);
+            weights.push(same.iter().map(|(_, weight)| weight).sum());
+        }
+        offsets.push(columns.len());
+    }
+    (offsets, columns, weights)
+}
