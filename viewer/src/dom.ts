@@ -1,0 +1,35 @@
+/** The few lines that stand in for a framework. */
+
+type Properties = {
+  [key: string]: string | number | boolean | undefined | ((event: Event) => void);
+};
+
+/** Makes an element: `onclick` and its like become listeners, everything else an attribute. */
+export function element<K extends keyof HTMLElementTagNameMap>(
+  tag: K, properties: Properties = {}, ...children: (Node | string | null)[]
+): HTMLElementTagNameMap[K] {
+  const made = document.createElement(tag);
+  for (const [key, value] of Object.entries(properties)) {
+    if (typeof value === "function") made.addEventListener(key.slice(2), value);
+    else if (value === true) made.setAttribute(key, "");
+    else if (value !== false && value !== undefined) made.setAttribute(key, String(value));
+  }
+  for (const child of children) if (child !== null) made.append(child);
+  return made;
+}
+
+/** The element of index.html with this id. */
+export function part(id: string): HTMLElement {
+  const found = document.getElementById(id);
+  if (!found) throw new Error(`index.html has no element "${id}"`);
+  return found;
+}
+
+/** Writes a text only where it differs, so that nothing is laid out anew without need. */
+export function write(target: Element, text: string): void {
+  if (target.textContent !== text) target.textContent = text;
+}
+
+/** A label that is unique in the page. */
+let count = 0;
+export const identifier = (stem: string): string => `${stem}-${++count}`;

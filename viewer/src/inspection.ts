@@ -1,0 +1,44 @@
+/**
+ * `window.tombolo`: what the viewer knows, for tests and for the curious. It can be read and not written, and every value is
+ * a copy; the numbers of `views` and `featureBounds` are those of the newest frame.
+ */
+import type { ConnectionState } from "./connection";
+import type { OrderRecord } from "./orders";
+import type { QualitySummary, Role, Status, Vector } from "./protocol";
+
+export interface ViewInspection { bounds: [Vector, Vector] | null; points: number; triangles: number; topology: string | null }
+
+export interface Inspection {
+  /** How the connection stands: connecting, connected, reconnecting or refused. */
+  readonly connection: ConnectionState;
+  readonly role: Role | null;
+  /** The cycle of the newest frame; null before the first. */
+  readonly cycle: number | null;
+  /** Data frames taken since the page was opened. */
+  readonly frames: number;
+  /** Frames left out because a newer one of the same view was there. */
+  readonly dropped: number;
+  readonly views: Readonly<Record<string, ViewInspection>>;
+  /** Orders by the time they became known, with their state and reason. */
+  readonly orders: readonly OrderRecord[];
+  readonly status: Status | null;
+  readonly quality: QualitySummary | null;
+  readonly stack: readonly unknown[];
+  /** Handle and fixed features, by name. */
+  readonly selection: { handle: string[]; fixed: string[] };
+  /** What went wrong, newest last: frames or messages that could not be read. */
+  readonly errors: readonly string[];
+  /** The box around a feature as it is now; null when no view shows it. */
+  featureBounds(name: string): [Vector, Vector] | null;
+  /** A place of the page (clientX, clientY) at which a click would pick this feature; null when it cannot be seen. */
+  featurePlace(name: string): [number, number] | null;
+}
+
+declare global {
+  interface Window { tombolo?: Inspection }
+}
+
+/** Publishes the getters of `source` on `window.tombolo`. */
+export function publish(source: Inspection): void {
+  Object.defineProperty(window, "tombolo", { value: Object.freeze(source), writable: false, configurable: false });
+}

@@ -1,0 +1,217 @@
+/** Puts the parts together: messages in, orders out. */
+import { Connection, streamAddress } from "./connection";
+import { InputError } from "./controls";
+import { Decoder } from "./decoder";
+import type { DecodeWorker } from "./decoder";
+import { element, part, write } from "./dom";
+import { EditForm, describeEdit } from "./form";
+import { publish } from "./inspection";
+import { Orders } from "./orders";
+import { ScalarBar, Triad, showEmpty } from "./overlay";
+import { watchPointer } from "./pointer";
+import type { ClientMessage, Frame, Hello, Json, ServerMessage, Status } from "./protocol";
+import { Scene } from "./scene";
+import { Selection } from "./selection";
+import { ColourPanel, MonitorPanel, ParameterPanel, ViewList } from "./sidebar";
+import { StatusBar } from "./status";
+
+let hello: Hello | null = null;
+let status: Status | null = null;
+let cycle: number | null = null;
+let frames = 0;
+let sequence = 0;
+let everConnected = false;
+let fresh = false;
+const errors: string[] = [];
+const session = Array.from(crypto.getRandomValues(new Uint8Array(4)), (byte) => byte.toString(16).padStart(2, "0")).join("");
+
+const selection = new Selection();
+const scalarBar = new ScalarBar();
+const triad = new Triad();
+const scene = new Scene(part("scene"), selection, {
+  range: (range) => {
+    scalarBar.range(range);
+    colours.setRange(range);
+  },
+  drawn: (axes) => triad.turn(axes),
+  trouble: report,
+});
+const views = new ViewList(part("views"), scene);
+const colours = new ColourPanel(scene, (colouring, map) => scalarBar.describe(colouring, map, hello?.fields ?? []));
+const monitors = new MonitorPanel(part("monitors"));
+const parameters = new ParameterPanel(part("parameters"), (name, value) => send({ parameter: { name, value } }), showProblem);
+const form = new EditForm(part("fields"), selection);
+const orders = new Orders(part("orders"), (text) => write(part("announcer"), text));
+const bar = new StatusBar();
+watchPointer(part("scene"), scene, selection);
+
+const worker = new Worker(new URL("./decode.worker.ts", import.meta.url), { type: "module" });
+const decoder = new Decoder(worker as unknown as DecodeWorker, takeFrame, report);
+
+const connection = new Connection(streamAddress(window.location.href), {
+  state: (state, explanation) => {
+    bar.connection(state, explanation);
+    if (state === "connected") fresh = true;
+    else decoder.clear();
+    refresh();
+  },
+  message: takeMessage,
+  binary: (bytes) => decoder.push(bytes),
+  trouble: report,
+});
+
+function takeMessage(message: ServerMessage): void {
+  switch (message.kind) {
+    case "hello": return takeHello(message.body);
+    case "status":
+      status = message.body;
+      bar.update(status);
+      if (hello) bar.role(hello, status.driver);
+      return refresh();
+    case "order": return orders.update(message.body);
+    case "monitor": return monitors.update(message.body);
+    case "error": {
+      const { id, message: text } = message.body;
+      if (!(id && orders.refused(id, text))) showProblem(text);
+    }
+  }
+}
+
+function takeHello(body: Hello): void {
+  hello = body;
+  const names = body.features.map((feature) => feature.name);
+  write(part("channel"), body.channel ?? "");
+  scene.setViews(body.views);
+  scene.setFeatures(names);
+  selection.keep(names);
+  views.set(body.views);
+  colours.set(body.fields);
+  form.setSchema(body.schemas.order, body.defaults);
+  form.setFeatures(body.features);
+  parameters.set(body.parameters, body.role === "driver");
+  orders.reconcile(body.orders, fresh && everConnected);
+  fresh = false;
+  everConnected = true;
+  part("stack").replaceChildren(...body.stack.map((edit) => element("li", {}, describeEdit(edit))));
+  part("stack-empty").hidden = body.stack.length > 0;
+  bar.role(body, status?.driver);
+  refresh();
+}
+
+function takeFrame(frame: Frame): void {
+  if (frame.kind === "topology") {
+    scene.setTopology(frame);
+  } else if (scene.setData(frame)) {
+    frames++;
+    cycle = frame.cycle;
+    if (frames === 1) refresh();
+  }
+}
+
+/** Something that arrived could not be read; the viewer goes on with what it has. */
+function report(text: string): void {
+  errors.push(text);
+  if (errors.length > 50) errors.shift();
+  console.warn(text);
+}
+
+function refresh(): void {
+  const connected = connection.state === "connected";
+  const driving = connected && hello?.role === "driver";
+  const stopped = status?.stopped === true;
+  (part("apply") as HTMLButtonElement).disabled = !driving || stopped;
+  (part("undo") as HTMLButtonElement).disabled = !driving || stopped;
+  const pause = part("pause") as HTMLButtonElement;
+  pause.disabled = !driving || stopped;
+  write(pause, status?.paused ? "Resume" : "Pause");
+  pause.dataset.paused = String(status?.paused === true);
+  part("wheel").hidden = !connected || !hello || driving;
+  if (frames > 0) return showEmpty("", "");
+  if (connection.state === "refused") showEmpty("This link does not open the simulation", "The token in it is missing or wrong. Open the link that the simulation printed when it started.");
+  else if (!connected) showEmpty("Waiting for the simulation", "Nothing answers at this address yet. The viewer connects by itself as soon as the run is there.");
+  else if (hello && hello.views.length === 0) showEmpty("Nothing is streamed", "The simulation runs, but no pipeline of its configuration ends in a stream stage.");
+  else showEmpty("Connected", "The first picture appears when the simulation has taken its next step.");
+}
+
+function showProblem(text: string): void {
+  const problem = part("problem");
+  write(problem, text);
+  problem.hidden = text === "";
+}
+
+function send(message: ClientMessage): string | null {
+  const id = `${session}-${++sequence}`;
+  if (connection.send({ id, ...message })) return id;
+  showProblem("There is no connection to the simulation; nothing was sent.");
+  return null;
+}
+
+function sendOrder(order: Json): void {
+  const id = send({ order });
+  if (id) orders.sent(id, order);
+}
+
+part("edit").addEventListener("submit", (event) => {
+  event.preventDefault();
+  showProblem("");
+  try {
+    sendOrder(form.read());
+  } catch (error) {
+    if (!(error instanceof InputError)) throw error;
+    showProblem(error.message);
+    error.field?.focus();
+  }
+});
+part("undo").addEventListener("click", () => {
+  showProblem("");
+  sendOrder({ undo: 1 });
+});
+part("pause").addEventListener("click", () => send(status?.paused ? { resume: {} } : { pause: {} }));
+part("wheel").addEventListener("click", () => send({ drive: {} }));
+part("retry").addEventListener("click", () => connection.retry());
+window.addEventListener("online", () => connection.retry());
+
+let side: 1 | -1 = 1;
+let looking = "";
+part("tools").addEventListener("click", (event) => {
+  const button = (event.target as HTMLElement).closest("button");
+  const camera = button?.dataset.camera;
+  if (!button || !camera) return;
+  if (camera === "reset") scene.reset();
+  else if (camera === "parallel") {
+    scene.parallel = !scene.parallel;
+    button.setAttribute("aria-pressed", String(scene.parallel));
+  } else {
+    side = looking === camera ? (side === 1 ? -1 : 1) : camera === "1" ? -1 : 1;
+    scene.axis(Number(camera) as 0 | 1 | 2, side);
+  }
+  looking = camera;
+});
+
+publish({
+  get connection() { return connection.state; },
+  get role() { return hello?.role ?? null; },
+  get cycle() { return cycle; },
+  get frames() { return frames; },
+  get dropped() { return decoder.dropped; },
+  get views() {
+    return Object.fromEntries([...scene.layers].map(([name, layer]) => [name, {
+      bounds: scene.viewBounds(name), points: layer.topology?.points ?? 0,
+      triangles: (layer.topology?.triangles.length ?? 0) / 3, topology: layer.topology?.topology ?? null,
+    }]));
+  },
+  get orders() { return orders.all(); },
+  get status() { return status && structuredClone(status); },
+  get quality() { return status?.quality ? { ...status.quality } : null; },
+  get stack() { return structuredClone(hello?.stack ?? []); },
+  get selection() {
+    const names = hello?.features.map((feature) => feature.name) ?? [];
+    return { handle: selection.chosen("handle", names), fixed: selection.chosen("fixed", names) };
+  },
+  get errors() { return [...errors]; },
+  featureBounds: (name) => scene.featureBounds(name),
+  featurePlace: (name) => scene.featurePlace(name),
+});
+
+refresh();
+connection.start();

@@ -1,0 +1,333 @@
+/** The picture: a vtk.js render window that draws when something changed, and never waits for the network. */
+import "@kitware/vtk.js/Rendering/Profiles/Geometry";
+import vtkRenderWindow from "@kitware/vtk.js/Rendering/Core/RenderWindow";
+import vtkRenderer from "@kitware/vtk.js/Rendering/Core/Renderer";
+import vtkRenderWindowInteractor from "@kitware/vtk.js/Rendering/Core/RenderWindowInteractor";
+import vtkInteractorStyleTrackballCamera from "@kitware/vtk.js/Interaction/Style/InteractorStyleTrackballCamera";
+import vtkColorTransferFunction from "@kitware/vtk.js/Rendering/Core/ColorTransferFunction";
+import vtkOpenGLRenderWindow from "@kitware/vtk.js/Rendering/OpenGL/RenderWindow";
+import type { ColourMap, Colouring } from "./colour";
+import { Layer } from "./layer";
+import { bounds, firstTriangle } from "./picking";
+import type { DataFrame, TopologyFrame, Vector, ViewInformation } from "./protocol";
+import type { Selection } from "./selection";
+
+const BACKGROUND: Vector = [0.086, 0.094, 0.106];
+
+export interface SceneEvents {
+  /** The range of the values that are drawn now; null when nothing is coloured. */
+  range(range: [number, number] | null): void;
+  /** After each picture, with the directions of the axes on the screen. */
+  drawn(axes: [number, number][]): void;
+  trouble(message: string): void;
+}
+
+export class Scene {
+  readonly layers = new Map<string, Layer>();
+  private readonly window = vtkRenderWindow.newInstance();
+  private readonly renderer = vtkRenderer.newInstance();
+  private readonly canvas = vtkOpenGLRenderWindow.newInstance();
+  private readonly interactor = vtkRenderWindowInteractor.newInstance();
+  private readonly colours = vtkColorTransferFunction.newInstance();
+  private readonly pending = new Map<string, DataFrame>();
+  private features: string[] = [];
+  private colouring: Colouring | null = null;
+  private locked: [number, number] | null = null;
+  private map: ColourMap | null = null;
+  private scheduled = false;
+  private placed = false;
+  private recolour = true;
+
+  constructor(private readonly container: HTMLElement, private readonly selection: Selection, private readonly events: SceneEvents) {
+    this.window.addRenderer(this.renderer);
+    this.window.addView(this.canvas);
+    this.renderer.setBackground(...BACKGROUND);
+    this.canvas.setContainer(container);
+    this.interactor.setView(this.canvas);
+    this.interactor.initialize();
+    this.interactor.bindEvents(container);
+    this.interactor.setInteractorStyle(vtkInteractorStyleTrackballCamera.newInstance());
+    this.interactor.onRenderEvent(() => this.turned());
+    container.addEventListener("keypress", (event) => event.stopImmediatePropagation(), true);
+    container.addEventListener("keydown", (event) => this.key(event));
+    new ResizeObserver(() => this.resize()).observe(container);
+    selection.onChange(() => this.request());
+    this.resize();
+  }
+
+  /** The views that the server streams; those that are gone are removed, the others keep their state. */
+  setViews(views: readonly ViewInformation[]): void {
+    const names = new Set(views.map((view) => view.name));
+    for (const [name, layer] of this.layers) {
+      if (names.has(name)) continue;
+      layer.remove();
+      this.layers.delete(name);
+      this.pending.delete(name);
+    }
+    const inside = views.some((view) => view.kind !== "surface");
+    for (const view of views) {
+      if (this.layers.has(view.name)) continue;
+      const layer = new Layer(view.name, view.kind, this.renderer, this.colours);
+      // A surface that hides what is inside it is of little use: it starts as a shell.
+      layer.opacity = view.kind === "surface" && inside ? 0.25 : 1;
+      this.layers.set(view.name, layer);
+    }
+    this.request();
+  }
+
+  setFeatures(names: string[]): void {
+    this.features = names;
+    this.request();
+  }
+
+  setTopology(frame: TopologyFrame): void {
+    this.pending.delete(frame.view);
+    this.layers.get(frame.view)?.setTopology(frame);
+  }
+
+  /** Takes values to be drawn with the next picture; returns whether the view and its topology are known. */
+  setData(frame: DataFrame): boolean {
+    const layer = this.layers.get(frame.view);
+    if (!layer?.topology || layer.topology.topology !== frame.topology) return false;
+    this.pending.set(frame.view, frame);
+    this.request();
+    return true;
+  }
+
+  setVisible(name: string, visible: boolean): void {
+    const layer = this.layers.get(name);
+    if (layer) layer.visible = visible;
+    this.recolour = true;
+    this.request();
+  }
+
+  setOpacity(name: string, opacity: number): void {
+    const layer = this.layers.get(name);
+    if (layer) layer.opacity = opacity;
+    this.request();
+  }
+
+  setColouring(colouring: Colouring | null, map: ColourMap, locked: [number, number] | null): void {
+    this.colouring = colouring;
+    this.locked = locked;
+    this.map = map;
+    this.recolour = true;
+    this.request();
+  }
+
+  /** The newest coordinates of a feature, whether or not they are drawn yet. */
+  featureBounds(name: string): [Vector, Vector] | null {
+    const number = this.features.indexOf(name);
+    if (number < 0) return null;
+    for (const layer of this.layers.values()) {
+      const { topology } = layer;
+      if (!topology?.triangleFeatures) continue;
+      const points = this.pending.get(layer.name)?.points ?? layer.coordinates;
+      if (points.length !== topology.points * 3) continue;
+      const found = bounds(points, topology.triangles, (triangle) => topology.triangleFeatures?.[triangle] === number);
+      if (found) return found;
+    }
+    return null;
+  }
+
+  viewBounds(name: string): [Vector, Vector] | null {
+    const layer = this.layers.get(name);
+    return layer ? bounds(this.pending.get(name)?.points ?? layer.coordinates) : null;
+  }
+
+  /** The feature under a place of the page; null when there is none. */
+  featureAt(clientX: number, clientY: number): string | null {
+    const box = this.container.getBoundingClientRect();
+    const [width, height] = this.canvas.getSize();
+    const x = ((clientX - box.left) / box.width) * width;
+    const y = (1 - (clientY - box.top) / box.height) * height;
+    const near = this.canvas.displayToWorld(x, y, 0, this.renderer) as Vector;
+    const far = this.canvas.displayToWorld(x, y, 1, this.renderer) as Vector;
+    const direction: Vector = [far[0] - near[0], far[1] - near[1], far[2] - near[2]];
+    let nearest = Infinity;
+    let feature: string | null = null;
+    for (const layer of this.layers.values()) {
+      const { topology } = layer;
+      if (!layer.visible || !topology?.triangleFeatures || layer.coordinates.length !== topology.points * 3) continue;
+      const hit = firstTriangle(layer.coordinates, topology.triangles, near, direction);
+      if (!hit || hit.distance >= nearest) continue;
+      nearest = hit.distance;
+      feature = this.features[topology.triangleFeatures[hit.triangle] ?? -1] ?? null;
+    }
+    return feature;
+  }
+
+  /** A place of the page at which this feature is seen and would be picked; null when nothing of it is. */
+  featurePlace(name: string): [number, number] | null {
+    const number = this.features.indexOf(name);
+    const box = this.container.getBoundingClientRect();
+    const [width, height] = this.canvas.getSize();
+    for (const { topology, coordinates } of this.layers.values()) {
+      if (!topology?.triangleFeatures || coordinates.length !== topology.points * 3) continue;
+      const own = [...topology.triangleFeatures.keys()].filter((triangle) => topology.triangleFeatures?.[triangle] === number);
+      const stride = Math.max(1, Math.floor(own.length / 200));
+      for (let i = Math.floor(stride / 2); i < own.length; i += stride) {
+        const corner = (k: number, axis: number): number => coordinates[3 * topology.triangles[3 * own[i]! + k]! + axis]!;
+        const middle = [0, 1, 2].map((axis) => (corner(0, axis) + corner(1, axis) + corner(2, axis)) / 3);
+        const place = this.canvas.worldToDisplay(middle[0]!, middle[1]!, middle[2]!, this.renderer) as Vector;
+        const x = box.left + (place[0] / width) * box.width;
+        const y = box.top + (1 - place[1] / height) * box.height;
+        if (this.featureAt(x, y) === name && document.elementFromPoint(x, y)?.closest("#scene")) return [x, y];
+      }
+    }
+    return null;
+  }
+
+  /** The whole in the picture, seen across its flat side. */
+  reset(): void {
+    const box = this.box();
+    if (!box) return;
+    const size = [box[1] - box[0], box[3] - box[2], box[5] - box[4]];
+    const order = [0, 1, 2].sort((a, b) => size[a]! - size[b]!);
+    const direction: Vector = [0, 0, 0];
+    direction[order[0]!] = 1;
+    direction[order[1]!] = 0.32;
+    direction[order[2]!] = order[0] === 1 ? -0.32 : 0.32;
+    this.look(direction, order[0] === 2 ? [0, 1, 0] : [0, 0, 1]);
+  }
+
+  /** Looks along an axis, from its positive side or its negative one. */
+  axis(axis: 0 | 1 | 2, sign: 1 | -1): void {
+    const direction: Vector = [0, 0, 0];
+    direction[axis] = sign;
+    this.look(direction, axis === 2 ? [0, 1, 0] : [0, 0, 1]);
+  }
+
+  get parallel(): boolean {
+    return this.renderer.getActiveCamera().getParallelProjection();
+  }
+
+  set parallel(parallel: boolean) {
+    this.renderer.getActiveCamera().setParallelProjection(parallel);
+    this.request();
+  }
+
+  private look(direction: Vector, up: Vector): void {
+    const box = this.box();
+    if (!box) return;
+    const camera = this.renderer.getActiveCamera();
+    const center: Vector = [(box[0] + box[1]) / 2, (box[2] + box[3]) / 2, (box[4] + box[5]) / 2];
+    camera.setFocalPoint(...center);
+    camera.setPosition(center[0] + direction[0], center[1] + direction[1], center[2] + direction[2]);
+    camera.setViewUp(...up);
+    camera.orthogonalizeViewUp();
+    this.renderer.resetCamera(box);
+    this.fill(box);
+    this.request();
+  }
+
+  /** Moves closer until the box fills the picture: vtk.js leaves room for a sphere around it. */
+  private fill(box: number[]): void {
+    const camera = this.renderer.getActiveCamera();
+    const [width, height] = this.canvas.getSize();
+    let largest = 0;
+    for (let corner = 0; corner < 8; corner++) {
+      const place = this.canvas.worldToDisplay(box[corner & 1]!, box[2 + ((corner >> 1) & 1)]!, box[4 + (corner >> 2)]!, this.renderer) as Vector;
+      largest = Math.max(largest, Math.abs(place[0] / width - 0.5), Math.abs(place[1] / height - 0.5));
+    }
+    if (largest > 0) camera.zoom(Math.min(6, 0.43 / largest));
+  }
+
+  private box(): [number, number, number, number, number, number] | null {
+    const low = [Infinity, Infinity, Infinity];
+    const high = [-Infinity, -Infinity, -Infinity];
+    for (const layer of this.layers.values()) {
+      const found = layer.visible ? bounds(layer.coordinates) : null;
+      if (!found) continue;
+      for (let k = 0; k < 3; k++) {
+        low[k] = Math.min(low[k]!, found[0][k]!);
+        high[k] = Math.max(high[k]!, found[1][k]!);
+      }
+    }
+    return low[0]! <= high[0]! ? [low[0]!, high[0]!, low[1]!, high[1]!, low[2]!, high[2]!] : null;
+  }
+
+  private resize(): void {
+    const box = this.container.getBoundingClientRect();
+    const ratio = window.devicePixelRatio || 1;
+    this.canvas.setSize(Math.max(1, Math.floor(box.width * ratio)), Math.max(1, Math.floor(box.height * ratio)));
+    this.request();
+  }
+
+  private request(): void {
+    if (this.scheduled) return;
+    this.scheduled = true;
+    requestAnimationFrame(() => {
+      this.scheduled = false;
+      this.draw();
+    });
+  }
+
+  private draw(): void {
+    for (const [name, frame] of this.pending) {
+      const trouble = this.layers.get(name)?.setData(frame) ?? null;
+      if (trouble) this.events.trouble(trouble);
+      else this.recolour = true;
+    }
+    this.pending.clear();
+    if (this.recolour) this.applyColours();
+    for (const layer of this.layers.values()) {
+      const names = this.features;
+      layer.highlight("handle", this.selection.chosen("handle", names), names);
+      layer.highlight("fixed", this.selection.chosen("fixed", names), names);
+      layer.highlight("hover", this.selection.hovered ? [this.selection.hovered] : [], names);
+      layer.show();
+    }
+    if (!this.placed && this.box()) {
+      this.placed = true;
+      this.reset();
+    }
+    this.renderer.resetCameraClippingRange();
+    this.window.render();
+    this.turned();
+  }
+
+  private applyColours(): void {
+    this.recolour = false;
+    let range: [number, number] | null = null;
+    for (const layer of this.layers.values()) {
+      const found = layer.colour(this.colouring);
+      if (!found || !layer.visible) continue;
+      range = range ? [Math.min(range[0], found[0]), Math.max(range[1], found[1])] : found;
+    }
+    const shown = this.locked ?? range;
+    if (shown && this.map) {
+      const [low, high] = shown;
+      const width = high > low ? high - low : Math.max(Math.abs(low) * 1e-6, 1e-12);
+      const { stops } = this.map;
+      this.colours.removeAllPoints();
+      stops.forEach((stop, i) => this.colours.addRGBPoint(low + (width * i) / (stops.length - 1), ...stop));
+      this.colours.setMappingRange(low, low + width);
+      this.colours.updateRange();
+    }
+    this.events.range(shown);
+  }
+
+  private turned(): void {
+    const matrix = this.renderer.getActiveCamera().getViewMatrix();
+    this.events.drawn([0, 1, 2].map((axis) => [matrix[axis] ?? 0, matrix[4 + axis] ?? 0]));
+  }
+
+  private key(event: KeyboardEvent): void {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const camera = this.renderer.getActiveCamera();
+    const actions: Record<string, () => void> = {
+      ArrowLeft: () => camera.azimuth(8), ArrowRight: () => camera.azimuth(-8),
+      ArrowUp: () => camera.elevation(-8), ArrowDown: () => camera.elevation(8),
+      "+": () => camera.zoom(1.1), "=": () => camera.zoom(1.1), "-": () => camera.zoom(1 / 1.1),
+      r: () => this.reset(), x: () => this.axis(0, 1), y: () => this.axis(1, -1), z: () => this.axis(2, 1),
+      X: () => this.axis(0, -1), Y: () => this.axis(1, 1), Z: () => this.axis(2, -1),
+    };
+    const action = actions[event.key];
+    if (!action) return;
+    event.preventDefault();
+    action();
+    camera.orthogonalizeViewUp();
+    this.request();
+  }
+}

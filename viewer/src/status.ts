@@ -1,0 +1,70 @@
+/** The bar at the top: the connection, the progress of the run, the quality of its mesh, and who steers. */
+import type { ConnectionState } from "./connection";
+import { part, write } from "./dom";
+import { digits, seconds } from "./number";
+import type { Hello, Status } from "./protocol";
+
+const CONNECTIONS: Record<ConnectionState, string> = {
+  connecting: "connecting", connected: "connected", reconnecting: "reconnecting", refused: "wrong token",
+};
+/** Without a word from the simulation for this long, the bar says so. */
+const SILENCE = 4000;
+
+export class StatusBar {
+  private heard = 0;
+  private stopped = false;
+  private state: ConnectionState = "connecting";
+
+  constructor() {
+    setInterval(() => this.silence(), 1000);
+  }
+
+  connection(state: ConnectionState, explanation: string): void {
+    this.state = state;
+    this.heard = performance.now();
+    const pill = part("connection");
+    pill.dataset.state = state;
+    write(pill, CONNECTIONS[state]);
+    pill.title = explanation || (state === "connected" ? "The simulation streams to this viewer." : "");
+    const banner = part("banner");
+    banner.hidden = state === "connected" || state === "connecting";
+    write(part("banner-text"), state === "refused"
+      ? `${explanation} Open the link that the simulation printed when it started.`
+      : `${explanation} Trying again; the run itself goes on.`);
+    banner.dataset.state = state;
+    this.silence();
+  }
+
+  role(hello: Hello, driver: Status["driver"]): void {
+    const driving = hello.role === "driver";
+    const text = part("role");
+    write(text, driving ? "you steer" : driver === null || driver === undefined ? "watching only" : "watching only · another viewer steers");
+    text.dataset.role = hello.role;
+  }
+
+  update(status: Status): void {
+    this.heard = performance.now();
+    this.stopped = status.stopped;
+    write(part("cycle"), String(status.cycle));
+    write(part("time"), digits(status.time, 5));
+    write(part("step"), seconds(status.step_seconds));
+    write(part("viewers"), status.viewers === undefined ? "–" : String(status.viewers));
+    const quality = status.quality;
+    const shown = part("quality");
+    write(shown, quality ? digits(quality.min, 3) : "–");
+    const inverted = quality?.inverted ?? 0;
+    shown.dataset.level = !quality ? "" : inverted > 0 || quality.min <= 0 ? "bad" : quality.min < 0.05 ? "low" : "good";
+    shown.title = quality ? `smallest scaled Jacobian ${digits(quality.min, 4)}, mean ${digits(quality.mean, 3)}, ${inverted} inverted elements` : "";
+    const run = part("run");
+    run.dataset.state = status.stopped ? "stopped" : status.paused ? "paused" : "running";
+    write(run, status.stopped ? "stopped" : status.paused ? "paused" : "running");
+    this.silence();
+  }
+
+  private silence(): void {
+    const note = part("silence");
+    const quiet = performance.now() - this.heard;
+    note.hidden = this.state !== "connected" || this.stopped || quiet < SILENCE;
+    if (!note.hidden) write(note, `no word for ${Math.round(quiet / 1000)} s`);
+  }
+}
