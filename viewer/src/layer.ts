@@ -17,7 +17,7 @@ export const HIGHLIGHT_COLOURS: Record<Highlight, Colour> = {
   hover: [1, 1, 1], handle: [1, 0.6, 0.2], fixed: [0.35, 0.72, 1],
 };
 const HIGHLIGHT_OPACITY: Record<Highlight, number> = { hover: 0.3, handle: 0.55, fixed: 0.55 };
-const SOLID: Colour = [0.62, 0.66, 0.7];
+const SOLID: Colour = [0.72, 0.76, 0.8];
 const EDGE: Colour = [0.82, 0.85, 0.88];
 
 /** Cells as vtk.js wants them: the number of points before each cell's points. */
@@ -61,6 +61,8 @@ export class Layer {
   coordinates = new Float32Array(0);
   visible = true;
   opacity = 1;
+  /** Whether the field colours this view; it is plain otherwise. */
+  coloured = true;
   private colouredBy: DataArray | null = null;
   private readonly points = vtkPoints.newInstance();
   private readonly surface: Piece;
@@ -160,7 +162,7 @@ export class Layer {
 
   /** Colours by a field; returns the range of what is shown, null when this view does not carry the field. */
   colour(colouring: Colouring | null): [number, number] | null {
-    const field = colouring ? this.frame?.fields.find((candidate) => candidate.name === colouring.field) : undefined;
+    const field = colouring && this.coloured ? this.frame?.fields.find((candidate) => candidate.name === colouring.field) : undefined;
     const { data, mapper } = this.surface;
     if (!field || !colouring) {
       this.colouredBy = null;

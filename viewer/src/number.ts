@@ -6,10 +6,19 @@ export function digits(value: number | null | undefined, count = 4): string {
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
   if (value === 0) return "0";
   const size = Math.abs(value);
-  const text = size >= 1e5 || size < 1e-3 ? value.toExponential(Math.max(0, count - 2)) : value.toPrecision(count);
-  const [mantissa, power] = (text.includes("e") ? text : size >= 10 ** count ? String(Math.round(value)) : text).split("e") as [string, string?];
+  const long = size >= 10 ** count;
+  const text = (long && size >= 1e5) || size < 1e-3 ? value.toExponential(Math.max(1, count - 2)) : long ? String(Math.round(value)) : value.toPrecision(count);
+  const [mantissa, power] = text.split("e") as [string, string?];
   const short = mantissa.includes(".") ? mantissa.replace(/\.?0+$/, "") : mantissa;
   return (power === undefined ? short : `${short}e${power.replace("+", "")}`).replace("-", "−").replace("e-", "e−");
+}
+
+/** A number of a range, with the digits that tell it from its neighbours in that range. */
+export function within(value: number, range: readonly [number, number]): string {
+  const width = Math.abs(range[1] - range[0]);
+  if (!(width > 0) || !Number.isFinite(width)) return digits(value);
+  const quantum = 10 ** (Math.floor(Math.log10(width)) - 3);
+  return digits(Math.round(value / quantum) * quantum || 0, Math.max(4, Math.min(12, Math.ceil(Math.log10(Math.abs(value) / width || 1)) + 4)));
 }
 
 /** Seconds in the unit that suits them. */

@@ -2,7 +2,7 @@
 import type { ColourMap, Colouring } from "./colour";
 import { componentNames, gradient } from "./colour";
 import { element, part, write } from "./dom";
-import { digits, words } from "./number";
+import { within, words } from "./number";
 import type { FieldInformation } from "./protocol";
 
 const TICKS = 6;
@@ -29,12 +29,7 @@ export class ScalarBar {
     part("scalar-bar").hidden = !this.shown || range === null;
     if (!range) return;
     const [low, high] = range;
-    // A tick a rounding error away from zero is zero.
-    const width = high - low;
-    this.ticks.forEach((tick, i) => {
-      const value = high - (width * i) / (TICKS - 1);
-      write(tick, digits(Math.abs(value) < width * 1e-9 ? 0 : value, 4));
-    });
+    this.ticks.forEach((tick, i) => write(tick, within(high - ((high - low) * i) / (TICKS - 1), range)));
   }
 }
 

@@ -196,7 +196,12 @@ export function decodeFrame(bytes: Uint8Array): Frame {
   const arrays = new Blobs(blobs, header.arrays);
   const view = text(header, "view", "the header");
   const topology = text(header, "topology", "the header");
-  return kind === 1 ? decodeTopology(view, topology, header, arrays) : decodeData(view, topology, header, arrays);
+  try {
+    return kind === 1 ? decodeTopology(view, topology, header, arrays) : decodeData(view, topology, header, arrays);
+  } catch (error) {
+    if (error instanceof RangeError) throw new ProtocolError(`view ${view}: there is not enough memory for a frame of this size`);
+    throw error;
+  }
 }
 
 function decodeTopology(view: string, topology: string, header: JsonObject, arrays: Blobs): TopologyFrame {
@@ -293,6 +298,7 @@ class Entry {
       }
       return result;
     }
+    if (count === 0) return result;
     const quantum = numbers(this.header.quantum, components, `${this.place}: quantum`);
     const offset = numbers(this.header.offset, components, `${this.place}: offset`);
     const integers = this.integers("none");

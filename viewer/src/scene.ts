@@ -68,8 +68,11 @@ export class Scene {
     for (const view of views) {
       if (this.layers.has(view.name)) continue;
       const layer = new Layer(view.name, view.kind, this.renderer, this.colours);
-      // A surface that hides what is inside it is of little use: it starts as a shell.
-      layer.opacity = view.kind === "surface" && inside ? 0.25 : 1;
+      // A surface that hides what is inside it is of little use: it starts as a shell of glass.
+      if (view.kind === "surface" && inside) {
+        layer.opacity = 0.15;
+        layer.coloured = false;
+      }
       this.layers.set(view.name, layer);
     }
     this.request();
@@ -104,6 +107,13 @@ export class Scene {
   setOpacity(name: string, opacity: number): void {
     const layer = this.layers.get(name);
     if (layer) layer.opacity = opacity;
+    this.request();
+  }
+
+  setColoured(name: string, coloured: boolean): void {
+    const layer = this.layers.get(name);
+    if (layer) layer.coloured = coloured;
+    this.recolour = true;
     this.request();
   }
 
@@ -230,7 +240,7 @@ export class Scene {
       const place = this.canvas.worldToDisplay(box[corner & 1]!, box[2 + ((corner >> 1) & 1)]!, box[4 + (corner >> 2)]!, this.renderer) as Vector;
       largest = Math.max(largest, Math.abs(place[0] / width - 0.5), Math.abs(place[1] / height - 0.5));
     }
-    if (largest > 0) camera.zoom(Math.min(6, 0.43 / largest));
+    if (largest > 0) camera.zoom(Math.min(6, 0.45 / largest));
   }
 
   private box(): [number, number, number, number, number, number] | null {

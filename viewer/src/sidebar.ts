@@ -3,7 +3,7 @@ import { COLOUR_MAPS, colourMap, componentNames } from "./colour";
 import type { ColourMap, Colouring } from "./colour";
 import { InputError, readInput } from "./controls";
 import { element, identifier, part } from "./dom";
-import { digits, readNumber, words } from "./number";
+import { digits, readNumber, within, words } from "./number";
 import type { FieldInformation, Monitor, ParameterInformation, ViewInformation } from "./protocol";
 import type { Scene } from "./scene";
 
@@ -34,8 +34,14 @@ export class ViewList {
       },
     });
     box.checked = layer?.visible ?? true;
+    const coloured = element("input", {
+      type: "checkbox", "aria-label": `${view.name}: coloured by the field`,
+      onchange: () => this.scene.setColoured(view.name, coloured.checked),
+    });
+    coloured.checked = layer?.coloured ?? true;
     return element("div", { class: "view", "data-view": view.name }, box,
-      element("label", { for: id }, view.name, element("small", {}, view.kind)), slider);
+      element("label", { for: id }, view.name, view.kind === view.name ? null : element("small", {}, view.kind)),
+      element("label", { class: "coloured", title: "colour by the field" }, coloured, "field"), slider);
   }
 }
 
@@ -80,7 +86,7 @@ export class ColourPanel {
     this.range = range;
     if (this.lock.checked) return;
     for (const [input, value] of [[this.low, range?.[0]], [this.high, range?.[1]]] as const) {
-      if (document.activeElement !== input) input.value = value === undefined ? "" : digits(value, 4);
+      if (document.activeElement !== input) input.value = value === undefined || !range ? "" : within(value, range);
     }
   }
 

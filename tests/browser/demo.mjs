@@ -1,0 +1,296 @@
+/**
+ * Drives the viewer of a running nozzle as a person would, in Debian's Chromium: sees the flow, pinches the throat through
+ * the form, takes it back, pauses, loses the connection, and opens a link with a wrong token.
+ *
+ *     TOMBOLO_URL=http://127.0.0.1:7070/?token=... node tests/browser/demo.mjs
+ *
+ * TOMBOLO_URL          the link that the run printed (needed)
+ * TOMBOLO_SCREENSHOTS  the directory for the screenshots (default: a new one in the directory for temporary files)
+ * TOMBOLO_SECONDS      how long to wait for the simulation at each step (default 120)
+ * TOMBOLO_SCHEDULE     steps and cycles between them of the pinch (default 10,1)
+ * CHROMIUM             the browser (default /usr/bin/chromium)
+ *
+ * Needs the packages of viewer/ (`npm ci` there). Exits with 0 when all of it holds.
+ */
+import { mkdirSync, mkdtempSync } from "node:fs";
+import { createRequire } from "node:module";
+import { connect, createServer } from "node:net";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+
+const { chromium } = createRequire(new URL("../../viewer/package.json", import.meta.url))("playwright-core");
+
+const HANDLE = "throat", FIXED = ["inlet", "outlet"], FACTOR = 0.5;
+const patience = Number(process.env.TOMBOLO_SECONDS ?? 120) * 1000;
+const [scheduleSteps, scheduleEvery] = (process.env.TOMBOLO_SCHEDULE ?? "10,1").split(",");
+const link = process.env.TOMBOLO_URL;
+if (!link) {
+  console.error("TOMBOLO_URL is not set: it is the link that the running demo printed");
+  process.exit(2);
+}
+const screenshots = process.env.TOMBOLO_SCREENSHOTS ?? mkdtempSync(join(tmpdir(), "tombolo-browser-"));
+mkdirSync(screenshots, { recursive: true });
+
+class Failure extends Error {}
+const check = (holds, message) => {
+  if (!holds) throw new Failure(message);
+};
+
+/** Passes the bytes of the run on, so that the test can cut the connection without touching the run. */
+async function cuttable(target) {
+  const pairs = new Set();
+  const server = createServer((near) => {
+    const far = connect(Number(target.port || 80), target.hostname);
+    const pair = [near, far];
+    pairs.add(pair);
+    for (const [from, to] of [[near, far], [far, near]]) {
+      from.on("data", (bytes) => to.write(bytes));
+      from.on("error", () => {});
+      from.on("close", () => {
+        to.destroy();
+        pairs.delete(pair);
+      });
+    }
+  });
+  await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
+  const url = new URL(target);
+  url.hostname = "127.0.0.1";
+  url.port = String(server.address().port);
+  return {
+    url: url.toString(),
+    cut: () => pairs.forEach(([near]) => near.destroy()),
+    close: () => {
+      pairs.forEach(([near]) => near.destroy());
+      server.close();
+    },
+  };
+}
+
+const proxy = await cuttable(new URL(link));
+const browser = await chromium.launch({
+  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+  args: ["--headless", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync"],
+});
+const page = await browser.newPage({ viewport: { width: 1280, height: 800 } });
+const complaints = [];
+page.on("pageerror", (error) => complaints.push(`the page failed: ${error.message}`));
+page.on("console", (message) => {
+  // The browser itself reports the connections that this test cuts.
+  if (message.type() === "error" && !/WebSocket|ERR_|status of 401/.test(message.text())) complaints.push(`the page complained: ${message.text()}`);
+});
+page.on("request", (request) => {
+  const { hostname } = new URL(request.url());
+  if (hostname && hostname !== "127.0.0.1") complaints.push(`the page asked another host: ${request.url()}`);
+});
+
+const look = () => page.evaluate(() => {
+  const { connection, role, cycle, frames, orders, status, quality, stack, selection, errors, views } = window.tombolo;
+  return { connection, role, cycle, frames, orders, status, quality, stack, selection, errors, views };
+});
+const extent = () => page.evaluate((name) => {
+  const box = window.tombolo.featureBounds(name);
+  return box && box[1][2] - box[0][2];
+}, HANDLE);
+
+/** Waits until `condition` of what the viewer shows holds. */
+async function until(what, condition, milliseconds = patience) {
+  const end = Date.now() + milliseconds;
+  for (;;) {
+    const seen = await look();
+    if (await condition(seen)) return seen;
+    if (Date.now() > end) {
+      const { views, ...rest } = seen;
+      throw new Failure(`${what}: not within ${milliseconds / 1000} s. The viewer shows ${JSON.stringify({ ...rest, views: Object.keys(views) }, null, 1)}`);
+    }
+    await page.waitForTimeout(100);
+  }
+}
+
+let pictures = 0;
+const picture = (name) => page.screenshot({ path: join(screenshots, `${String(++pictures).padStart(2, "0")}-${name}.png`) });
+
+/** How many pixels of the column at `x` show something other than the background. */
+async function silhouette(x) {
+  const clip = { x: Math.round(x), y: 100, width: 1, height: 640 };
+  const png = (await page.screenshot({ clip })).toString("base64");
+  return page.evaluate(async (data) => {
+    const image = new Image();
+    image.src = `data:image/png;base64,${data}`;
+    await image.decode();
+    const canvas = document.createElement("canvas");
+    canvas.width = image.width;
+    canvas.height = image.height;
+    const context = canvas.getContext("2d");
+    context.drawImage(image, 0, 0);
+    const { data: pixels } = context.getImageData(0, 0, image.width, image.height);
+    let first = -1, last = -1;
+    for (let row = 0; row < image.height; row++) {
+      const differs = [0, 1, 2].some((k) => Math.abs(pixels[4 * row * image.width + k] - pixels[k]) > 5);
+      if (differs && first < 0) first = row;
+      if (differs) last = row;
+    }
+    return first < 0 ? 0 : last - first + 1;
+  }, png);
+}
+
+/** Clicks a feature in the picture, turning the camera along the flow where it cannot be seen otherwise. */
+async function pick(name, modifiers) {
+  for (const camera of ["reset", "1", "1", "0", "2"]) {
+    await page.click(`[data-camera="${camera}"]`);
+    await page.waitForTimeout(300);
+    const place = await page.evaluate((feature) => window.tombolo.featurePlace(feature), name);
+    if (!place) continue;
+    await page.mouse.move(place[0], place[1]);
+    await page.waitForTimeout(200);
+    const tip = await page.locator("#tip").innerText();
+    check(tip.startsWith(name), `hovering ${name} shows "${tip}"`);
+    for (const key of modifiers) await page.keyboard.down(key);
+    await page.mouse.click(place[0], place[1]);
+    for (const key of modifiers) await page.keyboard.up(key);
+    await page.mouse.move(place[0], place[1] > 400 ? 120 : 700);
+    return;
+  }
+  throw new Failure(`the feature ${name} cannot be seen from any side`);
+}
+
+const steps = [
+  ["the page connects, steers and draws", async () => {
+    await page.goto(proxy.url);
+    const seen = await until("a first picture", (now) => now.connection === "connected" && now.frames > 0);
+    check(seen.role === "driver", `the first viewer should steer, it is ${seen.role}`);
+    check(Object.values(seen.views).some((view) => view.triangles > 0), "no view has triangles");
+    await page.waitForTimeout(500);
+    await picture("flow");
+  }],
+  ["frames change", async () => {
+    const before = await look();
+    const first = await page.locator("#scene").screenshot();
+    await until("newer frames", (now) => now.frames > before.frames + 2 && now.cycle > before.cycle);
+    await page.waitForTimeout(500);
+    check(!first.equals(await page.locator("#scene").screenshot()), "the picture stayed the same while frames arrived");
+  }],
+  ["features are picked in the picture", async () => {
+    await pick(HANDLE, []);
+    for (const name of FIXED) await pick(name, ["Shift"]);
+    const { selection } = await look();
+    check(JSON.stringify(selection.handle) === JSON.stringify([HANDLE]), `the handle is ${JSON.stringify(selection.handle)}`);
+    check(FIXED.every((name) => selection.fixed.includes(name)) && selection.fixed.length === FIXED.length, `fixed are ${JSON.stringify(selection.fixed)}`);
+    check(await page.isChecked(`input[aria-label="${HANDLE}: handle"]`), "the list does not show the handle that was picked in the picture");
+    await page.click('[data-camera="reset"]');
+    await page.waitForTimeout(300);
+    await picture("picked");
+  }],
+  ["a mistake in the form is answered in words", async () => {
+    await page.selectOption("#action", { label: "scale direction" });
+    await page.fill('.object:not([hidden]) input[aria-label="factors z"]', "half");
+    await page.click("#apply");
+    const problem = await page.locator("#problem").innerText();
+    check(/half/.test(problem) && /not a number/.test(problem), `the form says "${problem}"`);
+    check((await look()).orders.every((order) => order.status !== "sent"), "an order was sent although the form was wrong");
+  }],
+  ["the pinch is applied and the throat narrows", async () => {
+    await page.click('[data-camera="0"]');
+    await page.waitForTimeout(500);
+    const place = await page.evaluate((name) => window.tombolo.featurePlace(name), HANDLE);
+    check(place, "the throat cannot be seen along x");
+    shared.column = place[0];
+    shared.extent = await extent();
+    shared.pixels = await silhouette(shared.column);
+    check(shared.pixels > 20, `the throat is only ${shared.pixels} pixels high`);
+    const known = new Set((await look()).orders.map((order) => order.id));
+    for (const [axis, factor] of [["x", 1], ["y", 1], ["z", FACTOR]]) await page.fill(`.object:not([hidden]) input[aria-label="factors ${axis}"]`, String(factor));
+    await page.getByLabel("steps", { exact: true }).first().fill(scheduleSteps);
+    await page.getByLabel("every", { exact: true }).first().fill(scheduleEvery);
+    await page.click("#apply");
+    const phases = new Set();
+    const seen = await until("the order applied", (now) => {
+      const order = now.orders.find((entry) => !known.has(entry.id));
+      if (order) phases.add(order.status);
+      check(order?.status !== "rejected", `the pinch was rejected: ${order?.reason}`);
+      return order?.status === "applied";
+    });
+    const order = seen.orders.find((entry) => !known.has(entry.id));
+    check(Number.isInteger(order.cycle_applied), "an applied order without the cycle at which it was");
+    check(order.min_scaled_jacobian > 0, `an applied order with quality ${order.min_scaled_jacobian}`);
+    console.log(`    seen: ${[...phases].join(", ")}; cycle ${order.cycle_applied}, quality ${order.min_scaled_jacobian}`);
+    await until("the throat at half its height", async () => Math.abs((await extent()) / shared.extent - FACTOR) < 0.005, 30000);
+    check(seen.quality === null || !(seen.quality.inverted > 0), `${seen.quality?.inverted} elements are inverted`);
+    await page.waitForTimeout(1000);
+    const pixels = await silhouette(shared.column);
+    console.log(`    throat: ${shared.extent} to ${await extent()}; on the screen ${shared.pixels} to ${pixels} pixels`);
+    check(Math.abs(pixels / shared.pixels - FACTOR) < 0.12, `the throat went from ${shared.pixels} to ${pixels} pixels on the screen, expected about half`);
+    check((await page.locator("#stack li").count()) === 1, "the stack of edits does not show the pinch");
+    await picture("pinched-side");
+    await page.click('[data-camera="reset"]');
+    await page.waitForTimeout(500);
+    await picture("pinched");
+  }],
+  ["undo brings the old shape back", async () => {
+    await page.click('[data-camera="0"]');
+    const known = new Set((await look()).orders.map((order) => order.id));
+    await page.click("#undo");
+    await until("the undo applied", (now) => {
+      const order = now.orders.find((entry) => !known.has(entry.id));
+      check(order?.status !== "rejected", `the undo was rejected: ${order?.reason}`);
+      return order?.status === "applied";
+    });
+    await until("the throat at its old height", async () => Math.abs((await extent()) / shared.extent - 1) < 0.001, 30000);
+    await until("an empty stack", (now) => now.stack.length === 0, 30000);
+    await page.waitForTimeout(1000);
+    const pixels = await silhouette(shared.column);
+    check(Math.abs(pixels - shared.pixels) <= 3, `the throat is ${pixels} pixels high, it was ${shared.pixels}`);
+    await picture("undone");
+  }],
+  ["pause holds the run, resume lets it go on", async () => {
+    await page.click("#pause");
+    await until("the run paused", (now) => now.status?.paused === true);
+    await page.waitForTimeout(1000);
+    const held = (await look()).status.cycle;
+    await page.waitForTimeout(2000);
+    check((await look()).status.cycle === held, "the cycle went on while the run was paused");
+    check((await page.locator("#pause").innerText()) === "Resume", "the button does not offer to resume");
+    await picture("paused");
+    await page.click("#pause");
+    await until("the run going on", (now) => now.status?.paused === false && now.status.cycle > held);
+  }],
+  ["the connection comes back by itself", async () => {
+    const before = await look();
+    proxy.cut();
+    await until("the loss noticed", (now) => now.connection === "reconnecting" || now.connection === "connecting", 10000);
+    await picture("reconnecting");
+    const back = await until("the connection back", (now) => now.connection === "connected" && now.frames > before.frames + 2 && now.cycle > before.cycle);
+    check(back.orders.length >= before.orders.length, "orders were forgotten");
+    check(back.errors.length === 0, `frames or messages could not be read: ${back.errors.join("; ")}`);
+  }],
+  ["a wrong token is refused in words", async () => {
+    const wrong = new URL(proxy.url);
+    wrong.searchParams.set("token", "0".repeat(32));
+    await page.goto(wrong.toString());
+    await until("the refusal shown", (now) => now.connection === "refused", 15000);
+    const text = await page.locator("#banner").innerText();
+    check(/token/.test(text), `the banner says "${text}"`);
+    await picture("wrong-token");
+  }],
+  ["nothing went wrong on the way", async () => check(complaints.length === 0, complaints.join("\n"))],
+];
+
+const shared = {};
+let failed = false;
+for (const [name, run] of steps) {
+  const start = Date.now();
+  try {
+    await run();
+    console.log(`ok      ${name} (${((Date.now() - start) / 1000).toFixed(1)} s)`);
+  } catch (error) {
+    failed = true;
+    await picture("failed").catch(() => {});
+    console.error(`FAILED  ${name}: ${error instanceof Failure ? error.message : error.stack}`);
+    if (complaints.length) console.error(complaints.join("\n"));
+    break;
+  }
+}
+await browser.close();
+proxy.close();
+console.log(`Screenshots are in ${screenshots}`);
+process.exitCode = failed ? 1 : 0;
