@@ -5,13 +5,17 @@ use std::sync::Arc;
 use super::extraction::{cross, dot, subtract};
 use super::features::Parts;
 use super::laplacian::Laplacian;
-use super::polyharmonic::Polyharmonic;
+use super::polyharmonic::{NotFactored, Polyharmonic};
 use super::{Edit, HarmonicOrder, InvalidEdit, Surface, SurfaceError, UnknownFeature};
 use crate::mesh::Vector;
 
 /// How many factored operators are kept, and how many numbers they may hold together (8 bytes each); the newest is always kept.
 const OPERATORS_KEPT: usize = 8;
 const NUMBERS_KEPT: usize = 1 << 26;
+
+/// How much slack the triangles of the Laplacian must have (see [`Laplacian`]). The first is for rounding alone; the others are
+/// tried one after the other on surfaces whose triangles are so thin that the operator cannot be factored accurately.
+const SLACKS: [f64; 4] = [1e-9, 1e-5, 1e-3, 1e-1];
 
 /// Evaluates stacks of edits on one surface.
 ///
@@ -25,6 +29,9 @@ const NUMBERS_KEPT: usize = 1 << 26;
 /// - Every edit acts on the shape that the edits before it have reached.
 ///
 /// # What it does not
+/// On surfaces with triangles so thin that the operator cannot be factored to six digits, it is that of a slightly inflated
+/// surface.
+///
 /// It does not look at what the surface runs into: folds, flat parts and self-intersections are the guard's business.
 /// Slopes and curvatures are continuous as far as the prescribed features carry them: a part one ring of faces wide fixes a
 /// slope, one two rings wide a curvature. At an open rim that nothing is prescribed on, the displacement has no slope across it.
@@ -59,7 +66,8 @@ const NUMBERS_KEPT: usize = 1 << 26;
 /// ```
 pub struct Editor {
     surface: Arc<Surface>,
-    laplacian: Laplacian,
+    /// One for each of the first [`SLACKS`] so far needed.
+    laplacians: Vec<Laplacian>,
     parts: Vec<u32>,
     operators: Vec<Polyharmonic>,
     /// The stack without its last edit, as it was last evaluated.
@@ -72,14 +80,14 @@ impl Editor {
     /// # Errors
     /// [`SurfaceError::NonManifoldEdge`].
     pub fn new(surface: Arc<Surface>) -> Result<Self, SurfaceError> {
-        let laplacian = Laplacian::new(&surface)?;
+        let laplacians = vec![Laplacian::new(&surface, SLACKS[0])?];
         let mut parts = Parts::new(surface.points().len());
         for &[a, b, c] in surface.triangles() {
             parts.join(a, b);
             parts.join(b, c);
         }
         let parts = (0..surface.points().len() as u32).map(|vertex| parts.root(vertex)).collect();
-        Ok(Self { surface, laplacian, parts, operators: Vec::new(), below: None })
+        Ok(Self { surface, laplacians, parts, operators: Vec::new(), below: None })
     }
 
     /// The surface.
@@ -160,13 +168,16 @@ impl Editor {
             }
         }
         let prescribed: Vec<bool> = roles.roles.iter().map(|role| *role != Role::Free).collect();
-        let operator = self.operator(what.harmonic_order(), prescribed).map_err(|reason| EditError::NotSolvable {
+        let order = what.harmonic_order();
+        self.choose_operator(order, prescribed).map_err(|reason| EditError::NotSolvable {
             edit,
             name: what.name(),
-            order: what.harmonic_order(),
-            reason: reason.to_string(),
+            order,
+            reason,
         })?;
-        self.operators[operator].solve(&self.laplacian, &self.parts, &mut fields);
+        if let Some(operator) = self.operators.last() {
+            operator.solve(&self.laplacians[operator.level()], &self.parts, &mut fields);
+        }
 
         for (vertex, moved) in displacement.iter_mut().enumerate() {
             let reference = self.surface.points()[vertex];
@@ -241,15 +252,12 @@ impl Editor {
         normals
     }
 
-    /// The place of the operator for an order and a set of prescribed vertices, factored now or kept from before.
-    fn operator(
-        &mut self,
-        order: HarmonicOrder,
-        prescribed: Vec<bool>,
-    ) -> Result<usize, super::polyharmonic::NotFactored> {
+    /// Brings the operator for an order and a set of prescribed vertices to the end of the kept ones: kept from before, or
+    /// factored now.
+    fn choose_operator(&mut self, order: HarmonicOrder, prescribed: Vec<bool>) -> Result<(), String> {
         let operator = match self.operators.iter().position(|operator| operator.is_for(order, &prescribed)) {
             Some(found) => self.operators.remove(found),
-            None => Polyharmonic::new(&self.laplacian, order, prescribed, &self.parts)?,
+            None => self.factor(order, prescribed)?,
         };
         let mut room = NUMBERS_KEPT.saturating_sub(operator.size());
         // The most recently used are at the end.
@@ -261,7 +269,22 @@ impl Editor {
         let dropped = self.operators.len() - kept.count();
         self.operators.drain(..dropped);
         self.operators.push(operator);
-        Ok(self.operators.len() - 1)
+        Ok(())
+    }
+
+    fn factor(&mut self, order: HarmonicOrder, prescribed: Vec<bool>) -> Result<Polyharmonic, String> {
+        let mut reason = String::new();
+        for (level, slack) in SLACKS.into_iter().enumerate() {
+            if self.laplacians.len() == level {
+                self.laplacians.push(Laplacian::new(&self.surface, slack).map_err(|error| error.to_string())?);
+            }
+            match Polyharmonic::new(&self.laplacians[level], level, order, prescribed.clone(), &self.parts) {
+                Ok(operator) => return Ok(operator),
+                Err(NotFactored::NotPositive) => reason = NotFactored::NotPositive.to_string(),
+                Err(other) => return Err(other.to_string()),
+            }
+        }
+        Err(reason)
     }
 }
 

@@ -14,8 +14,9 @@ use super::{Surface, SurfaceError};
 /// The mass of a vertex is its mixed Voronoi area (Meyer, Desbrun, Schröder and Barr 2003) divided by the mean of all, so that
 /// nothing here depends on the units of the mesh.
 ///
-/// Triangles without area are given one by lengthening all edges by the same least amount (Sharp and Crane 2020); surfaces
-/// without such triangles are taken as they are.
+/// Triangles without area are given one by lengthening all edges by the same least amount (Sharp and Crane 2020), so that the
+/// longest side of each triangle is shorter than the two others by at least `slack` of its length; surfaces without such
+/// triangles are taken as they are.
 #[derive(Debug, Clone)]
 pub(super) struct Laplacian {
     offsets: Vec<usize>,
@@ -27,8 +28,8 @@ pub(super) struct Laplacian {
 impl Laplacian {
     /// # Errors
     /// [`SurfaceError::NonManifoldEdge`].
-    pub fn new(surface: &Surface) -> Result<Self, SurfaceError> {
-        let mut triangulation = Triangulation::new(surface)?;
+    pub fn new(surface: &Surface, slack: f64) -> Result<Self, SurfaceError> {
+        let mut triangulation = Triangulation::new(surface, slack)?;
         triangulation.make_delaunay();
         let (mass, sides) = triangulation.mass_and_weights(surface.points().len());
         let (offsets, columns, weights) = compressed_rows(surface.points().len(), &sides);
@@ -93,7 +94,7 @@ struct Triangulation {
 }
 
 impl Triangulation {
-    fn new(surface: &Surface) -> Result<Self, SurfaceError> {
+    fn new(surface: &Surface, least_slack: f64) -> Result<Self, SurfaceError> {
         let triangles = surface.triangles();
         let mut twins = vec![OPEN; 3 * triangles.len()];
         let sides = edges(triangles.iter().map(|triangle| triangle.as_slice()));
@@ -119,7 +120,7 @@ impl Triangulation {
                 }
             }
         }
-        Ok(Self { corners: triangles.concat(), lengths: edge_lengths(surface), twins })
+        Ok(Self { corners: triangles.concat(), lengths: edge_lengths(surface, least_slack), twins })
     }
 
     /// The cotangent of the angle opposite a side.
@@ -266,7 +267,7 @@ fn apex(base: f64, from_origin: f64, from_end: f64) -> (f64, f64) {
 }
 
 /// The lengths of all sides, in units of their mean, lengthened where a triangle would have no area.
-fn edge_lengths(surface: &Surface) -> Vec<f64> {
+fn edge_lengths(surface: &Surface, least_slack: f64) -> Vec<f64> {
     let points = surface.points();
     let scale = points.iter().flatten().fold(0.0f64, |largest, value| largest.max(value.abs()));
     let scale = if scale > 0.0 { scale } else { 1.0 };
@@ -289,7 +290,7 @@ fn edge_lengths(surface: &Surface) -> Vec<f64> {
         .map(|sides| {
             let longest = sides.iter().copied().fold(0.0, f64::max);
             let slack = sides.iter().sum::<f64>() - 2.0 * longest;
-            1e-9 * longest.max(1e-6) - slack
+            least_slack * longest.max(1e-6) - slack
         })
         .fold(0.0, f64::max);
     if missing > 0.0 {

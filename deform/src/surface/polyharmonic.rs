@@ -8,6 +8,9 @@ use faer::{Conj, Mat, Par, Side};
 use super::HarmonicOrder;
 use super::laplacian::Laplacian;
 
+/// The largest error that one step of refinement, which squares it, still brings below what matters.
+const LARGEST_ERROR: f64 = 1e-3;
+
 /// The factored polyharmonic operator `L`, `L M^-1 L` or `L M^-1 L M^-1 L` with some vertices prescribed.
 ///
 /// Free vertices minimise the energy of the whole surface: that of order 2 also counts the bending at the outermost prescribed
@@ -16,6 +19,8 @@ use super::laplacian::Laplacian;
 pub(super) struct Polyharmonic {
     order: HarmonicOrder,
     prescribed: Vec<bool>,
+    /// Which of the editor's Laplacians it is made from.
+    level: usize,
     free: Vec<u32>,
     symbolic: Option<SymbolicCholesky<u32>>,
     values: Vec<f64>,
@@ -23,8 +28,11 @@ pub(super) struct Polyharmonic {
 
 impl Polyharmonic {
     /// `parts` gives each vertex its component; components without a prescribed vertex take no part.
+    ///
+    /// The operator is tried out on a known solution, so that one that has lost too many digits is refused as well.
     pub fn new(
         laplacian: &Laplacian,
+        level: usize,
         order: HarmonicOrder,
         prescribed: Vec<bool>,
         parts: &[u32],
@@ -37,17 +45,37 @@ impl Polyharmonic {
             .filter(|&vertex| !prescribed[vertex] && held[parts[vertex] as usize])
             .map(|vertex| vertex as u32)
             .collect();
-        if free.is_empty() {
-            return Ok(Self { order, prescribed, free, symbolic: None, values: Vec::new() });
+        let mut operator = Self { order, prescribed, level, free, symbolic: None, values: Vec::new() };
+        if operator.free.is_empty() {
+            return Ok(operator);
         }
-        let matrix = assemble(laplacian, order, &free).ok_or(NotFactored::TooLarge)?;
-        let (symbolic, values) = factor(&matrix, free.len())?;
-        Ok(Self { order, prescribed, free, symbolic: Some(symbolic), values })
+        let matrix = assemble(laplacian, order, &operator.free).ok_or(NotFactored::TooLarge)?;
+        let (symbolic, values) = factor(&matrix, operator.free.len())?;
+        (operator.symbolic, operator.values) = (Some(symbolic), values);
+        if operator.error_on_ones(laplacian) < LARGEST_ERROR { Ok(operator) } else { Err(NotFactored::NotPositive) }
+    }
+
+    /// The largest error, before refinement, where the solution is 1 at every free vertex and 0 at every prescribed one.
+    fn error_on_ones(&self, laplacian: &Laplacian) -> f64 {
+        let mut ones = vec![0.0; laplacian.len()];
+        for &vertex in &self.free {
+            ones[vertex as usize] = 1.0;
+        }
+        let image = laplacian.apply_power(self.order as usize, &ones);
+        let mut solution = Mat::from_fn(self.free.len(), 1, |row, _| image[self.free[row] as usize]);
+        self.solve_in_place(&mut solution);
+        // A maximum that keeps NaN.
+        (0..self.free.len()).map(|row| (solution[(row, 0)] - 1.0).abs()).fold(0.0, |a, b| if b <= a { a } else { b })
     }
 
     /// Whether this operator answers for an order and a set of prescribed vertices.
     pub fn is_for(&self, order: HarmonicOrder, prescribed: &[bool]) -> bool {
         self.order == order && self.prescribed == prescribed
+    }
+
+    /// Which of the editor's Laplacians it is made from.
+    pub fn level(&self) -> usize {
+        self.level
     }
 
     /// How many numbers the factor holds.

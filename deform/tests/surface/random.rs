@@ -1,0 +1,105 @@
+//! Random meshes and edits with absurd values: an answer or an error, never a panic, and never a number that is not finite.
+
+use super::*;
+use proptest::prelude::*;
+use tombolo_deform::shapes;
+
+fn absurd() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        4 => -2.0..2.0f64,
+        1 => any::<f64>(),
+        1 => prop_oneof![
+            Just(0.0),
+            Just(-0.0),
+            Just(f64::NAN),
+            Just(f64::INFINITY),
+            Just(f64::NEG_INFINITY),
+            Just(f64::MAX),
+            Just(f64::MIN_POSITIVE),
+            Just(5e-324),
+            Just(1e150),
+        ],
+    ]
+}
+
+fn feature() -> impl Strategy<Value = String> {
+    prop_oneof![
+        8 => (0..6usize).prop_map(|which| shapes::BOX_FEATURES[which].to_string()),
+        4 => (0..4usize).prop_map(|which| format!("feature-{which}")),
+        1 => ".*",
+    ]
+}
+
+fn edit() -> impl Strategy<Value = Edit> {
+    let features = || proptest::collection::vec(feature(), 0..3);
+    let order = (0..3usize).prop_map(|which| ORDERS[which]);
+    let vector = || [absurd(), absurd(), absurd()];
+    (features(), features(), order, vector(), proptest::option::of(vector()), 0..3).prop_map(
+        |(features, fixed, harmonic_order, numbers, center, kind)| match kind {
+            0 => Edit::Translate(Translate { features, fixed, by: numbers, harmonic_order }),
+            1 => Edit::ScaleNormals(ScaleNormals { features, fixed, distance: numbers[0], harmonic_order }),
+            _ => Edit::ScaleDirection(ScaleDirection { features, fixed, factors: numbers, center, harmonic_order }),
+        },
+    )
+}
+
+fn random_mesh() -> impl Strategy<Value = Mesh> {
+    let counts = [1..5usize, 1..5, 1..5];
+    let size = prop_oneof![Just(0.0), Just(1e-300), Just(1e-9), Just(1.0), Just(1e12), Just(1e300)];
+    (0..4, counts, size.clone(), size.clone(), size).prop_map(|(kind, [i, j, k], x, y, z)| match kind {
+        0 => shapes::box_of_tets([i, j, k], [0.0; 3], [x, y, z]),
+        1 => shapes::box_of_hexahedra([i, j, k], [-x, y, 0.0], [x, 2.0 * y, z]),
+        2 => shapes::torus(x, y, [3 * i, 3 * j]),
+        _ => tagged(&shapes::plate([i, j], [0.0, 0.0], [x, y]), |point| (point[0] / x.max(1e-300) * 4.0) as i64),
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_stack_on_any_mesh_is_answered(mesh in random_mesh(), stack in proptest::collection::vec(edit(), 0..4)) {
+        let surface = Arc::new(extract(&mesh));
+        let mut editor = Editor::new(Arc::clone(&surface)).expect("a manifold");
+        match editor.displacement(&stack) {
+            Ok(displacement) => {
+                prop_assert!(moved(&surface, &displacement).iter().flatten().all(|value| value.is_finite()));
+                prop_assert_eq!(&editor.displacement(&stack).unwrap(), &displacement, "again");
+                prop_assert_eq!(
+                    &Editor::new(Arc::clone(&surface)).unwrap().displacement(&stack).unwrap(), &displacement, "anew"
+                );
+                for edit in &stack {
+                    let finite = serde_json::from_str::<Edit>(&serde_json::to_string(edit).unwrap()).unwrap();
+                    prop_assert_eq!(&finite, edit);
+                }
+            }
+            Err(error) => prop_assert!(error.to_string().starts_with("edit ")),
+        }
+        prop_assert!(editor.displacement(&[]).unwrap().iter().flatten().all(|value| value.to_bits() == 0));
+    }
+
+    #[test]
+    fn prescribed_vertices_move_exactly(
+        counts in [1..5usize, 1..5, 1..5],
+        by in [-1e3..1e3f64, -1e3..1e3f64, -1e3..1e3f64],
+        handle in 0..6usize,
+        fixed in 0..6usize,
+        order in 0..3usize,
+    ) {
+        prop_assume!(handle != fixed);
+        let mesh = shapes::box_of_tets(counts, [0.0; 3], [1.0, 2.0, 3.0]);
+        let mut editor = editor(&mesh);
+        let [handle, fixed] = [handle, fixed].map(|side| shapes::BOX_FEATURES[side]);
+        let displacement = editor.displacement(&[translate(&[handle], &[fixed], by, ORDERS[order])]);
+        let features = editor.surface().features();
+        let held = features.vertices(features.index(fixed).unwrap());
+        let displacement = displacement.unwrap();
+        for &vertex in features.vertices(features.index(handle).unwrap()) {
+            let expected = if held.contains(&vertex) { [0.0; 3] } else { by };
+            prop_assert_eq!(displacement[vertex as usize], expected);
+        }
+        for &vertex in held {
+            prop_assert_eq!(displacement[vertex as usize], [0.0; 3]);
+        }
+    }
+}
