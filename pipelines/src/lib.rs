@@ -6,4 +6,6 @@
 #![warn(missing_docs)]
 
 pub mod communicator;
+pub mod expression;
 pub mod extract;
+pub mod language;

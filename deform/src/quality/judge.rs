@@ -30,6 +30,9 @@ pub enum Otherwise {
     /// It is rejected, with the reason, the worst cells and the largest feasible fraction. The shape stays as it is.
     #[default]
     Reject,
+    /// It is mended by an inversion-free solve where there is one, and rejected where there is none or it does not succeed.
+    /// [`judge`] itself only judges: it refuses the path either way.
+    Untangle,
 }
 
 impl Default for Guard {

@@ -1,0 +1,280 @@
+//! Errors that point at their token.
+
+use serde_path_to_error::Segment;
+
+use super::scan::{Node, Value};
+
+/// What is wrong in a JSON text, and where.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{file}:{line}:{column}: {}{message}{}", prefix(path), hint(suggestion.as_deref()))]
+pub struct LanguageError {
+    /// The file, as the caller named it.
+    pub file: String,
+    /// The line of the token at fault, from 1.
+    pub line: usize,
+    /// The column of its first character, from 1.
+    pub column: usize,
+    /// The way from the outermost value to it, as in `pipelines[1].stages[0].slice.normal`; empty for the outermost.
+    pub path: String,
+    /// What was found, and what was expected.
+    pub message: String,
+    /// The known name that is nearest to a misspelt one.
+    pub suggestion: Option<String>,
+}
+
+fn prefix(path: &str) -> String {
+    if path.is_empty() { String::new() } else { format!("{path}: ") }
+}
+
+fn hint(suggestion: Option<&str>) -> String {
+    suggestion.map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
+}
+
+/// One step of the way to a value.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Step {
+    Key(String),
+    Index(usize),
+}
+
+/// Something that is well-formed but means nothing, found after parsing. The way to it is built from the inside outwards.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Problem {
+    /// From the innermost step to the outermost.
+    path: Vec<Step>,
+    message: String,
+    suggestion: Option<String>,
+}
+
+impl Problem {
+    /// A problem of the value at hand.
+    pub fn new(message: impl Into<String>) -> Self {
+        Self { path: Vec::new(), message: message.into(), suggestion: None }
+    }
+
+    /// The same with the name that was likely meant.
+    #[must_use]
+    pub fn suggest(self, suggestion: Option<&str>) -> Self {
+        Self { suggestion: suggestion.map(str::to_owned), ..self }
+    }
+
+    /// The same, seen from the object that has it under `key`.
+    #[must_use]
+    pub fn within(mut self, key: &str) -> Self {
+        self.path.push(Step::Key(key.to_owned()));
+        self
+    }
+
+    /// The same, seen from the array that has it at `index`.
+    #[must_use]
+    pub fn at(mut self, index: usize) -> Self {
+        self.path.push(Step::Index(index));
+        self
+    }
+
+    pub(super) fn locate(self, root: &Node, text: &str, file: &str) -> LanguageError {
+        let steps: Vec<Step> = self.path.into_iter().rev().collect();
+        let (node, _) = walk(root, &steps);
+        error(text, file, node.span.start, show(&steps), self.message, self.suggestion)
+    }
+}
+
+impl std::fmt::Display for Problem {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let steps: Vec<Step> = self.path.iter().rev().cloned().collect();
+        write!(f, "{}{}{}", prefix(&show(&steps)), self.message, hint(self.suggestion.as_deref()))
+    }
+}
+
+impl std::error::Error for Problem {}
+
+/// The deepest node on the way, and the key of the step that led nowhere or last.
+fn walk<'a>(root: &'a Node, steps: &[Step]) -> (&'a Node, Option<usize>) {
+    let (mut node, mut key) = (root, None);
+    for step in steps {
+        match step {
+            Step::Key(name) => {
+                let Some(member) = node.member(name) else { return (node, None) };
+                (node, key) = (&member.node, Some(member.key_span.start));
+            }
+            Step::Index(index) => {
+                let Some(item) = node.item(*index) else { return (node, None) };
+                (node, key) = (item, None);
+            }
+        }
+    }
+    (node, key)
+}
+
+fn show(steps: &[Step]) -> String {
+    let mut path = String::new();
+    for step in steps {
+        match step {
+            Step::Index(index) => path.push_str(&format!("[{index}]")),
+            Step::Key(key) if path.is_empty() => path.push_str(key),
+            Step::Key(key) => {
+                path.push('.');
+                path.push_str(key);
+            }
+        }
+    }
+    path
+}
+
+/// An error at a byte of the text.
+pub(super) fn error(
+    text: &str,
+    file: &str,
+    byte: usize,
+    path: String,
+    message: String,
+    suggestion: Option<String>,
+) -> LanguageError {
+    let before = text.get(..byte.min(text.len())).unwrap_or(text);
+    let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+    LanguageError {
+        file: file.to_owned(),
+        line: before.matches('\n').count() + 1,
+        column: before[line_start..].chars().count() + 1,
+        path,
+        message,
+        suggestion,
+    }
+}
+
+/// Translates an error of serde, which speaks of Rust's types, into one that speaks of the text.
+pub(super) fn from_serde(
+    failure: &serde_path_to_error::Error<serde_json::Error>,
+    root: &Node,
+    text: &str,
+    file: &str,
+) -> LanguageError {
+    let mut steps: Vec<Step> = Vec::new();
+    for segment in failure.path().iter() {
+        match segment {
+            Segment::Seq { index } => steps.push(Step::Index(*index)),
+            Segment::Map { key } => steps.push(Step::Key(key.clone())),
+            Segment::Enum { variant } => steps.push(Step::Key(variant.clone())),
+            Segment::Unknown => {}
+        }
+    }
+    let message = failure.inner().to_string();
+    let (node, key) = walk(root, &steps);
+
+    if let Some(rest) = message.strip_prefix("unknown field ").or_else(|| message.strip_prefix("unknown variant ")) {
+        let is_field = message.starts_with("unknown field");
+        let names = backticked(rest);
+        let (name, known) = names.split_first().map_or(("", &[][..]), |(name, known)| (*name, known));
+        let suggestion = nearest(name, known.iter().copied()).map(str::to_owned);
+        let expected = match known {
+            [] => "no key at all".to_owned(),
+            [one] => format!("`{one}`"),
+            [first @ .., last] => {
+                let first: Vec<String> = first.iter().map(|name| format!("`{name}`")).collect();
+                format!("{} or `{last}`", first.join(", "))
+            }
+        };
+        let mut at = key.unwrap_or(node.span.start);
+        if !is_field {
+            at = node.span.start;
+            if let Value::Object(members) = &node.value
+                && let Some(member) = members.first()
+            {
+                at = member.key_span.start;
+                steps.push(Step::Key(member.key.clone()));
+            }
+        }
+        let what = if is_field { "key" } else { "name" };
+        let message = format!("found the unknown {what} `{name}`, expected {expected}");
+        return error(text, file, at, show(&steps), message, suggestion);
+    }
+
+    let message = if let Some(rest) = message.strip_prefix("missing field ") {
+        format!("the key {rest} is missing")
+    } else if let Some((_, expected)) =
+        message.strip_prefix("invalid type: ").or(message.strip_prefix("invalid value: ")).and_then(split_expected)
+    {
+        format!("found {}, expected {}", describe(node, text), humane(expected))
+    } else if let Some((length, expected)) = message.strip_prefix("invalid length ").and_then(split_expected) {
+        format!("found {length} values, expected {}", humane(expected))
+    } else {
+        message
+    };
+    error(text, file, node.span.start, show(&steps), message, None)
+}
+
+fn split_expected(rest: &str) -> Option<(&str, &str)> {
+    rest.rfind(", expected ").map(|at| (&rest[..at], &rest[at + ", expected ".len()..]))
+}
+
+/// The names between backticks.
+fn backticked(text: &str) -> Vec<&str> {
+    text.split('`').skip(1).step_by(2).collect()
+}
+
+/// A value as it stands in the text, shortened.
+fn describe(node: &Node, text: &str) -> String {
+    match &node.value {
+        Value::Array(items) => format!("an array of {}", items.len()),
+        Value::Object(_) => "an object".into(),
+        _ => {
+            let token = text.get(node.span.clone()).unwrap_or_default();
+            match token.char_indices().nth(60) {
+                Some((end, _)) => format!("{}...", &token[..end]),
+                None => token.to_owned(),
+            }
+        }
+    }
+}
+
+/// What serde expected, in the words of JSON.
+fn humane(expected: &str) -> String {
+    let plain = match expected {
+        "f64" | "f32" => "a number",
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number of at least 0",
+        "a nonzero u8" | "a nonzero u16" | "a nonzero u32" | "a nonzero u64" => "a whole number of at least 1",
+        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number",
+        "a boolean" => "true or false",
+        "a string" | "a borrowed string" | "string or map" => "a string",
+        "a sequence" => "an array",
+        "unit" => "null",
+        "struct variant" | "newtype variant" | "tuple variant" => "an object with this key and its settings",
+        other if other.starts_with("struct ") || other == "a map" || other == "map" => "an object",
+        other if other.starts_with("enum ") || other.starts_with("variant identifier") => {
+            "a name, or an object with one key"
+        }
+        other => match other.strip_prefix("an array of length ").and_then(|rest| rest.split(' ').next()) {
+            Some(length) => return format!("an array of {length} values"),
+            None => other,
+        },
+    };
+    plain.to_owned()
+}
+
+/// The known name that a misspelt one is nearest to, if it is near at all.
+///
+/// # Example
+/// ```
+/// use tombolo_pipelines::language::nearest;
+///
+/// assert_eq!(nearest("presure", ["velocity", "pressure"]), Some("pressure"));
+/// assert_eq!(nearest("zebra", ["velocity", "pressure"]), None);
+/// ```
+#[must_use]
+pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    // Names longer than any of ours cannot be near one; measuring them would cost the square of their length.
+    if name.len() > 200 {
+        return None;
+    }
+    let plain = |name: &str| name.to_lowercase().replace(['-', ' '], "_");
+    let name = plain(name);
+    let longest_slip = (name.chars().count() * 2 / 5).max(1);
+    known
+        .into_iter()
+        .map(|candidate| (strsim::damerau_levenshtein(&name, &plain(candidate)), candidate))
+        .filter(|&(distance, candidate)| {
+            distance <= longest_slip || (name.len() >= 4 && plain(candidate).starts_with(&name))
+        })
+        .min_by_key(|&(distance, _)| distance)
+        .map(|(_, candidate)| candidate)
+}

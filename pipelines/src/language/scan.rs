@@ -1,0 +1,313 @@
+//! Where everything in a JSON text stands.
+//!
+//! serde_json tells at best where it stopped reading, which is past the token at fault, and lets a key stand twice where a type
+//! does not mind. This reader keeps the place of each key and value, so that an error of meaning can point at its token.
+
+use std::ops::Range;
+
+/// How deep arrays and objects may be nested: far beyond any meaning, far below the stack.
+const DEEPEST: usize = 64;
+
+/// A value and where it stands, in bytes.
+#[derive(Debug)]
+pub(super) struct Node {
+    pub(super) span: Range<usize>,
+    pub(super) value: Value,
+}
+
+/// A value of JSON. Whole numbers are kept whole where they fit.
+#[derive(Debug)]
+pub(super) enum Value {
+    Null,
+    Boolean(bool),
+    Unsigned(u64),
+    Signed(i64),
+    Float(f64),
+    String(String),
+    Array(Vec<Node>),
+    Object(Vec<Member>),
+}
+
+/// A member of an object.
+#[derive(Debug)]
+pub(super) struct Member {
+    pub(super) key: String,
+    pub(super) key_span: Range<usize>,
+    pub(super) node: Node,
+}
+
+impl Node {
+    /// The member of an object that has this key.
+    pub(super) fn member(&self, key: &str) -> Option<&Member> {
+        match &self.value {
+            Value::Object(members) => members.iter().find(|member| member.key == key),
+            _ => None,
+        }
+    }
+
+    /// The item of an array at this place.
+    pub(super) fn item(&self, index: usize) -> Option<&Node> {
+        match &self.value {
+            Value::Array(items) => items.get(index),
+            _ => None,
+        }
+    }
+}
+
+/// A place where the text is not JSON.
+#[derive(Debug)]
+pub(super) struct SyntaxError {
+    pub(super) at: usize,
+    pub(super) path: String,
+    pub(super) message: String,
+}
+
+/// Reads one JSON value that fills the text.
+pub(super) fn scan(text: &str) -> Result<Node, SyntaxError> {
+    let mut scanner = Scanner { text, at: 0, path: String::new() };
+    scanner.skip_space();
+    let node = scanner.value(0)?;
+    scanner.skip_space();
+    if scanner.at < text.len() {
+        return Err(scanner.error(format!("found {} after the end of the value", scanner.found())));
+    }
+    Ok(node)
+}
+
+struct Scanner<'a> {
+    text: &'a str,
+    at: usize,
+    path: String,
+}
+
+impl Scanner<'_> {
+    fn peek(&self) -> Option<u8> {
+        self.text.as_bytes().get(self.at).copied()
+    }
+
+    fn skip_space(&mut self) {
+        while matches!(self.peek(), Some(b' ' | b'\t' | b'\n' | b'\r')) {
+            self.at += 1;
+        }
+    }
+
+    /// What stands here, in words.
+    fn found(&self) -> String {
+        match self.text.get(self.at..).and_then(|rest| rest.chars().next()) {
+            None => "the end of the text".into(),
+            Some('\'') => "a single quote (strings stand in double quotes)".into(),
+            Some('/' | '#') => "a comment (JSON has none)".into(),
+            Some(other) => format!("{other:?}"),
+        }
+    }
+
+    fn error(&self, message: String) -> SyntaxError {
+        SyntaxError { at: self.at, path: self.path.clone(), message }
+    }
+
+    fn expect(&mut self, byte: u8, expected: &str) -> Result<(), SyntaxError> {
+        if self.peek() == Some(byte) {
+            self.at += 1;
+            return Ok(());
+        }
+        Err(self.error(format!("found {}, expected {expected}", self.found())))
+    }
+
+    fn value(&mut self, depth: usize) -> Result<Node, SyntaxError> {
+        if depth > DEEPEST {
+            return Err(self.error(format!("nested more than {DEEPEST} deep")));
+        }
+        let start = self.at;
+        let value = match self.peek() {
+            Some(b'{') => self.object(depth)?,
+            Some(b'[') => self.array(depth)?,
+            Some(b'"') => Value::String(self.string()?),
+            Some(b'-' | b'0'..=b'9') => self.number()?,
+            Some(b'a'..=b'z' | b'A'..=b'Z') => self.word()?,
+            _ => return Err(self.error(format!("found {}, expected a value", self.found()))),
+        };
+        Ok(Node { span: start..self.at, value })
+    }
+
+    fn word(&mut self) -> Result<Value, SyntaxError> {
+        let rest = &self.text[self.at..];
+        let end = rest.find(|c: char| !c.is_ascii_alphanumeric()).unwrap_or(rest.len());
+        let word = &rest[..end];
+        let known = match word {
+            "true" => Some(Value::Boolean(true)),
+            "false" => Some(Value::Boolean(false)),
+            "null" => Some(Value::Null),
+            _ => None,
+        };
+        if let Some(value) = known {
+            self.at += end;
+            return Ok(value);
+        }
+        let shown: String = word.chars().take(40).collect();
+        let message = match word.to_ascii_lowercase().as_str() {
+            "nan" | "infinity" | "inf" => format!("found {shown}, expected a finite number"),
+            "true" | "false" | "null" => format!("found {shown}, expected {}", word.to_ascii_lowercase()),
+            _ => format!("found {shown}, expected a value (a string stands in double quotes)"),
+        };
+        Err(self.error(message))
+    }
+
+    fn digits(&mut self) -> usize {
+        let start = self.at;
+        while matches!(self.peek(), Some(b'0'..=b'9')) {
+            self.at += 1;
+        }
+        self.at - start
+    }
+
+    fn number(&mut self) -> Result<Value, SyntaxError> {
+        let start = self.at;
+        if self.peek() == Some(b'-') {
+            self.at += 1;
+        }
+        let leading_zero = self.peek() == Some(b'0');
+        let whole = self.digits();
+        let not_a_number = |scanner: &Self| scanner.error(format!("found {}, expected a digit", scanner.found()));
+        if whole == 0 {
+            let negative_infinity = self.text[self.at..].starts_with(['I', 'i']);
+            return Err(match negative_infinity {
+                true => self.error("found an infinity, expected a finite number".into()),
+                false => not_a_number(self),
+            });
+        }
+        if leading_zero && whole > 1 {
+            self.at = start;
+            return Err(self.error("found a number that starts with 0".into()));
+        }
+        if self.peek() == Some(b'.') {
+            self.at += 1;
+            if self.digits() == 0 {
+                return Err(not_a_number(self));
+            }
+        }
+        if matches!(self.peek(), Some(b'e' | b'E')) {
+            self.at += 1;
+            if matches!(self.peek(), Some(b'+' | b'-')) {
+                self.at += 1;
+            }
+            if self.digits() == 0 {
+                return Err(not_a_number(self));
+            }
+        }
+        let token = &self.text[start..self.at];
+        if let Ok(value) = token.parse() {
+            return Ok(Value::Unsigned(value));
+        }
+        // "-0" has a sign that only a floating point number keeps.
+        if let Some(value) = token.parse().ok().filter(|&value: &i64| value != 0) {
+            return Ok(Value::Signed(value));
+        }
+        match token.parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(Value::Float(value)),
+            _ => {
+                let shown: String = token.chars().take(40).collect();
+                self.at = start;
+                Err(self.error(format!("{shown} is beyond the range of double precision")))
+            }
+        }
+    }
+
+    /// The text between the quotes, its escapes resolved as far as names need it.
+    fn string(&mut self) -> Result<String, SyntaxError> {
+        let start = self.at;
+        self.at += 1;
+        loop {
+            match self.peek() {
+                None => {
+                    self.at = start;
+                    return Err(self.error("found a string that does not end, expected a closing '\"'".into()));
+                }
+                Some(b'"') => break,
+                Some(b'\\') => {
+                    // The byte after may be the first of several; the others are skipped one by one as any are.
+                    self.at += 2;
+                }
+                Some(0..=0x1f) => {
+                    return Err(self.error(format!("found {} in a string, expected its escape", self.found())));
+                }
+                Some(_) => self.at += 1,
+            }
+        }
+        self.at += 1;
+        let quoted = &self.text[start..self.at];
+        serde_json::from_str(quoted).map_err(|_| SyntaxError {
+            at: start,
+            path: self.path.clone(),
+            message: "found a string with an escape that JSON does not know".into(),
+        })
+    }
+
+    fn array(&mut self, depth: usize) -> Result<Value, SyntaxError> {
+        self.at += 1;
+        let mut items = Vec::new();
+        let parent = self.path.len();
+        self.skip_space();
+        if self.peek() == Some(b']') {
+            self.at += 1;
+            return Ok(Value::Array(items));
+        }
+        loop {
+            self.skip_space();
+            if self.peek() == Some(b']') {
+                return Err(self.error("found ']' after a comma, expected a value".into()));
+            }
+            self.path.push_str(&format!("[{}]", items.len()));
+            items.push(self.value(depth + 1)?);
+            self.path.truncate(parent);
+            self.skip_space();
+            if self.peek() == Some(b',') {
+                self.at += 1;
+                continue;
+            }
+            self.expect(b']', "',' or ']'")?;
+            return Ok(Value::Array(items));
+        }
+    }
+
+    fn object(&mut self, depth: usize) -> Result<Value, SyntaxError> {
+        self.at += 1;
+        let mut members: Vec<Member> = Vec::new();
+        let mut keys = std::collections::HashSet::new();
+        let parent = self.path.len();
+        self.skip_space();
+        if self.peek() == Some(b'}') {
+            self.at += 1;
+            return Ok(Value::Object(members));
+        }
+        loop {
+            self.skip_space();
+            if self.peek() != Some(b'"') {
+                return Err(self.error(format!("found {}, expected a key in double quotes", self.found())));
+            }
+            let key_start = self.at;
+            let key = self.string()?;
+            let key_span = key_start..self.at;
+            if !keys.insert(key.clone()) {
+                self.at = key_start;
+                return Err(self.error(format!("found the key `{key}` twice")));
+            }
+            self.skip_space();
+            self.expect(b':', "':'")?;
+            self.skip_space();
+            if parent > 0 {
+                self.path.push('.');
+            }
+            self.path.push_str(&key);
+            let node = self.value(depth + 1)?;
+            self.path.truncate(parent);
+            members.push(Member { key, key_span, node });
+            self.skip_space();
+            if self.peek() == Some(b',') {
+                self.at += 1;
+                continue;
+            }
+            self.expect(b'}', "',' or '}'")?;
+            return Ok(Value::Object(members));
+        }
+    }
+}

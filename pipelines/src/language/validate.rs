@@ -1,0 +1,329 @@
+//! What a well-formed configuration must keep to so that it means something.
+
+use std::collections::HashSet;
+
+use tombolo_deform::quality::Guard;
+use tombolo_deform::schedule::Schedule;
+use tombolo_deform::volume::Deform;
+
+use super::config::{Action, Config, Due, ErrorBound, OrderStage, Pipeline, Stage, StreamStage, Write};
+use super::order::{Change, Command, Order, TimedCommand};
+use super::parse::Validate;
+use super::{At, Problem, nearest};
+use crate::expression::Expression;
+
+impl Validate for Config {
+    fn validate(&self) -> Result<(), Problem> {
+        if self.version != 1 {
+            let message = format!("found version {}, expected 1", self.version);
+            return Err(Problem::new(message).within("version"));
+        }
+        if let Some(stream) = &self.stream
+            && let Some(token) = &stream.token
+        {
+            let known = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+            if !(16..=128).contains(&token.len()) || !token.chars().all(known) {
+                let message = "expected a token of 16 to 128 letters, digits, '-' or '_'";
+                return Err(Problem::new(message).within("token").within("stream"));
+            }
+        }
+        if self.journal.as_deref() == Some("") {
+            return Err(Problem::new("expected the name of a file").within("journal"));
+        }
+        let mut names = HashSet::new();
+        let mut on_order = None;
+        for (index, pipeline) in self.pipelines.iter().enumerate() {
+            let located = |problem: Problem| problem.at(index).within("pipelines");
+            if !names.insert(&pipeline.name) {
+                let message = format!("two pipelines are named `{}`", pipeline.name);
+                return Err(located(Problem::new(message).within("name")));
+            }
+            if pipeline.due == Due::OnOrder && on_order.replace(index).is_some() {
+                let message = "two pipelines run on orders, expected at most one";
+                return Err(located(Problem::new(message).within("on")));
+            }
+            pipeline.validate().map_err(located)?;
+        }
+        Ok(())
+    }
+}
+
+impl Validate for Pipeline {
+    fn validate(&self) -> Result<(), Problem> {
+        if self.name.trim().is_empty() || self.name.chars().any(char::is_control) || self.name.len() > 200 {
+            return Err(Problem::new("expected a name of 1 to 200 visible characters").within("name"));
+        }
+        if let Due::At(At::Time(time)) = self.due {
+            finite(time).map_err(|problem| problem.within("time").within("at"))?;
+        }
+        let mut state = State::default();
+        for (index, stage) in self.stages.iter().enumerate() {
+            state.check(stage, self.due).map_err(|problem| problem.within(stage.name()).at(index).within("stages"))?;
+        }
+        if self.due == Due::OnOrder {
+            if self.when.is_some() {
+                return Err(Problem::new("a pipeline that runs on orders has no condition").within("when"));
+            }
+            if !self.then.is_empty() {
+                return Err(Problem::new("a pipeline that runs on orders has no `then`").within("then"));
+            }
+        }
+        if let Some(when) = &self.when {
+            let names = monitor_names(self);
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            Expression::parse_condition(when, &names).map_err(|error| {
+                let message = format!("column {} of the formula: {}", error.column, error.message);
+                Problem::new(message).suggest(error.suggestion.as_deref()).within("when")
+            })?;
+            if self.then.is_empty() {
+                return Err(Problem::new("found a condition without `then`").within("when"));
+            }
+        }
+        for (index, action) in self.then.iter().enumerate() {
+            let located = |problem: Problem| problem.within(action.name()).at(index).within("then");
+            match action {
+                Action::Pause {} | Action::Stop {} => Ok(()),
+                Action::Stream(stream) => state.stream(stream),
+                Action::Write(write) => state.write(write),
+                Action::Order(order) => state.order(order),
+            }
+            .map_err(located)?;
+        }
+        if let Some((index, name)) = state.unordered {
+            let message = "found an edit that nothing orders, expected an `order` stage after it";
+            return Err(Problem::new(message).within(name).at(index).within("stages"));
+        }
+        Ok(())
+    }
+}
+
+/// The monitors that a condition may name, in the order in which the runner gives their values.
+pub(crate) fn monitor_names(pipeline: &Pipeline) -> Vec<String> {
+    let mut names = vec!["cycle".to_owned(), "time".to_owned()];
+    for stage in &pipeline.stages {
+        match stage {
+            Stage::Quality {} => names.extend(["min", "mean", "max", "inverted"].map(|name| format!("quality.{name}"))),
+            Stage::Statistics(statistics) => {
+                let field = &statistics.field;
+                names.extend(["min", "max", "mean", "l2", "non_finite"].map(|name| format!("{field}.{name}")));
+            }
+            _ => {}
+        }
+    }
+    names
+}
+
+/// What the stages so far have made.
+#[derive(Default)]
+struct State {
+    stages: usize,
+    extract: bool,
+    quality: bool,
+    measured: HashSet<String>,
+    settings: HashSet<&'static str>,
+    /// The last edit that no order has taken up yet.
+    unordered: Option<(usize, &'static str)>,
+}
+
+impl State {
+    fn check(&mut self, stage: &Stage, due: Due) -> Result<(), Problem> {
+        let index = self.stages;
+        self.stages += 1;
+        let is_setting = matches!(stage, Stage::Deform(_) | Stage::Guard(_) | Stage::Schedule(_));
+        if is_setting != (due == Due::OnOrder) {
+            return Err(Problem::new(if is_setting {
+                "this stage belongs to a pipeline with `\"on\": \"order\"`"
+            } else {
+                "a pipeline with `\"on\": \"order\"` has only the stages `deform`, `guard` and `schedule`"
+            }));
+        }
+        if is_setting && !self.settings.insert(stage.name()) {
+            return Err(Problem::new("found twice, expected at most once"));
+        }
+        if let Some(edit) = stage.edit() {
+            edit.validate().map_err(|error| Problem::new(error.to_string()))?;
+            self.unordered = Some((index, stage.name()));
+            return Ok(());
+        }
+        match stage {
+            Stage::Surface {} => self.source(),
+            Stage::Slice(slice) => {
+                self.source()?;
+                let length = slice.normal.iter().fold(0.0_f64, |sum, x| sum.hypot(*x));
+                if !(length.is_normal()) {
+                    return Err(Problem::new("expected a direction, whose length is not 0").within("normal"));
+                }
+                Ok(())
+            }
+            Stage::Select(select) => {
+                let twice =
+                    (1..select.fields.len()).find(|&index| select.fields[..index].contains(&select.fields[index]));
+                match twice {
+                    Some(index) => Err(Problem::new("found the same field twice").at(index).within("fields")),
+                    None => Ok(()),
+                }
+            }
+            Stage::Quality {} if std::mem::replace(&mut self.quality, true) => {
+                Err(Problem::new("found twice, expected at most once"))
+            }
+            Stage::Statistics(statistics) if !self.measured.insert(statistics.field.clone()) => {
+                Err(Problem::new("this field is measured twice").within("field"))
+            }
+            Stage::Statistics(statistics) if ["quality", "cycle", "time"].contains(&statistics.field.as_str()) => {
+                Err(Problem::new("a field of this name cannot be told from other monitors").within("field"))
+            }
+            Stage::Stream(stream) => self.stream(stream),
+            Stage::Write(write) => self.write(write),
+            Stage::Order(order) => self.order(order),
+            Stage::Deform(deform) => check_deform(deform),
+            Stage::Guard(guard) => check_guard(guard),
+            _ => Ok(()),
+        }
+    }
+
+    fn source(&mut self) -> Result<(), Problem> {
+        if self.stages > 1 {
+            let message =
+                if self.extract { "a pipeline has one source stage" } else { "a source stage must come first" };
+            return Err(Problem::new(message));
+        }
+        self.extract = true;
+        Ok(())
+    }
+
+    fn stream(&self, stream: &StreamStage) -> Result<(), Problem> {
+        if !self.extract {
+            return Err(Problem::new("nothing to stream, expected a `surface` or `slice` stage first"));
+        }
+        check_bound(stream.error).map_err(|problem| problem.within("error"))?;
+        match stream.positions {
+            Some(bound) => check_bound(bound).map_err(|problem| problem.within("positions")),
+            None => Ok(()),
+        }
+    }
+
+    fn write(&self, write: &Write) -> Result<(), Problem> {
+        let surface_only = write.file.to_ascii_lowercase().ends_with(".vtp") && !self.extract;
+        if surface_only {
+            let message = "a `.vtp` file holds surfaces, expected a `surface` or `slice` stage first, or a `.vtu` file";
+            return Err(Problem::new(message).within("file"));
+        }
+        check_file(&write.file).map_err(|problem| problem.within("file"))
+    }
+
+    fn order(&mut self, order: &OrderStage) -> Result<(), Problem> {
+        if self.unordered.take().is_none() {
+            return Err(Problem::new("nothing to order, expected an edit stage before it"));
+        }
+        check_settings(order.deform.as_ref(), order.guard.as_ref(), order.schedule.as_ref())
+    }
+}
+
+fn finite(value: f64) -> Result<(), Problem> {
+    if value.is_finite() { Ok(()) } else { Err(Problem::new(format!("found {value}, expected a finite number"))) }
+}
+
+fn check_bound(bound: ErrorBound) -> Result<(), Problem> {
+    let (key, value) = match bound {
+        ErrorBound::Lossless => return Ok(()),
+        ErrorBound::Relative(value) => ("relative", value),
+        ErrorBound::Absolute(value) => ("absolute", value),
+    };
+    if value.is_finite() && value > 0.0 && (key == "absolute" || value <= 0.5) {
+        return Ok(());
+    }
+    let most = if key == "relative" { " and at most 0.5" } else { "" };
+    Err(Problem::new(format!("found {value}, expected a number above 0{most}")).within(key))
+}
+
+fn check_deform(deform: &Deform) -> Result<(), Problem> {
+    deform.validate().map_err(|error| Problem::new(error.to_string()))
+}
+
+fn check_guard(guard: &Guard) -> Result<(), Problem> {
+    if (0.0..=1.0).contains(&guard.min_scaled_jacobian) {
+        return Ok(());
+    }
+    let message = format!("found {}, expected a number from 0 to 1", guard.min_scaled_jacobian);
+    Err(Problem::new(message).within("min_scaled_jacobian"))
+}
+
+fn check_settings(deform: Option<&Deform>, guard: Option<&Guard>, _: Option<&Schedule>) -> Result<(), Problem> {
+    deform.map_or(Ok(()), check_deform).map_err(|problem| problem.within("deform"))?;
+    guard.map_or(Ok(()), check_guard).map_err(|problem| problem.within("guard"))
+}
+
+fn check_file(pattern: &str) -> Result<(), Problem> {
+    let extensions = ["vtu", "vtp"];
+    let extension = pattern.rsplit_once('.').map_or("", |(_, extension)| extension);
+    if !extensions.contains(&extension) {
+        let message = format!("found the file `{pattern}`, expected one that ends in `.vtu` or `.vtp`");
+        return Err(Problem::new(message).suggest(nearest(extension, extensions).filter(|_| !extension.is_empty())));
+    }
+    file_pattern(pattern, 0, 0.0).map(|_| ())
+}
+
+/// The file that a pattern stands for at a step: `{cycle}` becomes the cycle with six digits or more, `{time}` the time.
+///
+/// # Errors
+/// A [`Problem`] for braces that hold anything else, with the nearest known name.
+pub fn file_pattern(pattern: &str, cycle: u64, time: f64) -> Result<String, Problem> {
+    let mut file = String::with_capacity(pattern.len() + 16);
+    let mut rest = pattern;
+    while let Some((before, after)) = rest.split_once('{') {
+        file.push_str(before);
+        let Some((name, after)) = after.split_once('}') else {
+            return Err(Problem::new("found '{' without its '}'"));
+        };
+        match name {
+            "cycle" => file.push_str(&format!("{cycle:06}")),
+            "time" => file.push_str(&time.to_string()),
+            _ => {
+                let message = format!("found `{{{name}}}` in a file's name, expected `{{cycle}}` or `{{time}}`");
+                return Err(Problem::new(message).suggest(nearest(name, ["cycle", "time"])));
+            }
+        }
+        rest = after;
+    }
+    if rest.contains('}') {
+        return Err(Problem::new("found '}' without its '{'"));
+    }
+    file.push_str(rest);
+    Ok(file)
+}
+
+impl Validate for Order {
+    fn validate(&self) -> Result<(), Problem> {
+        let (key, edits) = match &self.change {
+            Change::Edits(edits) if edits.is_empty() => {
+                return Err(Problem::new("expected at least one edit").within("edits"));
+            }
+            Change::Edits(edits) => ("edits", edits.as_slice()),
+            Change::Stack(edits) => ("stack", edits.as_slice()),
+            Change::Undo(_) => ("undo", &[][..]),
+        };
+        for (index, edit) in edits.iter().enumerate() {
+            let located = |problem: Problem| problem.within(edit.name()).at(index).within(key);
+            edit.validate().map_err(|error| located(Problem::new(error.to_string())))?;
+        }
+        check_settings(self.deform.as_ref(), self.guard.as_ref(), self.schedule.as_ref())
+    }
+}
+
+impl Validate for Command {
+    fn validate(&self) -> Result<(), Problem> {
+        match self {
+            Command::Order(order) => order.validate().map_err(|problem| problem.within("order")),
+            Command::Parameter(parameter) => {
+                finite(parameter.value).map_err(|problem| problem.within("value").within("parameter"))
+            }
+            Command::Pause {} | Command::Resume {} | Command::Stop {} => Ok(()),
+        }
+    }
+}
+
+impl Validate for TimedCommand {
+    fn validate(&self) -> Result<(), Problem> {
+        self.command.validate()
+    }
+}

@@ -1,0 +1,200 @@
+//! The JSON language as its users meet it: what is read, and where errors point.
+
+use proptest::prelude::*;
+use tombolo_pipelines::language::{
+    At, Change, Command, Config, Due, Order, Stage, config_schema, order_schema, parse, parse_json, parse_orders,
+    parse_valid, text,
+};
+
+const DESIGN: &str = include_str!("design.json");
+
+#[test]
+fn the_example_of_the_design_is_read_and_written_back() {
+    let config = parse(DESIGN, "design.json").unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(config.pipelines.len(), 4);
+    assert_eq!(config.pipelines[2].due, Due::OnOrder);
+    assert_eq!(config.pipelines[3].due, Due::At(At::Time(0.1)));
+    assert!(matches!(config.pipelines[0].stages[0], Stage::Slice(slice) if slice.normal == [1.0, 0.0, 0.0]));
+    let again = parse(&serde_json::to_string_pretty(&config).unwrap(), "again.json").unwrap();
+    assert_eq!(config, again);
+}
+
+/// (text, line, column, path, part of the message, suggestion)
+type Case = (&'static str, usize, usize, &'static str, &'static str, Option<&'static str>);
+
+#[test]
+fn errors_point_at_the_token() {
+    #[rustfmt::skip]
+    let cases: [Case; 41] = [
+        ("", 1, 1, "", "found the end of the text, expected a value", None),
+        ("{\"version\": 1,\n}", 2, 1, "", "expected a key in double quotes", None),
+        (r#"{"version": 1} x"#, 1, 16, "", "after the end of the value", None),
+        (r#"{"version": 1, "version": 1}"#, 1, 16, "", "found the key `version` twice", None),
+        (r#"{"version": 1e400}"#, 1, 13, "version", "beyond the range", None),
+        (r#"{"version": NaN}"#, 1, 13, "version", "expected a finite number", None),
+        (r#"{'version': 1}"#, 1, 2, "", "double quotes", None),
+        (r#"{"version": 01}"#, 1, 13, "version", "starts with 0", None),
+        (r#"{"version": "x}"#, 1, 13, "version", "does not end", None),
+        (r#"{"version": 2}"#, 1, 13, "version", "found version 2, expected 1", None),
+        (r#"{"version": "1"}"#, 1, 13, "version", "found \"1\", expected a whole number of at least 0", None),
+        (r#"{"version": 1.5}"#, 1, 13, "version", "found 1.5, expected a whole number", None),
+        (r#"{"pipelines": []}"#, 1, 1, "", "the key `version` is missing", None),
+        (r#"[1]"#, 1, 1, "", "found an array of 1, expected an object", None),
+        ("{\"version\": 1,\n \"pipeline\": []}", 2, 2, "pipeline", "unknown key `pipeline`", Some("pipelines")),
+        (r#"{"version": 1, "stream": {"listen": "nowhere"}}"#, 1, 37, "stream.listen", "invalid socket address", None),
+        (r#"{"version": 1, "stream": {"token": "short"}}"#, 1, 36, "stream.token", "16 to 128", None),
+        (r#"{"version": 1, "pipelines": [{"name": "a"}]}"#, 1, 30, "pipelines[0]", "the key `stages` is missing", None),
+        (r#"{"version": 1, "pipelines": [{"name": "", "stages": []}]}"#, 1, 39, "pipelines[0].name", "1 to 200", None),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "stages": []}, {"name": "a", "stages": []}]}"#, 1, 68, "pipelines[1].name", "two pipelines", None),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "every": {"steps": 0}, "stages": []}]}"#, 1, 63, "pipelines[0].every.steps", "found 0, expected a whole number of at least 1", None),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "every": {"time": -1}, "stages": []}]}"#, 1, 62, "pipelines[0].every.time", "above 0", None),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "every": {"steps": 1, "time": 1}, "stages": []}]}"#, 1, 53, "pipelines[0].every", "found the keys `steps`, `time`, expected an object with exactly one key", None),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "every": {}, "stages": []}]}"#, 1, 53, "pipelines[0].every", "found an empty object", None),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "every": {"steps": 1}, "at": {"cycle": 1}, "stages": []}]}"#, 1, 30, "pipelines[0]", "more than one of `every`, `at` and `on`", None),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "stages": [{"sclie": {}}]}]}"#, 1, 56, "pipelines[0].stages[0].sclie", "unknown name `sclie`", Some("slice")),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "stages": ["surface"]}]}"#, 1, 55, "pipelines[0].stages[0].surface", "found \"surface\", expected an object with this key", None),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "stages": [{"slice": {"origin": [0,0], "normal": [0,0,1]}}]}]}"#, 1, 76, "pipelines[0].stages[0].slice.origin", "found 2 values, expected an array of 3 values", None),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "stages": [{"slice": {"origin": [0,0,"z"], "normal": [0,0,1]}}]}]}"#, 1, 81, "pipelines[0].stages[0].slice.origin[2]", "found \"z\", expected a number", None),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "stages": [{"slice": {"origin": [0,0,0], "normal": [0,0,0]}}]}]}"#, 1, 95, "pipelines[0].stages[0].slice.normal", "length is not 0", None),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "stages": [{"quality": {}}, {"surface": {}}]}]}"#, 1, 84, "pipelines[0].stages[1].surface", "must come first", None),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "stages": [{"stream": {}}]}]}"#, 1, 66, "pipelines[0].stages[0].stream", "nothing to stream", None),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "stages": [{"surface": {}}, {"stream": {"error": {"relative": 0}}}]}]}"#, 1, 106, "pipelines[0].stages[1].stream.error.relative", "above 0", None),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "stages": [{"write": {"file": "a-{cylce}.vtu"}}]}]}"#, 1, 74, "pipelines[0].stages[0].write.file", "`{cylce}`", Some("cycle")),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "stages": [{"write": {"file": "a.stl"}}]}]}"#, 1, 74, "pipelines[0].stages[0].write.file", "expected one that ends in", None),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "stages": [{"guard": {}}]}]}"#, 1, 65, "pipelines[0].stages[0].guard", "\"on\": \"order\"", None),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "on": "order", "stages": [{"guard": {"min_scaled_jacobian": 2}}]}]}"#, 1, 104, "pipelines[0].stages[0].guard.min_scaled_jacobian", "from 0 to 1", None),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "on": "oder", "stages": []}]}"#, 1, 50, "pipelines[0].on", "unknown name `oder`", Some("order")),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "stages": [{"translate": {"features": ["w"], "by": [1,0,0]}}]}]}"#, 1, 69, "pipelines[0].stages[0].translate", "nothing orders", None),
+        (r#"{"version": 1, "pipelines": [{"name": "a", "stages": [{"order": {}}]}]}"#, 1, 65, "pipelines[0].stages[0].order", "nothing to order", None),
+        (r#"{"version": 1, "pipelines": [{"name": "é", "stages": [{"quality": {}}], "when": "quality.mn < 1", "then": [{"stop": {}}]}]}"#, 1, 81, "pipelines[0].when", "unknown name `quality.mn`", Some("quality.min")),
+    ];
+    let mut wrong = Vec::new();
+    for (text, line, column, path, message, suggestion) in cases {
+        let error = parse(text, "views.json").expect_err(text);
+        let same = (error.line, error.column, error.path.as_str()) == (line, column, path)
+            && error.message.contains(message)
+            && error.suggestion.as_deref() == suggestion;
+        if !same {
+            wrong.push(format!("{text}\n  {error}\n  expected {line}:{column}: {path}: {message} {suggestion:?}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn bytes_that_are_no_text_are_named() {
+    let error = text(b"{\n \"name\": \"\xff\"}", "a.json").unwrap_err();
+    assert_eq!((error.line, error.column), (2, 11));
+    assert!(error.message.contains("0xff"), "{error}");
+}
+
+#[test]
+fn deep_nesting_is_an_error() {
+    let error = parse_json::<serde_json::Value>(&"[".repeat(1_000_000), "a.json").unwrap_err();
+    assert!(error.message.contains("nested more than 64 deep"), "{error}");
+}
+
+#[test]
+fn an_order_is_exactly_one_change() {
+    let order: Order = parse_valid(r#"{"undo": 2}"#, "o").unwrap();
+    assert_eq!(order, Change::Undo(2.try_into().unwrap()).into());
+    for (text, message) in [
+        ("{}", "none of `edits`, `stack` and `undo`"),
+        (r#"{"undo": 1, "stack": []}"#, "more than one"),
+        (r#"{"undo": 0}"#, "at least 1"),
+        (r#"{"edits": []}"#, "at least one edit"),
+        (r#"{"edits": [{"translate": {"features": ["a"], "by": [1, 2]}}]}"#, "array of 3 values"),
+        (r#"{"undo": 1, "guard": {"min_scaled_jacobian": -1}}"#, "from 0 to 1"),
+    ] {
+        let error = parse_valid::<Order>(text, "o").expect_err(text);
+        assert!(error.message.contains(message), "{error}");
+    }
+}
+
+#[test]
+fn orders_are_read_from_arrays_and_journals() {
+    let array = r#"[{"at": {"cycle": 3}, "order": {"undo": 1}}, {"at": {"time": 0.5}, "id": "p", "pause": {}}]"#;
+    let orders = parse_orders(array, "orders.json").unwrap();
+    assert_eq!(orders[0].at, Some(At::Cycle(3)));
+    assert_eq!((orders[1].id.as_deref(), &orders[1].command), (Some("p"), &Command::Pause {}));
+
+    let journal = concat!(
+        r#"{"id":"a","status":"accepted","cycle":3,"time":0.3,"order":{"undo":1}}"#,
+        "\n",
+        r#"{"id":"b","status":"accepted","cycle":4,"time":0.4,"order":{"stack":[]}}"#,
+        "\n",
+        r#"{"id":"b","status":"rejected","cycle":4,"time":0.4,"reason":"folds"}"#,
+        "\n",
+        r#"{"id":"a","status":"applied","cycle":7,"time":0.7,"min_scaled_jacobian":0.3}"#,
+        "\n",
+        r#"{"id":"c","status":"accepted","cycle":9,"time":0.9,"stop":{}}"#,
+        "\n",
+    );
+    let orders = parse_orders(journal, "journal.jsonl").unwrap();
+    let places: Vec<_> = orders.iter().map(|timed| (timed.id.as_deref().unwrap(), timed.at.unwrap())).collect();
+    assert_eq!(places, [("a", At::Cycle(7)), ("c", At::Cycle(9))]);
+
+    let error = parse_orders("{\"pause\": {}}\n{\"puase\": {}}\n", "o.jsonl").unwrap_err();
+    assert_eq!((error.line, error.column, error.suggestion.as_deref()), (2, 2, Some("pause")));
+    assert!(parse_orders(r#"[{"order": {"undo": 1}, "pause": {}}]"#, "o").unwrap_err().message.contains("exactly one"));
+    assert!(parse_orders(" \n", "o").unwrap().is_empty());
+    assert_eq!(parse_orders("{\n \"at\": {\"cycle\": 1},\n \"pause\": {}\n}", "o").unwrap().len(), 1);
+    assert!(parse_orders(r#"{"pause": {}"#, "o").is_err(), "one broken line is not a torn journal");
+}
+
+#[test]
+fn schemas_name_what_the_parser_reads() {
+    let schema = config_schema().to_string();
+    for name in ["scale_direction", "harmonic_order", "min_scaled_jacobian", "listen", "background", "at most one of"] {
+        let lower = schema.to_lowercase();
+        assert!(lower.contains(name), "{name} is not in the schema");
+    }
+    let order = order_schema();
+    assert_eq!(order["oneOf"].as_array().map(Vec::len), Some(3), "{order}");
+    assert_eq!(order["additionalProperties"], false);
+}
+
+proptest! {
+    #[test]
+    fn no_bytes_make_the_parser_panic(bytes in proptest::collection::vec(any::<u8>(), 0..300)) {
+        if let Ok(text) = text(&bytes, "fuzz") {
+            let _ = parse(text, "fuzz");
+            let _ = parse_orders(text, "fuzz");
+        }
+    }
+
+    /// A valid text with some bytes overwritten, removed or doubled is read or refused at a place that it has.
+    #[test]
+    fn no_mutation_makes_the_parser_panic(
+        changes in proptest::collection::vec((any::<prop::sample::Index>(), 0..3u8, r#"[\[\]{}:,"0-9a-e\\. é-]"#), 1..6)
+    ) {
+        let mut characters: Vec<char> = DESIGN.chars().collect();
+        for (place, action, replacement) in changes {
+            let place = place.index(characters.len());
+            match action {
+                0 => characters[place] = replacement.chars().next().unwrap_or(' '),
+                1 => { characters.remove(place); }
+                _ => characters.insert(place, characters[place]),
+            }
+        }
+        let text: String = characters.into_iter().collect();
+        if let Err(error) = parse(&text, "fuzz") {
+            prop_assert!(error.line <= text.lines().count() + 1);
+            let line = text.split('\n').nth(error.line - 1).unwrap_or_default();
+            prop_assert!(error.column <= line.chars().count() + 1, "{}\n{}", error, text);
+        }
+        let _ = parse_orders(&text, "fuzz");
+    }
+
+    #[test]
+    fn what_is_read_is_written_and_read_the_same(steps in 1u64..1000, time in 1e-9f64..1e9, relative in 1e-9f64..0.5) {
+        let text = format!(
+            r#"{{"version": 1, "pipelines": [{{"name": "v", "every": {{"steps": {steps}}}, "stages":
+               [{{"surface": {{}}}}, {{"stream": {{"error": {{"relative": {relative:e}}}}}}}]}},
+               {{"name": "w", "at": {{"time": {time:e}}}, "stages": []}}]}}"#
+        );
+        let config = parse(&text, "a").unwrap();
+        let again: Config = parse(&serde_json::to_string(&config).unwrap(), "b").unwrap();
+        prop_assert_eq!(config, again);
+    }
+}
