@@ -1,0 +1,274 @@
+//! What holds on the boundary: prescribed velocities, walls, outlets.
+
+use std::fmt;
+use std::sync::Arc;
+
+use tombolo_deform::mesh::Vector;
+
+use crate::SolverError;
+use crate::geometry::{cross, dot, minus};
+use crate::topology::Topology;
+
+/// Where and when a [`Value`] is asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Place<'a> {
+    /// The position.
+    pub position: Vector,
+    /// The time.
+    pub time: f64,
+    /// The values of the parameters, in the order in which they were declared.
+    pub parameters: &'a [f64],
+}
+
+/// A number that may depend on place, time and parameters.
+#[derive(Clone)]
+pub enum Value {
+    /// The same everywhere and always.
+    Uniform(f64),
+    /// A function of place, time and parameters.
+    Function(Arc<dyn Fn(&Place) -> f64 + Send + Sync>),
+}
+
+impl Value {
+    /// The value at a place.
+    #[must_use]
+    pub fn at(&self, place: &Place) -> f64 {
+        match self {
+            Value::Uniform(value) => *value,
+            Value::Function(function) => function(place),
+        }
+    }
+
+    /// A function of position and time.
+    pub fn function(function: impl Fn(Vector, f64) -> f64 + Send + Sync + 'static) -> Self {
+        Value::Function(Arc::new(move |place| function(place.position, place.time)))
+    }
+}
+
+impl fmt::Debug for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Value::Uniform(value) => write!(f, "{value}"),
+            Value::Function(_) => f.write_str("function"),
+        }
+    }
+}
+
+/// What holds on one part of the boundary.
+#[derive(Debug, Clone)]
+pub enum Condition {
+    /// The fluid moves with the wall.
+    NoSlip,
+    /// The fluid moves along the wall without friction; normal to it, with the wall.
+    Slip,
+    /// The velocity is prescribed.
+    Velocity([Value; 3]),
+    /// The pressure is prescribed, with zero viscous traction. It holds weakly: through the traction on the fluid.
+    Pressure(Value),
+}
+
+/// A part of the boundary with its condition. The patches together must cover the whole boundary.
+///
+/// Where patches meet, a no-slip wall rules before a prescribed velocity, and that before slip and pressure; between two
+/// prescribed velocities the earlier patch rules.
+#[derive(Debug, Clone)]
+pub struct Patch {
+    /// Its name.
+    pub name: String,
+    /// Its faces by vertices of the mesh, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// What holds there.
+    pub condition: Condition,
+}
+
+/// How the velocity of a vertex comes about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Rule {
+    /// From the equations.
+    Free,
+    /// It is the mesh's velocity.
+    Wall,
+    /// A patch prescribes it.
+    Prescribed(u32),
+}
+
+/// A vertex on an outlet whose velocity is free.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct OutletVertex {
+    pub vertex: u32,
+    pub patch: u32,
+    /// The integral of the vertex's shape function times the outward normal.
+    pub area: Vector,
+}
+
+/// A vertex on a frictionless wall.
+#[derive(Debug, Clone, Copy)]
+struct SlipVertex {
+    vertex: u32,
+    normal: Vector,
+}
+
+/// The boundary in the solver's numbering.
+#[derive(Debug)]
+pub(crate) struct Boundary {
+    pub patches: Vec<Patch>,
+    pub rules: Vec<Rule>,
+    /// Components held by walls that lie along the axes.
+    pub held: Vec<[bool; 3]>,
+    pub outlets: Vec<OutletVertex>,
+    slip: Vec<SlipVertex>,
+}
+
+impl Boundary {
+    pub fn new(topology: &Topology, mut patches: Vec<Patch>, points: &[Vector]) -> Result<Self, SolverError> {
+        let vertex_count = topology.vertex_count();
+        for patch in &mut patches {
+            for vertex in patch.triangles.iter_mut().flatten() {
+                *vertex = *topology
+                    .vertex_rank
+                    .get(*vertex as usize)
+                    .ok_or_else(|| SolverError::PatchVertex { patch: patch.name.clone(), vertex: *vertex })?;
+            }
+        }
+        let mut rules = vec![Rule::Free; vertex_count];
+        for (index, patch) in patches.iter().enumerate().rev() {
+            if let Condition::Velocity(_) = patch.condition {
+                for &vertex in patch.triangles.iter().flatten() {
+                    #[expect(clippy::cast_possible_truncation, reason = "a mesh has few features")]
+                    {
+                        rules[vertex as usize] = Rule::Prescribed(index as u32);
+                    }
+                }
+            }
+        }
+        for patch in patches.iter().filter(|patch| matches!(patch.condition, Condition::NoSlip)) {
+            for &vertex in patch.triangles.iter().flatten() {
+                rules[vertex as usize] = Rule::Wall;
+            }
+        }
+        // A vertex that no element uses has no equation.
+        for (vertex, rule) in rules.iter_mut().enumerate() {
+            if topology.around(vertex).is_empty() {
+                *rule = Rule::Wall;
+            }
+        }
+        let mut boundary =
+            Self { patches, rules, held: vec![[false; 3]; vertex_count], outlets: Vec::new(), slip: Vec::new() };
+        boundary.measure(points);
+        Ok(boundary)
+    }
+
+    /// Brings normals and areas up to date with the coordinates.
+    pub fn measure(&mut self, points: &[Vector]) {
+        self.outlets.clear();
+        self.slip.clear();
+        self.held.fill([false; 3]);
+        let mut areas = vec![[0.0; 3]; points.len()];
+        for (index, patch) in self.patches.iter().enumerate() {
+            if !matches!(patch.condition, Condition::Slip | Condition::Pressure(_)) {
+                continue;
+            }
+            let mut vertices: Vec<u32> = patch.triangles.iter().flatten().copied().collect();
+            vertices.sort_unstable();
+            vertices.dedup();
+            for &vertex in &vertices {
+                areas[vertex as usize] = [0.0; 3];
+            }
+            for triangle in &patch.triangles {
+                let area = triangle_area(points, *triangle);
+                for &vertex in triangle {
+                    for axis in 0..3 {
+                        areas[vertex as usize][axis] += area[axis] / 3.0;
+                    }
+                }
+            }
+            for &vertex in vertices.iter().filter(|&&vertex| self.rules[vertex as usize] == Rule::Free) {
+                let area = areas[vertex as usize];
+                let size = dot(area, area).sqrt();
+                if size == 0.0 {
+                    continue;
+                }
+                if let Condition::Pressure(_) = patch.condition {
+                    #[expect(clippy::cast_possible_truncation, reason = "a mesh has few features")]
+                    self.outlets.push(OutletVertex { vertex, patch: index as u32, area });
+                } else {
+                    let normal = area.map(|value| value / size);
+                    if let Some(axis) = (0..3).find(|&axis| normal[axis].abs() > 1.0 - 1e-12) {
+                        self.held[vertex as usize][axis] = true;
+                    }
+                    self.slip.push(SlipVertex { vertex, normal });
+                }
+            }
+        }
+    }
+
+    /// Whether some part of the boundary lets the fluid choose how much of it passes.
+    pub fn is_open(&self) -> bool {
+        !self.outlets.is_empty()
+    }
+
+    /// Writes the prescribed velocities into `velocity`, and takes the part normal to frictionless walls from the mesh.
+    pub fn impose(&self, velocity: &mut [Vector], mesh_velocity: &[Vector], points: &[Vector], time: f64, parameters: &[f64]) {
+        for (vertex, rule) in self.rules.iter().enumerate() {
+            match *rule {
+                Rule::Free => {}
+                Rule::Wall => velocity[vertex] = mesh_velocity[vertex],
+                Rule::Prescribed(patch) => {
+                    if let Condition::Velocity(values) = &self.patches[patch as usize].condition {
+                        let place = Place { position: points[vertex], time, parameters };
+                        velocity[vertex] = [0, 1, 2].map(|axis: usize| values[axis].at(&place));
+                    }
+                }
+            }
+        }
+        self.impose_slip(velocity, mesh_velocity);
+    }
+
+    /// Takes the part of the velocity normal to frictionless walls from the mesh.
+    pub fn impose_slip(&self, velocity: &mut [Vector], mesh_velocity: &[Vector]) {
+        for slip in &self.slip {
+            let (own, wall) = (&mut velocity[slip.vertex as usize], mesh_velocity[slip.vertex as usize]);
+            let through = dot(minus(*own, wall), slip.normal);
+            for axis in 0..3 {
+                own[axis] -= through * slip.normal[axis];
+            }
+        }
+    }
+
+    /// The prescribed pressure at an outlet vertex.
+    pub fn outlet_pressure(&self, outlet: &OutletVertex, points: &[Vector], time: f64, parameters: &[f64]) -> f64 {
+        match &self.patches[outlet.patch as usize].condition {
+            Condition::Pressure(value) => {
+                value.at(&Place { position: points[outlet.vertex as usize], time, parameters })
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// The flux of a vector field out through a patch.
+    pub fn flux(&self, patch: usize, field: &[Vector], points: &[Vector]) -> f64 {
+        let outward = |triangle: &[u32; 3]| {
+            let area = triangle_area(points, *triangle);
+            triangle.iter().map(|&vertex| dot(field[vertex as usize], area)).sum::<f64>() / 3.0
+        };
+        self.patches[patch].triangles.iter().map(outward).sum()
+    }
+
+    /// The mean of a scalar field over a patch, and the patch's area.
+    pub fn mean(&self, patch: usize, field: &[f64], points: &[Vector]) -> (f64, f64) {
+        let (mut total, mut whole) = (0.0, 0.0);
+        for triangle in &self.patches[patch].triangles {
+            let area = triangle_area(points, *triangle);
+            let size = dot(area, area).sqrt();
+            total += size * triangle.iter().map(|&vertex| field[vertex as usize]).sum::<f64>() / 3.0;
+            whole += size;
+        }
+        (if whole > 0.0 { total / whole } else { 0.0 }, whole)
+    }
+}
+
+/// The outward normal of a triangle, as long as its area.
+fn triangle_area(points: &[Vector], triangle: [u32; 3]) -> Vector {
+    let [a, b, c] = triangle.map(|vertex| points[vertex as usize]);
+    cross(minus(b, a), minus(c, a)).map(|value| 0.5 * value)
+}

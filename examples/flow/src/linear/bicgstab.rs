@@ -1,0 +1,189 @@
+//! The stabilised bi-conjugate gradient method, for three right-hand sides of one matrix at once.
+
+use super::{BlockIncompleteLu, Matrix, Outcome, for_each_chunk, sum};
+
+/// One value of three components for each row.
+pub type Tuples = Vec<[f64; 3]>;
+
+/// BiCGStab (van der Vorst 1992), preconditioned from the right, for three systems that share a matrix.
+///
+/// Each component has its own scalars and rests once it has converged. `held` marks components of rows that are prescribed
+/// although the matrix does not say so: the operator is the identity there.
+#[derive(Debug, Default)]
+pub struct BiCgStab {
+    residual: Tuples,
+    shadow: Tuples,
+    direction: Tuples,
+    preconditioned: Tuples,
+    image: Tuples,
+    second: Tuples,
+    second_image: Tuples,
+}
+
+impl BiCgStab {
+    /// Improves `solution` until each component's residual is below its `tolerance` (absolute, Euclidean norm).
+    ///
+    /// Gives up after `limit` iterations; a breakdown restarts from the residual reached. NaN in, NaN out: the outcome then is
+    /// not converged.
+    #[expect(clippy::too_many_arguments, reason = "the parts of one linear system")]
+    pub fn solve(
+        &mut self,
+        matrix: &Matrix,
+        preconditioner: &BlockIncompleteLu,
+        held: &[[bool; 3]],
+        right: &[[f64; 3]],
+        solution: &mut [[f64; 3]],
+        tolerance: [f64; 3],
+        limit: usize,
+    ) -> Outcome {
+        let rows = right.len();
+        for buffer in [
+            &mut self.residual,
+            &mut self.shadow,
+            &mut self.direction,
+            &mut self.preconditioned,
+            &mut self.image,
+            &mut self.second,
+            &mut self.second_image,
+        ] {
+            buffer.resize(rows, [0.0; 3]);
+        }
+        let mut iterations = 0;
+        let mut norms = [f64::INFINITY; 3];
+        while iterations < limit {
+            subtract_product(matrix, held, right, solution, &mut self.residual);
+            norms = dot(&self.residual, &self.residual).map(f64::sqrt);
+            let open: [bool; 3] = std::array::from_fn(|c| norms[c] > tolerance[c]);
+            if !open.contains(&true) {
+                break;
+            }
+            let done = self.run(matrix, preconditioner, held, solution, tolerance, open, limit - iterations);
+            iterations += done.max(1);
+            if norms.iter().any(|norm| !norm.is_finite()) {
+                break;
+            }
+        }
+        let converged = (0..3).all(|c| norms[c] <= tolerance[c]);
+        Outcome { iterations, residual: norms.into_iter().fold(0.0, f64::max), converged }
+    }
+
+    /// Iterates from `self.residual` until all components that are `open` rest or one breaks down.
+    #[expect(clippy::too_many_arguments, reason = "the parts of one linear system")]
+    fn run(
+        &mut self,
+        matrix: &Matrix,
+        preconditioner: &BlockIncompleteLu,
+        held: &[[bool; 3]],
+        solution: &mut [[f64; 3]],
+        tolerance: [f64; 3],
+        mut open: [bool; 3],
+        limit: usize,
+    ) -> usize {
+        self.shadow.copy_from_slice(&self.residual);
+        self.direction.fill([0.0; 3]);
+        self.image.fill([0.0; 3]);
+        let (mut rho, mut alpha, mut omega) = ([1.0; 3], [1.0; 3], [1.0; 3]);
+        for iteration in 0..limit {
+            let next = dot(&self.shadow, &self.residual);
+            let beta = quotient(open, |c| next[c] * alpha[c], |c| rho[c] * omega[c]);
+            rho = next;
+            let (residual, image) = (&self.residual, &self.image);
+            for_each_chunk(&mut self.direction, |start, chunk| {
+                for (offset, value) in chunk.iter_mut().enumerate() {
+                    let row = start + offset;
+                    for c in 0..3 {
+                        value[c] = residual[row][c] + beta[c] * (value[c] - omega[c] * image[row][c]);
+                    }
+                }
+            });
+            preconditioner.apply(&self.direction, &mut self.preconditioned);
+            multiply(matrix, held, &self.preconditioned, &mut self.image);
+            let against = dot(&self.shadow, &self.image);
+            alpha = quotient(open, |c| rho[c], |c| against[c]);
+            update(solution, alpha, &self.preconditioned);
+            update(&mut self.residual, alpha.map(|value| -value), &self.image);
+
+            preconditioner.apply(&self.residual, &mut self.second);
+            multiply(matrix, held, &self.second, &mut self.second_image);
+            let (top, bottom) =
+                (dot(&self.second_image, &self.residual), dot(&self.second_image, &self.second_image));
+            omega = quotient(open, |c| top[c], |c| bottom[c]);
+            update(solution, omega, &self.second);
+            update(&mut self.residual, omega.map(|value| -value), &self.second_image);
+
+            let norms = dot(&self.residual, &self.residual).map(f64::sqrt);
+            let mut broken = false;
+            for c in 0..3 {
+                open[c] &= norms[c] > tolerance[c];
+                broken |= open[c] && (omega[c] == 0.0 || alpha[c] == 0.0);
+            }
+            if broken || !open.contains(&true) || norms.iter().any(|norm| !norm.is_finite()) {
+                return iteration + 1;
+            }
+        }
+        limit
+    }
+}
+
+/// The quotient for the components that are still open; 0 for the others and where the divisor vanishes.
+fn quotient(open: [bool; 3], top: impl Fn(usize) -> f64, bottom: impl Fn(usize) -> f64) -> [f64; 3] {
+    std::array::from_fn(|c| {
+        let divisor = bottom(c);
+        if open[c] && divisor != 0.0 { top(c) / divisor } else { 0.0 }
+    })
+}
+
+fn dot(a: &[[f64; 3]], b: &[[f64; 3]]) -> [f64; 3] {
+    sum(a.len(), |range| {
+        let mut total = [0.0; 3];
+        for (a, b) in a[range.clone()].iter().zip(&b[range]) {
+            for c in 0..3 {
+                total[c] += a[c] * b[c];
+            }
+        }
+        total
+    })
+}
+
+fn update(values: &mut [[f64; 3]], factor: [f64; 3], by: &[[f64; 3]]) {
+    for_each_chunk(values, |start, chunk| {
+        for (offset, value) in chunk.iter_mut().enumerate() {
+            for c in 0..3 {
+                value[c] += factor[c] * by[start + offset][c];
+            }
+        }
+    });
+}
+
+fn row_image(matrix: &Matrix, held: &[[bool; 3]], row: usize, vector: &[[f64; 3]]) -> [f64; 3] {
+    let mut value = matrix.row_times_tuples(row, vector);
+    for c in 0..3 {
+        if held[row][c] {
+            value[c] = vector[row][c];
+        }
+    }
+    value
+}
+
+fn multiply(matrix: &Matrix, held: &[[bool; 3]], vector: &[[f64; 3]], result: &mut [[f64; 3]]) {
+    for_each_chunk(result, |start, chunk| {
+        for (offset, value) in chunk.iter_mut().enumerate() {
+            *value = row_image(matrix, held, start + offset, vector);
+        }
+    });
+}
+
+fn subtract_product(
+    matrix: &Matrix,
+    held: &[[bool; 3]],
+    right: &[[f64; 3]],
+    vector: &[[f64; 3]],
+    result: &mut [[f64; 3]],
+) {
+    for_each_chunk(result, |start, chunk| {
+        for (offset, value) in chunk.iter_mut().enumerate() {
+            let image = row_image(matrix, held, start + offset, vector);
+            *value = std::array::from_fn(|c| right[start + offset][c] - image[c]);
+        }
+    });
+}

@@ -1,0 +1,636 @@
+//! One time step after the other.
+
+use tombolo_deform::mesh::{Mesh, Vector};
+
+use crate::SolverError;
+use crate::boundary::{Boundary, Patch, Place, Rule, Value};
+use crate::geometry::{Geometry, dot};
+use crate::linear::{
+    BiCgStab, BlockIncompleteLu, ConjugateGradients, Matrix, Multigrid, Outcome, Pattern, for_each_chunk, norm, sum,
+};
+use crate::momentum::{self, ElementState, Known};
+use crate::topology::Topology;
+
+/// How much of the energy that flows in at an outlet is damped; one half makes the energy of the scheme bounded.
+const BACKFLOW: f64 = 0.5;
+
+/// An incompressible Newtonian fluid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fluid {
+    /// Mass per volume.
+    pub density: f64,
+    /// The dynamic viscosity.
+    pub viscosity: f64,
+}
+
+/// How the equations are solved.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// The residual of the momentum equation, relative to its right-hand side.
+    pub momentum_tolerance: f64,
+    /// The residual of the pressure equation, relative to its right-hand side.
+    pub pressure_tolerance: f64,
+    /// No solve takes more iterations than this.
+    pub iteration_limit: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { momentum_tolerance: 1e-7, pressure_tolerance: 1e-6, iteration_limit: 200 }
+    }
+}
+
+/// Where the mesh is at the end of a step.
+#[derive(Debug, Clone, Copy)]
+pub struct Motion<'a> {
+    /// The coordinates of each vertex, in the mesh's numbering.
+    pub points: &'a [Vector],
+}
+
+/// What one step came to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepOutcome {
+    /// The solve of the momentum equation.
+    pub momentum: Outcome,
+    /// The solve of the pressure equation; both solves where the step began with an impulse.
+    pub pressure: Outcome,
+    /// The flux of the velocity out through the whole boundary; 0 up to the tolerance of the pressure solve.
+    pub imbalance: f64,
+}
+
+/// The flow on one mesh.
+///
+/// Arrays go in and come out in the mesh's numbering; within, the solver has its own.
+#[derive(Debug)]
+pub struct Solver {
+    settings: Settings,
+    fluid: Fluid,
+    topology: Topology,
+    geometry: Geometry,
+    boundary: Boundary,
+    cycle: u64,
+    time: f64,
+    parameters: Vec<f64>,
+
+    velocity: Vec<Vector>,
+    previous_velocity: Vec<Vector>,
+    pressure: Vec<f64>,
+    potential: Vec<f64>,
+    mesh_velocity: Vec<Vector>,
+    moving: bool,
+    /// Whether the boundary values jump before the next step.
+    jump: bool,
+    /// How many steps of the present, unbroken history there are for the time derivative.
+    history_length: u32,
+
+    momentum: Matrix,
+    momentum_diagonal: Vec<usize>,
+    momentum_preconditioner: BlockIncompleteLu,
+    momentum_solver: BiCgStab,
+    projection: Projection,
+    states: Vec<ElementState>,
+    convecting: Vec<Vector>,
+    history: Vec<Vector>,
+    right: Vec<Vector>,
+    scratch: Vec<Vector>,
+}
+
+/// The pressure equation.
+#[derive(Debug)]
+struct Projection {
+    matrix: Matrix,
+    diagonal: Vec<usize>,
+    multigrid: Multigrid,
+    /// Whether the multigrid was set up for another shape than the matrix.
+    stale: bool,
+    /// How many iterations a full solve took with a fresh multigrid.
+    usual_iterations: usize,
+    solver: ConjugateGradients,
+    right: Vec<f64>,
+}
+
+impl Solver {
+    /// A fluid at rest on a mesh of tetrahedra.
+    ///
+    /// # Errors
+    /// [`SolverError`] for a mesh that is not of tetrahedra, that has an inverted one, or for a fluid that is none.
+    pub fn new(mesh: &Mesh, patches: Vec<Patch>, fluid: Fluid, settings: Settings) -> Result<Self, SolverError> {
+        check_fluid(fluid)?;
+        let topology = Topology::new(mesh)?;
+        let geometry = Geometry::new(&topology, topology.to_solver(mesh.points()));
+        check_elements(&topology, &geometry, 0)?;
+        let boundary = Boundary::new(&topology, patches, &geometry.points)?;
+        let vertices = topology.vertex_count();
+        let momentum = Matrix::zeros(std::sync::Arc::clone(&topology.pattern));
+        let (momentum_diagonal, momentum_preconditioner) = diagonal_of(&topology.pattern)
+            .zip(BlockIncompleteLu::new(&topology.pattern))
+            .ok_or(SolverError::NoCells)?;
+        let projection = Projection::new(&topology, &geometry, &boundary, momentum_diagonal.clone());
+        Ok(Self {
+            settings,
+            fluid,
+            cycle: 0,
+            time: 0.0,
+            parameters: Vec::new(),
+            velocity: vec![[0.0; 3]; vertices],
+            previous_velocity: vec![[0.0; 3]; vertices],
+            pressure: vec![0.0; vertices],
+            potential: vec![0.0; vertices],
+            mesh_velocity: vec![[0.0; 3]; vertices],
+            moving: false,
+            jump: true,
+            history_length: 0,
+            momentum,
+            momentum_diagonal,
+            momentum_preconditioner,
+            momentum_solver: BiCgStab::default(),
+            projection,
+            states: Vec::new(),
+            convecting: vec![[0.0; 3]; vertices],
+            history: vec![[0.0; 3]; vertices],
+            right: vec![[0.0; 3]; vertices],
+            scratch: Vec::new(),
+            topology,
+            geometry,
+            boundary,
+        })
+    }
+
+    /// Starts from this velocity and pressure instead of from rest.
+    pub fn initialise(&mut self, velocity: &[Value; 3], pressure: &Value) {
+        for (vertex, &position) in self.geometry.points.iter().enumerate() {
+            let place = Place { position, time: self.time, parameters: &self.parameters };
+            self.velocity[vertex] = [0, 1, 2].map(|axis: usize| velocity[axis].at(&place));
+            self.pressure[vertex] = pressure.at(&place);
+        }
+        self.history_length = 0;
+        self.jump = true;
+    }
+
+    /// Sets the parameters that boundary values may depend on; a change acts from the next step on, as a jump.
+    pub fn set_parameters(&mut self, parameters: &[f64]) {
+        if self.parameters != parameters {
+            self.parameters = parameters.to_vec();
+            self.jump = true;
+        }
+    }
+
+    /// Changes the fluid from the next step on.
+    ///
+    /// # Errors
+    /// [`SolverError::NotPositive`]; the fluid then stays as it is.
+    pub fn set_fluid(&mut self, fluid: Fluid) -> Result<(), SolverError> {
+        check_fluid(fluid)?;
+        self.fluid = fluid;
+        Ok(())
+    }
+
+    /// Goes on by one time step; `motion` says where the mesh is at its end, where it moves.
+    ///
+    /// The mesh velocity over the step is the displacement divided by the time step. No-slip walls take the fluid with them;
+    /// a prescribed velocity is taken as it stands.
+    ///
+    /// # Errors
+    /// [`SolverError::Inverted`] for a motion that turns an element inside out, and [`SolverError::Length`]: the solver then
+    /// is as before. [`SolverError::Diverged`] where the solution is no longer finite: there is no going on from there.
+    pub fn step(&mut self, time_step: f64, motion: Option<Motion>) -> Result<StepOutcome, SolverError> {
+        if !(time_step > 0.0 && time_step.is_finite()) {
+            return Err(SolverError::NotPositive { what: "the time step", value: time_step });
+        }
+        let moves = self.move_mesh(time_step, motion)?;
+        let end = self.time + time_step;
+        let impulse = self.jump || moves != self.moving;
+        let mut pressure_outcome = None;
+        if impulse {
+            self.boundary.impose(
+                &mut self.velocity,
+                &self.mesh_velocity,
+                &self.geometry.points,
+                end,
+                &self.parameters,
+            );
+            self.potential.fill(0.0);
+            pressure_outcome = Some(self.project(None));
+            self.potential.fill(0.0);
+        }
+        let second_order = !impulse && !moves && self.history_length >= 2;
+        let rate = self.predict(time_step, second_order);
+        self.assemble(time_step, rate, end);
+
+        std::mem::swap(&mut self.previous_velocity, &mut self.velocity);
+        // `scratch` is the first guess: the solution extrapolated, with the boundary values of the end of the step.
+        std::mem::swap(&mut self.velocity, &mut self.scratch);
+        let momentum = self.solve_momentum();
+        self.boundary.impose_slip(&mut self.velocity, &self.mesh_velocity);
+
+        let mut pressure = self.project(Some(self.fluid.density));
+        let scale = self.fluid.density * rate;
+        let potential = &self.potential;
+        for_each_chunk(&mut self.pressure, |start, chunk| {
+            for (offset, value) in chunk.iter_mut().enumerate() {
+                *value += scale * potential[start + offset];
+            }
+        });
+        if !self.boundary.is_open() {
+            self.centre_pressure();
+        }
+        if let Some(first) = pressure_outcome {
+            pressure.iterations += first.iterations;
+            pressure.converged &= first.converged;
+        }
+        self.moving = moves;
+        self.jump = false;
+        self.history_length = if impulse { 2 } else { self.history_length.saturating_add(1) };
+        self.cycle += 1;
+        self.time = end;
+        self.check_finite()?;
+        Ok(StepOutcome { momentum, pressure, imbalance: self.imbalance() })
+    }
+
+    /// Puts the mesh where it is at the end of the step; whether it moved.
+    fn move_mesh(&mut self, time_step: f64, motion: Option<Motion>) -> Result<bool, SolverError> {
+        let Some(motion) = motion else {
+            if self.moving {
+                self.mesh_velocity.fill([0.0; 3]);
+            }
+            return Ok(false);
+        };
+        let vertices = self.topology.vertex_count();
+        if motion.points.len() != vertices {
+            return Err(SolverError::Length { what: "coordinates", found: motion.points.len(), expected: vertices });
+        }
+        let points = self.topology.to_solver(motion.points);
+        let geometry = Geometry::new(&self.topology, points);
+        check_elements(&self.topology, &geometry, self.cycle)?;
+        let mut moves = false;
+        for (velocity, (new, old)) in
+            self.mesh_velocity.iter_mut().zip(geometry.points.iter().zip(&self.geometry.points))
+        {
+            *velocity = std::array::from_fn(|axis| (new[axis] - old[axis]) / time_step);
+            moves |= *velocity != [0.0; 3];
+        }
+        self.geometry = geometry;
+        self.boundary.measure(&self.geometry.points);
+        self.projection.reassemble(&self.topology, &self.geometry, &self.boundary);
+        Ok(moves)
+    }
+
+    /// Prepares the known part of the time derivative, the convecting velocity and the first guess (in `scratch`); the rate.
+    fn predict(&mut self, time_step: f64, second_order: bool) -> f64 {
+        let (now, before, mesh) = (&self.velocity, &self.previous_velocity, &self.mesh_velocity);
+        self.scratch.resize(now.len(), [0.0; 3]);
+        let (last, weights) = if second_order { (-1.0, [2.0, -0.5]) } else { (0.0, [1.0, 0.0]) };
+        for_each_chunk(&mut self.history, |start, chunk| {
+            for (offset, value) in chunk.iter_mut().enumerate() {
+                let (now, before) = (now[start + offset], before[start + offset]);
+                *value = std::array::from_fn(|c| (weights[0] * now[c] + weights[1] * before[c]) / time_step);
+            }
+        });
+        for_each_chunk(&mut self.scratch, |start, chunk| {
+            for (offset, value) in chunk.iter_mut().enumerate() {
+                let (now, before) = (now[start + offset], before[start + offset]);
+                *value = std::array::from_fn(|c| now[c] + last * (before[c] - now[c]));
+            }
+        });
+        let guess = &self.scratch;
+        for_each_chunk(&mut self.convecting, |start, chunk| {
+            for (offset, value) in chunk.iter_mut().enumerate() {
+                let (guess, mesh) = (guess[start + offset], mesh[start + offset]);
+                *value = std::array::from_fn(|c| guess[c] - mesh[c]);
+            }
+        });
+        if second_order { 1.5 / time_step } else { 1.0 / time_step }
+    }
+
+    /// Fills the momentum matrix and its right-hand side, boundary conditions included.
+    fn assemble(&mut self, time_step: f64, rate: f64, end: f64) {
+        let known = Known {
+            convecting: &self.convecting,
+            history: &self.history,
+            rate,
+            pressure: &self.pressure,
+            time_step,
+            fluid: self.fluid,
+        };
+        momentum::element_states(&self.topology, &self.geometry, &known, &mut self.states);
+        momentum::assemble(
+            &self.topology,
+            &self.geometry,
+            &known,
+            &self.states,
+            &mut self.momentum,
+            &mut self.right,
+        );
+        for outlet in &self.boundary.outlets {
+            let vertex = outlet.vertex as usize;
+            let given = self.boundary.outlet_pressure(outlet, &self.geometry.points, end, &self.parameters);
+            for axis in 0..3 {
+                self.right[vertex][axis] += outlet.area[axis] * (self.pressure[vertex] - given);
+            }
+            let outward = dot(self.convecting[vertex], outlet.area);
+            self.momentum.values[self.momentum_diagonal[vertex]] -= BACKFLOW * self.fluid.density * outward.min(0.0);
+        }
+        self.boundary.impose(&mut self.scratch, &self.mesh_velocity, &self.geometry.points, end, &self.parameters);
+        for (vertex, rule) in self.boundary.rules.iter().enumerate() {
+            if *rule != Rule::Free {
+                self.momentum.values[self.topology.pattern.row(vertex)].fill(0.0);
+                self.momentum.values[self.momentum_diagonal[vertex]] = 1.0;
+                self.right[vertex] = self.scratch[vertex];
+            } else {
+                for axis in (0..3).filter(|&axis| self.boundary.held[vertex][axis]) {
+                    self.right[vertex][axis] = self.scratch[vertex][axis];
+                }
+            }
+        }
+    }
+
+    fn solve_momentum(&mut self) -> Outcome {
+        self.momentum_preconditioner.factor(&self.momentum);
+        let (right, rules) = (&self.right, &self.boundary.rules);
+        let squares = sum(right.len(), |range| {
+            let mut total = [0.0; 1];
+            for vertex in range.filter(|&vertex| rules[vertex] == Rule::Free) {
+                total[0] += dot(right[vertex], right[vertex]);
+            }
+            total
+        });
+        let tolerance = self.settings.momentum_tolerance * squares[0].sqrt().max(f64::MIN_POSITIVE);
+        self.momentum_solver.solve(
+            &self.momentum,
+            &self.momentum_preconditioner,
+            &self.boundary.held,
+            &self.right,
+            &mut self.velocity,
+            [tolerance; 3],
+            self.settings.iteration_limit,
+        )
+    }
+
+    /// Makes the velocity satisfy continuity: solves for the potential and subtracts its gradient. With a density, continuity is
+    /// stabilised by the states of the present step.
+    fn project(&mut self, stabilised: Option<f64>) -> Outcome {
+        momentum::divergence(&self.topology, &self.geometry, &self.velocity, &mut self.projection.right);
+        self.projection.right.iter_mut().for_each(|value| *value = -*value);
+        if let Some(density) = stabilised {
+            momentum::subtract_pressure_stabilisation(
+                &self.topology,
+                &self.geometry,
+                &self.states,
+                density,
+                &mut self.scratch,
+                &mut self.projection.right,
+            );
+        }
+        let through: f64 = (0..self.boundary.patches.len())
+            .map(|patch| self.boundary.flux(patch, &self.velocity, &self.geometry.points).abs())
+            .sum();
+        let outcome = self.projection.solve(
+            &self.topology,
+            &mut self.potential,
+            &self.settings,
+            through,
+            self.boundary.is_open(),
+        );
+        self.scratch.resize(self.velocity.len(), [0.0; 3]);
+        momentum::gradient(&self.topology, &self.geometry, &self.potential, &mut self.scratch);
+        // At an outlet, the part normal to it is that which the pressure equation took into its balance.
+        for outlet in &self.boundary.outlets {
+            let vertex = outlet.vertex as usize;
+            let (own, area) = (&mut self.scratch[vertex], outlet.area);
+            let along = dot(*own, area) / dot(area, area) + self.potential[vertex];
+            for axis in 0..3 {
+                own[axis] -= along * area[axis];
+            }
+        }
+        let (gradient, geometry, boundary) = (&self.scratch, &self.geometry, &self.boundary);
+        for_each_chunk(&mut self.velocity, |start, chunk| {
+            for (offset, value) in chunk.iter_mut().enumerate() {
+                let vertex = start + offset;
+                if boundary.rules[vertex] == Rule::Free {
+                    for axis in (0..3).filter(|&axis| !boundary.held[vertex][axis]) {
+                        value[axis] -= gradient[vertex][axis] / geometry.vertex_volumes[vertex];
+                    }
+                }
+            }
+        });
+        self.boundary.impose_slip(&mut self.velocity, &self.mesh_velocity);
+        outcome
+    }
+
+    fn centre_pressure(&mut self) {
+        let (pressure, volumes) = (&self.pressure, &self.geometry.vertex_volumes);
+        let [total, whole] = sum(pressure.len(), |range| {
+            let mut parts = [0.0; 2];
+            for vertex in range {
+                parts[0] += volumes[vertex] * pressure[vertex];
+                parts[1] += volumes[vertex];
+            }
+            parts
+        });
+        self.pressure.iter_mut().for_each(|value| *value -= total / whole);
+    }
+
+    fn check_finite(&self) -> Result<(), SolverError> {
+        let (velocity, pressure) = (&self.velocity, &self.pressure);
+        let [total] = sum(pressure.len(), |range| {
+            [range.map(|v| (velocity[v][0] + velocity[v][1] + velocity[v][2] + pressure[v]) * 0.0).sum()]
+        });
+        if total == 0.0 {
+            return Ok(());
+        }
+        for (rank, &vertex) in self.topology.vertex_order.iter().enumerate() {
+            let values = [self.velocity[rank][0], self.velocity[rank][1], self.velocity[rank][2], self.pressure[rank]];
+            if let Some(component) = values.iter().position(|value| !value.is_finite()) {
+                return Err(SolverError::Diverged {
+                    cycle: self.cycle,
+                    time: self.time,
+                    quantity: if component < 3 { "velocity" } else { "pressure" },
+                    vertex: vertex as usize,
+                    place: self.geometry.points[rank],
+                    value: values[component],
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn imbalance(&self) -> f64 {
+        (0..self.boundary.patches.len()).map(|patch| self.flux(patch)).sum()
+    }
+
+    /// How many steps have been done.
+    #[must_use]
+    pub fn cycle(&self) -> u64 {
+        self.cycle
+    }
+
+    /// The time reached.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// The fluid.
+    #[must_use]
+    pub fn fluid(&self) -> Fluid {
+        self.fluid
+    }
+
+    /// The velocity at each vertex.
+    #[must_use]
+    pub fn velocity(&self) -> Vec<Vector> {
+        self.topology.to_mesh(&self.velocity)
+    }
+
+    /// The pressure at each vertex.
+    #[must_use]
+    pub fn pressure(&self) -> Vec<f64> {
+        self.topology.to_mesh(&self.pressure)
+    }
+
+    /// The coordinates of each vertex.
+    #[must_use]
+    pub fn points(&self) -> Vec<Vector> {
+        self.topology.to_mesh(&self.geometry.points)
+    }
+
+    /// The patches, in the order in which they were given; their triangles in the solver's own numbering.
+    #[must_use]
+    pub fn patches(&self) -> &[Patch] {
+        &self.boundary.patches
+    }
+
+    /// The flux of the velocity out through a patch (volume per time).
+    ///
+    /// # Panics
+    /// Where there is no such patch.
+    #[must_use]
+    pub fn flux(&self, patch: usize) -> f64 {
+        self.boundary.flux(patch, &self.velocity, &self.geometry.points)
+    }
+
+    /// The mean pressure over a patch.
+    ///
+    /// # Panics
+    /// Where there is no such patch.
+    #[must_use]
+    pub fn mean_pressure(&self, patch: usize) -> f64 {
+        self.boundary.mean(patch, &self.pressure, &self.geometry.points).0
+    }
+
+    /// The largest Courant number of any element for a time step: how many elements the fluid crosses in it.
+    #[must_use]
+    pub fn courant(&self, time_step: f64) -> f64 {
+        let across = |(vertices, element): (&[u32; 4], &crate::geometry::Element)| {
+            let mean: Vector = std::array::from_fn(|axis| {
+                0.25 * vertices.iter().map(|&vertex| self.velocity[vertex as usize][axis]).sum::<f64>()
+            });
+            0.5 * time_step * element.gradients.iter().map(|&gradient| dot(mean, gradient).abs()).sum::<f64>()
+        };
+        self.topology.elements.iter().zip(&self.geometry.elements).map(across).fold(0.0, f64::max)
+    }
+}
+
+impl Projection {
+    fn new(topology: &Topology, geometry: &Geometry, boundary: &Boundary, diagonal: Vec<usize>) -> Self {
+        let matrix = pressure_matrix(topology, geometry, boundary, &diagonal);
+        Self {
+            multigrid: Multigrid::new(&matrix),
+            right: vec![0.0; topology.vertex_count()],
+            matrix,
+            diagonal,
+            stale: false,
+            usual_iterations: 0,
+            solver: ConjugateGradients::default(),
+        }
+    }
+
+    fn reassemble(&mut self, topology: &Topology, geometry: &Geometry, boundary: &Boundary) {
+        self.matrix = pressure_matrix(topology, geometry, boundary, &self.diagonal);
+        self.stale = true;
+    }
+
+    /// Solves for the potential; `through` is the sum of the fluxes through the boundary's parts, which says what is small.
+    fn solve(
+        &mut self,
+        topology: &Topology,
+        potential: &mut [f64],
+        settings: &Settings,
+        through: f64,
+        open: bool,
+    ) -> Outcome {
+        let rows = self.right.len();
+        if !open {
+            // Only a right-hand side without a mean has a solution.
+            let used = (0..rows).filter(|&row| !topology.around(row).is_empty()).count();
+            let [total] = sum(rows, |range| [self.right[range].iter().sum()]);
+            #[expect(clippy::cast_precision_loss, reason = "a count of vertices")]
+            let mean = total / used.max(1) as f64;
+            self.right.iter_mut().for_each(|value| *value -= mean);
+        }
+        for row in (0..rows).filter(|&row| topology.around(row).is_empty()) {
+            self.right[row] = 0.0;
+        }
+        #[expect(clippy::cast_precision_loss, reason = "a count of vertices")]
+        let small = 1e-9 * through / (rows as f64).sqrt();
+        let tolerance = (settings.pressure_tolerance * norm(&self.right)).max(small);
+        let solve = |this: &mut Self, potential: &mut [f64], limit| {
+            this.solver.solve(&this.matrix, &mut this.multigrid, &this.right, potential, tolerance, limit)
+        };
+        // An old multigrid still serves a mesh that has moved a little; conjugate gradients have the true matrix.
+        if self.stale {
+            let limit = self.usual_iterations + self.usual_iterations / 2 + 2;
+            let first = solve(self, potential, limit);
+            if first.converged {
+                return first;
+            }
+            self.multigrid = Multigrid::new(&self.matrix);
+            self.stale = false;
+            self.usual_iterations = 0;
+            let mut second = solve(self, potential, settings.iteration_limit);
+            self.usual_iterations = second.iterations;
+            second.iterations += first.iterations;
+            return second;
+        }
+        let outcome = solve(self, potential, settings.iteration_limit);
+        self.usual_iterations = self.usual_iterations.max(outcome.iterations);
+        outcome
+    }
+}
+
+fn diagonal_of(pattern: &Pattern) -> Option<Vec<usize>> {
+    pattern.diagonal()
+}
+
+/// The Laplacian, and at outlets the flux that a potential drives out of each vertex.
+fn pressure_matrix(topology: &Topology, geometry: &Geometry, boundary: &Boundary, diagonal: &[usize]) -> Matrix {
+    let mut matrix = geometry.laplacian(topology);
+    for outlet in &boundary.outlets {
+        let vertex = outlet.vertex as usize;
+        matrix.values[diagonal[vertex]] += dot(outlet.area, outlet.area) / geometry.vertex_volumes[vertex];
+    }
+    for vertex in (0..topology.vertex_count()).filter(|&vertex| topology.around(vertex).is_empty()) {
+        matrix.values[diagonal[vertex]] = 1.0;
+    }
+    matrix
+}
+
+fn check_fluid(fluid: Fluid) -> Result<(), SolverError> {
+    for (what, value) in [("the density", fluid.density), ("the viscosity", fluid.viscosity)] {
+        if !(value > 0.0 && value.is_finite()) {
+            return Err(SolverError::NotPositive { what, value });
+        }
+    }
+    Ok(())
+}
+
+fn check_elements(topology: &Topology, geometry: &Geometry, cycle: u64) -> Result<(), SolverError> {
+    let Some(element) = geometry.inverted() else { return Ok(()) };
+    let corners = topology.elements[element].map(|vertex| geometry.points[vertex as usize]);
+    Err(SolverError::Inverted {
+        cycle,
+        cell: topology.element_order[element] as usize,
+        place: std::array::from_fn(|axis| 0.25 * corners.iter().map(|corner| corner[axis]).sum::<f64>()),
+        volume: geometry.elements[element].volume,
+    })
+}
