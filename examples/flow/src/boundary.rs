@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tombolo_deform::mesh::Vector;
 
 use crate::SolverError;
-use crate::geometry::{cross, dot, minus};
+use crate::geometry::{Geometry, cross, dot, minus};
 use crate::topology::Topology;
 
 /// Where and when a [`Value`] is asked for.
@@ -99,7 +99,13 @@ pub(crate) struct OutletVertex {
     pub patch: u32,
     /// The integral of the vertex's shape function times the outward normal.
     pub area: Vector,
+    /// The velocity with which a potential of one drives fluid out (1/length); the same all over the patch.
+    pub yield_rate: f64,
 }
+
+/// How much stiffer an outlet is than the lumped mass of its vertices says: no tetrahedron's mass matrix is less than a fifth of
+/// its lumped one (Wathen 1987), and the projection is stable only where the pressure equation is the stiffer one.
+const OUTLET_STIFFNESS: f64 = 5.0;
 
 /// A vertex on a frictionless wall.
 #[derive(Debug, Clone, Copy)]
@@ -120,7 +126,7 @@ pub(crate) struct Boundary {
 }
 
 impl Boundary {
-    pub fn new(topology: &Topology, mut patches: Vec<Patch>, points: &[Vector]) -> Result<Self, SolverError> {
+    pub fn new(topology: &Topology, mut patches: Vec<Patch>, geometry: &Geometry) -> Result<Self, SolverError> {
         let vertex_count = topology.vertex_count();
         for patch in &mut patches {
             for vertex in patch.triangles.iter_mut().flatten() {
@@ -154,12 +160,13 @@ impl Boundary {
         }
         let mut boundary =
             Self { patches, rules, held: vec![[false; 3]; vertex_count], outlets: Vec::new(), slip: Vec::new() };
-        boundary.measure(points);
+        boundary.measure(geometry);
         Ok(boundary)
     }
 
     /// Brings normals and areas up to date with the coordinates.
-    pub fn measure(&mut self, points: &[Vector]) {
+    pub fn measure(&mut self, geometry: &Geometry) {
+        let points = geometry.points.as_slice();
         self.outlets.clear();
         self.slip.clear();
         self.held.fill([false; 3]);
@@ -182,6 +189,7 @@ impl Boundary {
                     }
                 }
             }
+            let first_outlet = self.outlets.len();
             for &vertex in vertices.iter().filter(|&&vertex| self.rules[vertex as usize] == Rule::Free) {
                 let area = areas[vertex as usize];
                 let size = dot(area, area).sqrt();
@@ -190,7 +198,7 @@ impl Boundary {
                 }
                 if let Condition::Pressure(_) = patch.condition {
                     #[expect(clippy::cast_possible_truncation, reason = "a mesh has few features")]
-                    self.outlets.push(OutletVertex { vertex, patch: index as u32, area });
+                    self.outlets.push(OutletVertex { vertex, patch: index as u32, area, yield_rate: 0.0 });
                 } else {
                     let normal = area.map(|value| value / size);
                     if let Some(axis) = (0..3).find(|&axis| normal[axis].abs() > 1.0 - 1e-12) {
@@ -198,6 +206,14 @@ impl Boundary {
                     }
                     self.slip.push(SlipVertex { vertex, normal });
                 }
+            }
+            let (mut area, mut volume) = (0.0, 0.0);
+            for outlet in &self.outlets[first_outlet..] {
+                area += dot(outlet.area, outlet.area).sqrt();
+                volume += geometry.vertex_volumes[outlet.vertex as usize];
+            }
+            for outlet in &mut self.outlets[first_outlet..] {
+                outlet.yield_rate = OUTLET_STIFFNESS * area / volume;
             }
         }
     }
@@ -208,7 +224,14 @@ impl Boundary {
     }
 
     /// Writes the prescribed velocities into `velocity`, and takes the part normal to frictionless walls from the mesh.
-    pub fn impose(&self, velocity: &mut [Vector], mesh_velocity: &[Vector], points: &[Vector], time: f64, parameters: &[f64]) {
+    pub fn impose(
+        &self,
+        velocity: &mut [Vector],
+        mesh_velocity: &[Vector],
+        points: &[Vector],
+        time: f64,
+        parameters: &[f64],
+    ) {
         for (vertex, rule) in self.rules.iter().enumerate() {
             match *rule {
                 Rule::Free => {}

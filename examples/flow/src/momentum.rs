@@ -38,12 +38,7 @@ pub(crate) struct Known<'a> {
 }
 
 /// Gathers each element's state.
-pub(crate) fn element_states(
-    topology: &Topology,
-    geometry: &Geometry,
-    known: &Known,
-    states: &mut Vec<ElementState>,
-) {
+pub(crate) fn element_states(topology: &Topology, geometry: &Geometry, known: &Known, states: &mut Vec<ElementState>) {
     (&topology.elements, &geometry.elements)
         .into_par_iter()
         .with_min_len(1024)
@@ -173,8 +168,7 @@ pub(crate) fn subtract_pressure_stabilisation(
             for incidence in topology.around(start + offset) {
                 let element = incidence.element as usize;
                 for axis in 0..3 {
-                    total[axis] +=
-                        0.25 * geometry.elements[element].volume * states[element].pressure_gradient[axis];
+                    total[axis] += 0.25 * geometry.elements[element].volume * states[element].pressure_gradient[axis];
                 }
             }
             let volume = geometry.vertex_volumes[start + offset];

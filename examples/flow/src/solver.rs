@@ -14,6 +14,9 @@ use crate::topology::Topology;
 /// How much of the energy that flows in at an outlet is damped; one half makes the energy of the scheme bounded.
 const BACKFLOW: f64 = 0.5;
 
+/// How often the velocity is projected at the beginning of a step with an impulse.
+const IMPULSE_PROJECTIONS: usize = 4;
+
 /// An incompressible Newtonian fluid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fluid {
@@ -119,7 +122,7 @@ impl Solver {
         let topology = Topology::new(mesh)?;
         let geometry = Geometry::new(&topology, topology.to_solver(mesh.points()));
         check_elements(&topology, &geometry, 0)?;
-        let boundary = Boundary::new(&topology, patches, &geometry.points)?;
+        let boundary = Boundary::new(&topology, patches, &geometry)?;
         let vertices = topology.vertex_count();
         let momentum = Matrix::zeros(std::sync::Arc::clone(&topology.pattern));
         let (momentum_diagonal, momentum_preconditioner) = diagonal_of(&topology.pattern)
@@ -202,16 +205,8 @@ impl Solver {
         let impulse = self.jump || moves != self.moving;
         let mut pressure_outcome = None;
         if impulse {
-            self.boundary.impose(
-                &mut self.velocity,
-                &self.mesh_velocity,
-                &self.geometry.points,
-                end,
-                &self.parameters,
-            );
-            self.potential.fill(0.0);
-            pressure_outcome = Some(self.project(None));
-            self.potential.fill(0.0);
+            self.boundary.impose(&mut self.velocity, &self.mesh_velocity, &self.geometry.points, end, &self.parameters);
+            pressure_outcome = Some(self.apply_impulse());
         }
         let second_order = !impulse && !moves && self.history_length >= 2;
         let rate = self.predict(time_step, second_order);
@@ -247,6 +242,20 @@ impl Solver {
         Ok(StepOutcome { momentum, pressure, imbalance: self.imbalance() })
     }
 
+    /// Projects the velocity onto its new boundary values. The projection is approximate where the velocity jumps, hence repeated.
+    fn apply_impulse(&mut self) -> Outcome {
+        let mut total = Outcome { converged: true, ..Outcome::default() };
+        for _ in 0..IMPULSE_PROJECTIONS {
+            self.potential.fill(0.0);
+            let outcome = self.project(None);
+            total.iterations += outcome.iterations;
+            total.residual = outcome.residual;
+            total.converged &= outcome.converged;
+        }
+        self.potential.fill(0.0);
+        total
+    }
+
     /// Puts the mesh where it is at the end of the step; whether it moved.
     fn move_mesh(&mut self, time_step: f64, motion: Option<Motion>) -> Result<bool, SolverError> {
         let Some(motion) = motion else {
@@ -270,7 +279,7 @@ impl Solver {
             moves |= *velocity != [0.0; 3];
         }
         self.geometry = geometry;
-        self.boundary.measure(&self.geometry.points);
+        self.boundary.measure(&self.geometry);
         self.projection.reassemble(&self.topology, &self.geometry, &self.boundary);
         Ok(moves)
     }
@@ -313,21 +322,15 @@ impl Solver {
             fluid: self.fluid,
         };
         momentum::element_states(&self.topology, &self.geometry, &known, &mut self.states);
-        momentum::assemble(
-            &self.topology,
-            &self.geometry,
-            &known,
-            &self.states,
-            &mut self.momentum,
-            &mut self.right,
-        );
+        momentum::assemble(&self.topology, &self.geometry, &known, &self.states, &mut self.momentum, &mut self.right);
         for outlet in &self.boundary.outlets {
             let vertex = outlet.vertex as usize;
             let given = self.boundary.outlet_pressure(outlet, &self.geometry.points, end, &self.parameters);
             for axis in 0..3 {
                 self.right[vertex][axis] += outlet.area[axis] * (self.pressure[vertex] - given);
             }
-            let outward = dot(self.convecting[vertex], outlet.area);
+            // Inflow both through space and through the mesh: a stream that leaves is not damped because the outlet moves.
+            let outward = dot(self.convecting[vertex], outlet.area).max(dot(self.scratch[vertex], outlet.area));
             self.momentum.values[self.momentum_diagonal[vertex]] -= BACKFLOW * self.fluid.density * outward.min(0.0);
         }
         self.boundary.impose(&mut self.scratch, &self.mesh_velocity, &self.geometry.points, end, &self.parameters);
@@ -397,9 +400,12 @@ impl Solver {
         for outlet in &self.boundary.outlets {
             let vertex = outlet.vertex as usize;
             let (own, area) = (&mut self.scratch[vertex], outlet.area);
-            let along = dot(*own, area) / dot(area, area) + self.potential[vertex];
+            let size = dot(area, area).sqrt();
+            let normal = area.map(|value| value / size);
+            let driven = self.geometry.vertex_volumes[vertex] * outlet.yield_rate * self.potential[vertex];
+            let along = dot(*own, normal) + driven;
             for axis in 0..3 {
-                own[axis] -= along * area[axis];
+                own[axis] -= along * normal[axis];
             }
         }
         let (gradient, geometry, boundary) = (&self.scratch, &self.geometry, &self.boundary);
@@ -607,7 +613,7 @@ fn pressure_matrix(topology: &Topology, geometry: &Geometry, boundary: &Boundary
     let mut matrix = geometry.laplacian(topology);
     for outlet in &boundary.outlets {
         let vertex = outlet.vertex as usize;
-        matrix.values[diagonal[vertex]] += dot(outlet.area, outlet.area) / geometry.vertex_volumes[vertex];
+        matrix.values[diagonal[vertex]] += outlet.yield_rate * dot(outlet.area, outlet.area).sqrt();
     }
     for vertex in (0..topology.vertex_count()).filter(|&vertex| topology.around(vertex).is_empty()) {
         matrix.values[diagonal[vertex]] = 1.0;

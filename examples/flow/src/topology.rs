@@ -6,8 +6,8 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use tombolo_deform::mesh::{CellType, Mesh};
 
-use crate::linear::Pattern;
 use crate::SolverError;
+use crate::linear::Pattern;
 
 /// The tetrahedra of a mesh in the solver's own numbering, and the sparsity of every matrix on them.
 ///

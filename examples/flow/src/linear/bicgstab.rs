@@ -105,8 +105,7 @@ impl BiCgStab {
 
             preconditioner.apply(&self.residual, &mut self.second);
             multiply(matrix, held, &self.second, &mut self.second_image);
-            let (top, bottom) =
-                (dot(&self.second_image, &self.residual), dot(&self.second_image, &self.second_image));
+            let (top, bottom) = (dot(&self.second_image, &self.residual), dot(&self.second_image, &self.second_image));
             omega = quotient(open, |c| top[c], |c| bottom[c]);
             update(solution, omega, &self.second);
             update(&mut self.residual, omega.map(|value| -value), &self.second_image);
