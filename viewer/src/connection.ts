@@ -10,8 +10,8 @@ export type ConnectionState = "connecting" | "connected" | "reconnecting" | "ref
 /** The part of the browser that a connection needs, so that a test can stand in for it. */
 export interface Surroundings {
   open(address: string): WebSocket;
-  /** The HTTP status with which the address answers an ordinary request; null when nothing answers. */
-  probe(address: string): Promise<number | null>;
+  /** How the address answers an ordinary request; null when nothing answers. */
+  probe(address: string): Promise<{ status: number; text: string } | null>;
   setTimer(action: () => void, milliseconds: number): number;
   clearTimer(timer: number): void;
   random(): number;
@@ -50,7 +50,8 @@ export const browserSurroundings: Surroundings = {
   open: (address) => new WebSocket(address),
   probe: async (address) => {
     try {
-      return (await fetch(address, { cache: "no-store", redirect: "error" })).status;
+      const response = await fetch(address, { cache: "no-store", redirect: "error" });
+      return { status: response.status, text: (await response.text()).slice(0, 300).trim() };
     } catch {
       return null;
     }
@@ -66,6 +67,8 @@ export class Connection {
   private timer: number | null = null;
   private closed = false;
   state: ConnectionState = "connecting";
+  /** What the server calls this viewer: named when it comes back, so that it finds the wheel where it left it. */
+  client: string | null = null;
 
   constructor(
     private readonly target: { address: string; probe: string; token: string },
@@ -108,7 +111,8 @@ export class Connection {
   private open(): void {
     let socket: WebSocket;
     try {
-      socket = this.surroundings.open(this.target.address);
+      const client = this.client === null ? "" : `&client=${encodeURIComponent(this.client)}`;
+      socket = this.surroundings.open(this.target.address + client);
     } catch (error) {
       this.again("reconnecting", error instanceof Error ? error.message : String(error), backOff(this.attempt++, this.surroundings.random()));
       return;
@@ -118,7 +122,6 @@ export class Connection {
     let opened = false;
     socket.onopen = () => {
       opened = true;
-      this.attempt = 0;
       this.change("connected", "");
     };
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => {
@@ -133,36 +136,29 @@ export class Connection {
         this.listener.trouble(error instanceof Error ? error.message : String(error));
         return;
       }
+      // Only a server that has something to say ends the waiting: one that closes at once is not asked ever faster.
+      this.attempt = 0;
       this.listener.message(message);
     };
     socket.onclose = (event: CloseEvent) => {
       if (this.socket !== socket) return;
       this.socket = null;
-      if (!this.closed) void this.lost(opened, event.code, event.reason);
+      if (!this.closed) void this.lost(opened, event.reason);
     };
   }
 
-  private async lost(opened: boolean, code: number, reason: string): Promise<void> {
-    if (code === 1008 || code === 4401 || code === 4403) {
-      this.refuse(reason);
-      return;
-    }
+  private async lost(opened: boolean, reason: string): Promise<void> {
     // A browser does not say why an opening failed; an ordinary request to the same address does.
-    if (!opened) {
-      const status = await this.surroundings.probe(this.target.probe);
-      if (this.closed) return;
-      if (status === 401 || status === 403) {
-        this.refuse("");
-        return;
-      }
+    const answer = opened ? null : await this.surroundings.probe(this.target.probe);
+    if (this.closed) return;
+    if (answer?.status === 401) {
+      this.again("refused", this.target.token === "" ? "The link has no token." : "The simulation does not accept the token in this link.", REFUSED_DELAY);
+    } else if (answer?.status === 403) {
+      this.again("refused", `The simulation does not accept this address: ${answer.text}.`, REFUSED_DELAY);
+    } else {
+      const what = reason !== "" ? `The simulation closed the connection: ${reason}.` : opened ? "The connection was lost." : "The simulation does not answer.";
+      this.again("reconnecting", what, backOff(this.attempt++, this.surroundings.random()));
     }
-    const delay = backOff(this.attempt++, this.surroundings.random());
-    this.again("reconnecting", opened ? "The connection was lost." : "The simulation does not answer.", delay);
-  }
-
-  private refuse(reason: string): void {
-    const what = this.target.token === "" ? "The link has no token." : "The simulation does not accept the token in this link.";
-    this.again("refused", reason && this.target.token !== "" ? `${what} (${reason})` : what, REFUSED_DELAY);
   }
 
   private again(state: ConnectionState, explanation: string, delay: number): void {

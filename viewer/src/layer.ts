@@ -16,7 +16,7 @@ export type Highlight = "hover" | "handle" | "fixed";
 export const HIGHLIGHT_COLOURS: Record<Highlight, Colour> = {
   hover: [1, 1, 1], handle: [1, 0.6, 0.2], fixed: [0.35, 0.72, 1],
 };
-const HIGHLIGHT_OPACITY: Record<Highlight, number> = { hover: 0.3, handle: 0.55, fixed: 0.55 };
+const HIGHLIGHT_OPACITY: Record<Highlight, number> = { hover: 0.25, handle: 0.35, fixed: 0.4 };
 const SOLID: Colour = [0.72, 0.76, 0.8];
 const EDGE: Colour = [0.82, 0.85, 0.88];
 
@@ -67,7 +67,7 @@ export class Layer {
   private readonly points = vtkPoints.newInstance();
   private readonly surface: Piece;
   private readonly edges: Piece;
-  private readonly highlights: Record<Highlight, Piece>;
+  private readonly highlights: Record<Highlight, { tint: Piece; outline: Piece }>;
   private readonly highlighted: Record<Highlight, string> = { hover: "", handle: "", fixed: "" };
 
   constructor(readonly name: string, readonly kind: string, private readonly renderer: vtkRenderer, colours: vtkColorTransferFunction) {
@@ -91,15 +91,19 @@ export class Layer {
     this.edges.actor.getProperty().setLighting(false);
     this.edges.actor.getProperty().setOpacity(0.5);
     this.raise(this.edges, -2);
-    const highlight = (kindOf: Highlight, order: number): Piece => {
-      const piece = new Piece(this.points, renderer);
-      piece.actor.getProperty().setColor(...HIGHLIGHT_COLOURS[kindOf]);
-      piece.actor.getProperty().setOpacity(HIGHLIGHT_OPACITY[kindOf]);
-      piece.actor.getProperty().setAmbient(0.5);
-      piece.actor.getProperty().setDiffuse(0.5);
-      piece.actor.setVisibility(false);
-      this.raise(piece, order);
-      return piece;
+    const highlight = (kindOf: Highlight, order: number): { tint: Piece; outline: Piece } => {
+      const tint = new Piece(this.points, renderer);
+      const outline = new Piece(this.points, renderer);
+      for (const piece of [tint, outline]) {
+        piece.actor.getProperty().setColor(...HIGHLIGHT_COLOURS[kindOf]);
+        piece.actor.setVisibility(false);
+        this.raise(piece, piece === tint ? order : order - 2);
+      }
+      tint.actor.getProperty().setOpacity(HIGHLIGHT_OPACITY[kindOf]);
+      tint.actor.getProperty().setAmbient(0.5);
+      tint.actor.getProperty().setDiffuse(0.5);
+      outline.actor.getProperty().setLighting(false);
+      return { tint, outline };
     };
     this.highlights = { fixed: highlight("fixed", -1), handle: highlight("handle", -1), hover: highlight("hover", -1.5) };
   }
@@ -115,7 +119,7 @@ export class Layer {
   }
 
   private pieces(): Piece[] {
-    return [this.surface, this.edges, ...Object.values(this.highlights)];
+    return [this.surface, this.edges, ...Object.values(this.highlights).flatMap(({ tint, outline }) => [tint, outline])];
   }
 
   setTopology(topology: TopologyFrame): void {
@@ -196,9 +200,10 @@ export class Layer {
     topology.triangleFeatures.forEach((feature, triangle) => {
       if (wanted.has(feature)) picked.push(topology.triangles[3 * triangle]!, topology.triangles[3 * triangle + 1]!, topology.triangles[3 * triangle + 2]!);
     });
-    const piece = this.highlights[kind];
-    piece.setTriangles(Uint32Array.from(picked));
-    piece.actor.setVisibility(this.visible && picked.length > 0);
+    const triangles = Uint32Array.from(picked);
+    const { tint, outline } = this.highlights[kind];
+    tint.setTriangles(triangles);
+    outline.setLines(featureEdges(triangles, new Uint32Array(triangles.length / 3), topology.points));
   }
 
   /** Brings what is shown in line with `visible` and `opacity`. */
@@ -208,7 +213,7 @@ export class Layer {
     this.surface.actor.getProperty().setOpacity(this.opacity);
     this.edges.actor.setVisibility(drawn && this.topology?.triangleFeatures !== null);
     for (const kind of Object.keys(this.highlights) as Highlight[]) {
-      this.highlights[kind].actor.setVisibility(drawn && this.highlighted[kind] !== "");
+      for (const piece of Object.values(this.highlights[kind])) piece.actor.setVisibility(drawn && this.highlighted[kind] !== "");
     }
   }
 }

@@ -56,11 +56,18 @@ const connection = new Connection(streamAddress(window.location.href), {
     refresh();
   },
   message: takeMessage,
-  binary: (bytes) => decoder.push(bytes),
+  binary: (bytes) => {
+    bar.alive();
+    decoder.push(bytes);
+  },
   trouble: report,
 });
 
+const CLIENT = "tombolo-client";
+connection.client = sessionStorage.getItem(CLIENT);
+
 function takeMessage(message: ServerMessage): void {
+  bar.alive();
   switch (message.kind) {
     case "hello": return takeHello(message.body);
     case "status":
@@ -79,6 +86,8 @@ function takeMessage(message: ServerMessage): void {
 
 function takeHello(body: Hello): void {
   hello = body;
+  connection.client = String(body.client);
+  sessionStorage.setItem(CLIENT, connection.client);
   const names = body.features.map((feature) => feature.name);
   write(part("channel"), body.channel ?? "");
   scene.setViews(body.views);

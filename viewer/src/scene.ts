@@ -14,6 +14,9 @@ import type { Selection } from "./selection";
 
 const BACKGROUND: Vector = [0.086, 0.094, 0.106];
 
+/** The longest pause between two pictures of new values, in milliseconds. */
+const LONGEST_REST = 500;
+
 export interface SceneEvents {
   /** The range of the values that are drawn now; null when nothing is coloured. */
   range(range: [number, number] | null): void;
@@ -35,6 +38,9 @@ export class Scene {
   private locked: [number, number] | null = null;
   private map: ColourMap | null = null;
   private scheduled = false;
+  /** The time before which new values do not ask for a picture. */
+  private rested = 0;
+  private waiting: number | null = null;
   private placed = false;
   private recolour = true;
 
@@ -93,7 +99,7 @@ export class Scene {
     const layer = this.layers.get(frame.view);
     if (!layer?.topology || layer.topology.topology !== frame.topology) return false;
     this.pending.set(frame.view, frame);
-    this.request();
+    this.requestGently();
     return true;
   }
 
@@ -269,8 +275,24 @@ export class Scene {
     this.scheduled = true;
     requestAnimationFrame(() => {
       this.scheduled = false;
+      const start = performance.now();
       this.draw();
+      // What a picture costs is known once the browser takes up its next task.
+      setTimeout(() => {
+        this.rested = performance.now();
+        this.rested += Math.min(LONGEST_REST, this.rested - start);
+      }, 0);
     });
+  }
+
+  /** Draws new values, but leaves as much time between pictures as they take: messages and the person come first. */
+  private requestGently(): void {
+    const rest = this.rested - performance.now();
+    if (rest <= 0) this.request();
+    else this.waiting ??= window.setTimeout(() => {
+      this.waiting = null;
+      this.request();
+    }, rest);
   }
 
   private draw(): void {

@@ -7,12 +7,13 @@ import type { Hello, Status } from "./protocol";
 const CONNECTIONS: Record<ConnectionState, string> = {
   connecting: "connecting", connected: "connected", reconnecting: "reconnecting", refused: "wrong token",
 };
-/** Without a word from the simulation for this long, the bar says so. */
+/** Without a word from the simulation for this long, or for ten of its steps, the bar says so. */
 const SILENCE = 4000;
 
 export class StatusBar {
   private heard = 0;
-  private stopped = false;
+  private still = false;
+  private patience = SILENCE;
   private state: ConnectionState = "connecting";
 
   constructor() {
@@ -44,7 +45,8 @@ export class StatusBar {
 
   update(status: Status): void {
     this.heard = performance.now();
-    this.stopped = status.stopped;
+    this.still = status.stopped || status.paused;
+    this.patience = Math.max(SILENCE, 10000 * (status.step_seconds ?? 0));
     write(part("cycle"), String(status.cycle));
     write(part("time"), digits(status.time, 5));
     write(part("step"), seconds(status.step_seconds));
@@ -61,10 +63,15 @@ export class StatusBar {
     this.silence();
   }
 
+  /** Something arrived, whatever it was. */
+  alive(): void {
+    this.heard = performance.now();
+  }
+
   private silence(): void {
     const note = part("silence");
     const quiet = performance.now() - this.heard;
-    note.hidden = this.state !== "connected" || this.stopped || quiet < SILENCE;
+    note.hidden = this.state !== "connected" || this.still || quiet < this.patience;
     if (!note.hidden) write(note, `no word for ${Math.round(quiet / 1000)} s`);
   }
 }

@@ -21,13 +21,15 @@ function setUp(status: number | null = null) {
   const states: [ConnectionState, string][] = [];
   const messages: unknown[] = [];
   const troubles: string[] = [];
+  const addresses: string[] = [];
   const surroundings: Surroundings = {
-    open: () => {
+    open: (address) => {
+      addresses.push(address);
       const socket = new FakeSocket();
       sockets.push(socket);
       return socket as unknown as WebSocket;
     },
-    probe: async () => status,
+    probe: async () => (status === null ? null : { status, text: "no" }),
     setTimer: (action, delay) => timers.push({ action, delay }),
     clearTimer: () => undefined,
     random: () => 0.5,
@@ -37,7 +39,7 @@ function setUp(status: number | null = null) {
     message: (message) => messages.push(message), binary: (bytes) => messages.push(bytes.byteLength), trouble: (text) => troubles.push(text),
   }, surroundings);
   connection.start();
-  return { connection, sockets, timers, states, messages, troubles };
+  return { connection, addresses, sockets, timers, states, messages, troubles };
 }
 const settle = (): Promise<void> => new Promise((resolve) => setTimeout(resolve, 0));
 
@@ -69,6 +71,7 @@ describe("a connection", () => {
       timers.at(-1)!.action();
     }
     sockets.at(-1)!.open();
+    sockets.at(-1)!.onmessage?.({ data: '{"error":{"message":"hello"}}' });
     expect(states.at(-1)![0]).toBe("connected");
     sockets.at(-1)!.end(1006);
     await settle();
@@ -85,9 +88,19 @@ describe("a connection", () => {
     }
     const { sockets, states } = setUp();
     sockets[0]!.open();
-    sockets[0]!.end(1008, "wrong token");
+    sockets[0]!.end(1013, "16 viewers watch already");
     await settle();
-    expect(states.at(-1)).toEqual(["refused", "The simulation does not accept the token in this link. (wrong token)"]);
+    expect(states.at(-1)).toEqual(["reconnecting", "The simulation closed the connection: 16 viewers watch already."]);
+  });
+
+  it("says who it was when it comes back", async () => {
+    const { connection, addresses, sockets, timers } = setUp();
+    sockets[0]!.open();
+    connection.client = "c 7";
+    sockets[0]!.end(1006);
+    await settle();
+    timers[0]!.action();
+    expect(addresses).toEqual(["ws://x/ws?token=t", "ws://x/ws?token=t&client=c%207"]);
   });
 
   it("says when nothing could be sent, and sends JSON when it could", () => {

@@ -166,7 +166,7 @@ export function startFakeServer({ port = 0, token = "0123456789abcdef0123456789a
         { name: "points", components: 3, values: points, type: "u32" }, { name: "velocity", components: 3, values: speeds },
         { name: "pressure", components: 1, values: pressure(speeds) },
       ]);
-      for (const socket of sockets.keys()) if (socket.bufferedAmount < 4e6) socket.send(bytes);
+      for (const socket of sockets.keys()) if (socket.bufferedAmount < 1e5) socket.send(bytes);
     }
     tell({ monitor: { pipeline: "health", cycle, values: { "quality.min": 0.214 * scale + 0.02, "velocity.max": 22.4 / scale } } });
   };
