@@ -74,10 +74,11 @@ enum Operation {
     Maximum,
     Atan2,
     Choose,
-    Unary(fn(f64) -> f64),
+    Unary(Function),
 }
 
-const UNARY: [(&str, fn(f64) -> f64); 17] = [
+type Function = fn(f64) -> f64;
+const UNARY: [(&str, Function); 17] = [
     ("sqrt", f64::sqrt),
     ("exp", f64::exp),
     ("ln", f64::ln),

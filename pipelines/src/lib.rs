@@ -9,3 +9,4 @@ pub mod communicator;
 pub mod expression;
 pub mod extract;
 pub mod language;
+pub mod run;

@@ -1,4 +1,17 @@
 //! What is taken out of a running solver: surfaces, slices and fields, from borrowed arrays to compact copies.
+//!
+//! [`Source`] keeps what does not change while a channel's cells stay the same; [`Source::surface`], [`Source::slice`] and
+//! [`Source::whole`] then make an [`Extract`] of the channel as it is now.
+
+mod error;
+mod gather;
+mod slice;
+mod source;
+mod statistics;
+
+pub use error::ExtractError;
+pub use source::{Extracted, Source};
+pub use statistics::{FieldStatistics, statistics};
 
 use std::sync::Arc;
 

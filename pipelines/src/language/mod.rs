@@ -34,6 +34,7 @@ pub use error::{LanguageError, Problem, nearest};
 pub use order::{Change, Command, JournalEntry, Order, OrderStatus, Parameter, TimedCommand, parse_orders};
 pub use parse::{Validate, parse_json, parse_valid, text};
 pub use validate::file_pattern;
+pub(crate) use validate::monitor_names;
 
 /// Reads and checks a configuration.
 ///

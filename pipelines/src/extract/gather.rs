@@ -1,0 +1,118 @@
+//! Values from the solver's arrays to the points and cells of an extract.
+
+use tombolo_deform::mesh::{ArrayView, Vector};
+
+use super::slice::Crossing;
+use super::{Association, Channel, ExtractError, Field, FieldView};
+
+/// Where the points of an extract come from.
+pub(super) enum Points<'a> {
+    /// Every vertex of the mesh.
+    All,
+    /// These vertices.
+    Vertices(&'a [u32]),
+    /// Between vertices.
+    Crossings(&'a [Crossing]),
+}
+
+/// Where the cells of an extract come from.
+pub(super) enum Owners<'a> {
+    /// Every cell of the mesh.
+    All,
+    /// These cells.
+    Cells(&'a [u32]),
+}
+
+/// The coordinates of these vertices.
+pub(super) fn points(points: &ArrayView, vertices: &[u32], cycle: u64) -> Result<Vec<Vector>, ExtractError> {
+    vertices.iter().map(|&vertex| point(points, vertex as usize, cycle)).collect()
+}
+
+/// The coordinates of one vertex.
+pub(super) fn point(points: &ArrayView, vertex: usize, cycle: u64) -> Result<Vector, ExtractError> {
+    let point = points.vector(vertex);
+    match point.iter().find(|x| !x.is_finite()) {
+        Some(&value) => Err(ExtractError::PointNotFinite { vertex, value, cycle }),
+        None => Ok(point),
+    }
+}
+
+/// The wanted fields, and what was wrong with those that are left out.
+pub(super) fn fields(
+    channel: &Channel,
+    cycle: u64,
+    wanted: &dyn Fn(&str) -> bool,
+    points: &Points,
+    owners: &Owners,
+) -> (Vec<Field>, Vec<ExtractError>) {
+    let (mut fields, mut errors) = (Vec::new(), Vec::new());
+    for view in channel.fields.iter().filter(|view| wanted(view.name)) {
+        match field(channel, cycle, view, points, owners) {
+            Ok(field) => fields.push(field),
+            Err(error) => errors.push(error),
+        }
+    }
+    (fields, errors)
+}
+
+/// Refuses a field that has not one tuple for each vertex or cell.
+pub(super) fn check_length(channel: &Channel, view: &FieldView) -> Result<(), ExtractError> {
+    let expected = match view.association {
+        Association::Vertex => channel.mesh.points.len(),
+        Association::Element => channel.mesh.cells.len(),
+    };
+    if view.values.len() == expected {
+        return Ok(());
+    }
+    Err(ExtractError::FieldLength {
+        field: view.name.to_owned(),
+        association: view.association,
+        found: view.values.len(),
+        expected,
+    })
+}
+
+fn field(
+    channel: &Channel,
+    cycle: u64,
+    view: &FieldView,
+    points: &Points,
+    owners: &Owners,
+) -> Result<Field, ExtractError> {
+    check_length(channel, view)?;
+    let components = view.values.components();
+    let read = |entity: usize, component: usize| {
+        let value = view.values.get(entity, component);
+        if value.is_finite() {
+            return Ok(value);
+        }
+        let (field, association) = (view.name.to_owned(), view.association);
+        Err(ExtractError::FieldNotFinite { field, association, entity, value, cycle })
+    };
+    let mut values = Vec::new();
+    let mut copy = |entities: &mut dyn Iterator<Item = usize>| -> Result<(), ExtractError> {
+        values.reserve(entities.size_hint().0 * components);
+        for entity in entities {
+            for component in 0..components {
+                values.push(read(entity, component)?);
+            }
+        }
+        Ok(())
+    };
+    match (view.association, points, owners) {
+        (Association::Vertex, Points::All, _) => copy(&mut (0..view.values.len()))?,
+        (Association::Vertex, Points::Vertices(vertices), _) => copy(&mut vertices.iter().map(|&v| v as usize))?,
+        (Association::Element, _, Owners::All) => copy(&mut (0..view.values.len()))?,
+        (Association::Element, _, Owners::Cells(cells)) => copy(&mut cells.iter().map(|&cell| cell as usize))?,
+        (Association::Vertex, Points::Crossings(crossings), _) => {
+            values.reserve(crossings.len() * components);
+            for crossing in *crossings {
+                for component in 0..components {
+                    let [a, b] = crossing.edge.map(|vertex| read(vertex as usize, component));
+                    values.push(crossing.between(a?, b?));
+                }
+            }
+        }
+    }
+    Ok(Field { name: view.name.to_owned(), association: view.association, components, values })
+}

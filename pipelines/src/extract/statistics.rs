@@ -1,0 +1,92 @@
+//! Measures of a field over the whole mesh.
+
+use super::gather::check_length;
+use super::{Channel, ExtractError, FieldView};
+use crate::communicator::{Communicator, Reduction};
+
+/// Measures of a field: of its value for a scalar, of its magnitude for a vector or tensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FieldStatistics {
+    /// The least; NaN where there is no finite value.
+    pub min: f64,
+    /// The largest; NaN where there is no finite value.
+    pub max: f64,
+    /// The mean over the vertices or cells, not weighted; NaN where there is no finite value.
+    pub mean: f64,
+    /// The root of the mean square; NaN where there is no finite value.
+    pub l2: f64,
+    /// How many vertices or cells have a component that is NaN or infinite. They are left out of the other measures.
+    pub non_finite: u64,
+    /// The first of them on this rank, and what was found there.
+    pub first_non_finite: Option<(usize, f64)>,
+}
+
+/// How many tuples are added up before their sum is: the sums lose less to rounding.
+const CHUNK: usize = 4096;
+
+/// Measures a field over all ranks.
+///
+/// # Errors
+/// [`ExtractError::FieldLength`].
+pub fn statistics(
+    channel: &Channel,
+    field: &FieldView,
+    communicator: &dyn Communicator,
+) -> Result<FieldStatistics, ExtractError> {
+    check_length(channel, field)?;
+    let values = &field.values;
+    let (mut least, mut largest) = (f64::INFINITY, f64::NEG_INFINITY);
+    let (mut sum, mut scaled_squares, mut count, mut non_finite) = (0.0, 0.0, 0.0_f64, 0.0_f64);
+    let mut first_non_finite = None;
+    let measure = |tuple: usize| match values.components() {
+        1 => values.get(tuple, 0),
+        components => (0..components).fold(0.0_f64, |sum, component| sum.hypot(values.get(tuple, component))),
+    };
+    // The squares of large values would overflow: they are taken of the values over the largest.
+    let mut scale = 0.0_f64;
+    for tuple in 0..values.len() {
+        let value = measure(tuple);
+        if value.is_finite() {
+            scale = scale.max(value.abs());
+        }
+    }
+    let mut widest = [scale];
+    communicator.reduce(Reduction::Maximum, &mut widest);
+    let scale = if widest[0] > 0.0 { widest[0] } else { 1.0 };
+    for start in (0..values.len()).step_by(CHUNK) {
+        let (mut part_sum, mut part_squares) = (0.0, 0.0);
+        for tuple in start..values.len().min(start + CHUNK) {
+            let value = measure(tuple);
+            if !value.is_finite() {
+                non_finite += 1.0;
+                let found = (0..values.components()).map(|component| values.get(tuple, component));
+                first_non_finite =
+                    first_non_finite.or(Some((tuple, found.into_iter().find(|x| !x.is_finite()).unwrap_or(value))));
+                continue;
+            }
+            least = least.min(value);
+            largest = largest.max(value);
+            part_sum += value / scale;
+            part_squares += (value / scale).powi(2);
+            count += 1.0;
+        }
+        sum += part_sum;
+        scaled_squares += part_squares;
+    }
+    let mut extremes = [-least, largest];
+    communicator.reduce(Reduction::Maximum, &mut extremes);
+    let mut sums = [sum, scaled_squares, count, non_finite];
+    communicator.reduce(Reduction::Sum, &mut sums);
+    let [sum, scaled_squares, count, non_finite] = sums;
+    let or_nan = |value: f64| if count > 0.0 { value } else { f64::NAN };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
+    let non_finite = non_finite as u64;
+    Ok(FieldStatistics {
+        min: or_nan(-extremes[0]),
+        max: or_nan(extremes[1]),
+        mean: or_nan(sum / count * scale),
+        l2: or_nan((scaled_squares / count).sqrt() * scale),
+        non_finite,
+        first_non_finite,
+    })
+}

@@ -1,0 +1,169 @@
+//! Pipelines at work: which are due, and what comes of them.
+
+mod due;
+mod output;
+mod pipeline;
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use tombolo_deform::surface::Surface;
+
+use crate::communicator::{Communicator, Solo};
+use crate::extract::{Channel, ExtractError, Snapshot, Source};
+use crate::language::{Config, Due, Problem, Stage, Validate, nearest};
+use pipeline::Prepared;
+
+pub use output::{Encoding, Frame, MonitorValues, Output, View, ViewKind};
+
+/// Runs the pipelines of a configuration.
+///
+/// # Example
+/// ```
+/// use tombolo_deform::{mesh::MeshView, shapes};
+/// use tombolo_pipelines::extract::{Channel, Snapshot};
+/// use tombolo_pipelines::run::{Output, Runner};
+///
+/// let config = tombolo_pipelines::language::parse(
+///     r#"{"version": 1, "pipelines": [
+///         {"name": "health", "every": {"steps": 10}, "stages": [{"quality": {}}],
+///          "when": "quality.min < 0.9", "then": [{"stop": {}}]}]}"#,
+///     "health.json",
+/// )?;
+/// let mut runner = Runner::new(&config)?;
+/// assert!(!runner.is_due(3, 0.3));
+/// assert!(runner.is_due(20, 2.0));
+///
+/// let mesh = shapes::box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
+/// let channels = [Channel { name: "fluid", mesh: MeshView::from(&mesh), fields: &[] }];
+/// let outputs = runner.run(&Snapshot { cycle: 20, time: 2.0, channels: &channels });
+/// assert!(matches!(outputs[..], [Output::Monitor(_), Output::Stop { .. }]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Runner {
+    pipelines: Vec<Prepared>,
+    sources: HashMap<String, Source>,
+    communicator: Arc<dyn Communicator>,
+}
+
+impl Runner {
+    /// Prepares the pipelines for one process.
+    ///
+    /// # Errors
+    /// The first [`Problem`] of a configuration that did not come from the parser.
+    pub fn new(config: &Config) -> Result<Self, Problem> {
+        Self::with_communicator(config, Arc::new(Solo))
+    }
+
+    /// Prepares the pipelines for the processes of a communicator.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn with_communicator(config: &Config, communicator: Arc<dyn Communicator>) -> Result<Self, Problem> {
+        config.validate()?;
+        let pipelines = config.pipelines.iter().filter(|pipeline| pipeline.due != Due::OnOrder);
+        let pipelines: Result<Vec<_>, _> = pipelines.map(Prepared::new).collect();
+        Ok(Self { pipelines: pipelines?, sources: HashMap::new(), communicator })
+    }
+
+    /// The views that the pipelines stream.
+    #[must_use]
+    pub fn views(&self) -> Vec<View> {
+        self.pipelines
+            .iter()
+            .filter(|prepared| prepared.streams())
+            .map(|prepared| View {
+                name: prepared.pipeline.name.clone(),
+                kind: match prepared.pipeline.stages.first() {
+                    Some(Stage::Slice(_)) => ViewKind::Slice,
+                    _ => ViewKind::Surface,
+                },
+                channel: prepared.pipeline.channel.clone(),
+            })
+            .collect()
+    }
+
+    /// Whether any pipeline is due at this step. Allocates nothing and looks at no data.
+    #[must_use]
+    #[inline]
+    pub fn is_due(&self, cycle: u64, time: f64) -> bool {
+        self.pipelines.iter().any(|prepared| prepared.due.is_due(cycle, time))
+    }
+
+    /// Runs the pipelines that are due, in the order of the configuration. Collective.
+    ///
+    /// What goes wrong in one pipeline comes out as [`Output::Error`] and stops neither the others nor the solver. An error that
+    /// lasts is told once, and again after it has been gone.
+    pub fn run(&mut self, snapshot: &Snapshot) -> Vec<Output> {
+        let mut outputs = Vec::new();
+        for prepared in &mut self.pipelines {
+            if !prepared.due.is_due(snapshot.cycle, snapshot.time) {
+                continue;
+            }
+            prepared.due.take(snapshot.cycle, snapshot.time);
+            let name = prepared.pipeline.channel.as_deref();
+            match source(&mut self.sources, snapshot.channels, name) {
+                Ok((channel, source)) => {
+                    prepared.run(snapshot, channel, source, &*self.communicator, &mut outputs);
+                }
+                Err(message) => prepared.report(snapshot.cycle, vec![("channel".into(), message)], &mut outputs),
+            }
+        }
+        outputs
+    }
+
+    /// The surface of a channel (`None`: the first), worked out once for as long as its cells stay the same and shared with the
+    /// pipelines that need it.
+    ///
+    /// # Errors
+    /// A text that names the channel or what is wrong with its mesh.
+    pub fn surface(&mut self, channels: &[Channel], name: Option<&str>) -> Result<Arc<Surface>, String> {
+        let (channel, source) = source(&mut self.sources, channels, name)?;
+        source.surface_of(channel).map_err(|error| error.to_string())
+    }
+
+    /// Lets the pipelines use a surface that was extracted from the same channel elsewhere.
+    ///
+    /// # Errors
+    /// A text that names the channel or what is wrong with its mesh.
+    pub fn set_surface(
+        &mut self,
+        channels: &[Channel],
+        name: Option<&str>,
+        surface: Arc<Surface>,
+    ) -> Result<(), String> {
+        let (_, source) = source(&mut self.sources, channels, name)?;
+        source.set_surface(surface);
+        Ok(())
+    }
+}
+
+/// The channel of this name and what is known of its cells, taken anew where they have changed.
+fn source<'a, 'c>(
+    sources: &'a mut HashMap<String, Source>,
+    channels: &'c [Channel<'c>],
+    name: Option<&str>,
+) -> Result<(&'c Channel<'c>, &'a mut Source), String> {
+    let found = match name {
+        None => channels.first(),
+        Some(name) => channels.iter().find(|channel| channel.name == name),
+    };
+    let channel = found.ok_or_else(|| {
+        let known: Vec<&str> = channels.iter().map(|channel| channel.name).collect();
+        let Some(name) = name.filter(|_| !known.is_empty()) else { return "the solver has no channel".to_owned() };
+        let hint =
+            nearest(name, known.iter().copied()).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+        format!("the solver has no channel `{name}`; its channels are {}{hint}", known.join(", "))
+    })?;
+    let describe = |error: ExtractError| format!("channel `{}`: {error}", channel.name);
+    if !sources.get(channel.name).is_some_and(|source| source.is_of(channel)) {
+        sources.remove(channel.name);
+    }
+    match sources.entry(channel.name.to_owned()) {
+        std::collections::hash_map::Entry::Occupied(entry) => Ok((channel, entry.into_mut())),
+        std::collections::hash_map::Entry::Vacant(entry) => {
+            let source = Source::new(channel).map_err(describe)?;
+            Ok((channel, entry.insert(source)))
+        }
+    }
+}

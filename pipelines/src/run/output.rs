@@ -1,0 +1,133 @@
+//! What comes of pipelines.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use crate::extract::Extract;
+use crate::language::{ErrorBound, Order, StreamStage};
+
+/// How exactly an extract is sent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Encoding {
+    /// By how much a field's value may differ in the viewer.
+    pub fields: ErrorBound,
+    /// By how much a point's coordinates may; relative to the diagonal of the bounding box.
+    pub positions: ErrorBound,
+}
+
+impl Default for Encoding {
+    /// Fields to a thousandth of their range, points to a hundred-thousandth of the diagonal.
+    fn default() -> Self {
+        StreamStage::default().into()
+    }
+}
+
+impl From<StreamStage> for Encoding {
+    fn from(stage: StreamStage) -> Self {
+        Self { fields: stage.error, positions: stage.positions.unwrap_or(ErrorBound::Relative(1e-5)) }
+    }
+}
+
+/// An extract to be encoded and sent as the newest frame of a view.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    /// The pipeline, which is the view.
+    pub pipeline: Arc<str>,
+    /// The step.
+    pub cycle: u64,
+    /// The simulated time.
+    pub time: f64,
+    /// What to send.
+    pub extract: Arc<Extract>,
+    /// How exactly.
+    pub encoding: Encoding,
+}
+
+/// The values of a pipeline's monitors at a step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MonitorValues {
+    /// The pipeline.
+    pub pipeline: Arc<str>,
+    /// The step.
+    pub cycle: u64,
+    /// The simulated time.
+    pub time: f64,
+    /// Names such as `quality.min`, and their values; NaN where nothing could be measured.
+    pub values: Vec<(String, f64)>,
+}
+
+/// What a pipeline wants done.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub enum Output {
+    /// Send this to viewers.
+    Frame(Frame),
+    /// Write this to a file.
+    Write {
+        /// The pipeline.
+        pipeline: Arc<str>,
+        /// The file, its pattern filled in. A relative one lies in the run's output directory.
+        path: String,
+        /// The step.
+        cycle: u64,
+        /// The simulated time.
+        time: f64,
+        /// What to write.
+        extract: Arc<Extract>,
+    },
+    /// Tell viewers and reports.
+    Monitor(MonitorValues),
+    /// Pause the solver.
+    Pause {
+        /// The pipeline.
+        pipeline: Arc<str>,
+        /// Its condition.
+        reason: String,
+    },
+    /// Ask the solver to stop.
+    Stop {
+        /// The pipeline.
+        pipeline: Arc<str>,
+        /// Its condition.
+        reason: String,
+    },
+    /// A new shape.
+    Order {
+        /// The pipeline.
+        pipeline: Arc<str>,
+        /// The order.
+        order: Order,
+    },
+    /// Something could not be done; tell viewers and the log.
+    Error {
+        /// The pipeline.
+        pipeline: Arc<str>,
+        /// The step.
+        cycle: u64,
+        /// What, where, and what was expected.
+        message: String,
+    },
+}
+
+/// A view that a pipeline streams.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct View {
+    /// The pipeline's name.
+    pub name: String,
+    /// What it shows.
+    pub kind: ViewKind,
+    /// The channel that it shows; left out, the solver's first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub channel: Option<String>,
+}
+
+/// What a view shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ViewKind {
+    /// The boundary of a mesh.
+    Surface,
+    /// A cut.
+    Slice,
+}
