@@ -33,6 +33,33 @@ pub(crate) fn map_chunks<R: Send>(
     (0..chunks).map(|index| work(range(index))).collect()
 }
 
+/// Calls `work` with each chunk of rows and what two arrays in compressed rows hold for them.
+pub(crate) fn for_each_rows<T: Send, U: Send>(
+    chunk: usize,
+    (offsets, values): (&[usize], &mut [T]),
+    (other_offsets, other_values): (&[usize], &mut [U]),
+    work: impl Fn(std::ops::Range<usize>, &mut [T], &mut [U]) + Sync,
+) {
+    let rows = offsets.len() - 1;
+    let mut parts = Vec::with_capacity(rows.div_ceil(chunk));
+    let (mut rest, mut other_rest) = (values, other_values);
+    for start in (0..rows).step_by(chunk) {
+        let end = (start + chunk).min(rows);
+        let (part, after) = rest.split_at_mut(offsets[end] - offsets[start]);
+        let (other_part, other_after) = other_rest.split_at_mut(other_offsets[end] - other_offsets[start]);
+        parts.push((start..end, part, other_part));
+        (rest, other_rest) = (after, other_after);
+    }
+    #[cfg(feature = "parallel")]
+    if parts.len() > 1 {
+        parts.into_par_iter().for_each(|(range, part, other)| work(range, part, other));
+        return;
+    }
+    for (range, part, other) in parts {
+        work(range, part, other);
+    }
+}
+
 /// Whether `test` holds for any chunk of `0..count`.
 pub(crate) fn any_chunk(count: usize, chunk: usize, test: impl Fn(std::ops::Range<usize>) -> bool + Sync) -> bool {
     let range = |index: usize| index * chunk..((index + 1) * chunk).min(count);

@@ -1,4 +1,57 @@
 //! Sparse matrices and the solvers of linear systems.
+//!
+//! A [`LinearSolver`] is set up for one symmetric positive definite matrix and answers any number of right sides.
+//! [`ConjugateGradients`] with a [`BlockPreconditioner`] is the one built in. All of it is deterministic: sums are taken in
+//! chunks whose size does not depend on the number of threads.
+
+mod conjugate_gradients;
+mod matrix;
+mod ordering;
+mod preconditioner;
+
+pub use conjugate_gradients::ConjugateGradients;
+pub(crate) use conjugate_gradients::norm;
+pub use matrix::{Block, SparseMatrix};
+pub(crate) use matrix::{ROW_CHUNK, invert_positive};
+pub use ordering::reverse_cuthill_mckee;
+pub use preconditioner::{BlockPreconditioner, Factorization};
+
+/// When an iterative solve may stop: once the residual's 2-norm is at most the larger of the two.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tolerance {
+    /// A multiple of the 2-norm of the right side.
+    pub relative: f64,
+    /// A 2-norm of the residual.
+    pub absolute: f64,
+}
+
+/// How a solve went.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Convergence {
+    /// How many iterations it took; 0 for a direct solver.
+    pub iterations: usize,
+    /// The 2-norm of the residual by that of the right side; 0 where the right side is.
+    pub residual: f64,
+}
+
+/// A solver set up for one symmetric positive definite matrix of `B` by `B` blocks.
+pub trait LinearSolver<const B: usize>: std::fmt::Debug + Send + Sync {
+    /// How many unknown vectors of `B` values the system has on this process.
+    fn unknowns(&self) -> usize;
+
+    /// Solves for one right side, from zero. `right_side` and `solution` have [`LinearSolver::unknowns`] entries each.
+    ///
+    /// A right side of zeros gives exact zeros.
+    ///
+    /// # Errors
+    /// [`LinearError`]; `solution` then holds nothing of use.
+    fn solve(
+        &self,
+        right_side: &[[f64; B]],
+        solution: &mut [[f64; B]],
+        tolerance: Tolerance,
+    ) -> Result<Convergence, LinearError>;
+}
 
 /// Why a linear system was not solved.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -6,7 +59,8 @@
 pub enum LinearError {
     /// The iteration ended before the residual was small enough.
     #[error(
-        "the linear solve reached a relative residual of {residual:.3e} in {iterations} iterations; {tolerance:.3e} was asked for"
+        "the linear solve reached a relative residual of {residual:.3e} in {iterations} iterations; {tolerance:.3e} was asked \
+         for"
     )]
     NotConverged {
         /// How many iterations were made.
@@ -16,13 +70,19 @@ pub enum LinearError {
         /// The relative residual asked for.
         tolerance: f64,
     },
-    /// The matrix, or its preconditioner, is not positive definite.
+    /// The matrix is not positive definite.
     #[error("the linear system is not positive definite (curvature {curvature:.3e} at iteration {iteration})")]
     Indefinite {
         /// The iteration that met it.
         iteration: usize,
         /// The value that should have been positive.
         curvature: f64,
+    },
+    /// A block on the diagonal is not positive definite, so that no preconditioner can be built.
+    #[error("the diagonal block of unknown {row} is not positive definite")]
+    Diagonal {
+        /// The row of the block.
+        row: usize,
     },
     /// The right side, or something computed from it, is NaN or infinite.
     #[error("the linear solve met a value that is not finite at iteration {iteration}")]

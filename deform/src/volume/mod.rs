@@ -1,59 +1,21 @@
 //! Carrying the motion of the boundary into the volume.
 //!
-//! A [`VolumeOperator`] is set up once from the reference mesh and then answers any number of boundary motions.
+//! A [`VolumeOperator`] is set up once from the reference mesh and then answers any number of boundary motions. It solves, on
+//! linear finite elements, either linear elasticity with a material that is stiffer where cells are small (T. Tezduyar et al.
+//! 1992; K. Stein, T. Tezduyar, R. Benney 2003) or Laplace's equation for each component of the displacement.
 
+mod assembly;
+mod element;
+mod operator;
+mod rigid;
 mod settings;
+#[cfg(test)]
+mod tests;
 
+pub use operator::{VolumeOperator, VolumeSolution};
 pub use settings::{Deform, Method};
 
-use crate::mesh::{CellType, Mesh, Vector};
-
-/// The operator that carries boundary motion into the volume of one reference mesh. Set up once, immutable afterwards.
-#[derive(Debug)]
-pub struct VolumeOperator {
-    vertex_count: usize,
-    boundary: Vec<u32>,
-}
-
-/// The displacement of every vertex of a mesh.
-#[derive(Debug, Clone, PartialEq)]
-pub struct VolumeSolution {
-    /// The displacement of each mesh vertex, from the reference.
-    pub displacement: Vec<Vector>,
-    /// How many iterations the solve took; with several solves (harmonic), the most of any.
-    pub iterations: usize,
-    /// The relative residual reached.
-    pub residual: f64,
-}
-
-impl VolumeOperator {
-    /// Sets up the operator of `mesh` as it lies, where the displacement of the vertices `boundary` will be prescribed.
-    ///
-    /// # Errors
-    /// [`VolumeError`].
-    pub fn new(mesh: &Mesh, boundary: &[u32], settings: &Deform) -> Result<Self, VolumeError> {
-        settings.validate()?;
-        Ok(Self { vertex_count: mesh.points().len(), boundary: boundary.to_vec() })
-    }
-
-    /// The displacement of every vertex for these displacements of the boundary vertices, one for each of `boundary`.
-    ///
-    /// # Errors
-    /// [`VolumeError`].
-    pub fn solve(&self, boundary_displacement: &[Vector]) -> Result<VolumeSolution, VolumeError> {
-        if boundary_displacement.len() != self.boundary.len() {
-            return Err(VolumeError::BoundaryCount {
-                found: boundary_displacement.len(),
-                expected: self.boundary.len(),
-            });
-        }
-        let mut displacement = vec![[0.0; 3]; self.vertex_count];
-        for (&vertex, &value) in self.boundary.iter().zip(boundary_displacement) {
-            displacement[vertex as usize] = value;
-        }
-        Ok(VolumeSolution { displacement, iterations: 0, residual: 0.0 })
-    }
-}
+use crate::mesh::{CellType, Vector};
 
 /// Why a volume could not be deformed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -85,6 +47,12 @@ pub enum VolumeError {
         /// How many there are.
         count: usize,
     },
+    /// More cells than 32-bit numbers can count.
+    #[error("{cells} cells in one mesh; at most {} can be deformed as one", u32::MAX)]
+    TooLarge {
+        /// How many there are.
+        cells: usize,
+    },
     /// A boundary vertex that the mesh does not have.
     #[error("boundary vertex {vertex} does not exist; the mesh has {vertex_count} vertices, numbered from 0")]
     BoundaryVertex {
@@ -115,7 +83,7 @@ pub enum VolumeError {
         /// How many there are.
         expected: usize,
     },
-    /// A displacement that is NaN or infinite, or too large to compute with.
+    /// A displacement that is NaN or infinite.
     #[error("the displacement of boundary vertex {vertex} is {value:?}; it must be finite")]
     NotFinite {
         /// The vertex.

@@ -1,0 +1,321 @@
+//! From a mesh to the equations of its free vertices.
+
+use super::VolumeError;
+use super::element::{Elements, Scratch};
+use crate::linear::{Block, ROW_CHUNK, SparseMatrix, reverse_cuthill_mckee};
+use crate::mesh::{Mesh, Vector};
+use crate::parallel;
+use crate::quality::centroid;
+use crate::vector::dot;
+
+/// How many cells are worked on at a time.
+const CELL_CHUNK: usize = 4096;
+
+/// Which vertex is what: free ones are numbered first, then those of the boundary.
+const NONE: u32 = u32::MAX;
+
+/// A bilinear form: what it couples two shape functions with, by their gradients, per unit of volume.
+pub(super) trait Form<const B: usize>: Sync {
+    /// The block in the row of the one and the column of the other.
+    fn block(&self, row: Vector, column: Vector) -> Block<B>;
+}
+
+/// `∫ grad u · grad v`.
+pub(super) struct Laplace;
+
+impl Form<1> for Laplace {
+    #[inline]
+    fn block(&self, row: Vector, column: Vector) -> Block<1> {
+        [[dot(row, column)]]
+    }
+}
+
+/// `∫ λ div u div v + 2 μ ε(u) : ε(v)` for Young's modulus 1.
+pub(super) struct Elastic {
+    lambda: f64,
+    mu: f64,
+}
+
+impl Elastic {
+    pub(super) fn new(poisson_ratio: f64) -> Self {
+        Self {
+            lambda: poisson_ratio / ((1.0 + poisson_ratio) * (1.0 - 2.0 * poisson_ratio)),
+            mu: 0.5 / (1.0 + poisson_ratio),
+        }
+    }
+}
+
+impl Form<3> for Elastic {
+    #[inline]
+    fn block(&self, row: Vector, column: Vector) -> Block<3> {
+        let shared = self.mu * dot(row, column);
+        std::array::from_fn(|p| {
+            std::array::from_fn(|q| {
+                let value = self.lambda * row[p] * column[q] + self.mu * column[p] * row[q];
+                if p == q { value + shared } else { value }
+            })
+        })
+    }
+}
+
+/// The graph of a mesh's free vertices, in the order in which they are solved for.
+pub(super) struct Graph {
+    /// The vertex of each unknown.
+    pub(super) vertices: Vec<u32>,
+    /// For each vertex of the mesh the number of its unknown; for boundary vertices the number of unknowns and their number
+    /// on the boundary.
+    slots: Vec<u32>,
+    incidence: Incidence,
+    matrix: (Vec<usize>, Vec<u32>),
+    coupling: (Vec<usize>, Vec<u32>),
+}
+
+/// The volume cells at each vertex.
+struct Incidence {
+    offsets: Vec<usize>,
+    cells: Vec<u32>,
+}
+
+impl Incidence {
+    fn new(mesh: &Mesh) -> Self {
+        let cells = mesh.cells();
+        let volume_cells = || (0..cells.len()).filter(|&cell| cells.cell_type(cell).dimension() == 3);
+        let mut offsets = vec![0usize; mesh.points().len() + 2];
+        for cell in volume_cells() {
+            for &vertex in cells.vertices(cell) {
+                offsets[vertex as usize + 2] += 1;
+            }
+        }
+        for index in 2..offsets.len() {
+            offsets[index] += offsets[index - 1];
+        }
+        let mut found = vec![0u32; offsets[offsets.len() - 1]];
+        for cell in volume_cells() {
+            for &vertex in cells.vertices(cell) {
+                let place = &mut offsets[vertex as usize + 1];
+                #[expect(clippy::cast_possible_truncation, reason = "checked where the operator is set up")]
+                (found[*place] = cell as u32);
+                *place += 1;
+            }
+        }
+        offsets.pop();
+        Self { offsets, cells: found }
+    }
+
+    fn cells(&self, vertex: u32) -> &[u32] {
+        &self.cells[self.offsets[vertex as usize]..self.offsets[vertex as usize + 1]]
+    }
+}
+
+impl Graph {
+    /// # Errors
+    /// [`VolumeError::BoundaryVertex`], [`VolumeError::BoundaryTwice`], [`VolumeError::Unattached`].
+    pub(super) fn new(mesh: &Mesh, boundary: &[u32]) -> Result<Self, VolumeError> {
+        let vertex_count = mesh.points().len();
+        let mut on_boundary = vec![false; vertex_count];
+        for &vertex in boundary {
+            match on_boundary.get_mut(vertex as usize) {
+                None => return Err(VolumeError::BoundaryVertex { vertex, vertex_count }),
+                Some(true) => return Err(VolumeError::BoundaryTwice { vertex }),
+                Some(seen) => *seen = true,
+            }
+        }
+        let incidence = Incidence::new(mesh);
+        #[expect(clippy::cast_possible_truncation, reason = "vertex numbers are 32-bit")]
+        let free: Vec<u32> = (0..vertex_count as u32)
+            .filter(|&vertex| !on_boundary[vertex as usize] && !incidence.cells(vertex).is_empty())
+            .collect();
+        #[expect(clippy::cast_possible_truncation, reason = "no more than there are vertices")]
+        let free_count = free.len() as u32;
+        let mut slots = vec![NONE; vertex_count];
+        for (slot, &vertex) in (0..).zip(free.iter().chain(boundary)) {
+            slots[vertex as usize] = slot;
+        }
+
+        let (offsets, neighbours) = neighbours(mesh, &incidence, &free, &slots);
+        let row = |index: u32| &neighbours[offsets[index as usize]..offsets[index as usize + 1]];
+        let split = |index: u32| {
+            let row = row(index);
+            row.split_at(row.partition_point(|&slot| slot < free_count))
+        };
+        check_attached(&free, split)?;
+        let order = reverse_cuthill_mckee(free.len(), |index| split(index).0);
+
+        let mut place = vec![0u32; free.len()];
+        for (new, &old) in (0..).zip(&order) {
+            place[old as usize] = new;
+        }
+        let mut matrix = (vec![0], Vec::new());
+        let mut coupling = (vec![0], Vec::new());
+        for &old in &order {
+            let (inner, outer) = split(old);
+            let start = matrix.1.len();
+            matrix.1.extend(inner.iter().map(|&slot| place[slot as usize]));
+            matrix.1[start..].sort_unstable();
+            matrix.0.push(matrix.1.len());
+            coupling.1.extend(outer.iter().map(|&slot| slot - free_count));
+            coupling.0.push(coupling.1.len());
+        }
+        let vertices: Vec<u32> = order.iter().map(|&old| free[old as usize]).collect();
+        for (slot, &vertex) in (0..).zip(&vertices) {
+            slots[vertex as usize] = slot;
+        }
+        Ok(Self { vertices, slots, incidence, matrix, coupling })
+    }
+
+    /// The matrix of the free vertices, and that which couples them to the boundary. `stiffness` has a factor for each cell.
+    pub(super) fn assemble<const B: usize>(
+        &self,
+        mesh: &Mesh,
+        elements: &Elements<'_>,
+        form: &impl Form<B>,
+        stiffness: &[f64],
+    ) -> (SparseMatrix<B>, SparseMatrix<B>) {
+        let mut matrix = SparseMatrix::<B>::zeros(self.matrix.0.clone(), self.matrix.1.clone());
+        let mut coupling = SparseMatrix::<B>::zeros(self.coupling.0.clone(), self.coupling.1.clone());
+        let (offsets, columns, values) = matrix.offsets_and_values_mut();
+        let (outer_offsets, outer_columns, outer_values) = coupling.offsets_and_values_mut();
+        #[expect(clippy::cast_possible_truncation, reason = "no more than there are vertices")]
+        let free_count = self.vertices.len() as u32;
+        parallel::for_each_rows(ROW_CHUNK, (offsets, values), (outer_offsets, outer_values), |rows, inner, outer| {
+            let mut scratch = Scratch::default();
+            let (first, outer_first) = (offsets[rows.start], outer_offsets[rows.start]);
+            for row in rows {
+                let (start, end) = (offsets[row], offsets[row + 1]);
+                let (outer_start, outer_end) = (outer_offsets[row], outer_offsets[row + 1]);
+                let vertex = self.vertices[row];
+                for &cell in self.incidence.cells(vertex) {
+                    let cell = cell as usize;
+                    let vertices = mesh.cells().vertices(cell);
+                    let Some(own) = vertices.iter().position(|&other| other == vertex) else { continue };
+                    elements.for_each_point(cell, &mut scratch, |weight, gradients| {
+                        let weight = weight * stiffness[cell];
+                        let own: Vector = gradients[own].map(|value| value * weight);
+                        for (&other, &gradient) in vertices.iter().zip(gradients) {
+                            let slot = self.slots[other as usize];
+                            let target = if slot < free_count {
+                                let place = columns[start..end].partition_point(|&column| column < slot);
+                                &mut inner[start - first + place]
+                            } else {
+                                let slot = slot - free_count;
+                                let place =
+                                    outer_columns[outer_start..outer_end].partition_point(|&column| column < slot);
+                                &mut outer[outer_start - outer_first + place]
+                            };
+                            for (entries, values) in target.iter_mut().zip(form.block(own, gradient)) {
+                                for (entry, value) in entries.iter_mut().zip(values) {
+                                    *entry += value;
+                                }
+                            }
+                        }
+                    });
+                }
+            }
+        });
+        (matrix, coupling)
+    }
+}
+
+/// The slots of the vertices that share a cell with each free vertex (itself among them), rising, in compressed rows.
+fn neighbours(mesh: &Mesh, incidence: &Incidence, free: &[u32], slots: &[u32]) -> (Vec<usize>, Vec<u32>) {
+    let parts = parallel::map_chunks(free.len(), ROW_CHUNK, |range| {
+        let mut lengths = Vec::with_capacity(range.len());
+        let mut found: Vec<u32> = Vec::new();
+        let mut row = Vec::new();
+        for &vertex in &free[range] {
+            row.clear();
+            for &cell in incidence.cells(vertex) {
+                // A vertex that is neither free nor on the boundary is in no volume cell, so every slot is one.
+                row.extend(mesh.cells().vertices(cell as usize).iter().map(|&other| slots[other as usize]));
+            }
+            row.sort_unstable();
+            row.dedup();
+            found.extend_from_slice(&row);
+            lengths.push(row.len());
+        }
+        (lengths, found)
+    });
+    let mut offsets = Vec::with_capacity(free.len() + 1);
+    let mut all = Vec::with_capacity(parts.iter().map(|(_, found)| found.len()).sum());
+    offsets.push(0);
+    let mut end = 0;
+    for (lengths, found) in parts {
+        for length in lengths {
+            end += length;
+            offsets.push(end);
+        }
+        all.extend_from_slice(&found);
+    }
+    (offsets, all)
+}
+
+/// Every free vertex must be connected to the boundary.
+fn check_attached<'a>(free: &[u32], split: impl Fn(u32) -> (&'a [u32], &'a [u32])) -> Result<(), VolumeError> {
+    let mut attached = vec![false; free.len()];
+    let mut waiting: Vec<u32> =
+        (0..).zip(free).map(|(index, _)| index).filter(|&index| !split(index).1.is_empty()).collect();
+    for &index in &waiting {
+        attached[index as usize] = true;
+    }
+    while let Some(index) = waiting.pop() {
+        for &other in split(index).0 {
+            if !std::mem::replace(&mut attached[other as usize], true) {
+                waiting.push(other);
+            }
+        }
+    }
+    let mut loose = free.iter().zip(&attached).filter(|(_, attached)| !**attached).map(|(&vertex, _)| vertex);
+    match loose.next() {
+        None => Ok(()),
+        Some(vertex) => Err(VolumeError::Unattached { vertex: vertex as usize, count: 1 + loose.count() }),
+    }
+}
+
+/// The stiffness of each cell, `(mean volume / volume)^stiffening`; 0 for cells that are not of volume. Divided by the size of
+/// a mean cell, so that the equations are of order 1 whatever the unit of length.
+///
+/// # Errors
+/// [`VolumeError::InvertedCell`].
+pub(super) fn stiffness(mesh: &Mesh, elements: &Elements<'_>, stiffening: f64) -> Result<Vec<f64>, VolumeError> {
+    let cells = mesh.cells();
+    let mut volumes = vec![0.0; cells.len()];
+    parallel::for_each_chunk(&mut volumes, CELL_CHUNK, |chunk, part| {
+        let mut scratch = Scratch::default();
+        for (index, volume) in part.iter_mut().enumerate() {
+            let cell = chunk * CELL_CHUNK + index;
+            if cells.cell_type(cell).dimension() == 3 {
+                *volume = elements.volume(cell, &mut scratch).unwrap_or(f64::NAN);
+            }
+        }
+    });
+    let sums = parallel::map_chunks(volumes.len(), CELL_CHUNK, |range| {
+        volumes[range]
+            .iter()
+            .fold((0.0, 0usize), |(sum, count), &volume| (sum + volume, count + usize::from(volume != 0.0)))
+    });
+    let (sum, count) = sums.into_iter().fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    #[expect(clippy::cast_precision_loss, reason = "fewer cells than 2^53")]
+    let mean = sum / count.max(1) as f64;
+    let size = mean.cbrt();
+    parallel::for_each_chunk(&mut volumes, CELL_CHUNK, |_, part| {
+        for value in part.iter_mut().filter(|value| **value != 0.0) {
+            let ratio = mean / *value;
+            *value = if stiffening == 1.0 { ratio } else { ratio.powf(stiffening) } / size;
+        }
+    });
+    let inverted = |&cell: &usize| !volumes[cell].is_finite() || volumes[cell] < 0.0;
+    if sum.is_finite() && (0..cells.len()).all(|cell| !inverted(&cell)) {
+        return Ok(volumes);
+    }
+    // A NaN sum makes all of them NaN: the cells are looked at again to tell which are to blame.
+    let mut scratch = Scratch::default();
+    let mut broken = (0..cells.len())
+        .filter(|&cell| cells.cell_type(cell).dimension() == 3 && elements.volume(cell, &mut scratch).is_none());
+    let cell = broken.next().unwrap_or(0);
+    Err(VolumeError::InvertedCell {
+        cell,
+        cell_type: cells.cell_type(cell),
+        centroid: centroid(cells, cell, mesh.points()),
+        count: 1 + broken.count(),
+    })
+}
