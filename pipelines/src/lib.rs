@@ -10,3 +10,4 @@ pub mod expression;
 pub mod extract;
 pub mod language;
 pub mod run;
+pub mod shape;
