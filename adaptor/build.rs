@@ -1,0 +1,36 @@
+//! Puts the built viewer, where there is one, into the library.
+
+use std::{env, fmt::Write, fs, io, path::Path};
+
+fn main() -> io::Result<()> {
+    let manifest = env::var("CARGO_MANIFEST_DIR").map_err(io::Error::other)?;
+    let viewer = Path::new(&manifest).join("../viewer/dist");
+    let mut files = Vec::new();
+    println!("cargo::rerun-if-changed=build.rs");
+    // A path that does not exist would make every build start from here, so the viewer is built first or this file touched.
+    if let Ok(viewer) = viewer.canonicalize() {
+        println!("cargo::rerun-if-changed={}", viewer.display());
+        collect(&viewer, "", &mut files)?;
+    }
+    files.sort();
+    let mut table = String::from("&[\n");
+    for (name, path) in files {
+        writeln!(table, "    ({name:?}, include_bytes!({path:?})),").map_err(io::Error::other)?;
+    }
+    table.push(']');
+    let out = env::var("OUT_DIR").map_err(io::Error::other)?;
+    fs::write(Path::new(&out).join("viewer_files.rs"), table)
+}
+
+fn collect(directory: &Path, prefix: &str, files: &mut Vec<(String, String)>) -> io::Result<()> {
+    for entry in fs::read_dir(directory)? {
+        let entry = entry?;
+        let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
+        if entry.file_type()?.is_dir() {
+            collect(&entry.path(), &format!("{name}/"), files)?;
+        } else {
+            files.push((name, entry.path().to_string_lossy().into_owned()));
+        }
+    }
+    Ok(())
+}

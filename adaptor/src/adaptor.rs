@@ -1,0 +1,525 @@
+//! The three calls.
+
+use std::{net::SocketAddr, sync::Arc, time::Instant};
+
+use serde::{Serialize, de::DeserializeOwned};
+use serde_json::{Value, json};
+use tombolo_deform::{
+    mesh::Mesh,
+    surface::{FeatureSettings, Surface},
+};
+use tombolo_pipelines::{
+    extract::Channel,
+    language::{self, Command, Config, Due, Stage, TimedCommand, Validate},
+    shape::Shaper,
+};
+
+use crate::{
+    comm,
+    journal::Journal,
+    report::{Durations, Report},
+    settings::{ExecuteError, FinalizeError, InitializeError, MeshMotion, Settings, Steering, Step},
+    stages::Pipelines,
+    steering::{Defaults, Log, Moment, Parameters, Queue, Received, Source, Steerer, Timed},
+    stream::{CommandSink, Hub, Server},
+};
+
+/// Links a solver to its viewers and to the orders that change its shape.
+///
+/// See the [crate's page](crate) for a whole solver.
+pub struct Adaptor {
+    config: Config,
+    communicator: Arc<dyn comm::Communicator>,
+    parameters: Parameters,
+    defaults: Defaults,
+    pipelines: Pipelines,
+    timed: Timed,
+    queue: Arc<Queue>,
+    log: Arc<Log>,
+    hub: Option<Arc<Hub>>,
+    server: Option<Server>,
+    mesh: SteeredMesh,
+    /// The name of the first channel, and its fields as `hello` tells them.
+    channel: String,
+    fields: Vec<Value>,
+    paused: bool,
+    stopped: bool,
+    timing: Timing,
+}
+
+/// The mesh that orders change: that of the solver's first channel.
+enum SteeredMesh {
+    /// The first call will take it over.
+    Unknown,
+    /// Nobody can give an order, so that no copy is made.
+    Unsteered,
+    /// Orders cannot be carried out, for this reason.
+    Refused(String),
+    Steered(Box<Steerer>, Arc<Surface>),
+}
+
+/// Where the time went.
+#[derive(Default)]
+struct Timing {
+    cycles: u64,
+    left: Option<Instant>,
+    steps: Durations,
+    execute: Durations,
+    reference: Durations,
+    pipelines: Durations,
+    steering: Durations,
+    paused: Durations,
+}
+
+impl Adaptor {
+    /// Sets a run up: starts the server and the journal that the configuration asks for.
+    ///
+    /// # Errors
+    /// [`InitializeError`]: an address in use, a journal that cannot be written, a configuration, a parameter or a command that
+    /// makes no sense.
+    pub fn initialize(settings: Settings) -> Result<Self, InitializeError> {
+        let Settings { config, communicator, parameters, orders, output } = settings;
+        // What was built by hand is held to the same rules as what was read.
+        let config: Config = checked(&config, "configuration")?;
+        let orders: Vec<TimedCommand> = checked(&orders, "orders")?;
+        let parameters = Parameters::new(parameters)?;
+        let first = communicator.rank() == 0;
+        let journal = match config.journal.as_ref().filter(|_| first) {
+            Some(path) => Journal::create(&output.join(path))?,
+            None => Journal::none(),
+        };
+        let queue = Arc::new(Queue::default());
+        let hub = config.stream.as_ref().filter(|_| first).map(|_| Arc::new(Hub::default()));
+        let log = Arc::new(Log::new(journal, hub.clone()));
+        let server = match (&config.stream, &hub) {
+            (Some(stream), Some(hub)) => {
+                let intake = Intake { queue: Arc::clone(&queue), log: Arc::clone(&log), hub: Arc::clone(hub) };
+                Some(Server::start(stream, Arc::clone(hub), Arc::new(intake))?)
+            }
+            _ => None,
+        };
+        let adaptor = Self {
+            defaults: defaults(&config),
+            pipelines: Pipelines::new(&config, &output)?,
+            config,
+            communicator,
+            parameters,
+            timed: Timed::new(orders),
+            queue,
+            log,
+            hub,
+            server,
+            mesh: SteeredMesh::Unknown,
+            channel: String::new(),
+            fields: Vec::new(),
+            paused: false,
+            stopped: false,
+            timing: Timing::default(),
+        };
+        adaptor.describe();
+        adaptor.tell_conditions();
+        Ok(adaptor)
+    }
+
+    /// The link that a viewer opens, with its token; `None` without a server.
+    #[must_use]
+    pub fn link(&self) -> Option<String> {
+        self.server.as_ref().map(|server| format!("http://{}/?token={}", server.address(), server.token().as_str()))
+    }
+
+    /// The address that viewers connect to; `None` without a server.
+    #[must_use]
+    pub fn address(&self) -> Option<SocketAddr> {
+        self.server.as_ref().map(Server::address)
+    }
+
+    /// Shows the solver's present state and says what to do in the step that follows.
+    ///
+    /// `channels` are borrowed for the length of the call; the first is the mesh that orders change. Its mesh at the first call
+    /// is the reference from which all shapes are measured. A motion must be carried out by the solver over the coming step;
+    /// the adaptor takes it for done.
+    ///
+    /// Where no pipeline is due, no command has arrived and no motion is under way, it costs one atomic load and a few
+    /// comparisons and allocates nothing. It waits for nobody, except while it is paused, and for the plans of orders that
+    /// take effect at a given cycle.
+    ///
+    /// # Errors
+    /// [`ExecuteError`] for a mistake of the solver alone; nothing that a viewer, a file of orders or the network did ends up
+    /// here.
+    pub fn execute(&mut self, step: &Step, channels: &[Channel<'_>]) -> Result<Steering<'_>, ExecuteError> {
+        let entered = Instant::now();
+        if let Some(left) = self.timing.left.take() {
+            self.timing.steps.add(entered - left);
+        }
+        self.timing.cycles += 1;
+        let moment = Moment { cycle: step.cycle, time: step.time };
+        if let Some(hub) = &self.hub {
+            hub.clock.set(moment.cycle, moment.time);
+        }
+        self.check(step, channels)?;
+        let moved = if self.is_calm(moment) { false } else { self.act(step, moment, channels)? };
+        let left = Instant::now();
+        self.timing.execute.add(left - entered);
+        self.timing.left = Some(left);
+        let motion = match &self.mesh {
+            SteeredMesh::Steered(steerer, _) if moved => {
+                let (shape, coordinates) = steerer.present();
+                Some(MeshMotion {
+                    coordinates,
+                    displacement: &shape.displacement,
+                    velocity: &shape.velocity,
+                    shape: shape.shape,
+                    order: &shape.order,
+                })
+            }
+            _ => None,
+        };
+        Ok(Steering { motion, parameters: self.parameters.take_changed(), stop: self.stopped })
+    }
+
+    /// Ends the run: viewers are disconnected, and every thread has ended when it returns.
+    ///
+    /// # Errors
+    /// [`FinalizeError`] where a file that a pipeline asked for could not be written; it holds the report all the same.
+    pub fn finalize(mut self) -> Result<Report, FinalizeError> {
+        self.mesh = SteeredMesh::Unknown;
+        self.server = None;
+        let faults = self.pipelines.finish();
+        let parts = [
+            ("execute", &self.timing.execute),
+            ("reference", &self.timing.reference),
+            ("pipelines", &self.timing.pipelines),
+            ("steering", &self.timing.steering),
+            ("paused", &self.timing.paused),
+        ];
+        let report = Report {
+            cycles: self.timing.cycles,
+            orders: self.log.reports(),
+            step_seconds: self.timing.steps.spread(),
+            adaptor_seconds: parts.into_iter().map(|(name, durations)| (name, durations.spread())).collect(),
+            stream: self.hub.as_ref().map(|hub| hub.counts()).unwrap_or_default(),
+        };
+        match faults.first() {
+            None => Ok(report),
+            Some(first) => {
+                Err(FinalizeError::Files { count: faults.len(), first: first.clone(), report: Box::new(report) })
+            }
+        }
+    }
+
+    fn check(&self, step: &Step, channels: &[Channel<'_>]) -> Result<(), ExecuteError> {
+        let cycle = step.cycle;
+        if !step.time.is_finite() {
+            return Err(ExecuteError::Time { cycle, what: "time", value: step.time });
+        }
+        if !(step.time_step >= 0.0 && step.time_step.is_finite()) {
+            return Err(ExecuteError::Time { cycle, what: "time_step", value: step.time_step });
+        }
+        let channel = channels.first().ok_or(ExecuteError::NoChannel { cycle })?;
+        let expected = match &self.mesh {
+            SteeredMesh::Steered(steerer, _) => steerer.vertex_count(),
+            SteeredMesh::Unknown | SteeredMesh::Unsteered | SteeredMesh::Refused(_) => return Ok(()),
+        };
+        let found = channel.mesh.points.len();
+        if found != expected {
+            return Err(ExecuteError::VertexCount { cycle, channel: channel.name.into(), found, expected });
+        }
+        Ok(())
+    }
+
+    /// Whether there is nothing to do in this call.
+    #[inline]
+    fn is_calm(&self, moment: Moment) -> bool {
+        let at_rest = match &self.mesh {
+            SteeredMesh::Unknown => false,
+            SteeredMesh::Unsteered | SteeredMesh::Refused(_) => true,
+            SteeredMesh::Steered(steerer, _) => steerer.is_at_rest(),
+        };
+        at_rest
+            && !self.paused
+            && !self.queue.has_called()
+            && !self.timed.is_due(moment)
+            && !self.pipelines.is_due(moment)
+            && self.communicator.size() == 1
+    }
+
+    /// Does what there is to do; says whether the mesh moves over the coming step.
+    fn act(&mut self, step: &Step, moment: Moment, channels: &[Channel<'_>]) -> Result<bool, ExecuteError> {
+        if matches!(self.mesh, SteeredMesh::Unknown) {
+            let begun = Instant::now();
+            self.take_reference(step, channels)?;
+            self.timing.reference.add(begun.elapsed());
+        }
+        let mut commands = Vec::new();
+        if self.pipelines.is_due(moment) {
+            let begun = Instant::now();
+            commands = self.pipelines.run(moment, channels, self.hub.as_ref());
+            self.timing.pipelines.add(begun.elapsed());
+        }
+        for (pipeline, command) in commands {
+            self.accept(None, Source::Pipeline(pipeline), command, moment);
+        }
+        for timed in self.timed.take_due(moment) {
+            self.accept(timed.id, Source::File, timed.command, moment);
+        }
+        let begun = Instant::now();
+        self.serve(moment);
+        self.timing.steering.add(begun.elapsed());
+        if self.paused {
+            let begun = Instant::now();
+            while self.paused && !self.stopped {
+                if self.communicator.rank() == 0 {
+                    self.queue.wait();
+                }
+                self.serve(moment);
+            }
+            self.timing.paused.add(begun.elapsed());
+        }
+        let SteeredMesh::Steered(steerer, _) = &mut self.mesh else { return Ok(false) };
+        let moved = steerer.next_shape(moment, step.time_step);
+        if moved {
+            self.tell_conditions();
+        }
+        Ok(moved)
+    }
+
+    /// Takes in a command that no viewer sent.
+    fn accept(&mut self, id: Option<String>, source: Source, command: Command, moment: Moment) {
+        match self.log.accept(id, &source, &command, moment) {
+            Ok(id) => self.obey(id, &source, command, moment),
+            Err(reason) => self.complain(&format!("a command was not taken: {reason}")),
+        }
+    }
+
+    /// Says to whom it may concern what no order's outcome can say.
+    fn complain(&self, message: &str) {
+        eprintln!("tombolo: {message}");
+        if let Some(hub) = &self.hub {
+            hub.tell(&json!({"error": {"message": message}}));
+        }
+    }
+
+    /// Carries out what viewers have asked for meanwhile, as far as it can be now.
+    fn serve(&mut self, moment: Moment) {
+        let received: Vec<Received> = self.queue.take().into();
+        if self.communicator.size() == 1 {
+            for Received { client, id, command } in received {
+                self.obey(id, &Source::Viewer(client), command, moment);
+            }
+        } else {
+            let own = received.into_iter().map(|received| (received.id, received.command)).collect();
+            for (id, command) in comm::agree(&*self.communicator, own) {
+                self.obey(id, &Source::Viewer(0), command, moment);
+            }
+        }
+        let step_seconds = self.timing.steps.median();
+        if let SteeredMesh::Steered(steerer, _) = &mut self.mesh {
+            if steerer.advance(moment, step_seconds) {
+                self.describe();
+                self.tell_conditions();
+            }
+        }
+    }
+
+    fn obey(&mut self, id: String, source: &Source, command: Command, moment: Moment) {
+        let outcome = match command {
+            Command::Order(order) => {
+                let background = self.config.steering.background && matches!(source, Source::Viewer(_));
+                match &mut self.mesh {
+                    SteeredMesh::Steered(steerer, _) => steerer.take(id, order, background),
+                    SteeredMesh::Refused(reason) => self.log.reject(&id, moment, reason),
+                    SteeredMesh::Unknown | SteeredMesh::Unsteered => {
+                        self.log.reject(&id, moment, "no reference mesh was taken");
+                    }
+                }
+                return;
+            }
+            Command::Pause {} if self.config.stream.is_none() => {
+                Err("there is no stream, so that nobody could resume".to_owned())
+            }
+            Command::Pause {} => {
+                self.paused = true;
+                Ok(())
+            }
+            Command::Resume {} => {
+                self.paused = false;
+                Ok(())
+            }
+            Command::Stop {} => {
+                self.stopped = true;
+                Ok(())
+            }
+            Command::Parameter(change) => {
+                self.parameters.set(&change.name, change.value).map_err(|error| error.to_string())
+            }
+        };
+        if let Err(reason) = &outcome {
+            match (source, &self.hub) {
+                (Source::Viewer(client), Some(hub)) => {
+                    hub.tell_client(*client, &json!({"error": {"message": reason, "id": id}}));
+                }
+                _ => self.complain(&format!("command '{id}': {reason}")),
+            }
+        }
+        self.log.settle(&id, moment, outcome);
+        self.describe();
+        self.tell_conditions();
+    }
+
+    /// Copies the mesh as it is now as the reference of all shapes, if anybody could ask for one.
+    fn take_reference(&mut self, step: &Step, channels: &[Channel<'_>]) -> Result<(), ExecuteError> {
+        let cycle = step.cycle;
+        let channel = channels.first().ok_or(ExecuteError::NoChannel { cycle })?;
+        self.mesh = if self.config.stream.is_none() && self.timed.is_empty() && !self.pipelines.can_order() {
+            SteeredMesh::Unsteered
+        } else if self.communicator.size() > 1 {
+            SteeredMesh::Refused("the shape of a mesh on more than one process cannot be changed yet".into())
+        } else {
+            let mesh = channel.mesh.to_mesh().map_err(|source| ExecuteError::Mesh {
+                cycle,
+                channel: channel.name.into(),
+                source,
+            })?;
+            match self.take_over(mesh) {
+                Ok((steerer, surface)) => SteeredMesh::Steered(Box::new(steerer), surface),
+                Err(reason) => {
+                    let reason = format!("the shape of this mesh cannot be changed: {reason}");
+                    self.complain(&reason);
+                    SteeredMesh::Refused(reason)
+                }
+            }
+        };
+        self.channel = channel.name.to_owned();
+        self.fields = channel
+            .fields
+            .iter()
+            .map(|field| {
+                json!({"name": field.name, "association": field.association, "components": field.values.components()})
+            })
+            .collect();
+        self.describe();
+        self.tell_conditions();
+        Ok(())
+    }
+
+    fn take_over(&self, mesh: Mesh) -> Result<(Steerer, Arc<Surface>), String> {
+        let mesh = Arc::new(mesh);
+        let surface = Surface::extract(&mesh, &FeatureSettings::default()).map_err(|error| error.to_string())?;
+        let surface = Arc::new(surface);
+        let shaper = Shaper::new(mesh, Arc::clone(&surface)).map_err(|error| error.to_string())?;
+        let steerer = Steerer::new(
+            shaper,
+            self.defaults,
+            Arc::clone(&self.log),
+            Arc::clone(&self.queue),
+            self.config.stream.is_some(),
+        )
+        .map_err(|error| format!("a thread could not be started: {error}"))?;
+        Ok((steerer, surface))
+    }
+
+    /// Brings what `hello` tells up to date.
+    fn describe(&self) {
+        let Some(hub) = &self.hub else { return };
+        let (features, stack) = match &self.mesh {
+            SteeredMesh::Steered(steerer, surface) => (features(surface), json!(steerer.stack().edits())),
+            _ => (json!([]), json!([])),
+        };
+        let Defaults { deform, guard, schedule } = self.defaults;
+        let description = json!({
+            "protocol": 1,
+            "views": self.pipelines.views(),
+            "channel": self.channel,
+            "features": features,
+            "fields": self.fields,
+            "parameters": self.parameters.all(),
+            "schemas": {"order": language::order_schema()},
+            "stack": stack,
+            "defaults": {"deform": deform, "guard": guard, "schedule": schedule},
+        });
+        if let Value::Object(description) = description {
+            hub.describe(description);
+        }
+    }
+
+    fn tell_conditions(&self) {
+        let Some(hub) = &self.hub else { return };
+        let quality = match &self.mesh {
+            SteeredMesh::Steered(steerer, _) => steerer.quality(),
+            _ => None,
+        };
+        let quality = quality.map(|(min, mean, inverted)| json!({"min": min, "mean": mean, "inverted": inverted}));
+        let conditions = json!({"paused": self.paused, "stopped": self.stopped, "quality": quality});
+        if let Value::Object(conditions) = conditions {
+            hub.conditions(conditions);
+        }
+    }
+}
+
+/// Reads what was built by hand as if it had stood in a file, so that the same rules hold.
+fn checked<T: Serialize + DeserializeOwned + Validate>(value: &T, name: &str) -> Result<T, InitializeError> {
+    let text = serde_json::to_string(value).map_err(InitializeError::Unwritable)?;
+    Ok(language::parse_valid(&text, name)?)
+}
+
+fn features(surface: &Surface) -> Value {
+    let features = surface.features();
+    let mut faces = vec![0_usize; features.names().len()];
+    for &feature in features.face_features() {
+        if let Some(count) = faces.get_mut(feature as usize) {
+            *count += 1;
+        }
+    }
+    let described = features.names().iter().zip(faces).zip(0..).map(|((name, faces), feature)| {
+        let vertices = features.vertices(feature);
+        let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        for &vertex in vertices {
+            for axis in 0..3 {
+                let value = surface.points()[vertex as usize][axis];
+                bounds[0][axis] = bounds[0][axis].min(value);
+                bounds[1][axis] = bounds[1][axis].max(value);
+            }
+        }
+        json!({"name": name, "faces": faces, "vertices": vertices.len(), "bounds": bounds})
+    });
+    described.collect()
+}
+
+/// The settings of orders that bring none: those of the pipeline that waits for orders, else the kernel's.
+fn defaults(config: &Config) -> Defaults {
+    let mut defaults = Defaults::default();
+    let stages = config.pipelines.iter().filter(|pipeline| pipeline.due == Due::OnOrder).flat_map(|it| &it.stages);
+    for stage in stages {
+        match stage {
+            Stage::Deform(deform) => defaults.deform = *deform,
+            Stage::Guard(guard) => defaults.guard = *guard,
+            Stage::Schedule(schedule) => defaults.schedule = *schedule,
+            _ => {}
+        }
+    }
+    defaults
+}
+
+/// Takes the commands of viewers in, on the stream's thread.
+struct Intake {
+    queue: Arc<Queue>,
+    log: Arc<Log>,
+    hub: Arc<Hub>,
+}
+
+impl CommandSink for Intake {
+    fn receive(&self, client: u64, id: Option<String>, command: &str) -> Result<(), String> {
+        let command: Command = language::parse_valid(command, "message").map_err(|error| error.to_string())?;
+        if !self.queue.has_room() {
+            return Err("the solver has not come to the commands before this one yet; try again later".into());
+        }
+        let (cycle, time) = self.hub.clock.get();
+        let id = self.log.accept(id, &Source::Viewer(client), &command, Moment { cycle, time })?;
+        self.queue.push(Received { client, id, command });
+        Ok(())
+    }
+
+    fn orders(&self) -> Value {
+        self.log.told()
+    }
+}

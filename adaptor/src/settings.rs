@@ -1,0 +1,173 @@
+//! What a solver hands to the adaptor and gets back.
+
+use std::{path::PathBuf, sync::Arc};
+
+use tombolo_deform::mesh::{MeshError, Vector};
+use tombolo_pipelines::{
+    communicator::{Communicator, Solo},
+    language::{Config, LanguageError, TimedCommand},
+};
+
+use crate::{
+    journal::JournalError,
+    steering::{Parameter, ParameterError},
+    stream::StreamError,
+};
+
+/// Everything that a run is set up with.
+#[derive(Clone)]
+pub struct Settings {
+    /// What to watch, stream and write, and how orders become mesh motion; read it with
+    /// [`language::parse`](tombolo_pipelines::language::parse).
+    pub config: Config,
+    /// The processes that the mesh is distributed over.
+    pub communicator: Arc<dyn Communicator>,
+    /// The numbers of the solver that can be steered.
+    pub parameters: Vec<Parameter>,
+    /// Commands known beforehand; read a file of them, or a journal, with
+    /// [`language::parse_orders`](tombolo_pipelines::language::parse_orders). They take effect at their cycle exactly: the
+    /// solver waits for their plans.
+    pub orders: Vec<TimedCommand>,
+    /// The directory of the files that pipelines write and of the journal, where their names are relative.
+    pub output: PathBuf,
+}
+
+impl Default for Settings {
+    /// One process, nothing to watch, nothing to steer, files in the current directory.
+    fn default() -> Self {
+        let config =
+            Config { version: 1, stream: None, journal: None, steering: Default::default(), pipelines: Vec::new() };
+        Self {
+            config,
+            communicator: Arc::new(Solo),
+            parameters: Vec::new(),
+            orders: Vec::new(),
+            output: PathBuf::from("."),
+        }
+    }
+}
+
+/// A step that the solver is about to take, from `time` to `time + time_step`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Its number.
+    pub cycle: u64,
+    /// The simulated time at its start.
+    pub time: f64,
+    /// Its length; it may vary from step to step. 0 for a steady solver, whose mesh then has no velocity.
+    pub time_step: f64,
+}
+
+/// What the solver is asked to do in the step that follows.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Steering<'a> {
+    /// Where to move the mesh over the step; `None`: it stays where it is.
+    pub motion: Option<MeshMotion<'a>>,
+    /// Parameters that changed since the last call, by name, each with its new value.
+    pub parameters: &'a [(String, f64)],
+    /// Whether the solver should end. Once true it stays true.
+    pub stop: bool,
+}
+
+/// A motion of the mesh over one step.
+#[derive(Debug, Clone, Copy)]
+pub struct MeshMotion<'a> {
+    /// The coordinates of each vertex at the end of the step: the reference's plus the displacement that the stack of edits
+    /// makes (or a shape on the way there). With every order taken back they are the reference's, bit for bit.
+    pub coordinates: &'a [Vector],
+    /// From the present coordinates to these.
+    pub displacement: &'a [Vector],
+    /// `displacement / time_step`, for an arbitrary Lagrangian-Eulerian (ALE) solver; 0 in a steady one.
+    pub velocity: &'a [Vector],
+    /// Which shape of the order's schedule this is, counted from 1, and how many there are.
+    pub shape: (u32, u32),
+    /// The order's name.
+    pub order: &'a str,
+}
+
+/// Why a run could not be set up.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum InitializeError {
+    /// The server for viewers could not be started.
+    #[error(transparent)]
+    Stream(#[from] StreamError),
+    /// The journal could not be created.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    /// A parameter's declaration makes no sense.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+    /// The configuration, or one of the commands given beforehand, makes no sense.
+    #[error(transparent)]
+    Language(#[from] LanguageError),
+    /// The configuration or a command cannot be written as JSON.
+    #[error("the configuration or the orders cannot be written as JSON: {0}")]
+    Unwritable(serde_json::Error),
+    /// The pipelines cannot be run.
+    #[error("{0}")]
+    Pipelines(String),
+}
+
+/// What a solver did wrong. Nothing was changed; it may go on and call again.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExecuteError {
+    /// Nothing was handed over.
+    #[error("cycle {cycle}: no channel was given; the first channel is the mesh to be steered")]
+    NoChannel {
+        /// The step.
+        cycle: u64,
+    },
+    /// A time that is none.
+    #[error("cycle {cycle}: {what} is {value}; it must be finite{}", if *what == "time_step" { " and not below 0" } else { "" })]
+    Time {
+        /// The step.
+        cycle: u64,
+        /// `time` or `time_step`.
+        what: &'static str,
+        /// What it is.
+        value: f64,
+    },
+    /// The mesh handed over first makes no sense.
+    #[error("cycle {cycle}: channel '{channel}': {source}")]
+    Mesh {
+        /// The step.
+        cycle: u64,
+        /// The channel.
+        channel: String,
+        /// What is wrong.
+        source: MeshError,
+    },
+    /// The mesh is not the one of the first call.
+    #[error(
+        "cycle {cycle}: channel '{channel}' has {found} vertices, but the reference mesh of the first call had {expected}; \
+         shapes are measured from that mesh, so its vertices must stay the same"
+    )]
+    VertexCount {
+        /// The step.
+        cycle: u64,
+        /// The channel.
+        channel: String,
+        /// How many there are.
+        found: usize,
+        /// How many there were.
+        expected: usize,
+    },
+}
+
+/// What went wrong in the course of a run without stopping it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FinalizeError {
+    /// Files that pipelines asked for were not written.
+    #[error("{count} file(s) could not be written; the first: {first}")]
+    Files {
+        /// How many.
+        count: usize,
+        /// What was wrong with the first.
+        first: String,
+        /// The report of the run.
+        report: Box<crate::Report>,
+    },
+}

@@ -1,0 +1,204 @@
+//! The orders of a run and how far each has come; kept for the viewers, the report and the journal.
+
+use std::{
+    collections::VecDeque,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+};
+
+use serde_json::{Value, json};
+use tombolo_pipelines::{
+    language::{Command, JournalEntry, OrderStatus as JournalStatus},
+    shape::ShapeSeconds,
+};
+
+use crate::{
+    journal::Journal,
+    report::{ORDERS_KEPT, OrderReport, OrderStatus},
+    stream::Hub,
+};
+
+/// Orders that a viewer is told of when it connects.
+const ORDERS_TOLD: usize = 100;
+
+/// Who gave a command.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Source {
+    /// The viewer of this number.
+    Viewer(u64),
+    /// The file of orders.
+    File,
+    /// The pipeline of this name.
+    Pipeline(String),
+}
+
+/// Where and when something happens.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Moment {
+    pub(crate) cycle: u64,
+    pub(crate) time: f64,
+}
+
+#[derive(Default)]
+struct State {
+    orders: VecDeque<OrderReport>,
+    /// Names of the other commands, so that none is given twice.
+    others: VecDeque<String>,
+    counted: u64,
+}
+
+/// Shared by the thread that reads from viewers and the solver's.
+pub(crate) struct Log {
+    state: Mutex<State>,
+    journal: Journal,
+    hub: Option<Arc<Hub>>,
+}
+
+impl Log {
+    pub(crate) fn new(journal: Journal, hub: Option<Arc<Hub>>) -> Self {
+        Self { state: Mutex::default(), journal, hub }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes a command in: gives it a name unless it has one, writes it to the journal, tells the viewers of an order.
+    ///
+    /// # Errors
+    /// Where another command has that name already.
+    pub(crate) fn accept(
+        &self,
+        wanted: Option<String>,
+        source: &Source,
+        command: &Command,
+        moment: Moment,
+    ) -> Result<String, String> {
+        let id = {
+            let mut state = self.lock();
+            let id = match wanted {
+                Some(id) if state.has(&id) => return Err(format!("the id '{id}' was given to another command")),
+                Some(id) => id,
+                None => state.next_id(),
+            };
+            if matches!(command, Command::Order(_)) {
+                if state.orders.len() >= ORDERS_KEPT {
+                    state.orders.pop_front();
+                }
+                state.orders.push_back(OrderReport {
+                    id: id.clone(),
+                    status: OrderStatus::Accepted,
+                    reason: None,
+                    cycle_applied: None,
+                    shape: 0,
+                    shapes: 0,
+                    min_scaled_jacobian: None,
+                    seconds: ShapeSeconds::default(),
+                    added_steps: None,
+                });
+            } else {
+                if state.others.len() >= ORDERS_KEPT {
+                    state.others.pop_front();
+                }
+                state.others.push_back(id.clone());
+            }
+            id
+        };
+        // A replay's own pipelines give their commands again; those of the journal would double them.
+        let command = (!matches!(source, Source::Pipeline(_))).then(|| command.clone());
+        let reason = match source {
+            Source::Pipeline(name) => Some(format!("from pipeline '{name}'")),
+            _ => None,
+        };
+        if command.is_some() {
+            self.journal(&id, JournalStatus::Accepted, moment, command, reason, None);
+        }
+        self.tell(&id);
+        Ok(id)
+    }
+
+    /// Notes that a command that is no order took effect, or why it did not.
+    pub(crate) fn settle(&self, id: &str, moment: Moment, outcome: Result<(), String>) {
+        match outcome {
+            Ok(()) => self.journal(id, JournalStatus::Applied, moment, None, None, None),
+            Err(reason) => self.journal(id, JournalStatus::Rejected, moment, None, Some(reason), None),
+        }
+    }
+
+    /// Changes what is known of an order and tells the viewers.
+    pub(crate) fn update(&self, id: &str, change: impl FnOnce(&mut OrderReport)) {
+        {
+            let mut state = self.lock();
+            let Some(order) = state.orders.iter_mut().rev().find(|order| order.id == id) else { return };
+            change(order);
+        }
+        self.tell(id);
+    }
+
+    /// Notes that an order changes nothing, and why.
+    pub(crate) fn reject(&self, id: &str, moment: Moment, reason: &str) {
+        self.journal(id, JournalStatus::Rejected, moment, None, Some(reason.into()), None);
+        self.update(id, |order| {
+            order.status = OrderStatus::Rejected;
+            order.reason = Some(reason.into());
+        });
+    }
+
+    /// Notes that the motion of an order begins.
+    pub(crate) fn begin(&self, id: &str, moment: Moment, min_scaled_jacobian: f64) {
+        self.journal(id, JournalStatus::Applied, moment, None, None, Some(min_scaled_jacobian));
+    }
+
+    fn journal(
+        &self,
+        id: &str,
+        status: JournalStatus,
+        moment: Moment,
+        command: Option<Command>,
+        reason: Option<String>,
+        min_scaled_jacobian: Option<f64>,
+    ) {
+        let Moment { cycle, time } = moment;
+        let entry = JournalEntry { id: id.into(), status, cycle, time, command, reason, min_scaled_jacobian };
+        if let Err(error) = self.journal.write(&entry) {
+            // The solver goes on without; it must not go unsaid.
+            eprintln!("tombolo: {error}; this run has no journal from here on");
+            if let Some(hub) = &self.hub {
+                hub.tell(&json!({"error": {"message": format!("{error}; this run has no journal from here on")}}));
+            }
+        }
+    }
+
+    fn tell(&self, id: &str) {
+        let Some(hub) = &self.hub else { return };
+        if let Some(order) = self.lock().orders.iter().rev().find(|order| order.id == id) {
+            hub.tell(&json!({ "order": order }));
+        }
+    }
+
+    /// The newest orders, for a viewer that connects.
+    pub(crate) fn told(&self) -> Value {
+        let state = self.lock();
+        let skipped = state.orders.len().saturating_sub(ORDERS_TOLD);
+        json!(state.orders.iter().skip(skipped).collect::<Vec<_>>())
+    }
+
+    pub(crate) fn reports(&self) -> Vec<OrderReport> {
+        self.lock().orders.iter().cloned().collect()
+    }
+}
+
+impl State {
+    fn has(&self, id: &str) -> bool {
+        self.orders.iter().any(|order| order.id == id) || self.others.iter().any(|other| other == id)
+    }
+
+    fn next_id(&mut self) -> String {
+        loop {
+            self.counted += 1;
+            let id = format!("o{}", self.counted);
+            if !self.has(&id) {
+                return id;
+            }
+        }
+    }
+}

@@ -1,0 +1,334 @@
+//! From orders to mesh motion.
+//!
+//! Orders are carried out one after the other, in the order in which they came in. Each is planned from the shape that the mesh
+//! has when its turn comes: if an earlier order's schedule is still under way then, its remaining shapes are dropped and the new
+//! motion starts where the mesh is. Nothing is lost by that, because shapes are measured from the reference: the new target
+//! holds the earlier order's edits too (or not, if the new order takes it back). If the new order is refused, the schedule under
+//! way goes on as if nothing had been asked.
+//!
+//! Orders of viewers are planned on a thread of their own while the solver keeps stepping, and a schedule under way goes on
+//! meanwhile. Where the mesh has moved since, the way from its present shape is judged again before the first shape is handed
+//! out, so that what a journal replays is the same bits: the start of each motion depends only on the cycle at which it began.
+
+mod log;
+mod parameters;
+mod queue;
+mod stack;
+mod timed;
+mod worker;
+
+use std::{
+    collections::VecDeque,
+    sync::{Arc, Mutex, PoisonError},
+    time::Instant,
+};
+
+use tombolo_deform::{
+    mesh::Vector,
+    quality::{Guard, Quality},
+    schedule::Schedule,
+    volume::Deform,
+};
+use tombolo_pipelines::{
+    language::Order,
+    shape::{Plan, Shaper, Target},
+};
+
+pub(crate) use log::{Log, Moment, Source};
+pub(crate) use parameters::Parameters;
+pub use parameters::{Parameter, ParameterError};
+pub(crate) use queue::{Queue, Received};
+pub(crate) use stack::EditStack;
+pub(crate) use timed::Timed;
+
+use crate::report::OrderStatus;
+use worker::{Done, Wish, Worker, caught};
+
+/// The settings of orders that bring none.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Defaults {
+    pub(crate) deform: Deform,
+    pub(crate) guard: Guard,
+    pub(crate) schedule: Schedule,
+}
+
+/// An order waiting for its turn.
+struct Task {
+    id: String,
+    order: Order,
+    background: bool,
+}
+
+/// An order whose plan is being made.
+struct Computing {
+    id: String,
+    stack: EditStack,
+    guard: Guard,
+}
+
+/// A schedule under way.
+struct Motion {
+    id: String,
+    plan: Plan,
+    begun: Moment,
+    taken: u32,
+}
+
+/// One change of the mesh, to be made over the coming step.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Shape {
+    pub(crate) displacement: Vec<Vector>,
+    pub(crate) velocity: Vec<Vector>,
+    pub(crate) shape: (u32, u32),
+    pub(crate) order: String,
+}
+
+/// The shape of one mesh and the orders that change it.
+pub(crate) struct Steerer {
+    log: Arc<Log>,
+    defaults: Defaults,
+    shaper: Arc<Mutex<Shaper>>,
+    worker: Option<Worker>,
+    stack: EditStack,
+    points: Arc<[Vector]>,
+    waiting: VecDeque<Task>,
+    computing: Option<Computing>,
+    motion: Option<Motion>,
+    shape: Shape,
+    /// The quality of the present shape as far as it is known: least and mean scaled Jacobian.
+    quality: Option<(f64, f64)>,
+    reference_quality: Option<(f64, f64, usize)>,
+}
+
+impl Steerer {
+    /// Takes over a mesh at its reference shape. `prepare` sets the volume operator up on the worker's thread at once.
+    pub(crate) fn new(
+        shaper: Shaper,
+        defaults: Defaults,
+        log: Arc<Log>,
+        queue: Arc<Queue>,
+        prepare: bool,
+    ) -> std::io::Result<Self> {
+        let points: Arc<[Vector]> = shaper.mesh().points().into();
+        let shaper = Arc::new(Mutex::new(shaper));
+        let worker = prepare.then(|| Worker::start(Arc::clone(&shaper), queue)).transpose()?;
+        if let Some(worker) = &worker {
+            worker.prepare(defaults.deform);
+        }
+        Ok(Self {
+            log,
+            defaults,
+            shaper,
+            worker,
+            stack: EditStack::default(),
+            points,
+            waiting: VecDeque::new(),
+            computing: None,
+            motion: None,
+            shape: Shape::default(),
+            quality: None,
+            reference_quality: None,
+        })
+    }
+
+    /// How many vertices the mesh has.
+    pub(crate) fn vertex_count(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Whether nothing is under way and nothing waits.
+    #[inline]
+    pub(crate) fn is_at_rest(&self) -> bool {
+        self.motion.is_none() && self.waiting.is_empty()
+    }
+
+    pub(crate) fn stack(&self) -> &EditStack {
+        &self.stack
+    }
+
+    /// The least and the mean scaled Jacobian of the present shape and its inverted elements, as far as they are known.
+    pub(crate) fn quality(&self) -> Option<(f64, f64, usize)> {
+        // A shape that passed the guard holds no inverted element.
+        self.quality.map(|(min, mean)| (min, mean, 0)).or(self.reference_quality)
+    }
+
+    /// Puts an order at the end of the queue.
+    pub(crate) fn take(&mut self, id: String, order: Order, background: bool) {
+        self.waiting.push_back(Task { id, order, background: background && self.worker.is_some() });
+    }
+
+    /// Brings orders as far as they can come now; says whether anything changed. Called at safe points only.
+    pub(crate) fn advance(&mut self, moment: Moment, step_seconds: Option<f64>) -> bool {
+        let mut changed = false;
+        loop {
+            changed |= self.collect(moment, step_seconds);
+            if self.computing.is_some() {
+                // An order that must take effect at this cycle waits for the one before it.
+                if self.waiting.iter().all(|task| task.background) {
+                    return changed;
+                }
+                let done = self.worker.as_ref().map(Worker::take);
+                if let Some(done) = done {
+                    self.finish(done, moment, step_seconds);
+                }
+                changed = true;
+                continue;
+            }
+            let Some(task) = self.waiting.pop_front() else { return changed };
+            self.start(task, moment, step_seconds);
+            changed = true;
+        }
+    }
+
+    /// Takes what the worker has finished.
+    fn collect(&mut self, moment: Moment, step_seconds: Option<f64>) -> bool {
+        let mut changed = false;
+        while let Some(done) = self.worker.as_ref().and_then(Worker::try_take) {
+            let is_gone = matches!(done, Done::Planned(_)) && self.computing.is_none();
+            self.finish(done, moment, step_seconds);
+            if is_gone {
+                self.worker = None;
+            }
+            changed = true;
+        }
+        changed
+    }
+
+    fn start(&mut self, task: Task, moment: Moment, step_seconds: Option<f64>) {
+        let Task { id, order, background } = task;
+        let (stack, deform) = match self.stack.after(&order.change, order.deform, self.defaults.deform) {
+            Ok(after) => after,
+            Err(error) => return self.log.reject(&id, moment, &error.to_string()),
+        };
+        let wish = Wish {
+            stack: stack.edits(),
+            start: Arc::clone(&self.points),
+            deform,
+            schedule: order.schedule.unwrap_or(self.defaults.schedule),
+            guard: order.guard.unwrap_or(self.defaults.guard),
+        };
+        let guard = wish.guard;
+        self.log.update(&id, |order| order.status = OrderStatus::Computing);
+        let computing = Computing { id, stack, guard };
+        match &self.worker {
+            Some(worker) if background => {
+                worker.plan(wish);
+                self.computing = Some(computing);
+            }
+            _ => {
+                let begun = Instant::now();
+                let plan = wish.plan(&self.shaper);
+                self.commit(computing, plan, moment, begun, step_seconds);
+            }
+        }
+    }
+
+    fn finish(&mut self, done: Done, moment: Moment, step_seconds: Option<f64>) {
+        match done {
+            Done::Prepared(quality) => {
+                let Quality { min, mean, inverted, .. } = *quality;
+                self.reference_quality = Some((min, mean, inverted));
+            }
+            Done::Planned(plan) => {
+                if let Some(computing) = self.computing.take() {
+                    self.commit(computing, plan, moment, Instant::now(), step_seconds);
+                }
+            }
+        }
+    }
+
+    /// Makes a plan the motion under way, or says why not.
+    fn commit(
+        &mut self,
+        computing: Computing,
+        plan: Result<Plan, String>,
+        moment: Moment,
+        begun: Instant,
+        step_seconds: Option<f64>,
+    ) {
+        let Computing { id, stack, guard } = computing;
+        let plan = plan.and_then(|plan| self.from_here(plan, &guard));
+        let plan = match plan {
+            Ok(plan) => plan,
+            Err(reason) => return self.log.reject(&id, moment, &reason),
+        };
+        if let Some(before) = self.motion.take() {
+            self.log.update(&before.id, |order| {
+                order.status = OrderStatus::Applied;
+                order.reason = Some(format!("order {id} went on from shape {}", before.taken));
+            });
+        }
+        self.stack = stack;
+        self.log.begin(&id, moment, plan.quality().min_scaled_jacobian);
+        self.log.update(&id, |order| {
+            order.status = OrderStatus::Applying;
+            order.cycle_applied = Some(moment.cycle);
+            order.shapes = plan.shapes();
+            order.min_scaled_jacobian = Some(plan.quality().min_scaled_jacobian);
+            order.seconds = plan.seconds();
+            order.added_steps = step_seconds.map(|step| begun.elapsed().as_secs_f64() / step);
+        });
+        self.motion = Some(Motion { id, plan, begun: moment, taken: 0 });
+    }
+
+    /// The plan itself if the mesh is still where it starts, else one from where the mesh is.
+    fn from_here(&self, plan: Plan, guard: &Guard) -> Result<Plan, String> {
+        if Arc::ptr_eq(plan.start(), &self.points) {
+            return Ok(plan);
+        }
+        let target = Target { points: Arc::clone(plan.end()), seconds: plan.seconds(), iterations: 0 };
+        let shaper = self.shaper.lock().unwrap_or_else(PoisonError::into_inner);
+        caught(|| shaper.judge(Arc::clone(&self.points), &target, plan.schedule(), guard))
+    }
+
+    /// The last change of the mesh and the coordinates at its end.
+    pub(crate) fn present(&self) -> (&Shape, &[Vector]) {
+        (&self.shape, &self.points)
+    }
+
+    /// Takes the next shape of the schedule under way for the coming step, if it is due; says whether it was.
+    pub(crate) fn next_shape(&mut self, moment: Moment, time_step: f64) -> bool {
+        let Some(motion) = self.motion.as_mut() else { return false };
+        let (cycles, time) = (moment.cycle.saturating_sub(motion.begun.cycle), moment.time - motion.begun.time);
+        if !motion.plan.schedule().is_due(motion.taken, cycles, time) {
+            return false;
+        }
+        motion.taken += 1;
+        let last = motion.taken >= motion.plan.shapes();
+        let points: Arc<[Vector]> = if last {
+            Arc::clone(motion.plan.end())
+        } else {
+            let mut points = vec![[0.0; 3]; self.points.len()];
+            motion.plan.write_shape(motion.taken, &mut points);
+            points.into()
+        };
+        let shape = &mut self.shape;
+        shape.displacement.resize(points.len(), [0.0; 3]);
+        shape.velocity.resize(points.len(), [0.0; 3]);
+        for (((displacement, velocity), new), old) in
+            shape.displacement.iter_mut().zip(&mut shape.velocity).zip(&*points).zip(&*self.points)
+        {
+            for axis in 0..3 {
+                displacement[axis] = new[axis] - old[axis];
+                velocity[axis] = if time_step > 0.0 { displacement[axis] / time_step } else { 0.0 };
+            }
+        }
+        shape.shape = (motion.taken, motion.plan.shapes());
+        shape.order.clone_from(&motion.id);
+        self.points = points;
+        if let Some(quality) = motion.plan.quality().shapes.get(motion.taken as usize - 1) {
+            self.quality = Some((quality.min, quality.mean));
+        }
+        let taken = motion.taken;
+        self.log.update(&motion.id, |order| {
+            order.shape = taken;
+            if last {
+                order.status = OrderStatus::Applied;
+            }
+        });
+        if last {
+            self.motion = None;
+        }
+        true
+    }
+}

@@ -1,0 +1,159 @@
+//! Numbers of the solver that can be steered.
+
+use serde::Serialize;
+use tombolo_pipelines::language::nearest;
+
+/// A scalar that the solver lets itself be steered by.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Parameter {
+    /// Its name.
+    pub name: String,
+    /// Its value now.
+    pub value: f64,
+    /// The least value it may take.
+    pub minimum: f64,
+    /// The greatest.
+    pub maximum: f64,
+}
+
+/// Why a declaration or a change of a parameter was refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ParameterError {
+    /// There is none of that name.
+    #[error("there is no parameter '{name}'{}; the solver has {}", near_text(near.as_deref()), known_text(known))]
+    Unknown {
+        /// The name.
+        name: String,
+        /// The name that was likely meant.
+        near: Option<String>,
+        /// All names.
+        known: Vec<String>,
+    },
+    /// A value out of its bounds, or none at all.
+    #[error("parameter '{name}' cannot be {value}; it must be a number from {minimum} to {maximum}")]
+    Value {
+        /// The name.
+        name: String,
+        /// The value.
+        value: f64,
+        /// The least it may be.
+        minimum: f64,
+        /// The greatest.
+        maximum: f64,
+    },
+    /// Two parameters of one name.
+    #[error("parameter '{name}' is declared twice")]
+    Twice {
+        /// The name.
+        name: String,
+    },
+}
+
+fn near_text(near: Option<&str>) -> String {
+    near.map_or_else(String::new, |name| format!(" (did you mean '{name}'?)"))
+}
+
+fn known_text(known: &[String]) -> String {
+    if known.is_empty() { "none".into() } else { known.join(", ") }
+}
+
+/// The parameters of a run and which of them changed since the solver last looked.
+#[derive(Debug, Default)]
+pub(crate) struct Parameters {
+    all: Vec<Parameter>,
+    changed: Vec<(String, f64)>,
+    read: bool,
+}
+
+impl Parameters {
+    pub(crate) fn new(all: Vec<Parameter>) -> Result<Self, ParameterError> {
+        for (index, parameter) in all.iter().enumerate() {
+            check(parameter, parameter.value)?;
+            if all[..index].iter().any(|other| other.name == parameter.name) {
+                return Err(ParameterError::Twice { name: parameter.name.clone() });
+            }
+        }
+        Ok(Self { all, changed: Vec::new(), read: true })
+    }
+
+    pub(crate) fn all(&self) -> &[Parameter] {
+        &self.all
+    }
+
+    pub(crate) fn check(&self, name: &str, value: f64) -> Result<usize, ParameterError> {
+        let known = || self.all.iter().map(|parameter| parameter.name.clone()).collect::<Vec<_>>();
+        let index = self.all.iter().position(|parameter| parameter.name == name).ok_or_else(|| {
+            let near = nearest(name, self.all.iter().map(|parameter| parameter.name.as_str())).map(str::to_owned);
+            ParameterError::Unknown { name: name.into(), near, known: known() }
+        })?;
+        check(&self.all[index], value)?;
+        Ok(index)
+    }
+
+    pub(crate) fn set(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
+        let index = self.check(name, value)?;
+        self.forget_read();
+        self.all[index].value = value;
+        self.changed.retain(|(other, _)| other != name);
+        self.changed.push((name.into(), value));
+        Ok(())
+    }
+
+    /// The changes that the solver is about to read.
+    pub(crate) fn take_changed(&mut self) -> &[(String, f64)] {
+        self.forget_read();
+        self.read = true;
+        &self.changed
+    }
+
+    fn forget_read(&mut self) {
+        if std::mem::take(&mut self.read) {
+            self.changed.clear();
+        }
+    }
+}
+
+fn check(parameter: &Parameter, value: f64) -> Result<(), ParameterError> {
+    let Parameter { name, minimum, maximum, .. } = parameter;
+    // Written so that a NaN among the three is refused.
+    if value.is_finite() && *minimum <= value && value <= *maximum {
+        return Ok(());
+    }
+    Err(ParameterError::Value { name: name.clone(), value, minimum: *minimum, maximum: *maximum })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parameters() -> Parameters {
+        let parameter = |name: &str| Parameter { name: name.into(), value: 1.0, minimum: 0.0, maximum: 2.0 };
+        Parameters::new(vec![parameter("inlet_speed"), parameter("viscosity")]).unwrap()
+    }
+
+    #[test]
+    fn a_change_is_read_once() {
+        let mut parameters = parameters();
+        assert!(parameters.take_changed().is_empty());
+        parameters.set("viscosity", 0.5).unwrap();
+        parameters.set("viscosity", 0.25).unwrap();
+        assert_eq!(parameters.take_changed(), [("viscosity".to_owned(), 0.25)]);
+        assert!(parameters.take_changed().is_empty());
+        assert_eq!(parameters.all()[1].value, 0.25);
+    }
+
+    #[test]
+    fn what_is_no_value_of_a_parameter_is_refused_by_name() {
+        let mut parameters = parameters();
+        for bad in [f64::NAN, f64::INFINITY, -0.1, 2.1] {
+            let message = parameters.set("viscosity", bad).unwrap_err().to_string();
+            assert!(message.contains("viscosity") && message.contains(&bad.to_string()), "{message}");
+        }
+        let message = parameters.set("viscositi", 1.0).unwrap_err().to_string();
+        assert!(message.contains("did you mean 'viscosity'?") && message.contains("inlet_speed"), "{message}");
+        assert!(parameters.take_changed().is_empty());
+        let bad = Parameter { name: "x".into(), value: 1.0, minimum: f64::NAN, maximum: 2.0 };
+        assert!(Parameters::new(vec![bad]).is_err());
+    }
+}

@@ -1,0 +1,75 @@
+//! Commands on their way from the viewers' thread to the solver's.
+
+use std::{
+    collections::VecDeque,
+    sync::{
+        Condvar, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
+};
+
+use tombolo_pipelines::language::Command;
+
+/// Commands that may wait for the solver; the next one is refused.
+const WAITING: usize = 256;
+
+/// A command that was read, found valid and written to the journal.
+#[derive(Debug)]
+pub(crate) struct Received {
+    pub(crate) client: u64,
+    pub(crate) id: String,
+    pub(crate) command: Command,
+}
+
+/// The queue. To look whether anything happened costs the solver one atomic load.
+#[derive(Debug, Default)]
+pub(crate) struct Queue {
+    attention: AtomicBool,
+    waiting: Mutex<VecDeque<Received>>,
+    arrived: Condvar,
+}
+
+impl Queue {
+    fn lock(&self) -> MutexGuard<'_, VecDeque<Received>> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether there is room for one more.
+    pub(crate) fn has_room(&self) -> bool {
+        self.lock().len() < WAITING
+    }
+
+    pub(crate) fn push(&self, received: Received) {
+        self.lock().push_back(received);
+        self.call();
+    }
+
+    /// Tells the solver's thread that there is something to look at.
+    pub(crate) fn call(&self) {
+        // Under the lock, so that a thread about to wait cannot miss it.
+        let _held = self.lock();
+        self.attention.store(true, Ordering::Release);
+        self.arrived.notify_all();
+    }
+
+    /// Whether there was a call since [`Queue::take`].
+    #[inline]
+    pub(crate) fn has_called(&self) -> bool {
+        self.attention.load(Ordering::Acquire)
+    }
+
+    /// All that waits.
+    pub(crate) fn take(&self) -> VecDeque<Received> {
+        let mut waiting = self.lock();
+        self.attention.store(false, Ordering::Release);
+        std::mem::take(&mut *waiting)
+    }
+
+    /// Returns once there was a call.
+    pub(crate) fn wait(&self) {
+        let mut waiting = self.lock();
+        while !self.has_called() {
+            waiting = self.arrived.wait(waiting).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! The stack of edits, order by order, so that orders can be taken back.
+
+use std::num::NonZeroU32;
+
+use tombolo_deform::{surface::Edit, volume::Deform};
+use tombolo_pipelines::language::Change;
+
+/// Orders that a stack may hold.
+const ORDERS: usize = 4096;
+/// Edits that a shape may be made of.
+const EDITS: usize = 1024;
+
+/// What one order did to the stack.
+#[derive(Debug, Clone, PartialEq)]
+struct Entry {
+    replaces: bool,
+    edits: Vec<Edit>,
+    deform: Deform,
+}
+
+/// The edits that make the present shape, and how they came there.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct EditStack {
+    entries: Vec<Entry>,
+}
+
+/// Why an order makes no stack.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum StackError {
+    #[error("undo {wanted}: {}", if *held == 0 { "there is no order to take back".into() } else { format!("only {held} order(s) can be taken back") })]
+    Undo { wanted: u32, held: usize },
+    #[error(
+        "the stack would hold {edits} edits of {orders} orders; at most {EDITS} edits and {ORDERS} orders are kept"
+    )]
+    Full { edits: usize, orders: usize },
+}
+
+impl EditStack {
+    /// The stack after an order, and the way to deform that its shape is made with: the order's own, else for an undo the one
+    /// that the shape it goes back to was made with (so that the same bits come back), else `default`.
+    pub(crate) fn after(
+        &self,
+        change: &Change,
+        deform: Option<Deform>,
+        default: Deform,
+    ) -> Result<(Self, Deform), StackError> {
+        let mut entries = self.entries.clone();
+        match change {
+            Change::Edits(edits) | Change::Stack(edits) => entries.push(Entry {
+                replaces: matches!(change, Change::Stack(_)),
+                edits: edits.clone(),
+                deform: deform.unwrap_or(default),
+            }),
+            Change::Undo(count) => {
+                let kept = kept_after(entries.len(), *count)?;
+                entries.truncate(kept);
+            }
+        }
+        let deform = deform.unwrap_or_else(|| entries.last().map_or(default, |entry| entry.deform));
+        let stack = Self { entries };
+        let (orders, edits) = (stack.entries.len(), stack.edits().len());
+        if orders > ORDERS || edits > EDITS {
+            return Err(StackError::Full { edits, orders });
+        }
+        Ok((stack, deform))
+    }
+
+    /// The edits, the oldest first.
+    pub(crate) fn edits(&self) -> Vec<Edit> {
+        let from = self.entries.iter().rposition(|entry| entry.replaces).unwrap_or(0);
+        self.entries[from..].iter().flat_map(|entry| entry.edits.iter().cloned()).collect()
+    }
+}
+
+fn kept_after(held: usize, count: NonZeroU32) -> Result<usize, StackError> {
+    held.checked_sub(count.get() as usize).ok_or(StackError::Undo { wanted: count.get(), held })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn edit(x: f64) -> Edit {
+        serde_json::from_value(serde_json::json!({"translate": {"features": ["a"], "by": [x, 0.0, 0.0]}})).unwrap()
+    }
+
+    fn after(stack: &EditStack, change: Change) -> EditStack {
+        stack.after(&change, None, Deform::default()).unwrap().0
+    }
+
+    fn undo(count: u32) -> Change {
+        Change::Undo(NonZeroU32::new(count).unwrap())
+    }
+
+    #[test]
+    fn orders_are_taken_back_one_by_one() {
+        let none = EditStack::default();
+        let one = after(&none, Change::Edits(vec![edit(1.0), edit(2.0)]));
+        let two = after(&one, Change::Edits(vec![edit(3.0)]));
+        let replaced = after(&two, Change::Stack(vec![edit(4.0)]));
+        let more = after(&replaced, Change::Edits(vec![edit(5.0)]));
+        assert_eq!(two.edits(), [edit(1.0), edit(2.0), edit(3.0)]);
+        assert_eq!(more.edits(), [edit(4.0), edit(5.0)]);
+        assert_eq!(after(&more, undo(1)), replaced);
+        assert_eq!(after(&more, undo(2)), two);
+        assert_eq!(after(&more, undo(4)), none);
+        let error = more.after(&undo(5), None, Deform::default()).unwrap_err();
+        assert!(error.to_string().contains("only 4"), "{error}");
+    }
+
+    #[test]
+    fn an_undo_deforms_as_the_shape_it_goes_back_to() {
+        let stiff = Deform { stiffening: 2.0, ..Deform::default() };
+        let none = EditStack::default();
+        let (one, _) = none.after(&Change::Edits(vec![edit(1.0)]), Some(stiff), Deform::default()).unwrap();
+        let two = after(&one, Change::Edits(vec![edit(2.0)]));
+        assert_eq!(two.after(&undo(1), None, Deform::default()).unwrap(), (one, stiff));
+    }
+
+    #[test]
+    fn a_stack_does_not_grow_without_end() {
+        let edits = vec![edit(1.0); EDITS + 1];
+        assert!(EditStack::default().after(&Change::Edits(edits), None, Deform::default()).is_err());
+    }
+}

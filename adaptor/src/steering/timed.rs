@@ -1,0 +1,80 @@
+//! Commands that were given beforehand.
+
+use tombolo_pipelines::language::{At, TimedCommand};
+
+use super::Moment;
+
+/// Commands that are not due yet, in the order in which they were given.
+#[derive(Debug)]
+pub(crate) struct Timed {
+    commands: Vec<TimedCommand>,
+    /// The least of the cycles and of the times at which one is due.
+    cycle: u64,
+    time: f64,
+}
+
+impl Timed {
+    pub(crate) fn new(commands: Vec<TimedCommand>) -> Self {
+        let mut timed = Self { commands, cycle: u64::MAX, time: f64::INFINITY };
+        timed.look_ahead();
+        timed
+    }
+
+    fn look_ahead(&mut self) {
+        (self.cycle, self.time) = (u64::MAX, f64::INFINITY);
+        for command in &self.commands {
+            match command.at {
+                None => self.cycle = 0,
+                Some(At::Cycle(cycle)) => self.cycle = self.cycle.min(cycle),
+                Some(At::Time(time)) => self.time = self.time.min(time),
+            }
+        }
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.commands.is_empty()
+    }
+
+    /// Whether [`Timed::take_due`] would find one; two comparisons.
+    #[inline]
+    pub(crate) fn is_due(&self, moment: Moment) -> bool {
+        !self.commands.is_empty()
+            && (moment.cycle >= self.cycle || At::Time(self.time).has_come(moment.cycle, moment.time))
+    }
+
+    /// The commands that are due, in the order in which they were given; each is given once.
+    pub(crate) fn take_due(&mut self, moment: Moment) -> Vec<TimedCommand> {
+        if !self.is_due(moment) {
+            return Vec::new();
+        }
+        let has_come = |command: &TimedCommand| command.at.is_none_or(|at| at.has_come(moment.cycle, moment.time));
+        let (due, rest) = std::mem::take(&mut self.commands).into_iter().partition(has_come);
+        self.commands = rest;
+        self.look_ahead();
+        due
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tombolo_pipelines::language::Command;
+
+    fn at(at: Option<At>) -> TimedCommand {
+        TimedCommand { at, id: None, command: Command::Stop {} }
+    }
+
+    #[test]
+    fn each_command_is_given_once_when_its_moment_has_come() {
+        let moments = [Some(At::Cycle(3)), None, Some(At::Time(0.5)), Some(At::Cycle(3))];
+        let mut timed = Timed::new(moments.map(at).to_vec());
+        let mut given = Vec::new();
+        for cycle in 0..20 {
+            let moment = Moment { cycle, time: f64::from(cycle as u32) * 0.1 };
+            assert_eq!(timed.is_due(moment), [0, 3, 5].contains(&cycle));
+            given.extend(timed.take_due(moment).into_iter().map(|command| (cycle, command.at)));
+        }
+        assert_eq!(given, [(0, None), (3, Some(At::Cycle(3))), (3, Some(At::Cycle(3))), (5, Some(At::Time(0.5)))]);
+        assert!(timed.is_empty());
+    }
+}

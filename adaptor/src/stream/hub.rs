@@ -1,0 +1,437 @@
+//! What the solver's side has to say to the viewers, the newest of each kind, and who the viewers are.
+//!
+//! Every call returns at once. What is kept is bounded: one newest frame of each view (as an extract until somebody looks), the
+//! same again for each viewer that has not read it yet, and short queues of texts.
+
+use std::{
+    collections::{BTreeMap, VecDeque},
+    sync::{
+        Arc, Condvar, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::{Duration, Instant},
+};
+
+use axum::body::Bytes;
+use serde_json::{Map, Value, json};
+use tokio::sync::Notify;
+
+use super::StreamCounts;
+
+/// How long the wheel is kept for a driver whose connection was lost.
+pub(super) const WHEEL_KEPT: Duration = Duration::from_secs(3);
+/// Texts that may wait for a viewer; one that leaves more unread is let go.
+const TEXTS: usize = 1024;
+/// Monitor values that may wait for a viewer; older ones make way.
+const MONITORS: usize = 256;
+
+/// One encoded frame of a view, shared by all viewers.
+#[derive(Debug)]
+pub(crate) struct Frame {
+    pub(crate) topology_id: u64,
+    pub(crate) topology: Bytes,
+    pub(crate) data: Bytes,
+    /// Bytes that the arrays of `data` fill uncompressed.
+    pub(crate) raw_bytes: u64,
+}
+
+/// Encodes a frame on the encoder's thread; the message says why it could not be done.
+pub(crate) type Encode = Box<dyn FnOnce() -> Result<Frame, String> + Send>;
+
+/// What one viewer has yet to read.
+#[derive(Default)]
+struct Outbox {
+    texts: VecDeque<Arc<str>>,
+    monitors: VecDeque<Arc<str>>,
+    status: Option<Arc<str>>,
+    hello: bool,
+    frames: BTreeMap<usize, Arc<Frame>>,
+    overflowed: bool,
+}
+
+/// One viewer.
+pub(super) struct Client {
+    pub(super) id: u64,
+    pub(super) wake: Notify,
+    outbox: Mutex<Outbox>,
+}
+
+/// What to send to a viewer next.
+pub(super) enum Message {
+    Text(Arc<str>),
+    Hello,
+    Frame(usize, Arc<Frame>),
+}
+
+impl Client {
+    /// The next thing to send, the most urgent first; `Err` once the viewer has left too much unread.
+    pub(super) fn next(&self) -> Result<Option<Message>, ()> {
+        let mut outbox = lock(&self.outbox);
+        if outbox.overflowed {
+            return Err(());
+        }
+        if std::mem::take(&mut outbox.hello) {
+            return Ok(Some(Message::Hello));
+        }
+        if let Some(text) = outbox.texts.pop_front() {
+            return Ok(Some(Message::Text(text)));
+        }
+        if let Some(text) = outbox.status.take() {
+            return Ok(Some(Message::Text(text)));
+        }
+        if let Some(text) = outbox.monitors.pop_front() {
+            return Ok(Some(Message::Text(text)));
+        }
+        Ok(outbox.frames.pop_first().map(|(view, frame)| Message::Frame(view, frame)))
+    }
+
+    fn put(&self, change: impl FnOnce(&mut Outbox)) {
+        change(&mut lock(&self.outbox));
+        self.wake.notify_one();
+    }
+
+    pub(super) fn text(&self, text: &Arc<str>) {
+        self.put(|outbox| {
+            outbox.overflowed |= outbox.texts.len() >= TEXTS;
+            if !outbox.overflowed {
+                outbox.texts.push_back(Arc::clone(text));
+            }
+        });
+    }
+}
+
+/// The part of the status that changes with every step: written by the solver's thread with plain stores.
+#[derive(Debug, Default)]
+pub(crate) struct Clock {
+    cycle: AtomicU64,
+    time: AtomicU64,
+}
+
+impl Clock {
+    pub(crate) fn set(&self, cycle: u64, time: f64) {
+        self.cycle.store(cycle, Ordering::Relaxed);
+        self.time.store(time.to_bits(), Ordering::Relaxed);
+    }
+
+    pub(crate) fn get(&self) -> (u64, f64) {
+        (self.cycle.load(Ordering::Relaxed), f64::from_bits(self.time.load(Ordering::Relaxed)))
+    }
+}
+
+/// Counted as it happens, for the report.
+#[derive(Debug, Default)]
+struct Counters {
+    frames: AtomicU64,
+    dropped: AtomicU64,
+    bytes: AtomicU64,
+    raw_bytes: AtomicU64,
+}
+
+#[derive(Default)]
+struct View {
+    waiting: Option<Encode>,
+    frame: Option<Arc<Frame>>,
+}
+
+#[derive(Default)]
+struct State {
+    description: Map<String, Value>,
+    conditions: Map<String, Value>,
+    views: Vec<View>,
+    clients: BTreeMap<u64, Arc<Client>>,
+    next_client: u64,
+    driver: Option<u64>,
+    /// When the driver's connection was lost, and whose it was.
+    wheel_lost: Option<(Instant, u64)>,
+    last_status: Option<(u64, Instant)>,
+    status_dirty: bool,
+    closed: bool,
+}
+
+/// See the module.
+#[derive(Default)]
+pub(crate) struct Hub {
+    state: Mutex<State>,
+    work: Condvar,
+    pub(crate) clock: Clock,
+    counters: Counters,
+}
+
+/// What a viewer is called in messages.
+fn name(client: u64) -> String {
+    format!("c{client}")
+}
+
+/// A panic while one of these was held leaves nothing half-done in it: every change is one assignment or one push.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Said by the solver's side.
+impl Hub {
+    /// Replaces what `hello` tells about the run, and tells it to every viewer again.
+    pub(crate) fn describe(&self, description: Map<String, Value>) {
+        let mut state = lock(&self.state);
+        state.description = description;
+        state.greet();
+    }
+
+    /// Replaces the slowly changing part of the status: `paused`, `stopped`, `quality`.
+    pub(crate) fn conditions(&self, conditions: Map<String, Value>) {
+        let mut state = lock(&self.state);
+        state.conditions = conditions;
+        state.status_dirty = true;
+    }
+
+    /// Tells every viewer, one after the other, and drops none of it.
+    pub(crate) fn tell(&self, message: &Value) {
+        let text: Arc<str> = message.to_string().into();
+        for client in lock(&self.state).clients.values() {
+            client.text(&text);
+        }
+    }
+
+    /// Tells one viewer, if it is still there.
+    pub(crate) fn tell_client(&self, client: u64, message: &Value) {
+        if let Some(client) = lock(&self.state).clients.get(&client) {
+            client.text(&message.to_string().into());
+        }
+    }
+
+    /// Tells the values of monitors; a viewer that is behind misses the oldest.
+    pub(crate) fn monitor(&self, message: &Value) {
+        let state = lock(&self.state);
+        if state.clients.is_empty() {
+            return;
+        }
+        let text: Arc<str> = message.to_string().into();
+        for client in state.clients.values() {
+            client.put(|outbox| {
+                if outbox.monitors.len() >= MONITORS {
+                    outbox.monitors.pop_front();
+                }
+                outbox.monitors.push_back(Arc::clone(&text));
+            });
+        }
+    }
+
+    /// Hands over the newest extract of a view. The one before it, if nobody came to encode it, is dropped.
+    pub(crate) fn frame(&self, view: usize, encode: Encode) {
+        let mut state = lock(&self.state);
+        if state.views.len() <= view {
+            state.views.resize_with(view + 1, View::default);
+        }
+        let watched = !state.clients.is_empty();
+        if state.views[view].waiting.replace(encode).is_some() && watched {
+            self.counters.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+        if watched {
+            self.work.notify_one();
+        }
+    }
+
+    /// How many viewers there are.
+    pub(crate) fn viewers(&self) -> usize {
+        lock(&self.state).clients.len()
+    }
+
+    pub(crate) fn counts(&self) -> StreamCounts {
+        let get = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
+        StreamCounts {
+            frames: get(&self.counters.frames),
+            dropped: get(&self.counters.dropped),
+            bytes: get(&self.counters.bytes),
+            raw_bytes: get(&self.counters.raw_bytes),
+        }
+    }
+
+    /// Ends the encoder's thread.
+    pub(crate) fn close(&self) {
+        lock(&self.state).closed = true;
+        self.work.notify_all();
+    }
+}
+
+/// Done on the encoder's thread.
+impl Hub {
+    /// Encodes what waits, as long as anybody looks, until the hub is closed.
+    pub(super) fn encode_until_closed(&self) {
+        loop {
+            let mut state = lock(&self.state);
+            let (view, encode) = loop {
+                if state.closed {
+                    return;
+                }
+                let watched = !state.clients.is_empty();
+                let waiting = state.views.iter_mut().enumerate().find_map(|(index, view)| {
+                    if watched { view.waiting.take().map(|encode| (index, encode)) } else { None }
+                });
+                match waiting {
+                    Some(found) => break found,
+                    None => state = self.work.wait(state).unwrap_or_else(PoisonError::into_inner),
+                }
+            };
+            drop(state);
+            // A frame that cannot be encoded must not take the others with it.
+            let encoded = std::panic::catch_unwind(std::panic::AssertUnwindSafe(encode))
+                .unwrap_or_else(|_| Err("the encoder failed".into()));
+            match encoded {
+                Ok(frame) => self.publish(view, Arc::new(frame)),
+                Err(reason) => self.tell(&json!({"error": {"message": format!("a frame was not encoded: {reason}")}})),
+            }
+        }
+    }
+
+    fn publish(&self, view: usize, frame: Arc<Frame>) {
+        let mut state = lock(&self.state);
+        for client in state.clients.values() {
+            client.put(|outbox| {
+                if outbox.frames.insert(view, Arc::clone(&frame)).is_some() {
+                    self.counters.dropped.fetch_add(1, Ordering::Relaxed);
+                }
+            });
+        }
+        if let Some(view) = state.views.get_mut(view) {
+            view.frame = Some(frame);
+        }
+    }
+}
+
+/// Done on the stream's thread.
+impl Hub {
+    /// Lets a viewer in, unless there are `limit` already. `returning` is what it was called before its connection was lost.
+    pub(super) fn join(&self, limit: usize, returning: Option<&str>) -> Option<Arc<Client>> {
+        let mut state = lock(&self.state);
+        if state.clients.len() >= limit {
+            return None;
+        }
+        state.next_client += 1;
+        let client =
+            Arc::new(Client { id: state.next_client, wake: Notify::new(), outbox: Mutex::new(Outbox::default()) });
+        let alone = state.clients.is_empty();
+        let kept_for_it = state.wheel_lost.is_some_and(|(_, driver)| Some(&*name(driver)) == returning);
+        if state.driver.is_none() && (alone || kept_for_it || state.wheel_is_free()) {
+            state.take_wheel(client.id);
+        }
+        {
+            let mut outbox = lock(&client.outbox);
+            outbox.hello = true;
+            for (index, view) in state.views.iter().enumerate() {
+                if let Some(frame) = &view.frame {
+                    outbox.frames.insert(index, Arc::clone(frame));
+                }
+            }
+        }
+        state.clients.insert(client.id, Arc::clone(&client));
+        state.status_dirty = true;
+        drop(state);
+        self.work.notify_one();
+        Some(client)
+    }
+
+    pub(super) fn leave(&self, client: u64) {
+        let mut state = lock(&self.state);
+        state.clients.remove(&client);
+        if state.driver == Some(client) {
+            state.driver = None;
+            state.wheel_lost = Some((Instant::now(), client));
+        }
+        state.status_dirty = true;
+    }
+
+    pub(super) fn is_driver(&self, client: u64) -> bool {
+        lock(&self.state).driver == Some(client)
+    }
+
+    /// Gives a viewer the wheel; the message says why not.
+    pub(super) fn drive(&self, client: u64) -> Result<(), String> {
+        let mut state = lock(&self.state);
+        match state.driver {
+            Some(driver) if driver == client => Ok(()),
+            Some(driver) => Err(format!("{} has the wheel; it is free once that viewer has left", name(driver))),
+            None if state.wheel_is_free() => {
+                state.take_wheel(client);
+                state.greet();
+                Ok(())
+            }
+            None => Err(format!(
+                "the wheel is kept for {} seconds for the driver whose connection was lost; ask again",
+                WHEEL_KEPT.as_secs()
+            )),
+        }
+    }
+
+    /// The `hello` of a viewer.
+    pub(super) fn hello(&self, client: u64, orders: Value) -> Arc<str> {
+        let state = lock(&self.state);
+        let mut hello = state.description.clone();
+        hello.insert("orders".into(), orders);
+        hello.insert("client".into(), name(client).into());
+        let role = if state.driver == Some(client) { "driver" } else { "watcher" };
+        hello.insert("role".into(), role.into());
+        json!({ "hello": hello }).to_string().into()
+    }
+
+    /// Puts a status into every outbox if anything in it changed. Called a few times a second.
+    pub(super) fn status(&self) {
+        let (cycle, time) = self.clock.get();
+        let mut state = lock(&self.state);
+        if state.clients.is_empty() {
+            state.last_status = None;
+            return;
+        }
+        let now = Instant::now();
+        let before = state.last_status;
+        if before.is_some_and(|(last, _)| last == cycle) && !state.status_dirty {
+            return;
+        }
+        state.status_dirty = false;
+        // Measured over the steps since the last status, so that the solver need not look at a clock for it.
+        let step_seconds = before.and_then(|(last, at)| {
+            let steps = cycle.checked_sub(last).filter(|&steps| steps > 0)?;
+            #[expect(clippy::cast_precision_loss, reason = "steps of a fraction of a second")]
+            Some(now.duration_since(at).as_secs_f64() / steps as f64)
+        });
+        if before.is_none_or(|(last, _)| last != cycle) {
+            state.last_status = Some((cycle, now));
+        }
+        let mut status = state.conditions.clone();
+        status.insert("cycle".into(), cycle.into());
+        status.insert("time".into(), time.into());
+        if let Some(seconds) = step_seconds {
+            status.insert("step_seconds".into(), seconds.into());
+        } else {
+            status.insert("step_seconds".into(), Value::Null);
+        }
+        status.insert("viewers".into(), state.clients.len().into());
+        status.insert("driver".into(), state.driver.map(name).into());
+        let text: Arc<str> = json!({ "status": status }).to_string().into();
+        for client in state.clients.values() {
+            client.put(|outbox| outbox.status = Some(Arc::clone(&text)));
+        }
+    }
+
+    pub(super) fn sent(&self, bytes: usize, frame: &Frame) {
+        self.counters.frames.fetch_add(1, Ordering::Relaxed);
+        self.counters.bytes.fetch_add(bytes as u64, Ordering::Relaxed);
+        self.counters.raw_bytes.fetch_add(frame.raw_bytes, Ordering::Relaxed);
+    }
+}
+
+impl State {
+    fn wheel_is_free(&self) -> bool {
+        self.driver.is_none() && self.wheel_lost.is_none_or(|(at, _)| at.elapsed() >= WHEEL_KEPT)
+    }
+
+    fn take_wheel(&mut self, client: u64) {
+        self.driver = Some(client);
+        self.wheel_lost = None;
+        self.status_dirty = true;
+    }
+
+    fn greet(&self) {
+        for client in self.clients.values() {
+            client.put(|outbox| outbox.hello = true);
+        }
+    }
+}
