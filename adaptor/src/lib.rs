@@ -9,7 +9,7 @@
 //!
 //! let orders = r#"[
 //!     {"at": {"cycle": 2}, "order": {"edits": [
-//!         {"translate": {"features": ["feature-1"], "fixed": ["feature-2"], "by": [0.1, 0.1, 0.1]}}]}},
+//!         {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -0.2]}}]}},
 //!     {"at": {"cycle": 4}, "order": {"undo": 1}}]"#;
 //! let mut mesh = box_of_tets([3, 3, 3], [0.0; 3], [1.0; 3]);
 //! let reference = mesh.clone();
