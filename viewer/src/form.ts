@@ -127,7 +127,7 @@ export class EditForm {
     const index = Number(this.action?.value ?? 0);
     this.edits.forEach((control, i) => { control.root.hidden = i !== index; });
     const text = this.form?.edits[index]?.description ?? "";
-    write(this.description, text.split(/\n\s*\n/)[0]?.replaceAll("\n", " ") ?? "");
+    write(this.description, text);
     this.description.hidden = text === "";
     this.table.hidden = this.form?.edits[index]?.field.kind !== "object";
   }

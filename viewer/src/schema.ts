@@ -72,7 +72,7 @@ function alternativesOf(root: Schema, entries: Json[], depth: number): Field {
   const values: { value: Json; title: string }[] = [];
   for (const entry of entries) {
     const schema = resolve(root, entry);
-    const described = typeof schema.description === "string" ? schema.description : "";
+    const described = plain(schema.description);
     const constants = schema.const !== undefined ? [schema.const] : list(schema.enum);
     if (constants.length > 0) {
       for (const value of constants) values.push({ value, title: title(value) });
@@ -112,14 +112,22 @@ function arrayOf(root: Schema, schema: Schema, depth: number): Field {
 
 function propertiesOf(root: Schema, schema: Schema, depth: number): Property[] {
   const required = list(schema.required);
-  return Object.entries(isObject(schema.properties) ? schema.properties : {}).map(([name, entry]) => {
+  const properties = Object.entries(isObject(schema.properties) ? schema.properties : {}).map(([name, entry]): Property => {
     const resolved = resolve(root, entry);
     return {
       name, required: required.includes(name), field: fieldOf(root, entry, depth + 1),
-      description: typeof resolved.description === "string" ? resolved.description : "", initial: resolved.default,
+      description: plain(resolved.description), initial: resolved.default,
     };
   });
+  // JSON does not keep an order: what must be given comes first, what is rarely given last.
+  const rank = ({ required, field }: Property): number =>
+    required ? 0 : ["optional", "json"].includes(field.kind) ? 3 : ["object", "variants"].includes(field.kind) ? 2 : 1;
+  return properties.sort((a, b) => rank(a) - rank(b));
 }
+
+/** The first paragraph of a description, without the marks of rustdoc. */
+const plain = (description: Json | undefined): string =>
+  typeof description !== "string" ? "" : (description.split(/\n\s*\n/)[0] ?? "").replaceAll("\n", " ").replace(/\[?`([^`]*)`\]?/g, "$1");
 
 const title = (value: Json): string => (typeof value === "string" ? value.replaceAll("_", " ") : JSON.stringify(value));
 

@@ -2,15 +2,15 @@
  * A stand-in for a running simulation, to work on the viewer without one: a flat duct with a throat, a flow that moves, and
  * orders that scale the throat. `node test/fake-server.mjs [port]` prints the link.
  */
-import { createReadStream, existsSync, statSync } from "node:fs";
+import { createReadStream, existsSync, readFileSync, statSync } from "node:fs";
 import { createServer } from "node:http";
 import { dirname, extname, join, normalize } from "node:path";
 import { fileURLToPath } from "node:url";
 import { WebSocketServer } from "ws";
 import { dataFrame, topologyFrame } from "./frames.mjs";
-import { ORDER_SCHEMA } from "./order-schema.mjs";
 
 const DIST = join(dirname(fileURLToPath(import.meta.url)), "..", "dist");
+const ORDER_SCHEMA = JSON.parse(readFileSync(new URL("order-schema.json", import.meta.url), "utf8"));
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
 const HALF = { x: 0.025, y: 0.525, z: 0.05 };
 const ALONG = 180, ACROSS = 40, UP = 22;

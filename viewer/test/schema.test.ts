@@ -5,9 +5,10 @@ import { EditForm, describeOrder } from "../src/form";
 import type { Json } from "../src/protocol";
 import { fieldOf, orderForm } from "../src/schema";
 import { Selection } from "../src/selection";
-import { ORDER_SCHEMA } from "./order-schema.mjs";
+// As the server sends it; `tombolo schema` and the crate tombolo-pipelines make it.
+import orderSchema from "./order-schema.json";
 
-const schema = ORDER_SCHEMA as unknown as Json;
+const schema = orderSchema as unknown as Json;
 const features = ["inlet", "outlet", "wall", "throat"].map((name) => ({ name, faces: 4, vertices: 4, bounds: [[0, 0, 0], [1, 1, 1]] as [[number, number, number], [number, number, number]] }));
 const defaults = { schedule: { steps: 10, every: { steps: 5 } }, guard: { min_scaled_jacobian: 0.03, otherwise: "reject" } };
 
@@ -15,10 +16,14 @@ describe("the schema of an order", () => {
   it("holds the edits and what an order can set", () => {
     const form = orderForm(schema)!;
     expect(form.edits.map((edit) => edit.key)).toEqual(["translate", "scale_normals", "scale_direction"]);
-    expect(form.settings.map((property) => property.name)).toEqual(["schedule", "deform", "guard"]);
+    expect(form.settings.map((property) => property.name)).toEqual(["deform", "guard", "schedule"]);
     const scale = form.edits[2]!.field;
     expect(scale.kind === "object" && scale.properties.map((property) => [property.name, property.field.kind])).toEqual([
-      ["features", "names"], ["fixed", "names"], ["factors", "vector"], ["center", "optional"], ["harmonic_order", "choice"],
+      ["factors", "vector"], ["features", "names"], ["fixed", "names"], ["harmonic_order", "choice"], ["center", "optional"],
+    ]);
+    const schedule = form.settings[2]!.field;
+    expect(schedule.kind === "optional" && schedule.field.kind === "object" && schedule.field.properties.map((property) => [property.name, property.field.kind])).toEqual([
+      ["steps", "number"], ["every", "variants"],
     ]);
   });
 
