@@ -5,7 +5,7 @@ use super::{LinearError, SparseMatrix};
 use crate::parallel;
 
 /// Rows are cut into at most this many pieces, each factorised by itself. It bounds the threads that one application can use.
-const PIECES: usize = 16;
+const PIECES: usize = 2;
 
 /// A piece has at least this many rows.
 const PIECE_ROWS: usize = 2048;

@@ -7,6 +7,8 @@ mod cell;
 mod fold;
 mod judge;
 mod path;
+#[cfg(test)]
+mod tests;
 
 use schemars::JsonSchema;
 use serde::Serialize;
