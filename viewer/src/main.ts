@@ -15,6 +15,11 @@ import { Selection } from "./selection";
 import { ColourPanel, MonitorPanel, ParameterPanel, ViewList } from "./sidebar";
 import { StatusBar } from "./status";
 
+if (!document.createElement("canvas").getContext("webgl2")) {
+  showEmpty("This browser cannot draw the picture", "It has no WebGL 2, or it is switched off. Any current Chrome, Firefox, Edge or Safari has it.");
+  throw new Error("WebGL 2 is missing");
+}
+
 let hello: Hello | null = null;
 let status: Status | null = null;
 let cycle: number | null = null;
@@ -22,6 +27,7 @@ let frames = 0;
 let sequence = 0;
 let everConnected = false;
 let fresh = false;
+let noticed = 0;
 const errors: string[] = [];
 const session = Array.from(crypto.getRandomValues(new Uint8Array(4)), (byte) => byte.toString(16).padStart(2, "0")).join("");
 
@@ -121,7 +127,11 @@ function takeFrame(frame: Frame): void {
 function report(text: string): void {
   errors.push(text);
   if (errors.length > 50) errors.shift();
-  console.warn(text);
+  const notice = part("notice");
+  write(notice, `Something that arrived could not be read: ${text}.`);
+  notice.hidden = false;
+  clearTimeout(noticed);
+  noticed = window.setTimeout(() => { notice.hidden = true; }, 10000);
 }
 
 function refresh(): void {

@@ -299,8 +299,10 @@ class Entry {
       return result;
     }
     if (count === 0) return result;
-    const quantum = numbers(this.header.quantum, components, `${this.place}: quantum`);
-    const offset = numbers(this.header.offset, components, `${this.place}: offset`);
+    // Without a quantum the integers are the values.
+    const plain = (this.header.quantum ?? null) === null;
+    const quantum = plain ? Array<number>(components).fill(1) : numbers(this.header.quantum, components, `${this.place}: quantum`);
+    const offset = plain ? Array<number>(components).fill(0) : numbers(this.header.offset, components, `${this.place}: offset`);
     const integers = this.integers("none");
     for (let c = 0; c < components; c++) {
       const step = quantum[c]!;
