@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::extraction::{cross, dot, subtract};
 use super::features::Parts;
 use super::laplacian::Laplacian;
 use super::polyharmonic::{NotFactored, Polyharmonic};
 use super::{Edit, HarmonicOrder, InvalidEdit, Surface, SurfaceError, UnknownFeature};
 use crate::mesh::Vector;
+use crate::vector::{add, cross, dot, subtract};
 
 /// How many factored operators are kept, and how many numbers they may hold together (8 bytes each); the newest is always kept.
 const OPERATORS_KEPT: usize = 8;
@@ -150,13 +150,8 @@ impl Editor {
     }
 
     fn apply(&mut self, edit: usize, what: &Edit, roles: Roles, displacement: &mut [Vector]) -> Result<(), EditError> {
-        let shape: Vec<Vector> = self
-            .surface
-            .points()
-            .iter()
-            .zip(displacement.iter())
-            .map(|(point, moved)| [point[0] + moved[0], point[1] + moved[1], point[2] + moved[2]])
-            .collect();
+        let shape: Vec<Vector> =
+            self.surface.points().iter().zip(displacement.iter()).map(|(point, moved)| add(*point, *moved)).collect();
         let motion = self.handle_motion(edit, what, &roles, &shape)?;
 
         let mut fields = [0, 1, 2].map(|_| vec![0.0; shape.len()]);

@@ -3,6 +3,7 @@
 use super::faces::{self, FaceBuffer};
 use super::features::{FeatureSettings, Features};
 use crate::mesh::{CellType, Cells, Mesh, Vector};
+use crate::vector::{cross, dot, subtract};
 
 /// The surface of a mesh: its boundary faces, their vertices and their features.
 ///
@@ -192,18 +193,6 @@ pub(super) fn polygon_normal(points: &[Vector], vertices: &[u32]) -> Vector {
         }
     }
     normal
-}
-
-pub(super) fn subtract(a: Vector, b: Vector) -> Vector {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-pub(super) fn cross(a: Vector, b: Vector) -> Vector {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-pub(super) fn dot(a: Vector, b: Vector) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Why a mesh has no surface that can be used.

@@ -6,9 +6,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::SurfaceError;
-use super::extraction::{cross, dot, polygon_normal};
+use super::extraction::polygon_normal;
 use super::faces::TagLookup;
 use crate::mesh::{Cells, FeatureSource, Vector};
+use crate::vector::{cross, dot};
 
 /// How features are found where the mesh does not name them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -333,3 +333,107 @@ fn compressed_rows(count: usize, sides: &[(u32, u32, f64)]) -> (Vec<usize>, Vec<
     }
     (offsets, columns, weights)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{FeatureSource, Mesh, Vector};
+    use crate::shapes;
+    use crate::surface::FeatureSettings;
+
+    fn laplacian(mesh: &Mesh, place: impl Fn(Vector) -> Vector) -> (Surface, Laplacian) {
+        let points = mesh.points().iter().map(|&point| place(point)).collect();
+        let mesh = Mesh::new(points, mesh.cells().clone(), FeatureSource::SharpEdges).unwrap();
+        let surface = Surface::extract(&mesh, &FeatureSettings::default()).unwrap();
+        let laplacian = Laplacian::new(&surface, 1e-9).unwrap();
+        (surface, laplacian)
+    }
+
+    /// A plate sheared and bent within its plane, so that most of its triangles are obtuse, some by 170 degrees.
+    fn sheared([x, y, _]: Vector) -> Vector {
+        [x + 4.0 * y + 0.1 * (3.0 * y).sin(), y + 0.03 * (5.0 * x).sin(), 0.0]
+    }
+
+    #[test]
+    fn inner_edges_of_obtuse_triangles_have_no_negative_weight() {
+        let torus = shapes::torus(2.0, 0.5, [30, 18]);
+        let (_, laplacian) = laplacian(&torus, |[x, y, z]| [x + 3.0 * z, 4.0 * y + 2.0 * x, z]);
+        let lowest = (0..laplacian.len()).flat_map(|vertex| laplacian.neighbours(vertex)).map(|(_, weight)| weight);
+        assert!(lowest.fold(f64::INFINITY, f64::min) > -1e-9);
+        let mean = laplacian.mass().iter().sum::<f64>() / laplacian.len() as f64;
+        assert!((mean - 1.0).abs() < 1e-12 && laplacian.mass().iter().all(|&mass| mass > 0.0));
+    }
+
+    #[test]
+    fn flips_change_neither_the_energy_nor_the_kernel_of_linear_functions() {
+        let plate = shapes::plate([12, 10], [0.0, 0.0], [1.2, 1.0]);
+        let (surface, laplacian) = laplacian(&plate, sheared);
+        let triangles = surface.triangles();
+        let flipped = (0..laplacian.len()).any(|vertex| {
+            laplacian.neighbours(vertex).any(|(other, weight)| {
+                let joined = |t: &[u32; 3]| t.contains(&(vertex as u32)) && t.contains(&(other as u32));
+                weight > 1e-6 && !triangles.iter().any(joined)
+            })
+        });
+        assert!(flipped, "the test would show nothing");
+        let area: f64 = triangles
+            .iter()
+            .map(|triangle| {
+                let [a, b, c] = triangle.map(|vertex| surface.points()[vertex as usize]);
+                0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+            })
+            .sum();
+        for axis in 0..2 {
+            let values: Vec<f64> = surface.points().iter().map(|point| point[axis]).collect();
+            let image = laplacian.apply(&values);
+            // The energy of a coordinate is the integral of 1 over the plate.
+            let energy: f64 = values.iter().zip(&image).map(|(value, image)| value * image).sum();
+            assert!((energy / area - 1.0).abs() < 1e-11, "{energy} {area}");
+            for j in 1..10 {
+                for i in 1..12 {
+                    assert!(image[i + 13 * j].abs() < 1e-11);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_laplacian_is_symmetric_and_annihilates_constants() {
+        let (_, laplacian) = laplacian(&shapes::torus(2.0, 0.5, [20, 12]), |[x, y, z]| [x, y + 0.3 * x * z, 3.0 * z]);
+        for vertex in 0..laplacian.len() {
+            for (other, weight) in laplacian.neighbours(vertex) {
+                let back: Vec<f64> =
+                    laplacian.neighbours(other).filter(|(back, _)| *back == vertex).map(|(_, weight)| weight).collect();
+                assert_eq!(back, [weight]);
+            }
+        }
+        for order in 1..4 {
+            assert!(laplacian.apply_power(order, &vec![0.1; laplacian.len()]).iter().all(|&value| value == 0.0));
+        }
+    }
+
+    /// `M^-1 L` of the coordinates is twice the mean curvature times the normal.
+    #[test]
+    fn the_curvature_of_a_torus_converges() {
+        let error = |count: usize| {
+            let (surface, laplacian) = laplacian(&shapes::torus(2.0, 1.0, [2 * count, count]), |point| point);
+            let total: f64 = 4.0 * std::f64::consts::PI.powi(2) * 2.0;
+            let area = total / laplacian.len() as f64;
+            let images =
+                [0, 1, 2].map(|axis| laplacian.apply(&surface.points().iter().map(|p| p[axis]).collect::<Vec<f64>>()));
+            (0..laplacian.len())
+                .map(|vertex| {
+                    let [x, y, z] = surface.points()[vertex];
+                    let cosine = x.hypot(y) - 2.0;
+                    let expected = (2.0 + 2.0 * cosine) / (2.0 + cosine);
+                    let image = images.each_ref().map(|image| image[vertex] / (laplacian.mass()[vertex] * area));
+                    let normal = [cosine * x / x.hypot(y), cosine * y / x.hypot(y), z];
+                    let found: f64 = (0..3).map(|axis| image[axis] * normal[axis]).sum();
+                    (found - expected).abs()
+                })
+                .fold(0.0, f64::max)
+        };
+        let [coarse, fine] = [error(24), error(48)];
+        assert!(coarse / fine > 3.0 && fine < 0.02, "{coarse} {fine}");
+    }
+}
