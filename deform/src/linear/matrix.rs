@@ -120,12 +120,13 @@ pub(crate) fn invert_positive<const B: usize>(block: &Block<B>) -> Option<Block<
             }
         }
     }
+    // Column by column: the solution of `factor x = e_j`.
     let mut inverse_factor = [[0.0; B]; B];
-    for i in 0..B {
-        inverse_factor[i][i] = 1.0 / factor[i][i];
-        for j in 0..i {
+    for j in 0..B {
+        for i in j..B {
+            let unit = if i == j { 1.0 } else { 0.0 };
             let sum: f64 = (j..i).map(|k| factor[i][k] * inverse_factor[k][j]).sum();
-            inverse_factor[i][j] = -sum / factor[i][i];
+            inverse_factor[i][j] = (unit - sum) / factor[i][i];
         }
     }
     let mut inverse = [[0.0; B]; B];
@@ -155,9 +156,9 @@ mod tests {
     fn inverts_positive_blocks_and_only_those() {
         let block = [[4.0, 1.0, 0.5], [1.0, 3.0, -1.0], [0.5, -1.0, 2.0]];
         let inverse = invert_positive(&block).unwrap();
-        for i in 0..3 {
+        for (i, row) in block.iter().enumerate() {
             for j in 0..3 {
-                let product: f64 = (0..3).map(|k| block[i][k] * inverse[k][j]).sum();
+                let product: f64 = row.iter().zip(&inverse).map(|(entry, other)| entry * other[j]).sum();
                 assert!((product - f64::from(u8::from(i == j))).abs() < 1e-14);
             }
         }
