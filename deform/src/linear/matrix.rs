@@ -103,6 +103,7 @@ fn multiply_add<const B: usize>(sum: &mut [f64; B], block: &Block<B>, vector: &[
 }
 
 /// The inverse of a symmetric positive definite block; `None` where a pivot falls below `1e-10` of its diagonal entry.
+#[expect(clippy::needless_range_loop, reason = "the indices are those of the formulas")]
 pub(crate) fn invert_positive<const B: usize>(block: &Block<B>) -> Option<Block<B>> {
     // Cholesky, then the inverse of the factor, then inverse = factor⁻ᵀ factor⁻¹.
     let mut factor = [[0.0; B]; B];

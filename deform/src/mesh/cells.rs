@@ -38,7 +38,7 @@ impl Cells {
             found: cell_type,
             expected: "a type with a fixed vertex count",
         })?;
-        if connectivity.len() % size != 0 {
+        if !connectivity.len().is_multiple_of(size) {
             return Err(MeshError::VertexCount {
                 cell: connectivity.len() / size,
                 cell_type,

@@ -63,7 +63,7 @@ impl<'a> ArrayView<'a> {
     /// # Errors
     /// [`MeshError::ArrayLength`] where `values` is not a whole number of tuples, or `components` is 0 or more than 9.
     pub fn interleaved(values: Values<'a>, components: usize) -> Result<Self, MeshError> {
-        if components == 0 || components > 9 || values.len() % components != 0 {
+        if components == 0 || components > 9 || !values.len().is_multiple_of(components) {
             return Err(MeshError::ArrayLength {
                 name: format!("{components} interleaved components"),
                 found: values.len(),
