@@ -9,6 +9,8 @@ pub mod communicator;
 pub mod encode;
 pub mod expression;
 pub mod extract;
+#[cfg(feature = "files")]
+pub mod files;
 pub mod language;
 pub mod run;
 pub mod shape;

@@ -1,0 +1,179 @@
+//! Mesh files: Gmsh's .msh and VTK's .vtu, .vtp and .vtk are read, .vtu, .vtp and .pvd written.
+//!
+//! | format | read | written |
+//! |---|---|---|
+//! | Gmsh `.msh` | 2.2 and 4.1, text and binary of either byte order | |
+//! | VTK `.vtu`, `.vtp` | text, base64, appended; plain, zlib, LZ4; either byte order | appended raw, plain or zlib |
+//! | VTK `.vtk` (legacy) | text and binary, file versions 1 to 5 | |
+//! | ParaView `.pvd` | | [`Series`] |
+//!
+//! # Features
+//! Physical surfaces of Gmsh become [`FeatureSource::Faces`]. In a VTK file a cell array named `features` says which feature each
+//! face belongs to (a negative number: none), on cells of dimension 2 beside the volume cells or on the cells of a surface; a
+//! point array of that name becomes [`FeatureSource::Vertices`]. The field-data array `feature_names` names them, feature 0 first,
+//! or in the order of the numbers in `feature_numbers` where that is there.
+//!
+//! # What is left out
+//! The cells of the highest dimension make the mesh. Other cells but tagged faces, ghost cells, and vertices that no cell uses
+//! are left out; [`MeshFile::notes`] says how many.
+//!
+//! # Trouble
+//! Whatever the bytes, reading ends with a mesh or with a [`FileError`] that says which file, where in it, what stands there and
+//! what is needed. It never panics, and sets no memory aside that the size of the file does not warrant.
+//!
+//! [`FeatureSource::Faces`]: tombolo_deform::mesh::FeatureSource::Faces
+//! [`FeatureSource::Vertices`]: tombolo_deform::mesh::FeatureSource::Vertices
+
+mod assemble;
+mod error;
+mod gmsh;
+mod scanner;
+#[cfg(test)]
+mod tests;
+mod vtk;
+
+use std::io::Write;
+use std::path::Path;
+
+use tombolo_deform::mesh::Mesh;
+
+pub use error::{FileError, Place, Problem};
+pub use vtk::{Compression, Series};
+
+use crate::extract::{Extract, Field};
+use error::Flaw;
+
+/// A mesh with what its file says about it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeshFile {
+    /// The mesh.
+    pub mesh: Mesh,
+    /// The arrays on its vertices and cells, as the file has them: they may hold NaN.
+    pub fields: Vec<Field>,
+    /// What a person should know: what was left out and why.
+    pub notes: Vec<String>,
+}
+
+/// Reads a mesh by its file's extension: `.msh`, `.vtu`, `.vtp` or `.vtk`.
+///
+/// # Errors
+/// [`FileError`] where the file cannot be opened, is not of its format, uses something that is not read here (elements of higher
+/// order, other kinds of dataset), or holds a mesh that is none.
+///
+/// ```no_run
+/// # fn main() -> Result<(), tombolo_pipelines::files::FileError> {
+/// let file = tombolo_pipelines::files::read_mesh(std::path::Path::new("meshes/channel.msh"))?;
+/// println!("{} cells; {}", file.mesh.cells().len(), file.notes.join("; "));
+/// # Ok(())
+/// # }
+/// ```
+pub fn read_mesh(path: impl AsRef<Path>) -> Result<MeshFile, FileError> {
+    let path = path.as_ref();
+    let parse = parser(path)?;
+    let bytes = std::fs::read(path).map_err(|error| Flaw::from(error).in_file(path))?;
+    parse(&bytes).map_err(|flaw| flaw.in_file(path))
+}
+
+/// Reads a mesh from the bytes of a file; its name tells the format.
+///
+/// # Errors
+/// As [`read_mesh`].
+pub fn parse_mesh(name: &Path, bytes: &[u8]) -> Result<MeshFile, FileError> {
+    parser(name)?(bytes).map_err(|flaw| flaw.in_file(name))
+}
+
+type Parser = fn(&[u8]) -> Result<MeshFile, Flaw>;
+
+fn parser(path: &Path) -> Result<Parser, FileError> {
+    match extension(path).as_str() {
+        "msh" => Ok(gmsh::parse),
+        "vtu" | "vtp" => Ok(vtk::parse_xml),
+        "vtk" => Ok(vtk::parse_legacy),
+        found => Err(unknown_extension(found, ".msh, .vtu, .vtp and .vtk").in_file(path)),
+    }
+}
+
+fn extension(path: &Path) -> String {
+    path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
+}
+
+fn unknown_extension(found: &str, expected: &'static str) -> Flaw {
+    Problem::Extension { found: found.to_owned(), expected }.into()
+}
+
+/// Writes an extract: as `.vtp`, which holds cells up to dimension 2, or `.vtu`, which holds any. Folders are made where they are
+/// missing, and the file takes its place in one step, so that no reader ever sees half of it.
+///
+/// Numbers are written as they are, in double precision. In a `.vtp` file cells stand in VTK's order of kinds: vertices, lines,
+/// polygons, strips.
+///
+/// # Errors
+/// [`FileError`] for another extension, for volume cells in a `.vtp`, for fields whose length is not that of the mesh, and where
+/// the file cannot be written.
+pub fn write(path: impl AsRef<Path>, extract: &Extract) -> Result<(), FileError> {
+    write_compressed(path, extract, Compression::None)
+}
+
+/// As [`write`](fn@write), with the arrays compressed.
+///
+/// # Errors
+/// As [`write`](fn@write).
+pub fn write_compressed(path: impl AsRef<Path>, extract: &Extract, compression: Compression) -> Result<(), FileError> {
+    let path = path.as_ref();
+    let polygonal = is_polygonal(path)?;
+    let bytes = vtk::from_extract(extract, polygonal, compression).map_err(|error| Flaw::from(error).in_file(path))?;
+    write_atomically(path, |file| file.write_all(&bytes))
+}
+
+/// Writes a whole mesh with its fields to a `.vtu` (or, a surface mesh, `.vtp`) file, so that [`read_mesh`] gives the same again,
+/// features included: tagged faces are written as cells behind the mesh's own. Element fields take on such a face the value of the
+/// cell it belongs to.
+///
+/// # Errors
+/// As [`write`](fn@write).
+pub fn write_mesh(
+    path: impl AsRef<Path>,
+    mesh: &Mesh,
+    fields: &[Field],
+    compression: Compression,
+) -> Result<(), FileError> {
+    let path = path.as_ref();
+    let polygonal = is_polygonal(path)?;
+    let bytes =
+        vtk::from_mesh(mesh, fields, polygonal, compression).map_err(|error| Flaw::from(error).in_file(path))?;
+    write_atomically(path, |file| file.write_all(&bytes))
+}
+
+fn is_polygonal(path: &Path) -> Result<bool, FileError> {
+    match extension(path).as_str() {
+        "vtp" => Ok(true),
+        "vtu" => Ok(false),
+        found => Err(unknown_extension(found, ".vtu and .vtp").in_file(path)),
+    }
+}
+
+/// Writes a file beside its place, then puts it there.
+fn write_atomically(
+    path: &Path,
+    write: impl FnOnce(&mut std::fs::File) -> std::io::Result<()>,
+) -> Result<(), FileError> {
+    let attempt = || -> std::io::Result<()> {
+        let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+        if let Some(directory) = directory {
+            std::fs::create_dir_all(directory)?;
+        }
+        let mut name = std::ffi::OsString::from(".");
+        name.push(path.file_name().unwrap_or_default());
+        name.push(format!(".{}.part", std::process::id()));
+        let beside = path.with_file_name(name);
+        let written = std::fs::File::create(&beside)
+            .and_then(|mut file| write(&mut file))
+            .and_then(|()| std::fs::rename(&beside, path));
+        if written.is_err() {
+            // The error that matters is the first; this only tidies up.
+            let _ = std::fs::remove_file(&beside);
+        }
+        written
+    };
+    attempt().map_err(|error| Flaw::from(error).in_file(path))
+}

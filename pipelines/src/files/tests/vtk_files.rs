@@ -1,0 +1,192 @@
+//! What is written is read back alike, by this crate and by VTK.
+
+use std::path::Path;
+use std::process::Command;
+
+use super::*;
+use crate::files::{Series, write, write_compressed};
+
+#[test]
+fn a_mesh_comes_back_bit_for_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    for dimension in 0..=3 {
+        let mesh = one_of_each(dimension);
+        for compression in [Compression::None, Compression::Zlib] {
+            let path = folder.path().join("deep/mesh.vtu");
+            write_mesh(&path, &mesh, &fields(&mesh), compression).unwrap();
+            let back = read_mesh(&path).unwrap();
+            assert_eq!(back.mesh, mesh, "dimension {dimension}");
+            assert_eq!(back.fields, fields(&mesh), "dimension {dimension}");
+        }
+    }
+}
+
+#[test]
+fn an_extract_comes_back_with_its_features() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = one_of_each(2);
+    let path = folder.path().join("extract.vtu");
+    write(&path, &extract(&mesh)).unwrap();
+    let back = read_mesh(&path).unwrap();
+    assert_eq!(back.mesh.cells(), mesh.cells());
+    let FeatureSource::Faces(tagged) = back.mesh.features() else { panic!("{:?}", back.mesh.features()) };
+    assert_eq!(tagged.tags, [0, 1, 0, 1, 0]);
+    assert_eq!(tagged.names, [(0, "even".to_owned()), (1, "odd".to_owned())]);
+}
+
+#[test]
+fn negative_tags_keep_their_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut cells = Cells::new();
+    cells.push(CellType::Triangle, &[0, 1, 2]).unwrap();
+    let tagged = TaggedFaces { faces: cells.clone(), tags: vec![-5], names: vec![] };
+    let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let mesh = Mesh::new(points, cells, FeatureSource::Faces(tagged)).unwrap();
+    let path = folder.path().join("mesh.vtu");
+    write_mesh(&path, &mesh, &[], Compression::None).unwrap();
+    let FeatureSource::Faces(back) = read_mesh(&path).unwrap().mesh.features().clone() else { panic!("no faces") };
+    assert_eq!(back.names, [(back.tags[0], "feature--5".to_owned())]);
+}
+
+#[test]
+fn refusals_name_the_file_and_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = |result: Result<(), crate::files::FileError>| result.unwrap_err().to_string();
+    let mesh = one_of_each(3);
+    assert!(message(write(folder.path().join("a.vtp"), &extract(&mesh))).contains("write it as .vtu"));
+    assert!(message(write(folder.path().join("a.stl"), &extract(&mesh))).contains("'stl'"));
+    let mut twice = extract(&mesh);
+    twice.fields[1].name = "features".into();
+    assert!(message(write(folder.path().join("a.vtu"), &twice)).contains("'features'"));
+    let mut short = extract(&mesh);
+    short.fields[0].values.pop();
+    assert!(message(write(folder.path().join("a.vtu"), &short)).contains("velocity"));
+    assert!(read_mesh(folder.path().join("none.vtu")).unwrap_err().to_string().contains("none.vtu"));
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "a refused file leaves nothing behind");
+}
+
+#[test]
+fn a_series_is_whole_after_every_entry() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.pvd");
+    let mut series = Series::create(&path).unwrap();
+    for step in 0..3 {
+        series.push(f64::from(step) * 0.1, &folder.path().join(format!("run & {step}.vtu"))).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(text.matches("<DataSet ").count(), step as usize + 1);
+        assert!(text.contains(&format!("file=\"run &amp; {step}.vtu\"")), "{text}");
+        assert!(text.ends_with("</Collection>\n</VTKFile>\n"));
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+/// Runs `tests/vtk/read_back.py` with Debian's VTK; `None` where the environment says that there is none.
+fn vtk(arguments: &[&Path]) -> Option<String> {
+    if std::env::var_os("TOMBOLO_WITHOUT_VTK").is_some() {
+        eprintln!("skipped: TOMBOLO_WITHOUT_VTK is set, so VTK reads nothing back");
+        return None;
+    }
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/vtk/read_back.py");
+    let output = Command::new("/usr/bin/python3").arg(script).args(arguments).output().unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "VTK (apt-get install python3-vtk9): {errors}");
+    assert!(errors.is_empty(), "{errors}");
+    Some(String::from_utf8(output.stdout).unwrap())
+}
+
+/// What `read_back.py` prints of a file: every number as its bits.
+fn described(points: &[Vector], cells: &[(u8, Vec<u32>)], arrays: &[(&str, &str, usize, Vec<f64>)]) -> String {
+    use std::fmt::Write;
+    let bits =
+        |values: &[f64]| values.iter().fold(String::new(), |text, value| text + &format!(" {:016x}", value.to_bits()));
+    let mut text = format!("points{}\n", bits(points.as_flattened()));
+    for (cell_type, vertices) in cells {
+        let vertices = vertices.iter().fold(String::new(), |text, vertex| text + &format!(" {vertex}"));
+        writeln!(text, "cell {cell_type}{vertices}").unwrap();
+    }
+    for (place, name, components, values) in arrays {
+        writeln!(text, "{place} {name:?} {components}{}", bits(values)).unwrap();
+    }
+    text
+}
+
+#[test]
+fn vtk_reads_what_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    for dimension in 0..=3 {
+        for polygonal in [false, true] {
+            if polygonal && dimension == 3 {
+                continue;
+            }
+            for compression in [Compression::None, Compression::Zlib] {
+                let mesh = one_of_each(dimension);
+                let path = folder.path().join(if polygonal { "e.vtp" } else { "e.vtu" });
+                let mut extract = extract(&mesh);
+                extract.fields[1].name = "p".into();
+                write_compressed(&path, &extract, compression).unwrap();
+                let Some(read) = vtk(&[&path]) else { return };
+                // VTK's order of polygonal data, and its types there.
+                let mut order: Vec<usize> = (0..mesh.cells().len()).collect();
+                if polygonal {
+                    let strip = |&cell: &usize| mesh.cells().cell_type(cell) == CellType::TriangleStrip;
+                    if dimension == 2 {
+                        order.sort_by_key(strip);
+                    }
+                }
+                let cells: Vec<(u8, Vec<u32>)> = order
+                    .iter()
+                    .map(|&cell| match (mesh.cells().cell_type(cell), mesh.cells().vertices(cell)) {
+                        (CellType::Pixel, &[a, b, c, d]) if polygonal => (CellType::Quad.vtk(), vec![a, b, d, c]),
+                        (cell_type, vertices) => (cell_type.vtk(), vertices.to_vec()),
+                    })
+                    .collect();
+                let permuted = |values: Vec<f64>, components: usize| -> Vec<f64> {
+                    order.iter().flat_map(|&cell| values[cell * components..][..components].to_vec()).collect()
+                };
+                let tags = (0..cells.len()).map(|cell| (cell % 2) as f64).collect();
+                let [velocity, pressure, stress] = <[Field; 3]>::try_from(extract.fields.clone()).unwrap();
+                let expected = described(
+                    mesh.points(),
+                    &cells,
+                    &[
+                        ("point", "velocity", 3, velocity.values),
+                        ("cell", "features", 1, permuted(tags, 1)),
+                        ("cell", "p", 1, permuted(pressure.values, 1)),
+                        ("cell", "stress", 9, permuted(stress.values, 9)),
+                        ("field", "feature_numbers", 1, vec![0.0, 1.0]),
+                    ],
+                ) + "text \"feature_names\" [\"even\", \"odd\"]\n";
+                assert_eq!(read, expected, "dimension {dimension}, polygonal {polygonal}, {compression:?}");
+            }
+        }
+    }
+}
+
+/// VTK writes its own files in every way it can; each reads the same.
+#[test]
+fn what_vtk_writes_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = one_of_each(3);
+    let original = folder.path().join("original.vtu");
+    write_mesh(&original, &mesh, &fields(&mesh), Compression::None).unwrap();
+    let Some(names) = vtk(&[Path::new("--rewrite"), &original, folder.path()]) else { return };
+    assert!(names.lines().count() >= 18, "{names}");
+    for name in names.lines() {
+        let back = read_mesh(folder.path().join(name)).unwrap_or_else(|error| panic!("{error}"));
+        if name.contains("lossless") {
+            assert_eq!(back.mesh.points(), mesh.points(), "{name}");
+            assert_eq!(back.fields, fields(&mesh), "{name}");
+        }
+        assert_eq!(back.mesh.cells(), mesh.cells(), "{name}");
+        assert_eq!(back.mesh.features(), mesh.features(), "{name}");
+    }
+    // Polygonal data with all four kinds of cells: the order of cell data is VTK's own.
+    let Some(names) = vtk(&[Path::new("--polygonal"), folder.path()]) else { return };
+    assert!(names.lines().count() >= 4, "{names}");
+    for name in names.lines() {
+        let back = read_mesh(folder.path().join(name)).unwrap_or_else(|error| panic!("{error}"));
+        let sizes: Vec<f64> = back.mesh.cells().iter().map(|(_, vertices)| vertices.len() as f64).collect();
+        assert_eq!(back.fields.iter().find(|field| field.name == "size").unwrap().values, sizes, "{name}");
+        assert_eq!(sizes, [3.0, 4.0, 5.0], "{name}: the two polygons and the strip");
+    }
+}

@@ -1,0 +1,261 @@
+//! From the arrays of a VTK file to a mesh.
+
+use std::collections::BTreeMap;
+
+use tombolo_deform::mesh::{CellType, Cells, MeshError, Vector};
+
+use super::super::MeshFile;
+use super::super::assemble::Parts;
+use super::super::error::{Flaw, Problem};
+use super::array::{Array, Numbers};
+use super::{FEATURE_NAMES, FEATURE_NUMBERS, FEATURES};
+use crate::extract::{Association, Field};
+
+/// Bits of `vtkGhostType` on cells: a copy of another rank's, or not to be shown.
+const GHOST_OR_HIDDEN: i64 = 1 | 32;
+/// Components that a field may have.
+const MOST_COMPONENTS: usize = 9;
+
+/// An unstructured grid or polygonal data as a file has it.
+pub(super) struct Dataset {
+    pub points: Vec<Vector>,
+    pub cells: Cells,
+    pub point_arrays: Vec<Array>,
+    pub cell_arrays: Vec<Array>,
+    pub field_arrays: Vec<Array>,
+    pub notes: Vec<String>,
+}
+
+impl Default for Dataset {
+    fn default() -> Self {
+        Self {
+            points: Vec::new(),
+            cells: Cells::new(),
+            point_arrays: Vec::new(),
+            cell_arrays: Vec::new(),
+            field_arrays: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+}
+
+impl Dataset {
+    pub fn into_mesh_file(mut self) -> Result<MeshFile, Flaw> {
+        for (arrays, count, what) in
+            [(&self.point_arrays, self.points.len(), "points"), (&self.cell_arrays, self.cells.len(), "cells")]
+        {
+            for array in arrays {
+                let expected = array.components.saturating_mul(count);
+                if array.numbers.len() != expected {
+                    let what = format!("values of array '{}' on {count} {what}", array.name);
+                    let (found, expected) = (array.numbers.len() as u64, expected as u64);
+                    return Err(Problem::Count { what, found, expected }.into());
+                }
+            }
+        }
+        let left_out = self.ghost_cells()?;
+        let has_faces = self.cells.types().iter().any(|cell| cell.dimension() == 2);
+        let mut cell_tags = None;
+        if has_faces && let Some(array) = take(&mut self.cell_arrays, FEATURES) {
+            let tags = array.integers()?.into_iter().map(|tag| (tag >= 0).then_some(tag)).collect();
+            cell_tags = Some(tags);
+        }
+        let point_tags = match take(&mut self.point_arrays, FEATURES) {
+            Some(array) => Some(array.integers()?),
+            None => None,
+        };
+        let names = self.feature_names()?;
+        let mut fields = Vec::new();
+        for (arrays, association) in
+            [(self.point_arrays, Association::Vertex), (self.cell_arrays, Association::Element)]
+        {
+            for array in arrays {
+                let (name, components) = (array.name.clone(), array.components);
+                if components == 0 || components > MOST_COMPONENTS {
+                    self.notes.push(format!("left out: array '{name}' of {components} components"));
+                } else if let Some(values) = array.into_floats() {
+                    fields.push(Field { name, association, components, values });
+                } else {
+                    self.notes.push(format!("left out: array '{name}' of text"));
+                }
+            }
+        }
+        Parts {
+            points: self.points,
+            cells: self.cells,
+            cell_tags,
+            point_tags,
+            names,
+            left_out,
+            fields,
+            notes: self.notes,
+        }
+        .assemble()
+    }
+
+    fn ghost_cells(&mut self) -> Result<Option<Vec<bool>>, Problem> {
+        take(&mut self.point_arrays, "vtkGhostType");
+        take(&mut self.point_arrays, "vtkGhostLevels");
+        if let Some(array) = take(&mut self.cell_arrays, "vtkGhostType") {
+            return Ok(Some(array.integers()?.into_iter().map(|bits| bits & GHOST_OR_HIDDEN != 0).collect()));
+        }
+        match take(&mut self.cell_arrays, "vtkGhostLevels") {
+            Some(array) => Ok(Some(array.integers()?.into_iter().map(|level| level > 0).collect())),
+            None => Ok(None),
+        }
+    }
+
+    fn feature_names(&mut self) -> Result<BTreeMap<i64, String>, Problem> {
+        let Some(names) = take(&mut self.field_arrays, FEATURE_NAMES) else { return Ok(BTreeMap::new()) };
+        let Numbers::Text(names) = names.numbers else {
+            return Err(Problem::unexpected(b"numbers", format!("text in array '{FEATURE_NAMES}'")));
+        };
+        let numbers: Vec<i64> = match take(&mut self.field_arrays, FEATURE_NUMBERS) {
+            Some(numbers) => numbers.integers()?,
+            None => (0..).take(names.len()).collect(),
+        };
+        if numbers.len() != names.len() {
+            let what = format!("values of array '{FEATURE_NUMBERS}'");
+            return Err(Problem::Count { what, found: numbers.len() as u64, expected: names.len() as u64 });
+        }
+        Ok(numbers.into_iter().zip(names).collect())
+    }
+
+    /// Puts another piece of the same file behind this one.
+    pub fn append(&mut self, piece: Dataset) -> Result<(), Problem> {
+        let base = u32::try_from(self.points.len()).map_err(|_| too_large())?;
+        for cell in 0..piece.cells.len() {
+            let shift = |vertices: &[u32]| -> Result<Vec<u32>, Problem> {
+                vertices.iter().map(|&vertex| vertex.checked_add(base).ok_or_else(too_large)).collect()
+            };
+            if piece.cells.cell_type(cell) == CellType::Polyhedron {
+                let faces: Result<Vec<_>, _> =
+                    piece.cells.polyhedron_faces(cell).iter().map(|face| shift(face)).collect();
+                self.cells.push_polyhedron(&faces?)?;
+            } else {
+                self.cells.push(piece.cells.cell_type(cell), &shift(piece.cells.vertices(cell))?)?;
+            }
+        }
+        self.points.extend(piece.points);
+        self.notes.extend(piece.notes);
+        append_arrays(&mut self.point_arrays, piece.point_arrays, &mut self.notes);
+        append_arrays(&mut self.cell_arrays, piece.cell_arrays, &mut self.notes);
+        Ok(())
+    }
+}
+
+fn append_arrays(first: &mut Vec<Array>, second: Vec<Array>, notes: &mut Vec<String>) {
+    first.retain_mut(|array| {
+        let other = second.iter().find(|other| other.name == array.name && other.components == array.components);
+        match (&mut array.numbers, other.map(|other| &other.numbers)) {
+            (Numbers::Float(values), Some(Numbers::Float(more))) => values.extend(more),
+            (Numbers::Integer(values), Some(Numbers::Integer(more))) => values.extend(more),
+            (Numbers::Text(values), Some(Numbers::Text(more))) => values.extend(more.iter().cloned()),
+            _ => {
+                notes.push(format!("left out: array '{}', which not every piece has alike", array.name));
+                return false;
+            }
+        }
+        true
+    });
+}
+
+fn take(arrays: &mut Vec<Array>, name: &str) -> Option<Array> {
+    let index = arrays.iter().position(|array| array.name == name)?;
+    Some(arrays.remove(index))
+}
+
+fn too_large() -> Problem {
+    Problem::Unsupported {
+        what: format!("a mesh of more than {} points", u32::MAX),
+        instead: "split it into parts, one for each rank",
+    }
+}
+
+/// Points from three coordinates each.
+pub(super) fn points(array: Array) -> Result<Vec<Vector>, Problem> {
+    let length = array.numbers.len();
+    let values = array.into_floats().unwrap_or_default();
+    let (vectors, rest) = values.as_chunks::<3>();
+    if !rest.is_empty() || vectors.len() * 3 != length {
+        let what = "numbers of point coordinates".to_owned();
+        return Err(Problem::Count { what, found: length as u64, expected: length.next_multiple_of(3) as u64 });
+    }
+    Ok(vectors.to_vec())
+}
+
+/// Appends a cell of a VTK type number, its vertices as signed numbers.
+pub(super) fn push_cell(cells: &mut Cells, number: i64, vertices: &[i64]) -> Result<(), Problem> {
+    let cell = cells.len();
+    let cell_type = u8::try_from(number).ok().and_then(CellType::from_vtk).ok_or_else(|| {
+        let what = match higher_order_name(number) {
+            Some(name) => format!("cell {cell} of VTK type {number}, a {name},"),
+            None => format!("cell {cell} of VTK type {number}"),
+        };
+        Problem::Unsupported { what, instead: "write the mesh with linear cells, VTK types 1 to 16 and 42" }
+    })?;
+    let row: Result<Vec<u32>, Problem> = vertices.iter().map(|&vertex| vertex_number(cell, vertex)).collect();
+    Ok(cells.push(cell_type, &row?)?)
+}
+
+/// Appends a polyhedron from a stream of numbers: how many faces, then for each how many vertices and which.
+pub(super) fn push_polyhedron(cells: &mut Cells, stream: &[i64]) -> Result<(), Problem> {
+    let cell = cells.len();
+    let mut rest = stream;
+    let mut next = |what: &str| -> Result<i64, Problem> {
+        let (&first, tail) =
+            rest.split_first().ok_or_else(|| Problem::unexpected(b"", format!("{what} of polyhedron {cell}")))?;
+        rest = tail;
+        Ok(first)
+    };
+    let mut faces = Vec::new();
+    for _ in 0..next("the number of faces")? {
+        let mut face = Vec::new();
+        for _ in 0..next("the number of vertices of a face")? {
+            face.push(vertex_number(cell, next("a vertex of a face")?)?);
+        }
+        faces.push(face);
+    }
+    if !rest.is_empty() {
+        let what = format!("numbers for the faces of polyhedron {cell}");
+        let expected = (stream.len() - rest.len()) as u64;
+        return Err(Problem::Count { what, found: stream.len() as u64, expected });
+    }
+    Ok(cells.push_polyhedron(&faces)?)
+}
+
+fn vertex_number(cell: usize, vertex: i64) -> Result<u32, Problem> {
+    u32::try_from(vertex).map_err(|_| {
+        let vertex = u64::try_from(vertex).unwrap_or(u64::MAX);
+        MeshError::VertexNumber { cell, vertex, vertex_count: u32::MAX as usize }.into()
+    })
+}
+
+/// A row of a connectivity, by where it starts and ends.
+pub(super) fn row(connectivity: &[i64], cell: usize, start: i64, end: i64) -> Result<&[i64], Problem> {
+    let range = usize::try_from(start).ok().zip(usize::try_from(end).ok());
+    range.and_then(|(start, end)| connectivity.get(start..end)).ok_or_else(|| {
+        let unsigned = |number: i64| u64::try_from(number).unwrap_or(u64::MAX);
+        let length = connectivity.len();
+        MeshError::Offsets { cell, start: unsigned(start), end: unsigned(end), length }.into()
+    })
+}
+
+fn higher_order_name(number: i64) -> Option<&'static str> {
+    Some(match number {
+        21 => "quadratic edge",
+        22 | 34 => "quadratic triangle",
+        23 | 28 | 30 => "quadratic quad",
+        24 => "quadratic tetra",
+        25 | 29 | 33 => "quadratic hexahedron",
+        26 | 31 | 32 => "quadratic wedge",
+        27 | 37 => "quadratic pyramid",
+        35 => "cubic line",
+        36 => "quadratic polygon",
+        41 => "convex point set",
+        60..=67 => "higher-order cell",
+        68..=74 => "Lagrange cell",
+        75..=81 => "Bezier cell",
+        _ => return None,
+    })
+}

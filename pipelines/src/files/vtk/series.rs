@@ -1,0 +1,73 @@
+//! Collections of files over time (.pvd), as ParaView opens them.
+
+use std::fs::File;
+use std::io::{Read as _, Write as _};
+use std::path::{Path, PathBuf};
+
+use super::super::error::{FileError, Flaw};
+use super::super::write_atomically;
+
+const HEAD: &str = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n";
+const TAIL: &str = "</Collection>\n</VTKFile>\n";
+
+/// A .pvd file that grows by one entry at a time.
+///
+/// Whenever a run is killed, the file on disk is whole: each change is written beside it and takes its place in one step. The
+/// memory used does not grow with the number of entries.
+///
+/// ```no_run
+/// # use std::path::Path;
+/// # fn main() -> Result<(), tombolo_pipelines::files::FileError> {
+/// let mut series = tombolo_pipelines::files::Series::create(Path::new("out/flow.pvd"))?;
+/// series.push(0.001, Path::new("out/flow-1.vtu"))?;
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct Series {
+    path: PathBuf,
+    /// Bytes of the file up to its closing tags.
+    length: u64,
+}
+
+impl Series {
+    /// An empty series in place of what was there.
+    ///
+    /// # Errors
+    /// [`FileError`] where the file cannot be written.
+    pub fn create(path: &Path) -> Result<Self, FileError> {
+        write_atomically(path, |file| {
+            file.write_all(HEAD.as_bytes())?;
+            file.write_all(TAIL.as_bytes())
+        })?;
+        Ok(Self { path: path.to_path_buf(), length: HEAD.len() as u64 })
+    }
+
+    /// Where the series is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Adds a file that shows the state at this time. The entry is relative to the series where the file lies beside or below it.
+    ///
+    /// # Errors
+    /// [`FileError`] where the series cannot be read back or written.
+    pub fn push(&mut self, time: f64, file: &Path) -> Result<(), FileError> {
+        let directory = self.path.parent().unwrap_or(Path::new(""));
+        let shown = file.strip_prefix(directory).unwrap_or(file).to_string_lossy();
+        let shown = quick_xml::escape::escape(&*shown);
+        let entry = format!("<DataSet timestep=\"{time}\" part=\"0\" file=\"{shown}\"/>\n");
+        let old = File::open(&self.path).map_err(|error| Flaw::from(error).in_file(&self.path))?;
+        write_atomically(&self.path, |new| {
+            let copied = std::io::copy(&mut old.take(self.length), new)?;
+            if copied < self.length {
+                return Err(std::io::Error::other("the series was cut short by another program"));
+            }
+            new.write_all(entry.as_bytes())?;
+            new.write_all(TAIL.as_bytes())
+        })?;
+        self.length += entry.len() as u64;
+        Ok(())
+    }
+}

@@ -1,0 +1,413 @@
+//! Writes .vtu and .vtp: appended raw data, little endian, 64-bit headers, every number as it is.
+
+use std::borrow::Cow;
+use std::collections::HashMap;
+use std::fmt::Write as _;
+use std::io::Write as _;
+
+use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, TaggedFaces, Vector};
+
+use super::super::assemble::{owners_of_faces, sorted};
+use super::super::error::Problem;
+use super::{FEATURE_NAMES, FEATURE_NUMBERS, FEATURES};
+use crate::extract::{Association, Extract, Field};
+
+/// How arrays are compressed in the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Compression {
+    /// Not at all: fastest to write.
+    #[default]
+    None,
+    /// zlib, which every VTK reads.
+    Zlib,
+}
+
+/// An extract as the bytes of a .vtp (`polygonal`) or .vtu file.
+pub(in super::super) fn from_extract(
+    extract: &Extract,
+    polygonal: bool,
+    compression: Compression,
+) -> Result<Vec<u8>, Problem> {
+    let mut grid = Grid::new(&extract.points, Cow::Borrowed(&extract.cells));
+    if let Some(features) = &extract.features {
+        check_length(FEATURES, features.of_cells.len(), grid.cells.len())?;
+        let numbers = features.of_cells.iter().map(|&feature| i64::from(feature)).collect();
+        grid.cell_arrays.push(Array { name: FEATURES, components: 1, values: Values::Integers(numbers) });
+        grid.names = (0..).zip(features.names.iter().cloned()).collect();
+    }
+    grid.add_fields(&extract.fields)?;
+    grid.write(polygonal, compression)
+}
+
+/// A mesh with its fields, its tagged faces as cells behind the mesh's own.
+pub(in super::super) fn from_mesh(
+    mesh: &Mesh,
+    fields: &[Field],
+    polygonal: bool,
+    compression: Compression,
+) -> Result<Vec<u8>, Problem> {
+    let mut grid = Grid::new(mesh.points(), Cow::Borrowed(mesh.cells()));
+    let mut owners = Vec::new();
+    match mesh.features() {
+        FeatureSource::SharpEdges => {}
+        FeatureSource::Vertices(tags) => {
+            grid.point_arrays.push(Array { name: FEATURES, components: 1, values: Values::Integers(tags.clone()) });
+        }
+        FeatureSource::Faces(tagged) => {
+            let (tags, names) = with_natural_numbers(tagged);
+            grid.names = names;
+            let mut numbers = vec![-1; mesh.cells().len()];
+            if mesh.cells().dimension() == 3 {
+                let cells = grid.cells.to_mut();
+                for (cell_type, vertices) in tagged.faces.iter() {
+                    cells.push(cell_type, vertices)?;
+                }
+                numbers.extend(tags);
+                let by_face = owners_of_faces(mesh.cells());
+                owners.extend(tagged.faces.iter().map(|(_, face)| by_face.get(&sorted(face)).copied()));
+            } else {
+                // The faces are the cells themselves; any other face has no place in such a mesh.
+                let by_face: HashMap<Vec<u32>, i64> =
+                    tagged.faces.iter().map(|(_, face)| sorted(face)).zip(tags).collect();
+                for (number, (_, vertices)) in numbers.iter_mut().zip(mesh.cells().iter()) {
+                    *number = by_face.get(&sorted(vertices)).copied().unwrap_or(-1);
+                }
+            }
+            grid.cell_arrays.push(Array { name: FEATURES, components: 1, values: Values::Integers(numbers) });
+        }
+    }
+    let cell_count = mesh.cells().len();
+    let fields: Result<Vec<Field>, Problem> =
+        fields.iter().map(|field| with_faces(field, cell_count, &owners)).collect();
+    let fields = fields?;
+    grid.add_fields(&fields)?;
+    grid.write(polygonal, compression)
+}
+
+/// The field with values for the faces behind the cells: those of the cell that a face belongs to, NaN where there is none.
+fn with_faces(field: &Field, cell_count: usize, owners: &[Option<usize>]) -> Result<Field, Problem> {
+    let mut field = field.clone();
+    if field.association == Association::Element && !owners.is_empty() {
+        let components = field.components;
+        check_length(&field.name, field.values.len(), components * cell_count)?;
+        for owner in owners {
+            for component in 0..components {
+                let index = owner.map(|owner| owner * components + component);
+                let value = index.and_then(|index| field.values.get(index).copied()).unwrap_or(f64::NAN);
+                field.values.push(value);
+            }
+        }
+    }
+    Ok(field)
+}
+
+/// Tags and names, negative numbers put behind the others: in a file they say that a cell has no feature.
+fn with_natural_numbers(tagged: &TaggedFaces) -> (Vec<i64>, Vec<(i64, String)>) {
+    let highest = tagged.tags.iter().chain(tagged.names.iter().map(|(number, _)| number)).max().copied().unwrap_or(0);
+    let mut natural: HashMap<i64, i64> = HashMap::new();
+    let mut names = tagged.names.clone();
+    for &tag in tagged.tags.iter().filter(|&&tag| tag < 0) {
+        let next = highest.max(-1) + 1 + natural.len() as i64;
+        if !natural.contains_key(&tag) {
+            natural.insert(tag, next);
+            if tagged.names.iter().all(|(number, _)| *number != tag) {
+                names.push((tag, format!("feature-{tag}")));
+            }
+        }
+    }
+    let renumber = |tag: i64| natural.get(&tag).copied().unwrap_or(tag);
+    let tags = tagged.tags.iter().map(|&tag| renumber(tag)).collect();
+    (tags, names.into_iter().map(|(number, name)| (renumber(number), name)).collect())
+}
+
+fn check_length(name: &str, found: usize, expected: usize) -> Result<(), Problem> {
+    if found == expected {
+        return Ok(());
+    }
+    let what = format!("values of array '{name}'");
+    Err(Problem::Count { what, found: found as u64, expected: expected as u64 })
+}
+
+enum Values<'a> {
+    Floats(Cow<'a, [f64]>),
+    Integers(Vec<i64>),
+    Bytes(Vec<u8>),
+}
+
+struct Array<'a> {
+    name: &'a str,
+    components: usize,
+    values: Values<'a>,
+}
+
+struct Grid<'a> {
+    points: &'a [Vector],
+    cells: Cow<'a, Cells>,
+    point_arrays: Vec<Array<'a>>,
+    cell_arrays: Vec<Array<'a>>,
+    names: Vec<(i64, String)>,
+}
+
+impl<'a> Grid<'a> {
+    fn new(points: &'a [Vector], cells: Cow<'a, Cells>) -> Self {
+        Self { points, cells, point_arrays: Vec::new(), cell_arrays: Vec::new(), names: Vec::new() }
+    }
+
+    fn add_fields(&mut self, fields: &'a [Field]) -> Result<(), Problem> {
+        for field in fields {
+            let (arrays, count) = match field.association {
+                Association::Vertex => (&mut self.point_arrays, self.points.len()),
+                Association::Element => (&mut self.cell_arrays, self.cells.len()),
+            };
+            check_length(&field.name, field.values.len(), field.components.saturating_mul(count))?;
+            if arrays.iter().any(|array| array.name == field.name) {
+                return Err(Problem::Unsupported {
+                    what: format!("a second {} array named '{}'", field.association, field.name),
+                    instead: "give each array a name of its own; 'features' holds the mesh's features",
+                });
+            }
+            let values = Values::Floats(Cow::Borrowed(&field.values));
+            arrays.push(Array { name: &field.name, components: field.components, values });
+        }
+        Ok(())
+    }
+
+    fn write(mut self, polygonal: bool, compression: Compression) -> Result<Vec<u8>, Problem> {
+        if polygonal && self.cells.dimension() > 2 {
+            return Err(Problem::Unsupported {
+                what: "a volume cell in polygonal data (.vtp)".into(),
+                instead: "write it as .vtu, or take its surface",
+            });
+        }
+        let mut file = File { text: String::new(), appended: Vec::new(), compression };
+        let kind = if polygonal { "PolyData" } else { "UnstructuredGrid" };
+        let compressor = match compression {
+            Compression::None => "",
+            Compression::Zlib => " compressor=\"vtkZLibDataCompressor\"",
+        };
+        file.line(format_args!("<?xml version=\"1.0\"?>"));
+        file.line(format_args!(
+            "<VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\"{compressor}>"
+        ));
+        file.line(format_args!("<{kind}>"));
+        self.write_names(&mut file)?;
+        let sections = if polygonal { Sections::new(&self.cells) } else { Sections::default() };
+        let counts = if polygonal { sections.counts() } else { format!(" NumberOfCells=\"{}\"", self.cells.len()) };
+        file.line(format_args!("<Piece NumberOfPoints=\"{}\"{counts}>", self.points.len()));
+        file.section("PointData", &self.point_arrays)?;
+        if polygonal {
+            let order = sections.order();
+            self.cell_arrays.iter_mut().for_each(|array| array.permute(&order));
+        }
+        file.section("CellData", &self.cell_arrays)?;
+        let points =
+            Array { name: "Points", components: 3, values: Values::Floats(Cow::Borrowed(self.points.as_flattened())) };
+        file.section("Points", &[points])?;
+        if polygonal {
+            for (name, cells) in sections.named() {
+                file.section(name, &polygonal_rows(&self.cells, cells))?;
+            }
+        } else {
+            file.section("Cells", &unstructured_rows(&self.cells))?;
+        }
+        file.line(format_args!("</Piece>"));
+        file.line(format_args!("</{kind}>"));
+        Ok(file.finish())
+    }
+
+    fn write_names(&self, file: &mut File) -> Result<(), Problem> {
+        if self.names.is_empty() {
+            return Ok(());
+        }
+        file.line(format_args!("<FieldData>"));
+        let mut codes = String::new();
+        for (_, name) in &self.names {
+            for byte in name.bytes().filter(|&byte| byte != 0).chain([0]) {
+                let _ = write!(codes, "{byte} ");
+            }
+        }
+        let count = self.names.len();
+        file.line(format_args!(
+            "<Array type=\"String\" Name=\"{FEATURE_NAMES}\" NumberOfTuples=\"{count}\" format=\"ascii\">"
+        ));
+        file.line(format_args!("{}", codes.trim_end()));
+        file.line(format_args!("</Array>"));
+        let numbers = self.names.iter().map(|(number, _)| *number).collect();
+        file.array(&Array { name: FEATURE_NUMBERS, components: 1, values: Values::Integers(numbers) }, Some(count))?;
+        file.line(format_args!("</FieldData>"));
+        Ok(())
+    }
+}
+
+impl Array<'_> {
+    /// Puts the tuples into this order.
+    fn permute(&mut self, order: &[usize]) {
+        fn permuted<T: Copy>(values: &[T], components: usize, order: &[usize]) -> Vec<T> {
+            let tuple = |&tuple: &usize| values.get(tuple * components..(tuple + 1) * components).unwrap_or(&[]);
+            order.iter().flat_map(tuple).copied().collect()
+        }
+        match &mut self.values {
+            Values::Floats(values) => *values = Cow::Owned(permuted(values, self.components, order)),
+            Values::Integers(values) => *values = permuted(values, self.components, order),
+            Values::Bytes(values) => *values = permuted(values, self.components, order),
+        }
+    }
+}
+
+/// The cells of polygonal data by the element of the file that they stand in.
+#[derive(Default)]
+struct Sections {
+    vertices: Vec<usize>,
+    lines: Vec<usize>,
+    polygons: Vec<usize>,
+    strips: Vec<usize>,
+}
+
+impl Sections {
+    fn new(cells: &Cells) -> Self {
+        let mut sections = Self::default();
+        for (cell, cell_type) in cells.types().iter().enumerate() {
+            match cell_type {
+                CellType::Vertex | CellType::PolyVertex => sections.vertices.push(cell),
+                CellType::Line | CellType::PolyLine => sections.lines.push(cell),
+                CellType::TriangleStrip => sections.strips.push(cell),
+                _ => sections.polygons.push(cell),
+            }
+        }
+        sections
+    }
+
+    fn named(&self) -> [(&'static str, &[usize]); 4] {
+        [("Verts", &self.vertices), ("Lines", &self.lines), ("Polys", &self.polygons), ("Strips", &self.strips)]
+    }
+
+    fn counts(&self) -> String {
+        self.named().iter().fold(String::new(), |mut text, (name, cells)| {
+            let _ = write!(text, " NumberOf{name}=\"{}\"", cells.len());
+            text
+        })
+    }
+
+    fn order(&self) -> Vec<usize> {
+        self.named().iter().flat_map(|(_, cells)| cells.iter().copied()).collect()
+    }
+}
+
+fn polygonal_rows(cells: &Cells, section: &[usize]) -> Vec<Array<'static>> {
+    let mut connectivity: Vec<i64> = Vec::new();
+    let mut offsets = Vec::with_capacity(section.len());
+    for &cell in section {
+        match (cells.cell_type(cell), cells.vertices(cell)) {
+            (CellType::Pixel, &[a, b, c, d]) => connectivity.extend([a, b, d, c].map(i64::from)),
+            (_, vertices) => connectivity.extend(vertices.iter().map(|&vertex| i64::from(vertex))),
+        }
+        offsets.push(connectivity.len() as i64);
+    }
+    vec![integers("connectivity", connectivity), integers("offsets", offsets)]
+}
+
+fn unstructured_rows(cells: &Cells) -> Vec<Array<'static>> {
+    let connectivity = cells.connectivity().iter().map(|&vertex| i64::from(vertex)).collect();
+    let offsets = cells.offsets().iter().skip(1).map(|&offset| offset as i64).collect();
+    let types = cells.types().iter().map(|cell| cell.vtk()).collect();
+    let mut arrays = vec![
+        integers("connectivity", connectivity),
+        integers("offsets", offsets),
+        Array { name: "types", components: 1, values: Values::Bytes(types) },
+    ];
+    if cells.types().contains(&CellType::Polyhedron) {
+        let mut faces: Vec<i64> = Vec::new();
+        let mut ends = Vec::with_capacity(cells.len());
+        for cell in 0..cells.len() {
+            let of_cell = cells.polyhedron_faces(cell);
+            if of_cell.is_empty() {
+                ends.push(-1);
+                continue;
+            }
+            faces.push(of_cell.len() as i64);
+            for face in of_cell {
+                faces.push(face.len() as i64);
+                faces.extend(face.iter().map(|&vertex| i64::from(vertex)));
+            }
+            ends.push(faces.len() as i64);
+        }
+        arrays.extend([integers("faces", faces), integers("faceoffsets", ends)]);
+    }
+    arrays
+}
+
+fn integers(name: &'static str, values: Vec<i64>) -> Array<'static> {
+    Array { name, components: 1, values: Values::Integers(values) }
+}
+
+/// A file in the making: its elements, and the data that follow them.
+struct File {
+    text: String,
+    appended: Vec<u8>,
+    compression: Compression,
+}
+
+impl File {
+    fn line(&mut self, line: std::fmt::Arguments) {
+        let _ = writeln!(self.text, "{line}");
+    }
+
+    fn section(&mut self, name: &str, arrays: &[Array]) -> Result<(), Problem> {
+        self.line(format_args!("<{name}>"));
+        for array in arrays {
+            self.array(array, None)?;
+        }
+        self.line(format_args!("</{name}>"));
+        Ok(())
+    }
+
+    fn array(&mut self, array: &Array, tuples: Option<usize>) -> Result<(), Problem> {
+        let (kind, bytes): (_, Vec<u8>) = match &array.values {
+            Values::Floats(values) => ("Float64", values.iter().flat_map(|value| value.to_le_bytes()).collect()),
+            Values::Integers(values) => ("Int64", values.iter().flat_map(|value| value.to_le_bytes()).collect()),
+            Values::Bytes(values) => ("UInt8", values.clone()),
+        };
+        // Control characters have no place in XML.
+        let name: String = array.name.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect();
+        let name = quick_xml::escape::escape(&name);
+        let components = array.components;
+        let tuples = tuples.map_or(String::new(), |count| format!(" NumberOfTuples=\"{count}\""));
+        let offset = self.appended.len();
+        self.line(format_args!(
+            "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\"{tuples} format=\"appended\" \
+             offset=\"{offset}\"/>"
+        ));
+        match self.compression {
+            Compression::None => {
+                self.appended.extend((bytes.len() as u64).to_le_bytes());
+                self.appended.extend(bytes);
+                Ok(())
+            }
+            Compression::Zlib => self.append_compressed(&bytes),
+        }
+    }
+
+    fn append_compressed(&mut self, bytes: &[u8]) -> Result<(), Problem> {
+        const BLOCK: usize = 1 << 20;
+        let mut packed = Vec::new();
+        let mut header = vec![bytes.len().div_ceil(BLOCK) as u64, BLOCK as u64, (bytes.len() % BLOCK) as u64];
+        for block in bytes.chunks(BLOCK) {
+            let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+            encoder.write_all(block)?;
+            let block = encoder.finish()?;
+            header.push(block.len() as u64);
+            packed.extend(block);
+        }
+        self.appended.extend(header.iter().flat_map(|number| number.to_le_bytes()));
+        self.appended.extend(packed);
+        Ok(())
+    }
+
+    fn finish(mut self) -> Vec<u8> {
+        self.text.push_str("<AppendedData encoding=\"raw\">\n_");
+        let mut bytes = self.text.into_bytes();
+        bytes.extend(self.appended);
+        bytes.extend(b"\n</AppendedData>\n</VTKFile>\n");
+        bytes
+    }
+}
