@@ -56,7 +56,7 @@ impl Series {
     pub fn push(&mut self, time: f64, file: &Path) -> Result<(), FileError> {
         let directory = self.path.parent().unwrap_or(Path::new(""));
         let shown = file.strip_prefix(directory).unwrap_or(file).to_string_lossy();
-        let shown = quick_xml::escape::escape(&*shown);
+        let shown = quick_xml::escape::escape(shown.as_ref());
         let entry = format!("<DataSet timestep=\"{time}\" part=\"0\" file=\"{shown}\"/>\n");
         let old = File::open(&self.path).map_err(|error| Flaw::from(error).in_file(&self.path))?;
         write_atomically(&self.path, |new| {

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::fmt::Write as _;
 use std::io::Write as _;
 
@@ -108,8 +109,8 @@ fn with_natural_numbers(tagged: &TaggedFaces) -> (Vec<i64>, Vec<(i64, String)>) 
     let mut names = tagged.names.clone();
     for &tag in tagged.tags.iter().filter(|&&tag| tag < 0) {
         let next = highest.max(-1) + 1 + natural.len() as i64;
-        if !natural.contains_key(&tag) {
-            natural.insert(tag, next);
+        if let Entry::Vacant(entry) = natural.entry(tag) {
+            entry.insert(next);
             if tagged.names.iter().all(|(number, _)| *number != tag) {
                 names.push((tag, format!("feature-{tag}")));
             }
