@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use tombolo_deform::mesh::{ArrayView, CellType, CellsView, Indices, Mesh, MeshView, Values, Vector};
+use tombolo_deform::mesh::{
+    ArrayView, CellType, Cells, CellsView, FeatureSource, Indices, Mesh, MeshView, Values, Vector,
+};
 use tombolo_deform::shapes;
 use tombolo_pipelines::extract::{Association, Channel, Extract, FieldView, Snapshot, Source};
 use tombolo_pipelines::language::{Slice, parse};
@@ -317,4 +319,61 @@ fn a_broken_mesh_is_an_error() {
         runner(r#"{"name": "a", "stages": [{"slice": {"origin": [0.5,0,0], "normal": [1,0,0]}}, {"stream": {}}]}"#);
     let outputs = pipelines.run(&Snapshot { cycle: 9, time: 0.0, channels: &channels });
     assert_eq!(errors(&outputs), ["cycle 9: a coordinate of vertex 3 is NaN"]);
+}
+
+#[derive(serde::Deserialize)]
+struct Table {
+    mesh: TableMesh,
+    slices: Vec<TableSlice>,
+}
+
+#[derive(serde::Deserialize)]
+struct TableMesh {
+    points: Vec<Vector>,
+    cells: Vec<[u32; 4]>,
+}
+
+#[derive(serde::Deserialize)]
+struct TableSlice {
+    origin: Vector,
+    normal: Vector,
+    area: f64,
+    element_integral: f64,
+    /// Coordinates and vertex field.
+    points: Vec<[f64; 4]>,
+}
+
+/// The table that tests/vtk/slice.py writes: vtkCutter on a box of irregular tetrahedra.
+#[test]
+fn slices_are_those_of_vtk() {
+    let table: Table = serde_json::from_str(include_str!("slice.json")).unwrap();
+    let cells = Cells::uniform(CellType::Tetra, table.mesh.cells.as_flattened().to_vec()).unwrap();
+    let numbers: Vec<f64> = (0..cells.len()).map(|cell| (cell % 17) as f64).collect();
+    let mesh = Mesh::new(table.mesh.points, cells, FeatureSource::SharpEdges).unwrap();
+    let values: Vec<f64> = mesh.points().iter().map(|[x, y, z]| x * y + z * z - 0.5 * x).collect();
+    let fields = [
+        FieldView { name: "vertex", association: Association::Vertex, values: ArrayView::scalars(&values) },
+        FieldView { name: "element", association: Association::Element, values: ArrayView::scalars(&numbers) },
+    ];
+    for theirs in table.slices {
+        let ours = cut(&mesh, &fields, theirs.origin, theirs.normal);
+        let length = theirs.normal.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let normal = theirs.normal.map(|x| x / length);
+        let area = |extract: &Extract| area(extract, normal);
+        assert!((area(&ours) - theirs.area).abs() < 1e-12, "{} and {}", area(&ours), theirs.area);
+        let integral: f64 = (0..ours.cells.len())
+            .map(|cell| {
+                let mut one = Cells::new();
+                one.push(ours.cells.cell_type(cell), ours.cells.vertices(cell)).unwrap();
+                area(&Extract { cells: one.into(), ..Extract::clone(&ours) }) * ours.fields[1].values[cell]
+            })
+            .sum();
+        assert!((integral - theirs.element_integral).abs() < 1e-11, "{integral} and {}", theirs.element_integral);
+        assert_eq!(ours.points.len(), theirs.points.len());
+        for point in &theirs.points {
+            let same = |other: &Vector| (0..3).all(|axis| (other[axis] - point[axis]).abs() < 1e-12);
+            let index = ours.points.iter().position(same).unwrap_or_else(|| panic!("{point:?} is missing"));
+            assert!((ours.fields[0].values[index] - point[3]).abs() < 1e-12);
+        }
+    }
 }
