@@ -1,2 +1,48 @@
-//! x
-fn main() {}
+//! Benchmarks of Tombolo, side by side with their peers where there are any.
+//!
+//! ```sh
+//! cargo run --release -p tombolo-benchmarks -- overhead
+//! cargo run --release -p tombolo-benchmarks -- overhead --json
+//! ```
+
+mod measure;
+mod overhead;
+mod report;
+
+use std::process::ExitCode;
+
+use clap::{Parser, ValueEnum};
+use report::Report;
+
+/// Measures Tombolo and prints what was measured against what it should be.
+#[derive(Parser)]
+#[command(name = "tombolo-benchmarks", version)]
+struct Arguments {
+    /// Which benchmark.
+    name: Name,
+    /// Print one JSON object instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Name {
+    /// What `execute` costs with nothing to do, and what each stage costs against a step of the solver.
+    Overhead,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let result: Result<Report, Box<dyn std::error::Error>> = match arguments.name {
+        Name::Overhead => overhead::run(),
+    };
+    match result {
+        Ok(report) if arguments.json => println!("{}", report.json()),
+        Ok(report) => print!("{report}"),
+        Err(error) => {
+            eprintln!("tombolo-benchmarks: {error}");
+            return ExitCode::FAILURE;
+        }
+    }
+    ExitCode::SUCCESS
+}

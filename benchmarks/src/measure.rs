@@ -1,0 +1,27 @@
+//! Time, measured.
+
+use std::time::Instant;
+
+/// Runs of each measurement.
+pub const RUNS: usize = 7;
+
+/// The median of the seconds that `RUNS` runs take, after one that is not counted.
+///
+/// # Errors
+/// The first error of a run.
+pub fn median<E>(mut run: impl FnMut() -> Result<(), E>) -> Result<f64, E> {
+    run()?;
+    let mut seconds = Vec::with_capacity(RUNS);
+    for _ in 0..RUNS {
+        let start = Instant::now();
+        run()?;
+        seconds.push(start.elapsed().as_secs_f64());
+    }
+    Ok(middle(&mut seconds))
+}
+
+/// The median of values.
+pub fn middle(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}

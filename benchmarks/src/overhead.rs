@@ -1,0 +1,269 @@
+//! What the adaptor costs a solver: nothing to do, each stage, an order; in seconds and in steps of the flow solver.
+
+use std::error::Error;
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::Instant;
+
+use serde_json::{Value, json};
+use tombolo::deform::mesh::{ArrayView, FeatureSource, Mesh, MeshView};
+use tombolo::deform::quality::Guard;
+use tombolo::deform::schedule::Schedule;
+use tombolo::deform::shapes::box_of_tets;
+use tombolo::deform::surface::{Edit, FeatureSettings, Surface};
+use tombolo::deform::volume::Deform;
+use tombolo::pipelines::encode::Encoder;
+use tombolo::pipelines::extract::{Association, Channel, FieldView, Snapshot};
+use tombolo::pipelines::files;
+use tombolo::pipelines::language::{self, Config};
+use tombolo::pipelines::run::{Output, Runner};
+use tombolo::pipelines::shape::Shaper;
+use tombolo::{Adaptor, Settings, Step};
+use tombolo_flow::{Condition, Fluid, Patch, Solver, Value as Given};
+
+use crate::measure::{RUNS, median, middle};
+use crate::report::{Report, Row, Target};
+
+/// The paper's channel with about 60 000 tetrahedra.
+const COUNTS: [usize; 3] = [6, 130, 13];
+const LOWER: [f64; 3] = [-0.025, -0.525, -0.05];
+const UPPER: [f64; 3] = [0.025, 0.525, 0.05];
+const TIME_STEP: f64 = 1e-3;
+
+/// Calls of `execute` that are timed together.
+const CALLS: u32 = 200_000;
+
+/// Runs the benchmark; about a minute.
+///
+/// # Errors
+/// Whatever the parts fail with; nothing is skipped.
+pub fn run() -> Result<Report, Box<dyn Error>> {
+    let mesh = box_of_tets(COUNTS, LOWER, UPPER);
+    let mut solver = solver(&mesh)?;
+    let step = solver_step(&mut solver)?;
+    let velocity = solver.velocity();
+    let pressure = solver.pressure();
+    let fields = [
+        FieldView { name: "velocity", association: Association::Vertex, values: ArrayView::vectors(&velocity) },
+        FieldView { name: "pressure", association: Association::Vertex, values: ArrayView::scalars(&pressure) },
+    ];
+    let channels = [Channel { name: "fluid", mesh: MeshView::from(&mesh), fields: &fields }];
+
+    let mut rows =
+        vec![Row { case: format!("solver step, {} tets", mesh.cells().len()), seconds: step, steps: Some(1.0) }];
+    let mut push = |case: &str, seconds: f64| {
+        rows.push(Row { case: case.to_owned(), seconds, steps: Some(seconds / step) });
+        seconds
+    };
+    let idle = push("execute, nothing due, no order", idle(&channels)?);
+
+    let slice = json!({"slice": {"origin": [0, 0, 0], "normal": [1, 0, 0]}});
+    let select = json!({"select": {"fields": ["velocity", "pressure"]}});
+    let stream = json!({"stream": {"error": {"relative": 1e-3}}});
+    push("surface", stages(&[json!({"surface": {}})], &channels)?);
+    push("slice", stages(std::slice::from_ref(&slice), &channels)?);
+    push("surface, select", stages(&[json!({"surface": {}}), select.clone()], &channels)?);
+    push("quality", stages(&[json!({"quality": {}})], &channels)?);
+    push("statistics", stages(&[json!({"statistics": {"field": "velocity"}})], &channels)?);
+    let surface_view = [json!({"surface": {}}), select.clone(), stream.clone()];
+    let slice_view = [slice, select, stream];
+    let views = push("surface, select, stream", stages(&surface_view, &channels)?)
+        + push("slice, select, stream", stages(&slice_view, &channels)?);
+
+    let mut raw = 0;
+    for (name, view) in [("surface", &surface_view), ("slice", &slice_view)] {
+        let (seconds, bytes) = encoding(view, &channels)?;
+        push(&format!("encode {name} (another thread)"), seconds);
+        raw += bytes;
+    }
+    black_box(raw);
+    push("write surface.vtp", writing("surface.vtp", &[json!({"surface": {}})], &channels)?);
+    push("write mesh.vtu", writing("mesh.vtu", &[], &channels)?);
+
+    let order = order(&mesh)?;
+    push("order: set up the reference (once)", order.reference);
+    push("order: set up surface and volume (once)", order.first - order.later);
+    push("order: surface", order.surface);
+    push("order: volume", order.volume);
+    push("order: guard, 10 shapes", order.guard);
+    let later = push("order: every one after the first", order.later);
+
+    let targets = vec![
+        Target::at_most("execute, nothing due, no order [s]", idle, 1e-6),
+        Target::at_most("two views every 10 steps [part of a step]", views / 10.0 / step, 0.01),
+        Target::at_most("an order when no core is free [steps]", later / step, 3.0),
+    ];
+    Ok(Report { rows, targets })
+}
+
+fn solver(mesh: &Mesh) -> Result<Solver, Box<dyn Error>> {
+    let FeatureSource::Faces(tagged) = mesh.features() else { return Err("a box has tagged faces".into()) };
+    let mut patches: Vec<Patch> = tagged
+        .names
+        .iter()
+        .map(|(_, name)| Patch {
+            name: name.clone(),
+            triangles: Vec::new(),
+            condition: match name.as_str() {
+                "y-min" => Condition::Velocity([Given::Uniform(0.0), Given::Uniform(10.0), Given::Uniform(0.0)]),
+                "y-max" => Condition::Pressure(Given::Uniform(0.0)),
+                _ => Condition::NoSlip,
+            },
+        })
+        .collect();
+    for ((_, vertices), tag) in tagged.faces.iter().zip(&tagged.tags) {
+        let patch = tagged.names.iter().position(|(number, _)| number == tag).ok_or("every tag has a name")?;
+        patches[patch].triangles.push(vertices.try_into()?);
+    }
+    let fluid = Fluid { density: 1.0, viscosity: 1e-2 };
+    Ok(Solver::new(mesh, patches, fluid, tombolo_flow::Settings::default())?)
+}
+
+/// The median of the steps once the flow is on its way.
+fn solver_step(solver: &mut Solver) -> Result<f64, Box<dyn Error>> {
+    for _ in 0..10 {
+        solver.step(TIME_STEP, None)?;
+    }
+    let mut seconds = Vec::new();
+    for _ in 0..3 * RUNS {
+        let start = Instant::now();
+        solver.step(TIME_STEP, None)?;
+        seconds.push(start.elapsed().as_secs_f64());
+    }
+    Ok(middle(&mut seconds))
+}
+
+fn config(value: &Value) -> Result<Config, Box<dyn Error>> {
+    Ok(language::parse(&value.to_string(), "benchmark")?)
+}
+
+/// One call of `execute`, with a server that listens, views that are not due and no viewer.
+fn idle(channels: &[Channel]) -> Result<f64, Box<dyn Error>> {
+    let config = config(&json!({
+        "version": 1,
+        "stream": {"listen": "127.0.0.1:0"},
+        "pipelines": [
+            {"name": "surface", "every": {"steps": 1_000_000_000_000_u64}, "stages": [{"surface": {}}, {"stream": {}}]},
+            {"name": "health", "every": {"steps": 1_000_000_000_000_u64}, "stages": [{"quality": {}}]}
+        ]
+    }))?;
+    let mut adaptor = Adaptor::initialize(Settings { config, ..Settings::default() })?;
+    let mut cycle = 0;
+    let seconds = median(|| {
+        for _ in 0..CALLS {
+            let step = Step { cycle, time: 1e-3 * cycle as f64, time_step: TIME_STEP };
+            black_box(adaptor.execute(black_box(&step), channels)?);
+            cycle += 1;
+        }
+        Ok::<(), tombolo::ExecuteError>(())
+    })?;
+    adaptor.finalize()?;
+    Ok(seconds / f64::from(CALLS))
+}
+
+/// A runner of one pipeline that is due at every step.
+fn runner(stages: &[Value]) -> Result<Runner, Box<dyn Error>> {
+    let pipeline = json!({"name": "view", "every": {"steps": 1}, "stages": stages});
+    Runner::new(&config(&json!({"version": 1, "pipelines": [pipeline]}))?)
+        .map_err(|problem| format!("{problem:?}").into())
+}
+
+/// Runs a pipeline once.
+fn once(runner: &mut Runner, cycle: u64, channels: &[Channel]) -> Result<Vec<Output>, Box<dyn Error>> {
+    let outputs = runner.run(&Snapshot { cycle, time: 1e-3 * cycle as f64, channels });
+    match outputs
+        .iter()
+        .find_map(|output| if let Output::Error { message, .. } = output { Some(message) } else { None })
+    {
+        Some(message) => Err(message.clone().into()),
+        None => Ok(outputs),
+    }
+}
+
+/// A pipeline of these stages, once; what is set up once for a mesh is set up before.
+fn stages(stages: &[Value], channels: &[Channel]) -> Result<f64, Box<dyn Error>> {
+    let mut runner = runner(stages)?;
+    let mut cycle = 0;
+    median(|| {
+        cycle += 1;
+        black_box(once(&mut runner, cycle, channels)?);
+        Ok(())
+    })
+}
+
+/// Encodes the frame of a view; seconds and bytes before.
+fn encoding(view: &[Value], channels: &[Channel]) -> Result<(f64, usize), Box<dyn Error>> {
+    let outputs = once(&mut runner(view)?, 1, channels)?;
+    let frame = outputs
+        .into_iter()
+        .find_map(|output| if let Output::Frame(frame) = output { Some(frame) } else { None })
+        .ok_or("the view gave no frame")?;
+    let mut raw = 0;
+    let mut encoder = Encoder::new();
+    let seconds = median(|| {
+        raw = encoder.encode(&frame)?.raw_bytes;
+        Ok::<(), Box<dyn Error>>(())
+    })?;
+    Ok((seconds, raw))
+}
+
+/// Writes what these stages extract to a file.
+fn writing(name: &str, extract: &[Value], channels: &[Channel]) -> Result<f64, Box<dyn Error>> {
+    let directory = tempfile::tempdir()?;
+    let path = directory.path().join(name);
+    let stages: Vec<Value> = extract.iter().cloned().chain([json!({"write": {"file": name}})]).collect();
+    let mut runner = runner(&stages)?;
+    let mut cycle = 0;
+    median(|| {
+        cycle += 1;
+        for output in once(&mut runner, cycle, channels)? {
+            if let Output::Write { extract, .. } = output {
+                files::write(&path, &extract)?;
+            }
+        }
+        Ok(())
+    })
+}
+
+/// Seconds of an order's parts.
+struct Order {
+    reference: f64,
+    first: f64,
+    surface: f64,
+    volume: f64,
+    guard: f64,
+    later: f64,
+}
+
+/// Half of one wall is moved inward and back, by turns, on a schedule of ten shapes.
+fn order(mesh: &Mesh) -> Result<Order, Box<dyn Error>> {
+    let mesh = Arc::new(mesh.clone());
+    let start = Instant::now();
+    let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default())?);
+    let mut shaper = Shaper::new(Arc::clone(&mesh), surface)?;
+    let reference = start.elapsed().as_secs_f64();
+    let edits = |distance: f64| -> Result<Vec<Edit>, serde_json::Error> {
+        serde_json::from_value(json!([{"translate": {
+            "features": ["z-max"], "fixed": ["y-min", "y-max", "z-min"], "by": [0, 0, distance], "harmonic_order": 2}}]))
+    };
+    let (deform, guard) = (Deform::default(), Guard::default());
+    let schedule: Schedule = serde_json::from_value(json!({"steps": 10, "every": {"steps": 10}}))?;
+    let mut shape: Arc<[_]> = mesh.points().into();
+    let mut plan = |distance: f64| -> Result<_, Box<dyn Error>> {
+        let start = Instant::now();
+        let plan = shaper.plan(&edits(distance)?, Arc::clone(&shape), &deform, &schedule, &guard)?;
+        let seconds = start.elapsed().as_secs_f64();
+        shape = Arc::clone(plan.end());
+        Ok((seconds, plan.seconds()))
+    };
+    let (first, _) = plan(-0.01)?;
+    let mut parts = [const { Vec::new() }; 4];
+    for run in 0..RUNS {
+        let (seconds, own) = plan(if run % 2 == 0 { -0.02 } else { -0.01 })?;
+        for (values, value) in parts.iter_mut().zip([seconds, own.surface, own.volume, own.guard]) {
+            values.push(value);
+        }
+    }
+    let [later, surface, volume, guard] = parts.map(|mut values| middle(&mut values));
+    Ok(Order { reference, first, surface, volume, guard, later })
+}
