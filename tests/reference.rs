@@ -1,27 +1,31 @@
-//! `docs/json-reference.md` is what `tombolo schema` says, rendered; it is never written by hand.
+//! `docs/json-reference.md` is what the types say, rendered; it is never written by hand.
 //!
 //! `TOMBOLO_UPDATE=1 cargo test -p tombolo-tests --test reference` writes the page anew.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeSet, VecDeque};
 use std::fmt::Write as _;
 
 use serde_json::Value;
-use tombolo_tests::{project, tombolo};
+use tombolo_pipelines::language::{TimedCommand, config_schema};
+use tombolo_tests::project;
 
 const PAGE: &str = "docs/json-reference.md";
 
+const HEAD: &str = "# JSON reference
+
+Generated from the types of the program; do not edit. `tombolo schema` prints the same as a JSON Schema.
+
+A stage, an edit or a command is an object with exactly one key, its name: `{\"surface\": {}}`. A key that is not listed is an error, and so
+is one that stands twice. Every number must be finite.
+
+";
+
 #[test]
-fn the_reference_is_what_the_program_says() {
-    let mut page = String::from(
-        "# JSON reference\n\n\
-         Generated from the types of the program (`tombolo schema`); do not edit. A stage, an edit or a command is an object with\n\
-         exactly one key, its name. A key that is not listed is an error. Every number must be finite.\n\n",
-    );
-    for (title, arguments) in ROOTS {
-        let output = tombolo(arguments);
-        let schema: Value = serde_json::from_slice(&output.stdout).expect("`tombolo schema` prints JSON");
-        render(&mut page, title, &schema);
-    }
+fn the_reference_is_what_the_types_say() {
+    let mut renderer = Renderer::default();
+    renderer.render("Pipelines", &config_schema());
+    renderer.render("Orders", &schemars::schema_for!(Vec<TimedCommand>).to_value());
+    let page = format!("{HEAD}{}\n", renderer.page.trim_end());
     let path = project().join(PAGE);
     if std::env::var_os("TOMBOLO_UPDATE").is_some() {
         std::fs::write(&path, &page).expect("the page can be written");
@@ -33,30 +37,22 @@ fn the_reference_is_what_the_program_says() {
     );
 }
 
-const ROOTS: [(&str, &[&str]); 1] = [("Pipelines", &["schema"])];
-
-/// Renders a schema and every definition it reaches, each once, in the order they are met.
-fn render(page: &mut String, title: &str, schema: &Value) {
-    let definitions: BTreeMap<&str, &Value> = schema["$defs"]
-        .as_object()
-        .map(|defs| defs.iter().map(|(name, def)| (name.as_str(), def)).collect())
-        .unwrap_or_default();
-    let mut renderer = Renderer { page, definitions, queue: VecDeque::new(), met: Vec::new() };
-    renderer.definition(title, schema);
-    while let Some(name) = renderer.queue.pop_front() {
-        let definition = renderer.definitions.get(name.as_str()).copied().unwrap_or(&Value::Null);
-        renderer.definition(&name, definition);
-    }
-}
-
-struct Renderer<'a> {
-    page: &'a mut String,
-    definitions: BTreeMap<&'a str, &'a Value>,
+#[derive(Default)]
+struct Renderer {
+    page: String,
     queue: VecDeque<String>,
-    met: Vec<String>,
+    met: BTreeSet<String>,
 }
 
-impl Renderer<'_> {
+impl Renderer {
+    /// Renders a schema and every definition it reaches that no schema before it did, in the order they are met.
+    fn render(&mut self, title: &str, schema: &Value) {
+        self.definition(title, schema);
+        while let Some(name) = self.queue.pop_front() {
+            self.definition(&name, &schema["$defs"][&name]);
+        }
+    }
+
     fn definition(&mut self, name: &str, definition: &Value) {
         self.line(&format!("## {name}\n"));
         self.description(definition);
@@ -65,8 +61,16 @@ impl Renderer<'_> {
 
     fn body(&mut self, definition: &Value) {
         if let Some(variants) = definition["oneOf"].as_array().or(definition["anyOf"].as_array()) {
-            for variant in variants {
+            // A variant without a type says only which keys go together; the description says it better.
+            let variants: Vec<&Value> = variants
+                .iter()
+                .filter(|variant| variant.get("required").is_none() || variant.get("type").is_some())
+                .collect();
+            for variant in &variants {
                 self.variant(variant);
+            }
+            if !variants.is_empty() {
+                self.line("");
             }
         }
         if definition["properties"].is_object() {
@@ -111,7 +115,7 @@ impl Renderer<'_> {
             self.line("An empty object: `{}`.\n");
             return;
         }
-        self.line("\n| key | value | default | meaning |\n|---|---|---|---|");
+        self.line("| key | value | default | meaning |\n|---|---|---|---|");
         let required: Vec<&str> =
             definition["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
         for (key, value) in properties {
@@ -130,8 +134,7 @@ impl Renderer<'_> {
     fn kind(&mut self, value: &Value) -> String {
         if let Some(reference) = value["$ref"].as_str() {
             let name = reference.rsplit('/').next().unwrap_or(reference).to_owned();
-            if !self.met.contains(&name) {
-                self.met.push(name.clone());
+            if self.met.insert(name.clone()) {
                 self.queue.push_back(name.clone());
             }
             return format!("[{name}](#{})", name.to_lowercase());
@@ -174,13 +177,14 @@ impl Renderer<'_> {
             "object" if value["additionalProperties"].is_object() => {
                 format!("object of {}", self.kind(&value["additionalProperties"]))
             }
-            "integer" => "integer".to_owned(),
+            "object" if value["properties"].as_object().is_none_or(serde_json::Map::is_empty) => "`{}`".to_owned(),
             other => other.to_owned(),
         }
     }
 
     fn description(&mut self, definition: &Value) {
-        if let Some(text) = definition["description"].as_str() {
+        let text = prose(definition["description"].as_str().unwrap_or_default());
+        if !text.is_empty() {
             self.line(&format!("{text}\n"));
         }
     }
@@ -203,7 +207,14 @@ fn range(value: &Value) -> String {
 }
 
 fn sentence(value: &Value) -> String {
-    value["description"].as_str().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
+    prose(value["description"].as_str().unwrap_or_default()).split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// A description up to its first example in Rust, without links into the Rust documentation.
+fn prose(text: &str) -> String {
+    let end = ["```", "\n# "].iter().filter_map(|mark| text.find(mark)).min().unwrap_or(text.len());
+    let paragraphs = text[..end].trim_end().split("\n\n").filter(|paragraph| !paragraph.ends_with(':'));
+    paragraphs.collect::<Vec<_>>().join("\n\n").replace("[`", "`").replace("`]", "`").trim().to_owned()
 }
 
 fn capital(text: &str) -> String {

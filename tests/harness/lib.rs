@@ -2,10 +2,12 @@
 
 mod mesh;
 mod run;
+mod small;
 mod viewer;
 
 pub use mesh::{NOZZLE_FEATURES, write_nozzle};
 pub use run::{Run, program, programs, tombolo};
+pub use small::Small;
 pub use viewer::{Link, Message, Viewer};
 
 use std::path::Path;
@@ -17,4 +19,11 @@ use std::path::Path;
 #[must_use]
 pub fn project() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests/ lies in the project")
+}
+
+/// The programs of the book, run as tests.
+#[cfg(doctest)]
+mod book {
+    #[doc = include_str!("../../docs/instrument-your-solver.md")]
+    struct InstrumentYourSolver;
 }

@@ -1,0 +1,96 @@
+//! The same orders give the same bits, whoever watches and however often.
+
+use std::time::Duration;
+
+use serde_json::{Value, json};
+use tombolo_tests::{Run, Small, Viewer};
+
+const LIMIT: Duration = Duration::from_secs(120);
+
+fn pipelines(hold: bool) -> Value {
+    let mut list = vec![
+        json!({"name": "surface", "every": {"steps": 1}, "stages": [{"surface": {}}, {"stream": {}}]}),
+        json!({"name": "middle", "every": {"steps": 2},
+               "stages": [{"slice": {"origin": [0, 0, 0], "normal": [1, 0, 0]}}, {"stream": {}}]}),
+        json!({"name": "last", "at": {"cycle": 38}, "stages": [{"write": {"file": "last.vtu"}}]}),
+    ];
+    if hold {
+        list.push(json!({"name": "hold", "at": {"cycle": 3}, "stages": [{"pause": {}}]}));
+    }
+    json!({"version": 1, "stream": {"listen": "127.0.0.1:0"}, "journal": "journal.jsonl", "pipelines": list})
+}
+
+fn pinch(factor: f64) -> Value {
+    json!({"edits": [{"scale_direction": {
+                "features": ["throat"], "fixed": ["inlet", "outlet"], "factors": [1, 1, factor], "harmonic_order": 2}}],
+           "schedule": {"steps": 4, "every": {"steps": 2}}})
+}
+
+fn last(small: &Small) -> Vec<u8> {
+    small.bytes("out/last.vtu")
+}
+
+/// An unsteady run with an order from a file; with viewers that read everything, or with none.
+fn watched(viewers: usize) -> Vec<u8> {
+    let small = Small::new();
+    small.write("pipelines.json", &pipelines(viewers > 0));
+    small.write("orders.json", &json!([{"at": {"cycle": 5}, "order": pinch(0.8)}]));
+    let mut more = vec!["--pipelines", "@pipelines.json", "--orders", "@orders.json", "--steps", "40"];
+    if viewers == 0 {
+        more.push("--headless");
+    }
+    let mut run = Run::flow(&small.arguments(&more));
+    if viewers > 0 {
+        let link = run.link();
+        let mut all: Vec<Viewer> = (0..viewers).map(|_| Viewer::connect(&link).expect("the run lets in")).collect();
+        all[0].wait_for("hello", |hello| hello["role"] == "driver");
+        assert!(all[0].frame().starts_with(b"TMBL"));
+        all[0].send(&json!({"resume": {}}));
+        while all[0].next(Duration::from_secs(5)).is_some() {}
+    }
+    let (status, text) = run.finish(LIMIT);
+    assert!(status.success(), "{text}");
+    assert_eq!(small.read("report.json")["orders"][0]["status"], "applied");
+    last(&small)
+}
+
+#[test]
+fn who_watches_makes_no_difference() {
+    let alone = watched(0);
+    assert!(watched(0) == alone, "two runs alike differ");
+    assert!(watched(2) == alone, "a run with viewers differs");
+}
+
+#[test]
+fn a_journal_plays_back_to_the_same_bits() {
+    let live = Small::new();
+    live.write("pipelines.json", &pipelines(true));
+    let mut run = Run::flow(&live.arguments(&["--pipelines", "@pipelines.json", "--steps", "40"]));
+    let mut driver = Viewer::connect(&run.link()).expect("the run lets in");
+    driver.wait_for("hello", |hello| hello["role"] == "driver");
+    driver.send(&json!({"id": "first", "order": pinch(0.8)}));
+    driver.wait_for("order", |order| order["status"] == "accepted" || order["status"] == "computing");
+    driver.send(&json!({"resume": {}}));
+    let (status, text) = run.finish(LIMIT);
+    assert!(status.success(), "{text}");
+    let report = live.read("report.json");
+    assert_eq!(report["orders"][0]["status"], "applied", "{report}");
+
+    let again = Small::new();
+    again.write("pipelines.json", &pipelines(false));
+    std::fs::copy(live.path("out/journal.jsonl"), again.path("orders.jsonl")).expect("the run wrote its journal");
+    let arguments = again.arguments(&[
+        "--pipelines",
+        "@pipelines.json",
+        "--orders",
+        "@orders.jsonl",
+        "--headless",
+        "--steps",
+        "40",
+    ]);
+    let (status, text) = Run::flow(&arguments).finish(LIMIT);
+    assert!(status.success(), "{text}");
+    let replayed = again.read("report.json");
+    assert_eq!(replayed["orders"][0]["cycle_applied"], report["orders"][0]["cycle_applied"], "{replayed}");
+    assert!(last(&again) == last(&live), "the journal gives another flow");
+}
