@@ -69,8 +69,8 @@ pub enum Condition {
 
 /// A part of the boundary with its condition. The patches together must cover the whole boundary.
 ///
-/// Where patches meet, a no-slip wall rules before a prescribed velocity, and that before slip and pressure; between two
-/// prescribed velocities the earlier patch rules.
+/// Where patches meet, a prescribed velocity rules before a no-slip wall, so that what flows in is exactly what was prescribed,
+/// and both before slip and pressure; between two prescribed velocities the earlier patch rules.
 #[derive(Debug, Clone)]
 pub struct Patch {
     /// Its name.
@@ -137,6 +137,11 @@ impl Boundary {
             }
         }
         let mut rules = vec![Rule::Free; vertex_count];
+        for patch in patches.iter().filter(|patch| matches!(patch.condition, Condition::NoSlip)) {
+            for &vertex in patch.triangles.iter().flatten() {
+                rules[vertex as usize] = Rule::Wall;
+            }
+        }
         for (index, patch) in patches.iter().enumerate().rev() {
             if let Condition::Velocity(_) = patch.condition {
                 for &vertex in patch.triangles.iter().flatten() {
@@ -145,11 +150,6 @@ impl Boundary {
                         rules[vertex as usize] = Rule::Prescribed(index as u32);
                     }
                 }
-            }
-        }
-        for patch in patches.iter().filter(|patch| matches!(patch.condition, Condition::NoSlip)) {
-            for &vertex in patch.triangles.iter().flatten() {
-                rules[vertex as usize] = Rule::Wall;
             }
         }
         // A vertex that no element uses has no equation.
