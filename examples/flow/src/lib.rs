@@ -31,10 +31,13 @@
 #![expect(clippy::needless_range_loop, reason = "loops over rows and components index several arrays at once")]
 
 mod boundary;
+pub mod case;
 mod error;
 mod geometry;
 pub mod linear;
 mod momentum;
+pub mod program;
+pub mod report;
 mod solver;
 mod topology;
 

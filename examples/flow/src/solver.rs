@@ -494,6 +494,18 @@ impl Solver {
         self.topology.to_mesh(&self.pressure)
     }
 
+    /// As [`Solver::velocity`], into a vector that is there already.
+    pub fn velocity_into(&self, values: &mut Vec<Vector>) {
+        values.clear();
+        values.extend(self.topology.vertex_rank.iter().map(|&rank| self.velocity[rank as usize]));
+    }
+
+    /// As [`Solver::pressure`], into a vector that is there already.
+    pub fn pressure_into(&self, values: &mut Vec<f64>) {
+        values.clear();
+        values.extend(self.topology.vertex_rank.iter().map(|&rank| self.pressure[rank as usize]));
+    }
+
     /// The coordinates of each vertex.
     #[must_use]
     pub fn points(&self) -> Vec<Vector> {
@@ -515,13 +527,19 @@ impl Solver {
         self.boundary.flux(patch, &self.velocity, &self.geometry.points)
     }
 
-    /// The mean pressure over a patch.
+    /// The mean pressure over a patch, and the patch's area.
     ///
     /// # Panics
     /// Where there is no such patch.
     #[must_use]
-    pub fn mean_pressure(&self, patch: usize) -> f64 {
-        self.boundary.mean(patch, &self.pressure, &self.geometry.points).0
+    pub fn mean_pressure(&self, patch: usize) -> (f64, f64) {
+        self.boundary.mean(patch, &self.pressure, &self.geometry.points)
+    }
+
+    /// The greatest velocity of any vertex.
+    #[must_use]
+    pub fn max_velocity(&self) -> f64 {
+        self.velocity.iter().map(|&velocity| dot(velocity, velocity)).fold(0.0, f64::max).sqrt()
     }
 
     /// The largest Courant number of any element for a time step: how many elements the fluid crosses in it.

@@ -1,0 +1,294 @@
+//! The program `flow`: a case, steered through the adaptor.
+
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use tombolo::{Adaptor, ExecuteError, FinalizeError, InitializeError, JournalError, Settings, Step};
+use tombolo_deform::mesh::{ArrayView, CellsView, Mesh, MeshError, MeshView, Vector};
+use tombolo_deform::quality::quality;
+use tombolo_deform::surface::{FeatureSettings, Surface, SurfaceError};
+use tombolo_pipelines::extract::{Association, Channel, Field, FieldView};
+use tombolo_pipelines::files::{self, Compression, FileError};
+use tombolo_pipelines::language::{self, Config, LanguageError, StreamServer, TimedCommand};
+
+use crate::case::{Case, CaseError};
+use crate::report::{FlowReport, MeshReport, Report};
+use crate::solver::{Motion, Settings as SolverSettings, Solver};
+use crate::SolverError;
+
+/// What a run is asked to do.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// The case file.
+    pub case: PathBuf,
+    /// The pipelines; without them those that the case names.
+    pub pipelines: Option<PathBuf>,
+    /// The orders to carry out; without them those that the case names.
+    pub orders: Option<PathBuf>,
+    /// How many steps to take.
+    pub steps: Option<u64>,
+    /// Whether to run without a server for viewers.
+    pub headless: bool,
+    /// Where the server listens, in place of what the pipelines say.
+    pub listen: Option<SocketAddr>,
+    /// Where the final state is written, and what the pipelines write.
+    pub out: Option<PathBuf>,
+}
+
+/// Why a run could not be done, or ended early.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ProgramError {
+    /// The case makes no sense.
+    #[error(transparent)]
+    Case(#[from] CaseError),
+    /// A file cannot be read or written.
+    #[error("{}: {source}", file.display())]
+    File {
+        /// The file.
+        file: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// The pipelines or the orders make no sense.
+    #[error(transparent)]
+    Language(#[from] LanguageError),
+    /// The mesh cannot be read, or the result not written.
+    #[error(transparent)]
+    Mesh(#[from] FileError),
+    /// The mesh has no boundary to speak of.
+    #[error(transparent)]
+    Surface(#[from] SurfaceError),
+    /// The flow cannot be solved.
+    #[error(transparent)]
+    Solver(#[from] SolverError),
+    /// The adaptor could not be set up.
+    #[error(transparent)]
+    Initialize(#[from] InitializeError),
+    /// The adaptor was called wrongly.
+    #[error(transparent)]
+    Execute(#[from] ExecuteError),
+    /// The adaptor could not write everything.
+    #[error(transparent)]
+    Finalize(#[from] FinalizeError),
+    /// The journal of the run could not be written.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    /// A mesh that is none.
+    #[error(transparent)]
+    Points(#[from] MeshError),
+}
+
+/// A run that has been set up.
+pub struct Run {
+    case: Case,
+    out: Option<PathBuf>,
+    steps: Option<u64>,
+    adaptor: Adaptor,
+    solver: Solver,
+    mesh: Mesh,
+    points: Vec<Vector>,
+    parameters: Vec<f64>,
+    worst: MeshReport,
+    flow: FlowReport,
+}
+
+impl Run {
+    /// Reads everything, and starts the server where there is to be one.
+    ///
+    /// # Errors
+    /// [`ProgramError`] naming the file and the place in it.
+    pub fn new(options: &Options) -> Result<Self, ProgramError> {
+        let case = Case::read(&options.case)?;
+        let config = config(options, &case)?;
+        let orders = orders(options, &case)?;
+        let mesh = files::read_mesh(&case.mesh)?.mesh;
+        let surface = Surface::extract(&mesh, &FeatureSettings::default())?;
+        let patches = case.patches(&options.case, &surface)?;
+        let declared = case.declared_parameters();
+        let parameters: Vec<f64> = declared.iter().map(|parameter| parameter.value).collect();
+        let mut solver = Solver::new(&mesh, patches, case.fluid(&parameters), SolverSettings::default())?;
+        solver.set_parameters(&parameters);
+        let (velocity, pressure) = case.initial_values();
+        solver.initialise(&velocity, &pressure);
+        let adaptor = Adaptor::initialize(Settings {
+            config,
+            parameters: declared,
+            orders,
+            output: options.out.clone().unwrap_or_else(|| PathBuf::from(".")),
+            ..Settings::default()
+        })?;
+        let start = quality(mesh.cells(), mesh.points());
+        // With viewers a run goes on until somebody stops it, unless it was told when to end.
+        let steps = options.steps.or_else(|| options.headless.then_some(case.steps));
+        Ok(Self {
+            worst: MeshReport {
+                vertices: mesh.points().len(),
+                cells: mesh.cells().len(),
+                inverted: start.inverted,
+                min_scaled_jacobian: start.min,
+            },
+            points: mesh.points().to_vec(),
+            flow: FlowReport::default(),
+            out: options.out.clone(),
+            steps,
+            case,
+            adaptor,
+            solver,
+            mesh,
+            parameters,
+        })
+    }
+
+    /// The link that viewers open; `None` without a server.
+    #[must_use]
+    pub fn link(&self) -> Option<String> {
+        self.adaptor.link()
+    }
+
+    /// Steps until the end, writes the final state where it is wanted, and says what happened.
+    ///
+    /// A flow that diverges ends the run early; the report then says so in `error`.
+    ///
+    /// # Errors
+    /// [`ProgramError`] where a file cannot be written.
+    pub fn finish(mut self) -> Result<Report, ProgramError> {
+        let begun = Instant::now();
+        let error = match self.advance() {
+            Ok(()) => None,
+            Err(error @ ProgramError::Solver(_)) => Some(error.to_string()),
+            Err(error) => return Err(error),
+        };
+        self.flow.seconds = begun.elapsed().as_secs_f64();
+        self.flow.measure(&self.solver, self.case.time_step);
+        if let Some(folder) = &self.out {
+            self.write(&folder.join("final.vtu"))?;
+        }
+        let adaptor = match self.adaptor.finalize() {
+            Ok(report) => report,
+            Err(FinalizeError::Files { report, first, count }) => {
+                eprintln!("flow: {count} file(s) of the pipelines could not be written; the first: {first}");
+                *report
+            }
+        };
+        Ok(Report {
+            cycles: self.solver.cycle(),
+            time: self.solver.time(),
+            mesh: self.worst,
+            orders: adaptor.orders,
+            step_seconds: adaptor.step_seconds,
+            adaptor_seconds: adaptor.adaptor_seconds,
+            stream: adaptor.stream,
+            flow: self.flow,
+            error,
+        })
+    }
+
+    fn advance(&mut self) -> Result<(), ProgramError> {
+        let time_step = self.case.time_step;
+        let (mut velocity, mut pressure) = (self.solver.velocity(), self.solver.pressure());
+        while self.steps.is_none_or(|steps| self.solver.cycle() < steps) {
+            let step = Step { cycle: self.solver.cycle(), time: self.solver.time(), time_step };
+            let fields = [
+                FieldView {
+                    name: "velocity",
+                    association: Association::Vertex,
+                    values: ArrayView::vectors(&velocity),
+                },
+                FieldView {
+                    name: "pressure",
+                    association: Association::Vertex,
+                    values: ArrayView::scalars(&pressure),
+                },
+            ];
+            let mesh = MeshView::new(ArrayView::vectors(&self.points), CellsView::Owned(self.mesh.cells()))
+                .with_features(self.mesh.features());
+            let steering = self.adaptor.execute(&step, &[Channel { name: "fluid", mesh, fields: &fields }])?;
+            if steering.stop {
+                break;
+            }
+            for (name, value) in steering.parameters {
+                if let Some(index) = self.case.parameters.keys().position(|known| known == name) {
+                    self.parameters[index] = *value;
+                }
+            }
+            if !steering.parameters.is_empty() {
+                self.solver.set_parameters(&self.parameters);
+                if let Err(error) = self.solver.set_fluid(self.case.fluid(&self.parameters)) {
+                    eprintln!("flow: cycle {}: {error}; the fluid stays as it was", step.cycle);
+                }
+            }
+            let moved = match steering.motion {
+                Some(motion) => {
+                    self.points.copy_from_slice(motion.coordinates);
+                    true
+                }
+                None => false,
+            };
+            if moved {
+                let shape = quality(self.mesh.cells(), &self.points);
+                self.worst.inverted = self.worst.inverted.max(shape.inverted);
+                self.worst.min_scaled_jacobian = self.worst.min_scaled_jacobian.min(shape.min);
+            }
+            let motion = moved.then_some(Motion { points: &self.points });
+            let outcome = self.solver.step(time_step, motion)?;
+            self.flow.count(&outcome, &self.solver);
+            self.solver.velocity_into(&mut velocity);
+            self.solver.pressure_into(&mut pressure);
+        }
+        Ok(())
+    }
+
+    /// Writes the mesh as it is, its features, the velocity and the pressure.
+    fn write(&self, file: &Path) -> Result<(), ProgramError> {
+        let velocity = Field {
+            name: "velocity".into(),
+            association: Association::Vertex,
+            components: 3,
+            values: self.solver.velocity().into_flattened(),
+        };
+        let pressure = Field {
+            name: "pressure".into(),
+            association: Association::Vertex,
+            components: 1,
+            values: self.solver.pressure(),
+        };
+        let mesh = self.mesh.with_points(self.points.clone())?;
+        Ok(files::write_mesh(file, &mesh, &[velocity, pressure], Compression::default())?)
+    }
+}
+
+fn read(file: &Path) -> Result<Vec<u8>, ProgramError> {
+    std::fs::read(file).map_err(|source| ProgramError::File { file: file.into(), source })
+}
+
+fn config(options: &Options, case: &Case) -> Result<Config, ProgramError> {
+    let mut config = match options.pipelines.as_ref().or(case.pipelines.as_ref()) {
+        None => Settings::default().config,
+        Some(file) => {
+            let name = file.display().to_string();
+            language::parse(language::text(&read(file)?, &name)?, &name)?
+        }
+    };
+    if options.headless {
+        config.stream = None;
+    } else {
+        let server = config.stream.get_or_insert_with(StreamServer::default);
+        if let Some(listen) = options.listen {
+            server.listen = listen;
+        }
+    }
+    Ok(config)
+}
+
+fn orders(options: &Options, case: &Case) -> Result<Vec<TimedCommand>, ProgramError> {
+    match options.orders.as_ref().or(case.orders.as_ref()) {
+        None => Ok(Vec::new()),
+        Some(file) => {
+            let name = file.display().to_string();
+            Ok(language::parse_orders(language::text(&read(file)?, &name)?, &name)?)
+        }
+    }
+}
+

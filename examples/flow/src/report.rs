@@ -1,0 +1,122 @@
+//! What a run came to, as one JSON object.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use tombolo::stream::StreamCounts;
+use tombolo::{OrderReport, Spread};
+
+use crate::solver::{Solver, StepOutcome};
+use crate::Condition;
+
+/// The report of a run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// How many steps were taken.
+    pub cycles: u64,
+    /// The simulated time reached.
+    pub time: f64,
+    /// The mesh, the worst of all its shapes.
+    pub mesh: MeshReport,
+    /// What became of each order.
+    pub orders: Vec<OrderReport>,
+    /// Seconds of a step of the solver.
+    pub step_seconds: Spread,
+    /// Seconds in the adaptor, by part.
+    pub adaptor_seconds: BTreeMap<&'static str, Spread>,
+    /// What was streamed.
+    pub stream: StreamCounts,
+    /// The flow.
+    pub flow: FlowReport,
+    /// Why the run ended early, where it did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<String>,
+}
+
+/// The mesh of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct MeshReport {
+    /// How many vertices it has.
+    pub vertices: usize,
+    /// How many cells.
+    pub cells: usize,
+    /// The most inverted cells of any shape of the run.
+    pub inverted: usize,
+    /// The least scaled Jacobian of any shape of the run.
+    pub min_scaled_jacobian: f64,
+}
+
+/// The flow at the end of a run, and what its solves took.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct FlowReport {
+    /// Volume per time that flows in where the velocity is prescribed.
+    pub mass_in: f64,
+    /// Volume per time that flows out where the pressure is prescribed.
+    pub mass_out: f64,
+    /// The greatest flux through the whole boundary in any step, relative to what flowed through it then.
+    pub worst_imbalance: f64,
+    /// Mean pressure where the velocity is prescribed less that where the pressure is.
+    pub pressure_drop: f64,
+    /// The flux out through each feature.
+    pub fluxes: BTreeMap<String, f64>,
+    /// The mean pressure over each feature.
+    pub mean_pressures: BTreeMap<String, f64>,
+    /// The greatest velocity.
+    pub max_velocity: f64,
+    /// The greatest Courant number of any element.
+    pub courant: f64,
+    /// Iterations of the momentum solve per step.
+    pub momentum_iterations: f64,
+    /// Iterations of the pressure solve per step.
+    pub pressure_iterations: f64,
+    /// Steps with a solve that did not reach its tolerance.
+    pub unconverged: u64,
+    /// Seconds of the whole run, the adaptor's included.
+    pub seconds: f64,
+    #[serde(skip)]
+    steps: u64,
+}
+
+impl FlowReport {
+    /// Counts one step.
+    pub(crate) fn count(&mut self, outcome: &StepOutcome, solver: &Solver) {
+        let through: f64 = 0.5 * (0..solver.patches().len()).map(|patch| solver.flux(patch).abs()).sum::<f64>();
+        if through > 0.0 {
+            self.worst_imbalance = self.worst_imbalance.max(outcome.imbalance.abs() / through);
+        }
+        self.steps += 1;
+        self.momentum_iterations += outcome.momentum.iterations as f64;
+        self.pressure_iterations += outcome.pressure.iterations as f64;
+        self.unconverged += u64::from(!(outcome.momentum.converged && outcome.pressure.converged));
+    }
+
+    /// Measures the flow as it is at the end.
+    pub(crate) fn measure(&mut self, solver: &Solver, time_step: f64) {
+        let steps = self.steps.max(1) as f64;
+        self.momentum_iterations /= steps;
+        self.pressure_iterations /= steps;
+        let (mut inlets, mut outlets) = ((0.0, 0.0), (0.0, 0.0));
+        for (index, patch) in solver.patches().iter().enumerate() {
+            let flux = solver.flux(index);
+            let (pressure, area) = solver.mean_pressure(index);
+            self.fluxes.insert(patch.name.clone(), flux);
+            self.mean_pressures.insert(patch.name.clone(), pressure);
+            match patch.condition {
+                Condition::Velocity(_) => {
+                    self.mass_in -= flux;
+                    inlets = (inlets.0 + pressure * area, inlets.1 + area);
+                }
+                Condition::Pressure(_) => {
+                    self.mass_out += flux;
+                    outlets = (outlets.0 + pressure * area, outlets.1 + area);
+                }
+                Condition::NoSlip | Condition::Slip => {}
+            }
+        }
+        if inlets.1 > 0.0 && outlets.1 > 0.0 {
+            self.pressure_drop = inlets.0 / inlets.1 - outlets.0 / outlets.1;
+        }
+        self.max_velocity = solver.max_velocity();
+        self.courant = solver.courant(time_step);
+    }
+}
