@@ -171,6 +171,7 @@ impl Run {
                 eprintln!("flow: {count} file(s) of the pipelines could not be written; the first: {first}");
                 *report
             }
+            Err(error) => return Err(error.into()),
         };
         Ok(Report {
             cycles: self.solver.cycle(),
