@@ -209,10 +209,10 @@ impl Case {
         }
         let mut patches = Vec::with_capacity(features.names().len());
         for name in features.names() {
-            let condition = self.boundary.get(name).ok_or_else(|| CaseError::NoCondition {
-                file: file.into(),
-                feature: name.clone(),
-            })?;
+            let condition = self
+                .boundary
+                .get(name)
+                .ok_or_else(|| CaseError::NoCondition { file: file.into(), feature: name.clone() })?;
             let condition = match condition {
                 BoundaryCondition::Velocity(velocity) => Condition::Velocity(self.vector(velocity)),
                 BoundaryCondition::Pressure(pressure) => Condition::Pressure(self.value(pressure)),
@@ -289,11 +289,14 @@ impl Validate for Case {
         for (name, range) in &self.parameters {
             let inside = |problem: Problem| problem.within(name).within("parameters");
             if PLACE_NAMES.contains(&name.as_str()) {
-                return Err(inside(Problem::new(format!("`{name}` is a place or the time, and cannot name a parameter"))));
+                return Err(inside(Problem::new(format!(
+                    "`{name}` is a place or the time, and cannot name a parameter"
+                ))));
             }
             Expression::parse(name, &[name]).map_err(|error| inside(Problem::new(format!("not a name: {error}"))))?;
             if !(range.minimum <= range.value && range.value <= range.maximum) {
-                let message = format!("found {}, expected a number from {} to {}", range.value, range.minimum, range.maximum);
+                let message =
+                    format!("found {}, expected a number from {} to {}", range.value, range.minimum, range.maximum);
                 return Err(inside(Problem::new(message).within("value")));
             }
         }
@@ -315,7 +318,9 @@ impl Validate for Case {
         self.check_vector(&self.initial.velocity).map_err(|problem| initial(problem, "velocity"))?;
         self.check_number(&self.initial.pressure).map_err(|problem| initial(problem, "pressure"))?;
         if !(self.time_step > 0.0) {
-            return Err(Problem::new(format!("found {}, expected a positive number", self.time_step)).within("time_step"));
+            return Err(
+                Problem::new(format!("found {}, expected a positive number", self.time_step)).within("time_step")
+            );
         }
         Ok(())
     }

@@ -12,10 +12,10 @@ use tombolo_pipelines::extract::{Association, Channel, Field, FieldView};
 use tombolo_pipelines::files::{self, Compression, FileError};
 use tombolo_pipelines::language::{self, Config, LanguageError, StreamServer, TimedCommand};
 
+use crate::SolverError;
 use crate::case::{Case, CaseError};
 use crate::report::{FlowReport, MeshReport, Report};
 use crate::solver::{Motion, Settings as SolverSettings, Solver};
-use crate::SolverError;
 
 /// What a run is asked to do.
 #[derive(Debug, Clone, Default)]
@@ -192,16 +192,8 @@ impl Run {
         while self.steps.is_none_or(|steps| self.solver.cycle() < steps) {
             let step = Step { cycle: self.solver.cycle(), time: self.solver.time(), time_step };
             let fields = [
-                FieldView {
-                    name: "velocity",
-                    association: Association::Vertex,
-                    values: ArrayView::vectors(&velocity),
-                },
-                FieldView {
-                    name: "pressure",
-                    association: Association::Vertex,
-                    values: ArrayView::scalars(&pressure),
-                },
+                FieldView { name: "velocity", association: Association::Vertex, values: ArrayView::vectors(&velocity) },
+                FieldView { name: "pressure", association: Association::Vertex, values: ArrayView::scalars(&pressure) },
             ];
             let mesh = MeshView::new(ArrayView::vectors(&self.points), CellsView::Owned(self.mesh.cells()))
                 .with_features(self.mesh.features());
@@ -292,4 +284,3 @@ fn orders(options: &Options, case: &Case) -> Result<Vec<TimedCommand>, ProgramEr
         }
     }
 }
-

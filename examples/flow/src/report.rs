@@ -6,8 +6,8 @@ use serde::Serialize;
 use tombolo::stream::StreamCounts;
 use tombolo::{OrderReport, Spread};
 
-use crate::solver::{Solver, StepOutcome};
 use crate::Condition;
+use crate::solver::{Solver, StepOutcome};
 
 /// The report of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -1,0 +1,173 @@
+//! Cases, orders and reports, on a mesh small enough for a test.
+
+use std::path::{Path, PathBuf};
+
+use tombolo_deform::mesh::FeatureSource;
+use tombolo_deform::shapes::{BOX_FEATURES, box_of_tets};
+use tombolo_flow::case::{Case, CaseError};
+use tombolo_flow::program::{Options, Run};
+use tombolo_flow::report::Report;
+use tombolo_pipelines::files::{self, Compression};
+
+const CASE: &str = r#"{
+  "mesh": "channel.vtu",
+  "density": 1.0,
+  "viscosity": "0.01 * thickness",
+  "parameters": { "thickness": { "value": 1, "minimum": 0.1, "maximum": 10 } },
+  "boundary": {
+    "x-min": { "velocity": ["y * (1 - y)", 0, 0] },
+    "x-max": { "pressure": 0 },
+    "y-min": { "wall": "no_slip" },
+    "y-max": { "wall": "no_slip" },
+    "z-min": { "wall": "slip" },
+    "z-max": { "wall": "slip" }
+  },
+  "time_step": 0.05,
+  "steps": 12
+}"#;
+
+const ORDERS: &str = r#"[
+  { "at": { "cycle": 2 },
+    "order": { "edits": [ { "translate": { "features": ["y-max"], "fixed": ["y-min"], "by": [0, -0.2, 0], "harmonic_order": 1 } } ],
+               "schedule": { "steps": 2, "every": { "steps": 2 } } } },
+  { "at": { "cycle": 5 }, "parameter": { "name": "thickness", "value": 2 } },
+  { "at": { "cycle": 6 }, "order": { "edits": [ { "translate": { "features": ["y-max"], "fixed": ["y-min"], "by": [0, -3, 0] } } ] } },
+  { "at": { "cycle": 8 }, "order": { "undo": 1 } }
+]"#;
+
+fn folder(case: &str) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut mesh = box_of_tets([8, 4, 3], [0.0; 3], [2.0, 1.0, 0.75]);
+    if let FeatureSource::Faces(tagged) = mesh.features() {
+        let mut tagged = tagged.clone();
+        tagged.names = (1..).zip(BOX_FEATURES.map(str::to_owned)).collect();
+        mesh =
+            tombolo_deform::mesh::Mesh::new(mesh.points().to_vec(), mesh.cells().clone(), FeatureSource::Faces(tagged))
+                .unwrap();
+    }
+    files::write_mesh(folder.path().join("channel.vtu"), &mesh, &[], Compression::default()).unwrap();
+    let file = folder.path().join("case.json");
+    std::fs::write(&file, case).unwrap();
+    (folder, file)
+}
+
+fn headless(case: &Path) -> Options {
+    Options { case: case.into(), headless: true, ..Options::default() }
+}
+
+fn run(options: &Options) -> Report {
+    Run::new(options).unwrap().finish().unwrap()
+}
+
+#[test]
+fn runs_a_case_with_orders_and_undoes_them_bit_for_bit() {
+    let (folder, case) = folder(CASE);
+    let orders = folder.path().join("orders.json");
+    std::fs::write(&orders, ORDERS).unwrap();
+    let mut options = headless(&case);
+    options.orders = Some(orders);
+    options.out = Some(folder.path().join("out"));
+
+    options.steps = Some(5);
+    let squeezed = run(&options);
+    assert_eq!(squeezed.error, None);
+    let mesh = files::read_mesh(folder.path().join("out/final.vtu")).unwrap().mesh;
+    let highest = mesh.points().iter().map(|point| point[1]).fold(0.0, f64::max);
+    assert!((highest - 0.8).abs() < 1e-12, "{highest}");
+
+    options.steps = None;
+    let report = run(&options);
+    assert_eq!((report.cycles, report.mesh.inverted, report.error.as_deref()), (12, 0, None));
+    assert!((report.time - 0.6).abs() < 1e-12);
+    let json = serde_json::to_value(&report).unwrap();
+    let statuses: Vec<&str> =
+        json["orders"].as_array().unwrap().iter().map(|order| order["status"].as_str().unwrap()).collect();
+    assert_eq!(statuses, ["applied", "rejected", "applied"], "{json:#}");
+    assert_eq!(json["orders"][0]["cycle_applied"], 2);
+    assert!(json["orders"][1]["reason"].as_str().unwrap().len() > 20);
+    for key in ["median", "p95"] {
+        assert!(json["step_seconds"][key].as_f64().unwrap() > 0.0);
+    }
+    for key in ["surface", "volume", "guard"] {
+        assert!(json["orders"][0]["seconds"][key].is_number());
+    }
+    for key in ["frames", "dropped", "bytes", "raw_bytes"] {
+        assert!(json["stream"][key].is_number());
+    }
+    assert!(report.flow.mass_in > 0.1);
+    assert!((report.flow.mass_in - report.flow.mass_out).abs() < 1e-5 * report.flow.mass_in, "{:?}", report.flow);
+    assert!(report.flow.worst_imbalance < 1e-5);
+
+    let restored = files::read_mesh(folder.path().join("out/final.vtu")).unwrap();
+    let reference = files::read_mesh(folder.path().join("channel.vtu")).unwrap();
+    assert!(restored.mesh.points() == reference.mesh.points(), "undo did not restore every bit");
+    let names: Vec<&str> = restored.fields.iter().map(|field| field.name.as_str()).collect();
+    assert!(names.contains(&"velocity") && names.contains(&"pressure"), "{names:?}");
+}
+
+#[test]
+fn a_flow_that_diverges_ends_the_run_with_its_place() {
+    let diverging = CASE.replace("\"y * (1 - y)\"", "\"1 / max(0, 0.22 - t)\"");
+    let (_folder, case) = folder(&diverging);
+    let report = run(&headless(&case));
+    let error = report.error.unwrap();
+    assert!(error.starts_with("cycle 5, time 0.25") && error.contains("velocity"), "{error}");
+    assert_eq!(report.cycles, 5);
+}
+
+#[test]
+fn names_what_is_wrong_in_a_case() {
+    let failure = |from: &str, to: &str| {
+        assert!(CASE.contains(from));
+        let (_folder, file) = folder(&CASE.replace(from, to));
+        match Run::new(&headless(&file)) {
+            Ok(_) => panic!("{to} was taken"),
+            Err(error) => error.to_string(),
+        }
+    };
+    let expect = |found: String, parts: &[&str]| {
+        for part in parts {
+            assert!(found.contains(part), "'{part}' is not in: {found}");
+        }
+    };
+    expect(failure("\"x-min\"", "\"x-mni\""), &["x-mni", "did you mean 'x-min'", "z-max"]);
+    expect(failure(r#""z-max": { "wall": "slip" }"#, r#""z-min": { "wall": "slip" }"#), &["case.json:", "z-min"]);
+    expect(failure(",\n    \"z-max\": { \"wall\": \"slip\" }", ""), &["z-max", "no condition"]);
+    expect(
+        failure("viscosity\": \"0.01 * thickness\"", "viscosity\": \"0.01 * thicknes\""),
+        &["case.json:4:", "thickness"],
+    );
+    expect(failure("viscosity\": \"0.01 * thickness\"", "viscosity\": \"0.01 * x\""), &["viscosity"]);
+    expect(failure("\"density\": 1.0", "\"density\": -1.0"), &["case.json:3:", "density", "positive"]);
+    expect(failure("\"density\"", "\"densty\""), &["case.json:3:", "density"]);
+    expect(failure("no_slip", "no_slipp"), &["no_slip"]);
+    expect(failure("0.05", "0"), &["time_step", "positive"]);
+    expect(failure("channel.vtu", "chanel.vtu"), &["chanel.vtu"]);
+}
+
+#[test]
+fn every_case_that_comes_with_the_program_is_well_formed() {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let files = |folder: &str| -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(here.join(folder)).unwrap();
+        let found: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+        assert!(!found.is_empty(), "{folder}");
+        found
+    };
+    for file in files("cases") {
+        let case = Case::read(&file).unwrap_or_else(|error: CaseError| panic!("{error}"));
+        assert!(case.pipelines.unwrap().is_file());
+        assert!(case.mesh.extension().is_some_and(|extension| extension == "msh"), "scripts/demo makes .msh files");
+    }
+    for file in files("pipelines") {
+        tombolo_pipelines::language::parse(&std::fs::read_to_string(&file).unwrap(), &file.display().to_string())
+            .unwrap_or_else(|error| panic!("{error}"));
+    }
+    for file in files("orders") {
+        tombolo_pipelines::language::parse_orders(
+            &std::fs::read_to_string(&file).unwrap(),
+            &file.display().to_string(),
+        )
+        .unwrap_or_else(|error| panic!("{error}"));
+    }
+}
