@@ -13,7 +13,7 @@
 //! .unwrap_err();
 //! assert_eq!(
 //!     failure.to_string(),
-//!     "views.json:2:70: pipelines[0].stages[0].slice.nromal: found the unknown key `nromal`, \
+//!     "views.json:2:68: pipelines[0].stages[0].slice.nromal: found the unknown key `nromal`, \
 //!      expected `origin` or `normal`; did you mean `normal`?"
 //! );
 //! ```
