@@ -5,7 +5,7 @@ use std::{net::SocketAddr, sync::Arc, time::Instant};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Value, json};
 use tombolo_deform::{
-    mesh::Mesh,
+    mesh::{Mesh, Vector},
     surface::{FeatureSettings, Surface},
 };
 use tombolo_pipelines::{
@@ -39,9 +39,7 @@ pub struct Adaptor {
     hub: Option<Arc<Hub>>,
     server: Option<Server>,
     mesh: SteeredMesh,
-    /// The name of the first channel, and its fields as `hello` tells them.
-    channel: String,
-    fields: Vec<Value>,
+    told: Told,
     paused: bool,
     stopped: bool,
     timing: Timing,
@@ -56,6 +54,15 @@ enum SteeredMesh {
     /// Orders cannot be carried out, for this reason.
     Refused(String),
     Steered(Box<Steerer>, Arc<Surface>),
+}
+
+/// What `hello` tells and what does not change from order to order.
+#[derive(Default)]
+struct Told {
+    schema: Value,
+    channel: String,
+    fields: Value,
+    features: Value,
 }
 
 /// Where the time went.
@@ -100,7 +107,7 @@ impl Adaptor {
         };
         let adaptor = Self {
             defaults: defaults(&config),
-            pipelines: Pipelines::new(&config, &output)?,
+            pipelines: Pipelines::new(&config, Arc::clone(&communicator), &output)?,
             config,
             communicator,
             parameters,
@@ -110,8 +117,7 @@ impl Adaptor {
             hub,
             server,
             mesh: SteeredMesh::Unknown,
-            channel: String::new(),
-            fields: Vec::new(),
+            told: Told { schema: language::order_schema(), ..Told::default() },
             paused: false,
             stopped: false,
             timing: Timing::default(),
@@ -250,14 +256,16 @@ impl Adaptor {
             self.take_reference(step, channels)?;
             self.timing.reference.add(begun.elapsed());
         }
-        let mut commands = Vec::new();
         if self.pipelines.is_due(moment) {
             let begun = Instant::now();
-            commands = self.pipelines.run(moment, channels, self.hub.as_ref());
+            let asked = self.pipelines.run(moment, channels, self.hub.as_ref());
             self.timing.pipelines.add(begun.elapsed());
-        }
-        for (pipeline, command) in commands {
-            self.accept(None, Source::Pipeline(pipeline), command, moment);
+            for fault in asked.faults {
+                self.complain(&fault);
+            }
+            for (pipeline, command) in asked.commands {
+                self.accept(None, Source::Pipeline(pipeline), command, moment);
+            }
         }
         for timed in self.timed.take_due(moment) {
             self.accept(timed.id, Source::File, timed.command, moment);
@@ -313,11 +321,11 @@ impl Adaptor {
             }
         }
         let step_seconds = self.timing.steps.median();
-        if let SteeredMesh::Steered(steerer, _) = &mut self.mesh {
-            if steerer.advance(moment, step_seconds) {
-                self.describe();
-                self.tell_conditions();
-            }
+        if let SteeredMesh::Steered(steerer, _) = &mut self.mesh
+            && steerer.advance(moment, step_seconds)
+        {
+            self.describe();
+            self.tell_conditions();
         }
     }
 
@@ -381,7 +389,10 @@ impl Adaptor {
                 source,
             })?;
             match self.take_over(mesh) {
-                Ok((steerer, surface)) => SteeredMesh::Steered(Box::new(steerer), surface),
+                Ok((steerer, surface)) => {
+                    self.pipelines.share_surface(channels, Arc::clone(&surface));
+                    SteeredMesh::Steered(Box::new(steerer), surface)
+                }
                 Err(reason) => {
                     let reason = format!("the shape of this mesh cannot be changed: {reason}");
                     self.complain(&reason);
@@ -389,14 +400,14 @@ impl Adaptor {
                 }
             }
         };
-        self.channel = channel.name.to_owned();
-        self.fields = channel
-            .fields
-            .iter()
-            .map(|field| {
-                json!({"name": field.name, "association": field.association, "components": field.values.components()})
-            })
-            .collect();
+        let fields = channel.fields.iter().map(
+            |field| json!({"name": field.name, "association": field.association, "components": field.values.components()}),
+        );
+        self.told.channel = channel.name.to_owned();
+        self.told.fields = fields.collect();
+        if let SteeredMesh::Steered(_, surface) = &self.mesh {
+            self.told.features = features(surface);
+        }
         self.describe();
         self.tell_conditions();
         Ok(())
@@ -421,19 +432,20 @@ impl Adaptor {
     /// Brings what `hello` tells up to date.
     fn describe(&self) {
         let Some(hub) = &self.hub else { return };
-        let (features, stack) = match &self.mesh {
-            SteeredMesh::Steered(steerer, surface) => (features(surface), json!(steerer.stack().edits())),
-            _ => (json!([]), json!([])),
+        let stack = match &self.mesh {
+            SteeredMesh::Steered(steerer, _) => steerer.stack().edits(),
+            _ => Vec::new(),
         };
+        let list = |value: &Value| if value.is_null() { json!([]) } else { value.clone() };
         let Defaults { deform, guard, schedule } = self.defaults;
         let description = json!({
             "protocol": 1,
             "views": self.pipelines.views(),
-            "channel": self.channel,
-            "features": features,
-            "fields": self.fields,
+            "channel": self.told.channel,
+            "features": list(&self.told.features),
+            "fields": list(&self.told.fields),
             "parameters": self.parameters.all(),
-            "schemas": {"order": language::order_schema()},
+            "schemas": {"order": self.told.schema},
             "stack": stack,
             "defaults": {"deform": deform, "guard": guard, "schedule": schedule},
         });
@@ -472,14 +484,14 @@ fn features(surface: &Surface) -> Value {
     }
     let described = features.names().iter().zip(faces).zip(0..).map(|((name, faces), feature)| {
         let vertices = features.vertices(feature);
-        let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-        for &vertex in vertices {
-            for axis in 0..3 {
-                let value = surface.points()[vertex as usize][axis];
-                bounds[0][axis] = bounds[0][axis].min(value);
-                bounds[1][axis] = bounds[1][axis].max(value);
-            }
-        }
+        let points = vertices.iter().map(|&vertex| surface.points()[vertex as usize]);
+        let empty = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        let bounds = points.fold(empty, |[lower, upper]: [Vector; 2], point| {
+            [
+                std::array::from_fn(|axis| lower[axis].min(point[axis])),
+                std::array::from_fn(|axis| upper[axis].max(point[axis])),
+            ]
+        });
         json!({"name": name, "faces": faces, "vertices": vertices.len(), "bounds": bounds})
     });
     described.collect()

@@ -40,6 +40,7 @@ mod settings;
 mod stages;
 pub mod steering;
 pub mod stream;
+mod writer;
 
 pub use adaptor::Adaptor;
 pub use journal::JournalError;

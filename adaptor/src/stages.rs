@@ -1,40 +1,74 @@
 //! Runs the pipelines that are due and hands on what they make.
 
-use std::{path::Path, sync::Arc};
-
-use serde_json::{Value, json};
-use tombolo_pipelines::{
-    extract::Channel,
-    language::{Action, Command, Config, Stage},
+use std::{
+    path::{Path, PathBuf},
+    sync::{Arc, Mutex, PoisonError},
 };
 
-use crate::{settings::InitializeError, steering::Moment, stream::Hub};
+use axum::body::Bytes;
+use serde_json::{Map, Value, json};
+use tombolo_deform::surface::Surface;
+use tombolo_pipelines::{
+    communicator::Communicator,
+    encode::Encoder,
+    extract::{Channel, Snapshot},
+    language::{Action, Command, Config, Stage},
+    run::{Frame, MonitorValues, Output, Runner},
+};
+
+use crate::{
+    settings::InitializeError,
+    steering::Moment,
+    stream::{Frame as EncodedFrame, Hub},
+    writer::Writer,
+};
 
 /// The pipelines of a run.
 pub(crate) struct Pipelines {
-    views: Vec<(String, &'static str)>,
+    runner: Runner,
+    /// The name of each view, and what its last frame taught the encoder of its topology.
+    views: Vec<(String, Arc<Mutex<Encoder>>)>,
+    description: Value,
     can_order: bool,
+    output: PathBuf,
+    writer: Writer,
+}
+
+/// What pipelines ask for besides what was sent and written.
+#[derive(Default)]
+pub(crate) struct Asked {
+    /// Commands, each with the pipeline that gives it.
+    pub(crate) commands: Vec<(String, Command)>,
+    /// What could not be done.
+    pub(crate) faults: Vec<String>,
 }
 
 impl Pipelines {
-    pub(crate) fn new(config: &Config, _output: &Path) -> Result<Self, InitializeError> {
-        let mut views = Vec::new();
-        let mut can_order = false;
-        for pipeline in &config.pipelines {
-            let streams = pipeline.stages.iter().any(|stage| matches!(stage, Stage::Stream(_)))
-                || pipeline.then.iter().any(|action| matches!(action, Action::Stream(_)));
-            if streams {
-                views.push((pipeline.name.clone(), pipeline.stages.first().map_or("mesh", Stage::name)));
-            }
-            can_order |= pipeline.stages.iter().any(|stage| matches!(stage, Stage::Order(_)))
-                || pipeline.then.iter().any(|action| matches!(action, Action::Order(_)));
-        }
-        Ok(Self { views, can_order })
+    pub(crate) fn new(
+        config: &Config,
+        communicator: Arc<dyn Communicator>,
+        output: &Path,
+    ) -> Result<Self, InitializeError> {
+        let runner = Runner::with_communicator(config, communicator)
+            .map_err(|problem| InitializeError::Pipelines(format!("{problem:?}")))?;
+        let views = runner.views();
+        let can_order = config.pipelines.iter().any(|pipeline| {
+            pipeline.stages.iter().any(|stage| matches!(stage, Stage::Order(_)))
+                || pipeline.then.iter().any(|action| matches!(action, Action::Order(_)))
+        });
+        Ok(Self {
+            runner,
+            description: json!(views),
+            views: views.into_iter().map(|view| (view.name, Arc::default())).collect(),
+            can_order,
+            output: output.into(),
+            writer: Writer::default(),
+        })
     }
 
     /// What `hello` tells of the views.
-    pub(crate) fn views(&self) -> Value {
-        self.views.iter().map(|(name, kind)| json!({"name": name, "kind": kind})).collect()
+    pub(crate) fn views(&self) -> &Value {
+        &self.description
     }
 
     /// Whether a pipeline can give an order of a new shape.
@@ -42,23 +76,76 @@ impl Pipelines {
         self.can_order
     }
 
+    /// Lets the views use a surface of the first channel that is known already.
+    pub(crate) fn share_surface(&mut self, channels: &[Channel<'_>], surface: Arc<Surface>) {
+        // Where it does not fit, the pipelines work out their own and say what is wrong.
+        let _ = self.runner.set_surface(channels, None, surface);
+    }
+
     #[inline]
-    pub(crate) fn is_due(&self, _moment: Moment) -> bool {
-        false
+    pub(crate) fn is_due(&self, moment: Moment) -> bool {
+        self.runner.is_due(moment.cycle, moment.time)
     }
 
-    /// Runs what is due. Back come the commands that pipelines give, with the pipeline's name.
-    pub(crate) fn run(
-        &mut self,
-        _moment: Moment,
-        _channels: &[Channel<'_>],
-        _hub: Option<&Arc<Hub>>,
-    ) -> Vec<(String, Command)> {
-        Vec::new()
+    /// Runs what is due.
+    pub(crate) fn run(&mut self, moment: Moment, channels: &[Channel<'_>], hub: Option<&Arc<Hub>>) -> Asked {
+        let Moment { cycle, time } = moment;
+        let mut asked = Asked::default();
+        for output in self.runner.run(&Snapshot { cycle, time, channels }) {
+            match output {
+                Output::Frame(frame) => {
+                    if let Some(hub) = hub {
+                        self.send(frame, hub);
+                    }
+                }
+                Output::Write { pipeline, path, time, extract, .. } => {
+                    self.writer.write(&pipeline, self.output.join(path), time, extract);
+                }
+                Output::Monitor(values) => {
+                    if let Some(hub) = hub {
+                        hub.monitor(&monitor(&values));
+                    }
+                }
+                Output::Pause { pipeline, .. } => asked.commands.push((pipeline.to_string(), Command::Pause {})),
+                Output::Stop { pipeline, .. } => asked.commands.push((pipeline.to_string(), Command::Stop {})),
+                Output::Order { pipeline, order } => {
+                    asked.commands.push((pipeline.to_string(), Command::Order(order)));
+                }
+                Output::Error { pipeline, cycle, message } => {
+                    asked.faults.push(format!("cycle {cycle}, pipeline '{pipeline}': {message}"));
+                }
+                other => asked.faults.push(format!("cycle {cycle}: not understood: {other:?}")),
+            }
+        }
+        asked.faults.extend(self.writer.faults());
+        asked
     }
 
-    /// Waits for files that are still being written; what was wrong with any.
+    /// Hands a frame to the encoder's thread.
+    fn send(&self, frame: Frame, hub: &Hub) {
+        let Some(view) = self.views.iter().position(|(name, _)| **name == *frame.pipeline) else { return };
+        let encoder = Arc::clone(&self.views[view].1);
+        let encode = move || {
+            let mut encoder = encoder.lock().unwrap_or_else(PoisonError::into_inner);
+            let encoded = encoder.encode(&frame).map_err(|error| error.to_string())?;
+            Ok(EncodedFrame {
+                topology_id: encoded.topology_id,
+                topology: Bytes::from_owner(encoded.topology),
+                data: encoded.data.into(),
+                raw_bytes: encoded.raw_bytes as u64,
+            })
+        };
+        hub.frame(view, Box::new(encode));
+    }
+
+    /// Waits for files that are still being written; what was wrong with any of the run.
     pub(crate) fn finish(&mut self) -> Vec<String> {
-        Vec::new()
+        self.writer.finish()
     }
+}
+
+/// The message about the values of monitors; what could not be measured is null.
+fn monitor(values: &MonitorValues) -> Value {
+    let by_name: Map<String, Value> = values.values.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
+    json!({"monitor": {"pipeline": &*values.pipeline, "cycle": values.cycle, "values": by_name}})
 }

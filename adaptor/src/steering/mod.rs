@@ -247,7 +247,7 @@ impl Steerer {
         step_seconds: Option<f64>,
     ) {
         let Computing { id, stack, guard } = computing;
-        let plan = plan.and_then(|plan| self.from_here(plan, &guard));
+        let plan = plan.and_then(|plan| self.starting_here(plan, &guard));
         let plan = match plan {
             Ok(plan) => plan,
             Err(reason) => return self.log.reject(&id, moment, &reason),
@@ -272,7 +272,7 @@ impl Steerer {
     }
 
     /// The plan itself if the mesh is still where it starts, else one from where the mesh is.
-    fn from_here(&self, plan: Plan, guard: &Guard) -> Result<Plan, String> {
+    fn starting_here(&self, plan: Plan, guard: &Guard) -> Result<Plan, String> {
         if Arc::ptr_eq(plan.start(), &self.points) {
             return Ok(plan);
         }

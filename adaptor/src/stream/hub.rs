@@ -230,11 +230,6 @@ impl Hub {
         }
     }
 
-    /// How many viewers there are.
-    pub(crate) fn viewers(&self) -> usize {
-        lock(&self.state).clients.len()
-    }
-
     pub(crate) fn counts(&self) -> StreamCounts {
         let get = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         StreamCounts {

@@ -35,7 +35,7 @@ use serde::{Deserialize, Serialize};
 use tokio::sync::oneshot;
 use tombolo_pipelines::language::StreamServer;
 
-pub(crate) use hub::Hub;
+pub(crate) use hub::{Frame, Hub};
 pub use token::Token;
 
 use connection::{Connection, Listener};

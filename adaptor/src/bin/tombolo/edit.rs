@@ -1,0 +1,183 @@
+//! `tombolo edit`.
+
+use std::{num::NonZeroU32, path::PathBuf, sync::Arc, time::Instant};
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+use tombolo::{
+    deform::{
+        quality::{Quality, quality},
+        surface::{Edit, FeatureSettings, Surface},
+        volume::Method,
+    },
+    pipelines::{
+        files::{Compression, read_mesh, write_mesh},
+        language::{Change, Order, parse_valid},
+        shape::Shaper,
+    },
+};
+
+use crate::{Failure, json, read, say};
+
+#[derive(Debug, Args)]
+pub(crate) struct Options {
+    /// The mesh to start from: .vtu, .vtk, .vtp or .msh
+    #[arg(long, value_name = "IN")]
+    mesh: PathBuf,
+    /// A JSON list of edits, or an order: an object with `edits` and, at will, `deform`, `guard` and `schedule`
+    #[arg(long, value_name = "EDITS.json")]
+    edits: PathBuf,
+    /// The file to write: .vtu, or .vtp for a surface
+    #[arg(long, value_name = "OUT.vtu")]
+    out: PathBuf,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+    /// How the volume follows; wins over the order's
+    #[arg(long)]
+    method: Option<VolumeMethod>,
+    /// How much stiffer small cells are, from 0 to 4; wins over the order's
+    #[arg(long)]
+    stiffening: Option<f64>,
+    /// The least scaled Jacobian allowed, from 0 to 1; wins over the order's
+    #[arg(long)]
+    min_quality: Option<f64>,
+    /// In how many shapes the way is looked at; wins over the order's
+    #[arg(long)]
+    steps: Option<NonZeroU32>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum VolumeMethod {
+    Elasticity,
+    Harmonic,
+}
+
+#[derive(Serialize)]
+struct Outcome {
+    status: &'static str,
+    reason: Option<String>,
+    vertices: usize,
+    cells: usize,
+    before: Quality,
+    after: Option<Quality>,
+    inverted: Option<usize>,
+    iterations: Option<usize>,
+    seconds: Seconds,
+}
+
+/// Seconds of each part; 0 where it was not come to.
+#[derive(Default, Serialize)]
+struct Seconds {
+    read: f64,
+    features: f64,
+    surface: f64,
+    volume: f64,
+    guard: f64,
+    write: f64,
+}
+
+pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
+    let (edits, order) = read_order(options)?;
+    let mut seconds = Seconds::default();
+    let mesh_file = timed(&mut seconds.read, || read_mesh(&options.mesh))?;
+    let mesh = Arc::new(mesh_file.mesh);
+    let shaper = timed(&mut seconds.features, || {
+        let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default())?);
+        Shaper::new(Arc::clone(&mesh), surface)
+    });
+    let mut shaper = shaper?;
+
+    let mut outcome = Outcome {
+        status: "applied",
+        reason: None,
+        vertices: mesh.points().len(),
+        cells: mesh.cells().len(),
+        before: quality(mesh.cells(), mesh.points()),
+        after: None,
+        inverted: None,
+        iterations: None,
+        seconds,
+    };
+    let mut deform = order.deform.unwrap_or_default();
+    deform.method = match options.method {
+        None => deform.method,
+        Some(VolumeMethod::Elasticity) => Method::Elasticity,
+        Some(VolumeMethod::Harmonic) => Method::Harmonic,
+    };
+    deform.stiffening = options.stiffening.unwrap_or(deform.stiffening);
+    let mut guard = order.guard.unwrap_or_default();
+    guard.min_scaled_jacobian = options.min_quality.unwrap_or(guard.min_scaled_jacobian);
+    let mut schedule = order.schedule.unwrap_or_default();
+    schedule.steps = options.steps.unwrap_or(schedule.steps);
+
+    let target = shaper.target(&edits, &deform);
+    let plan = target.and_then(|target| {
+        outcome.iterations = Some(target.iterations);
+        outcome.seconds.surface = target.seconds.surface;
+        outcome.seconds.volume = target.seconds.volume;
+        let begun = Instant::now();
+        let plan = shaper.judge(mesh.points().into(), &target, &schedule, &guard);
+        outcome.seconds.guard = begun.elapsed().as_secs_f64();
+        plan
+    });
+    let plan = match plan {
+        Ok(plan) => plan,
+        Err(refused) => {
+            outcome.status = "rejected";
+            outcome.reason = Some(refused.to_string());
+            if options.json {
+                json(&outcome)?;
+            }
+            return Err(Failure::Refused(refused.to_string()));
+        }
+    };
+    let shaped = mesh.with_points(plan.end().to_vec())?;
+    let after = quality(shaped.cells(), shaped.points());
+    outcome.inverted = Some(after.inverted);
+    outcome.after = Some(after);
+    timed(&mut outcome.seconds.write, || write_mesh(&options.out, &shaped, &mesh_file.fields, Compression::None))?;
+    if options.json { json(&outcome) } else { tell(&outcome, options) }
+}
+
+/// The edits and the order's settings.
+fn read_order(options: &Options) -> Result<(Vec<Edit>, Order), Failure> {
+    let name = options.edits.to_string_lossy();
+    let text = read(&options.edits)?;
+    // A list of edits is read as an order that holds it, so that both are held to the same rules.
+    let is_list = text.trim_start_matches('\u{feff}').trim_start().starts_with('[');
+    let order: Order = if is_list {
+        let edits: Vec<Edit> = tombolo::pipelines::language::parse_json(&text, &name)?;
+        Change::Edits(edits).into()
+    } else {
+        parse_valid(&text, &name)?
+    };
+    match &order.change {
+        Change::Edits(edits) | Change::Stack(edits) => Ok((edits.clone(), order)),
+        Change::Undo(_) => Err(Failure::Wrong(format!("{name}: undo: a mesh from a file has no orders to take back"))),
+    }
+}
+
+fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
+    let begun = Instant::now();
+    let done = work();
+    *seconds = begun.elapsed().as_secs_f64();
+    done
+}
+
+fn tell(outcome: &Outcome, options: &Options) -> Result<(), Failure> {
+    let line = |quality: &Quality| {
+        format!("least {:.4}, mean {:.4}, {} inverted", quality.min, quality.mean, quality.inverted)
+    };
+    say(format_args!("{} vertices, {} cells", outcome.vertices, outcome.cells))?;
+    say(format_args!("scaled Jacobian before: {}", line(&outcome.before)))?;
+    if let Some(after) = &outcome.after {
+        say(format_args!("scaled Jacobian after:  {}", line(after)))?;
+    }
+    let Seconds { read, features, surface, volume, guard, write } = outcome.seconds;
+    say(format_args!(
+        "seconds: read {read:.3}, features {features:.3}, surface {surface:.3}, volume {volume:.3}, guard {guard:.3}, \
+         write {write:.3}"
+    ))?;
+    say(format_args!("wrote {}", options.out.display()))
+}

@@ -1,0 +1,104 @@
+//! The program `tombolo`: see `tombolo --help`.
+
+mod edit;
+mod mesh;
+
+use std::{
+    fmt::Display,
+    io::Write,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
+
+use clap::{Parser, Subcommand};
+use tombolo::pipelines::language;
+
+/// Checks configurations, looks at meshes, and gives them other shapes without a solver.
+#[derive(Debug, Parser)]
+#[command(name = "tombolo", version)]
+struct Arguments {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Debug, Subcommand)]
+enum Task {
+    /// Check a configuration; what is wrong goes to the error output with its line and column
+    Check {
+        /// The configuration
+        file: PathBuf,
+    },
+    /// Print the JSON Schema of configurations
+    Schema,
+    /// Look at a mesh
+    #[command(subcommand)]
+    Mesh(MeshTask),
+    /// Give a mesh another shape; exit code 2 where the order is refused, and nothing is written then
+    Edit(edit::Options),
+}
+
+#[derive(Debug, Subcommand)]
+enum MeshTask {
+    /// Print the counts, bounds, features and quality of a mesh
+    Info {
+        /// The mesh: .vtu, .vtk, .vtp or .msh
+        file: PathBuf,
+        /// Print one JSON object
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// Why a task was not done.
+enum Failure {
+    /// Something is wrong with what was given: exit code 1.
+    Wrong(String),
+    /// The shape that was asked for is refused: exit code 2.
+    Refused(String),
+}
+
+impl<E: std::error::Error> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Failure::Wrong(error.to_string())
+    }
+}
+
+fn main() -> ExitCode {
+    let done = match Arguments::parse().task {
+        Task::Check { file } => check(&file),
+        Task::Schema => json(&language::config_schema()),
+        Task::Mesh(MeshTask::Info { file, json }) => mesh::info(&file, json),
+        Task::Edit(options) => edit::edit(&options),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Failure::Wrong(message)) => {
+            eprintln!("tombolo: {message}");
+            ExitCode::from(1)
+        }
+        Err(Failure::Refused(message)) => {
+            eprintln!("tombolo: refused: {message}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn check(file: &Path) -> Result<(), Failure> {
+    let config = language::parse(&read(file)?, &file.to_string_lossy())?;
+    say(format_args!("{}: {} pipeline(s), all well", file.display(), config.pipelines.len()))
+}
+
+/// The text of a file; an error names the file.
+fn read(file: &Path) -> Result<String, Failure> {
+    let bytes = std::fs::read(file).map_err(|error| Failure::Wrong(format!("{}: {error}", file.display())))?;
+    Ok(language::text(&bytes, &file.to_string_lossy())?.to_owned())
+}
+
+/// Prints one line; a pipe that was closed early is an error, not a panic.
+fn say(line: impl Display) -> Result<(), Failure> {
+    Ok(writeln!(std::io::stdout(), "{line}")?)
+}
+
+fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
+    say(serde_json::to_string_pretty(value)?)
+}

@@ -1,0 +1,110 @@
+//! The program `tombolo`.
+
+use std::{
+    path::Path,
+    process::{Command, Output},
+};
+
+use serde_json::Value;
+use tombolo::{
+    deform::{
+        mesh::{FeatureSource, Mesh},
+        shapes::box_of_tets,
+    },
+    pipelines::files::{Compression, read_mesh, write_mesh},
+};
+
+fn tombolo(directory: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_tombolo")).args(arguments).current_dir(directory).output().expect("runs")
+}
+
+fn error_text(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn json(output: &Output) -> Value {
+    assert!(output.status.code().is_some());
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}: {}", error_text(output)))
+}
+
+fn with_box(edits: &str) -> (tempfile::TempDir, Mesh) {
+    let directory = tempfile::tempdir().unwrap();
+    let mesh = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+    write_mesh(directory.path().join("box.vtu"), &mesh, &[], Compression::None).unwrap();
+    std::fs::write(directory.path().join("edits.json"), edits).unwrap();
+    (directory, mesh)
+}
+
+const EDIT: [&str; 8] = ["edit", "--mesh", "box.vtu", "--edits", "edits.json", "--out", "out.vtu", "--json"];
+
+#[test]
+fn check_points_at_what_is_wrong() {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("bad.json"), "{\"version\": 1,\n \"pipelnes\": []}").unwrap();
+    std::fs::write(directory.path().join("good.json"), "{\"version\": 1}").unwrap();
+    let bad = tombolo(directory.path(), &["check", "bad.json"]);
+    assert_eq!(bad.status.code(), Some(1));
+    let text = error_text(&bad);
+    assert!(text.contains("bad.json:2:2") && text.contains("did you mean `pipelines`?"), "{text}");
+    assert_eq!(tombolo(directory.path(), &["check", "good.json"]).status.code(), Some(0));
+    let missing = tombolo(directory.path(), &["check", "missing.json"]);
+    assert!(missing.status.code() == Some(1) && error_text(&missing).contains("missing.json"));
+    assert!(json(&tombolo(directory.path(), &["schema"]))["properties"]["pipelines"].is_object());
+}
+
+#[test]
+fn info_counts_what_is_there() {
+    let (directory, _) = with_box("[]");
+    let info = json(&tombolo(directory.path(), &["mesh", "info", "box.vtu", "--json"]));
+    assert_eq!((&info["vertices"], &info["cells"]), (&125.into(), &384.into()));
+    assert_eq!(info["cell_types"]["tetra"], 384);
+    assert_eq!(info["features"].as_array().unwrap().len(), 6);
+    assert_eq!(info["features"][0]["faces"], 32);
+    assert_eq!(info["quality"]["inverted"], 0);
+    let text = tombolo(directory.path(), &["mesh", "info", "box.vtu"]);
+    assert!(String::from_utf8_lossy(&text.stdout).contains("z-max: 32 faces, 25 vertices"));
+}
+
+#[test]
+fn edit_moves_the_mesh_as_asked() {
+    let (directory, mesh) =
+        with_box(r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -0.5]}}]"#);
+    for more in [&[][..], &["--method", "harmonic"], &["--stiffening", "0.5", "--steps", "3"]] {
+        let output = tombolo(directory.path(), &[&EDIT[..], more].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", error_text(&output));
+        let outcome = json(&output);
+        assert_eq!((&outcome["status"], &outcome["inverted"]), (&"applied".into(), &0.into()));
+        assert!(outcome["before"]["min"].as_f64() > outcome["after"]["min"].as_f64());
+        for part in ["read", "surface", "volume", "guard", "write"] {
+            assert!(outcome["seconds"][part].as_f64() > Some(0.0), "{part}");
+        }
+        let shaped = read_mesh(directory.path().join("out.vtu")).unwrap().mesh;
+        assert!(matches!(shaped.features(), FeatureSource::Faces(_)));
+        for (point, reference) in shaped.points().iter().zip(mesh.points()) {
+            match reference[2] {
+                0.0 => assert_eq!(point, reference),
+                1.0 => assert_eq!(*point, [reference[0], reference[1], 0.5]),
+                _ => assert!(point[2] > 0.0 && point[2] < reference[2]),
+            }
+        }
+    }
+}
+
+#[test]
+fn edit_refuses_with_the_reason_and_writes_nothing() {
+    let good = r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -1.5]}}]"#;
+    for (edits, more, code, named) in [
+        (good, &[][..], 2, "feasible fraction"),
+        (r#"[{"translate": {"features": ["z-mux"], "by": [0, 0, 1]}}]"#, &[], 2, "z-max"),
+        (r#"[{"translate": {"features": ["z-max"], "by": [0, 0]}}]"#, &[], 1, "edits.json:1:"),
+        (r#"{"undo": 1}"#, &[], 1, "undo"),
+        (r#"{"stack": [], "guard": {"min_scaled_jacobian": 7}}"#, &[], 1, "min_scaled_jacobian"),
+        (r#"{"stack": []}"#, &["--stiffening", "NaN"], 2, "stiffening"),
+    ] {
+        let (directory, _) = with_box(edits);
+        let output = tombolo(directory.path(), &[&EDIT[..], more].concat());
+        assert_eq!(output.status.code(), Some(code), "{edits}: {}", error_text(&output));
+        assert!(error_text(&output).contains(named), "{}", error_text(&output));
+        assert!(!directory.path().join("out.vtu").exists());
+    }
+}

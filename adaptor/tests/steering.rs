@@ -1,0 +1,266 @@
+//! Orders of files and pipelines, without a server: all of it is exact.
+
+mod common;
+
+use common::{Solver, bits, config, squeeze};
+use serde_json::{Value, json};
+use tombolo::{
+    Adaptor, ExecuteError, InitializeError, OrderStatus, Parameter, Settings, Step,
+    deform::{mesh::MeshView, quality::quality, shapes::box_of_tets},
+    pipelines::{
+        extract::Channel,
+        language::{TimedCommand, parse_orders},
+    },
+};
+
+fn orders(list: &Value) -> Vec<TimedCommand> {
+    parse_orders(&list.to_string(), "orders.json").expect("orders")
+}
+
+fn with_orders(list: &Value) -> Solver {
+    Solver::new(Settings { orders: orders(list), ..Settings::default() })
+}
+
+fn at(cycle: u64, order: Value) -> Value {
+    json!({"at": {"cycle": cycle}, "order": order})
+}
+
+fn scheduled(mut order: Value, steps: u32, every: u32) -> Value {
+    order["schedule"] = json!({"steps": steps, "every": {"steps": every}});
+    order
+}
+
+#[test]
+fn a_schedule_is_kept_and_ends_exactly() {
+    let mut solver = with_orders(&json!([at(3, scheduled(squeeze(0.4), 4, 2))]));
+    solver.steps(20);
+    let cycles: Vec<u64> = solver.motions.iter().map(|(cycle, _, _)| *cycle).collect();
+    assert_eq!(cycles, [3, 5, 7, 9]);
+    assert_eq!(solver.motions[3].1, (4, 4));
+    for (point, reference) in solver.mesh.points().iter().zip(solver.reference.points()) {
+        if reference[2] == 1.0 {
+            assert_eq!(*point, [reference[0], reference[1], reference[2] + -0.4]);
+        }
+        if reference[2] == 0.0 {
+            assert_eq!(point, reference);
+        }
+    }
+    let report = solver.finish();
+    let order = &report.orders[0];
+    assert_eq!((order.status, order.cycle_applied, order.shape, order.shapes), (OrderStatus::Applied, Some(3), 4, 4));
+    assert!(order.min_scaled_jacobian.is_some_and(|min| min > 0.02), "{order:?}");
+    assert!(order.seconds.surface > 0.0 && order.seconds.volume > 0.0 && order.seconds.guard > 0.0);
+    assert!(order.added_steps.is_some());
+    assert_eq!(report.cycles, 20);
+}
+
+#[test]
+fn every_mesh_on_the_way_is_sound() {
+    let mut solver =
+        with_orders(&json!([at(0, scheduled(squeeze(0.5), 5, 1)), at(7, scheduled(json!({"undo": 1}), 3, 1))]));
+    for _ in 0..12 {
+        solver.step();
+        assert_eq!(quality(solver.mesh.cells(), solver.mesh.points()).inverted, 0);
+    }
+    assert_eq!(solver.motions.len(), 8);
+    assert!(solver.is_at_reference());
+}
+
+#[test]
+fn taking_orders_back_restores_each_shape_bit_for_bit() {
+    let mut solver = with_orders(&json!([
+        at(1, squeeze(0.2)),
+        at(2, json!({"edits": [{"scale_normals": {"features": ["x-max"], "fixed": ["x-min"], "distance": 0.1}}]})),
+        at(3, json!({"undo": 1})),
+        at(4, json!({"undo": 1})),
+        at(5, squeeze(0.2)),
+        at(6, json!({"stack": []})),
+        at(7, json!({"undo": 1})),
+        at(8, json!({"undo": 2})),
+    ]));
+    let mut shapes = Vec::new();
+    for _ in 0..10 {
+        shapes.push(bits(&solver.mesh));
+        solver.step();
+    }
+    shapes.push(bits(&solver.mesh));
+    // shapes[n + 1] is the shape after cycle n.
+    assert_ne!(shapes[2], shapes[1]);
+    assert_ne!(shapes[3], shapes[2]);
+    assert_eq!(shapes[4], shapes[2], "the second order taken back");
+    assert_eq!(shapes[5], shapes[0], "both taken back");
+    assert_eq!(shapes[6], shapes[2], "the same order again");
+    assert_eq!(shapes[7], shapes[0], "an empty stack");
+    assert_eq!(shapes[8], shapes[2], "the replacement taken back");
+    assert_eq!(solver.adaptor_reports_rejected(), vec![(8, true)]);
+}
+
+trait Rejected {
+    fn adaptor_reports_rejected(self) -> Vec<(u64, bool)>;
+}
+
+impl Rejected for Solver {
+    /// The last order asks for more than there is: one order is left to take back.
+    fn adaptor_reports_rejected(self) -> Vec<(u64, bool)> {
+        let report = self.finish();
+        let last = report.orders.last().expect("orders");
+        let reason = last.reason.clone().unwrap_or_default();
+        vec![(report.orders.len() as u64, last.status == OrderStatus::Rejected && reason.contains("only 1 order"))]
+    }
+}
+
+#[test]
+fn an_order_in_the_middle_of_another_starts_where_the_mesh_is() {
+    let mut solver =
+        with_orders(&json!([at(0, scheduled(squeeze(0.4), 10, 1)), at(4, scheduled(json!({"undo": 1}), 2, 1))]));
+    solver.steps(4);
+    assert_eq!(solver.motions.len(), 4);
+    let there = solver.mesh.clone();
+    solver.step();
+    let half: Vec<_> = there.points().iter().zip(solver.reference.points()).map(|(a, b)| 0.5 * (a[2] + b[2])).collect();
+    assert!(solver.mesh.points().iter().zip(half).all(|(point, half)| (point[2] - half).abs() < 1e-14));
+    solver.steps(10);
+    assert_eq!(solver.motions.len(), 6);
+    assert!(solver.is_at_reference());
+    let report = solver.finish();
+    assert_eq!((report.orders[0].status, report.orders[0].shape), (OrderStatus::Applied, 4));
+    assert!(report.orders[0].reason.as_ref().is_some_and(|reason| reason.contains("o2")));
+}
+
+#[test]
+fn a_refused_order_leaves_the_schedule_under_way_alone() {
+    let list = json!([
+        at(0, scheduled(squeeze(0.4), 6, 1)),
+        at(3, squeeze(1.5)),
+        at(
+            3,
+            json!({"edits": [
+        {"translate": {"features": ["z-mx"], "by": [0.0, 0.0, 0.1]}}]})
+        )
+    ]);
+    let mut solver = with_orders(&list);
+    let mut alone = with_orders(&json!([list[0]]));
+    for _ in 0..8 {
+        solver.step();
+        alone.step();
+        assert_eq!(bits(&solver.mesh), bits(&alone.mesh));
+    }
+    let report = solver.finish();
+    let reason = |index: usize| report.orders[index].reason.clone().unwrap_or_default();
+    assert_eq!(report.orders[1].status, OrderStatus::Rejected);
+    assert!(reason(1).contains("inside out") && reason(1).contains("largest feasible fraction"), "{}", reason(1));
+    assert!(reason(2).contains("z-mx") && reason(2).contains("z-max") && reason(2).contains("x-min"), "{}", reason(2));
+}
+
+#[test]
+fn parameters_are_steered_within_their_bounds() {
+    let list = json!([
+        {"at": {"cycle": 1}, "parameter": {"name": "inflow", "value": 2.5}},
+        {"at": {"cycle": 2}, "parameter": {"name": "inflow", "value": 99.0}},
+        {"at": {"cycle": 3}, "parameter": {"name": "inflo", "value": 1.0}},
+        {"at": {"cycle": 5}, "stop": {}}]);
+    let parameter = Parameter { name: "inflow".into(), value: 1.0, minimum: 0.0, maximum: 10.0 };
+    let mut solver =
+        Solver::new(Settings { orders: orders(&list), parameters: vec![parameter], ..Settings::default() });
+    solver.steps(5);
+    assert!(!solver.stopped);
+    solver.step();
+    assert!(solver.stopped);
+    assert_eq!(solver.parameters, [("inflow".to_owned(), 2.5)]);
+}
+
+#[test]
+fn a_pipeline_gives_an_order_once() {
+    let text = r#"{"version": 1, "pipelines": [
+        {"name": "shape", "on": "order", "stages": [{"schedule": {"steps": 2, "every": {"steps": 3}}}]},
+        {"name": "pinch", "at": {"time": 0.045}, "stages": [
+            {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -0.2]}}, {"order": {}}]}]}"#;
+    let mut solver = Solver::with_config(text);
+    solver.steps(20);
+    let cycles: Vec<u64> = solver.motions.iter().map(|(cycle, _, _)| *cycle).collect();
+    assert_eq!(cycles, [5, 8]);
+}
+
+#[test]
+fn a_pause_that_nobody_could_end_is_refused() {
+    let mut solver = with_orders(&json!([{"at": {"cycle": 1}, "pause": {}}]));
+    solver.steps(3);
+    assert_eq!(solver.cycle, 3);
+}
+
+#[test]
+fn the_solvers_own_mistakes_are_told_and_change_nothing() {
+    let mesh = box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
+    let other = box_of_tets([3, 2, 2], [0.0; 3], [1.0; 3]);
+    let list = orders(&json!([at(3, squeeze(0.2))]));
+    let mut adaptor = Adaptor::initialize(Settings { orders: list, ..Settings::default() }).unwrap();
+    let step = |cycle| Step { cycle, time: 0.0, time_step: 0.1 };
+    let channel = |mesh| [Channel { name: "fluid", mesh: MeshView::from(mesh), fields: &[] }];
+    assert!(matches!(adaptor.execute(&step(0), &[]), Err(ExecuteError::NoChannel { .. })));
+    adaptor.execute(&step(0), &channel(&mesh)).unwrap();
+    let error = adaptor.execute(&step(1), &channel(&other)).unwrap_err();
+    assert!(matches!(error, ExecuteError::VertexCount { found: 36, expected: 27, .. }), "{error}");
+    for time_step in [f64::NAN, -1.0, f64::INFINITY] {
+        assert!(adaptor.execute(&Step { time_step, ..step(1) }, &channel(&mesh)).is_err());
+    }
+    assert!(adaptor.execute(&Step { time: f64::NAN, ..step(1) }, &channel(&mesh)).is_err());
+    let steady = Step { time_step: 0.0, ..step(3) };
+    let channels = channel(&mesh);
+    let steering = adaptor.execute(&steady, &channels).unwrap();
+    let motion = steering.motion.expect("a motion");
+    assert!(motion.velocity.iter().all(|velocity| *velocity == [0.0; 3]));
+    assert!(motion.displacement.iter().any(|displacement| *displacement != [0.0; 3]));
+}
+
+#[test]
+fn what_makes_no_sense_is_refused_before_the_run() {
+    let twice = Parameter { name: "a".into(), value: 1.0, minimum: 0.0, maximum: 2.0 };
+    let settings = Settings { parameters: vec![twice.clone(), twice], ..Settings::default() };
+    assert!(matches!(Adaptor::initialize(settings).err(), Some(InitializeError::Parameter(_))));
+    let mut nan = orders(&json!([at(0, squeeze(0.1))]));
+    let tombolo::pipelines::language::Command::Order(order) = &mut nan[0].command else { panic!() };
+    order.guard = Some(tombolo::deform::quality::Guard { min_scaled_jacobian: f64::NAN, ..Default::default() });
+    let settings = Settings { orders: nan, ..Settings::default() };
+    let error = Adaptor::initialize(settings).err().expect("refused").to_string();
+    assert!(error.contains("min_scaled_jacobian"), "{error}");
+    let journal = Settings {
+        config: config(r#"{"version": 1, "journal": "no/such/directory/journal.jsonl"}"#),
+        ..Settings::default()
+    };
+    let error = Adaptor::initialize(journal).err().expect("refused").to_string();
+    assert!(error.contains("journal.jsonl"), "{error}");
+}
+
+#[test]
+fn a_journal_replays_to_the_same_bits() {
+    let directory = tempfile::tempdir().unwrap();
+    let run = |name: &str, orders: Vec<TimedCommand>| {
+        let text = format!(r#"{{"version": 1, "journal": "{name}"}}"#);
+        let mut solver = Solver::new(Settings {
+            config: config(&text),
+            orders,
+            output: directory.path().into(),
+            ..Settings::default()
+        });
+        let mut shapes = Vec::new();
+        for _ in 0..12 {
+            solver.step();
+            shapes.push(bits(&solver.mesh));
+        }
+        // The run is killed here: nothing is finalized.
+        let text = std::fs::read_to_string(directory.path().join(name)).unwrap();
+        (shapes, text)
+    };
+    let list = json!([
+        at(1, scheduled(squeeze(0.3), 3, 2)),
+        at(4, json!({"edits": [{"translate": {"features": ["nowhere"], "by": [1.0, 0.0, 0.0]}}]})),
+        at(4, scheduled(squeeze(0.1), 2, 1)),
+        at(9, json!({"undo": 1}))
+    ]);
+    let (shapes, journal) = run("first.jsonl", orders(&list));
+    assert_eq!(journal.lines().count(), 8, "{journal}");
+    let (again, _) = run("second.jsonl", parse_orders(&journal, "first.jsonl").unwrap());
+    assert!(shapes == again);
+    let torn = &journal[..journal.len() - 10];
+    assert_eq!(parse_orders(torn, "torn.jsonl").unwrap().len(), 3);
+}

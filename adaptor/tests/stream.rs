@@ -1,0 +1,403 @@
+//! Viewers, good and bad: what they are shown, what they can do, and that none of it costs the solver.
+
+mod common;
+
+use std::{
+    io::{Read, Write},
+    net::TcpStream,
+    time::{Duration, Instant},
+};
+
+use common::{LINK_TO_ALL, PATIENCE, Solver, Viewer, bits, config, socket_url, squeeze};
+use serde_json::{Value, json};
+use tokio_tungstenite::tungstenite::{Error, Message};
+use tombolo::{
+    Adaptor, InitializeError, OrderStatus, Parameter, Settings,
+    pipelines::{
+        encode::{Decoded, decode},
+        language::parse_orders,
+    },
+    stream::StreamError,
+};
+
+/// Sends raw bytes and reads the answer until the server closes.
+fn raw(adaptor: &Adaptor, bytes: &[u8]) -> String {
+    let mut stream = TcpStream::connect(adaptor.address().expect("a server")).expect("connected");
+    stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a timeout");
+    stream.write_all(bytes).expect("sent");
+    let mut answer = Vec::new();
+    let _ = stream.read_to_end(&mut answer);
+    String::from_utf8_lossy(&answer).into_owned()
+}
+
+fn get(adaptor: &Adaptor, path: &str, headers: &str) -> String {
+    raw(adaptor, format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n{headers}\r\n").as_bytes())
+}
+
+fn status_of(error: &Error) -> Option<u16> {
+    match error {
+        Error::Http(response) => Some(response.status().as_u16()),
+        _ => None,
+    }
+}
+
+#[test]
+fn a_viewer_sees_the_run_and_changes_its_shape() {
+    let parameter = Parameter { name: "inflow".into(), value: 1.0, minimum: 0.0, maximum: 10.0 };
+    let mut solver =
+        Solver::new(Settings { config: config(LINK_TO_ALL), parameters: vec![parameter], ..Settings::default() });
+    solver.step();
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    let hello = viewer.hello();
+    assert_eq!((&hello["protocol"], &hello["role"]), (&json!(1), &json!("driver")));
+    assert_eq!(hello["views"], json!([{"name": "boundary", "kind": "surface"}]));
+    assert_eq!(hello["fields"], json!([{"name": "speed", "association": "vertex", "components": 1}]));
+    assert_eq!(hello["features"][5]["name"], "z-max");
+    assert_eq!(hello["features"][5]["faces"], 32);
+    assert_eq!(hello["features"][5]["vertices"], 25);
+    assert_eq!(hello["features"][5]["bounds"], json!([[0.0, 0.0, 1.0], [1.0, 1.0, 1.0]]));
+    assert_eq!(hello["parameters"][0]["maximum"], 10.0);
+    assert!(hello["schemas"]["order"]["properties"]["edits"].is_object());
+    assert_eq!((&hello["stack"], &hello["orders"]), (&json!([]), &json!([])));
+    assert!(hello["defaults"]["schedule"]["steps"].is_number());
+
+    viewer.send(&json!({"id": "squeeze", "order": squeeze(0.3)}));
+    assert_eq!(viewer.wait_for("order", |order| order["id"] == "squeeze")["status"], "accepted");
+    let applied = solver.step_until_told(&mut viewer, "order", |order| order["status"] == "applied");
+    assert_eq!((&applied["shape"], &applied["shapes"], &applied["reason"]), (&json!(1), &json!(1), &Value::Null));
+    assert!(applied["cycle_applied"].is_u64() && applied["min_scaled_jacobian"].as_f64() > Some(0.02));
+    assert!(solver.mesh.points().contains(&[0.0, 0.0, 0.7]), "the lid has come down");
+    let stack = viewer.wait_for("hello", |hello| hello["stack"] != json!([]));
+    assert_eq!(stack["stack"][0]["translate"]["features"], json!(["z-max"]));
+
+    viewer.send(&json!({"parameter": {"name": "inflow", "value": 2.0}}));
+    viewer.send(&json!({"id": "back", "order": {"undo": 1}}));
+    solver.step_until_told(&mut viewer, "order", |order| order["id"] == "back" && order["status"] == "applied");
+    assert!(solver.is_at_reference());
+    assert_eq!(solver.parameters, [("inflow".to_owned(), 2.0)]);
+    let status = solver.step_until_told(&mut viewer, "status", |status| !status["quality"].is_null());
+    assert_eq!(status["quality"]["inverted"], 0);
+    assert_eq!(
+        (&status["viewers"], &status["driver"], &status["paused"]),
+        (&json!(1), &hello["client"], &json!(false))
+    );
+
+    assert!(viewer.frames.len() >= 2);
+    let Ok(Decoded::Topology(topology)) = decode(&viewer.frames[0]) else { panic!("the topology comes first") };
+    assert_eq!(topology.view, "boundary");
+    let mut squeezed = 0;
+    for frame in &viewer.frames[1..] {
+        let Ok(Decoded::Data(data)) = decode(frame) else { panic!("the topology comes once") };
+        assert_eq!(data.points.len(), topology.points);
+        let height = data.points.iter().map(|point| point[2]).fold(0.0, f64::max);
+        squeezed += usize::from((height - 0.7).abs() < 1e-4);
+        assert!((height - 0.7).abs() < 1e-4 || (height - 1.0).abs() < 1e-4, "{height}");
+    }
+    assert!(squeezed > 0, "the new shape was seen");
+    let report = solver.finish();
+    assert_eq!(report.orders.len(), 2);
+    assert!(report.stream.frames > 0 && report.stream.bytes > 0 && report.stream.raw_bytes > report.stream.bytes);
+    viewer.wait_for_end();
+}
+
+#[test]
+fn what_a_viewer_gets_wrong_is_told_and_changes_nothing() {
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    solver.step();
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    for (message, named) in [
+        ("not json", "message:1:1"),
+        ("", "message:1:1"),
+        ("[]", "message"),
+        (r#"{"ordr": {"undo": 1}}"#, "order"),
+        (r#"{"order": {"edits": [{"translate": {"features": ["z-max"], "by": [NaN, 0, 0]}}]}}"#, "NaN"),
+        (r#"{"order": {"edits": [{"translate": {"features": ["z-max"], "by": [1e999, 0, 0]}}]}}"#, "1e999"),
+        (r#"{"order": {"edits": [{"translate": {"feature": ["z-max"], "by": [0, 0, 0]}}]}}"#, "features"),
+        (r#"{"order": {"undo": 1}, "stop": {}}"#, "message"),
+        (r#"{"id": 3, "pause": {}}"#, "id"),
+        (r#"{"parameter": {"name": "nothing", "value": 1}}"#, "nothing"),
+    ] {
+        viewer.send_text(message);
+        solver.step_until_told(&mut viewer, "error", |error| error["message"].as_str().unwrap().contains(named));
+    }
+    viewer.send_message(Message::binary(vec![0, 1, 2]));
+    viewer.wait_for("error", |error| error["message"].as_str().unwrap().contains("binary"));
+    for (edit, named) in [
+        (json!({"translate": {"features": ["z-mox"], "by": [0.0, 0.0, 0.1]}}), "z-max"),
+        (json!({"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -1.2]}}), "feasible"),
+    ] {
+        viewer.send(&json!({"order": {"edits": [edit]}}));
+        let order = solver.step_until_told(&mut viewer, "order", |order| order["status"] == "rejected");
+        assert!(order["reason"].as_str().unwrap().contains(named), "{order}");
+    }
+    viewer.send(&json!({"id": "same", "order": {"stack": []}}));
+    viewer.send(&json!({"id": "same", "order": {"stack": []}}));
+    viewer.wait_for("error", |error| error["id"] == "same");
+    solver.steps(3);
+    assert!(solver.is_at_reference() && !solver.stopped);
+}
+
+#[test]
+fn only_the_token_lets_anybody_in() {
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    let right = socket_url(&solver.adaptor);
+    let wrong = right.replace("token=", "token=0");
+    let none = right.split('?').next().unwrap().to_owned();
+    for url in [wrong, none, format!("{right}0")] {
+        let error = Viewer::try_connect(&url).err().expect("not let in");
+        assert_eq!(status_of(&error), Some(401), "{error}");
+    }
+    assert!(get(&solver.adaptor, "/?token=0123", "").starts_with("HTTP/1.1 401"));
+    let page = get(&solver.adaptor, "/", "");
+    assert!(page.starts_with("HTTP/1.1 200") && page.contains("text/html"), "{page}");
+    for header in ["no-store", "nosniff", "content-security-policy"] {
+        assert!(page.contains(header), "{header}");
+    }
+    assert!(get(&solver.adaptor, "/no/such/file", "").starts_with("HTTP/1.1 404"));
+    assert!(get(&solver.adaptor, "/../Cargo.toml", "").starts_with("HTTP/1.1 4"));
+    let path = right.split_once("/ws").map(|(_, query)| format!("/ws{query}")).unwrap();
+    assert!(get(&solver.adaptor, &path, "Origin: http://evil.example\r\n").starts_with("HTTP/1.1 403"));
+    let rebound = raw(&solver.adaptor, b"GET / HTTP/1.1\r\nHost: evil.example\r\nConnection: close\r\n\r\n");
+    assert!(rebound.starts_with("HTTP/1.1 403"), "{rebound}");
+    solver.steps(3);
+}
+
+#[test]
+fn one_drives_and_the_others_watch() {
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    solver.step();
+    let mut driver = Viewer::connect(&solver.adaptor);
+    let name = driver.hello()["client"].clone();
+    let mut watcher = Viewer::connect(&solver.adaptor);
+    assert_eq!(watcher.hello()["role"], "watcher");
+    watcher.send(&json!({"id": "w", "order": squeeze(0.2)}));
+    assert!(watcher.wait_for("error", |error| error["id"] == "w")["message"].as_str().unwrap().contains("watches"));
+    watcher.send(&json!({"id": "d", "drive": {}}));
+    let refused = watcher.wait_for("error", |error| error["id"] == "d");
+    assert!(refused["message"].as_str().unwrap().contains(name.as_str().unwrap()));
+    driver.send(&json!({"id": "seen by both", "order": squeeze(0.2)}));
+    solver
+        .step_until_told(&mut watcher, "order", |order| order["id"] == "seen by both" && order["status"] == "applied");
+
+    drop(driver);
+    let begun = Instant::now();
+    loop {
+        watcher.send(&json!({"drive": {}}));
+        if watcher.look_for("hello", Duration::from_millis(300), |hello| hello["role"] == "driver").is_some() {
+            break;
+        }
+        assert!(begun.elapsed() < PATIENCE, "the wheel never came free");
+    }
+    assert!(begun.elapsed() > Duration::from_secs(2), "the wheel is kept for a moment");
+    watcher.send(&json!({"id": "mine", "order": {"undo": 1}}));
+    solver.step_until_told(&mut watcher, "order", |order| order["id"] == "mine" && order["status"] == "applied");
+    assert!(solver.is_at_reference());
+}
+
+#[test]
+fn a_driver_that_comes_back_has_the_wheel() {
+    let solver = Solver::with_config(LINK_TO_ALL);
+    let mut driver = Viewer::connect(&solver.adaptor);
+    let name = driver.hello()["client"].as_str().unwrap().to_owned();
+    let mut watcher = Viewer::connect(&solver.adaptor);
+    watcher.hello();
+    drop(driver);
+    watcher.wait_for("status", |status| status["viewers"] == 1);
+    let mut again = Viewer::try_connect(&format!("{}&client={name}", socket_url(&solver.adaptor))).unwrap();
+    assert_eq!(again.hello()["role"], "driver");
+}
+
+#[test]
+fn a_paused_solver_waits_and_still_listens() {
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    solver.step();
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    viewer.send(&json!({"pause": {}}));
+    let helper = std::thread::spawn(move || {
+        viewer.wait_for("status", |status| status["paused"] == true);
+        viewer.send(&json!({"id": "meanwhile", "order": squeeze(0.2)}));
+        viewer.wait_for("order", |order| order["id"] == "meanwhile" && order["status"] == "applying");
+        std::thread::sleep(Duration::from_millis(200));
+        viewer.send(&json!({"resume": {}}));
+        viewer.wait_for("status", |status| status["paused"] == false);
+        viewer
+    });
+    solver.step_until("the pause", |solver| solver.slowest > Duration::from_millis(200));
+    assert!(!solver.motions.is_empty(), "the order's motion starts at the cycle of the pause");
+    solver.step();
+    let mut viewer = helper.join().unwrap();
+    viewer.send(&json!({"pause": {}}));
+    viewer.send(&json!({"stop": {}}));
+    solver.step_until("the stop", |solver| solver.stopped);
+    assert!(solver.finish().adaptor_seconds["paused"].count >= 1);
+}
+
+#[test]
+fn garbage_on_the_port_is_no_trouble() {
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    let url = socket_url(&solver.adaptor);
+    let path = url.split_once("/ws").map(|(_, query)| format!("/ws{query}")).unwrap();
+    let noise: Vec<u8> = (0..70_000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
+    raw(&solver.adaptor, b"\0\0\0\0\r\n\r\n");
+    raw(&solver.adaptor, &noise);
+    raw(&solver.adaptor, b"GET / HTTP/9.9\r\n\r\n");
+    raw(&solver.adaptor, "GET /\u{fffd} HTTP/1.1\r\n\r\n".as_bytes());
+    // A true handshake, then noise instead of frames.
+    let mut stream = TcpStream::connect(solver.adaptor.address().unwrap()).unwrap();
+    let handshake = format!(
+        "GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
+         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+    );
+    stream.write_all(handshake.as_bytes()).unwrap();
+    let mut first = [0; 12];
+    stream.read_exact(&mut first).unwrap();
+    assert_eq!(&first, b"HTTP/1.1 101");
+    let _ = stream.write_all(&noise);
+    solver.steps(5);
+    // And one that goes away in the middle of a frame.
+    let mut half = Viewer::connect(&solver.adaptor);
+    half.hello();
+    solver.step();
+    drop(half);
+    solver.steps(5);
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    solver.step_until_told(&mut viewer, "status", |_| true);
+}
+
+#[test]
+fn a_message_that_is_too_long_ends_only_its_own_connection() {
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    let mut long = Viewer::connect(&solver.adaptor);
+    long.send_text(&"x".repeat(2 << 20));
+    long.wait_for_end();
+    solver.step_until_told(&mut viewer, "status", |status| status["viewers"] == 1);
+}
+
+#[test]
+fn a_viewer_that_does_not_read_costs_the_solver_nothing() {
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    solver.step();
+    let mut deaf = Viewer::connect(&solver.adaptor);
+    deaf.hello();
+    let begun = Instant::now();
+    solver.slowest = Duration::ZERO;
+    while begun.elapsed() < Duration::from_secs(3) {
+        solver.step();
+    }
+    assert!(solver.slowest < Duration::from_secs(1), "{:?}", solver.slowest);
+    assert!(solver.cycle > 20);
+}
+
+#[test]
+fn a_port_in_use_is_told_by_name() {
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap();
+    let text = LINK_TO_ALL.replace("127.0.0.1:0", &address.to_string());
+    let error = Adaptor::initialize(Settings { config: config(&text), ..Settings::default() }).err().expect("refused");
+    assert!(matches!(error, InitializeError::Stream(StreamError::InUse { .. })));
+    let message = error.to_string();
+    assert!(message.contains(&address.to_string()) && message.contains("port 0"), "{message}");
+}
+
+#[test]
+fn a_viewer_changes_no_bit_of_the_run() {
+    let orders = json!([{"at": {"cycle": 3}, "order": {"edits": squeeze(0.3)["edits"],
+        "schedule": {"steps": 3, "every": {"steps": 2}}}}]);
+    let run = |watched: bool| {
+        let text = if watched { LINK_TO_ALL } else { r#"{"version": 1}"# };
+        let mut solver = Solver::new(Settings {
+            config: config(text),
+            orders: parse_orders(&orders.to_string(), "orders.json").unwrap(),
+            ..Settings::default()
+        });
+        let _viewer = watched.then(|| Viewer::connect(&solver.adaptor));
+        let mut shapes = Vec::new();
+        for _ in 0..15 {
+            solver.step();
+            shapes.push(bits(&solver.mesh));
+        }
+        assert_eq!(solver.finish().orders[0].status, OrderStatus::Applied);
+        shapes
+    };
+    assert!(run(true) == run(false));
+}
+
+#[test]
+fn orders_of_viewers_replay_from_the_journal() {
+    let directory = tempfile::tempdir().unwrap();
+    let text = LINK_TO_ALL.replacen("\"version\": 1,", "\"version\": 1, \"journal\": \"run.jsonl\",", 1);
+    let settings = Settings { config: config(&text), output: directory.path().into(), ..Settings::default() };
+    let mut solver = Solver::new(settings);
+    solver.step();
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    let schedule = json!({"steps": 8, "every": {"steps": 3}});
+    viewer.send(&json!({"id": "a", "order": {"edits": squeeze(0.3)["edits"], "schedule": schedule}}));
+    solver.step_until_told(&mut viewer, "order", |order| order["id"] == "a" && order["shape"] == 3);
+    viewer.send(&json!({"id": "b", "order": {"edits": squeeze(0.1)["edits"], "schedule": schedule}}));
+    solver.step_until_told(&mut viewer, "order", |order| order["id"] == "b" && order["status"] == "applied");
+    let journal = std::fs::read_to_string(directory.path().join("run.jsonl")).unwrap();
+    let mut replay =
+        Solver::new(Settings { orders: parse_orders(&journal, "run.jsonl").unwrap(), ..Settings::default() });
+    replay.steps(solver.cycle);
+    assert_eq!(replay.motions, solver.motions);
+    assert!(bits(&replay.mesh) == bits(&solver.mesh));
+}
+
+mod any_bytes {
+    use super::*;
+    use proptest::{prelude::*, strategy::ValueTree};
+
+    /// Texts near to messages, so that more than the first byte is looked at.
+    fn message() -> impl Strategy<Value = String> {
+        let word = prop::sample::select(vec![
+            "{",
+            "}",
+            "[",
+            "]",
+            ":",
+            ",",
+            "\"order\"",
+            "\"edits\"",
+            "\"undo\"",
+            "\"stack\"",
+            "\"translate\"",
+            "\"id\"",
+            "\"features\"",
+            "\"by\"",
+            "\"parameter\"",
+            "1e400",
+            "-0",
+            "4294967296",
+            "null",
+            "NaN",
+            "\"\\ud800\"",
+            "\u{0}",
+        ]);
+        prop_oneof![any::<String>(), prop::collection::vec(word, 0..20).prop_map(|words| words.concat())]
+    }
+
+    #[test]
+    fn no_message_stops_the_solver_or_moves_its_mesh() {
+        let mut solver = Solver::with_config(LINK_TO_ALL);
+        solver.step();
+        let mut viewer = Viewer::connect(&solver.adaptor);
+        viewer.hello();
+        let mut runner =
+            proptest::test_runner::TestRunner::new(ProptestConfig { cases: 30, ..ProptestConfig::default() });
+        let mut texts = Vec::new();
+        for _ in 0..30 {
+            texts.push(message().new_tree(&mut runner).unwrap().current());
+        }
+        for text in texts {
+            viewer.send_text(&text);
+            solver.step_until_told(&mut viewer, "error", |_| true);
+        }
+        assert!(solver.is_at_reference() && !solver.stopped);
+    }
+}
