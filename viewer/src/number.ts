@@ -24,10 +24,10 @@ export function within(value: number, range: readonly [number, number]): string 
 /** Seconds in the unit that suits them. */
 export function seconds(value: number | null | undefined): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-  if (value < 1e-3) return `${digits(value * 1e6, 3)} µs`;
-  if (value < 1) return `${digits(value * 1e3, 3)} ms`;
-  if (value < 120) return `${digits(value, 3)} s`;
-  return `${digits(value / 60, 3)} min`;
+  if (value < 1e-3) return `${digits(value * 1e6, 3)}\u00a0µs`;
+  if (value < 1) return `${digits(value * 1e3, 3)}\u00a0ms`;
+  if (value < 120) return `${digits(value, 3)}\u00a0s`;
+  return `${digits(value / 60, 3)}\u00a0min`;
 }
 
 /** Reads a number as a person writes one; null when it is none. */

@@ -35,7 +35,7 @@ export class Orders {
 
   update(status: OrderStatus): void {
     const known = this.records.get(status.id);
-    const record: OrderRecord = { ...known, ...status, text: known?.text ?? "order", sentAt: known?.sentAt ?? null };
+    const record: OrderRecord = { ...known, ...status, text: known?.text ?? `order ${status.id}`, sentAt: known?.sentAt ?? null };
     this.put(record);
     if (known?.status !== record.status && (record.status === "applied" || record.status === "rejected")) {
       this.announce(`Order ${record.text}: ${record.status}${record.reason ? `, ${record.reason}` : ""}`);
@@ -117,7 +117,7 @@ function detailOf(record: OrderRecord): string {
         const total = (spent.surface ?? 0) + (spent.volume ?? 0) + (spent.guard ?? 0);
         parts.push(`computed in ${seconds(total)}`);
       }
-      if (record.added_steps) parts.push(`cost ${digits(record.added_steps, 2)} steps`);
+      if (record.added_steps && record.added_steps >= 0.05) parts.push(`cost ${digits(record.added_steps, 2)} steps`);
       return parts.join(" · ");
     }
   }

@@ -47,7 +47,7 @@ describe("numbers", () => {
   it("have the digits that matter", () => {
     expect([0, 1, 0.061234, 12345.678, 123456, 1.5e-7, -2, NaN, Infinity, null].map((value) => digits(value))).toEqual(
       ["0", "1", "0.06123", "12346", "1.23e5", "1.5e−7", "−2", "–", "∞", "–"]);
-    expect([2e-5, 0.0613, 2.5, 300].map((value) => seconds(value))).toEqual(["20 µs", "61.3 ms", "2.5 s", "5 min"]);
+    expect([2e-5, 0.0613, 2.5, 300].map((value) => seconds(value))).toEqual(["20\u00a0µs", "61.3\u00a0ms", "2.5\u00a0s", "5\u00a0min"]);
     expect(within(7.7e-5, [0, 18])).toBe("0");
     expect(within(101325.25, [101325, 101326])).toBe("101325.25");
   });
