@@ -317,7 +317,7 @@ impl Validate for Case {
         let initial = |problem: Problem, key| problem.within(key).within("initial");
         self.check_vector(&self.initial.velocity).map_err(|problem| initial(problem, "velocity"))?;
         self.check_number(&self.initial.pressure).map_err(|problem| initial(problem, "pressure"))?;
-        if !(self.time_step > 0.0) {
+        if self.time_step <= 0.0 {
             return Err(
                 Problem::new(format!("found {}, expected a positive number", self.time_step)).within("time_step")
             );
