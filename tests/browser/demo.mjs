@@ -39,7 +39,12 @@ const check = (holds, message) => {
 /** Passes the bytes of the run on, so that the test can cut the connection without touching the run. */
 async function cuttable(target) {
   const pairs = new Set();
+  let down = false;
   const server = createServer((near) => {
+    if (down) {
+      near.destroy();
+      return;
+    }
     const far = connect(Number(target.port || 80), target.hostname);
     const pair = [near, far];
     pairs.add(pair);
@@ -58,7 +63,11 @@ async function cuttable(target) {
   url.port = String(server.address().port);
   return {
     url: url.toString(),
-    cut: () => pairs.forEach(([near]) => near.destroy()),
+    cut: () => {
+      down = true;
+      pairs.forEach(([near]) => near.destroy());
+    },
+    mend: () => { down = false; },
     close: () => {
       pairs.forEach(([near]) => near.destroy());
       server.close();
@@ -111,8 +120,19 @@ async function until(what, condition, milliseconds = patience) {
 let pictures = 0;
 const picture = (name) => page.screenshot({ path: join(screenshots, `${String(++pictures).padStart(2, "0")}-${name}.png`) });
 
-/** How many pixels of the column at `x` show something other than the background. */
+/** How many pixels of the column at `x` the shape covers, once the picture has come to rest. */
 async function silhouette(x) {
+  let height = -1;
+  for (let tries = 0; tries < 20; tries++) {
+    const before = height;
+    height = await silhouetteNow(x);
+    if (height === before && height > 0) break;
+    await page.waitForTimeout(500);
+  }
+  return height;
+}
+
+async function silhouetteNow(x) {
   const clip = { x: Math.round(x), y: 100, width: 1, height: 640 };
   const png = (await page.screenshot({ clip })).toString("base64");
   return page.evaluate(async (data) => {
@@ -143,9 +163,9 @@ async function pick(name, modifiers) {
     const place = await page.evaluate((feature) => window.tombolo.featurePlace(feature), name);
     if (!place) continue;
     await page.mouse.move(place[0], place[1]);
-    await page.waitForTimeout(200);
-    const tip = await page.locator("#tip").innerText();
-    check(tip.startsWith(name), `hovering ${name} shows "${tip}"`);
+    const shown = () => page.evaluate(() => { const tip = document.getElementById("tip"); return tip.hidden ? "" : tip.textContent; });
+    for (let tries = 0; tries < 50 && !(await shown()).startsWith(name); tries++) await page.waitForTimeout(100);
+    check((await shown()).startsWith(name), `hovering ${name} shows "${await shown()}"`);
     for (const key of modifiers) await page.keyboard.down(key);
     await page.mouse.click(place[0], place[1]);
     for (const key of modifiers) await page.keyboard.up(key);
@@ -260,6 +280,7 @@ const steps = [
     proxy.cut();
     await until("the loss noticed", (now) => now.connection === "reconnecting" || now.connection === "connecting", 10000);
     await picture("reconnecting");
+    proxy.mend();
     const back = await until("the connection back", (now) => now.connection === "connected" && now.frames > before.frames + 2 && now.cycle > before.cycle);
     check(back.orders.length >= before.orders.length, "orders were forgotten");
     check(back.errors.length === 0, `frames or messages could not be read: ${back.errors.join("; ")}`);
