@@ -66,9 +66,14 @@ impl Surface {
                         4 => CellType::Quad,
                         _ => CellType::Polygon,
                     };
+                    let cell = same_cell[0].cell;
+                    let mut vertices = vertices.to_vec();
+                    if is_right_handed_wedge(mesh, cell as usize) {
+                        vertices.reverse();
+                    }
                     // A face has three vertices at least, so that it is always taken.
-                    if faces.push(cell_type, vertices).is_ok() {
-                        owner_cells.push(same_cell[0].cell);
+                    if faces.push(cell_type, &vertices).is_ok() {
+                        owner_cells.push(cell);
                     }
                 }
             });
@@ -140,6 +145,18 @@ impl Surface {
     pub fn features(&self) -> &Features {
         &self.features
     }
+}
+
+/// Whether a cell is a wedge whose first triangle faces its second, as mesh generators number it, and not outwards, as VTK's
+/// manual has it: its faces then come out inside first.
+fn is_right_handed_wedge(mesh: &Mesh, cell: usize) -> bool {
+    if mesh.cells().cell_type(cell) != CellType::Wedge {
+        return false;
+    }
+    let point = |place: usize| mesh.points()[mesh.cells().vertices(cell)[place] as usize];
+    let normal = cross(subtract(point(1), point(0)), subtract(point(2), point(0)));
+    let along: f64 = (0..3).map(|place| dot(normal, subtract(point(place + 3), point(place)))).sum();
+    along > 0.0
 }
 
 fn split_into_triangles(points: &[Vector], faces: &Cells) -> (Vec<[u32; 3]>, Vec<u32>) {

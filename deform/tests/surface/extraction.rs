@@ -58,6 +58,20 @@ fn the_surface_of_one_cell_of_each_type_is_its_faces_outward() {
     }
 }
 
+/// Mesh generators and VTK's manual number a wedge the other way round; either way the faces look outward.
+#[test]
+fn wedges_of_either_hand_face_outward() {
+    let left = shapes::single_cell(CellType::Wedge);
+    let [a, b, c, d, e, f] = left.cells().vertices(0) else { panic!("six vertices") };
+    let mut cells = Cells::new();
+    cells.push(CellType::Wedge, &[*d, *e, *f, *a, *b, *c]).unwrap();
+    let right = mesh(left.points().to_vec(), cells);
+    for surface in [extract(&left), extract(&right)] {
+        assert!(is_closed(&surface));
+        assert!((enclosed_volume(&surface, surface.points()) - 0.5).abs() < 1e-15);
+    }
+}
+
 #[test]
 fn boxes_have_the_surface_of_the_box() {
     for mesh in [
