@@ -56,7 +56,7 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{:<44} {:>12} {:>14}", "case", "seconds", "solver steps")?;
         for row in &self.rows {
-            let steps = row.steps.map_or_else(String::new, |steps| format!("{steps:.4}"));
+            let steps = row.steps.map_or_else(String::new, |steps| format!("{steps:.2e}"));
             writeln!(f, "{:<44} {:>12.3e} {:>14}", row.case, row.seconds, steps)?;
         }
         writeln!(f, "\n{:<44} {:>12} {:>14}", "target", "value", "at most")?;
