@@ -25,7 +25,7 @@ fn the_reference_is_what_the_types_say() {
     let mut renderer = Renderer::default();
     renderer.render("Pipelines", &config_schema());
     renderer.render("Orders", &schemars::schema_for!(Vec<TimedCommand>).to_value());
-    renderer.render("Cases of flow", &schemars::schema_for!(tombolo_flow::Case).to_value());
+    renderer.render("Cases of flow", &schemars::schema_for!(tombolo_flow::case::Case).to_value());
     let page = format!("{HEAD}{}\n", renderer.page.trim_end());
     let path = project().join(PAGE);
     if std::env::var_os("TOMBOLO_UPDATE").is_some() {
