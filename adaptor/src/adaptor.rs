@@ -335,9 +335,9 @@ impl Adaptor {
                 let background = self.config.steering.background && matches!(source, Source::Viewer(_));
                 match &mut self.mesh {
                     SteeredMesh::Steered(steerer, _) => steerer.take(id, order, background),
-                    SteeredMesh::Refused(reason) => self.log.reject(&id, moment, reason),
+                    SteeredMesh::Refused(reason) => self.log.reject(&id, moment, &reason.into()),
                     SteeredMesh::Unknown | SteeredMesh::Unsteered => {
-                        self.log.reject(&id, moment, "no reference mesh was taken");
+                        self.log.reject(&id, moment, &"no reference mesh was taken".into());
                     }
                 }
                 return;

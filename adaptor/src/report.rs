@@ -41,7 +41,7 @@ pub struct OrderReport {
     pub shape: u32,
     /// Shapes in all.
     pub shapes: u32,
-    /// The least scaled Jacobian of all shapes on its way.
+    /// The least scaled Jacobian of all shapes on its way; of an order that the guard rejected, what it would have come to.
     pub min_scaled_jacobian: Option<f64>,
     /// Seconds that its plan took.
     pub seconds: ShapeSeconds,

@@ -148,6 +148,8 @@ fn a_refused_order_leaves_the_schedule_under_way_alone() {
     let report = solver.finish();
     let reason = |index: usize| report.orders[index].reason.clone().unwrap_or_default();
     assert_eq!(report.orders[1].status, OrderStatus::Rejected);
+    assert!(report.orders[1].min_scaled_jacobian.is_some_and(|reached| reached < 0.0), "what it would have come to");
+    assert!(report.orders[1].seconds.volume > 0.0 && report.orders[1].seconds.guard > 0.0, "what it took to find out");
     assert!(reason(1).contains("inside out") && reason(1).contains("largest feasible fraction"), "{}", reason(1));
     assert!(reason(2).contains("z-mx") && reason(2).contains("z-max") && reason(2).contains("x-min"), "{}", reason(2));
 }

@@ -40,6 +40,17 @@ pub enum Refused {
     Guard(#[from] Refusal),
 }
 
+impl Refused {
+    /// The least scaled Jacobian on the way, where that is what was wrong.
+    #[must_use]
+    pub fn min_scaled_jacobian(&self) -> Option<f64> {
+        match self {
+            Refused::Guard(Refusal::Quality(path)) => Some(path.min_scaled_jacobian),
+            _ => None,
+        }
+    }
+}
+
 /// The shape that a stack of edits makes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Target {

@@ -92,7 +92,7 @@ impl Small {
     /// Where it cannot be read.
     #[must_use]
     pub fn mesh(&self, name: &str) -> Mesh {
-        read_mesh(&self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}")).mesh
+        read_mesh(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}")).mesh
     }
 
     /// The arguments of `flow` for this case, its output in `out/`.

@@ -11,6 +11,7 @@ use tombolo_pipelines::{
     shape::ShapeSeconds,
 };
 
+use super::worker::Rejection;
 use crate::{
     journal::Journal,
     report::{ORDERS_KEPT, OrderReport, OrderStatus},
@@ -135,11 +136,14 @@ impl Log {
     }
 
     /// Notes that an order changes nothing, and why.
-    pub(crate) fn reject(&self, id: &str, moment: Moment, reason: &str) {
-        self.journal(id, JournalStatus::Rejected, moment, None, Some(reason.into()), None);
+    pub(crate) fn reject(&self, id: &str, moment: Moment, rejection: &Rejection) {
+        let Rejection { reason, min_scaled_jacobian, seconds } = rejection;
+        self.journal(id, JournalStatus::Rejected, moment, None, Some(reason.clone()), *min_scaled_jacobian);
         self.update(id, |order| {
             order.status = OrderStatus::Rejected;
-            order.reason = Some(reason.into());
+            order.reason = Some(reason.clone());
+            order.min_scaled_jacobian = *min_scaled_jacobian;
+            order.seconds = *seconds;
         });
     }
 

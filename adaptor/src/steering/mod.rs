@@ -42,7 +42,7 @@ pub(crate) use stack::EditStack;
 pub(crate) use timed::Timed;
 
 use crate::report::OrderStatus;
-use worker::{Done, Wish, Worker, caught};
+use worker::{Done, Rejection, Wish, Worker, caught};
 
 /// The settings of orders that bring none.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -198,7 +198,7 @@ impl Steerer {
         let Task { id, order, background } = task;
         let (stack, deform) = match self.stack.after(&order.change, order.deform, self.defaults.deform) {
             Ok(after) => after,
-            Err(error) => return self.log.reject(&id, moment, &error.to_string()),
+            Err(error) => return self.log.reject(&id, moment, &error.into()),
         };
         let wish = Wish {
             stack: stack.edits(),
@@ -241,7 +241,7 @@ impl Steerer {
     fn commit(
         &mut self,
         computing: Computing,
-        plan: Result<Plan, String>,
+        plan: Result<Plan, Rejection>,
         moment: Moment,
         begun: Instant,
         step_seconds: Option<f64>,
@@ -250,7 +250,7 @@ impl Steerer {
         let plan = plan.and_then(|plan| self.starting_here(plan, &guard));
         let plan = match plan {
             Ok(plan) => plan,
-            Err(reason) => return self.log.reject(&id, moment, &reason),
+            Err(rejection) => return self.log.reject(&id, moment, &rejection),
         };
         if let Some(before) = self.motion.take() {
             self.log.update(&before.id, |order| {
@@ -272,7 +272,7 @@ impl Steerer {
     }
 
     /// The plan itself if the mesh is still where it starts, else one from where the mesh is.
-    fn starting_here(&self, plan: Plan, guard: &Guard) -> Result<Plan, String> {
+    fn starting_here(&self, plan: Plan, guard: &Guard) -> Result<Plan, Rejection> {
         if Arc::ptr_eq(plan.start(), &self.points) {
             return Ok(plan);
         }

@@ -6,6 +6,7 @@ use std::{
         mpsc::{Receiver, RecvError, Sender, TryRecvError, channel},
     },
     thread::JoinHandle,
+    time::Instant,
 };
 
 use tombolo_deform::{
@@ -15,7 +16,7 @@ use tombolo_deform::{
     surface::Edit,
     volume::Deform,
 };
-use tombolo_pipelines::shape::{Plan, Refused, Shaper};
+use tombolo_pipelines::shape::{Plan, Refused, ShapeSeconds, Shaper};
 
 use super::queue::Queue;
 
@@ -30,27 +31,51 @@ pub(crate) struct Wish {
 }
 
 impl Wish {
-    pub(crate) fn plan(&self, shaper: &Mutex<Shaper>) -> Result<Plan, String> {
-        let attempt = || {
+    pub(crate) fn plan(&self, shaper: &Mutex<Shaper>) -> Result<Plan, Rejection> {
+        let mut seconds = ShapeSeconds::default();
+        let plan = caught(|| {
             // A panic in the kernel leaves at worst a cache without its entry.
             let mut shaper = shaper.lock().unwrap_or_else(PoisonError::into_inner);
-            shaper.plan(&self.stack, Arc::clone(&self.start), &self.deform, &self.schedule, &self.guard)
-        };
-        caught(attempt)
+            let target = shaper.target(&self.stack, &self.deform)?;
+            seconds = target.seconds;
+            let begun = Instant::now();
+            let plan = shaper.judge(Arc::clone(&self.start), &target, &self.schedule, &self.guard);
+            seconds.guard = begun.elapsed().as_secs_f64();
+            plan
+        });
+        plan.map_err(|rejection| Rejection { seconds, ..rejection })
+    }
+}
+
+/// Why an order is not carried out, and what it took to find out.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Rejection {
+    pub(crate) reason: String,
+    /// What the way would have come down to, where the guard did not let it through.
+    pub(crate) min_scaled_jacobian: Option<f64>,
+    pub(crate) seconds: ShapeSeconds,
+}
+
+impl<T: ToString> From<T> for Rejection {
+    fn from(reason: T) -> Self {
+        Self { reason: reason.to_string(), min_scaled_jacobian: None, seconds: ShapeSeconds::default() }
     }
 }
 
 /// Runs a piece of the kernel so that a fault in it rejects one order instead of ending the solver.
-pub(crate) fn caught<T>(attempt: impl FnOnce() -> Result<T, Refused>) -> Result<T, String> {
+pub(crate) fn caught<T>(attempt: impl FnOnce() -> Result<T, Refused>) -> Result<T, Rejection> {
     match std::panic::catch_unwind(std::panic::AssertUnwindSafe(attempt)) {
-        Ok(result) => result.map_err(|refused| refused.to_string()),
+        Ok(result) => result.map_err(|refused| Rejection {
+            min_scaled_jacobian: refused.min_scaled_jacobian(),
+            ..Rejection::from(&refused)
+        }),
         Err(panic) => {
             let message = panic
                 .downcast_ref::<&str>()
                 .map(|text| (*text).to_owned())
                 .or_else(|| panic.downcast_ref::<String>().cloned())
                 .unwrap_or_else(|| "no reason given".into());
-            Err(format!("the geometry kernel failed, which is a defect of it: {message}"))
+            Err(Rejection::from(format!("the geometry kernel failed, which is a defect of it: {message}")))
         }
     }
 }
@@ -64,7 +89,7 @@ enum Job {
 pub(crate) enum Done {
     /// The quality of the reference mesh.
     Prepared(Box<Quality>),
-    Planned(Result<Plan, String>),
+    Planned(Result<Plan, Rejection>),
 }
 
 /// The thread. It ends when this is dropped, after the job at hand.
@@ -127,7 +152,7 @@ impl Worker {
 }
 
 fn gone() -> Done {
-    Done::Planned(Err("the thread that plans shapes has ended".into()))
+    Done::Planned(Err(Rejection::from("the thread that plans shapes has ended")))
 }
 
 fn prepare(shaper: &Mutex<Shaper>, deform: &Deform) -> Quality {

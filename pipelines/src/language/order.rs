@@ -277,7 +277,7 @@ pub struct JournalEntry {
     pub command: Option<Command>,
     /// Why it was rejected.
     pub reason: Option<String>,
-    /// The least scaled Jacobian on the path of an applied order.
+    /// The least scaled Jacobian on the path; of an order that the guard rejected, what it would have come to.
     pub min_scaled_jacobian: Option<f64>,
 }
 
@@ -295,7 +295,7 @@ with_command! {
         time: f64,
         /// Why it was rejected.
         reason: String,
-        /// The least scaled Jacobian on the path of an applied order.
+        /// The least scaled Jacobian on the path; of an order that the guard rejected, what it would have come to.
         min_scaled_jacobian: f64,
     }
 }
