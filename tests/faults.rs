@@ -38,7 +38,7 @@ fn start(small: &Small) -> (Run, Link) {
 
 /// Lets a paused run go on to its end: it must end well and say nothing of a panic.
 fn finish(run: Run, mut driver: Viewer) -> String {
-    driver.send(&json!({"resume": {}}));
+    driver.resume();
     let (status, text) = run.finish(LIMIT);
     assert!(status.success(), "{text}");
     assert!(!text.contains("panicked"), "{text}");

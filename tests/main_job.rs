@@ -42,7 +42,7 @@ fn check(small: &Small, report: &Value, shapes: usize) {
 
     let mut heights = Vec::new();
     for cycle in 0..60 {
-        let mesh = small.mesh(&format!("out/mesh-{cycle}.vtu"));
+        let mesh = small.mesh(&format!("out/mesh-{cycle:06}.vtu"));
         let measured = quality(mesh.cells(), mesh.points());
         assert_eq!(measured.inverted, 0, "cycle {cycle}");
         assert!(measured.min > 0.0, "cycle {cycle}: {}", measured.min);
@@ -67,7 +67,7 @@ fn check(small: &Small, report: &Value, shapes: usize) {
         assert!((height - wanted).abs() < 1e-9, "shape {shape}: {heights:?}");
     }
 
-    let undone = small.mesh("out/mesh-59.vtu");
+    let undone = small.mesh("out/mesh-000059.vtu");
     for (vertex, (was, is)) in reference.points().iter().zip(undone.points()).enumerate() {
         assert_eq!(was.map(f64::to_bits), is.map(f64::to_bits), "vertex {vertex}: {was:?} came back as {is:?}");
     }

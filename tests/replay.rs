@@ -45,7 +45,7 @@ fn watched(viewers: usize) -> Vec<u8> {
         let mut all: Vec<Viewer> = (0..viewers).map(|_| Viewer::connect(&link).expect("the run lets in")).collect();
         all[0].wait_for("hello", |hello| hello["role"] == "driver");
         assert!(all[0].frame().starts_with(b"TMBL"));
-        all[0].send(&json!({"resume": {}}));
+        all[0].resume();
         while all[0].next(Duration::from_secs(5)).is_some() {}
     }
     let (status, text) = run.finish(LIMIT);
@@ -70,7 +70,7 @@ fn a_journal_plays_back_to_the_same_bits() {
     driver.wait_for("hello", |hello| hello["role"] == "driver");
     driver.send(&json!({"id": "first", "order": pinch(0.8)}));
     driver.wait_for("order", |order| order["status"] == "accepted" || order["status"] == "computing");
-    driver.send(&json!({"resume": {}}));
+    driver.resume();
     let (status, text) = run.finish(LIMIT);
     assert!(status.success(), "{text}");
     let report = live.read("report.json");

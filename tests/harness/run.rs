@@ -17,12 +17,12 @@ use crate::{Link, project};
 #[must_use]
 pub fn programs() -> &'static Path {
     static PROGRAMS: OnceLock<PathBuf> = OnceLock::new();
-    // With the tests among the targets, the dependencies have the features that `cargo test` gave them: nothing is built twice.
+    // With a test among the targets, the dependencies have the features that `cargo test` gave them: nothing is built twice.
     PROGRAMS.get_or_init(|| {
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let output = Command::new(cargo)
             .current_dir(project())
-            .args(["build", "--quiet", "--workspace", "--bins", "--tests"])
+            .args(["build", "--quiet", "--workspace", "--bins", "--test", "browser"])
             .output()
             .expect("cargo runs");
         assert!(output.status.success(), "the programs do not build:\n{}", String::from_utf8_lossy(&output.stderr));

@@ -134,6 +134,15 @@ impl Viewer {
         panic!("no such '{name}' came; the last was {last}");
     }
 
+    /// Waits until the run is paused, and lets it go on: a resume that comes before the pause would do nothing.
+    ///
+    /// # Panics
+    /// Where it is not paused in half a minute.
+    pub fn resume(&mut self) {
+        self.wait_for("status", |status| status["paused"] == true);
+        self.send(&serde_json::json!({"resume": {}}));
+    }
+
     /// Waits for the next frame.
     ///
     /// # Panics
