@@ -62,7 +62,7 @@ fn we_read_what_vtkio_writes() {
         types: vec![vtkio::model::CellType::Tetra; mesh.cells().len()],
     };
     let file = Vtk {
-        version: Version { major: 2, minor: 0 },
+        version: Version::new(),
         title: "box".into(),
         byte_order: vtkio::model::ByteOrder::LittleEndian,
         file_path: None,

@@ -1,7 +1,7 @@
 //! The server that viewers connect to, on a thread of its own.
 //!
 //! It serves the viewer's files at `/` and one WebSocket at `/ws?token=...` (the protocol is in `docs/protocol.md`). Nothing
-//! that a client does reaches the solver but commands that were read and found valid, through a [`CommandSink`].
+//! that a client does reaches the solver but commands that were read and found valid.
 //!
 //! What it guarantees: it listens on the loopback address unless told otherwise; no WebSocket without the token; no page of
 //! another site can use a browser's connection (the `Origin` must be the server's own), nor reach it under another name (on
