@@ -35,7 +35,8 @@ impl Journal {
     pub(crate) fn create(path: &Path) -> Result<Self, JournalError> {
         let directory = path.parent().unwrap_or(Path::new(""));
         let made = if directory == Path::new("") { Ok(()) } else { std::fs::create_dir_all(directory) };
-        let file = made.and_then(|()| File::create(path)).map_err(|source| JournalError { path: path.into(), source })?;
+        let file =
+            made.and_then(|()| File::create(path)).map_err(|source| JournalError { path: path.into(), source })?;
         Ok(Self { file: Mutex::new(Some((path.into(), file))) })
     }
 
