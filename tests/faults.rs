@@ -230,10 +230,9 @@ fn drive(link: &Link) -> Viewer {
         std::thread::sleep(Duration::from_millis(500));
         viewer.send(&json!({"drive": {}}));
         // Answered with a new hello when it is granted, with an error when not; a second connection asks again either way.
-        if let Some(Message::Text(answer)) = viewer.next(Duration::from_secs(1)) {
-            if answer["hello"]["role"] == "driver" {
-                return viewer;
-            }
+        let answer = viewer.next(Duration::from_secs(1));
+        if matches!(answer, Some(Message::Text(answer)) if answer["hello"]["role"] == "driver") {
+            return viewer;
         }
         drop(viewer);
         viewer = Viewer::connect(link).expect("the run lets in");

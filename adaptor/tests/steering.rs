@@ -225,8 +225,11 @@ fn what_makes_no_sense_is_refused_before_the_run() {
     let settings = Settings { orders: nan, ..Settings::default() };
     let error = Adaptor::initialize(settings).err().expect("refused").to_string();
     assert!(error.contains("min_scaled_jacobian"), "{error}");
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("file"), "").unwrap();
     let journal = Settings {
-        config: config(r#"{"version": 1, "journal": "no/such/directory/journal.jsonl"}"#),
+        config: config(r#"{"version": 1, "journal": "file/journal.jsonl"}"#),
+        output: directory.path().into(),
         ..Settings::default()
     };
     let error = Adaptor::initialize(journal).err().expect("refused").to_string();

@@ -86,7 +86,8 @@ const complaints = [];
 page.on("pageerror", (error) => complaints.push(`the page failed: ${error.message}`));
 page.on("console", (message) => {
   // The browser itself reports the connections that this test cuts, and looks for an icon where it is shown plain text.
-  if (message.location().url.endsWith("/favicon.ico")) return;
+  const { pathname } = new URL(message.location().url || "about:blank");
+  if (pathname === "/favicon.ico" || pathname === "/ws") return;
   if (message.type() === "error" && !/WebSocket|ERR_|status of 401/.test(message.text())) complaints.push(`the page complained: ${message.text()}`);
 });
 page.on("request", (request) => {

@@ -107,7 +107,7 @@ pub(crate) struct OutletVertex {
 /// its lumped one (Wathen 1987), and the projection is stable only where the pressure equation is the stiffer one.
 const OUTLET_STIFFNESS: f64 = 5.0;
 
-/// A vertex on a frictionless wall.
+/// A vertex that no fluid passes through the wall at: one on a frictionless wall, or one where an inlet meets a no-slip wall.
 #[derive(Debug, Clone, Copy)]
 struct SlipVertex {
     vertex: u32,
@@ -171,6 +171,7 @@ impl Boundary {
         self.slip.clear();
         self.held.fill([false; 3]);
         let mut areas = vec![[0.0; 3]; points.len()];
+        self.measure_rims(points, &mut areas);
         for (index, patch) in self.patches.iter().enumerate() {
             if !matches!(patch.condition, Condition::Slip | Condition::Pressure(_)) {
                 continue;
@@ -218,12 +219,39 @@ impl Boundary {
         }
     }
 
+    /// Where a prescribed velocity meets no-slip walls, it rules, but not through the walls: what flows in then flows out,
+    /// also where a wall slopes away from the inlet. `areas` is memory, zero before and after.
+    fn measure_rims(&mut self, points: &[Vector], areas: &mut [Vector]) {
+        let is_rim = |vertex: u32| matches!(self.rules[vertex as usize], Rule::Prescribed(_));
+        let mut rims = Vec::new();
+        for patch in self.patches.iter().filter(|patch| matches!(patch.condition, Condition::NoSlip)) {
+            for triangle in patch.triangles.iter().filter(|triangle| triangle.iter().any(|&vertex| is_rim(vertex))) {
+                let area = triangle_area(points, *triangle);
+                for &vertex in triangle.iter().filter(|&&vertex| is_rim(vertex)) {
+                    rims.push(vertex);
+                    for axis in 0..3 {
+                        areas[vertex as usize][axis] += area[axis] / 3.0;
+                    }
+                }
+            }
+        }
+        rims.sort_unstable();
+        rims.dedup();
+        for vertex in rims {
+            let area = std::mem::take(&mut areas[vertex as usize]);
+            let size = dot(area, area).sqrt();
+            if size > 0.0 {
+                self.slip.push(SlipVertex { vertex, normal: area.map(|value| value / size) });
+            }
+        }
+    }
+
     /// Whether some part of the boundary lets the fluid choose how much of it passes.
     pub fn is_open(&self) -> bool {
         !self.outlets.is_empty()
     }
 
-    /// Writes the prescribed velocities into `velocity`, and takes the part normal to frictionless walls from the mesh.
+    /// Writes the prescribed velocities into `velocity`, and takes the part through walls from the mesh.
     pub fn impose(
         &self,
         velocity: &mut [Vector],
@@ -247,7 +275,7 @@ impl Boundary {
         self.impose_slip(velocity, mesh_velocity);
     }
 
-    /// Takes the part of the velocity normal to frictionless walls from the mesh.
+    /// Takes the part of the velocity through walls, where it is not prescribed to be the wall's, from the mesh.
     pub fn impose_slip(&self, velocity: &mut [Vector], mesh_velocity: &[Vector]) {
         for slip in &self.slip {
             let (own, wall) = (&mut velocity[slip.vertex as usize], mesh_velocity[slip.vertex as usize]);

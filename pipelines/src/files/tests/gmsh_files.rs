@@ -136,7 +136,7 @@ pub(super) fn version_2(binary: bool, big_endian: bool) -> Vec<u8> {
         out.point(point);
     }
     // An element of several physical groups stands once for each.
-    let rows: Vec<(i32, &(i32, i32, i32, &[u64]))> = ELEMENTS
+    let rows: Vec<_> = ELEMENTS
         .iter()
         .flat_map(|row| match physical(row.0, row.1) {
             [] => vec![(0, row)],
