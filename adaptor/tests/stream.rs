@@ -273,7 +273,7 @@ fn a_message_that_is_too_long_ends_only_its_own_connection() {
     let mut viewer = Viewer::connect(&solver.adaptor);
     viewer.hello();
     let mut long = Viewer::connect(&solver.adaptor);
-    long.send_text(&"x".repeat(2 << 20));
+    long.send_unwelcome(Message::text("x".repeat(2 << 20)));
     long.wait_for_end();
     solver.step_until_told(&mut viewer, "status", |status| status["viewers"] == 1);
 }

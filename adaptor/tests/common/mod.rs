@@ -171,6 +171,11 @@ impl Viewer {
         self.runtime.block_on(self.socket.send(message)).expect("sent");
     }
 
+    /// Sends what the server may refuse, and cut the connection, before it is all sent.
+    pub fn send_unwelcome(&mut self, message: Message) {
+        let _ = self.runtime.block_on(self.socket.send(message));
+    }
+
     /// Reads one message; `None` after `wait`, or once the connection has ended.
     fn read(&mut self, wait: Duration) -> Option<Message> {
         let next = async { tokio::time::timeout(wait, self.socket.next()).await };
