@@ -30,6 +30,15 @@ fn paused_pipelines(port: u16) -> Value {
     })
 }
 
+/// The same run without the waiting.
+fn unpaused() -> Small {
+    let small = Small::new();
+    let mut pipelines = paused_pipelines(0);
+    pipelines["pipelines"].as_array_mut().expect("a list").remove(1);
+    small.write("pipelines.json", &pipelines);
+    small
+}
+
 fn start(small: &Small) -> (Run, Link) {
     let mut run = Run::flow(&small.arguments(&["--pipelines", "@pipelines.json", "--steps", "20"]));
     let link = run.link();
@@ -47,10 +56,7 @@ fn finish(run: Run, mut driver: Viewer) -> String {
 
 /// What `last.vtu` holds when nobody interferes.
 fn undisturbed() -> Vec<u8> {
-    let small = Small::new();
-    let mut pipelines = paused_pipelines(0);
-    pipelines["pipelines"].as_array_mut().expect("a list").remove(1);
-    small.write("pipelines.json", &pipelines);
+    let small = unpaused();
     let (status, text) = Run::flow(&small.arguments(&["--pipelines", "@pipelines.json", "--headless"])).finish(LIMIT);
     assert!(status.success(), "{text}");
     small.bytes("out/last.vtu")
@@ -118,10 +124,7 @@ fn a_mesh_that_cannot_be_read_is_refused() {
 
 #[test]
 fn an_unknown_feature_is_rejected_with_the_near_and_all_names() {
-    let small = Small::new();
-    let mut pipelines = paused_pipelines(0);
-    pipelines["pipelines"].as_array_mut().expect("a list").remove(1);
-    small.write("pipelines.json", &pipelines);
+    let small = unpaused();
     small.write(
         "orders.json",
         &json!([{"at": {"cycle": 3}, "order": {"edits": [
@@ -305,10 +308,7 @@ fn garbage_on_the_port_changes_nothing() {
 
 #[test]
 fn an_order_that_would_break_the_mesh_is_refused_and_the_solver_runs_on() {
-    let small = Small::new();
-    let mut pipelines = paused_pipelines(0);
-    pipelines["pipelines"].as_array_mut().expect("a list").remove(1);
-    small.write("pipelines.json", &pipelines);
+    let small = unpaused();
     small.write(
         "orders.json",
         &json!([{"at": {"cycle": 3}, "order": {"edits": [
