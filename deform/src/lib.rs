@@ -9,6 +9,7 @@ pub mod mesh;
 pub mod quality;
 pub mod schedule;
 pub mod shapes;
+pub mod skeleton;
 pub mod surface;
 pub mod volume;
 
