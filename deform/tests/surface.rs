@@ -37,23 +37,32 @@ fn names(list: &[&str]) -> Vec<String> {
 }
 
 fn translate(features: &[&str], fixed: &[&str], by: Vector, harmonic_order: HarmonicOrder) -> Edit {
-    Edit::Translate(Translate { features: names(features), fixed: names(fixed), by, harmonic_order })
+    Edit::Translate(Translate {
+        features: names(features),
+        fixed: names(fixed),
+        by,
+        harmonic_order,
+        ..Translate::default()
+    })
 }
 
 fn scale(features: &[&str], fixed: &[&str], factors: Vector, harmonic_order: HarmonicOrder) -> Edit {
-    let center = None;
     Edit::ScaleDirection(ScaleDirection {
         features: names(features),
         fixed: names(fixed),
         factors,
-        center,
         harmonic_order,
+        ..ScaleDirection::default()
     })
 }
 
 fn scale_normals(features: &[&str], fixed: &[&str], distance: f64) -> Edit {
-    let harmonic_order = HarmonicOrder::Biharmonic;
-    Edit::ScaleNormals(ScaleNormals { features: names(features), fixed: names(fixed), distance, harmonic_order })
+    Edit::ScaleNormals(ScaleNormals {
+        features: names(features),
+        fixed: names(fixed),
+        distance,
+        ..ScaleNormals::default()
+    })
 }
 
 /// The volume that the triangles of a closed surface enclose, positive where they run outward.

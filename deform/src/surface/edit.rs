@@ -5,10 +5,15 @@ use std::borrow::Cow;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::Region;
 use crate::mesh::Vector;
 
-/// One edit of the shape: a handle (the union of some features) is moved, other features are held fixed, and the rest of the
-/// surface follows smoothly.
+/// One edit of the shape, a layer of the stack: a handle is moved, other parts are held fixed, and the rest of the surface
+/// follows smoothly.
+///
+/// The handle is the vertices of `features` that lie in `region`; with one of the two alone, all vertices of the features or all
+/// surface vertices in the region. A vertex that is also in `fixed` or in `fixed_region` stays fixed. A muted edit is checked
+/// like any other and does nothing.
 ///
 /// In JSON an edit is an object with one key, the name of the edit:
 ///
@@ -20,6 +25,12 @@ use crate::mesh::Vector;
 /// )?;
 /// let Edit::ScaleDirection(scale) = &edit else { panic!() };
 /// assert_eq!(scale.harmonic_order, HarmonicOrder::Biharmonic);
+///
+/// let edit: Edit = serde_json::from_str(
+///     r#"{ "rotate": { "region": { "sphere": { "center": [0, 0, 1], "radius": 0.2 } }, "axis": [0, 1, 0], "degrees": 15,
+///                      "name": "tilt the outlet", "muted": true } }"#,
+/// )?;
+/// assert!(edit.muted() && edit.features().is_empty());
 /// # Ok::<(), serde_json::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -27,69 +38,253 @@ use crate::mesh::Vector;
 pub enum Edit {
     /// Moves the handle as a rigid body.
     Translate(Translate),
-    /// Moves every vertex of the handle along its own normal.
-    ScaleNormals(ScaleNormals),
+    /// Turns the handle as a rigid body.
+    Rotate(Rotate),
     /// Scales the handle along the axes about a centre.
     ScaleDirection(ScaleDirection),
+    /// Moves every vertex of the handle along its own normal.
+    ScaleNormals(ScaleNormals),
+    /// Moves the handle by a matrix and a translation.
+    Affine(Affine),
+    /// Adds a displacement made elsewhere, exactly as it is: nothing else follows.
+    Displacement(Displacement),
+    /// Drags the surface by its skeleton.
+    Skeleton(Skeleton),
 }
 
-/// Moves features as one rigid body.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// Declares the body of an edit: what every edit has, then its own fields. (serde's `flatten` would let unknown keys pass.)
+macro_rules! layer {
+    ($(#[$attribute:meta])* pub struct $name:ident { $($(#[$field_attribute:meta])* pub $field:ident: $type:ty,)* }) => {
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+        #[serde(deny_unknown_fields)]
+        $(#[$attribute])*
+        pub struct $name {
+            /// The features that make up the handle: all of them move together.
+            #[serde(default, deserialize_with = "at_least_one", skip_serializing_if = "Vec::is_empty")]
+            #[schemars(length(min = 1))]
+            pub features: Vec<String>,
+            /// The part of the reference surface that makes up the handle; with `features`, what of them lies in it.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub region: Option<Region>,
+            /// The features held where they are. A vertex that is also in the handle stays fixed.
+            #[serde(default)]
+            pub fixed: Vec<String>,
+            /// A part of the reference surface that is held where it is, beside the fixed features.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub fixed_region: Option<Region>,
+            $($(#[$field_attribute])* pub $field: $type,)*
+            /// Whether the edit is passed over.
+            #[serde(default, skip_serializing_if = "is_false")]
+            pub muted: bool,
+            /// A name for the layer, in reports and lists.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub name: Option<String>,
+        }
+
+        impl Layer for $name {
+            fn features(&self) -> &[String] {
+                &self.features
+            }
+
+            fn region(&self) -> Option<&Region> {
+                self.region.as_ref()
+            }
+
+            fn fixed(&self) -> &[String] {
+                &self.fixed
+            }
+
+            fn fixed_region(&self) -> Option<&Region> {
+                self.fixed_region.as_ref()
+            }
+
+            fn muted(&self) -> bool {
+                self.muted
+            }
+
+            fn layer_name(&self) -> Option<&str> {
+                self.name.as_deref()
+            }
+        }
+    };
+}
+
+layer! {
+    /// Moves the handle as one rigid body.
+    ///
+    /// ```
+    /// use tombolo_deform::surface::{Edit, Translate};
+    ///
+    /// let edit = Edit::Translate(Translate { features: vec!["outlet".into()], by: [0.0, 0.0, 0.1], ..Translate::default() });
+    /// assert_eq!(edit.name(), "translate");
+    /// ```
+    #[derive(Default)]
+    pub struct Translate {
+        /// How far the handle moves along x, y and z, in units of the mesh.
+        pub by: Vector,
+        /// How smoothly the surface between handle and fixed parts follows.
+        #[serde(default)]
+        pub harmonic_order: HarmonicOrder,
+    }
+}
+
+layer! {
+    /// Turns the handle as one rigid body about an axis.
+    #[derive(Default)]
+    pub struct Rotate {
+        /// The direction of the axis, of any length but 0.
+        pub axis: Vector,
+        /// The angle in degrees, counter-clockwise seen against the axis (right-hand rule). Multiples of 90 are exact.
+        pub degrees: f64,
+        /// A point of the axis. Left out or null, it is the centre of the handle's bounding box in the shape that the edits
+        /// before this one have reached.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub center: Option<Vector>,
+        /// How smoothly the surface between handle and fixed parts follows.
+        #[serde(default)]
+        pub harmonic_order: HarmonicOrder,
+    }
+}
+
+layer! {
+    /// Scales the handle along the axes about a centre, as one body.
+    #[derive(Default)]
+    pub struct ScaleDirection {
+        /// The factors along x, y and z; 1 leaves an axis as it is.
+        pub factors: Vector,
+        /// The point that stays in place. Left out or null, it is the centre of the handle's bounding box in the shape that the
+        /// edits before this one have reached.
+        #[serde(default)]
+        pub center: Option<Vector>,
+        /// How smoothly the surface between handle and fixed parts follows.
+        #[serde(default)]
+        pub harmonic_order: HarmonicOrder,
+    }
+}
+
+layer! {
+    /// Moves the handle along its surface normals: outward for a positive distance.
+    #[derive(Default)]
+    pub struct ScaleNormals {
+        /// How far each vertex of the handle moves along its normal, in units of the mesh; negative moves inward. The normal of
+        /// a vertex is the area-weighted mean of the normals of the handle's own faces around it.
+        pub distance: f64,
+        /// How smoothly the surface between handle and fixed parts follows.
+        #[serde(default)]
+        pub harmonic_order: HarmonicOrder,
+    }
+}
+
+layer! {
+    /// Moves the handle by a matrix about a centre and a translation: `x` goes to `matrix (x - center) + center + translation`.
+    #[derive(Default)]
+    pub struct Affine {
+        /// The rows of the matrix. It may be singular: what is flattened is the guard's business.
+        pub matrix: [Vector; 3],
+        /// The translation after it, in units of the mesh.
+        #[serde(default)]
+        pub translation: Vector,
+        /// The point that the matrix leaves in place. Left out or null, it is the centre of the handle's bounding box in the
+        /// shape that the edits before this one have reached.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub center: Option<Vector>,
+        /// How smoothly the surface between handle and fixed parts follows.
+        #[serde(default)]
+        pub harmonic_order: HarmonicOrder,
+    }
+}
+
+layer! {
+    /// Adds a displacement made elsewhere to what the edits before it have reached.
+    ///
+    /// What is imported is exact: vertices that are not named do not move, and nothing follows. Without `features` and `region`
+    /// every named vertex moves; with them, those in the handle alone.
+    pub struct Displacement {
+        /// A file that holds the displacement: `.vtp`, `.vtu` or `.vtk` with the point array `displacement`, or plain text. A
+        /// relative one lies beside the JSON file that names it. Only files name files: an order that comes over the network
+        /// must hold the numbers.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub file: Option<String>,
+        /// The vertices that move, by mesh vertex numbers, where no file is given.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        pub vertices: Vec<u32>,
+        /// How far each of them moves along x, y and z, in units of the mesh.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        pub values: Vec<Vector>,
+        /// A factor for all of them.
+        #[serde(default = "one", skip_serializing_if = "is_one")]
+        pub scale: f64,
+    }
+}
+
+layer! {
+    /// Drags the surface by its skeleton: each vertex follows the part of the skeleton that carries it.
+    ///
+    /// Features and region say which vertices follow; without them, all do. What is fixed is held exactly, and the motion fades
+    /// out towards it.
+    #[derive(Default)]
+    pub struct Skeleton {
+        /// A place in the reference shape: the node of the reference skeleton nearest to it is dragged.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub at: Option<Vector>,
+        /// How far it is dragged along x, y and z, in units of the mesh.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub by: Option<Vector>,
+        /// Several drags at once, in place of `at` and `by`.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        pub moves: Vec<SkeletonMove>,
+        /// How the surface follows its skeleton.
+        #[serde(default)]
+        pub skinning: Skinning,
+    }
+}
+
+/// A drag of one node of the skeleton.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Translate {
-    /// The features that make up the handle: all of them move together.
-    #[serde(deserialize_with = "at_least_one")]
-    #[schemars(length(min = 1))]
-    pub features: Vec<String>,
-    /// The features held where they are. A vertex that is also in the handle stays fixed.
-    #[serde(default)]
-    pub fixed: Vec<String>,
-    /// How far the handle moves along x, y and z, in units of the mesh.
+pub struct SkeletonMove {
+    /// A place in the reference shape: the node of the reference skeleton nearest to it is dragged.
+    pub at: Vector,
+    /// How far it is dragged along x, y and z, in units of the mesh.
     pub by: Vector,
-    /// How smoothly the surface between handle and fixed features follows.
-    #[serde(default)]
-    pub harmonic_order: HarmonicOrder,
 }
 
-/// Moves features along their surface normals: outward for a positive distance.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ScaleNormals {
-    /// The features that make up the handle.
-    #[serde(deserialize_with = "at_least_one")]
-    #[schemars(length(min = 1))]
-    pub features: Vec<String>,
-    /// The features held where they are. A vertex that is also in the handle stays fixed.
-    #[serde(default)]
-    pub fixed: Vec<String>,
-    /// How far each vertex of the handle moves along its normal, in units of the mesh; negative moves inward. The normal of a
-    /// vertex is the area-weighted mean of the normals of the handle's own faces around it.
-    pub distance: f64,
-    /// How smoothly the surface between handle and fixed features follows.
-    #[serde(default)]
-    pub harmonic_order: HarmonicOrder,
+/// How the surface follows its skeleton.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Skinning {
+    /// With the rotation of the skeleton too, blended along its arc length: cross-sections keep their shape.
+    #[default]
+    Smooth,
+    /// With the translation of the nearest node alone.
+    Nearest,
 }
 
-/// Scales features along the axes about a centre.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ScaleDirection {
-    /// The features that make up the handle: they are scaled as one body.
-    #[serde(deserialize_with = "at_least_one")]
-    #[schemars(length(min = 1))]
-    pub features: Vec<String>,
-    /// The features held where they are. A vertex that is also in the handle stays fixed.
-    #[serde(default)]
-    pub fixed: Vec<String>,
-    /// The factors along x, y and z; 1 leaves an axis as it is.
-    pub factors: Vector,
-    /// The point that stays in place. Left out or null, it is the centre of the handle's bounding box in the shape that the
-    /// edits before this one have reached.
-    #[serde(default)]
-    pub center: Option<Vector>,
-    /// How smoothly the surface between handle and fixed features follows.
-    #[serde(default)]
-    pub harmonic_order: HarmonicOrder,
+impl Default for Displacement {
+    /// Nothing, at a scale of 1.
+    fn default() -> Self {
+        Self {
+            features: Vec::new(),
+            region: None,
+            fixed: Vec::new(),
+            fixed_region: None,
+            file: None,
+            vertices: Vec::new(),
+            values: Vec::new(),
+            scale: 1.0,
+            muted: false,
+            name: None,
+        }
+    }
+}
+
+impl Skeleton {
+    /// The drags, however they were given.
+    #[must_use]
+    pub fn moves(&self) -> Vec<SkeletonMove> {
+        let single = self.at.zip(self.by).map(|(at, by)| SkeletonMove { at, by });
+        single.into_iter().chain(self.moves.iter().copied()).collect()
+    }
 }
 
 /// The order k of the polyharmonic equation that the displacement of the free surface solves, 1 to 3; a number in JSON.
@@ -147,88 +342,96 @@ impl JsonSchema for HarmonicOrder {
     }
 }
 
+/// What every edit has.
+trait Layer {
+    fn features(&self) -> &[String];
+    fn region(&self) -> Option<&Region>;
+    fn fixed(&self) -> &[String];
+    fn fixed_region(&self) -> Option<&Region>;
+    fn muted(&self) -> bool;
+    fn layer_name(&self) -> Option<&str>;
+}
+
 impl Edit {
     /// The name of the edit, as JSON has it.
     #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
             Edit::Translate(_) => "translate",
-            Edit::ScaleNormals(_) => "scale_normals",
+            Edit::Rotate(_) => "rotate",
             Edit::ScaleDirection(_) => "scale_direction",
+            Edit::ScaleNormals(_) => "scale_normals",
+            Edit::Affine(_) => "affine",
+            Edit::Displacement(_) => "displacement",
+            Edit::Skeleton(_) => "skeleton",
+        }
+    }
+
+    fn layer(&self) -> &dyn Layer {
+        match self {
+            Edit::Translate(edit) => edit,
+            Edit::Rotate(edit) => edit,
+            Edit::ScaleDirection(edit) => edit,
+            Edit::ScaleNormals(edit) => edit,
+            Edit::Affine(edit) => edit,
+            Edit::Displacement(edit) => edit,
+            Edit::Skeleton(edit) => edit,
         }
     }
 
     /// The features that make up the handle.
     #[must_use]
     pub fn features(&self) -> &[String] {
-        match self {
-            Edit::Translate(edit) => &edit.features,
-            Edit::ScaleNormals(edit) => &edit.features,
-            Edit::ScaleDirection(edit) => &edit.features,
-        }
+        self.layer().features()
+    }
+
+    /// The region that makes up the handle, or cuts it out of the features.
+    #[must_use]
+    pub fn region(&self) -> Option<&Region> {
+        self.layer().region()
     }
 
     /// The features held fixed.
     #[must_use]
     pub fn fixed(&self) -> &[String] {
-        match self {
-            Edit::Translate(edit) => &edit.fixed,
-            Edit::ScaleNormals(edit) => &edit.fixed,
-            Edit::ScaleDirection(edit) => &edit.fixed,
-        }
+        self.layer().fixed()
     }
 
-    /// The order of the polyharmonic equation.
+    /// The region held fixed.
     #[must_use]
-    pub fn harmonic_order(&self) -> HarmonicOrder {
+    pub fn fixed_region(&self) -> Option<&Region> {
+        self.layer().fixed_region()
+    }
+
+    /// Whether the edit is passed over.
+    #[must_use]
+    pub fn muted(&self) -> bool {
+        self.layer().muted()
+    }
+
+    /// The name that the layer was given.
+    #[must_use]
+    pub fn layer_name(&self) -> Option<&str> {
+        self.layer().layer_name()
+    }
+
+    /// The order of the polyharmonic equation; `None` for edits where nothing follows by it.
+    #[must_use]
+    pub fn harmonic_order(&self) -> Option<HarmonicOrder> {
         match self {
-            Edit::Translate(edit) => edit.harmonic_order,
-            Edit::ScaleNormals(edit) => edit.harmonic_order,
-            Edit::ScaleDirection(edit) => edit.harmonic_order,
+            Edit::Translate(edit) => Some(edit.harmonic_order),
+            Edit::Rotate(edit) => Some(edit.harmonic_order),
+            Edit::ScaleDirection(edit) => Some(edit.harmonic_order),
+            Edit::ScaleNormals(edit) => Some(edit.harmonic_order),
+            Edit::Affine(edit) => Some(edit.harmonic_order),
+            Edit::Displacement(_) | Edit::Skeleton(_) => None,
         }
     }
 
-    /// Checks what can be checked without a surface: that there is a handle and that every number is finite.
-    ///
-    /// # Errors
-    /// [`InvalidEdit`], naming the field.
-    pub fn validate(&self) -> Result<(), InvalidEdit> {
-        if self.features().is_empty() {
-            return Err(InvalidEdit::NoFeatures);
-        }
-        let numbers = |field: &'static str, values: &[f64]| match values.iter().position(|value| !value.is_finite()) {
-            Some(index) if values.len() > 1 => {
-                Err(InvalidEdit::NotFinite { field: format!("{field}[{index}]"), value: values[index] })
-            }
-            Some(index) => Err(InvalidEdit::NotFinite { field: field.to_string(), value: values[index] }),
-            None => Ok(()),
-        };
-        match self {
-            Edit::Translate(edit) => numbers("by", &edit.by),
-            Edit::ScaleNormals(edit) => numbers("distance", &[edit.distance]),
-            Edit::ScaleDirection(edit) => {
-                numbers("factors", &edit.factors)?;
-                edit.center.map_or(Ok(()), |center| numbers("center", &center))
-            }
-        }
+    /// Whether the edit acts on the whole surface where it names neither features nor a region.
+    pub(super) fn may_take_all(&self) -> bool {
+        matches!(self, Edit::Displacement(_) | Edit::Skeleton(_))
     }
-}
-
-/// What is wrong with an edit whatever the surface.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum InvalidEdit {
-    /// The list of features is empty.
-    #[error("features: the list is empty; at least one feature must be named")]
-    NoFeatures,
-    /// A number is NaN or infinite.
-    #[error("{field}: {value} is not a finite number")]
-    NotFinite {
-        /// The field, and the place in it.
-        field: String,
-        /// The number.
-        value: f64,
-    },
 }
 
 fn at_least_one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<String>, D::Error> {
@@ -237,6 +440,18 @@ fn at_least_one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<String
         return Err(serde::de::Error::invalid_length(0, &"the name of at least one feature"));
     }
     Ok(names)
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn is_one(value: &f64) -> bool {
+    *value == 1.0
 }
 
 #[cfg(test)]
@@ -251,12 +466,12 @@ mod tests {
     fn the_json_of_an_edit_reads_and_writes_back() {
         let json = r#"{"translate":{"features":["a","b"],"fixed":["c"],"by":[1.0,-2.5,0.1],"harmonic_order":3}}"#;
         let edit: Edit = serde_json::from_str(json).unwrap();
-        assert_eq!(edit.harmonic_order(), HarmonicOrder::Triharmonic);
+        assert_eq!(edit.harmonic_order(), Some(HarmonicOrder::Triharmonic));
         assert_eq!(edit.fixed(), ["c"]);
         assert_eq!(serde_json::to_string(&edit).unwrap(), json);
 
         let short: Edit = serde_json::from_str(r#"{"scale_normals":{"features":["a"],"distance":-1}}"#).unwrap();
-        assert_eq!(short.harmonic_order(), HarmonicOrder::Biharmonic);
+        assert_eq!(short.harmonic_order(), Some(HarmonicOrder::Biharmonic));
         assert!(short.fixed().is_empty());
         assert_eq!(serde_json::from_str::<Edit>(&serde_json::to_string(&short).unwrap()).unwrap(), short);
     }
@@ -267,7 +482,7 @@ mod tests {
         assert!(error(r#"{"translate":{"features":["a"]}}"#).contains("missing field `by`"));
         assert!(error(r#"{"translate":{"features":["a"],"by":[0,0,0],"fix":[]}}"#).contains("unknown field `fix`"));
         assert!(error(r#"{"translate":{"features":["a"],"by":[0,0]}}"#).contains("array of length 3"));
-        assert!(error(r#"{"rotate":{}}"#).contains("unknown variant `rotate`"));
+        assert!(error(r#"{"turn":{}}"#).contains("unknown variant `turn`"));
         for order in ["0", "4", "-1"] {
             let json = format!(r#"{{"translate":{{"features":["a"],"by":[0,0,0],"harmonic_order":{order}}}}}"#);
             assert!(error(&json).contains(&format!("harmonic order {order} does not exist")));
@@ -277,21 +492,15 @@ mod tests {
     #[test]
     fn numbers_that_are_not_finite_are_refused_by_field() {
         let features = vec!["a".to_string()];
-        let scale = ScaleDirection {
-            features: features.clone(),
-            fixed: vec![],
-            factors: [1.0, f64::NAN, 1.0],
-            center: None,
-            harmonic_order: HarmonicOrder::default(),
-        };
+        let scale =
+            ScaleDirection { features: features.clone(), factors: [1.0, f64::NAN, 1.0], ..ScaleDirection::default() };
         let message = |edit: Edit| edit.validate().unwrap_err().to_string();
         assert_eq!(message(Edit::ScaleDirection(scale.clone())), "factors[1]: NaN is not a finite number");
         let scale = ScaleDirection { factors: [1.0; 3], center: Some([0.0, 0.0, f64::INFINITY]), ..scale };
         assert_eq!(message(Edit::ScaleDirection(scale)), "center[2]: inf is not a finite number");
-        let normals =
-            ScaleNormals { features, fixed: vec![], distance: f64::NEG_INFINITY, harmonic_order: Default::default() };
+        let normals = ScaleNormals { features, distance: f64::NEG_INFINITY, ..ScaleNormals::default() };
         assert_eq!(message(Edit::ScaleNormals(normals.clone())), "distance: -inf is not a finite number");
-        assert!(message(Edit::ScaleNormals(ScaleNormals { features: vec![], ..normals })).contains("at least one"));
+        assert!(message(Edit::ScaleNormals(ScaleNormals { features: vec![], ..normals })).contains("no handle"));
     }
 
     #[test]

@@ -3,11 +3,13 @@
 use std::sync::Arc;
 
 use super::features::Parts;
+use super::handle::{Handle, Role};
 use super::laplacian::Laplacian;
+use super::motion::{self, Motion};
 use super::polyharmonic::{NotFactored, Polyharmonic};
-use super::{Edit, HarmonicOrder, InvalidEdit, Surface, SurfaceError, UnknownFeature};
+use super::{Edit, EditError, HarmonicOrder, Surface, SurfaceError};
 use crate::mesh::Vector;
-use crate::vector::{add, cross, dot, subtract};
+use crate::vector::add;
 
 /// How many factored operators are kept, and how many numbers they may hold together (8 bytes each); the newest is always kept.
 const OPERATORS_KEPT: usize = 8;
@@ -54,6 +56,7 @@ const SLACKS: [f64; 4] = [1e-9, 1e-5, 1e-3, 1e-1];
 ///     fixed: vec!["x-min".into()],
 ///     by: [0.0, 0.0, 0.5],
 ///     harmonic_order: HarmonicOrder::Biharmonic,
+///     ..Translate::default()
 /// });
 /// let displacement = editor.displacement(&[edit])?;
 /// for (point, moved) in surface.points().iter().zip(&displacement) {
@@ -102,8 +105,11 @@ impl Editor {
     /// [`EditError`], naming the edit by its place in the stack, counted from 0. Nothing is evaluated unless every edit of the
     /// stack is valid on this surface.
     pub fn displacement(&mut self, stack: &[Edit]) -> Result<Vec<Vector>, EditError> {
-        let roles =
-            stack.iter().enumerate().map(|(edit, what)| self.roles(edit, what)).collect::<Result<Vec<_>, _>>()?;
+        let handles = stack
+            .iter()
+            .enumerate()
+            .map(|(edit, what)| Handle::find(&self.surface, what, edit))
+            .collect::<Result<Vec<_>, _>>()?;
         let Some((_, lower)) = stack.split_last() else {
             return Ok(vec![[0.0; 3]; self.surface.points().len()]);
         };
@@ -111,69 +117,33 @@ impl Editor {
             Some((edits, displacement)) if edits == lower => (lower.len(), displacement),
             _ => (0, vec![[0.0; 3]; self.surface.points().len()]),
         };
-        for (edit, roles) in roles.into_iter().enumerate().skip(done) {
+        for (edit, handle) in handles.iter().enumerate().skip(done) {
             if edit + 1 == stack.len() {
                 self.below = Some((lower.to_vec(), displacement.clone()));
             }
-            self.apply(edit, &stack[edit], roles, &mut displacement)?;
+            self.apply(edit, &stack[edit], handle, &mut displacement)?;
         }
         Ok(displacement)
     }
 
-    /// Which vertices an edit moves and which it holds.
-    fn roles(&self, edit: usize, what: &Edit) -> Result<Roles, EditError> {
-        what.validate().map_err(|source| EditError::Invalid { edit, name: what.name(), source })?;
-        let features = self.surface.features();
-        let find = |field: &'static str, names: &[String]| {
-            let found = names.iter().map(|name| features.index(name)).collect::<Result<Vec<u32>, _>>();
-            found.map_err(|source| EditError::UnknownFeature { edit, name: what.name(), field, source })
+    fn apply(
+        &mut self,
+        edit: usize,
+        what: &Edit,
+        handle: &Handle,
+        displacement: &mut [Vector],
+    ) -> Result<(), EditError> {
+        if what.muted() {
+            return Ok(());
+        }
+        let fields = match what {
+            Edit::Displacement(import) => axes(&motion::displacement(&self.surface, import, handle)),
+            Edit::Skeleton(_) => {
+                let reason = "this build does not carry skeletons onto the surface".into();
+                return Err(EditError::Skeleton { edit, reason });
+            }
+            _ => self.follow(edit, what, handle, displacement)?,
         };
-        let handle_features = find("features", what.features())?;
-        let mut roles = vec![Role::Free; self.surface.points().len()];
-        let mut handle = Vec::new();
-        for &feature in &handle_features {
-            for &vertex in features.vertices(feature) {
-                if std::mem::replace(&mut roles[vertex as usize], Role::Handle) == Role::Free {
-                    handle.push(vertex);
-                }
-            }
-        }
-        for feature in find("fixed", what.fixed())? {
-            for &vertex in features.vertices(feature) {
-                roles[vertex as usize] = Role::Fixed;
-            }
-        }
-        if handle.iter().all(|&vertex| roles[vertex as usize] == Role::Fixed) {
-            return Err(EditError::HandleFixed { edit, name: what.name(), features: what.features().to_vec() });
-        }
-        Ok(Roles { roles, handle, handle_features })
-    }
-
-    fn apply(&mut self, edit: usize, what: &Edit, roles: Roles, displacement: &mut [Vector]) -> Result<(), EditError> {
-        let shape: Vec<Vector> =
-            self.surface.points().iter().zip(displacement.iter()).map(|(point, moved)| add(*point, *moved)).collect();
-        let motion = self.handle_motion(edit, what, &roles, &shape)?;
-
-        let mut fields = [0, 1, 2].map(|_| vec![0.0; shape.len()]);
-        for (&vertex, motion) in roles.handle.iter().zip(&motion) {
-            if roles.roles[vertex as usize] == Role::Handle {
-                for axis in 0..3 {
-                    fields[axis][vertex as usize] = motion[axis];
-                }
-            }
-        }
-        let prescribed: Vec<bool> = roles.roles.iter().map(|role| *role != Role::Free).collect();
-        let order = what.harmonic_order();
-        self.choose_operator(order, prescribed).map_err(|reason| EditError::NotSolvable {
-            edit,
-            name: what.name(),
-            order,
-            reason,
-        })?;
-        if let Some(operator) = self.operators.last() {
-            operator.solve(&self.laplacians[operator.level()], &self.parts, &mut fields);
-        }
-
         for (vertex, moved) in displacement.iter_mut().enumerate() {
             let reference = self.surface.points()[vertex];
             for axis in 0..3 {
@@ -190,61 +160,37 @@ impl Editor {
         Ok(())
     }
 
-    /// How each vertex of the handle moves.
-    fn handle_motion(
-        &self,
+    /// The displacement along each axis of an edit whose handle makes a [`Motion`] that the free surface follows.
+    fn follow(
+        &mut self,
         edit: usize,
         what: &Edit,
-        roles: &Roles,
-        shape: &[Vector],
-    ) -> Result<Vec<Vector>, EditError> {
-        let handle = roles.handle.iter().map(|&vertex| shape[vertex as usize]);
-        match what {
-            Edit::Translate(translate) => Ok(vec![translate.by; roles.handle.len()]),
-            Edit::ScaleDirection(scale) => {
-                let center = scale.center.unwrap_or_else(|| box_center(handle.clone()));
-                Ok(handle
-                    .map(|point| [0, 1, 2].map(|axis| (scale.factors[axis] - 1.0) * (point[axis] - center[axis])))
-                    .collect())
-            }
-            Edit::ScaleNormals(scale) => {
-                let normals = self.handle_normals(roles, shape);
-                let moved = |&vertex: &u32| {
-                    if roles.roles[vertex as usize] == Role::Fixed {
-                        return Ok([0.0; 3]);
-                    }
-                    let normal = normals[vertex as usize];
-                    let length = dot(normal, normal).sqrt();
-                    if length > 0.0 && length.is_finite() {
-                        Ok(normal.map(|part| scale.distance * (part / length)))
-                    } else {
-                        Err(EditError::NoNormal { edit, vertex: self.surface.vertices()[vertex as usize] })
-                    }
-                };
-                roles.handle.iter().map(moved).collect()
-            }
-        }
-    }
-
-    /// The area-weighted sum of the normals of the handle's own triangles at each vertex, up to one common factor.
-    fn handle_normals(&self, roles: &Roles, shape: &[Vector]) -> Vec<Vector> {
-        let scale = shape.iter().flatten().fold(0.0f64, |largest, value| largest.max(value.abs()));
-        let scale = if scale > 0.0 { scale } else { 1.0 };
-        let face_features = self.surface.features().face_features();
-        let mut normals = vec![[0.0; 3]; shape.len()];
-        for (triangle, &face) in self.surface.triangles().iter().zip(self.surface.triangle_faces()) {
-            if !roles.handle_features.contains(&face_features[face as usize]) {
-                continue;
-            }
-            let [a, b, c] = triangle.map(|vertex| shape[vertex as usize].map(|value| value / scale));
-            let normal = cross(subtract(b, a), subtract(c, a));
-            for &vertex in triangle {
+        handle: &Handle,
+        displacement: &[Vector],
+    ) -> Result<[Vec<f64>; 3], EditError> {
+        let shape: Vec<Vector> =
+            self.surface.points().iter().zip(displacement).map(|(point, moved)| add(*point, *moved)).collect();
+        let mut fields = [0, 1, 2].map(|_| vec![0.0; shape.len()]);
+        let motion = Motion::new(&self.surface, what, edit, handle, &shape)?;
+        let (Some(motion), Some(order)) = (motion, what.harmonic_order()) else { return Ok(fields) };
+        for (&vertex, motion) in handle.vertices.iter().zip(&motion.displacement()) {
+            if handle.roles[vertex as usize] == Role::Handle {
                 for axis in 0..3 {
-                    normals[vertex as usize][axis] += normal[axis];
+                    fields[axis][vertex as usize] = motion[axis];
                 }
             }
         }
-        normals
+        let prescribed: Vec<bool> = handle.roles.iter().map(|role| *role != Role::Free).collect();
+        self.choose_operator(order, prescribed).map_err(|reason| EditError::NotSolvable {
+            edit,
+            name: what.name(),
+            order,
+            reason,
+        })?;
+        if let Some(operator) = self.operators.last() {
+            operator.solve(&self.laplacians[operator.level()], &self.parts, &mut fields);
+        }
+        Ok(fields)
     }
 
     /// Brings the operator for an order and a set of prescribed vertices to the end of the kept ones: kept from before, or
@@ -292,98 +238,6 @@ impl std::fmt::Debug for Editor {
     }
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Role {
-    Free,
-    Handle,
-    Fixed,
-}
-
-struct Roles {
-    roles: Vec<Role>,
-    /// Every vertex of the handle's features, the fixed ones among them too.
-    handle: Vec<u32>,
-    handle_features: Vec<u32>,
-}
-
-fn box_center(points: impl Iterator<Item = Vector>) -> Vector {
-    let mut lower = [f64::INFINITY; 3];
-    let mut upper = [f64::NEG_INFINITY; 3];
-    for point in points {
-        for axis in 0..3 {
-            lower[axis] = lower[axis].min(point[axis]);
-            upper[axis] = upper[axis].max(point[axis]);
-        }
-    }
-    [0, 1, 2].map(|axis| 0.5 * lower[axis] + 0.5 * upper[axis])
-}
-
-/// Why a stack of edits has no displacement. `edit` is the place of the edit in the stack, counted from 0.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum EditError {
-    /// An edit that is wrong whatever the surface.
-    #[error("edit {edit} ({name}): {source}")]
-    Invalid {
-        /// The place of the edit.
-        edit: usize,
-        /// Its kind.
-        name: &'static str,
-        /// What is wrong.
-        source: InvalidEdit,
-    },
-    /// A feature that the surface does not have.
-    #[error("edit {edit} ({name}): {field}: {source}")]
-    UnknownFeature {
-        /// The place of the edit.
-        edit: usize,
-        /// Its kind.
-        name: &'static str,
-        /// The field that names the feature: features or fixed.
-        field: &'static str,
-        /// The name, those like it, and the features there are.
-        source: UnknownFeature,
-    },
-    /// Fixed features hold the whole handle.
-    #[error("edit {edit} ({name}): every vertex of {features:?} is also in a fixed feature, so that nothing can move")]
-    HandleFixed {
-        /// The place of the edit.
-        edit: usize,
-        /// Its kind.
-        name: &'static str,
-        /// The features of the handle.
-        features: Vec<String>,
-    },
-    /// A vertex of the handle has no normal to move along.
-    #[error(
-        "edit {edit} (scale_normals): the faces of the handle around mesh vertex {vertex} have no area or cancel out, so that it has no normal"
-    )]
-    NoNormal {
-        /// The place of the edit.
-        edit: usize,
-        /// The vertex, by mesh vertex number.
-        vertex: u32,
-    },
-    /// A coordinate would overflow.
-    #[error("edit {edit} ({name}): mesh vertex {vertex} would leave the range of floating-point numbers")]
-    OutOfRange {
-        /// The place of the edit.
-        edit: usize,
-        /// Its kind.
-        name: &'static str,
-        /// The vertex, by mesh vertex number.
-        vertex: u32,
-    },
-    /// The polyharmonic equation could not be solved.
-    #[error("edit {edit} ({name}): the operator of harmonic order {order} could not be factored: {reason}")]
-    NotSolvable {
-        /// The place of the edit.
-        edit: usize,
-        /// Its kind.
-        name: &'static str,
-        /// The harmonic order.
-        order: HarmonicOrder,
-        /// Why.
-        reason: String,
-    },
+fn axes(vectors: &[Vector]) -> [Vec<f64>; 3] {
+    [0, 1, 2].map(|axis| vectors.iter().map(|vector| vector[axis]).collect())
 }

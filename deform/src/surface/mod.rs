@@ -81,14 +81,24 @@
 //! found by [`crate::quality`]. Surfaces that are no manifold can be extracted and looked at, but not edited.
 
 mod edit;
+mod edit_error;
+mod edit_validate;
 mod editor;
 mod extraction;
 mod faces;
 mod features;
+mod handle;
 mod laplacian;
+mod motion;
 mod polyharmonic;
+mod region;
 
-pub use edit::{Edit, HarmonicOrder, InvalidEdit, ScaleDirection, ScaleNormals, Translate};
-pub use editor::{EditError, Editor};
+pub use edit::{
+    Affine, Displacement, Edit, HarmonicOrder, Rotate, ScaleDirection, ScaleNormals, Skeleton, SkeletonMove, Skinning,
+    Translate,
+};
+pub use edit_error::{EditError, InvalidEdit};
+pub use editor::Editor;
 pub use extraction::{Surface, SurfaceError};
 pub use features::{FeatureSettings, Features, UnknownFeature};
+pub use region::{BoxRegion, HalfSpaceRegion, Region, RegionError, SphereRegion};

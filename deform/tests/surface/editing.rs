@@ -270,10 +270,9 @@ fn a_centre_can_be_given() {
     let mut editor = editor(&mesh);
     let edit = Edit::ScaleDirection(ScaleDirection {
         features: names(&shapes::BOX_FEATURES),
-        fixed: vec![],
         factors: [2.0, 0.0, -1.0],
         center: Some([1.0, 2.0, 3.0]),
-        harmonic_order: HarmonicOrder::Biharmonic,
+        ..ScaleDirection::default()
     });
     let displacement = editor.displacement(&[edit]).unwrap();
     for (point, moved) in editor.surface().points().iter().zip(&displacement) {
@@ -450,7 +449,7 @@ fn every_mistake_is_named_and_changes_nothing() {
     let error = refused(scale_normals(&["x-max"], &[], f64::INFINITY));
     assert_eq!(error.to_string(), "edit 1 (scale_normals): distance: inf is not a finite number");
     let error = refused(translate(&[], &[], [0.0; 3], order));
-    assert!(matches!(error, EditError::Invalid { edit: 1, source: InvalidEdit::NoFeatures, .. }));
+    assert!(matches!(error, EditError::Invalid { edit: 1, source: InvalidEdit::NoHandle, .. }));
 
     let error = refused(translate(&["x-max"], &["x-max", "x-min"], [1.0; 3], order));
     assert!(matches!(&error, EditError::HandleFixed { edit: 1, .. }), "{error}");

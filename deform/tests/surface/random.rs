@@ -36,9 +36,22 @@ fn edit() -> impl Strategy<Value = Edit> {
     let vector = || [absurd(), absurd(), absurd()];
     (features(), features(), order, vector(), proptest::option::of(vector()), 0..3).prop_map(
         |(features, fixed, harmonic_order, numbers, center, kind)| match kind {
-            0 => Edit::Translate(Translate { features, fixed, by: numbers, harmonic_order }),
-            1 => Edit::ScaleNormals(ScaleNormals { features, fixed, distance: numbers[0], harmonic_order }),
-            _ => Edit::ScaleDirection(ScaleDirection { features, fixed, factors: numbers, center, harmonic_order }),
+            0 => Edit::Translate(Translate { features, fixed, by: numbers, harmonic_order, ..Translate::default() }),
+            1 => Edit::ScaleNormals(ScaleNormals {
+                features,
+                fixed,
+                distance: numbers[0],
+                harmonic_order,
+                ..ScaleNormals::default()
+            }),
+            _ => Edit::ScaleDirection(ScaleDirection {
+                features,
+                fixed,
+                factors: numbers,
+                center,
+                harmonic_order,
+                ..ScaleDirection::default()
+            }),
         },
     )
 }

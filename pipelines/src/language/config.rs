@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use tombolo_deform::mesh::Vector;
 use tombolo_deform::quality::Guard;
 use tombolo_deform::schedule::{Every, Schedule};
-use tombolo_deform::surface::{Edit, ScaleDirection, ScaleNormals, Translate};
+use tombolo_deform::surface::{Affine, Displacement, Edit, Rotate, ScaleDirection, ScaleNormals, Skeleton, Translate};
 use tombolo_deform::volume::Deform;
 
 /// A whole configuration file.
@@ -216,9 +216,17 @@ pub enum Stage {
     /// An edit of the shape, for `order`.
     Translate(Translate),
     /// An edit of the shape, for `order`.
-    ScaleNormals(ScaleNormals),
+    Rotate(Rotate),
     /// An edit of the shape, for `order`.
     ScaleDirection(ScaleDirection),
+    /// An edit of the shape, for `order`.
+    ScaleNormals(ScaleNormals),
+    /// An edit of the shape, for `order`.
+    Affine(Affine),
+    /// An edit of the shape, for `order`.
+    Displacement(Displacement),
+    /// An edit of the shape, for `order`.
+    Skeleton(Skeleton),
     /// Orders the edits of the stages before it.
     Order(OrderStage),
     /// How the motion of the surface is carried into the volume. Only with `"on": "order"`.
@@ -246,8 +254,12 @@ impl Stage {
             Stage::Stream(_) => "stream",
             Stage::Write(_) => "write",
             Stage::Translate(_) => "translate",
-            Stage::ScaleNormals(_) => "scale_normals",
+            Stage::Rotate(_) => "rotate",
             Stage::ScaleDirection(_) => "scale_direction",
+            Stage::ScaleNormals(_) => "scale_normals",
+            Stage::Affine(_) => "affine",
+            Stage::Displacement(_) => "displacement",
+            Stage::Skeleton(_) => "skeleton",
             Stage::Order(_) => "order",
             Stage::Deform(_) => "deform",
             Stage::Guard(_) => "guard",
@@ -262,8 +274,12 @@ impl Stage {
     pub fn edit(&self) -> Option<Edit> {
         match self {
             Stage::Translate(edit) => Some(Edit::Translate(edit.clone())),
-            Stage::ScaleNormals(edit) => Some(Edit::ScaleNormals(edit.clone())),
+            Stage::Rotate(edit) => Some(Edit::Rotate(edit.clone())),
             Stage::ScaleDirection(edit) => Some(Edit::ScaleDirection(edit.clone())),
+            Stage::ScaleNormals(edit) => Some(Edit::ScaleNormals(edit.clone())),
+            Stage::Affine(edit) => Some(Edit::Affine(edit.clone())),
+            Stage::Displacement(edit) => Some(Edit::Displacement(edit.clone())),
+            Stage::Skeleton(edit) => Some(Edit::Skeleton(edit.clone())),
             _ => None,
         }
     }

@@ -170,7 +170,13 @@ impl Prepared {
             Stage::Statistics(stage) => Self::statistics(&stage.field, progress),
             Stage::Stream(stream) => self.stream(stream, progress),
             Stage::Write(write) => self.write(write, progress),
-            Stage::Translate(_) | Stage::ScaleNormals(_) | Stage::ScaleDirection(_) => {
+            Stage::Translate(_)
+            | Stage::Rotate(_)
+            | Stage::ScaleDirection(_)
+            | Stage::ScaleNormals(_)
+            | Stage::Affine(_)
+            | Stage::Displacement(_)
+            | Stage::Skeleton(_) => {
                 progress.edits.extend(stage.edit());
             }
             Stage::Order(order) => self.order(order, progress),

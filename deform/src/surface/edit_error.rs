@@ -1,0 +1,257 @@
+//! What can be wrong with an edit.
+
+use super::{HarmonicOrder, RegionError, UnknownFeature};
+use crate::mesh::Vector;
+
+/// What is wrong with an edit whatever the surface.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum InvalidEdit {
+    /// Neither features nor a region are given.
+    #[error("features: there is no handle; expected features, a region, or both")]
+    NoHandle,
+    /// A number is NaN or infinite.
+    #[error("{field}: {value} is not a finite number")]
+    NotFinite {
+        /// The field, and the place in it.
+        field: String,
+        /// The number.
+        value: f64,
+    },
+    /// A list that must hold something is empty.
+    #[error("{field}: the list is empty; expected {expected}")]
+    EmptyList {
+        /// The field.
+        field: String,
+        /// What it should hold.
+        expected: &'static str,
+    },
+    /// A direction has the length 0.
+    #[error("{field}: expected a direction, whose length is not 0")]
+    NoDirection {
+        /// The field.
+        field: String,
+    },
+    /// A box whose lower corner is above its upper one.
+    #[error("{field}: {lower} is above the upper corner's {upper}")]
+    TurnedBox {
+        /// The field, and the axis.
+        field: String,
+        /// The lower corner's coordinate.
+        lower: f64,
+        /// The upper corner's.
+        upper: f64,
+    },
+    /// A radius below 0.
+    #[error("{field}: {radius} is below 0")]
+    NegativeRadius {
+        /// The field.
+        field: String,
+        /// The radius.
+        radius: f64,
+    },
+    /// Two fields that exclude each other, or two of which one is needed.
+    #[error("{field}: expected either {first} or {second}")]
+    EitherOr {
+        /// The field at fault.
+        field: String,
+        /// One way to give it.
+        first: &'static str,
+        /// The other way.
+        second: &'static str,
+    },
+    /// Two lists that go together differ in length.
+    #[error("values: found {values} values for {vertices} vertices, expected one for each")]
+    Lengths {
+        /// How many vertices there are.
+        vertices: usize,
+        /// How many values.
+        values: usize,
+    },
+    /// A vertex is named twice.
+    #[error("vertices[{second}]: vertex {vertex} is also vertices[{first}]; expected each vertex once")]
+    VertexTwice {
+        /// The vertex, by mesh vertex number.
+        vertex: u32,
+        /// Where it stands first.
+        first: usize,
+        /// Where it stands again.
+        second: usize,
+    },
+    /// The name of a layer cannot be shown.
+    #[error("name: expected 1 to 200 visible characters")]
+    Name,
+}
+
+impl InvalidEdit {
+    /// The way to the fault from the edit's body, as in `region.box.lower[0]`.
+    #[must_use]
+    pub fn field(&self) -> String {
+        match self {
+            InvalidEdit::NoHandle => "features".into(),
+            InvalidEdit::NotFinite { field, .. }
+            | InvalidEdit::EmptyList { field, .. }
+            | InvalidEdit::NoDirection { field }
+            | InvalidEdit::TurnedBox { field, .. }
+            | InvalidEdit::NegativeRadius { field, .. }
+            | InvalidEdit::EitherOr { field, .. } => field.clone(),
+            InvalidEdit::Lengths { .. } => "values".into(),
+            InvalidEdit::VertexTwice { second, .. } => format!("vertices[{second}]"),
+            InvalidEdit::Name => "name".into(),
+        }
+    }
+}
+
+/// Refuses numbers that are not finite, naming the place in a field of several.
+pub(super) fn finite(field: &str, values: &[f64]) -> Result<(), InvalidEdit> {
+    match values.iter().position(|value| !value.is_finite()) {
+        Some(index) if values.len() > 1 => {
+            Err(InvalidEdit::NotFinite { field: format!("{field}[{index}]"), value: values[index] })
+        }
+        Some(index) => Err(InvalidEdit::NotFinite { field: field.to_string(), value: values[index] }),
+        None => Ok(()),
+    }
+}
+
+/// Why a stack of edits has no displacement. `edit` is the place of the edit in the stack, counted from 0.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum EditError {
+    /// An edit that is wrong whatever the surface.
+    #[error("edit {edit} ({name}): {source}")]
+    Invalid {
+        /// The place of the edit.
+        edit: usize,
+        /// Its kind.
+        name: &'static str,
+        /// What is wrong.
+        source: InvalidEdit,
+    },
+    /// A feature that the surface does not have.
+    #[error("edit {edit} ({name}): {field}: {source}")]
+    UnknownFeature {
+        /// The place of the edit.
+        edit: usize,
+        /// Its kind.
+        name: &'static str,
+        /// The field that names the feature: features or fixed.
+        field: &'static str,
+        /// The name, those like it, and the features there are.
+        source: UnknownFeature,
+    },
+    /// A region that does not fit the surface.
+    #[error("edit {edit} ({name}): {field}.{source}")]
+    Region {
+        /// The place of the edit.
+        edit: usize,
+        /// Its kind.
+        name: &'static str,
+        /// The field that holds the region: region or fixed_region.
+        field: &'static str,
+        /// What does not fit.
+        source: RegionError,
+    },
+    /// A region without a vertex of the surface.
+    #[error("edit {edit} ({name}): {field}: {}", empty(*nearest, *bounds))]
+    EmptyRegion {
+        /// The place of the edit.
+        edit: usize,
+        /// Its kind.
+        name: &'static str,
+        /// The field that holds the region: region or fixed_region.
+        field: &'static str,
+        /// The nearest mesh vertex, where it lies, and its distance from the region.
+        nearest: Option<(u32, Vector, f64)>,
+        /// The bounding box of the reference surface.
+        bounds: [Vector; 2],
+    },
+    /// No vertex of the features lies in the region.
+    #[error("edit {edit} ({name}): region: no vertex of {features:?} lies in it, though {vertices} other vertices do")]
+    NothingInCommon {
+        /// The place of the edit.
+        edit: usize,
+        /// Its kind.
+        name: &'static str,
+        /// The features.
+        features: Vec<String>,
+        /// How many vertices the region has.
+        vertices: usize,
+    },
+    /// Fixed parts hold the whole handle.
+    #[error("edit {edit} ({name}): every vertex of {handle} is also fixed, so that nothing can move")]
+    HandleFixed {
+        /// The place of the edit.
+        edit: usize,
+        /// Its kind.
+        name: &'static str,
+        /// The handle, in words.
+        handle: String,
+    },
+    /// A vertex of the handle has no normal to move along.
+    #[error(
+        "edit {edit} (scale_normals): the faces of the handle around mesh vertex {vertex} have no area or cancel out, so that it has no normal"
+    )]
+    NoNormal {
+        /// The place of the edit.
+        edit: usize,
+        /// The vertex, by mesh vertex number.
+        vertex: u32,
+    },
+    /// A displacement names a vertex that is not on the surface.
+    #[error("edit {edit} (displacement): vertices[{index}]: mesh vertex {vertex} is not on the surface")]
+    NotOnSurface {
+        /// The place of the edit.
+        edit: usize,
+        /// The place in its list.
+        index: usize,
+        /// The vertex, by mesh vertex number.
+        vertex: u32,
+    },
+    /// A displacement is still in a file.
+    #[error(
+        "edit {edit} (displacement): file: {file:?} has not been read; only an edit in a file can name a file, expected vertices and values"
+    )]
+    Unread {
+        /// The place of the edit.
+        edit: usize,
+        /// The file.
+        file: String,
+    },
+    /// A surface that has no skeleton, or an edit that has none to drag.
+    #[error("edit {edit} (skeleton): {reason}")]
+    Skeleton {
+        /// The place of the edit.
+        edit: usize,
+        /// Why.
+        reason: String,
+    },
+    /// A coordinate would overflow.
+    #[error("edit {edit} ({name}): mesh vertex {vertex} would leave the range of floating-point numbers")]
+    OutOfRange {
+        /// The place of the edit.
+        edit: usize,
+        /// Its kind.
+        name: &'static str,
+        /// The vertex, by mesh vertex number.
+        vertex: u32,
+    },
+    /// The polyharmonic equation could not be solved.
+    #[error("edit {edit} ({name}): the operator of harmonic order {order} could not be factored: {reason}")]
+    NotSolvable {
+        /// The place of the edit.
+        edit: usize,
+        /// Its kind.
+        name: &'static str,
+        /// The harmonic order.
+        order: HarmonicOrder,
+        /// Why.
+        reason: String,
+    },
+}
+
+fn empty(nearest: Option<(u32, Vector, f64)>, [lower, upper]: [Vector; 2]) -> String {
+    let nearest = nearest.map_or_else(String::new, |(vertex, point, distance)| {
+        format!("; the nearest, mesh vertex {vertex} at {point:?}, is {distance:.6} away")
+    });
+    format!("no vertex of the surface lies in it{nearest}; the surface reaches from {lower:?} to {upper:?}")
+}

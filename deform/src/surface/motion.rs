@@ -1,0 +1,195 @@
+//! How the vertices of a handle move.
+
+use super::handle::{Handle, Role, bounds};
+use super::{Displacement, Edit, EditError, Surface};
+use crate::mesh::Vector;
+use crate::vector::{add, cross, dot, scale, subtract};
+
+/// The motion of a handle as a sum of scalar fields on its vertices times constant vectors:
+/// `displacement(v) = sum_j bases[j][v] * coefficients[j]`, in the order of [`Handle::vertices`].
+///
+/// Since what follows depends on the handle's motion linearly, each base need be carried to the free surface once, and another
+/// amount (another angle, another factor) of the same edit costs a sum for each vertex.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Motion {
+    /// For each base its value at each vertex of the handle, of the order of 1.
+    pub bases: Vec<Vec<f64>>,
+    /// For each base the vector that it is multiplied with.
+    pub coefficients: Vec<Vector>,
+}
+
+impl Motion {
+    /// The motion that `edit` asks of its handle on the shape that the edits before it have reached; `None` for edits that give
+    /// each vertex its own displacement ([`displacement`], skeletons).
+    ///
+    /// # Errors
+    /// [`EditError::NoNormal`].
+    pub fn new(
+        surface: &Surface,
+        edit: &Edit,
+        place: usize,
+        handle: &Handle,
+        shape: &[Vector],
+    ) -> Result<Option<Self>, EditError> {
+        Ok(Some(match edit {
+            Edit::Translate(edit) => {
+                Self { bases: vec![vec![1.0; handle.vertices.len()]], coefficients: vec![edit.by] }
+            }
+            Edit::Rotate(edit) => {
+                Self::linear(handle, shape, edit.center, rotation_minus_identity(edit.axis, edit.degrees), [0.0; 3])
+            }
+            Edit::ScaleDirection(edit) => {
+                let [x, y, z] = edit.factors.map(|factor| factor - 1.0);
+                Self::linear(handle, shape, edit.center, [[x, 0.0, 0.0], [0.0, y, 0.0], [0.0, 0.0, z]], [0.0; 3])
+            }
+            Edit::Affine(edit) => {
+                let mut columns = [0, 1, 2].map(|column| edit.matrix.map(|row| row[column]));
+                for (axis, column) in columns.iter_mut().enumerate() {
+                    column[axis] -= 1.0;
+                }
+                Self::linear(handle, shape, edit.center, columns, edit.translation)
+            }
+            Edit::ScaleNormals(edit) => {
+                let normals = handle_normals(surface, handle, shape, place)?;
+                let along = |axis: usize| {
+                    let mut vector = [0.0; 3];
+                    vector[axis] = edit.distance;
+                    vector
+                };
+                Self {
+                    bases: [0, 1, 2].map(|axis| normals.iter().map(|normal| normal[axis]).collect()).to_vec(),
+                    coefficients: [0, 1, 2].map(along).to_vec(),
+                }
+            }
+            Edit::Displacement(_) | Edit::Skeleton(_) => return Ok(None),
+        }))
+    }
+
+    /// `displacement(x) = columns (x - center) + translation`.
+    fn linear(
+        handle: &Handle,
+        shape: &[Vector],
+        center: Option<Vector>,
+        columns: [Vector; 3],
+        translation: Vector,
+    ) -> Self {
+        let points = || handle.vertices.iter().map(|&vertex| shape[vertex as usize]);
+        let [lower, upper] = bounds(points());
+        let center = center.unwrap_or_else(|| [0, 1, 2].map(|axis| 0.5 * lower[axis] + 0.5 * upper[axis]));
+        let reach = [lower, upper]
+            .map(|corner| subtract(corner, center))
+            .as_flattened()
+            .iter()
+            .fold(0.0f64, |largest, value| largest.max(value.abs()));
+        // A power of two changes no digit.
+        let unit = if reach.is_normal() { reach.log2().ceil().clamp(-1000.0, 1000.0).exp2() } else { 1.0 };
+        let mut motion = Self {
+            bases: [0, 1, 2]
+                .map(|axis| points().map(|point| (point[axis] - center[axis]) / unit).collect::<Vec<f64>>())
+                .to_vec(),
+            coefficients: columns.map(|column| scale(column, unit)).to_vec(),
+        };
+        if translation != [0.0; 3] {
+            motion.bases.push(vec![1.0; handle.vertices.len()]);
+            motion.coefficients.push(translation);
+        }
+        motion
+    }
+
+    /// The displacement of each vertex of the handle.
+    pub fn displacement(&self) -> Vec<Vector> {
+        let count = self.bases.first().map_or(0, Vec::len);
+        let mut sum = vec![[0.0; 3]; count];
+        for (base, &coefficient) in self.bases.iter().zip(&self.coefficients) {
+            for (sum, &value) in sum.iter_mut().zip(base) {
+                *sum = add(*sum, scale(coefficient, value));
+            }
+        }
+        sum
+    }
+}
+
+/// The columns of `R - 1` for the rotation `R` about an axis through the origin (Rodrigues), without the digits that the
+/// difference would lose where the angle is small.
+fn rotation_minus_identity(axis: Vector, degrees: f64) -> [Vector; 3] {
+    // In units of its largest part, so that no length overflows.
+    let largest = axis.iter().fold(0.0f64, |largest, part| largest.max(part.abs()));
+    let axis = axis.map(|part| part / largest);
+    let axis = scale(axis, 1.0 / dot(axis, axis).sqrt());
+    let (sine, versine) = sine_and_versine(degrees);
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|unit| {
+        let turned = cross(axis, unit);
+        add(scale(turned, sine), scale(cross(axis, turned), versine))
+    })
+}
+
+/// `sin` and `1 - cos` of an angle in degrees, exact at multiples of 90.
+fn sine_and_versine(degrees: f64) -> (f64, f64) {
+    let turn = degrees % 360.0;
+    let quarter = (turn / 90.0).round();
+    let rest = turn - 90.0 * quarter;
+    let (sine, cosine) = rest.to_radians().sin_cos();
+    let half = (0.5 * rest).to_radians().sin();
+    let versine = 2.0 * half * half;
+    match quarter.rem_euclid(4.0) as u8 {
+        0 => (sine, versine),
+        1 => (cosine, 1.0 + sine),
+        2 => (-sine, 1.0 + cosine),
+        _ => (-cosine, 1.0 - sine),
+    }
+}
+
+/// The unit normal of each vertex of the handle: the area-weighted mean of the normals of the handle's own triangles around it,
+/// or of all triangles around it where none of its triangles is wholly in the handle. Fixed vertices need none and get 0.
+fn handle_normals(
+    surface: &Surface,
+    handle: &Handle,
+    shape: &[Vector],
+    place: usize,
+) -> Result<Vec<Vector>, EditError> {
+    let largest = shape.iter().flatten().fold(0.0f64, |largest, value| largest.max(value.abs()));
+    let unit = if largest > 0.0 { largest } else { 1.0 };
+    let mut own = vec![[0.0; 3]; shape.len()];
+    let mut has_own = vec![false; shape.len()];
+    let mut all = vec![[0.0; 3]; shape.len()];
+    for (triangle, &face) in surface.triangles().iter().zip(surface.triangle_faces()) {
+        let [a, b, c] = triangle.map(|vertex| shape[vertex as usize].map(|value| value / unit));
+        let normal = cross(subtract(b, a), subtract(c, a));
+        for &vertex in triangle {
+            let vertex = vertex as usize;
+            all[vertex] = add(all[vertex], normal);
+            if handle.faces[face as usize] {
+                own[vertex] = add(own[vertex], normal);
+                has_own[vertex] = true;
+            }
+        }
+    }
+    let unit_normal = |&vertex: &u32| {
+        let local = vertex as usize;
+        if handle.roles[local] == Role::Fixed {
+            return Ok([0.0; 3]);
+        }
+        let normal = if has_own[local] { own[local] } else { all[local] };
+        let length = dot(normal, normal).sqrt();
+        if length > 0.0 && length.is_finite() {
+            Ok(normal.map(|part| part / length))
+        } else {
+            Err(EditError::NoNormal { edit: place, vertex: surface.vertices()[local] })
+        }
+    };
+    handle.vertices.iter().map(unit_normal).collect()
+}
+
+/// What an imported displacement adds to each surface vertex.
+pub(super) fn displacement(surface: &Surface, edit: &Displacement, handle: &Handle) -> Vec<Vector> {
+    let mut displacement = vec![[0.0; 3]; surface.points().len()];
+    for (vertex, &value) in edit.vertices.iter().zip(&edit.values) {
+        // Known to be on the surface since the handle was found.
+        if let Ok(local) = surface.vertices().binary_search(vertex)
+            && handle.roles[local] == Role::Handle
+        {
+            displacement[local] = scale(value, edit.scale);
+        }
+    }
+    displacement
+}
