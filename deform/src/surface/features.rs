@@ -6,16 +6,17 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::SurfaceError;
-use super::extraction::polygon_normal;
 use super::faces::TagLookup;
+use super::sharp_edges::parts_between_sharp_edges;
+pub(super) use super::sharp_edges::{Parts, edges};
 use crate::mesh::{Cells, FeatureSource, Vector};
-use crate::vector::{cross, dot};
 
 /// How features are found where the mesh does not name them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FeatureSettings {
-    /// Two faces belong to different features where the angle between their normals is larger than this, in degrees.
+    /// Two faces belong to different features where the angle between their normals is this or larger, in degrees. 0 makes every
+    /// face a feature, and at 180 no edge is sharp.
     #[schemars(range(min = 0.0, max = 180.0))]
     pub sharp_angle_degrees: f64,
 }
@@ -192,101 +193,9 @@ fn named_features(tags: Vec<Option<i64>>, names: &[(i64, String)]) -> (Vec<Strin
     (found, face_features)
 }
 
-/// Connected parts of the surface between edges where the normals turn by more than the angle, or where more or fewer than two
-/// faces meet. A face without area turns nothing.
 fn sharp_features(points: &[Vector], faces: &Cells, settings: &FeatureSettings) -> (Vec<String>, Vec<u32>) {
-    let scale = points.iter().flatten().fold(0.0f64, |largest, value| largest.max(value.abs()));
-    let scaled: Vec<Vector> = match scale {
-        0.0 => points.to_vec(),
-        scale => points.iter().map(|point| point.map(|value| value / scale)).collect(),
-    };
-    let normals: Vec<Vector> = faces.iter().map(|(_, vertices)| polygon_normal(&scaled, vertices)).collect();
-    let limit = settings.sharp_angle_degrees.to_radians();
-    let mut parts = Parts::new(faces.len());
-    for pair in edges((0..faces.len()).map(|face| faces.vertices(face))).chunk_by(|a, b| a.ends == b.ends) {
-        if let [first, second] = pair {
-            let a = normals[first.face as usize];
-            // Faces that walk an edge the same way have opposite sides; their normals are compared as if they had not.
-            let b =
-                normals[second.face as usize].map(|part| if first.forward == second.forward { -part } else { part });
-            let turn = cross(a, b);
-            if dot(turn, turn).sqrt().atan2(dot(a, b)) <= limit {
-                parts.join(first.face, second.face);
-            }
-        }
-    }
-    let mut numbers: Vec<Option<u32>> = vec![None; faces.len()];
-    let mut count = 0;
-    let face_features = (0..faces.len() as u32)
-        .map(|face| {
-            *numbers[parts.root(face) as usize].get_or_insert_with(|| {
-                count += 1;
-                count - 1
-            })
-        })
-        .collect();
+    let (count, face_features) = parts_between_sharp_edges(points, faces, settings);
     ((1..=count).map(|number| format!("feature-{number}")).collect(), face_features)
-}
-
-/// One face's side at an edge; `ends` rise, `forward` where the face walks from the lower to the higher.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct EdgeSide {
-    pub ends: [u32; 2],
-    pub face: u32,
-    pub forward: bool,
-}
-
-/// The sides of all edges, those of one edge together, in rising order.
-pub(super) fn edges<'a>(faces: impl Iterator<Item = &'a [u32]> + Clone) -> Vec<EdgeSide> {
-    let sides_of = |face: &'a [u32]| {
-        let next = face.iter().cycle().skip(1);
-        face.iter().zip(next).map(|(&a, &b)| (a.min(b), a.max(b), a < b))
-    };
-    let vertex_count = faces.clone().flatten().max().map_or(0, |&highest| highest as usize + 1);
-    let mut starts = vec![0usize; vertex_count + 1];
-    for (low, ..) in faces.clone().flat_map(sides_of) {
-        starts[low as usize + 1] += 1;
-    }
-    for vertex in 0..vertex_count {
-        starts[vertex + 1] += starts[vertex];
-    }
-    let mut sides = vec![EdgeSide { ends: [0; 2], face: 0, forward: false }; starts[vertex_count]];
-    let mut next = starts.clone();
-    for (face, vertices) in faces.enumerate() {
-        for (low, high, forward) in sides_of(vertices) {
-            sides[next[low as usize]] = EdgeSide { ends: [low, high], face: face as u32, forward };
-            next[low as usize] += 1;
-        }
-    }
-    for vertex in 0..vertex_count {
-        sides[starts[vertex]..starts[vertex + 1]].sort_unstable();
-    }
-    sides
-}
-
-/// Disjoint sets of numbers; the root of a set is its lowest member.
-pub(super) struct Parts {
-    parents: Vec<u32>,
-}
-
-impl Parts {
-    pub fn new(count: usize) -> Self {
-        Self { parents: (0..count as u32).collect() }
-    }
-
-    pub fn root(&mut self, mut member: u32) -> u32 {
-        while self.parents[member as usize] != member {
-            let grandparent = self.parents[self.parents[member as usize] as usize];
-            self.parents[member as usize] = grandparent;
-            member = grandparent;
-        }
-        member
-    }
-
-    pub fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.parents[a.max(b) as usize] = a.min(b);
-    }
 }
 
 fn feature_vertices(count: usize, face_features: &[u32], faces: &Cells) -> (Vec<usize>, Vec<u32>) {

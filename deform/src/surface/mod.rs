@@ -92,6 +92,7 @@ mod laplacian;
 mod motion;
 mod polyharmonic;
 mod region;
+mod sharp_edges;
 
 pub use edit::{
     Affine, Displacement, Edit, HarmonicOrder, Rotate, ScaleDirection, ScaleNormals, Skeleton, SkeletonMove, Skinning,
