@@ -21,7 +21,7 @@ use crate::{
     settings::{ExecuteError, FinalizeError, InitializeError, MeshMotion, Settings, Steering, Step},
     stages::Pipelines,
     steering::{Defaults, Log, Moment, Parameters, Queue, Received, Source, Steerer, Timed},
-    stream::{CommandSink, Hub, Server},
+    stream::{CommandSink, Hub, ReferenceSurface, Server},
 };
 
 /// Links a solver to its viewers and to the orders that change its shape.
@@ -63,6 +63,7 @@ struct Told {
     channel: String,
     fields: Value,
     features: Value,
+    surface: Value,
 }
 
 /// Where the time went.
@@ -407,6 +408,11 @@ impl Adaptor {
         self.told.fields = fields.collect();
         if let SteeredMesh::Steered(_, surface) = &self.mesh {
             self.told.features = features(surface);
+            if let Some(hub) = &self.hub {
+                let surface = ReferenceSurface::new(Arc::clone(surface));
+                self.told.surface = surface.described();
+                hub.offer_surface(Arc::new(surface));
+            }
         }
         self.describe();
         self.tell_conditions();
@@ -443,6 +449,7 @@ impl Adaptor {
             "views": self.pipelines.views(),
             "channel": self.told.channel,
             "features": list(&self.told.features),
+            "surface": self.told.surface,
             "fields": list(&self.told.fields),
             "parameters": self.parameters.all(),
             "schemas": {"order": self.told.schema},

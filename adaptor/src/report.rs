@@ -43,6 +43,8 @@ pub struct OrderReport {
     pub shapes: u32,
     /// The least scaled Jacobian of all shapes on its way; of an order that the guard rejected, what it would have come to.
     pub min_scaled_jacobian: Option<f64>,
+    /// The longest way that a vertex of the surface goes for it, in units of the mesh.
+    pub largest_displacement: Option<f64>,
     /// Seconds that its plan took.
     pub seconds: ShapeSeconds,
     /// Seconds that the solver waited inside `execute` for this order, in steps of the solver (their median).

@@ -22,12 +22,16 @@ use tombolo::{
 
 /// Sends raw bytes and reads the answer until the server closes.
 fn raw(adaptor: &Adaptor, bytes: &[u8]) -> String {
+    String::from_utf8_lossy(&answer(adaptor, bytes)).into_owned()
+}
+
+fn answer(adaptor: &Adaptor, bytes: &[u8]) -> Vec<u8> {
     let mut stream = TcpStream::connect(adaptor.address().expect("a server")).expect("connected");
     stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a timeout");
     stream.write_all(bytes).expect("sent");
     let mut answer = Vec::new();
     let _ = stream.read_to_end(&mut answer);
-    String::from_utf8_lossy(&answer).into_owned()
+    answer
 }
 
 fn get(adaptor: &Adaptor, path: &str, headers: &str) -> String {
@@ -136,6 +140,32 @@ fn what_a_viewer_gets_wrong_is_told_and_changes_nothing() {
     viewer.wait_for("error", |error| error["id"] == "same");
     solver.steps(3);
     assert!(solver.is_at_reference() && !solver.stopped);
+}
+
+#[test]
+fn the_reference_surface_is_there_for_those_with_the_token_bit_for_bit() {
+    let mut solver = Solver::new(Settings { config: config(LINK_TO_ALL), ..Settings::default() });
+    let link = solver.adaptor.link().expect("a link");
+    let token = link.split_once('?').expect("a token").1;
+    let path = format!("/surface?{token}");
+    assert!(get(&solver.adaptor, &path, "").starts_with("HTTP/1.1 404"), "there is no mesh before the first step");
+    solver.step();
+    for wrong in ["/surface", "/surface?token=", "/surface?token=0123", &format!("{path}0")] {
+        assert!(get(&solver.adaptor, wrong, "").starts_with("HTTP/1.1 401"), "{wrong}");
+    }
+    for _ in 0..2 {
+        let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
+        let answer = answer(&solver.adaptor, request.as_bytes());
+        let body = answer.windows(4).position(|four| four == b"\r\n\r\n").expect("a body") + 4;
+        assert!(answer.starts_with(b"HTTP/1.1 200"));
+        let Decoded::Surface(surface) = decode(&answer[body..]).expect("a frame") else { panic!("another frame") };
+        let points: Vec<_> =
+            surface.vertices().iter().map(|&vertex| solver.reference.points()[vertex as usize]).collect();
+        assert_eq!(surface.points(), points);
+        assert_eq!(surface.features().names()[5], "z-max");
+    }
+    let hello = Viewer::connect(&solver.adaptor).hello();
+    assert_eq!((&hello["surface"]["vertices"], &hello["surface"]["faces"]), (&json!(98), &json!(192)));
 }
 
 #[test]

@@ -69,6 +69,7 @@ pub struct Plan {
     end: Arc<[Vector]>,
     schedule: Schedule,
     quality: PathQuality,
+    largest_displacement: f64,
     seconds: ShapeSeconds,
 }
 
@@ -113,6 +114,12 @@ impl Plan {
     #[must_use]
     pub fn quality(&self) -> &PathQuality {
         &self.quality
+    }
+
+    /// The longest way that a vertex of the surface goes from the start to the end, in units of the mesh.
+    #[must_use]
+    pub fn largest_displacement(&self) -> f64 {
+        self.largest_displacement
     }
 
     /// Seconds that it took to make.
@@ -245,7 +252,12 @@ impl Shaper {
         let watch = Stopwatch::start();
         let quality = judge(&self.mesh, &start, &target.points, &schedule.fractions(), guard)?;
         let seconds = ShapeSeconds { guard: watch.seconds(), ..target.seconds };
-        Ok(Plan { start, end: Arc::clone(&target.points), schedule: *schedule, quality, seconds })
+        let largest_displacement = self.surface.vertices().iter().fold(0.0_f64, |largest, &vertex| {
+            let [from, to] = [&start, &target.points].map(|points| points[vertex as usize]);
+            largest.max((to[0] - from[0]).hypot(to[1] - from[1]).hypot(to[2] - from[2]))
+        });
+        let end = Arc::clone(&target.points);
+        Ok(Plan { start, end, schedule: *schedule, quality, largest_displacement, seconds })
     }
 
     /// [`Shaper::target`], then [`Shaper::judge`].

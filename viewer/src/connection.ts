@@ -34,8 +34,8 @@ export function backOff(attempt: number, random: number): number {
   return Math.round(base * (0.75 + 0.5 * random));
 }
 
-/** The WebSocket address of the page's own server and the token, from the page's address (`?token=` or `#token=`). */
-export function streamAddress(page: string): { address: string; probe: string; token: string } {
+/** The addresses of the page's own server and the token, from the page's address (`?token=` or `#token=`). */
+export function streamAddress(page: string): { address: string; probe: string; token: string; surface: string } {
   const url = new URL(page);
   const token = url.searchParams.get("token") ?? new URLSearchParams(url.hash.slice(1)).get("token") ?? "";
   const stream = new URL("ws", url);
@@ -43,7 +43,10 @@ export function streamAddress(page: string): { address: string; probe: string; t
   stream.hash = "";
   const probe = stream.toString();
   stream.protocol = url.protocol === "https:" ? "wss:" : "ws:";
-  return { address: stream.toString(), probe, token };
+  const surface = new URL("surface", url);
+  surface.search = stream.search;
+  surface.hash = "";
+  return { address: stream.toString(), probe, token, surface: surface.toString() };
 }
 
 export const browserSurroundings: Surroundings = {

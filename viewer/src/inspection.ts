@@ -8,6 +8,17 @@ import type { QualitySummary, Role, Status, Vector } from "./protocol";
 
 export interface ViewInspection { bounds: [Vector, Vector] | null; points: number; triangles: number; topology: string | null }
 
+export interface PreviewInspection {
+  state: "none" | "waiting" | "shown" | "failed";
+  /** How far the edits would move any point of the surface. */
+  largest: number | null;
+  /** Milliseconds from the newest change of the form to its picture, and those of them that went into computing it. */
+  milliseconds: number | null;
+  computing: number | null;
+  bounds: [Vector, Vector] | null;
+  reason: string | null;
+}
+
 export interface Inspection {
   /** How the connection stands: connecting, connected, reconnecting or refused. */
   readonly connection: ConnectionState;
@@ -26,6 +37,8 @@ export interface Inspection {
   readonly stack: readonly unknown[];
   /** Handle and fixed features, by name. */
   readonly selection: { handle: string[]; fixed: string[] };
+  /** The preview that is drawn, or why there is none. */
+  readonly preview: PreviewInspection;
   /** What went wrong, newest last: frames or messages that could not be read. */
   readonly errors: readonly string[];
   /** The box around a feature as it is now; null when no view shows it. */

@@ -30,7 +30,7 @@ function cells(points: Uint32Array, size: number): Uint32Array {
   return result;
 }
 
-class Piece {
+export class Piece {
   readonly data = vtkPolyData.newInstance();
   readonly mapper = vtkMapper.newInstance();
   readonly actor = vtkActor.newInstance();

@@ -9,6 +9,7 @@ import { publish } from "./inspection";
 import { Orders } from "./orders";
 import { ScalarBar, Triad, showEmpty } from "./overlay";
 import { watchPointer } from "./pointer";
+import { PreviewPanel } from "./preview-panel";
 import type { ClientMessage, Frame, Hello, Json, ServerMessage, Status } from "./protocol";
 import { Scene } from "./scene";
 import { Selection } from "./selection";
@@ -50,11 +51,16 @@ const form = new EditForm(part("fields"), selection);
 const orders = new Orders(part("orders"), (text) => write(part("announcer"), text));
 const bar = new StatusBar();
 watchPointer(part("scene"), scene, selection);
+const addresses = streamAddress(window.location.href);
+const preview = new PreviewPanel(scene, addresses.surface, () => {
+  const { edits } = form.read();
+  return Array.isArray(edits) ? edits : [];
+});
 
 const worker = new Worker(new URL("./decode.worker.ts", import.meta.url), { type: "module" });
 const decoder = new Decoder(worker as unknown as DecodeWorker, takeFrame, report);
 
-const connection = new Connection(streamAddress(window.location.href), {
+const connection = new Connection(addresses, {
   state: (state, explanation) => {
     bar.connection(state, explanation);
     if (state === "connected") fresh = true;
@@ -103,6 +109,7 @@ function takeHello(body: Hello): void {
   colours.set(body.fields);
   form.setSchema(body.schemas.order, body.defaults);
   form.setFeatures(body.features);
+  preview.set(body.surface ?? null, body.stack);
   parameters.set(body.parameters, body.role === "driver");
   orders.reconcile(body.orders, fresh && everConnected);
   fresh = false;
@@ -175,6 +182,7 @@ part("edit").addEventListener("submit", (event) => {
   showProblem("");
   try {
     sendOrder(form.read());
+    preview.clear();
   } catch (error) {
     if (!(error instanceof InputError)) throw error;
     showProblem(error.message);
@@ -207,6 +215,11 @@ part("tools").addEventListener("click", (event) => {
   looking = camera;
 });
 
+part("edit").addEventListener("input", () => preview.changed());
+part("edit").addEventListener("change", () => preview.changed());
+part("cancel").addEventListener("click", () => preview.clear());
+selection.onChange(() => preview.chosen());
+
 publish({
   get connection() { return connection.state; },
   get role() { return hello?.role ?? null; },
@@ -227,6 +240,7 @@ publish({
     const names = hello?.features.map((feature) => feature.name) ?? [];
     return { handle: selection.chosen("handle", names), fixed: selection.chosen("fixed", names) };
   },
+  get preview() { return preview.inspect(); },
   get errors() { return [...errors]; },
   featureBounds: (name) => scene.featureBounds(name),
   featurePlace: (name) => scene.featurePlace(name),

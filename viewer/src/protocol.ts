@@ -27,6 +27,9 @@ export interface FeatureInformation { name: string; faces: number; vertices: num
 export interface FieldInformation { name: string; association: Association; components: number }
 export interface ParameterInformation { name: string; value: number; minimum?: number | null; maximum?: number | null }
 
+/** The surface from which shapes are measured; its points are sent on request only. */
+export interface SurfaceInformation { id: string; vertices: number; faces: number }
+
 export interface Hello {
   protocol: number;
   client: string | number;
@@ -34,6 +37,7 @@ export interface Hello {
   channel?: string | null;
   views: ViewInformation[];
   features: FeatureInformation[];
+  surface?: SurfaceInformation | null;
   fields: FieldInformation[];
   parameters: ParameterInformation[];
   schemas: { order?: Json };
@@ -65,6 +69,7 @@ export interface OrderStatus {
   shape?: number | null;
   shapes?: number | null;
   min_scaled_jacobian?: number | null;
+  largest_displacement?: number | null;
   seconds?: { surface?: number; volume?: number; guard?: number } | null;
   added_steps?: number | null;
 }

@@ -7,8 +7,10 @@ import vtkInteractorStyleTrackballCamera from "@kitware/vtk.js/Interaction/Style
 import vtkColorTransferFunction from "@kitware/vtk.js/Rendering/Core/ColorTransferFunction";
 import vtkOpenGLRenderWindow from "@kitware/vtk.js/Rendering/OpenGL/RenderWindow";
 import type { ColourMap, Colouring } from "./colour";
+import { Ghost } from "./ghost";
 import { Layer } from "./layer";
 import { bounds, firstTriangle } from "./picking";
+import type { PreviewSurface } from "./preview";
 import type { DataFrame, TopologyFrame, Vector, ViewInformation } from "./protocol";
 import type { Selection } from "./selection";
 
@@ -33,11 +35,14 @@ export class Scene {
   private readonly interactor = vtkRenderWindowInteractor.newInstance();
   private readonly colours = vtkColorTransferFunction.newInstance();
   private readonly pending = new Map<string, DataFrame>();
+  private readonly ghost: Ghost;
   private features: string[] = [];
   private colouring: Colouring | null = null;
   private locked: [number, number] | null = null;
   private map: ColourMap | null = null;
   private scheduled = false;
+  /** Who waits for the next picture. */
+  private readonly drawn: (() => void)[] = [];
   /** The time before which new values do not ask for a picture. */
   private rested = 0;
   private waiting: number | null = null;
@@ -58,7 +63,25 @@ export class Scene {
     container.addEventListener("keydown", (event) => this.key(event));
     new ResizeObserver(() => this.resize()).observe(container);
     selection.onChange(() => this.request());
+    this.ghost = new Ghost(this.renderer);
     this.resize();
+  }
+
+  /** The surface that previews are shapes of. */
+  setPreviewSurface(surface: PreviewSurface): void {
+    this.ghost.setSurface(surface);
+    this.request();
+  }
+
+  /** Shows the shape that an edit would make, with its broken triangles; null takes it away. `drawn` is called once it is seen. */
+  setPreview(points: Float32Array | null, broken?: Uint32Array, drawn?: () => void): void {
+    this.ghost.setPoints(points, broken);
+    this.request(drawn);
+  }
+
+  /** The box around the preview that is drawn; null when there is none. */
+  get previewBounds(): [Vector, Vector] | null {
+    return this.ghost.coordinates && bounds(this.ghost.coordinates);
   }
 
   /** The views that the server streams; those that are gone are removed, the others keep their state. */
@@ -270,13 +293,15 @@ export class Scene {
     this.request();
   }
 
-  private request(): void {
+  private request(drawn?: () => void): void {
+    if (drawn) this.drawn.push(drawn);
     if (this.scheduled) return;
     this.scheduled = true;
     requestAnimationFrame(() => {
       this.scheduled = false;
       const start = performance.now();
       this.draw();
+      for (const told of this.drawn.splice(0)) told();
       // What a picture costs is known once the browser takes up its next task.
       setTimeout(() => {
         this.rested = performance.now();

@@ -93,6 +93,7 @@ impl Log {
                     shape: 0,
                     shapes: 0,
                     min_scaled_jacobian: None,
+                    largest_displacement: None,
                     seconds: ShapeSeconds::default(),
                     added_steps: None,
                 });

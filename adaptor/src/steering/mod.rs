@@ -265,6 +265,7 @@ impl Steerer {
             order.cycle_applied = Some(moment.cycle);
             order.shapes = plan.shapes();
             order.min_scaled_jacobian = Some(plan.quality().min_scaled_jacobian);
+            order.largest_displacement = Some(plan.largest_displacement());
             order.seconds = plan.seconds();
             order.added_steps = step_seconds.map(|step| begun.elapsed().as_secs_f64() / step);
         });

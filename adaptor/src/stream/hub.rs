@@ -16,7 +16,7 @@ use axum::body::Bytes;
 use serde_json::{Map, Value, json};
 use tokio::sync::Notify;
 
-use super::StreamCounts;
+use super::{ReferenceSurface, StreamCounts};
 
 /// How long the wheel is kept for a driver whose connection was lost.
 pub(super) const WHEEL_KEPT: Duration = Duration::from_secs(3);
@@ -138,6 +138,7 @@ struct State {
     description: Map<String, Value>,
     conditions: Map<String, Value>,
     views: Vec<View>,
+    surface: Option<Arc<ReferenceSurface>>,
     clients: BTreeMap<u64, Arc<Client>>,
     next_client: u64,
     driver: Option<u64>,
@@ -174,6 +175,11 @@ impl Hub {
         let mut state = lock(&self.state);
         state.description = description;
         state.greet();
+    }
+
+    /// Offers the surface from which shapes are measured.
+    pub(crate) fn offer_surface(&self, surface: Arc<ReferenceSurface>) {
+        lock(&self.state).surface = Some(surface);
     }
 
     /// Replaces the slowly changing part of the status: `paused`, `stopped`, `quality`.
@@ -332,6 +338,10 @@ impl Hub {
             state.wheel_lost = Some((Instant::now(), client));
         }
         state.status_dirty = true;
+    }
+
+    pub(super) fn surface(&self) -> Option<Arc<ReferenceSurface>> {
+        lock(&self.state).surface.clone()
     }
 
     pub(super) fn is_driver(&self, client: u64) -> bool {

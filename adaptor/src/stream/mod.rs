@@ -1,9 +1,9 @@
 //! The server that viewers connect to, on a thread of its own.
 //!
-//! It serves the viewer's files at `/` and one WebSocket at `/ws?token=...` (the protocol is in `docs/protocol.md`). Nothing
-//! that a client does reaches the solver but commands that were read and found valid.
+//! It serves the viewer's files at `/`, one WebSocket at `/ws?token=...` and the reference surface at `/surface?token=...` (the
+//! protocol is in `docs/protocol.md`). Nothing that a client does reaches the solver but commands that were read and found valid.
 //!
-//! What it guarantees: it listens on the loopback address unless told otherwise; no WebSocket without the token; no page of
+//! What it guarantees: it listens on the loopback address unless told otherwise; nothing of the run without the token; no page of
 //! another site can use a browser's connection (the `Origin` must be the server's own), nor reach it under another name (on
 //! loopback the `Host` must be loopback too); messages over 1 MiB, more than [`VIEWERS`] viewers, and floods of messages
 //! are refused; a client that does not read for 10 seconds, or says nothing for 30, is let go.
@@ -13,6 +13,7 @@
 mod connection;
 mod hub;
 mod session;
+mod surface;
 mod token;
 mod viewer_files;
 
@@ -36,6 +37,7 @@ use tokio::sync::oneshot;
 use tombolo_pipelines::language::StreamServer;
 
 pub(crate) use hub::{Frame, Hub};
+pub(crate) use surface::ReferenceSurface;
 pub use token::Token;
 
 use connection::{Connection, Listener};
@@ -185,6 +187,7 @@ async fn serve(socket: TcpListener, shared: Shared, stopped: oneshot::Receiver<(
     let hub = Arc::clone(&shared.hub);
     let router = Router::new()
         .route("/ws", get(upgrade))
+        .route("/surface", get(reference_surface))
         .fallback(file)
         .layer(middleware::from_fn_with_state(shared.clone(), guard))
         .with_state(shared)
@@ -282,6 +285,23 @@ async fn upgrade(
             }
         }
     })
+}
+
+/// The reference surface as a frame, 404 as long as there is none.
+async fn reference_surface(State(shared): State<Shared>, Query(credentials): Query<Credentials>) -> Response {
+    if !credentials.token.is_some_and(|token| shared.token.matches(&token)) {
+        return (StatusCode::UNAUTHORIZED, UNAUTHORIZED).into_response();
+    }
+    let Some(surface) = shared.hub.surface() else {
+        return (StatusCode::NOT_FOUND, "this run has no mesh whose shape could be changed\n").into_response();
+    };
+    // Elsewhere: the others are served while it is encoded.
+    let failed = |reason: String| (StatusCode::INTERNAL_SERVER_ERROR, reason).into_response();
+    match tokio::task::spawn_blocking(move || surface.frame()).await {
+        Ok(Ok(frame)) => ([(header::CONTENT_TYPE, "application/octet-stream")], frame).into_response(),
+        Ok(Err(reason)) => failed(format!("the surface was not encoded: {reason}\n")),
+        Err(_) => failed("the encoder failed\n".into()),
+    }
 }
 
 async fn file(State(shared): State<Shared>, uri: Uri, request: Request) -> Response {

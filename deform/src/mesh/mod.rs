@@ -70,7 +70,7 @@ impl Mesh {
     }
 }
 
-fn check_finite(points: &[Vector]) -> Result<(), MeshError> {
+pub(crate) fn check_finite(points: &[Vector]) -> Result<(), MeshError> {
     for (vertex, point) in points.iter().enumerate() {
         for (axis, value) in point.iter().enumerate() {
             if !value.is_finite() {

@@ -2,7 +2,7 @@
 
 use super::faces::{self, FaceBuffer};
 use super::features::{FeatureSettings, Features};
-use crate::mesh::{CellType, Cells, Mesh, Vector};
+use crate::mesh::{CellType, Cells, Mesh, MeshError, Vector, check_finite};
 use crate::vector::{cross, dot, subtract};
 
 /// The surface of a mesh: its boundary faces, their vertices and their features.
@@ -100,6 +100,72 @@ impl Surface {
 
         let (triangles, triangle_faces) = split_into_triangles(&points, &faces);
         let features = Features::find(mesh.features(), &global_faces, &points, &faces, settings);
+        Ok(Self { points, vertices, faces, owner_cells, triangles, triangle_faces, features })
+    }
+
+    /// A surface from its parts, as those of another surface were sent from elsewhere: edits of it give what edits of that one
+    /// give. `vertices` are the mesh vertices of the `points`, rising; `faces` are by surface vertex numbers; `face_features` are
+    /// indices into `names`. The mesh is not there, so that each face counts as its own cell.
+    ///
+    /// # Errors
+    /// [`SurfaceError::Parts`] for numbers that are not finite or do not fit together, for cells that are no faces;
+    /// [`SurfaceError::NoBoundary`] without any.
+    ///
+    /// ```
+    /// use tombolo_deform::{shapes, surface::{FeatureSettings, Surface}};
+    ///
+    /// let mesh = shapes::box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
+    /// let surface = Surface::extract(&mesh, &FeatureSettings::default())?;
+    /// let features = surface.features();
+    /// let again = Surface::from_faces(
+    ///     surface.points().to_vec(),
+    ///     surface.vertices().to_vec(),
+    ///     surface.faces().clone(),
+    ///     features.names().to_vec(),
+    ///     features.face_features().to_vec(),
+    /// )?;
+    /// assert_eq!((again.triangles(), again.features()), (surface.triangles(), features));
+    /// # Ok::<(), tombolo_deform::surface::SurfaceError>(())
+    /// ```
+    pub fn from_faces(
+        points: Vec<Vector>,
+        vertices: Vec<u32>,
+        faces: Cells,
+        names: Vec<String>,
+        face_features: Vec<u32>,
+    ) -> Result<Self, SurfaceError> {
+        check_finite(&points)?;
+        if faces.is_empty() {
+            return Err(SurfaceError::NoBoundary);
+        }
+        if vertices.len() != points.len() {
+            return Err(MeshError::PointCount { found: points.len(), expected: vertices.len() }.into());
+        }
+        if let Some(place) = vertices.windows(2).position(|pair| pair[0] >= pair[1]) {
+            return Err(SurfaceError::VertexOrder { vertex: place + 1 });
+        }
+        faces.validate(points.len())?;
+        let mut referenced = vec![false; points.len()];
+        let mut sorted = Vec::new();
+        for (cell, (found, corners)) in faces.iter().enumerate() {
+            if !matches!(found, CellType::Triangle | CellType::Quad | CellType::Polygon) {
+                return Err(MeshError::CellType { cell, found, expected: "a face" }.into());
+            }
+            sorted.clear();
+            sorted.extend_from_slice(corners);
+            sorted.sort_unstable();
+            sorted.dedup();
+            if sorted.len() < corners.len() {
+                return Err(MeshError::VertexCount { cell, cell_type: found, found: sorted.len() }.into());
+            }
+            corners.iter().for_each(|&vertex| referenced[vertex as usize] = true);
+        }
+        if let Some(vertex) = referenced.iter().position(|referenced| !referenced) {
+            return Err(SurfaceError::Unreferenced { vertex });
+        }
+        let features = Features::of_faces(names, face_features, &faces)?;
+        let owner_cells = (0..faces.len() as u32).collect();
+        let (triangles, triangle_faces) = split_into_triangles(&points, &faces);
         Ok(Self { points, vertices, faces, owner_cells, triangles, triangle_faces, features })
     }
 
@@ -253,6 +319,21 @@ pub enum SurfaceError {
         edge: [u32; 2],
         /// How many faces meet there.
         faces: usize,
+    },
+    /// Parts of a surface that do not make one.
+    #[error("the parts do not make a surface: {0}")]
+    Parts(#[from] MeshError),
+    /// Parts of a surface whose vertices do not rise.
+    #[error("surface vertex {vertex}: its mesh vertex is not above that of the one before it")]
+    VertexOrder {
+        /// The surface vertex.
+        vertex: usize,
+    },
+    /// A surface vertex of no face.
+    #[error("surface vertex {vertex} belongs to no face")]
+    Unreferenced {
+        /// The surface vertex.
+        vertex: usize,
     },
     /// A sharp angle that is no angle between faces.
     #[error("sharp_angle_degrees is {0}; expected an angle from 0 to 180 degrees")]

@@ -9,7 +9,7 @@ use super::SurfaceError;
 use super::faces::TagLookup;
 use super::sharp_edges::parts_between_sharp_edges;
 pub(super) use super::sharp_edges::{Parts, edges};
-use crate::mesh::{Cells, FeatureSource, Vector};
+use crate::mesh::{Cells, FeatureSource, MeshError, Vector};
 
 /// How features are found where the mesh does not name them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -75,6 +75,19 @@ impl Features {
         };
         let (offsets, vertices) = feature_vertices(names.len(), &face_features, faces);
         Self { names, face_features, offsets, vertices }
+    }
+
+    /// Features that are known already: `face_features` are indices into `names`, one for each face.
+    pub(super) fn of_faces(names: Vec<String>, face_features: Vec<u32>, faces: &Cells) -> Result<Self, MeshError> {
+        if face_features.len() != faces.len() {
+            return Err(MeshError::FeatureCount { found: face_features.len(), expected: faces.len(), what: "faces" });
+        }
+        if let Some(&feature) = face_features.iter().find(|&&feature| feature as usize >= names.len()) {
+            let found = feature as usize + 1;
+            return Err(MeshError::FeatureCount { found, expected: names.len(), what: "feature names" });
+        }
+        let (offsets, vertices) = feature_vertices(names.len(), &face_features, faces);
+        Ok(Self { names, face_features, offsets, vertices })
     }
 
     /// The names, all different.

@@ -52,13 +52,23 @@ pub(super) fn decompress(blob: &[u8], expected: usize) -> Result<Vec<u8>, String
     check(bytes, expected)
 }
 
+/// The bytes behind a blob, which must be `expected` many. Never holds many more than that and one window of zstd.
+#[cfg(all(not(feature = "compression"), feature = "decompression"))]
+pub(super) fn decompress(blob: &[u8], expected: usize) -> Result<Vec<u8>, String> {
+    use std::io::Read;
+    let decoder = ruzstd::decoding::StreamingDecoder::new(blob).map_err(|error| error.to_string())?;
+    let mut bytes = Vec::with_capacity(expected);
+    decoder.take(expected as u64 + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
+    check(bytes, expected)
+}
+
 /// The bytes behind a blob of blocks that are not compressed: this build has no decompressor.
-#[cfg(not(feature = "compression"))]
+#[cfg(not(any(feature = "compression", feature = "decompression")))]
 pub(super) fn decompress(blob: &[u8], expected: usize) -> Result<Vec<u8>, String> {
     unstore(blob, expected)
 }
 
-#[cfg(any(test, not(feature = "compression")))]
+#[cfg(any(test, not(any(feature = "compression", feature = "decompression"))))]
 fn unstore(blob: &[u8], expected: usize) -> Result<Vec<u8>, String> {
     const COMPRESSED: &str = "the blob is compressed, and this build has no zstd";
     let mut rest = blob.strip_prefix(&ZSTD_MAGIC).ok_or("the blob is no zstd frame")?;

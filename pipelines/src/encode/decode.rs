@@ -1,9 +1,13 @@
 //! From frames back to numbers.
 
 use tombolo_deform::mesh::Vector;
+use tombolo_deform::surface::Surface;
 
 use super::blob::{MOST_BYTES, decompress};
-use super::wire::{Array, DATA, DataHeader, Kind, MAGIC, PREAMBLE, TOPOLOGY, TopologyHeader, VERSION, integers};
+use super::surface;
+use super::wire::{
+    Array, DATA, DataHeader, Kind, MAGIC, PREAMBLE, SURFACE, TOPOLOGY, TopologyHeader, VERSION, integers,
+};
 use crate::extract::{Association, Field};
 
 /// A decoded frame.
@@ -13,6 +17,8 @@ pub enum Decoded {
     Topology(TopologyFrame),
     /// Positions and fields.
     Data(DataFrame),
+    /// A reference surface, bit for bit.
+    Surface(Box<Surface>),
 }
 
 /// The cells of a view.
@@ -59,7 +65,7 @@ pub struct DecodeError {
     pub message: String,
 }
 
-fn error(place: impl Into<String>, message: impl Into<String>) -> DecodeError {
+pub(super) fn error(place: impl Into<String>, message: impl Into<String>) -> DecodeError {
     DecodeError { place: place.into(), message: message.into() }
 }
 
@@ -83,12 +89,16 @@ pub fn decode(bytes: &[u8]) -> Result<Decoded, DecodeError> {
     match kind {
         TOPOLOGY => topology(serde_json::from_slice(header).map_err(bad_header)?, blobs).map(Decoded::Topology),
         DATA => data(serde_json::from_slice(header).map_err(bad_header)?, blobs).map(Decoded::Data),
-        other => Err(error("preamble", format!("found kind {other}, expected 1 or 2"))),
+        SURFACE => {
+            let header = serde_json::from_slice(header).map_err(bad_header)?;
+            Ok(Decoded::Surface(Box::new(surface::decode(header, blobs)?)))
+        }
+        other => Err(error("preamble", format!("found kind {other}, expected 1, 2 or 3"))),
     }
 }
 
 /// Each array with its bytes, decompressed.
-fn arrays(headers: Vec<Array>, mut blobs: &[u8]) -> Result<Vec<(Array, Vec<u8>)>, DecodeError> {
+pub(super) fn arrays(headers: Vec<Array>, mut blobs: &[u8]) -> Result<Vec<(Array, Vec<u8>)>, DecodeError> {
     let mut total = 0usize;
     let mut arrays = Vec::new();
     for array in headers {
@@ -167,7 +177,7 @@ fn data(header: DataHeader, blobs: &[u8]) -> Result<DataFrame, DecodeError> {
 }
 
 /// The values of an array, tuple after tuple.
-fn values(array: &Array, bytes: &[u8]) -> Result<Vec<f64>, DecodeError> {
+pub(super) fn values(array: &Array, bytes: &[u8]) -> Result<Vec<f64>, DecodeError> {
     let planar: Vec<f64> = match array.kind {
         Kind::F32 => bytes.as_chunks().0.iter().map(|&chunk| f64::from(f32::from_le_bytes(chunk))).collect(),
         Kind::F64 => bytes.as_chunks().0.iter().map(|&chunk| f64::from_le_bytes(chunk)).collect(),

@@ -14,7 +14,7 @@ use crate::run::Frame;
 /// zstd's level for data, which is new with every frame.
 const DATA_LEVEL: i32 = 1;
 /// zstd's level for topologies, which are sent once.
-const TOPOLOGY_LEVEL: i32 = 3;
+pub(super) const TOPOLOGY_LEVEL: i32 = 3;
 
 /// An encoded frame: complete binary messages.
 #[derive(Debug, Clone)]
@@ -253,7 +253,7 @@ impl Hash {
 }
 
 /// A message under construction.
-struct Message {
+pub(super) struct Message {
     level: i32,
     arrays: Vec<Array>,
     blobs: Vec<u8>,
@@ -261,7 +261,7 @@ struct Message {
 }
 
 impl Message {
-    fn new(level: i32) -> Self {
+    pub(super) fn new(level: i32) -> Self {
         Self { level, arrays: Vec::new(), blobs: Vec::new(), raw_bytes: 0 }
     }
 
@@ -272,7 +272,7 @@ impl Message {
         Ok(())
     }
 
-    fn integers(&mut self, name: &str, values: &[u32], components: usize) -> Result<(), EncodeError> {
+    pub(super) fn integers(&mut self, name: &str, values: &[u32], components: usize) -> Result<(), EncodeError> {
         let count = values.len() / components;
         let planar = (0..values.len()).map(|index| values[index % count * components + index / count]);
         let bytes = delta(planar, Kind::U32);
@@ -291,7 +291,7 @@ impl Message {
         self.push(array, &bytes)
     }
 
-    fn values(
+    pub(super) fn values(
         &mut self,
         name: &str,
         association: Association,
@@ -321,7 +321,7 @@ impl Message {
         self.push(array, &packed.bytes)
     }
 
-    fn finish(
+    pub(super) fn finish(
         self,
         kind: u8,
         header: impl FnOnce(Vec<Array>) -> Result<Vec<u8>, serde_json::Error>,

@@ -12,6 +12,8 @@ pub(super) const VERSION: u8 = 1;
 pub(super) const TOPOLOGY: u8 = 1;
 /// A frame that holds positions and fields.
 pub(super) const DATA: u8 = 2;
+/// A frame that holds a reference surface.
+pub(super) const SURFACE: u8 = 3;
 /// The bytes before the JSON header.
 pub(super) const PREAMBLE: usize = 12;
 
@@ -29,6 +31,12 @@ pub(super) struct DataHeader {
     pub(super) topology: String,
     pub(super) cycle: u64,
     pub(super) time: f64,
+    pub(super) arrays: Vec<Array>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct SurfaceHeader {
+    pub(super) features: Vec<String>,
     pub(super) arrays: Vec<Array>,
 }
 

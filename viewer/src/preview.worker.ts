@@ -1,0 +1,66 @@
+/** Computes previews of edits away from the thread that draws. */
+import { Kernel, KernelError } from "./kernel";
+import type { FailureKind, KernelSurface, SurfaceDescription } from "./kernel";
+import type { Json } from "./protocol";
+
+export type PreviewRequest =
+  /** A reference surface, as the server sends it. */
+  | { id: string; surface: ArrayBuffer }
+  /** The edits that the shape has now, and those to be previewed with them. */
+  | { number: number; stack: Json[]; edits: Json[] };
+
+export type PreviewAnswer =
+  | { id: string; surface: Pick<SurfaceDescription, "triangles" | "triangleFeatures" | "features"> }
+  | { number: number; points: Float32Array; largest: number; milliseconds: number }
+  | { number: number; kind: FailureKind; error: string }
+  | { id: string; kind: FailureKind; error: string };
+
+const worker = self as unknown as {
+  onmessage: ((event: MessageEvent<PreviewRequest>) => void) | null;
+  postMessage(answer: PreviewAnswer, transfer: Transferable[]): void;
+};
+
+const kernel = fetch(new URL("../wasm/pkg/kernel.wasm", import.meta.url)).then((response) => Kernel.load(response));
+let surface: KernelSurface | null = null;
+let reference: Float64Array = new Float64Array(0);
+/** The displacement that the shape has now, and the stack that it is of. */
+let now: { stack: string; displacement: Float64Array } = { stack: "", displacement: new Float64Array(0) };
+
+async function answer(request: PreviewRequest): Promise<void> {
+  if ("surface" in request) {
+    surface?.close();
+    surface = null;
+    surface = (await kernel).openSurface(new Uint8Array(request.surface));
+    const { points, triangles, triangleFeatures, features } = surface.describe();
+    reference = points;
+    now = { stack: "[]", displacement: new Float64Array(points.length) };
+    worker.postMessage({ id: request.id, surface: { triangles, triangleFeatures, features } }, [triangles.buffer, triangleFeatures.buffer]);
+    return;
+  }
+  if (!surface) throw new KernelError("handle", "the reference surface has not arrived yet");
+  const start = performance.now();
+  const stack = JSON.stringify(request.stack);
+  if (now.stack !== stack) now = { stack, displacement: surface.displacement(request.stack) };
+  const displacement = surface.displacement([...request.stack, ...request.edits]);
+  const points = new Float32Array(displacement.length);
+  let largest = 0;
+  for (let i = 0; i < displacement.length; i += 3) {
+    let squared = 0;
+    for (let k = i; k < i + 3; k++) {
+      points[k] = reference[k]! + displacement[k]!;
+      squared += (displacement[k]! - now.displacement[k]!) ** 2;
+    }
+    largest = Math.max(largest, squared);
+  }
+  worker.postMessage({ number: request.number, points, largest: Math.sqrt(largest), milliseconds: performance.now() - start }, [points.buffer]);
+}
+
+// One after the other: an answer is there before the next question is looked at.
+let last = Promise.resolve();
+worker.onmessage = ({ data }) => {
+  last = last.then(() => answer(data)).catch((error: unknown) => {
+    const kind = error instanceof KernelError ? error.kind : "trap";
+    const which = "number" in data ? { number: data.number } : { id: data.id };
+    worker.postMessage({ ...which, kind, error: error instanceof Error ? error.message : String(error) }, []);
+  });
+};

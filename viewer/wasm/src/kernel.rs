@@ -1,0 +1,249 @@
+//! What the exports do, without the border.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use serde_json::json;
+use tombolo_deform::mesh::{CellType, Cells, Vector};
+use tombolo_deform::surface::{Edit, EditError, Editor, Surface, SurfaceError};
+use tombolo_pipelines::encode::{DecodeError, Decoded, decode};
+
+use crate::Array;
+
+/// The input of one call and the answer to it; the surfaces that are open.
+#[derive(Default)]
+pub struct Kernel {
+    input: Vec<u8>,
+    answer: Vec<Array>,
+    surfaces: BTreeMap<u32, Editor>,
+    opened: u32,
+}
+
+/// Why a call failed. Its name in an answer is in brackets.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// The surface was never opened, or is closed (`handle`).
+    #[error("there is no open surface {0}")]
+    Handle(u32),
+    /// The input ends before its arrays do (`input`).
+    #[error("the input has {found} bytes, {expected} are needed")]
+    Input {
+        /// How many there are.
+        found: usize,
+        /// How many there should be.
+        expected: usize,
+    },
+    /// A text that is not the JSON it should be (`json`).
+    #[error("{0}")]
+    Json(#[from] serde_json::Error),
+    /// A frame that cannot be read (`frame`).
+    #[error(transparent)]
+    Frame(#[from] DecodeError),
+    /// A frame of another kind than was asked for (`frame`).
+    #[error("the frame holds {found}, expected {expected}")]
+    Kind {
+        /// What it holds.
+        found: &'static str,
+        /// What it should hold.
+        expected: &'static str,
+    },
+    /// Arrays that make no surface, or one that cannot be edited (`surface`).
+    #[error(transparent)]
+    Surface(#[from] SurfaceError),
+    /// Edits that this surface cannot follow (`edit`).
+    #[error(transparent)]
+    Edit(#[from] EditError),
+}
+
+impl Failure {
+    /// What kind of failure it is, in one word.
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Failure::Handle(_) => "handle",
+            Failure::Input { .. } => "input",
+            Failure::Json(_) => "json",
+            Failure::Frame(_) | Failure::Kind { .. } => "frame",
+            Failure::Surface(_) => "surface",
+            Failure::Edit(_) => "edit",
+        }
+    }
+}
+
+impl Kernel {
+    /// A kernel with no surface open.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { input: Vec::new(), answer: Vec::new(), surfaces: BTreeMap::new(), opened: 0 }
+    }
+
+    /// Room for the next input; `None` where there is not so much memory.
+    pub fn input(&mut self, bytes: usize) -> Option<&mut [u8]> {
+        self.input.clear();
+        self.input.try_reserve_exact(bytes).ok()?;
+        self.input.resize(bytes, 0);
+        Some(&mut self.input)
+    }
+
+    /// The arrays of the last answer.
+    #[must_use]
+    pub fn arrays(&self) -> &[Array] {
+        &self.answer
+    }
+
+    /// See [`open_surface`](crate::open_surface).
+    pub fn open_surface(&mut self) -> u32 {
+        self.open(|input| match decode(input)? {
+            Decoded::Surface(surface) => Ok(*surface),
+            other => Err(Failure::Kind { found: contents(&other), expected: "a surface" }),
+        })
+    }
+
+    /// See [`create_surface`](crate::create_surface).
+    pub fn create_surface(&mut self, points: usize, faces: usize, corners: usize) -> u32 {
+        self.open(|input| surface_of_arrays(input, points, faces, corners))
+    }
+
+    fn open(&mut self, make: impl FnOnce(&[u8]) -> Result<Surface, Failure>) -> u32 {
+        let input = std::mem::take(&mut self.input);
+        match make(&input).and_then(|surface| Ok(Editor::new(Arc::new(surface))?)) {
+            Ok(editor) => {
+                self.opened = self.opened.wrapping_add(1).max(1);
+                self.surfaces.insert(self.opened, editor);
+                self.settle(Ok(Vec::new()));
+                self.opened
+            }
+            Err(failure) => {
+                self.settle(Err(failure));
+                0
+            }
+        }
+    }
+
+    /// See [`close_surface`](crate::close_surface).
+    pub fn close_surface(&mut self, surface: u32) {
+        self.settle(Ok(Vec::new()));
+        self.surfaces.remove(&surface);
+    }
+
+    /// See [`describe_surface`](crate::describe_surface).
+    pub fn describe_surface(&mut self, surface: u32) -> bool {
+        let answer = self.editor(surface).map(|editor| {
+            let surface = editor.surface();
+            let features = surface.features();
+            let of_triangles =
+                surface.triangle_faces().iter().map(|&face| features.face_features()[face as usize]).collect();
+            vec![
+                Array::Vectors(surface.points().to_vec()),
+                Array::Triangles(surface.triangles().to_vec()),
+                Array::Numbers(of_triangles),
+                Array::Numbers(surface.vertices().to_vec()),
+                Array::Text(json!(features.names()).to_string()),
+            ]
+        });
+        self.settle(answer)
+    }
+
+    /// See [`displacement`](crate::displacement).
+    pub fn displacement(&mut self, surface: u32) -> bool {
+        let input = std::mem::take(&mut self.input);
+        let answer = serde_json::from_slice::<Vec<Edit>>(&input).map_err(Failure::from).and_then(|stack| {
+            let displacement = self.editor(surface)?.displacement(&stack)?;
+            Ok(vec![Array::Vectors(displacement)])
+        });
+        self.settle(answer)
+    }
+
+    /// See [`decode_frame`](crate::decode_frame).
+    pub fn decode_frame(&mut self) -> bool {
+        let input = std::mem::take(&mut self.input);
+        let answer = decode(&input).map_err(Failure::from).and_then(|decoded| match decoded {
+            Decoded::Topology(frame) => {
+                let names = ["triangles", "lines", "triangle_features"];
+                let names = &names[..2 + usize::from(frame.triangle_features.is_some())];
+                let header = json!({
+                    "kind": "topology", "view": frame.view, "topology": frame.topology, "points": frame.points,
+                    "arrays": names,
+                });
+                let lines = frame.lines.into_flattened();
+                let mut arrays = vec![Array::Text(header.to_string()), Array::Triangles(frame.triangles), Array::Numbers(lines)];
+                arrays.extend(frame.triangle_features.map(Array::Numbers));
+                Ok(arrays)
+            }
+            Decoded::Data(frame) => {
+                let fields: Vec<_> = frame
+                    .fields
+                    .iter()
+                    .map(|field| json!({"name": field.name, "association": field.association, "components": field.components}))
+                    .collect();
+                let header = json!({
+                    "kind": "data", "view": frame.view, "topology": frame.topology, "cycle": frame.cycle, "time": frame.time,
+                    "fields": fields,
+                });
+                let mut arrays = vec![Array::Text(header.to_string()), singles(frame.points.as_flattened())];
+                arrays.extend(frame.fields.iter().map(|field| singles(&field.values)));
+                Ok(arrays)
+            }
+            other => Err(Failure::Kind { found: contents(&other), expected: "a topology or data" }),
+        });
+        self.settle(answer)
+    }
+
+    fn editor(&mut self, surface: u32) -> Result<&mut Editor, Failure> {
+        self.surfaces.get_mut(&surface).ok_or(Failure::Handle(surface))
+    }
+
+    fn settle(&mut self, answer: Result<Vec<Array>, Failure>) -> bool {
+        self.input = Vec::new();
+        let done = answer.is_ok();
+        self.answer = answer.unwrap_or_else(|failure| vec![Array::Text(format!("{}\n{failure}", failure.kind()))]);
+        done
+    }
+}
+
+fn contents(decoded: &Decoded) -> &'static str {
+    match decoded {
+        Decoded::Topology(_) => "a topology",
+        Decoded::Data(_) => "data",
+        Decoded::Surface(_) => "a surface",
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "this is what is drawn")]
+fn singles(values: &[f64]) -> Array {
+    Array::Singles(values.iter().map(|&value| value as f32).collect())
+}
+
+fn surface_of_arrays(input: &[u8], points: usize, faces: usize, corners: usize) -> Result<Surface, Failure> {
+    let mut rest = input;
+    let mut expected = 0_usize;
+    let mut take = |count: usize, size: usize| {
+        let bytes = count.saturating_mul(size);
+        expected = expected.saturating_add(bytes);
+        let (taken, after) = rest.split_at_checked(bytes).ok_or(Failure::Input { found: input.len(), expected })?;
+        rest = after;
+        Ok::<_, Failure>(taken)
+    };
+    let coordinates: Vec<f64> =
+        take(points, size_of::<Vector>())?.as_chunks().0.iter().map(|&bytes| f64::from_le_bytes(bytes)).collect();
+    let mut numbers = |count: usize| -> Result<Vec<u32>, Failure> {
+        Ok(take(count, size_of::<u32>())?.as_chunks().0.iter().map(|&bytes| u32::from_le_bytes(bytes)).collect())
+    };
+    let (vertices, sizes, connectivity, features) =
+        (numbers(points)?, numbers(faces)?, numbers(corners)?, numbers(faces)?);
+    let names: Vec<String> = serde_json::from_slice(rest)?;
+    let mut cells = Cells::new();
+    let mut start = 0_usize;
+    for &size in &sizes {
+        let end = start.saturating_add(size as usize);
+        let face = connectivity.get(start..end).ok_or(Failure::Input { found: connectivity.len(), expected: end })?;
+        let cell_type = match size {
+            3 => CellType::Triangle,
+            4 => CellType::Quad,
+            _ => CellType::Polygon,
+        };
+        cells.push(cell_type, face).map_err(SurfaceError::from)?;
+        start = end;
+    }
+    Ok(Surface::from_faces(coordinates.as_chunks().0.to_vec(), vertices, cells, names, features)?)
+}
