@@ -63,17 +63,21 @@ fn duct() -> Mesh {
     shapes::box_of_tets([16, 4, 5], [0.0; 3], [4.0, 1.0, 1.2])
 }
 
-/// Every kind of edit at every order, alone; and stacks of several.
+/// Every kind of edit at every order, alone; and stacks of all of them.
 fn stacks(handle: &str, fixed: &str) -> Vec<Value> {
-    let bodies = [
+    let followed = [
         ("translate", json!({"by": [0.1, -0.25, 0.3]})),
+        ("rotate", json!({"axis": [0.2, 1, -0.3], "degrees": 25})),
         ("scale_direction", json!({"factors": [1.1, 0.6, 1.4]})),
         ("scale_direction", json!({"factors": [0.9, 1.2, 0.8], "center": [0.3, 0.1, -0.2]})),
         ("scale_normals", json!({"distance": 0.07})),
+        ("affine", json!({"matrix": [[1, 0.2, 0], [0, 1.1, 0.1], [-0.1, 0, 0.9]], "translation": [0, 0.1, 0]})),
+        ("translate", json!({"by": [0, 0.1, 0], "region": {"sphere": {"center": [1, 0, 0], "radius": 1.5}}})),
+        ("translate", json!({"by": [0, 9, 0], "muted": true, "name": "not this one"})),
     ];
     let mut stacks = vec![json!([])];
     for order in 1..=3 {
-        let edits: Vec<Value> = bodies
+        let mut edits: Vec<Value> = followed
             .iter()
             .map(|(name, body)| {
                 let mut body = body.clone();
@@ -83,6 +87,8 @@ fn stacks(handle: &str, fixed: &str) -> Vec<Value> {
                 json!({ *name: body })
             })
             .collect();
+        edits
+            .push(json!({"displacement": {"vertices": [3, 5], "values": [[0.1, 0, 0.2], [0, -0.1, 0]], "scale": 0.5}}));
         stacks.extend(edits.iter().map(|edit| json!([edit])));
         stacks.push(json!(edits));
     }

@@ -3,11 +3,13 @@
 //! ```sh
 //! cargo run --release -p tombolo-benchmarks -- overhead
 //! cargo run --release -p tombolo-benchmarks -- overhead --json
+//! cargo run --release -p tombolo-benchmarks -- surface-wasm --json
 //! ```
 
 mod measure;
 mod overhead;
 mod report;
+mod surface_wasm;
 
 use std::process::ExitCode;
 
@@ -29,12 +31,15 @@ struct Arguments {
 enum Name {
     /// What `execute` costs with nothing to do, and what each stage costs against a step of the solver.
     Overhead,
+    /// The surface kernel in the viewer's WebAssembly module, in Node, beside the native one.
+    SurfaceWasm,
 }
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let result: Result<Report, Box<dyn std::error::Error>> = match arguments.name {
         Name::Overhead => overhead::run(),
+        Name::SurfaceWasm => surface_wasm::run(),
     };
     match result {
         Ok(report) if arguments.json => println!("{}", report.json()),

@@ -55,7 +55,9 @@ describe("the address of the stream", () => {
   it("follows the page, below any path and through TLS", () => {
     expect(streamAddress("http://127.0.0.1:7070/?token=ab").address).toBe("ws://127.0.0.1:7070/ws?token=ab");
     expect(streamAddress("https://host/run/7/index.html?token=ab#x").address).toBe("wss://host/run/7/ws?token=ab");
-    expect(streamAddress("http://host/#token=cd")).toEqual({ address: "ws://host/ws?token=cd", probe: "http://host/ws?token=cd", token: "cd" });
+    expect(streamAddress("http://host/#token=cd")).toEqual({
+      address: "ws://host/ws?token=cd", probe: "http://host/ws?token=cd", token: "cd", surface: "http://host/surface?token=cd",
+    });
     expect(streamAddress("http://host/").token).toBe("");
   });
 });

@@ -1,0 +1,110 @@
+import { readFileSync } from "node:fs";
+import { beforeAll, describe, expect, it } from "vitest";
+import { Kernel, KernelError } from "../src/kernel";
+import type { SurfaceParts } from "../src/kernel";
+import { decodeFrame } from "../src/protocol";
+import type { DataFrame, TopologyFrame } from "../src/protocol";
+import { dataFrame, topologyFrame } from "./frames.mjs";
+
+const COLUMNS = 12, ROWS = 6;
+
+/** A bent sheet of quadrilaterals: "left" is fixed in the tests, "right" moved. */
+function sheet(): SurfaceParts {
+  const points: number[] = [], facePoints: number[] = [], faceFeatures: number[] = [];
+  for (let j = 0; j <= ROWS; j++) for (let i = 0; i <= COLUMNS; i++) points.push(i / 4, j / 4, 0.2 * Math.sin(i / 3));
+  for (let j = 0; j < ROWS; j++) for (let i = 0; i < COLUMNS; i++) {
+    const a = j * (COLUMNS + 1) + i;
+    facePoints.push(a, a + 1, a + COLUMNS + 2, a + COLUMNS + 1);
+    faceFeatures.push(i < 2 ? 0 : i < COLUMNS - 2 ? 1 : 2);
+  }
+  return {
+    points: Float64Array.from(points), vertices: Uint32Array.from({ length: points.length / 3 }, (_, i) => 10 + 2 * i),
+    faceSizes: new Uint32Array(faceFeatures.length).fill(4), facePoints: Uint32Array.from(facePoints),
+    faceFeatures: Uint32Array.from(faceFeatures), features: ["left", "middle", "right"],
+  };
+}
+const move = (by: number[], features = ["right"], fixed = ["left"]) => [{ translate: { features, fixed, by } }];
+const failure = (action: () => unknown): KernelError => {
+  try {
+    action();
+  } catch (error) {
+    expect(error).toBeInstanceOf(KernelError);
+    return error as KernelError;
+  }
+  throw new Error("nothing failed");
+};
+
+describe("the geometry kernel as a module", () => {
+  let kernel: Kernel;
+  beforeAll(async () => {
+    kernel = await Kernel.load(readFileSync(new URL("../wasm/pkg/kernel.wasm", import.meta.url)));
+  });
+
+  it("moves the handle as it is told, holds what is fixed, and lets the rest follow", () => {
+    const parts = sheet();
+    const surface = kernel.createSurface(parts);
+    const { points, triangles, triangleFeatures, vertices, features } = surface.describe();
+    expect(points).toEqual(parts.points);
+    expect(vertices).toEqual(parts.vertices);
+    expect(features).toEqual(parts.features);
+    expect(triangles.length).toBe(3 * 2 * COLUMNS * ROWS);
+    expect(new Set(triangleFeatures)).toEqual(new Set([0, 1, 2]));
+    const displacement = surface.displacement(move([0.1, 0, 0.5]));
+    for (let i = 0; i < points.length; i += 3) {
+      const [x, , , dx, dy, dz] = [points[i]!, 0, 0, displacement[i]!, displacement[i + 1]!, displacement[i + 2]!];
+      expect(dy).toBe(0);
+      if (x >= (COLUMNS - 2) / 4) expect([dx, dz]).toEqual([0.1, 0.5]);
+      else if (x <= 0.5) expect([dx, dz]).toEqual([0, 0]);
+      else expect(dz > 0 && dz < 0.5 && Math.abs(dz - 5 * dx) < 1e-12).toBe(true);
+    }
+    expect(surface.displacement([]).every((value) => value === 0)).toBe(true);
+    surface.close();
+  });
+
+  it("says what is wrong, and of what kind it is", () => {
+    const surface = kernel.createSurface(sheet());
+    const wrong = failure(() => surface.displacement(move([1, 0, 0], ["rigth"])));
+    expect(wrong.kind).toBe("edit");
+    expect(wrong.message).toMatch(/'rigth'.*'right'/);
+    expect(failure(() => surface.displacement([{ translate: {} }])).kind).toBe("json");
+    expect(failure(() => surface.displacement("not a stack")).kind).toBe("json");
+    expect(failure(() => kernel.openSurface(Uint8Array.from([1, 2, 3]))).kind).toBe("frame");
+    expect(failure(() => kernel.openSurface(topologyFrame("v", "t", 3, [0, 1, 2]))).message).toMatch(/a topology, expected a surface/);
+    expect(failure(() => kernel.createSurface({ ...sheet(), points: new Float64Array(3).fill(NaN) })).kind).toBe("input");
+    const nowhere = sheet();
+    nowhere.facePoints[3] = 4000;
+    expect(failure(() => kernel.createSurface(nowhere)).message).toMatch(/vertex 4000/);
+    const nan = sheet();
+    nan.points[4] = NaN;
+    expect(failure(() => kernel.createSurface(nan)).message).toMatch(/vertex 1: coordinate y is NaN/);
+    expect(surface.displacement(move([1, 0, 0])).some((value) => value === 1)).toBe(true);
+  });
+
+  it("survives its own failure", () => {
+    const surface = kernel.createSurface(sheet());
+    const before = surface.displacement(move([0, 0, 0.25]));
+    const { memory } = (kernel as unknown as { exports: { memory: WebAssembly.Memory } }).exports;
+    new Uint8Array(memory.buffer).fill(0xff);
+    const broken = failure(() => surface.displacement(move([0, 0, 0.25])));
+    expect(broken.kind).toBe("trap");
+    expect(broken.message).toMatch(/the geometry kernel failed/);
+    expect(surface.displacement(move([0, 0, 0.25]))).toEqual(before);
+  });
+
+  it("reads frames as the viewer's own decoder does", () => {
+    const triangles = [0, 1, 2, 2, 1, 3];
+    const topology = topologyFrame("v", "t", 4, triangles, [0, 1]);
+    const ours = decodeFrame(topology) as TopologyFrame;
+    const theirs = kernel.decodeFrame(topology);
+    expect(theirs.header).toMatchObject({ kind: "topology", view: "v", topology: "t", points: 4 });
+    expect(theirs.arrays[0]).toEqual(ours.triangles);
+    expect(theirs.arrays[2]).toEqual(ours.triangleFeatures);
+    const values = Array.from({ length: 12 }, (_, i) => Math.sin(i) * 3);
+    const data = dataFrame("v", "t", 7, 0.5, [{ name: "points", components: 3, values }, { name: "speed", components: 1, values: values.slice(0, 4) }]);
+    const frame = decodeFrame(data) as DataFrame;
+    const read = kernel.decodeFrame(data);
+    expect(read.header).toMatchObject({ kind: "data", cycle: 7, time: 0.5, fields: [{ name: "speed", components: 1 }] });
+    expect(read.arrays[0]).toEqual(frame.points);
+    expect(read.arrays[1]).toEqual(frame.fields[0]!.values);
+  });
+});
