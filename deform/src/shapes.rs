@@ -15,6 +15,7 @@
 //! arguments are written by a programmer, never read from a user.
 
 use crate::mesh::{CellType, Cells, FeatureSource, Mesh, MeshError, TaggedFaces, Vector};
+use crate::vector::{add, cross, dot, scale, subtract};
 
 /// The features of a box, in the order of their tags 1 to 6.
 pub const BOX_FEATURES: [&str; 6] = ["x-min", "x-max", "y-min", "y-max", "z-min", "z-max"];
@@ -103,6 +104,44 @@ pub fn torus(major: f64, minor: f64, counts: [usize; 2]) -> Mesh {
     }
     let cells = valid(Cells::uniform(CellType::Triangle, connectivity));
     valid(Mesh::new(points, cells, FeatureSource::Vertices(tags)))
+}
+
+/// An open tube of triangles around a polyline of at least 2 points: a mesh of dimension 2, its triangles counter-clockwise seen
+/// from outside.
+///
+/// `around` vertices (at least 3) lie on a circle of the radius about each point, in the plane normal to the polyline there; vertex
+/// `j + around * i` is the `j`-th about point `i`. The circles are not turned against each other along the way. Its features are
+/// to be found at sharp edges.
+#[must_use]
+pub fn tube(axis: &[Vector], radius: f64, around: usize) -> Mesh {
+    let around = around.max(3);
+    let unit = |vector: Vector| scale(vector, 1.0 / dot(vector, vector).sqrt());
+    let tangent = |i: usize| {
+        let along = |i: usize| unit(subtract(axis[i + 1], axis[i]));
+        let [before, after] = [i.max(1) - 1, i.min(axis.len() - 2)].map(along);
+        unit(add(before, after))
+    };
+    let mut points = Vec::with_capacity(axis.len() * around);
+    let mut across = if tangent(0)[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+    for (i, &center) in axis.iter().enumerate() {
+        let along = tangent(i);
+        across = unit(subtract(across, scale(along, dot(across, along))));
+        let side = cross(along, across);
+        for j in 0..around {
+            let (sine, cosine) = (std::f64::consts::TAU * j as f64 / around as f64).sin_cos();
+            points.push(add(center, add(scale(across, radius * cosine), scale(side, radius * sine))));
+        }
+    }
+    let mut connectivity = Vec::with_capacity(6 * points.len());
+    for i in 1..axis.len() {
+        for j in 0..around {
+            let vertex = |i: usize, j: usize| number(j % around + around * i);
+            let [a, b, c, d] = [vertex(i - 1, j), vertex(i - 1, j + 1), vertex(i, j + 1), vertex(i, j)];
+            connectivity.extend([a, b, c, a, c, d]);
+        }
+    }
+    let cells = valid(Cells::uniform(CellType::Triangle, connectivity));
+    valid(Mesh::new(points, cells, FeatureSource::SharpEdges))
 }
 
 /// A flat plate of triangles in the plane z = 0, normal along +z: an open mesh of dimension 2.

@@ -2,6 +2,7 @@
 
 use super::{HarmonicOrder, RegionError, UnknownFeature};
 use crate::mesh::Vector;
+use crate::skeleton::SkeletonEditError;
 
 /// What is wrong with an edit whatever the surface.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -217,13 +218,13 @@ pub enum EditError {
         /// The file.
         file: String,
     },
-    /// A surface that has no skeleton, or an edit that has none to drag.
-    #[error("edit {edit} (skeleton): {reason}")]
+    /// A surface that has no skeleton, or a drag that it does not allow.
+    #[error("edit {edit} (skeleton): {source}")]
     Skeleton {
         /// The place of the edit.
         edit: usize,
-        /// Why.
-        reason: String,
+        /// What is wrong.
+        source: Box<SkeletonEditError>,
     },
     /// A coordinate would overflow.
     #[error("edit {edit} ({name}): mesh vertex {vertex} would leave the range of floating-point numbers")]
@@ -254,4 +255,10 @@ fn empty(nearest: Option<(u32, Vector, f64)>, [lower, upper]: [Vector; 2]) -> St
         format!("; the nearest, mesh vertex {vertex} at {point:?}, is {distance:.6} away")
     });
     format!("no vertex of the surface lies in it{nearest}; the surface reaches from {lower:?} to {upper:?}")
+}
+
+impl EditError {
+    pub(super) fn skeleton(edit: usize, source: SkeletonEditError) -> Self {
+        Self::Skeleton { edit, source: Box::new(source) }
+    }
 }

@@ -9,6 +9,7 @@ use super::motion::{self, Motion};
 use super::polyharmonic::{NotFactored, Polyharmonic};
 use super::{Edit, EditError, HarmonicOrder, Surface, SurfaceError};
 use crate::mesh::Vector;
+use crate::skeleton::{Skeleton, SkeletonEditor, SkeletonError, SkinError};
 use crate::vector::add;
 
 /// How many factored operators are kept, and how many numbers they may hold together (8 bytes each); the newest is always kept.
@@ -73,6 +74,7 @@ pub struct Editor {
     laplacians: Vec<Laplacian>,
     parts: Vec<u32>,
     operators: Vec<Polyharmonic>,
+    skeletons: SkeletonEditor,
     /// The stack without its last edit, as it was last evaluated.
     below: Option<(Vec<Edit>, Vec<Vector>)>,
 }
@@ -90,13 +92,32 @@ impl Editor {
             parts.join(b, c);
         }
         let parts = (0..surface.points().len() as u32).map(|vertex| parts.root(vertex)).collect();
-        Ok(Self { surface, laplacians, parts, operators: Vec::new(), below: None })
+        let skeletons = SkeletonEditor::new(Arc::clone(&surface));
+        Ok(Self { surface, laplacians, parts, operators: Vec::new(), skeletons, below: None })
     }
 
     /// The surface.
     #[must_use]
     pub fn surface(&self) -> &Arc<Surface> {
         &self.surface
+    }
+
+    /// The same with this skeleton, in place of the one that would be extracted when the first skeleton edit needs it.
+    ///
+    /// # Errors
+    /// [`SkinError::OtherSurface`], where it does not carry as many vertices as the surface has.
+    pub fn with_skeleton(mut self, skeleton: Arc<Skeleton>) -> Result<Self, SkinError> {
+        self.skeletons.set(skeleton)?;
+        self.below = None;
+        Ok(self)
+    }
+
+    /// The skeleton of the reference surface, that skeleton edits drag. The first call extracts it, unless it was given.
+    ///
+    /// # Errors
+    /// [`SkeletonError`], where the surface has none.
+    pub fn skeleton(&mut self) -> Result<Arc<Skeleton>, SkeletonError> {
+        self.skeletons.skeleton()
     }
 
     /// The displacement of each surface vertex from [`Surface::points`] that a stack of edits asks for.
@@ -110,6 +131,13 @@ impl Editor {
             .enumerate()
             .map(|(edit, what)| Handle::find(&self.surface, what, edit))
             .collect::<Result<Vec<_>, _>>()?;
+        for (edit, what) in stack.iter().enumerate() {
+            if let Edit::Skeleton(drag) = what
+                && !drag.muted
+            {
+                self.skeletons.nodes(drag).map_err(|source| EditError::skeleton(edit, source))?;
+            }
+        }
         let Some((_, lower)) = stack.split_last() else {
             return Ok(vec![[0.0; 3]; self.surface.points().len()]);
         };
@@ -138,9 +166,10 @@ impl Editor {
         }
         let fields = match what {
             Edit::Displacement(import) => axes(&motion::displacement(&self.surface, import, handle)),
-            Edit::Skeleton(_) => {
-                let reason = "this build does not carry skeletons onto the surface".into();
-                return Err(EditError::Skeleton { edit, reason });
+            Edit::Skeleton(drag) => {
+                let held = handle.roles.iter().map(|role| *role != Role::Handle).collect();
+                let moved = self.skeletons.displacement(drag, held, displacement);
+                axes(&moved.map_err(|source| EditError::skeleton(edit, source))?)
             }
             _ => self.follow(edit, what, handle, displacement)?,
         };
