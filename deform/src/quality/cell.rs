@@ -9,15 +9,15 @@ use crate::vector::{add, cross, determinant, dot, mean, subtract};
 pub(crate) const VOXEL_AS_HEXAHEDRON: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
 
 /// Each corner of a hexahedron with its three neighbours, right-handed.
-const HEXAHEDRON_CORNERS: [[usize; 4]; 8] =
+pub(crate) const HEXAHEDRON_CORNERS: [[usize; 4]; 8] =
     [[0, 1, 3, 4], [1, 2, 0, 5], [2, 3, 1, 6], [3, 0, 2, 7], [4, 7, 5, 0], [5, 4, 6, 1], [6, 5, 7, 2], [7, 6, 4, 3]];
 
 /// Each corner of a wedge with its three neighbours, right-handed where the first triangle's normal points at the second.
-const WEDGE_CORNERS: [[usize; 4]; 6] =
+pub(crate) const WEDGE_CORNERS: [[usize; 4]; 6] =
     [[0, 1, 2, 3], [1, 2, 0, 4], [2, 0, 1, 5], [3, 5, 4, 0], [4, 3, 5, 1], [5, 4, 3, 2]];
 
 /// Each corner of a pyramid's base with its neighbours and the apex.
-const PYRAMID_CORNERS: [[usize; 4]; 4] = [[0, 1, 3, 4], [1, 2, 0, 4], [2, 3, 1, 4], [3, 0, 2, 4]];
+pub(crate) const PYRAMID_CORNERS: [[usize; 4]; 4] = [[0, 1, 3, 4], [1, 2, 0, 4], [2, 3, 1, 4], [3, 0, 2, 4]];
 
 /// The scaled Jacobian of one cell: 1 for the ideal cell, 0 for a flat one, negative for one turned inside out.
 ///

@@ -30,9 +30,12 @@ pub enum Otherwise {
     /// It is rejected, with the reason, the worst cells and the largest feasible fraction. The shape stays as it is.
     #[default]
     Reject,
-    /// It is mended by an inversion-free solve where there is one, and rejected where there is none or it does not succeed.
-    /// [`judge`] itself only judges: it refuses the path either way.
+    /// It is mended: in sub-steps stiffened anew on the way, with an inversion-free solve where these are not enough. Rejected
+    /// where that does not succeed. [`judge`] itself only judges: it refuses the path either way.
     Untangle,
+    /// As much of it is done as keeps to the guard: the largest feasible fraction of the order's amounts, which is reported.
+    /// Rejected where that is nothing.
+    Clamp,
 }
 
 impl Default for Guard {
@@ -206,11 +209,7 @@ pub fn judge(
     guard: &Guard,
 ) -> Result<PathQuality, Refusal> {
     check_arguments(mesh, start, end, fractions, guard)?;
-    let measure = Measure::new(mesh.cells(), mesh.points());
-    let reference = least_scaled_jacobian(&measure, mesh.points());
-    let floor = guard.min_scaled_jacobian.min(reference);
-    let path = Path { measure, start, end, floor: floor - 1e-9 * floor.abs() };
-
+    let (path, floor) = Path::new(mesh, start, end, guard);
     let parts = parallel::map_chunks(mesh.cells().len(), CHUNK, |range| path.look(range, fractions));
     let mut total = Part::new(fractions.len());
     for part in parts {
@@ -229,6 +228,16 @@ pub fn judge(
         .collect();
     let min_scaled_jacobian = shapes.iter().map(|shape| shape.min).fold(1.0, f64::min);
     Ok(PathQuality { floor, min_scaled_jacobian, shapes })
+}
+
+/// Whether [`judge`] would let a straight step through, without saying why not.
+#[must_use]
+pub fn keeps(mesh: &Mesh, start: &[Vector], end: &[Vector], guard: &Guard) -> bool {
+    if check_arguments(mesh, start, end, &[1.0], guard).is_err() {
+        return false;
+    }
+    let path = Path::new(mesh, start, end, guard).0;
+    !path.fails(1.0)
 }
 
 fn check_arguments(
@@ -329,7 +338,14 @@ struct Memory {
     measure: Scratch,
 }
 
-impl Path<'_> {
+impl<'a> Path<'a> {
+    /// The path, and the floor that holds on it.
+    fn new(mesh: &'a Mesh, start: &'a [Vector], end: &'a [Vector], guard: &Guard) -> (Self, f64) {
+        let measure = Measure::new(mesh.cells(), mesh.points());
+        let floor = guard.min_scaled_jacobian.min(least_scaled_jacobian(&measure, mesh.points()));
+        (Self { measure, start, end, floor: floor - 1e-9 * floor.abs() }, floor)
+    }
+
     fn look(&self, range: std::ops::Range<usize>, fractions: &[f64]) -> Part {
         let mut part = Part::new(fractions.len());
         let mut memory = Memory::default();

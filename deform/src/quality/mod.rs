@@ -13,9 +13,11 @@ mod tests;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-pub(crate) use cell::corner_tets;
 pub use cell::scaled_jacobian;
-pub use judge::{BrokenPath, FailingCell, Guard, Otherwise, PathQuality, Refusal, ShapeQuality, judge, shape_at};
+pub(crate) use cell::{HEXAHEDRON_CORNERS, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, corner_tets};
+pub use judge::{
+    BrokenPath, FailingCell, Guard, Otherwise, PathQuality, Refusal, ShapeQuality, judge, keeps, shape_at,
+};
 
 use crate::mesh::{CellType, Cells, Vector};
 use crate::parallel;

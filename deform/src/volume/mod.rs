@@ -4,16 +4,21 @@
 //! linear finite elements, either linear elasticity with a material that is stiffer where cells are small (T. Tezduyar et al.
 //! 1992; K. Stein, T. Tezduyar, R. Benney 2003) or Laplace's equation for each component of the displacement.
 
+mod adaptive;
 mod assembly;
 mod element;
+mod foldover;
 mod operator;
 mod rigid;
 mod settings;
 #[cfg(test)]
 mod tests;
+mod untangle;
 
+pub use adaptive::{BoundaryMotion, FollowError, Route, Stalled, Waypoint, follow};
 pub use operator::{VolumeOperator, VolumeSolution};
 pub use settings::{Deform, Method};
+pub use untangle::Untangler;
 
 use crate::mesh::{CellType, Vector};
 

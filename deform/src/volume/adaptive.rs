@@ -1,0 +1,295 @@
+//! Carrying a motion of the boundary that one linear solve cannot follow into the volume in sub-steps.
+
+use std::sync::Arc;
+
+use super::{Deform, Untangler, VolumeError, VolumeOperator};
+use crate::linear::LinearError;
+use crate::mesh::{Mesh, Vector};
+use crate::quality::{Guard, Refusal, judge, keeps};
+use crate::vector::{add, subtract};
+
+/// The first sub-step, what a sub-step that holds lets the next one grow by, and the least one tried.
+const FIRST: f64 = 0.2;
+const GROWTH: f64 = 1.5;
+const LEAST: f64 = 1.0 / 512.0;
+
+/// The least one tried where the boundary itself folds.
+const LEAST_FOLDING: f64 = 1.0 / 128.0;
+
+/// Sub-steps longer than this are halved before the volume is untangled.
+const UNTANGLED_BELOW: f64 = 0.06;
+
+/// Sub-steps tried before it is given up.
+const TRIES: usize = 200;
+
+/// Sub-steps are solved no finer than this: what a solve leaves out is small against a sub-step.
+const TOLERANCE: f64 = 1e-6;
+
+/// A shape on the way of [`follow`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Waypoint {
+    /// How far along the motion of the boundary it lies, from 0 to 1.
+    pub fraction: f64,
+    /// The coordinates of every vertex of the mesh.
+    pub points: Arc<[Vector]>,
+}
+
+/// A way along which the volume followed its boundary: every straight piece of it was judged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Route {
+    /// The shapes after the first one; the last has the fraction 1.
+    pub waypoints: Vec<Waypoint>,
+    /// Sub-steps that were tried and did not hold.
+    pub rejected: usize,
+    /// Sub-steps that held only after they were untangled.
+    pub untangled: usize,
+    /// Iterations of the linear solver in all.
+    pub iterations: usize,
+}
+
+/// A way that ended before the boundary had come to its place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stalled {
+    /// As far as it came; its last fraction is the largest that was reached.
+    pub route: Route,
+    /// What is wrong with the smallest sub-step from there.
+    pub refusal: Refusal,
+    /// Whether it is the boundary itself that folds in that sub-step.
+    pub folds: bool,
+}
+
+impl Stalled {
+    /// How far along the motion of the boundary the volume could follow.
+    #[must_use]
+    pub fn fraction(&self) -> f64 {
+        self.route.waypoints.last().map_or(0.0, |last| last.fraction)
+    }
+}
+
+/// Why the volume did not follow.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FollowError<E> {
+    /// The boundary has no place at some fraction.
+    #[error(transparent)]
+    Boundary(E),
+    /// An equation could not be set up or solved.
+    #[error(transparent)]
+    Volume(VolumeError),
+    /// No further sub-step keeps to the guard.
+    #[error("the volume can follow {:.1} % of the way: {}", 100.0 * .0.fraction(), .0.refusal)]
+    Stalled(Box<Stalled>),
+}
+
+/// A motion of the boundary: where its vertices lie at the fraction `to`, going on from the shape of the whole mesh that was
+/// reached at the fraction `from`.
+pub trait BoundaryMotion {
+    /// Why there is no such place.
+    type Error;
+
+    /// The coordinates of each boundary vertex at the fraction `to`.
+    ///
+    /// # Errors
+    /// Where there are none.
+    fn at(&mut self, from: f64, to: f64, shape: &[Vector]) -> Result<Vec<Vector>, Self::Error>;
+
+    /// Whether the boundary folds over itself on its way to `places`, so that no motion of the inside can help.
+    fn folds(&self, shape: &[Vector], places: &[Vector]) -> bool {
+        let _ = (shape, places);
+        false
+    }
+}
+
+/// Takes the volume along with a motion of its boundary from the shape `start` on.
+///
+/// One linear solve on the shape reached, with a material stiffened anew, makes a sub-step: a fifth of the way at first. One
+/// that the guard does not let through is halved, a small one is untangled (see [`Untangler`]); after one that holds, the next
+/// may be half as long again. So what is found is a function of the arguments alone.
+///
+/// `untangler` is of the reference mesh, which is what cells are drawn back to.
+///
+/// # Errors
+/// [`FollowError`]; [`FollowError::Stalled`] with how far it came.
+pub fn follow<M: BoundaryMotion>(
+    mesh: &Mesh,
+    boundary: &[u32],
+    start: &Arc<[Vector]>,
+    motion: &mut M,
+    settings: &Deform,
+    guard: &Guard,
+    untangler: Option<&Untangler>,
+) -> Result<Route, FollowError<M::Error>> {
+    let settings = Deform { tolerance: settings.tolerance.max(TOLERANCE), ..*settings };
+    let mut route = Route { waypoints: Vec::new(), rejected: 0, untangled: 0, iterations: 0 };
+    let mut shape = Arc::clone(start);
+    let (mut reached, mut step) = (0.0, FIRST);
+    while reached < 1.0 {
+        let stiffened = mesh.with_points(shape.to_vec()).map_err(|_| FollowError::Volume(overflow()))?;
+        let operator = VolumeOperator::new(&stiffened, boundary, &settings).map_err(FollowError::Volume)?;
+        drop(stiffened);
+        loop {
+            // A last sub-step that would leave next to nothing takes it along.
+            let next = if reached + 1.25 * step >= 1.0 { 1.0 } else { reached + step };
+            let places = motion.at(reached, next, &shape).map_err(FollowError::Boundary)?;
+            let mut candidate =
+                moved(&operator, &shape, &places, &mut route.iterations).map_err(FollowError::Volume)?;
+            let mut holds = keeps(mesh, &shape, &candidate, guard);
+            let folds = !holds && motion.folds(&shape, &places);
+            if let Some(untangler) = untangler
+                && !(holds || folds)
+                && next - reached <= UNTANGLED_BELOW
+                && untangler.untangle(mesh, &mut candidate, guard.min_scaled_jacobian)
+            {
+                holds = keeps(mesh, &shape, &candidate, guard);
+                route.untangled += usize::from(holds);
+            }
+            if holds {
+                shape = candidate.into();
+                route.waypoints.push(Waypoint { fraction: next, points: Arc::clone(&shape) });
+                (reached, step) = (next, GROWTH * (next - reached));
+                break;
+            }
+            route.rejected += 1;
+            step = 0.5 * (next - reached);
+            if step < (if folds { LEAST_FOLDING } else { LEAST }) || route.rejected >= TRIES {
+                return Err(stalled(mesh, &shape, &candidate, guard, route, folds));
+            }
+        }
+    }
+    Ok(route)
+}
+
+/// The shape after a sub-step that takes the boundary to `places`.
+fn moved(
+    operator: &VolumeOperator,
+    shape: &[Vector],
+    places: &[Vector],
+    iterations: &mut usize,
+) -> Result<Vec<Vector>, VolumeError> {
+    let displacement: Vec<Vector> = operator
+        .boundary()
+        .iter()
+        .zip(places)
+        .map(|(&vertex, place)| subtract(*place, shape[vertex as usize]))
+        .collect();
+    let solution = operator.solve(&displacement)?;
+    *iterations += solution.iterations;
+    let mut candidate: Vec<Vector> = shape.iter().zip(&solution.displacement).map(|(&a, &b)| add(a, b)).collect();
+    for (&vertex, &place) in operator.boundary().iter().zip(places) {
+        candidate[vertex as usize] = place;
+    }
+    Ok(candidate)
+}
+
+fn overflow() -> VolumeError {
+    LinearError::NotFinite { iteration: 0 }.into()
+}
+
+fn stalled<E>(
+    mesh: &Mesh,
+    shape: &[Vector],
+    candidate: &[Vector],
+    guard: &Guard,
+    route: Route,
+    folds: bool,
+) -> FollowError<E> {
+    match judge(mesh, shape, candidate, &[1.0], guard) {
+        Err(refusal) => FollowError::Stalled(Box::new(Stalled { route, refusal, folds })),
+        // `keeps` and `judge` are one test.
+        Ok(_) => FollowError::Volume(overflow()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::convert::Infallible;
+
+    use super::*;
+    use crate::quality::quality;
+    use crate::shapes;
+
+    struct Places<F>(F);
+
+    impl<F: FnMut(f64) -> Vec<Vector>> BoundaryMotion for Places<F> {
+        type Error = Infallible;
+
+        fn at(&mut self, _: f64, to: f64, _: &[Vector]) -> Result<Vec<Vector>, Infallible> {
+            Ok((self.0)(to))
+        }
+    }
+
+    fn boundary(mesh: &Mesh) -> Vec<u32> {
+        let on = |p: &Vector| p.iter().any(|&x| x == 0.0 || x == 1.0);
+        (0..).zip(mesh.points()).filter(|(_, p)| on(p)).map(|(vertex, _)| vertex).collect()
+    }
+
+    /// The unit cube twisted about its axis by `degrees` from bottom to top.
+    fn twisted(mesh: &Mesh, boundary: &[u32], degrees: f64) -> Vec<Vector> {
+        let place = |&vertex: &u32| {
+            let [x, y, z] = mesh.points()[vertex as usize];
+            let (s, c) = (degrees * z).to_radians().sin_cos();
+            [0.5 + c * (x - 0.5) - s * (y - 0.5), 0.5 + s * (x - 0.5) + c * (y - 0.5), z]
+        };
+        boundary.iter().map(place).collect()
+    }
+
+    fn single(mesh: &Mesh, boundary: &[u32], places: &[Vector]) -> Vec<Vector> {
+        let operator = VolumeOperator::new(mesh, boundary, &Deform::default()).unwrap();
+        moved(&operator, mesh.points(), places, &mut 0).unwrap()
+    }
+
+    /// A turn that a single solve cannot follow, on tetrahedra and on hexahedra; every piece of the way holds.
+    #[test]
+    fn a_half_twist_is_followed() {
+        let guard = Guard { min_scaled_jacobian: 0.01, ..Guard::default() };
+        for mesh in [
+            shapes::box_of_tets([6, 6, 8], [0.0; 3], [1.0; 3]),
+            shapes::box_of_hexahedra([6, 6, 8], [0.0; 3], [1.0; 3]),
+        ] {
+            let boundary = boundary(&mesh);
+            let end = twisted(&mesh, &boundary, 180.0);
+            assert!(!keeps(&mesh, mesh.points(), &single(&mesh, &boundary, &end), &guard));
+            let start: Arc<[Vector]> = mesh.points().into();
+            let untangler = Untangler::new(&mesh, &boundary);
+            let mut motion = Places(|to| twisted(&mesh, &boundary, 180.0 * to));
+            let route =
+                follow(&mesh, &boundary, &start, &mut motion, &Deform::default(), &guard, Some(&untangler)).unwrap();
+            let mut before = &start;
+            for point in &route.waypoints {
+                assert!(keeps(&mesh, before, &point.points, &guard));
+                before = &point.points;
+            }
+            assert!(quality(mesh.cells(), before).min >= 0.01);
+            assert_eq!(route.waypoints.last().unwrap().fraction, 1.0);
+            for (&vertex, place) in boundary.iter().zip(&end) {
+                assert_eq!(before[vertex as usize], *place);
+            }
+            let again =
+                follow(&mesh, &boundary, &start, &mut motion, &Deform::default(), &guard, Some(&untangler)).unwrap();
+            assert_eq!(route, again);
+        }
+    }
+
+    /// A cube pressed flat and beyond: it stops short of it, and says where.
+    #[test]
+    fn what_cannot_be_followed_is_told_with_the_fraction_reached() {
+        let mesh = shapes::box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+        let boundary = boundary(&mesh);
+        let start: Arc<[Vector]> = mesh.points().into();
+        let pressed = |to: f64| {
+            let place = |&vertex: &u32| {
+                let [x, y, z] = mesh.points()[vertex as usize];
+                [x, y, z * (1.0 - 1.25 * to)]
+            };
+            boundary.iter().map(place).collect::<Vec<_>>()
+        };
+        let untangler = Untangler::new(&mesh, &boundary);
+        let guard = Guard { min_scaled_jacobian: 0.05, ..Guard::default() };
+        let result =
+            follow(&mesh, &boundary, &start, &mut Places(pressed), &Deform::default(), &guard, Some(&untangler));
+        let Err(FollowError::Stalled(stalled)) = result else { panic!("{result:?}") };
+        assert!((0.6..0.8).contains(&stalled.fraction()), "{}", stalled.fraction());
+        assert!(matches!(stalled.refusal, Refusal::Quality(_)));
+        let error = FollowError::<Infallible>::Stalled(stalled).to_string();
+        assert!(error.contains("can follow 7") || error.contains("can follow 6"), "{error}");
+    }
+}

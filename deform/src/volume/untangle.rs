@@ -1,0 +1,369 @@
+//! Moving the inside of a mesh so that no cell is turned inside out.
+
+use super::foldover;
+use crate::linear::{ConjugateGradients, LinearSolver, SparseMatrix, Tolerance, reverse_cuthill_mckee};
+use crate::mesh::{CellType, Mesh, Vector};
+use crate::parallel;
+use crate::quality::{
+    HEXAHEDRON_CORNERS, Measure, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, quality, tet_determinant,
+};
+use crate::vector::{add, cross, dot, scale, subtract};
+
+/// How many corners are worked on at a time, and how many such pieces are kept before they are added up.
+const CHUNK: usize = 1024;
+const PIECES: usize = 16;
+
+/// Newton steps at most.
+const STEPS: usize = 60;
+
+/// A mesh is settled once a Newton step takes less than this part of the energy off.
+const SETTLED: f64 = 1e-3;
+
+const NONE: u32 = u32::MAX;
+
+/// Moves the free vertices of one mesh so that no cell is turned inside out, and cells are as much like those of the reference
+/// mesh as the boundary allows.
+///
+/// With `J` the gradient of the map from the reference at each corner of each cell (tetrahedra are their own), it minimises the
+/// sum of `½ tr(JᵀJ) / χ^⅔ + ½ (1 + det²J) / χ`, the foldover-free energy of V. Garanzha, I. Kaporin, L. Kudryavtseva,
+/// F. Protais, N. Ray and D. Sokolov (2021), by Newton's method: `χ = ½ (det J + √(ε² + det²J))` makes it finite for cells
+/// that are inside out, and ε is brought down as they turn. Hessians are projected to positive definite ones corner by corner in
+/// closed form (B. Smith, F. de Goes, T. Kim 2019), so that the linear systems suit [`ConjugateGradients`]; the line search
+/// makes the energy fall in every step. All corners weigh the same, so that thin layers keep their shape.
+///
+/// Cells of types that are neither tetrahedra, hexahedra, voxels, wedges nor pyramids are passed over.
+///
+/// # Guarantees
+/// - Vertices that are not free do not move.
+/// - The same bits whatever the number of threads.
+///
+/// It does *not* guarantee to find a mesh that is valid, even where there is one.
+#[derive(Debug)]
+pub struct Untangler {
+    corners: Vec<Corner>,
+    /// The vertex of each unknown.
+    unknowns: Vec<u32>,
+    /// The unknown of each vertex.
+    slots: Vec<u32>,
+    offsets: Vec<usize>,
+    columns: Vec<u32>,
+}
+
+/// A tetrahedron at a corner of a cell.
+#[derive(Debug, Clone, Copy)]
+struct Corner {
+    vertices: [u32; 4],
+    /// The gradients of its linear shape functions in the reference.
+    gradients: [Vector; 4],
+}
+
+/// What is known of a shape.
+#[derive(Debug, Clone, Copy, Default)]
+struct State {
+    energy: f64,
+    /// The least determinant.
+    least: f64,
+}
+
+impl Untangler {
+    /// An untangler of the cells of the reference mesh `mesh`; the vertices of `boundary` are not free.
+    #[must_use]
+    pub fn new(mesh: &Mesh, boundary: &[u32]) -> Self {
+        let corners = corners(mesh);
+        let mut free = vec![true; mesh.points().len()];
+        for &vertex in boundary {
+            if let Some(free) = free.get_mut(vertex as usize) {
+                *free = false;
+            }
+        }
+        let mut pairs = Vec::with_capacity(12 * corners.len());
+        let mut used = vec![false; free.len()];
+        for corner in &corners {
+            for &a in &corner.vertices {
+                used[a as usize] = true;
+                if free[a as usize] {
+                    pairs.extend(corner.vertices.iter().filter(|&&b| free[b as usize] && a != b).map(|&b| (a, b)));
+                }
+            }
+        }
+        pairs.sort_unstable();
+        pairs.dedup();
+        let vertices: Vec<u32> =
+            (0..).zip(free.iter().zip(&used)).filter(|(_, (free, used))| **free && **used).map(|(v, _)| v).collect();
+        let mut slots = vec![NONE; free.len()];
+        for (slot, &vertex) in (0..).zip(&vertices) {
+            slots[vertex as usize] = slot;
+        }
+        let mut starts = Vec::with_capacity(vertices.len() + 1);
+        let mut place = 0;
+        for &vertex in &vertices {
+            starts.push(place);
+            while pairs.get(place).is_some_and(|pair| pair.0 == vertex) {
+                place += 1;
+            }
+        }
+        starts.push(place);
+        let neighbours: Vec<u32> = pairs.iter().map(|pair| slots[pair.1 as usize]).collect();
+        drop(pairs);
+        let order =
+            reverse_cuthill_mckee(vertices.len(), |row| &neighbours[starts[row as usize]..starts[row as usize + 1]]);
+        let mut new = vec![0u32; order.len()];
+        for (place, &old) in (0..).zip(&order) {
+            new[old as usize] = place;
+        }
+        let (mut offsets, mut columns) = (vec![0], Vec::with_capacity(neighbours.len() + order.len()));
+        for (row, &old) in (0..).zip(&order) {
+            let from = columns.len();
+            columns.push(row);
+            columns.extend(
+                neighbours[starts[old as usize]..starts[old as usize + 1]].iter().map(|&slot| new[slot as usize]),
+            );
+            columns[from..].sort_unstable();
+            offsets.push(columns.len());
+        }
+        let unknowns: Vec<u32> = order.iter().map(|&old| vertices[old as usize]).collect();
+        for (slot, &vertex) in (0..).zip(&unknowns) {
+            slots[vertex as usize] = slot;
+        }
+        Self { corners, unknowns, slots, offsets, columns }
+    }
+
+    /// Moves the free vertices of `points` until every corner's determinant is positive and every scaled Jacobian at least
+    /// `floor`, and on until the energy has settled. Says whether all of them are.
+    ///
+    /// `mesh` is the reference mesh.
+    pub fn untangle(&self, mesh: &Mesh, points: &mut [Vector], floor: f64) -> bool {
+        if self.unknowns.is_empty() || points.len() != self.slots.len() {
+            return false;
+        }
+        let mut epsilon = 1.0;
+        let mut direction = vec![[0.0; 3]; self.unknowns.len()];
+        for step in 0..STEPS {
+            let least = self.state(points, 1.0).least;
+            // As Garanzha et al.: the regularisation follows the worst determinant; a valid mesh has none.
+            epsilon = if least > 0.0 { (0.01 * least).min(epsilon) } else { (1e-12 + 0.04 * least * least).sqrt() };
+            let before = self.state(points, epsilon).energy;
+            let (matrix, right_side) = self.assemble(points, epsilon);
+            let slope = match ConjugateGradients::new(matrix).and_then(|solver| {
+                solver.solve(&right_side, &mut direction, Tolerance { relative: 1e-2, absolute: 0.0 })
+            }) {
+                Ok(_) => -inner(&right_side, &direction),
+                Err(_) => return false,
+            };
+            let Some(after) = self.descend(points, &direction, epsilon, before, slope) else { break };
+            let settled = before - after < SETTLED * before.abs();
+            if settled && least > 0.0 && step > 2 {
+                break;
+            }
+        }
+        let sum = quality(mesh.cells(), points);
+        sum.inverted == 0 && sum.min >= floor
+    }
+
+    /// Goes along `direction` as far as the energy falls enough (Armijo); the energy there.
+    fn descend(
+        &self,
+        points: &mut [Vector],
+        direction: &[Vector],
+        epsilon: f64,
+        before: f64,
+        slope: f64,
+    ) -> Option<f64> {
+        let start: Vec<Vector> = self.unknowns.iter().map(|&vertex| points[vertex as usize]).collect();
+        let mut length = 1.0;
+        for _ in 0..30 {
+            for ((&vertex, &from), &by) in self.unknowns.iter().zip(&start).zip(direction) {
+                points[vertex as usize] = add(from, scale(by, length));
+            }
+            let after = self.state(points, epsilon).energy;
+            if after <= before + 1e-4 * length * slope {
+                return Some(after);
+            }
+            length *= 0.5;
+        }
+        for (&vertex, &from) in self.unknowns.iter().zip(&start) {
+            points[vertex as usize] = from;
+        }
+        None
+    }
+
+    fn state(&self, points: &[Vector], epsilon: f64) -> State {
+        parallel::map_chunks(self.corners.len(), CHUNK, |range| {
+            let mut state = State { energy: 0.0, least: f64::INFINITY };
+            for corner in &self.corners[range] {
+                let j = corner.jacobian(points);
+                state.energy += foldover::energy(&j, epsilon);
+                state.least = state.least.min(foldover::determinant_of(&j));
+            }
+            state
+        })
+        .into_iter()
+        .fold(State { energy: 0.0, least: f64::INFINITY }, |sum, part| State {
+            energy: sum.energy + part.energy,
+            least: sum.least.min(part.least),
+        })
+    }
+
+    /// The Hessian, and the energy's gradient with its sign turned.
+    fn assemble(&self, points: &[Vector], epsilon: f64) -> (SparseMatrix<3>, Vec<Vector>) {
+        let mut matrix = SparseMatrix::<3>::zeros(self.offsets.clone(), self.columns.clone());
+        let mut right_side = vec![[0.0; 3]; self.unknowns.len()];
+        let (offsets, columns, values) = matrix.offsets_and_values_mut();
+        for corners in self.corners.chunks(CHUNK * PIECES) {
+            let locals = parallel::map_chunks(corners.len(), CHUNK, |range| {
+                corners[range]
+                    .iter()
+                    .map(|corner| foldover::local(&corner.jacobian(points), epsilon, &corner.gradients))
+                    .collect::<Vec<_>>()
+            });
+            for (corner, local) in corners.iter().zip(locals.iter().flatten()) {
+                let slots = corner.vertices.map(|vertex| self.slots[vertex as usize]);
+                for (&slot, &gradient) in slots.iter().zip(&local.gradient) {
+                    if slot != NONE {
+                        right_side[slot as usize] = subtract(right_side[slot as usize], gradient);
+                    }
+                }
+                for ([a, b], block) in foldover::PAIRS.into_iter().zip(&local.blocks) {
+                    let (row, column) = (slots[a], slots[b]);
+                    if row == NONE || column == NONE {
+                        continue;
+                    }
+                    let mut put = |row: u32, column: u32, transposed: bool| {
+                        let (start, end) = (offsets[row as usize], offsets[row as usize + 1]);
+                        let place = start + columns[start..end].partition_point(|&other| other < column);
+                        for (p, entries) in values[place].iter_mut().enumerate() {
+                            for (q, entry) in entries.iter_mut().enumerate() {
+                                *entry += if transposed { block[q][p] } else { block[p][q] };
+                            }
+                        }
+                    };
+                    put(row, column, false);
+                    if a != b {
+                        put(column, row, true);
+                    }
+                }
+            }
+        }
+        (matrix, right_side)
+    }
+}
+
+impl Corner {
+    #[inline]
+    fn jacobian(&self, points: &[Vector]) -> [Vector; 3] {
+        foldover::jacobian(self.vertices.map(|vertex| points[vertex as usize]), &self.gradients)
+    }
+}
+
+fn inner(a: &[Vector], b: &[Vector]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| dot(*a, *b)).sum()
+}
+
+/// The corners of the cells, each right-handed in a valid mesh; those flat in the reference are left out.
+fn corners(mesh: &Mesh) -> Vec<Corner> {
+    let (cells, points) = (mesh.cells(), mesh.points());
+    let measure = Measure::new(cells, points);
+    let mut corners = Vec::with_capacity(cells.len());
+    let mut take = |vertices: [u32; 4], turned: bool| {
+        let [a, b, c, d] = vertices;
+        let vertices = if turned { [a, c, b, d] } else { vertices };
+        let [p, q, r, s] = vertices.map(|vertex| points[vertex as usize]);
+        let (u, v, w) = (subtract(q, p), subtract(r, p), subtract(s, p));
+        let determinant = tet_determinant([p, q, r, s]);
+        if determinant > 0.0 {
+            let [g, h, k] = [cross(v, w), cross(w, u), cross(u, v)].map(|face| scale(face, 1.0 / determinant));
+            corners.push(Corner { vertices, gradients: [scale(add(add(g, h), k), -1.0), g, h, k] });
+        }
+    };
+    for (cell, (cell_type, vertices)) in cells.iter().enumerate() {
+        let mut take_all = |locals: &[[usize; 4]]| {
+            for local in locals {
+                take(local.map(|index| vertices[index]), measure.sign(cell) < 0.0);
+            }
+        };
+        match cell_type {
+            CellType::Tetra => take_all(&[[0, 1, 2, 3]]),
+            CellType::Hexahedron => take_all(&HEXAHEDRON_CORNERS),
+            CellType::Voxel => {
+                take_all(&HEXAHEDRON_CORNERS.map(|corner| corner.map(|local| VOXEL_AS_HEXAHEDRON[local])));
+            }
+            CellType::Wedge => take_all(&WEDGE_CORNERS),
+            CellType::Pyramid => take_all(&PYRAMID_CORNERS),
+            _ => {}
+        }
+    }
+    corners
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shapes;
+
+    fn boundary(mesh: &Mesh) -> Vec<u32> {
+        let on = |p: &Vector| p.iter().any(|&x| x == 0.0 || x == 1.0);
+        (0..).zip(mesh.points()).filter(|(_, p)| on(p)).map(|(vertex, _)| vertex).collect()
+    }
+
+    /// The inside of a cube thrown about by far more than the size of a cell.
+    fn thrown(mesh: &Mesh, boundary: &[u32]) -> Vec<Vector> {
+        let mut points = mesh.points().to_vec();
+        for (vertex, point) in points.iter_mut().enumerate() {
+            if !boundary.contains(&(vertex as u32)) {
+                let wave = |phase: f64| 0.3 * (12.9898 * vertex as f64 + phase).sin();
+                *point = [point[0] + wave(0.0), point[1] + wave(2.0), point[2] + wave(4.0)];
+            }
+        }
+        points
+    }
+
+    /// With the boundary where it was, the reference is the one minimum.
+    #[test]
+    fn a_thrown_inside_comes_back() {
+        for mesh in [
+            shapes::box_of_tets([5, 6, 4], [0.0; 3], [1.0; 3]),
+            shapes::box_of_hexahedra([5, 6, 4], [0.0; 3], [1.0; 3]),
+        ] {
+            let boundary = boundary(&mesh);
+            let mut points = thrown(&mesh, &boundary);
+            assert!(quality(mesh.cells(), &points).inverted > 50);
+            assert!(Untangler::new(&mesh, &boundary).untangle(&mesh, &mut points, 0.0));
+            for (vertex, (point, reference)) in points.iter().zip(mesh.points()).enumerate() {
+                let off = subtract(*point, *reference);
+                assert!(dot(off, off).sqrt() < 0.02, "vertex {vertex}: {off:?}");
+                if boundary.contains(&(vertex as u32)) {
+                    assert_eq!(point, reference);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_untangled_is_said() {
+        let mesh = shapes::box_of_tets([3, 3, 3], [0.0; 3], [1.0; 3]);
+        let boundary = boundary(&mesh);
+        let untangler = Untangler::new(&mesh, &boundary);
+        let mut mirrored: Vec<Vector> = mesh.points().iter().map(|&[x, y, z]| [x, y, -z]).collect();
+        assert!(!untangler.untangle(&mesh, &mut mirrored, 0.0));
+        assert!(!untangler.untangle(&mesh, &mut mesh.points()[1..].to_vec(), 0.0));
+        let all: Vec<u32> = (0..mesh.points().len() as u32).collect();
+        assert!(!Untangler::new(&mesh, &all).untangle(&mesh, &mut mesh.points().to_vec(), 0.0), "nothing is free");
+    }
+
+    #[cfg(feature = "parallel")]
+    #[test]
+    fn the_same_bits_whatever_the_number_of_threads() {
+        let mesh = shapes::box_of_tets([8, 8, 8], [0.0; 3], [1.0; 3]);
+        let boundary = boundary(&mesh);
+        let untangler = Untangler::new(&mesh, &boundary);
+        let run = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let mut points = thrown(&mesh, &boundary);
+            assert!(pool.install(|| untangler.untangle(&mesh, &mut points, 0.0)));
+            points
+        };
+        let one = run(1);
+        assert_eq!(one, run(2));
+        assert_eq!(one, run(3));
+    }
+}
