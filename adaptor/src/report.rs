@@ -45,6 +45,9 @@ pub struct OrderReport {
     pub min_scaled_jacobian: Option<f64>,
     /// The longest way that a vertex of the surface goes for it, in units of the mesh.
     pub largest_displacement: Option<f64>,
+    /// The fraction of its amounts that is done: below 1 where the guard clamped it; of one that was rejected, what would pass,
+    /// where that is known.
+    pub fraction: Option<f64>,
     /// Seconds that its plan took.
     pub seconds: ShapeSeconds,
     /// Seconds that the solver waited inside `execute` for this order, in steps of the solver (their median).

@@ -1,15 +1,23 @@
 //! From a stack of edits to the shapes that a solver is handed.
 
+mod forecast;
+mod mend;
+mod plan;
+
 use std::sync::Arc;
 
 use serde::Serialize;
 use tombolo_deform::{
     mesh::{Mesh, Vector},
-    quality::{Guard, PathQuality, Refusal, judge, shape_at},
+    quality::{Guard, Refusal},
     schedule::Schedule,
     surface::{Edit, EditError, Editor, Surface, SurfaceError},
-    volume::{Deform, VolumeError, VolumeOperator},
+    volume::{Deform, Untangler, VolumeError, VolumeOperator},
 };
+
+pub use forecast::{Forecast, Outcome};
+use mend::Mended;
+pub use plan::{Place, Plan};
 
 /// Volume operators kept, one for each way to deform that was asked for: the newest ones.
 const OPERATORS: usize = 2;
@@ -38,6 +46,24 @@ pub enum Refused {
     /// A mesh on the way would be broken.
     #[error(transparent)]
     Guard(#[from] Refusal),
+    /// An edit cannot be followed to its end, not in sub-steps and not by untangling.
+    #[error(
+        "edit {edit} ({name}) can be done to {:.2} % of its amount; beyond that{} {refusal}",
+        (1e4 * fraction).floor() / 1e2,
+        if *folds { " the surface itself folds:" } else { "" }
+    )]
+    Stalled {
+        /// The place of the edit in the stack, counted from 0.
+        edit: usize,
+        /// Its kind.
+        name: &'static str,
+        /// What fraction of its amount was reached.
+        fraction: f64,
+        /// Whether it is the prescribed surface that folds there.
+        folds: bool,
+        /// What is wrong with going further.
+        refusal: Refusal,
+    },
 }
 
 impl Refused {
@@ -45,7 +71,19 @@ impl Refused {
     #[must_use]
     pub fn min_scaled_jacobian(&self) -> Option<f64> {
         match self {
-            Refused::Guard(Refusal::Quality(path)) => Some(path.min_scaled_jacobian),
+            Refused::Guard(Refusal::Quality(path)) | Refused::Stalled { refusal: Refusal::Quality(path), .. } => {
+                Some(path.min_scaled_jacobian)
+            }
+            _ => None,
+        }
+    }
+
+    /// What fraction would pass: of the way, or of the amount of the edit that cannot be followed.
+    #[must_use]
+    pub fn feasible_fraction(&self) -> Option<f64> {
+        match self {
+            Refused::Guard(Refusal::Quality(path)) => Some(path.feasible_fraction),
+            Refused::Stalled { fraction, .. } => Some(*fraction),
             _ => None,
         }
     }
@@ -56,76 +94,30 @@ impl Refused {
 pub struct Target {
     /// The coordinates of every vertex: the reference's plus the displacement; bit for bit the reference's where nothing moves.
     pub points: Arc<[Vector]>,
-    /// Seconds spent so far; `guard` is 0.
+    /// The coordinates of the reference.
+    pub reference: Arc<[Vector]>,
+    /// The shapes over which it is reached from the reference, the last of them `points`: every straight piece between them was
+    /// judged. Empty where that was not asked.
+    pub way: Vec<Arc<[Vector]>>,
+    /// The fraction of the edits that was done: below 1 where they were clamped.
+    pub fraction: f64,
+    /// Seconds spent so far.
     pub seconds: ShapeSeconds,
     /// Iterations of the linear solver.
     pub iterations: usize,
+    /// Sub-steps that it took beyond one solve from the reference.
+    pub sub_steps: usize,
 }
 
-/// A way from one shape to another, every mesh of which has been judged.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
-    start: Arc<[Vector]>,
-    end: Arc<[Vector]>,
-    schedule: Schedule,
-    quality: PathQuality,
-    largest_displacement: f64,
-    seconds: ShapeSeconds,
-}
-
-impl Plan {
-    /// How many shapes there are.
+impl Target {
+    /// The place it is, once the mesh is there.
     #[must_use]
-    pub fn shapes(&self) -> u32 {
-        self.schedule.steps.get()
-    }
-
-    /// When they are due.
-    #[must_use]
-    pub fn schedule(&self) -> &Schedule {
-        &self.schedule
-    }
-
-    /// Writes the coordinates of the `shape`-th shape, counted from 1, into `points`; the last is exactly [`Plan::end`].
-    ///
-    /// # Panics
-    /// Where `points` has another length than the mesh has vertices.
-    pub fn write_shape(&self, shape: u32, points: &mut [Vector]) {
-        let fraction = self.schedule.fraction(shape);
-        assert_eq!(points.len(), self.end.len(), "one point for each vertex");
-        for ((point, &start), &end) in points.iter_mut().zip(&*self.start).zip(&*self.end) {
-            *point = shape_at(start, end, fraction);
+    pub fn place(&self) -> Place {
+        let mut back: Vec<_> = self.way.iter().rev().skip(1).cloned().collect();
+        if !self.way.is_empty() && !Arc::ptr_eq(&self.points, &self.reference) {
+            back.push(Arc::clone(&self.reference));
         }
-    }
-
-    /// Where it starts.
-    #[must_use]
-    pub fn start(&self) -> &Arc<[Vector]> {
-        &self.start
-    }
-
-    /// Where it ends.
-    #[must_use]
-    pub fn end(&self) -> &Arc<[Vector]> {
-        &self.end
-    }
-
-    /// The quality of the meshes on the way.
-    #[must_use]
-    pub fn quality(&self) -> &PathQuality {
-        &self.quality
-    }
-
-    /// The longest way that a vertex of the surface goes from the start to the end, in units of the mesh.
-    #[must_use]
-    pub fn largest_displacement(&self) -> f64 {
-        self.largest_displacement
-    }
-
-    /// Seconds that it took to make.
-    #[must_use]
-    pub fn seconds(&self) -> ShapeSeconds {
-        self.seconds
+        Place { points: Arc::clone(&self.points), back }
     }
 }
 
@@ -161,6 +153,11 @@ pub struct Shaper {
     surface: Arc<Surface>,
     editor: Editor,
     operators: Vec<(Deform, Arc<VolumeOperator>)>,
+    reference: Arc<[Vector]>,
+    untangler: Option<Arc<Untangler>>,
+    /// Shapes that took more than one solve, the newest last.
+    mended: Vec<Mended>,
+    spent: ShapeSeconds,
 }
 
 impl Shaper {
@@ -170,13 +167,27 @@ impl Shaper {
     /// As [`Editor::new`].
     pub fn new(mesh: Arc<Mesh>, surface: Arc<Surface>) -> Result<Self, SurfaceError> {
         let editor = Editor::new(Arc::clone(&surface))?;
-        Ok(Self { mesh, surface, editor, operators: Vec::new() })
+        let reference = mesh.points().into();
+        let (operators, untangler, mended, spent) = (Vec::new(), None, Vec::new(), ShapeSeconds::default());
+        Ok(Self { mesh, surface, editor, operators, reference, untangler, mended, spent })
     }
 
     /// The reference mesh.
     #[must_use]
     pub fn mesh(&self) -> &Arc<Mesh> {
         &self.mesh
+    }
+
+    /// The coordinates of the reference mesh.
+    #[must_use]
+    pub fn reference(&self) -> &Arc<[Vector]> {
+        &self.reference
+    }
+
+    /// Seconds spent by the last [`Shaper::reach`], and by what was asked since: also where it was refused.
+    #[must_use]
+    pub fn spent(&self) -> ShapeSeconds {
+        self.spent
     }
 
     /// Its surface.
@@ -217,53 +228,32 @@ impl Shaper {
         deform.validate()?;
         let mut seconds = ShapeSeconds::default();
         let watch = Stopwatch::start();
-        let surface = self.editor.displacement(stack)?;
+        let surface = self.editor.displacement(stack);
         seconds.surface = watch.seconds();
-        let mesh = Arc::clone(&self.mesh);
-        let reference = mesh.points();
+        self.spent.surface += seconds.surface;
+        let surface = surface?;
+        let reference = Arc::clone(&self.reference);
         let still = surface.iter().all(|displacement| *displacement == [0.0; 3]);
         if still {
-            return Ok(Target { points: reference.into(), seconds, iterations: 0 });
+            let points = Arc::clone(&reference);
+            let (way, fraction, iterations, sub_steps) = (Vec::new(), 1.0, 0, 0);
+            return Ok(Target { points, reference, way, fraction, seconds, iterations, sub_steps });
         }
         let watch = Stopwatch::start();
-        let solution = self.operator(deform)?.solve(&surface)?;
-        // Adding 0 would turn a coordinate of -0 into 0: what does not move keeps its bits.
-        let moved = |point: f64, by: f64| if by == 0.0 { point } else { point + by };
-        let points = reference
-            .iter()
-            .zip(&solution.displacement)
-            .map(|(point, by)| std::array::from_fn(|axis| moved(point[axis], by[axis])))
-            .collect();
+        let solution = self.operator(deform)?.solve(&surface);
         seconds.volume = watch.seconds();
-        Ok(Target { points, seconds, iterations: solution.iterations })
+        self.spent.volume += seconds.volume;
+        let solution = solution?;
+        let points = reference.iter().zip(&solution.displacement).map(|(&point, &by)| moved(point, by)).collect();
+        let (way, fraction, iterations, sub_steps) = (Vec::new(), 1.0, solution.iterations, 0);
+        Ok(Target { points, reference, way, fraction, seconds, iterations, sub_steps })
     }
 
-    /// The way from `start` (coordinates of every vertex) to a target in the steps of `schedule`, if `guard` lets it through.
+    /// The way from the shape `start` (coordinates of every vertex) to that of a stack: [`Shaper::reach`] where no way back is
+    /// known.
     ///
     /// # Errors
-    /// [`Refused::Guard`] with the worst cells and the largest feasible fraction.
-    pub fn judge(
-        &self,
-        start: Arc<[Vector]>,
-        target: &Target,
-        schedule: &Schedule,
-        guard: &Guard,
-    ) -> Result<Plan, Refused> {
-        let watch = Stopwatch::start();
-        let quality = judge(&self.mesh, &start, &target.points, &schedule.fractions(), guard)?;
-        let seconds = ShapeSeconds { guard: watch.seconds(), ..target.seconds };
-        let largest_displacement = self.surface.vertices().iter().fold(0.0_f64, |largest, &vertex| {
-            let [from, to] = [&start, &target.points].map(|points| points[vertex as usize]);
-            largest.max((to[0] - from[0]).hypot(to[1] - from[1]).hypot(to[2] - from[2]))
-        });
-        let end = Arc::clone(&target.points);
-        Ok(Plan { start, end, schedule: *schedule, quality, largest_displacement, seconds })
-    }
-
-    /// [`Shaper::target`], then [`Shaper::judge`].
-    ///
-    /// # Errors
-    /// As these.
+    /// As [`Shaper::reach`].
     pub fn plan(
         &mut self,
         stack: &[Edit],
@@ -272,9 +262,13 @@ impl Shaper {
         schedule: &Schedule,
         guard: &Guard,
     ) -> Result<Plan, Refused> {
-        let target = self.target(stack, deform)?;
-        self.judge(start, &target, schedule, guard)
+        self.reach(stack, 0, &start.into(), deform, schedule, guard)
     }
+}
+
+/// Adding 0 would turn a coordinate of -0 into 0: what does not move keeps its bits.
+fn moved(point: Vector, by: Vector) -> Vector {
+    std::array::from_fn(|axis| if by[axis] == 0.0 { point[axis] } else { point[axis] + by[axis] })
 }
 
 /// Measures time where there is a clock; in a browser the caller has a better one.

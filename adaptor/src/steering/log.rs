@@ -94,6 +94,7 @@ impl Log {
                     shapes: 0,
                     min_scaled_jacobian: None,
                     largest_displacement: None,
+                    fraction: None,
                     seconds: ShapeSeconds::default(),
                     added_steps: None,
                 });
@@ -112,7 +113,7 @@ impl Log {
             _ => None,
         };
         if command.is_some() {
-            self.journal(&id, JournalStatus::Accepted, moment, command, reason, None);
+            self.journal(&id, JournalStatus::Accepted, moment, command, reason, [None; 2]);
         }
         self.tell(&id);
         Ok(id)
@@ -121,8 +122,8 @@ impl Log {
     /// Notes that a command that is no order took effect, or why it did not.
     pub(crate) fn settle(&self, id: &str, moment: Moment, outcome: Result<(), String>) {
         match outcome {
-            Ok(()) => self.journal(id, JournalStatus::Applied, moment, None, None, None),
-            Err(reason) => self.journal(id, JournalStatus::Rejected, moment, None, Some(reason), None),
+            Ok(()) => self.journal(id, JournalStatus::Applied, moment, None, None, [None; 2]),
+            Err(reason) => self.journal(id, JournalStatus::Rejected, moment, None, Some(reason), [None; 2]),
         }
     }
 
@@ -138,19 +139,21 @@ impl Log {
 
     /// Notes that an order changes nothing, and why.
     pub(crate) fn reject(&self, id: &str, moment: Moment, rejection: &Rejection) {
-        let Rejection { reason, min_scaled_jacobian, seconds } = rejection;
-        self.journal(id, JournalStatus::Rejected, moment, None, Some(reason.clone()), *min_scaled_jacobian);
+        let Rejection { reason, min_scaled_jacobian, fraction, seconds } = rejection;
+        let numbers = [*min_scaled_jacobian, *fraction];
+        self.journal(id, JournalStatus::Rejected, moment, None, Some(reason.clone()), numbers);
         self.update(id, |order| {
             order.status = OrderStatus::Rejected;
             order.reason = Some(reason.clone());
             order.min_scaled_jacobian = *min_scaled_jacobian;
+            order.fraction = *fraction;
             order.seconds = *seconds;
         });
     }
 
-    /// Notes that the motion of an order begins.
-    pub(crate) fn begin(&self, id: &str, moment: Moment, min_scaled_jacobian: f64) {
-        self.journal(id, JournalStatus::Applied, moment, None, None, Some(min_scaled_jacobian));
+    /// Notes that the motion of an order begins; `clamped` is the fraction that is done, where that is not all of it.
+    pub(crate) fn begin(&self, id: &str, moment: Moment, min_scaled_jacobian: f64, clamped: Option<f64>) {
+        self.journal(id, JournalStatus::Applied, moment, None, None, [Some(min_scaled_jacobian), clamped]);
     }
 
     fn journal(
@@ -160,10 +163,10 @@ impl Log {
         moment: Moment,
         command: Option<Command>,
         reason: Option<String>,
-        min_scaled_jacobian: Option<f64>,
+        [min_scaled_jacobian, fraction]: [Option<f64>; 2],
     ) {
         let Moment { cycle, time } = moment;
-        let entry = JournalEntry { id: id.into(), status, cycle, time, command, reason, min_scaled_jacobian };
+        let entry = JournalEntry { id: id.into(), status, cycle, time, command, reason, min_scaled_jacobian, fraction };
         if let Err(error) = self.journal.write(&entry) {
             // The solver goes on without; it must not go unsaid.
             eprintln!("tombolo: {error}; this run has no journal from here on");

@@ -31,7 +31,7 @@ use tombolo_deform::{
 };
 use tombolo_pipelines::{
     language::Order,
-    shape::{Plan, Shaper, Target},
+    shape::{Place, Plan, Shaper},
 };
 
 pub(crate) use log::{Log, Moment, Source};
@@ -39,6 +39,7 @@ pub(crate) use parameters::Parameters;
 pub use parameters::{Parameter, ParameterError};
 pub(crate) use queue::{Queue, Received};
 pub(crate) use stack::EditStack;
+use stack::ShapeSettings;
 pub(crate) use timed::Timed;
 
 use crate::report::OrderStatus;
@@ -63,6 +64,7 @@ struct Task {
 struct Computing {
     id: String,
     stack: EditStack,
+    kept: usize,
     guard: Guard,
 }
 
@@ -90,7 +92,7 @@ pub(crate) struct Steerer {
     shaper: Arc<Mutex<Shaper>>,
     worker: Option<Worker>,
     stack: EditStack,
-    points: Arc<[Vector]>,
+    place: Place,
     waiting: VecDeque<Task>,
     computing: Option<Computing>,
     motion: Option<Motion>,
@@ -109,7 +111,7 @@ impl Steerer {
         queue: Arc<Queue>,
         prepare: bool,
     ) -> std::io::Result<Self> {
-        let points: Arc<[Vector]> = shaper.mesh().points().into();
+        let place = Arc::clone(shaper.reference()).into();
         let shaper = Arc::new(Mutex::new(shaper));
         let worker = prepare.then(|| Worker::start(Arc::clone(&shaper), queue)).transpose()?;
         if let Some(worker) = &worker {
@@ -121,7 +123,7 @@ impl Steerer {
             shaper,
             worker,
             stack: EditStack::default(),
-            points,
+            place,
             waiting: VecDeque::new(),
             computing: None,
             motion: None,
@@ -133,7 +135,7 @@ impl Steerer {
 
     /// How many vertices the mesh has.
     pub(crate) fn vertex_count(&self) -> usize {
-        self.points.len()
+        self.place.points.len()
     }
 
     /// Whether nothing is under way and nothing waits.
@@ -196,20 +198,23 @@ impl Steerer {
 
     fn start(&mut self, task: Task, moment: Moment, step_seconds: Option<f64>) {
         let Task { id, order, background } = task;
-        let (stack, deform) = match self.stack.after(&order.change, order.deform, self.defaults.deform) {
+        let default = ShapeSettings { deform: self.defaults.deform, guard: self.defaults.guard };
+        let (stack, settings) = match self.stack.after(&order.change, order.deform, order.guard, default) {
             Ok(after) => after,
             Err(error) => return self.log.reject(&id, moment, &error.into()),
         };
+        let ShapeSettings { deform, guard } = settings;
+        let kept = self.stack.shared(&stack);
         let wish = Wish {
             stack: stack.edits(),
-            start: Arc::clone(&self.points),
+            kept,
+            start: self.place.clone(),
             deform,
             schedule: order.schedule.unwrap_or(self.defaults.schedule),
-            guard: order.guard.unwrap_or(self.defaults.guard),
+            guard,
         };
-        let guard = wish.guard;
         self.log.update(&id, |order| order.status = OrderStatus::Computing);
-        let computing = Computing { id, stack, guard };
+        let computing = Computing { id, stack, kept, guard };
         match &self.worker {
             Some(worker) if background => {
                 worker.plan(wish);
@@ -246,7 +251,7 @@ impl Steerer {
         begun: Instant,
         step_seconds: Option<f64>,
     ) {
-        let Computing { id, stack, guard } = computing;
+        let Computing { id, stack, kept, guard } = computing;
         let plan = plan.and_then(|plan| self.starting_here(plan, &guard));
         let plan = match plan {
             Ok(plan) => plan,
@@ -258,14 +263,17 @@ impl Steerer {
                 order.reason = Some(format!("order {id} went on from shape {}", before.taken));
             });
         }
-        self.stack = stack;
-        self.log.begin(&id, moment, plan.quality().min_scaled_jacobian);
+        let fraction = plan.target().fraction;
+        self.stack = if fraction < 1.0 { stack.clamped(kept, fraction) } else { stack };
+        let clamped = (fraction < 1.0).then_some(fraction);
+        self.log.begin(&id, moment, plan.quality().min_scaled_jacobian, clamped);
         self.log.update(&id, |order| {
             order.status = OrderStatus::Applying;
             order.cycle_applied = Some(moment.cycle);
             order.shapes = plan.shapes();
             order.min_scaled_jacobian = Some(plan.quality().min_scaled_jacobian);
             order.largest_displacement = Some(plan.largest_displacement());
+            order.fraction = Some(fraction);
             order.seconds = plan.seconds();
             order.added_steps = step_seconds.map(|step| begun.elapsed().as_secs_f64() / step);
         });
@@ -274,17 +282,16 @@ impl Steerer {
 
     /// The plan itself if the mesh is still where it starts, else one from where the mesh is.
     fn starting_here(&self, plan: Plan, guard: &Guard) -> Result<Plan, Rejection> {
-        if Arc::ptr_eq(plan.start(), &self.points) {
+        if Arc::ptr_eq(plan.start(), &self.place.points) {
             return Ok(plan);
         }
-        let target = Target { points: Arc::clone(plan.end()), seconds: plan.seconds(), iterations: 0 };
-        let shaper = self.shaper.lock().unwrap_or_else(PoisonError::into_inner);
-        caught(|| shaper.judge(Arc::clone(&self.points), &target, plan.schedule(), guard))
+        let mut shaper = self.shaper.lock().unwrap_or_else(PoisonError::into_inner);
+        caught(|| shaper.go(&self.place, plan.target(), plan.asked(), guard))
     }
 
     /// The last change of the mesh and the coordinates at its end.
     pub(crate) fn present(&self) -> (&Shape, &[Vector]) {
-        (&self.shape, &self.points)
+        (&self.shape, &self.place.points)
     }
 
     /// Takes the next shape of the schedule under way for the coming step, if it is due; says whether it was.
@@ -299,7 +306,7 @@ impl Steerer {
         let points: Arc<[Vector]> = if last {
             Arc::clone(motion.plan.end())
         } else {
-            let mut points = vec![[0.0; 3]; self.points.len()];
+            let mut points = vec![[0.0; 3]; self.place.points.len()];
             motion.plan.write_shape(motion.taken, &mut points);
             points.into()
         };
@@ -307,7 +314,7 @@ impl Steerer {
         shape.displacement.resize(points.len(), [0.0; 3]);
         shape.velocity.resize(points.len(), [0.0; 3]);
         for (((displacement, velocity), new), old) in
-            shape.displacement.iter_mut().zip(&mut shape.velocity).zip(&*points).zip(&*self.points)
+            shape.displacement.iter_mut().zip(&mut shape.velocity).zip(&*points).zip(&*self.place.points)
         {
             for axis in 0..3 {
                 displacement[axis] = new[axis] - old[axis];
@@ -316,7 +323,7 @@ impl Steerer {
         }
         shape.shape = (motion.taken, motion.plan.shapes());
         shape.order.clone_from(&motion.id);
-        self.points = points;
+        self.place = motion.plan.place(motion.taken, points);
         if let Some(quality) = motion.plan.quality().shapes.get(motion.taken as usize - 1) {
             self.quality = Some((quality.min, quality.mean));
         }

@@ -2,7 +2,7 @@
 
 use std::num::NonZeroU32;
 
-use tombolo_deform::{surface::Edit, volume::Deform};
+use tombolo_deform::{quality::Guard, surface::Edit, volume::Deform};
 use tombolo_pipelines::language::Change;
 
 /// Orders that a stack may hold.
@@ -15,7 +15,14 @@ const EDITS: usize = 1024;
 struct Entry {
     replaces: bool,
     edits: Vec<Edit>,
-    deform: Deform,
+    settings: ShapeSettings,
+}
+
+/// What the shape of a stack depends on besides its edits.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct ShapeSettings {
+    pub(crate) deform: Deform,
+    pub(crate) guard: Guard,
 }
 
 /// The edits that make the present shape, and how they came there.
@@ -36,33 +43,57 @@ pub(crate) enum StackError {
 }
 
 impl EditStack {
-    /// The stack after an order, and the way to deform that its shape is made with: the order's own, else for an undo the one
-    /// that the shape it goes back to was made with (so that the same bits come back), else `default`.
+    /// The stack after an order, and the settings that its shape is made with: the order's own, else for an undo those that the
+    /// shape it goes back to was made with (so that the same bits come back), else `default`.
     pub(crate) fn after(
         &self,
         change: &Change,
         deform: Option<Deform>,
-        default: Deform,
-    ) -> Result<(Self, Deform), StackError> {
+        guard: Option<Guard>,
+        default: ShapeSettings,
+    ) -> Result<(Self, ShapeSettings), StackError> {
         let mut entries = self.entries.clone();
+        let own = |before: ShapeSettings| ShapeSettings {
+            deform: deform.unwrap_or(before.deform),
+            guard: guard.unwrap_or(before.guard),
+        };
         match change {
             Change::Edits(edits) | Change::Stack(edits) => entries.push(Entry {
                 replaces: matches!(change, Change::Stack(_)),
                 edits: edits.clone(),
-                deform: deform.unwrap_or(default),
+                settings: own(default),
             }),
             Change::Undo(count) => {
                 let kept = kept_after(entries.len(), *count)?;
                 entries.truncate(kept);
             }
         }
-        let deform = deform.unwrap_or_else(|| entries.last().map_or(default, |entry| entry.deform));
+        let settings = own(entries.last().map_or(default, |entry| entry.settings));
         let stack = Self { entries };
         let (orders, edits) = (stack.entries.len(), stack.edits().len());
         if orders > ORDERS || edits > EDITS {
             return Err(StackError::Full { edits, orders });
         }
-        Ok((stack, deform))
+        Ok((stack, settings))
+    }
+
+    /// How many edits it begins with that `other` begins with too.
+    pub(crate) fn shared(&self, other: &Self) -> usize {
+        self.edits().iter().zip(&other.edits()).take_while(|(a, b)| a == b).count()
+    }
+
+    /// The stack with a fraction of the last order's edits, those after the first `kept` edits of the stack.
+    pub(crate) fn clamped(mut self, kept: usize, fraction: f64) -> Self {
+        let count = self.edits().len();
+        if let Some(last) = self.entries.last_mut() {
+            let before = count - last.edits.len();
+            for (place, edit) in last.edits.iter_mut().enumerate() {
+                if before + place >= kept {
+                    *edit = edit.scaled(fraction);
+                }
+            }
+        }
+        self
     }
 
     /// The edits, the oldest first.
@@ -78,6 +109,8 @@ fn kept_after(held: usize, count: NonZeroU32) -> Result<usize, StackError> {
 
 #[cfg(test)]
 mod tests {
+    use tombolo_deform::quality::Otherwise;
+
     use super::*;
 
     fn edit(x: f64) -> Edit {
@@ -85,7 +118,7 @@ mod tests {
     }
 
     fn after(stack: &EditStack, change: Change) -> EditStack {
-        stack.after(&change, None, Deform::default()).unwrap().0
+        stack.after(&change, None, None, ShapeSettings::default()).unwrap().0
     }
 
     fn undo(count: u32) -> Change {
@@ -104,22 +137,35 @@ mod tests {
         assert_eq!(after(&more, undo(1)), replaced);
         assert_eq!(after(&more, undo(2)), two);
         assert_eq!(after(&more, undo(4)), none);
-        let error = more.after(&undo(5), None, Deform::default()).unwrap_err();
+        let error = more.after(&undo(5), None, None, ShapeSettings::default()).unwrap_err();
         assert!(error.to_string().contains("only 4"), "{error}");
     }
 
     #[test]
     fn an_undo_deforms_as_the_shape_it_goes_back_to() {
         let stiff = Deform { stiffening: 2.0, ..Deform::default() };
+        let mending = Guard { otherwise: Otherwise::Untangle, ..Guard::default() };
         let none = EditStack::default();
-        let (one, _) = none.after(&Change::Edits(vec![edit(1.0)]), Some(stiff), Deform::default()).unwrap();
+        let default = ShapeSettings::default();
+        let (one, _) = none.after(&Change::Edits(vec![edit(1.0)]), Some(stiff), Some(mending), default).unwrap();
         let two = after(&one, Change::Edits(vec![edit(2.0)]));
-        assert_eq!(two.after(&undo(1), None, Deform::default()).unwrap(), (one, stiff));
+        let settings = ShapeSettings { deform: stiff, guard: mending };
+        assert_eq!(two.after(&undo(1), None, None, default).unwrap(), (one, settings));
+    }
+
+    #[test]
+    fn only_what_an_order_brought_is_clamped() {
+        let one = after(&EditStack::default(), Change::Edits(vec![edit(1.0)]));
+        let two = after(&one, Change::Edits(vec![edit(2.0), edit(4.0)]));
+        assert_eq!((one.shared(&two), two.clone().clamped(1, 0.5).edits()), (1, vec![edit(1.0), edit(1.0), edit(2.0)]));
+        let replaced = after(&two, Change::Stack(vec![edit(1.0), edit(2.0), edit(8.0)]));
+        assert_eq!(two.shared(&replaced), 2);
+        assert_eq!(replaced.clamped(2, 0.25).edits(), [edit(1.0), edit(2.0), edit(2.0)]);
     }
 
     #[test]
     fn a_stack_does_not_grow_without_end() {
         let edits = vec![edit(1.0); EDITS + 1];
-        assert!(EditStack::default().after(&Change::Edits(edits), None, Deform::default()).is_err());
+        assert!(EditStack::default().after(&Change::Edits(edits), None, None, ShapeSettings::default()).is_err());
     }
 }

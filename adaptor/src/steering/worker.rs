@@ -6,17 +6,15 @@ use std::{
         mpsc::{Receiver, RecvError, Sender, TryRecvError, channel},
     },
     thread::JoinHandle,
-    time::Instant,
 };
 
 use tombolo_deform::{
-    mesh::Vector,
     quality::{Guard, Quality, quality},
     schedule::Schedule,
     surface::Edit,
     volume::Deform,
 };
-use tombolo_pipelines::shape::{Plan, Refused, ShapeSeconds, Shaper};
+use tombolo_pipelines::shape::{Place, Plan, Refused, ShapeSeconds, Shaper};
 
 use super::queue::Queue;
 
@@ -24,7 +22,9 @@ use super::queue::Queue;
 #[derive(Debug, Clone)]
 pub(crate) struct Wish {
     pub(crate) stack: Vec<Edit>,
-    pub(crate) start: Arc<[Vector]>,
+    /// How many of them the present shape has already.
+    pub(crate) kept: usize,
+    pub(crate) start: Place,
     pub(crate) deform: Deform,
     pub(crate) schedule: Schedule,
     pub(crate) guard: Guard,
@@ -32,18 +32,11 @@ pub(crate) struct Wish {
 
 impl Wish {
     pub(crate) fn plan(&self, shaper: &Mutex<Shaper>) -> Result<Plan, Rejection> {
-        let mut seconds = ShapeSeconds::default();
-        let plan = caught(|| {
-            // A panic in the kernel leaves at worst a cache without its entry.
-            let mut shaper = shaper.lock().unwrap_or_else(PoisonError::into_inner);
-            let target = shaper.target(&self.stack, &self.deform)?;
-            seconds = target.seconds;
-            let begun = Instant::now();
-            let plan = shaper.judge(Arc::clone(&self.start), &target, &self.schedule, &self.guard);
-            seconds.guard = begun.elapsed().as_secs_f64();
-            plan
-        });
-        plan.map_err(|rejection| Rejection { seconds, ..rejection })
+        // A panic in the kernel leaves at worst a cache without its entry.
+        let mut shaper = shaper.lock().unwrap_or_else(PoisonError::into_inner);
+        let plan =
+            caught(|| shaper.reach(&self.stack, self.kept, &self.start, &self.deform, &self.schedule, &self.guard));
+        plan.map_err(|rejection| Rejection { seconds: shaper.spent(), ..rejection })
     }
 }
 
@@ -53,12 +46,14 @@ pub(crate) struct Rejection {
     pub(crate) reason: String,
     /// What the way would have come down to, where the guard did not let it through.
     pub(crate) min_scaled_jacobian: Option<f64>,
+    /// What fraction would have passed.
+    pub(crate) fraction: Option<f64>,
     pub(crate) seconds: ShapeSeconds,
 }
 
 impl<T: ToString> From<T> for Rejection {
     fn from(reason: T) -> Self {
-        Self { reason: reason.to_string(), min_scaled_jacobian: None, seconds: ShapeSeconds::default() }
+        Self { reason: reason.to_string(), min_scaled_jacobian: None, fraction: None, seconds: ShapeSeconds::default() }
     }
 }
 
@@ -67,6 +62,7 @@ pub(crate) fn caught<T>(attempt: impl FnOnce() -> Result<T, Refused>) -> Result<
     match std::panic::catch_unwind(std::panic::AssertUnwindSafe(attempt)) {
         Ok(result) => result.map_err(|refused| Rejection {
             min_scaled_jacobian: refused.min_scaled_jacobian(),
+            fraction: refused.feasible_fraction(),
             ..Rejection::from(&refused)
         }),
         Err(panic) => {

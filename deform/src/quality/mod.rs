@@ -4,6 +4,7 @@
 //! - [`judge`] checks a whole path from one shape to another before the first step of it is handed out.
 
 mod cell;
+mod change;
 mod fold;
 mod judge;
 mod path;
@@ -15,6 +16,7 @@ use serde::Serialize;
 
 pub use cell::scaled_jacobian;
 pub(crate) use cell::{HEXAHEDRON_CORNERS, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, corner_tets};
+pub use change::{Change, Spread, change, swept_volume, volumes};
 pub use judge::{
     BrokenPath, FailingCell, Guard, Otherwise, PathQuality, Refusal, ShapeQuality, judge, keeps, shape_at,
 };

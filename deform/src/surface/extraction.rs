@@ -169,6 +169,11 @@ impl Surface {
         Ok(Self { points, vertices, faces, owner_cells, triangles, triangle_faces, features })
     }
 
+    /// The same surface, with the same features and triangles, at other places.
+    pub(super) fn with_points(&self, points: Vec<Vector>) -> Self {
+        Self { points, ..self.clone() }
+    }
+
     /// The coordinates of each surface vertex in the mesh the surface was taken from.
     #[must_use]
     pub fn points(&self) -> &[Vector] {

@@ -80,6 +80,8 @@
 //! A displacement says nothing about whether the shape it leads to can be meshed: folds, inversions and self-intersections are
 //! found by [`crate::quality`]. Surfaces that are no manifold can be extracted and looked at, but not edited.
 
+mod advance;
+mod amount;
 mod edit;
 mod edit_error;
 mod edit_validate;
@@ -94,6 +96,7 @@ mod polyharmonic;
 mod region;
 mod sharp_edges;
 
+pub use advance::Advance;
 pub use edit::{
     Affine, Displacement, Edit, HarmonicOrder, Rotate, ScaleDirection, ScaleNormals, Skeleton, SkeletonMove, Skinning,
     Translate,

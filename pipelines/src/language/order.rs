@@ -279,6 +279,8 @@ pub struct JournalEntry {
     pub reason: Option<String>,
     /// The least scaled Jacobian on the path; of an order that the guard rejected, what it would have come to.
     pub min_scaled_jacobian: Option<f64>,
+    /// The fraction of an order's amounts that was done, where the guard clamped it; of a rejected one, what would pass.
+    pub fraction: Option<f64>,
 }
 
 with_command! {
@@ -297,6 +299,8 @@ with_command! {
         reason: String,
         /// The least scaled Jacobian on the path; of an order that the guard rejected, what it would have come to.
         min_scaled_jacobian: f64,
+        /// The fraction of an order's amounts that was done, where the guard clamped it; of a rejected one, what would pass.
+        fraction: f64,
     }
 }
 
@@ -317,6 +321,7 @@ impl TryFrom<JournalFields> for JournalEntry {
             command,
             reason: fields.reason,
             min_scaled_jacobian: fields.min_scaled_jacobian,
+            fraction: fields.fraction,
         })
     }
 }
@@ -330,6 +335,7 @@ impl From<JournalEntry> for JournalFields {
             time: Some(entry.time),
             reason: entry.reason,
             min_scaled_jacobian: entry.min_scaled_jacobian,
+            fraction: entry.fraction,
             ..Self::default()
         };
         if let Some(command) = entry.command {

@@ -63,6 +63,8 @@ struct Outcome {
     after: Option<Quality>,
     inverted: Option<usize>,
     iterations: Option<usize>,
+    sub_steps: Option<usize>,
+    fraction: Option<f64>,
     seconds: Seconds,
 }
 
@@ -97,6 +99,8 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
         after: None,
         inverted: None,
         iterations: None,
+        sub_steps: None,
+        fraction: None,
         seconds,
     };
     let mut deform = order.deform.unwrap_or_default();
@@ -111,27 +115,25 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
     let mut schedule = order.schedule.unwrap_or_default();
     schedule.steps = options.steps.unwrap_or(schedule.steps);
 
-    let target = shaper.target(&edits, &deform);
-    let plan = target.and_then(|target| {
-        outcome.iterations = Some(target.iterations);
-        outcome.seconds.surface = target.seconds.surface;
-        outcome.seconds.volume = target.seconds.volume;
-        let begun = Instant::now();
-        let plan = shaper.judge(mesh.points().into(), &target, &schedule, &guard);
-        outcome.seconds.guard = begun.elapsed().as_secs_f64();
-        plan
-    });
+    let plan = shaper.plan(&edits, Arc::clone(shaper.reference()), &deform, &schedule, &guard);
+    let spent = shaper.spent();
+    (outcome.seconds.surface, outcome.seconds.volume, outcome.seconds.guard) =
+        (spent.surface, spent.volume, spent.guard);
     let plan = match plan {
         Ok(plan) => plan,
         Err(refused) => {
             outcome.status = "rejected";
             outcome.reason = Some(refused.to_string());
+            outcome.fraction = refused.feasible_fraction();
             if options.json {
                 json(&outcome)?;
             }
             return Err(Failure::Refused(refused.to_string()));
         }
     };
+    let target = plan.target();
+    (outcome.iterations, outcome.sub_steps) = (Some(target.iterations), Some(target.sub_steps));
+    outcome.fraction = Some(target.fraction);
     let shaped = mesh.with_points(plan.end().to_vec())?;
     let after = quality(shaped.cells(), shaped.points());
     outcome.inverted = Some(after.inverted);
@@ -171,6 +173,9 @@ fn tell(outcome: &Outcome, options: &Options) -> Result<(), Failure> {
     };
     say(format_args!("{} vertices, {} cells", outcome.vertices, outcome.cells))?;
     say(format_args!("scaled Jacobian before: {}", line(&outcome.before)))?;
+    if let Some(fraction) = outcome.fraction.filter(|fraction| *fraction < 1.0) {
+        say(format_args!("clamped to {:.2} % of the edits' amounts", 100.0 * fraction))?;
+    }
     if let Some(after) = &outcome.after {
         say(format_args!("scaled Jacobian after:  {}", line(after)))?;
     }

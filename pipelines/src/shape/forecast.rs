@@ -1,0 +1,112 @@
+//! What an order would give, without giving it.
+
+use serde::Serialize;
+use tombolo_deform::{
+    quality::{Change, Guard, Quality, change, quality},
+    schedule::Schedule,
+    surface::Edit,
+    volume::Deform,
+};
+
+use super::{Place, Refused, ShapeSeconds, Shaper};
+
+/// Whether an order would be carried out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// All of it.
+    Applied,
+    /// A part of it: [`Forecast::fraction`].
+    Clamped,
+    /// Nothing of it.
+    Rejected,
+}
+
+/// What an order would give.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Forecast {
+    /// Whether it would be carried out.
+    pub outcome: Outcome,
+    /// Why not.
+    pub reason: Option<String>,
+    /// The fraction that would be done; of an order that would be rejected, the fraction that would pass, where it is known.
+    pub fraction: Option<f64>,
+    /// The least scaled Jacobian on the way.
+    pub min_scaled_jacobian: Option<f64>,
+    /// In how many shapes it would be reached.
+    pub shapes: u32,
+    /// Sub-steps that its shape takes beyond one solve from the reference.
+    pub sub_steps: usize,
+    /// The quality of the mesh in the end.
+    pub quality: Option<Quality>,
+    /// The same against the reference mesh.
+    pub change: Option<Change>,
+    /// Seconds that it took to find out.
+    pub seconds: ShapeSeconds,
+}
+
+impl Shaper {
+    /// What [`Shaper::reach`] would come to. Nothing is changed by asking; what is set up on the way serves the order itself.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use tombolo_deform::{shapes::box_of_tets, surface::{Edit, FeatureSettings, Surface}};
+    /// use tombolo_pipelines::shape::{Outcome, Place, Shaper};
+    ///
+    /// let mesh = Arc::new(box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]));
+    /// let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default())?);
+    /// let mut shaper = Shaper::new(mesh, surface)?;
+    /// let edits: Vec<Edit> = serde_json::from_value(serde_json::json!([
+    ///     {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -2.0]}}
+    /// ]))?;
+    /// let here = Place::from(Arc::clone(shaper.reference()));
+    /// let forecast =
+    ///     shaper.forecast(&edits, 0, &here, &Default::default(), &Default::default(), &Default::default());
+    /// assert_eq!(forecast.outcome, Outcome::Rejected);
+    /// assert!(forecast.fraction.is_some_and(|fraction| fraction > 0.1 && fraction < 0.5));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn forecast(
+        &mut self,
+        stack: &[Edit],
+        kept: usize,
+        start: &Place,
+        deform: &Deform,
+        schedule: &Schedule,
+        guard: &Guard,
+    ) -> Forecast {
+        match self.reach(stack, kept, start, deform, schedule, guard) {
+            Ok(plan) => {
+                let target = plan.target();
+                Forecast {
+                    outcome: if target.fraction < 1.0 { Outcome::Clamped } else { Outcome::Applied },
+                    reason: None,
+                    fraction: Some(target.fraction),
+                    min_scaled_jacobian: Some(plan.quality().min_scaled_jacobian),
+                    shapes: plan.shapes(),
+                    sub_steps: target.sub_steps,
+                    quality: Some(quality(self.mesh.cells(), plan.end())),
+                    change: Some(change(self.mesh.cells(), self.mesh.points(), plan.end())),
+                    seconds: plan.seconds(),
+                }
+            }
+            Err(refused) => Forecast::rejected(&refused),
+        }
+    }
+}
+
+impl Forecast {
+    fn rejected(refused: &Refused) -> Self {
+        Self {
+            outcome: Outcome::Rejected,
+            reason: Some(refused.to_string()),
+            fraction: refused.feasible_fraction(),
+            min_scaled_jacobian: refused.min_scaled_jacobian(),
+            shapes: 0,
+            sub_steps: 0,
+            quality: None,
+            change: None,
+            seconds: ShapeSeconds::default(),
+        }
+    }
+}

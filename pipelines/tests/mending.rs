@@ -1,0 +1,282 @@
+//! Orders that one linear solve cannot carry out: followed in sub-steps, untangled, clamped or refused.
+
+use std::sync::Arc;
+
+use proptest::prelude::*;
+use serde_json::{Value, json};
+use tombolo_deform::{
+    mesh::{Mesh, Vector},
+    quality::{Guard, Otherwise, Refusal, keeps, quality},
+    schedule::Schedule,
+    shapes,
+    surface::{Edit, FeatureSettings, Surface},
+    volume::Deform,
+};
+use tombolo_pipelines::shape::{Outcome, Place, Plan, Refused, Shaper};
+
+fn shaper(mesh: Mesh) -> Shaper {
+    let mesh = Arc::new(mesh);
+    let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).unwrap());
+    Shaper::new(mesh, surface).unwrap()
+}
+
+fn column() -> Shaper {
+    shaper(shapes::box_of_tets([3, 3, 6], [0.0; 3], [1.0, 1.0, 2.0]))
+}
+
+fn edits(value: Value) -> Vec<Edit> {
+    serde_json::from_value(value).unwrap()
+}
+
+fn half_turn() -> Vec<Edit> {
+    edits(json!([{"rotate": {"features": ["z-max"], "fixed": ["z-min"], "axis": [0, 0, 1], "degrees": 170}}]))
+}
+
+fn guard(otherwise: Otherwise) -> Guard {
+    Guard { min_scaled_jacobian: 0.01, otherwise }
+}
+
+fn schedule(steps: u32) -> Schedule {
+    serde_json::from_value(json!({"steps": steps})).unwrap()
+}
+
+fn reach(shaper: &mut Shaper, stack: &[Edit], start: &Place, steps: u32, guard: &Guard) -> Result<Plan, Refused> {
+    shaper.reach(stack, 0, start, &Deform::default(), &schedule(steps), guard)
+}
+
+/// Goes along a plan shape by shape as a solver does, and looks at every step; the place where it ends.
+fn walk(mesh: &Mesh, plan: &Plan, guard: &Guard) -> Place {
+    let mut before: Arc<[Vector]> = Arc::clone(plan.start());
+    let mut place = Place::from(Arc::clone(&before));
+    assert_eq!(plan.quality().shapes.len(), plan.shapes() as usize);
+    for shape in 1..=plan.shapes() {
+        let mut points = vec![[0.0; 3]; before.len()];
+        plan.write_shape(shape, &mut points);
+        assert!(keeps(mesh, &before, &points, guard), "shape {shape} of {}", plan.shapes());
+        let measured = quality(mesh.cells(), &points);
+        assert_eq!(measured.inverted, 0);
+        assert!((measured.min - plan.quality().shapes[shape as usize - 1].min).abs() < 1e-12);
+        let points: Arc<[Vector]> = points.into();
+        place = plan.place(shape, Arc::clone(&points));
+        before = points;
+    }
+    assert_eq!(before, *plan.end());
+    place
+}
+
+fn here(shaper: &Shaper) -> Place {
+    Arc::clone(shaper.reference()).into()
+}
+
+#[test]
+fn a_half_turn_is_mended_and_taken_back_exactly() {
+    let mut shaper = column();
+    let mesh = Arc::clone(shaper.mesh());
+    let start = here(&shaper);
+    let (rejecting, mending) = (guard(Otherwise::Reject), guard(Otherwise::Untangle));
+    let refused = reach(&mut shaper, &half_turn(), &start, 1, &rejecting).unwrap_err();
+    assert!(matches!(refused, Refused::Guard(Refusal::Quality(_))), "{refused}");
+
+    for steps in [1, 3, 40] {
+        let plan = reach(&mut shaper, &half_turn(), &start, steps, &mending).unwrap();
+        assert!(plan.target().sub_steps > 1 && plan.shapes() >= steps.max(2), "{} shapes", plan.shapes());
+        assert_eq!(plan.asked().steps.get(), steps);
+        let there = walk(&mesh, &plan, &mending);
+        // The handle has made the motion that the edit states, and what is fixed has not moved.
+        let (sine, cosine) = 170f64.to_radians().sin_cos();
+        for (point, reference) in there.points.iter().zip(mesh.points()) {
+            let [x, y, z] = *reference;
+            let (u, v) = (x - 0.5, y - 0.5);
+            let stated = [0.5 + cosine * u - sine * v, 0.5 + sine * u + cosine * v, z];
+            for axis in 0..3 {
+                assert!(z != 2.0 || (point[axis] - stated[axis]).abs() < 1e-12);
+                assert!(z != 0.0 || point[axis] == reference[axis]);
+            }
+        }
+        // Back, with a guard that mends nothing: the way is known.
+        let back = reach(&mut shaper, &[], &there, steps, &rejecting).unwrap();
+        let home = walk(&mesh, &back, &rejecting);
+        assert_eq!(&*home.points, mesh.points());
+    }
+}
+
+/// The shape is a function of the reference and the stack, not of the way there or of what was asked before.
+#[test]
+fn the_shape_does_not_depend_on_where_the_mesh_is() {
+    let mending = guard(Otherwise::Untangle);
+    let mut shaper = column();
+    let mesh = Arc::clone(shaper.mesh());
+    let start = here(&shaper);
+    let first = reach(&mut shaper, &half_turn(), &start, 1, &mending).unwrap();
+
+    let mut other = column();
+    let lift = edits(json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.1, 0.0, 0.6]}}]));
+    let ground = here(&other);
+    let lifted = reach(&mut other, &lift, &ground, 1, &mending).unwrap();
+    let place = walk(&mesh, &lifted, &mending);
+    let second = reach(&mut other, &half_turn(), &place, 4, &mending).unwrap();
+    walk(&mesh, &second, &mending);
+    assert_eq!(first.end(), second.end());
+
+    // In the middle of the way, back to where it came from and on to somewhere else.
+    let middle = second.shapes() / 2;
+    let mut points = vec![[0.0; 3]; mesh.points().len()];
+    second.write_shape(middle, &mut points);
+    let place = second.place(middle, points.into());
+    let undone = reach(&mut other, &lift, &place, 3, &mending).unwrap();
+    walk(&mesh, &undone, &mending);
+    assert_eq!(undone.end(), lifted.end());
+}
+
+/// An edit on top of a shape that was mended goes on from that shape.
+#[test]
+fn edits_pile_up_on_a_mended_shape() {
+    let mending = guard(Otherwise::Untangle);
+    let mut shaper = column();
+    let mesh = Arc::clone(shaper.mesh());
+    let start = here(&shaper);
+    let turned = reach(&mut shaper, &half_turn(), &start, 1, &mending).unwrap();
+    let place = walk(&mesh, &turned, &mending);
+    let mut stack = half_turn();
+    stack.extend(edits(json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.3, 0.0, 0.2]}}])));
+    let plan = reach(&mut shaper, &stack, &place, 2, &mending).unwrap();
+    let there = walk(&mesh, &plan, &mending);
+    let fresh = {
+        let mut shaper = column();
+        let start = here(&shaper);
+        reach(&mut shaper, &stack, &start, 2, &mending).unwrap()
+    };
+    assert_eq!(fresh.end(), plan.end());
+    let home = reach(&mut shaper, &[], &there, 1, &mending).unwrap();
+    assert_eq!(&*walk(&mesh, &home, &mending).points, mesh.points());
+}
+
+#[test]
+fn the_largest_feasible_fraction_is_done_and_reported() {
+    let clamping = guard(Otherwise::Clamp);
+    for stack in [
+        edits(json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -3.0]}}])),
+        half_turn(),
+    ] {
+        let mut shaper = column();
+        let mesh = Arc::clone(shaper.mesh());
+        let start = here(&shaper);
+        let plan = reach(&mut shaper, &stack, &start, 3, &clamping).unwrap();
+        let fraction = plan.target().fraction;
+        assert!(fraction > 0.05 && fraction < 0.95, "{fraction}");
+        walk(&mesh, &plan, &clamping);
+        let scaled = |fraction: f64| stack.iter().map(|edit| edit.scaled(fraction)).collect::<Vec<_>>();
+        let again = reach(&mut shaper, &scaled(fraction), &start, 3, &guard(Otherwise::Reject)).unwrap();
+        assert_eq!(again.end(), plan.end());
+        assert!(reach(&mut shaper, &scaled(fraction + 0.02), &start, 3, &guard(Otherwise::Reject)).is_err());
+        let forecast =
+            shaper.forecast(&stack, 0, &start, &Deform::default(), &schedule(3), &clamping);
+        assert_eq!((forecast.outcome, forecast.fraction), (Outcome::Clamped, Some(fraction)));
+        assert_eq!(forecast.quality.unwrap().inverted, 0);
+    }
+}
+
+#[test]
+fn edits_that_are_there_already_are_not_clamped() {
+    let mut shaper = column();
+    let start = here(&shaper);
+    let stack = edits(json!([
+        {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, 0.5]}},
+        {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -4.0]}}
+    ]));
+    let clamping = guard(Otherwise::Clamp);
+    let first = shaper.plan(&stack[..1], Arc::clone(&start.points), &Deform::default(), &schedule(1), &clamping).unwrap();
+    let place = first.place(1, Arc::clone(first.end()));
+    let plan = shaper.reach(&stack, 1, &place, &Deform::default(), &schedule(1), &clamping).unwrap();
+    let fraction = plan.target().fraction;
+    let top = plan.end().iter().map(|point| point[2]).fold(0.0, f64::max);
+    assert!((top - (2.5 - 4.0 * fraction)).abs() < 1e-9 && fraction < 0.6, "{top} {fraction}");
+    let whole = shaper.reach(&stack, 2, &place, &Deform::default(), &schedule(1), &clamping);
+    assert!(matches!(whole, Err(Refused::Guard(_))), "nothing is left to clamp");
+}
+
+#[test]
+fn what_cannot_be_mended_says_how_far_it_came() {
+    let mut shaper = column();
+    let start = here(&shaper);
+    let stack = edits(json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -3.0],
+        "harmonic_order": 1}}]));
+    let refused = reach(&mut shaper, &stack, &start, 1, &guard(Otherwise::Untangle)).unwrap_err();
+    let Refused::Stalled { edit: 0, name: "translate", fraction, .. } = refused else { panic!("{refused}") };
+    assert!((0.3..0.67).contains(&fraction), "the column is flat at two thirds: {fraction}");
+    assert_eq!(refused.feasible_fraction(), Some(fraction));
+    let text = refused.to_string();
+    assert!(text.contains("edit 0 (translate) can be done to") && text.contains("beyond that"), "{text}");
+}
+
+fn any_edit() -> impl Strategy<Value = Value> {
+    let feature = prop::sample::select(shapes::BOX_FEATURES.to_vec());
+    let amount = (-1.0..1.0f64, -1.0..3.0f64).prop_map(|(sign, power)| sign * 10f64.powf(power));
+    let vector = prop::array::uniform3(amount.clone());
+    (feature.clone(), feature, 0..5usize, vector, amount, 1..=3u32).prop_map(
+        |(handle, fixed, kind, vector, amount, order)| {
+            let fixed = if fixed == handle { vec![] } else { vec![fixed] };
+            let (name, own) = match kind {
+                0 => ("translate", json!({"by": vector})),
+                1 => ("rotate", json!({"axis": [vector[0], vector[1], 1.0], "degrees": 60.0 * amount})),
+                2 => ("scale_direction", json!({"factors": vector})),
+                3 => ("scale_normals", json!({"distance": amount})),
+                _ => ("affine", json!({"matrix": [vector, [0.0, 1.0, 0.0], [0.0, 0.3, 1.0]], "translation": vector})),
+            };
+            let mut body = own;
+            body["features"] = json!([handle]);
+            body["fixed"] = json!(fixed);
+            body["harmonic_order"] = json!(order);
+            json!({ name: body })
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 40, max_shrink_iters: 20, ..ProptestConfig::default() })]
+
+    /// Whatever is asked for: every shape on the way is valid, or it is refused with a reason and the mesh has not moved.
+    #[test]
+    fn nothing_broken_is_ever_handed_out(
+        first in prop::collection::vec(any_edit(), 1..3),
+        second in prop::collection::vec(any_edit(), 1..3),
+        tets in any::<bool>(),
+        otherwise in prop::sample::select(vec![Otherwise::Reject, Otherwise::Untangle, Otherwise::Clamp]),
+        steps in 1..4u32,
+    ) {
+        let mut shaper = shaper(if tets {
+            shapes::box_of_tets([2, 3, 3], [0.0; 3], [1.0, 1.0, 2.0])
+        } else {
+            shapes::box_of_hexahedra([3, 2, 3], [0.0; 3], [1.0, 1.0, 2.0])
+        });
+        let mesh = Arc::clone(shaper.mesh());
+        let guard = guard(otherwise);
+        let mut place = here(&shaper);
+        let mut stack: Vec<Edit> = Vec::new();
+        for order in [first, second] {
+            let kept = stack.len();
+            let mut wanted = stack.clone();
+            wanted.extend(edits(Value::Array(order)));
+            match shaper.reach(&wanted, kept, &place, &Deform::default(), &schedule(steps), &guard) {
+                Ok(plan) => {
+                    prop_assert_eq!(&plan.start()[..], &place.points[..]);
+                    place = walk(&mesh, &plan, &guard);
+                    let fraction = plan.target().fraction;
+                    prop_assert!(fraction > 0.0 && fraction <= 1.0);
+                    for edit in &mut wanted[kept..] {
+                        *edit = edit.scaled(fraction);
+                    }
+                    stack = wanted;
+                }
+                Err(refused) => prop_assert!(!refused.to_string().is_empty()),
+            }
+        }
+        let back = shaper.reach(&[], 0, &place, &Deform::default(), &schedule(steps), &guard);
+        if let Ok(plan) = back {
+            let home = walk(&mesh, &plan, &guard);
+            prop_assert_eq!(&*home.points, mesh.points());
+        } else {
+            prop_assert!(otherwise != Otherwise::Untangle, "a shape that was mended has a way back");
+        }
+    }
+}
