@@ -169,8 +169,7 @@ fn the_largest_feasible_fraction_is_done_and_reported() {
         let again = reach(&mut shaper, &scaled(fraction), &start, 3, &guard(Otherwise::Reject)).unwrap();
         assert_eq!(again.end(), plan.end());
         assert!(reach(&mut shaper, &scaled(fraction + 0.02), &start, 3, &guard(Otherwise::Reject)).is_err());
-        let forecast =
-            shaper.forecast(&stack, 0, &start, &Deform::default(), &schedule(3), &clamping);
+        let forecast = shaper.forecast(&stack, 0, &start, &Deform::default(), &schedule(3), &clamping);
         assert_eq!((forecast.outcome, forecast.fraction), (Outcome::Clamped, Some(fraction)));
         assert_eq!(forecast.quality.unwrap().inverted, 0);
     }
@@ -185,7 +184,8 @@ fn edits_that_are_there_already_are_not_clamped() {
         {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -4.0]}}
     ]));
     let clamping = guard(Otherwise::Clamp);
-    let first = shaper.plan(&stack[..1], Arc::clone(&start.points), &Deform::default(), &schedule(1), &clamping).unwrap();
+    let first =
+        shaper.plan(&stack[..1], Arc::clone(&start.points), &Deform::default(), &schedule(1), &clamping).unwrap();
     let place = first.place(1, Arc::clone(first.end()));
     let plan = shaper.reach(&stack, 1, &place, &Deform::default(), &schedule(1), &clamping).unwrap();
     let fraction = plan.target().fraction;
