@@ -129,8 +129,12 @@ fn an_order_in_the_middle_of_another_starts_where_the_mesh_is() {
 
 #[test]
 fn a_refused_order_leaves_the_schedule_under_way_alone() {
+    // The walls fold in their own planes on the way.
+    let mut through_itself = squeeze(1.5);
+    through_itself["guard"] = json!({"surface": "allow"});
     let list = json!([
         at(0, scheduled(squeeze(0.4), 6, 1)),
+        at(3, through_itself),
         at(3, squeeze(1.5)),
         at(
             3,
@@ -151,7 +155,9 @@ fn a_refused_order_leaves_the_schedule_under_way_alone() {
     assert!(report.orders[1].min_scaled_jacobian.is_some_and(|reached| reached < 0.0), "what it would have come to");
     assert!(report.orders[1].seconds.volume > 0.0 && report.orders[1].seconds.guard > 0.0, "what it took to find out");
     assert!(reason(1).contains("inside out") && reason(1).contains("largest feasible fraction"), "{}", reason(1));
-    assert!(reason(2).contains("z-mx") && reason(2).contains("z-max") && reason(2).contains("x-min"), "{}", reason(2));
+    assert_eq!(report.orders[2].status, OrderStatus::Rejected);
+    assert!(reason(2).contains("intersect") && reason(2).contains("largest feasible fraction"), "{}", reason(2));
+    assert!(reason(3).contains("z-mx") && reason(3).contains("z-max") && reason(3).contains("x-min"), "{}", reason(3));
 }
 
 #[test]

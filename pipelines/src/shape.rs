@@ -9,9 +9,9 @@ use std::sync::Arc;
 use serde::Serialize;
 use tombolo_deform::{
     mesh::{Mesh, Vector},
-    quality::{Guard, Refusal},
+    quality::{Guard, Refusal, SurfaceRule},
     schedule::Schedule,
-    surface::{Edit, EditError, Editor, Surface, SurfaceError},
+    surface::{BrokenSurface, Edit, EditError, Editor, Surface, SurfaceError, require_sound},
     volume::{Deform, Untangler, VolumeError, VolumeOperator},
 };
 
@@ -25,7 +25,7 @@ const OPERATORS: usize = 2;
 /// Seconds that the parts of a plan took.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct ShapeSeconds {
-    /// The displacement of the surface, from the edits.
+    /// The displacement of the surface, from the edits, and its check.
     pub surface: f64,
     /// The motion of the volume; with it the set-up of its operator where this plan was the first to need it.
     pub volume: f64,
@@ -40,6 +40,9 @@ pub enum Refused {
     /// An edit asks for what the surface cannot do.
     #[error(transparent)]
     Edit(#[from] EditError),
+    /// The surface folds over or intersects itself.
+    #[error(transparent)]
+    Surface(#[from] Box<BrokenSurface>),
     /// The volume cannot follow.
     #[error(transparent)]
     Volume(#[from] VolumeError),
@@ -84,6 +87,7 @@ impl Refused {
         match self {
             Refused::Guard(Refusal::Quality(path)) => Some(path.feasible_fraction),
             Refused::Stalled { fraction, .. } => Some(*fraction),
+            Refused::Surface(broken) => Some(broken.sound_fraction),
             _ => None,
         }
     }
@@ -204,6 +208,14 @@ impl Shaper {
         Ok(self.operator(deform).map(drop)?)
     }
 
+    /// Holds a shape of the surface (coordinates of each of its vertices) to `rule`.
+    fn require_sound(&self, shape: &[Vector], rule: SurfaceRule) -> Result<(), Refused> {
+        match rule {
+            SurfaceRule::Allow => Ok(()),
+            _ => Ok(require_sound(&self.surface, self.surface.points(), shape)?),
+        }
+    }
+
     fn operator(&mut self, deform: &Deform) -> Result<Arc<VolumeOperator>, VolumeError> {
         if let Some(found) = self.operators.iter().position(|(settings, _)| settings == deform) {
             // The newest last, so that the oldest is the first to go.
@@ -220,15 +232,21 @@ impl Shaper {
         Ok(operator)
     }
 
-    /// The shape that `stack` makes, measured from the reference mesh, not judged yet.
+    /// The shape that `stack` makes, measured from the reference mesh. Its surface is held to `rule` before any volume work; the
+    /// volume is not judged yet.
     ///
     /// # Errors
-    /// [`Refused::Edit`], [`Refused::Volume`].
-    pub fn target(&mut self, stack: &[Edit], deform: &Deform) -> Result<Target, Refused> {
+    /// [`Refused::Edit`], [`Refused::Surface`], [`Refused::Volume`].
+    pub fn target(&mut self, stack: &[Edit], deform: &Deform, rule: SurfaceRule) -> Result<Target, Refused> {
         deform.validate()?;
         let mut seconds = ShapeSeconds::default();
         let watch = Stopwatch::start();
-        let surface = self.editor.displacement(stack);
+        let surface = self.editor.displacement(stack).map_err(Refused::from).and_then(|surface| {
+            let reference = self.surface.points();
+            let shape: Vec<Vector> = reference.iter().zip(&surface).map(|(&point, &by)| moved(point, by)).collect();
+            self.require_sound(&shape, rule)?;
+            Ok(surface)
+        });
         seconds.surface = watch.seconds();
         self.spent.surface += seconds.surface;
         let surface = surface?;

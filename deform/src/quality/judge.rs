@@ -20,6 +20,9 @@ pub struct Guard {
     pub min_scaled_jacobian: f64,
     /// What is done with a change of shape that does not keep to it.
     pub otherwise: Otherwise,
+    /// What is done with a surface that is broken before the volume comes into it: faces that lose their area, fold over or
+    /// intersect, where they did not in the reference.
+    pub surface: SurfaceRule,
 }
 
 /// What is done with a change of shape that the guard does not let through.
@@ -38,10 +41,23 @@ pub enum Otherwise {
     Clamp,
 }
 
+/// What is done with a surface that is broken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum SurfaceRule {
+    /// The change of shape is rejected before any volume work, with the faces, the place and the largest feasible fraction.
+    #[default]
+    Reject,
+    /// The surface is taken as it is, not looked at; the quality of the cells alone decides. For bodies that are meant to come
+    /// into contact.
+    Allow,
+}
+
 impl Default for Guard {
-    /// A floor of 0.02; whatever would fall under it is rejected.
+    /// A floor of 0.02; whatever would fall under it is rejected, and so is a broken surface.
     fn default() -> Self {
-        Self { min_scaled_jacobian: 0.02, otherwise: Otherwise::Reject }
+        Self { min_scaled_jacobian: 0.02, otherwise: Otherwise::Reject, surface: SurfaceRule::Reject }
     }
 }
 

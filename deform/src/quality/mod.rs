@@ -18,7 +18,7 @@ pub use cell::scaled_jacobian;
 pub(crate) use cell::{HEXAHEDRON_CORNERS, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, corner_tets};
 pub use change::{Change, Spread, change, swept_volume, volumes};
 pub use judge::{
-    BrokenPath, FailingCell, Guard, Otherwise, PathQuality, Refusal, ShapeQuality, judge, keeps, shape_at,
+    BrokenPath, FailingCell, Guard, Otherwise, PathQuality, Refusal, ShapeQuality, SurfaceRule, judge, keeps, shape_at,
 };
 
 use crate::mesh::{CellType, Cells, Vector};

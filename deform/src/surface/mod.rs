@@ -77,11 +77,13 @@
 //!   the feature or the number at fault.
 //!
 //! # What is not
-//! A displacement says nothing about whether the shape it leads to can be meshed: folds, inversions and self-intersections are
-//! found by [`crate::quality`]. Surfaces that are no manifold can be extracted and looked at, but not edited.
+//! A displacement says nothing about whether the shape it leads to can be meshed: [`check`] finds folds and self-intersections of
+//! the surface, [`crate::quality`] inversions of the volume. Surfaces that are no manifold can be extracted and looked at, but not edited.
 
 mod advance;
 mod amount;
+mod bounds;
+mod check;
 mod edit;
 mod edit_error;
 mod edit_validate;
@@ -95,8 +97,13 @@ mod motion;
 mod polyharmonic;
 mod region;
 mod sharp_edges;
+mod triangle_pair;
 
 pub use advance::Advance;
+pub use check::{
+    BrokenSurface, FlawedFace, FlawedFaces, Intersection, Intersections, SurfaceReport, check, require_sound,
+    sound_fraction,
+};
 pub use edit::{
     Affine, Displacement, Edit, HarmonicOrder, Rotate, ScaleDirection, ScaleNormals, Skeleton, SkeletonMove, Skinning,
     Translate,

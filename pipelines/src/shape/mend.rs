@@ -120,11 +120,14 @@ impl Shaper {
         match guard.otherwise {
             Otherwise::Untangle => {
                 let target = self.settled(stack, deform, guard)?;
+                let shape: Vec<Vector> =
+                    self.surface.vertices().iter().map(|&vertex| target.points[vertex as usize]).collect();
+                self.require_sound(&shape, guard.surface)?;
                 self.go(start, &target, schedule, guard)
             }
             Otherwise::Clamp => self.clamped(stack, kept, start, deform, schedule, guard),
             _ => {
-                let target = self.target(stack, deform)?;
+                let target = self.target(stack, deform, guard.surface)?;
                 self.go(start, &target, schedule, guard)
             }
         }
@@ -153,7 +156,14 @@ impl Shaper {
             if let Some(found) = self.mended.iter().find(known) {
                 break Target { seconds: ShapeSeconds::default(), ..found.target.clone() };
             }
-            let mut linear = self.target(&stack[..lower], deform)?;
+            let mut linear = match self.target(&stack[..lower], deform, guard.surface) {
+                // Followed in sub-steps, the surface may come out sound.
+                Err(Refused::Surface(_)) if lower > 0 => {
+                    lower -= 1;
+                    continue;
+                }
+                linear => linear?,
+            };
             let watch = Stopwatch::start();
             let holds = lower == 0 || keeps(self.mesh(), &self.reference, &linear.points, guard);
             linear.seconds.guard += watch.seconds();
@@ -226,30 +236,27 @@ impl Shaper {
         schedule: &Schedule,
         guard: &Guard,
     ) -> Result<Plan, Refused> {
-        let whole = self.target(stack, deform)?;
-        let refused = match self.go(start, &whole, schedule, guard) {
-            Err(Refused::Guard(Refusal::Quality(path))) => path,
+        let whole = self.target(stack, deform, guard.surface);
+        let refused = match whole.and_then(|whole| self.go(start, &whole, schedule, guard)) {
+            Err(refused @ (Refused::Guard(Refusal::Quality(_)) | Refused::Surface(_))) if kept < stack.len() => refused,
             other => return other,
         };
-        if kept >= stack.len() {
-            return Err(Refused::Guard(Refusal::Quality(refused)));
-        }
         let mut part = |fraction: f64| -> Result<Option<Plan>, Refused> {
             let scaled: Vec<Edit> = stack
                 .iter()
                 .enumerate()
                 .map(|(place, edit)| if place < kept { edit.clone() } else { edit.scaled(fraction) })
                 .collect();
-            let target = Target { fraction, ..self.target(&scaled, deform)? };
-            match self.go(start, &target, schedule, guard) {
+            let target = self.target(&scaled, deform, guard.surface);
+            match target.and_then(|target| self.go(start, &Target { fraction, ..target }, schedule, guard)) {
                 Ok(plan) => Ok(Some(plan)),
-                Err(Refused::Guard(Refusal::Quality(_))) => Ok(None),
+                Err(Refused::Guard(Refusal::Quality(_)) | Refused::Surface(_)) => Ok(None),
                 Err(other) => Err(other),
             }
         };
         // The shapes of most edits lie on a straight way, on which the fraction is known.
         let (mut low, mut high, mut best) = (0.0, 1.0, None::<Plan>);
-        let mut guess = refused.feasible_fraction * (1.0 - 1e-6);
+        let mut guess = refused.feasible_fraction().unwrap_or(0.5) * (1.0 - 1e-6);
         for _ in 0..PROBES {
             if !(guess > 1e-6 && guess < 1.0) {
                 guess = 0.5 * (low + high);
@@ -268,7 +275,7 @@ impl Shaper {
                 break;
             }
         }
-        best.ok_or(Refused::Guard(Refusal::Quality(refused)))
+        best.ok_or(refused)
     }
 }
 

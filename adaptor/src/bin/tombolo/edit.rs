@@ -7,13 +7,13 @@ use serde::Serialize;
 use tombolo::{
     deform::{
         quality::{Quality, quality},
-        surface::{Edit, FeatureSettings, Surface},
+        surface::{BrokenSurface, Edit, FeatureSettings, Surface},
         volume::Method,
     },
     pipelines::{
         files::{Compression, read_mesh, write_mesh},
         language::{Change, Order, parse_valid},
-        shape::Shaper,
+        shape::{Refused, Shaper},
     },
 };
 
@@ -57,6 +57,8 @@ enum VolumeMethod {
 struct Outcome {
     status: &'static str,
     reason: Option<String>,
+    /// What is wrong with the surface, where that is why it was refused.
+    surface: Option<BrokenSurface>,
     vertices: usize,
     cells: usize,
     before: Quality,
@@ -93,6 +95,7 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
     let mut outcome = Outcome {
         status: "applied",
         reason: None,
+        surface: None,
         vertices: mesh.points().len(),
         cells: mesh.cells().len(),
         before: quality(mesh.cells(), mesh.points()),
@@ -125,6 +128,9 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
             outcome.status = "rejected";
             outcome.reason = Some(refused.to_string());
             outcome.fraction = refused.feasible_fraction();
+            if let Refused::Surface(broken) = &refused {
+                outcome.surface = Some((**broken).clone());
+            }
             if options.json {
                 json(&outcome)?;
             }

@@ -1,0 +1,483 @@
+//! What is wrong with a deformed surface: faces without area, faces folded over, and self-intersections.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::Surface;
+use super::bounds::{Bounds, Hierarchy};
+use super::triangle_pair::{Shared, place};
+use crate::mesh::Vector;
+use crate::parallel;
+use crate::vector::{cross, dot, subtract};
+
+/// How many flaws of each kind are named.
+const NAMED: usize = 16;
+
+/// How many leaves of the hierarchy are looked at together.
+const CHUNK: usize = 256;
+
+/// After how many intersections such a part is left.
+const ENOUGH: usize = 1000;
+
+/// A triangle is degenerate where its height is this part of its longest side or less, or its longest side this part of what it
+/// was: beyond that the direction of its normal is rounding.
+const FLAT: f64 = 1e-8;
+
+/// Two triangles that open less than this many degrees at their edge, and much less than they did, may be folded.
+const FOLDED: f64 = 60.0;
+
+/// Below so many degrees they lie on each other.
+const CLOSED: f64 = 1.0;
+
+/// What a shape of a surface has that its reference did not have.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
+pub struct SurfaceReport {
+    /// Faces without area, or with a coordinate that is not finite.
+    pub degenerate: FlawedFaces,
+    /// Faces folded over: turned by more than 120° against most of what was smoothly connected to them around, or lying on a
+    /// neighbour with less than 1° between.
+    pub flipped: FlawedFaces,
+    /// Faces that pass through each other or touch, but for the vertices and edges they share.
+    pub intersections: Intersections,
+}
+
+/// Faces with a flaw.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
+pub struct FlawedFaces {
+    /// How many there are.
+    pub count: usize,
+    /// Those with the lowest numbers, at most 16.
+    pub first: Vec<FlawedFace>,
+}
+
+/// A face with a flaw.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct FlawedFace {
+    /// The number of the face, as in [`Surface::faces`].
+    pub face: u32,
+    /// The mean of its vertices in the shape.
+    pub place: Vector,
+}
+
+/// Pairs of faces that intersect.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
+pub struct Intersections {
+    /// How many pairs of triangles intersect (faces with more than three vertices are split into triangles).
+    pub count: usize,
+    /// Whether there are more: the count ends early where a small part of the surface has a thousand.
+    pub more: bool,
+    /// Those with the lowest numbers among those counted, at most 16.
+    pub first: Vec<Intersection>,
+}
+
+/// Two faces that intersect.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Intersection {
+    /// The numbers of the faces, as in [`Surface::faces`], the lower first; twice the same where the triangles of one face
+    /// meet.
+    pub faces: [u32; 2],
+    /// A point of both; for faces in one plane, a point near both.
+    pub place: Vector,
+}
+
+impl SurfaceReport {
+    /// Whether nothing is wrong.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        self.degenerate.count == 0 && self.flipped.count == 0 && self.intersections.count == 0
+    }
+}
+
+impl std::fmt::Display for SurfaceReport {
+    /// One line for people: what is wrong, how often, and where first.
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let at = |[x, y, z]: Vector| format!("({x:.6}, {y:.6}, {z:.6})");
+        let mut parts = Vec::new();
+        for (flawed, what) in [(&self.degenerate, "lose their area"), (&self.flipped, "fold over")] {
+            if let Some(first) = flawed.first.first() {
+                parts.push(format!(
+                    "{} face(s) {what}, the first is face {} at {}",
+                    flawed.count,
+                    first.face,
+                    at(first.place)
+                ));
+            }
+        }
+        if let Some(first) = self.intersections.first.first() {
+            let more = if self.intersections.more { "more than " } else { "" };
+            let [a, b] = first.faces;
+            parts.push(format!(
+                "{more}{} pair(s) of faces intersect, the first are faces {a} and {b} at {}",
+                self.intersections.count,
+                at(first.place)
+            ));
+        }
+        if parts.is_empty() {
+            return formatter.write_str("the surface is sound");
+        }
+        formatter.write_str(&parts.join("; "))
+    }
+}
+
+/// Looks for what is wrong with a surface at `shape` and was not already wrong at `reference` (coordinates of each surface
+/// vertex).
+///
+/// - **Degenerate**: a triangle whose height is under 10⁻⁸ of its longest side, or whose sides are under 10⁻⁸ of what they were.
+/// - **Flipped**: judged by the angles between normals only, before and after, so that a part that is turned as a whole, by
+///   180° too, is never flipped. Sharp edges that the reference has, however sharp, do not count.
+/// - **Intersections**: by exact predicates, so that no rounding hides or makes one; touching counts. Triangles without area are
+///   left out.
+///
+/// Pairs of triangles none of which moves are not looked at. Cost: a sort of the triangles and, for each, its neighbours in a
+/// hierarchy of boxes; on all threads. The same input gives the same report whatever their number.
+///
+/// What it does not say: whether the volume can follow, nor whether the surface passes through itself on the way to the shape and
+/// out again.
+///
+/// ```
+/// use tombolo_deform::{shapes, surface::{FeatureSettings, Surface, check}};
+///
+/// let mesh = shapes::box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+/// let surface = Surface::extract(&mesh, &FeatureSettings::default())?;
+/// // Pushes the middle of the floor through the ceiling.
+/// let middle = surface.points().iter().position(|point| *point == [0.5, 0.5, 0.0]).unwrap();
+/// let mut shape = surface.points().to_vec();
+/// shape[middle][2] = 1.5;
+/// let report = check(&surface, surface.points(), &shape);
+/// assert!(report.intersections.count > 0);
+/// assert_eq!(report.intersections.first[0].place[2], 1.0);
+/// // Turning everything by half a turn breaks nothing.
+/// let turned: Vec<_> = surface.points().iter().map(|[x, y, z]| [-x, -y, *z]).collect();
+/// assert!(check(&surface, surface.points(), &turned).is_sound());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Panics
+/// Where `reference` or `shape` has another length than [`Surface::points`].
+#[must_use]
+pub fn check(surface: &Surface, reference: &[Vector], shape: &[Vector]) -> SurfaceReport {
+    for points in [reference, shape] {
+        assert_eq!(points.len(), surface.points().len(), "one point for each vertex of the surface");
+    }
+    let found = Shapes { triangles: surface.triangles(), reference, shape }.look();
+    let face = |triangle: u32| surface.triangle_faces()[triangle as usize];
+    let faces = |triangles: Vec<u32>| {
+        let mut faces: Vec<u32> = triangles.into_iter().map(face).collect();
+        faces.sort_unstable();
+        faces.dedup();
+        let named = faces.iter().take(NAMED).map(|&face| {
+            let vertices = surface.faces().vertices(face as usize);
+            let place = crate::vector::mean(vertices.iter().map(|&vertex| shape[vertex as usize]));
+            FlawedFace { face, place }
+        });
+        FlawedFaces { count: faces.len(), first: named.collect() }
+    };
+    let first = found.intersecting.iter().map(|&[a, b]| {
+        let corners = [a, b].map(|triangle| surface.triangles()[triangle as usize]);
+        let place = place(shape, corners[0], corners[1]).unwrap_or_else(|| {
+            let [a, b] = corners.map(|corners| Bounds::around(corners.map(|vertex| shape[vertex as usize])));
+            a.middle_with(&b)
+        });
+        let (a, b) = (face(a), face(b));
+        Intersection { faces: [a.min(b), a.max(b)], place }
+    });
+    SurfaceReport {
+        degenerate: faces(found.degenerate),
+        intersections: Intersections { count: found.count, more: found.more, first: first.collect() },
+        flipped: faces(found.flipped),
+    }
+}
+
+/// A surface that is broken before any volume comes into it.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema, thiserror::Error)]
+#[error(
+    "the surface itself would be broken: {report}; the largest feasible fraction is at most {:.4}",
+    // Rounded down, so that what is shown is feasible.
+    (sound_fraction * 1e4).floor() / 1e4
+)]
+pub struct BrokenSurface {
+    /// What is wrong with it.
+    pub report: SurfaceReport,
+    /// How far it can go and still be sound there: see [`sound_fraction`].
+    pub sound_fraction: f64,
+}
+
+/// [`check`], for those who take a sound surface or none.
+///
+/// # Errors
+/// [`BrokenSurface`] with what is wrong and how far the surface could go.
+///
+/// # Panics
+/// As [`check`].
+pub fn require_sound(surface: &Surface, reference: &[Vector], shape: &[Vector]) -> Result<(), Box<BrokenSurface>> {
+    let report = check(surface, reference, shape);
+    if report.is_sound() {
+        return Ok(());
+    }
+    let sound_fraction = bisect(surface, reference, shape);
+    Err(Box::new(BrokenSurface { report, sound_fraction }))
+}
+
+/// How far a surface can go from `reference` straight to `shape` and still be sound there, by bisection of [`check`] to one part
+/// in 1024: 0 where not at all, 1 where all the way.
+///
+/// The surface is sound at that place; that it is sound at every place before is likely, and not looked at.
+///
+/// # Panics
+/// As [`check`].
+#[must_use]
+pub fn sound_fraction(surface: &Surface, reference: &[Vector], shape: &[Vector]) -> f64 {
+    if check(surface, reference, shape).is_sound() { 1.0 } else { bisect(surface, reference, shape) }
+}
+
+/// The fraction of a shape that is not sound.
+fn bisect(surface: &Surface, reference: &[Vector], shape: &[Vector]) -> f64 {
+    let is_sound = |fraction: f64| {
+        let between: Vec<Vector> = reference
+            .iter()
+            .zip(shape)
+            .map(|(&from, &to)| {
+                // What does not move must not seem to.
+                std::array::from_fn(|axis| {
+                    if from[axis] == to[axis] { from[axis] } else { from[axis] + fraction * (to[axis] - from[axis]) }
+                })
+            })
+            .collect();
+        check(surface, reference, &between).is_sound()
+    };
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..10 {
+        let middle = 0.5 * (low + high);
+        if is_sound(middle) { low = middle } else { high = middle }
+    }
+    low
+}
+
+/// The triangles of a surface in two shapes.
+struct Shapes<'a> {
+    triangles: &'a [[u32; 3]],
+    reference: &'a [Vector],
+    shape: &'a [Vector],
+}
+
+/// What was found, by numbers of triangles.
+#[derive(Default)]
+struct Found {
+    degenerate: Vec<u32>,
+    flipped: Vec<u32>,
+    count: usize,
+    more: bool,
+    /// The first pairs, rising.
+    intersecting: Vec<[u32; 2]>,
+}
+
+/// An edge at which two triangles have newly come to lie on each other.
+struct Fold {
+    triangles: [u32; 2],
+    /// Whether they nearly touch.
+    closed: bool,
+}
+
+#[derive(Default)]
+struct Part {
+    count: usize,
+    more: bool,
+    intersecting: Vec<[u32; 2]>,
+    folds: Vec<Fold>,
+}
+
+impl Part {
+    fn intersect(&mut self, pair: [u32; 2]) {
+        self.count += 1;
+        self.intersecting.push(pair);
+        if self.intersecting.len() >= 4 * NAMED {
+            self.keep_first();
+        }
+    }
+
+    fn keep_first(&mut self) {
+        self.intersecting.sort_unstable();
+        self.intersecting.truncate(NAMED);
+    }
+}
+
+impl Shapes<'_> {
+    fn look(&self) -> Found {
+        let mut found = Found::default();
+        let mut chosen = Vec::with_capacity(self.triangles.len());
+        for (number, &triangle) in self.triangles.iter().enumerate() {
+            let longest_was = longest_side(self.reference, triangle);
+            if is_flat(self.shape, triangle, FLAT * longest_was) {
+                if !is_flat(self.reference, triangle, 0.0) && self.moves(number as u32) {
+                    found.degenerate.push(number as u32);
+                }
+            } else {
+                chosen.push(number as u32);
+            }
+        }
+        let hierarchy = Hierarchy::new(self.shape, self.triangles, &chosen, |triangle| self.moves(triangle));
+        let parts = parallel::map_chunks(hierarchy.leaves(), CHUNK, |leaves| {
+            let mut part = Part::default();
+            for leaf in leaves {
+                if part.count >= ENOUGH {
+                    part.more = true;
+                    break;
+                }
+                hierarchy.for_each_pair(leaf, |a, b| self.look_at_pair([a.min(b), a.max(b)], &mut part));
+            }
+            part
+        });
+        let mut folds = Vec::new();
+        for part in parts {
+            found.count += part.count;
+            found.more |= part.more;
+            found.intersecting.extend(part.intersecting);
+            folds.extend(part.folds);
+        }
+        found.intersecting.sort_unstable();
+        found.intersecting.truncate(NAMED);
+        if !folds.is_empty() {
+            found.flipped = self.flipped(&folds);
+        }
+        found
+    }
+
+    fn moves(&self, triangle: u32) -> bool {
+        self.triangles[triangle as usize]
+            .iter()
+            .any(|&vertex| self.reference[vertex as usize] != self.shape[vertex as usize])
+    }
+
+    fn look_at_pair(&self, pair: [u32; 2], part: &mut Part) {
+        let [a, b] = pair.map(|triangle| self.triangles[triangle as usize]);
+        let shared = Shared::of(self.shape, a, b);
+        if let Shared::Edge { ends, thirds } = shared {
+            if !opens_less_than_right(ends, thirds) {
+                return;
+            }
+            let now = opening(ends, thirds);
+            if let Shared::Edge { ends, thirds } = Shared::of(self.reference, a, b) {
+                let before = opening(ends, thirds);
+                if now < FOLDED && now < before - FOLDED.min(0.5 * before) {
+                    part.folds.push(Fold { triangles: pair, closed: now < CLOSED });
+                }
+            }
+        }
+        if shared.intersect() && !Shared::of(self.reference, a, b).intersect() {
+            part.intersect(pair);
+        }
+    }
+
+    /// Of the triangles at folds, those that are turned against most of the area smoothly connected to them around; where a fold
+    /// is closed and neither side is in the minority, both.
+    fn flipped(&self, folds: &[Fold]) -> Vec<u32> {
+        let around = TrianglesAround::new(self.triangles, self.shape.len());
+        let mut flipped = Vec::new();
+        for fold in folds {
+            let turned = fold.triangles.map(|triangle| self.is_turned(triangle, &around));
+            for (&triangle, turned_alone) in fold.triangles.iter().zip(turned) {
+                if turned_alone || (fold.closed && turned == [false; 2]) {
+                    flipped.push(triangle);
+                }
+            }
+        }
+        flipped
+    }
+
+    fn is_turned(&self, triangle: u32, around: &TrianglesAround) -> bool {
+        let corners = self.triangles[triangle as usize];
+        let [was, is] = [self.reference, self.shape].map(|points| normal(points, corners));
+        let mut neighbours: Vec<u32> =
+            corners.iter().flat_map(|&vertex| around.of(vertex)).copied().filter(|&other| other != triangle).collect();
+        neighbours.sort_unstable();
+        neighbours.dedup();
+        let [mut with, mut against] = [0.0, 0.0];
+        for other in neighbours {
+            let corners = self.triangles[other as usize];
+            let [other_was, other_is] = [self.reference, self.shape].map(|points| normal(points, corners));
+            let before = cosine(was, other_was);
+            if before.abs() > 0.5 {
+                let area = dot(other_was, other_was).sqrt();
+                if cosine(is, other_is) * before.signum() < -0.5 {
+                    against += area;
+                } else {
+                    with += area;
+                }
+            }
+        }
+        against > with
+    }
+}
+
+fn normal(points: &[Vector], [a, b, c]: [u32; 3]) -> Vector {
+    let [a, b, c] = [a, b, c].map(|vertex| points[vertex as usize]);
+    cross(subtract(b, a), subtract(c, a))
+}
+
+/// The cosine of the angle between two vectors, NaN where one has no length.
+fn cosine(a: Vector, b: Vector) -> f64 {
+    dot(a, b) / (dot(a, a).sqrt() * dot(b, b).sqrt())
+}
+
+/// The angle in degrees between two triangles on an edge: 180 where they continue each other, 0 where one lies on the other.
+fn opening([start, end]: [Vector; 2], [a, b]: [Vector; 2]) -> f64 {
+    let along = subtract(end, start);
+    let [a, b] = [a, b].map(|third| cross(along, subtract(third, start)));
+    let turn = cross(a, b);
+    dot(turn, turn).sqrt().atan2(dot(a, b)).to_degrees()
+}
+
+/// The same as `opening(..) < 90.0`, in a few operations.
+fn opens_less_than_right([start, end]: [Vector; 2], [a, b]: [Vector; 2]) -> bool {
+    let along = subtract(end, start);
+    let [a, b] = [a, b].map(|third| cross(along, subtract(third, start)));
+    dot(a, b) > 0.0
+}
+
+fn longest_side(points: &[Vector], [a, b, c]: [u32; 3]) -> f64 {
+    let [a, b, c] = [a, b, c].map(|vertex| points[vertex as usize]);
+    let square = |from: Vector, to: Vector| {
+        let side = subtract(to, from);
+        dot(side, side)
+    };
+    square(a, b).max(square(b, c)).max(square(c, a)).sqrt()
+}
+
+/// Whether a triangle has no area to speak of, or no side longer than `least`, or a coordinate that is not finite.
+fn is_flat(points: &[Vector], triangle: [u32; 3], least: f64) -> bool {
+    let longest = longest_side(points, triangle);
+    let normal = normal(points, triangle);
+    let has_area = longest > least && dot(normal, normal).sqrt() > FLAT * longest * longest && longest.is_finite();
+    !has_area
+}
+
+/// The triangles at each vertex.
+struct TrianglesAround {
+    offsets: Vec<u32>,
+    triangles: Vec<u32>,
+}
+
+impl TrianglesAround {
+    fn new(triangles: &[[u32; 3]], vertices: usize) -> Self {
+        let mut offsets = vec![0u32; vertices + 1];
+        for vertex in triangles.iter().flatten() {
+            offsets[*vertex as usize + 1] += 1;
+        }
+        for vertex in 0..vertices {
+            offsets[vertex + 1] += offsets[vertex];
+        }
+        let mut next = offsets.clone();
+        let mut around = vec![0; 3 * triangles.len()];
+        for (number, triangle) in triangles.iter().enumerate() {
+            for &vertex in triangle {
+                around[next[vertex as usize] as usize] = number as u32;
+                next[vertex as usize] += 1;
+            }
+        }
+        Self { offsets, triangles: around }
+    }
+
+    fn of(&self, vertex: u32) -> &[u32] {
+        &self.triangles[self.offsets[vertex as usize] as usize..self.offsets[vertex as usize + 1] as usize]
+    }
+}
