@@ -1,11 +1,15 @@
 //! What the book says is true: its JSON is accepted, its links lead somewhere.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde_json::Value;
-use tombolo_deform::surface::Edit;
-use tombolo_pipelines::language::{LanguageError, parse, parse_json, parse_orders};
+use tombolo_deform::shapes::box_of_tets;
+use tombolo_deform::surface::{Edit, Editor, FeatureSettings, Surface};
+use tombolo_pipelines::files::read_displacements;
+use tombolo_pipelines::language::{Command, LanguageError, Validate, parse, parse_json, parse_orders, place_beside};
 use tombolo_tests::project;
 
 fn pages() -> Vec<PathBuf> {
@@ -67,6 +71,42 @@ fn json_of_the_book_is_accepted() {
         }
     }
     assert!(checked > 0, "the book has no JSON");
+}
+
+/// Every list of edits of the page on edits does something to the bar it speaks of.
+#[test]
+fn edits_of_the_book_are_carried_out() {
+    let text = fs::read_to_string(project().join("docs/edits.md")).expect("the page is there");
+    let folder = tempfile::tempdir().expect("a folder");
+    let (_, table) = blocks(&text, "text").swap_remove(0);
+    fs::write(folder.path().join("lift.txt"), table).expect("a file");
+    let list = folder.path().join("edits.json").to_string_lossy().into_owned();
+
+    let mesh = box_of_tets([16, 4, 4], [0.0; 3], [4.0, 1.0, 1.0]);
+    let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).expect("a surface"));
+    let mut editor = Editor::new(Arc::clone(&surface)).expect("an editor");
+    let mut kinds = BTreeSet::new();
+    for (line, block) in blocks(&text, "json") {
+        let mut edits = match parse_json::<Vec<Edit>>(&block, "snippet") {
+            Ok(edits) => edits,
+            Err(_) => match parse_orders(&block, "snippet").expect("edits or orders").swap_remove(0).command {
+                Command::Order(order) => order.edits().to_vec(),
+                other => panic!("docs/edits.md:{line}: {other:?} brings no edits"),
+            },
+        };
+        kinds.extend(edits.iter().map(Edit::name));
+        if edits.iter().any(|edit| matches!(edit, Edit::Skeleton(_))) {
+            // A bar of a few faces has no skeleton to speak of.
+            edits.validate().expect("a valid edit");
+            continue;
+        }
+        place_beside(&mut edits, &list);
+        read_displacements(&mut edits, &surface).unwrap_or_else(|error| panic!("docs/edits.md:{line}: {error}"));
+        let displacement = editor.displacement(&edits).unwrap_or_else(|error| panic!("docs/edits.md:{line}: {error}"));
+        let largest = displacement.iter().flatten().fold(0.0_f64, |largest, part| largest.max(part.abs()));
+        assert!(largest > 0.03 && largest < 2.0, "docs/edits.md:{line}: {largest}");
+    }
+    assert_eq!(kinds.len(), 7, "{kinds:?}");
 }
 
 #[test]

@@ -1,12 +1,12 @@
 //! `docs/json-reference.md` is what the types say, rendered; it is never written by hand.
 //!
-//! `TOMBOLO_UPDATE=1 cargo test -p tombolo-tests --test reference` writes the page anew.
+//! `TOMBOLO_UPDATE=1 cargo test -p tombolo-tests --test reference` writes the page anew, and the viewer's copy of the schema.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::fmt::Write as _;
 
 use serde_json::Value;
-use tombolo_pipelines::language::{TimedCommand, config_schema};
+use tombolo_pipelines::language::{TimedCommand, config_schema, order_schema};
 use tombolo_tests::project;
 
 const PAGE: &str = "docs/json-reference.md";
@@ -35,6 +35,20 @@ fn the_reference_is_what_the_types_say() {
     assert!(
         found == page,
         "{PAGE} is out of date; write it anew: TOMBOLO_UPDATE=1 cargo test -p tombolo-tests --test reference"
+    );
+}
+
+/// The viewer's tests read the schema of an order as a server sends it.
+#[test]
+fn the_viewer_has_the_schema_of_an_order() {
+    let path = project().join("viewer/test/order-schema.json");
+    let schema = serde_json::to_string_pretty(&order_schema()).expect("a schema can be written") + "\n";
+    if std::env::var_os("TOMBOLO_UPDATE").is_some() {
+        std::fs::write(&path, &schema).expect("the schema can be written");
+    }
+    assert!(
+        std::fs::read_to_string(&path).unwrap_or_default() == schema,
+        "viewer/test/order-schema.json is out of date; write it anew: TOMBOLO_UPDATE=1 cargo test -p tombolo-tests --test reference"
     );
 }
 

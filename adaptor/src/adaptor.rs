@@ -10,6 +10,7 @@ use tombolo_deform::{
 };
 use tombolo_pipelines::{
     extract::Channel,
+    files::{UnreadFile, read_displacements},
     language::{self, Command, Config, Due, Stage, TimedCommand, Validate},
     shape::Shaper,
 };
@@ -293,10 +294,23 @@ impl Adaptor {
     }
 
     /// Takes in a command that no viewer sent.
-    fn accept(&mut self, id: Option<String>, source: Source, command: Command, moment: Moment) {
+    fn accept(&mut self, id: Option<String>, source: Source, mut command: Command, moment: Moment) {
+        // The journal gets what a file holds and not its name, so that it replays whatever becomes of the file.
+        let read = self.read_files(&mut command);
         match self.log.accept(id, &source, &command, moment) {
-            Ok(id) => self.obey(id, &source, command, moment),
+            Ok(id) => match read {
+                Ok(()) => self.obey(id, &source, command, moment),
+                Err(reason) => self.log.reject(&id, moment, &reason.into()),
+            },
             Err(reason) => self.complain(&format!("a command was not taken: {reason}")),
+        }
+    }
+
+    fn read_files(&self, command: &mut Command) -> Result<(), UnreadFile> {
+        match (command, &self.mesh) {
+            (Command::Order(order), SteeredMesh::Steered(_, surface)) => read_displacements(order.edits_mut(), surface),
+            // Without a surface every order is rejected.
+            _ => Ok(()),
         }
     }
 
@@ -529,6 +543,12 @@ struct Intake {
 impl CommandSink for Intake {
     fn receive(&self, client: u64, id: Option<String>, command: &str) -> Result<(), String> {
         let command: Command = language::parse_valid(command, "message").map_err(|error| error.to_string())?;
+        if let Some((edit, file)) = command.file() {
+            return Err(format!(
+                "edit {edit} (displacement): file: found {file:?}; an order over the network names no files of this machine, \
+                 expected `vertices` and `values`"
+            ));
+        }
         if !self.queue.has_room() {
             return Err("the solver has not come to the commands before this one yet; try again later".into());
         }

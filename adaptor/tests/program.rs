@@ -108,3 +108,63 @@ fn edit_refuses_with_the_reason_and_writes_nothing() {
         assert!(!directory.path().join("out.vtu").exists());
     }
 }
+
+#[test]
+fn a_saved_stack_and_its_displacement_replay_to_the_same_bits() {
+    let (directory, _) = with_box(
+        r#"{"stack": [
+            {"rotate": {"features": ["z-max"], "fixed": ["z-min"], "axis": [1, 2, 3], "degrees": 7, "name": "tilt"}},
+            {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, 9], "muted": true}},
+            {"scale_normals": {"region": {"sphere": {"center": [0.5, 0.5, 1], "radius": 0.3}}, "fixed": ["z-min"],
+                               "fixed_region": {"box": {"lower": [0, 0, 0], "upper": [1, 1, 0.1]}}, "distance": 0.05}}
+        ]}"#,
+    );
+    let path = |name: &str| directory.path().join(name);
+    for file in ["first.txt", "first.vtp", "first.csv"] {
+        let output = tombolo(directory.path(), &[&EDIT[..], &["--displacement", file]].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", error_text(&output));
+        let layers = &json(&output)["layers"];
+        assert_eq!((&layers[0]["edit"], &layers[0]["name"]), (&"rotate".into(), &"tilt".into()));
+        assert_eq!(layers[0]["handle_vertices"], 25);
+        assert_eq!((&layers[1]["muted"], &layers[1]["largest_displacement"]), (&true.into(), &0.0.into()));
+        assert_eq!(layers[2]["handle_vertices"], 5);
+        assert!((layers[2]["largest_displacement"].as_f64().unwrap() - 0.05).abs() < 1e-15);
+    }
+    let bytes = std::fs::read(path("out.vtu")).unwrap();
+    let surface = std::fs::read(path("first.vtp")).unwrap();
+
+    // The same stack again; then the surface displacement in its place, from each kind of file.
+    assert_eq!(
+        tombolo(directory.path(), &[&EDIT[..], &["--displacement", "again.vtp"]].concat()).status.code(),
+        Some(0)
+    );
+    assert!(std::fs::read(path("out.vtu")).unwrap() == bytes && std::fs::read(path("again.vtp")).unwrap() == surface);
+    std::fs::create_dir(path("orders")).unwrap();
+    for file in ["first.txt", "first.vtp", "first.csv"] {
+        let order = format!(r#"[{{"displacement": {{"file": "../{file}"}}}}]"#);
+        std::fs::write(path("orders/edits.json"), order).unwrap();
+        let arguments = ["edit", "--mesh", "box.vtu", "--edits", "orders/edits.json", "--out", "new.vtu"];
+        let output = tombolo(directory.path(), &[&arguments[..], &["--displacement", "new.vtp"]].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", error_text(&output));
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(
+            text.contains("edit 0 (displacement): 98 vertices in the handle, moves the surface by at most 0."),
+            "{text}"
+        );
+        assert!(std::fs::read(path("new.vtu")).unwrap() == bytes, "{file}");
+        assert!(std::fs::read(path("new.vtp")).unwrap() == surface, "{file}");
+    }
+}
+
+#[test]
+fn a_displacement_file_that_is_wrong_is_named_by_line_and_column() {
+    let (directory, _) = with_box(r#"[{"displacement": {"file": "lift.txt"}}]"#);
+    let output = tombolo(directory.path(), &EDIT);
+    assert!(output.status.code() == Some(1) && error_text(&output).contains("lift.txt"), "{}", error_text(&output));
+    std::fs::write(directory.path().join("lift.txt"), "0 0 0 0 0 0\n0 0 1 0 zero 0\n").unwrap();
+    let output = tombolo(directory.path(), &EDIT);
+    assert_eq!(output.status.code(), Some(1));
+    let text = error_text(&output);
+    assert!(text.contains("edit 0 (displacement): file: lift.txt, line 2, column 9: found \"zero\""), "{text}");
+    assert!(!directory.path().join("out.vtu").exists());
+}

@@ -275,3 +275,36 @@ fn a_journal_replays_to_the_same_bits() {
     let torn = &journal[..journal.len() - 10];
     assert_eq!(parse_orders(torn, "torn.jsonl").unwrap().len(), 3);
 }
+
+#[test]
+fn a_journal_holds_what_a_displacement_file_held() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("lift.txt");
+    std::fs::write(&file, "0 0 1 0 0 0.1\n1 0 1 0 0 0.0625\n").unwrap();
+    let run = |name: &str, orders: Vec<TimedCommand>| {
+        let text = format!(r#"{{"version": 1, "journal": "{name}"}}"#);
+        let output = directory.path().into();
+        let mut solver = Solver::new(Settings { config: config(&text), orders, output, ..Settings::default() });
+        for _ in 0..6 {
+            solver.step();
+        }
+        (bits(&solver.mesh), std::fs::read_to_string(directory.path().join(name)).unwrap())
+    };
+    let list = json!([
+        at(1, json!({"edits": [{"displacement": {"file": "lift.txt"}}]})),
+        at(3, json!({"edits": [{"displacement": {"file": "missing.txt"}}]}))
+    ]);
+    let beside = directory.path().join("orders.json");
+    let (shape, journal) = run("first.jsonl", parse_orders(&list.to_string(), &beside.to_string_lossy()).unwrap());
+    let (still, _) = run("none.jsonl", Vec::new());
+    assert!(shape != still);
+    let lines: Vec<&str> = journal.lines().collect();
+    assert!(
+        lines[0].contains("\"values\":[[0.0,0.0,0.1],[0.0,0.0,0.0625]]") && !lines[0].contains("lift.txt"),
+        "{journal}"
+    );
+    assert!(lines.iter().any(|line| line.contains("rejected") && line.contains("missing.txt")), "{journal}");
+    std::fs::remove_file(file).unwrap();
+    let (again, _) = run("second.jsonl", parse_orders(&journal, "first.jsonl").unwrap());
+    assert!(shape == again);
+}

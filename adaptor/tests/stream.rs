@@ -118,6 +118,8 @@ fn what_a_viewer_gets_wrong_is_told_and_changes_nothing() {
         (r#"{"order": {"edits": [{"translate": {"features": ["z-max"], "by": [NaN, 0, 0]}}]}}"#, "NaN"),
         (r#"{"order": {"edits": [{"translate": {"features": ["z-max"], "by": [1e999, 0, 0]}}]}}"#, "1e999"),
         (r#"{"order": {"edits": [{"translate": {"feature": ["z-max"], "by": [0, 0, 0]}}]}}"#, "features"),
+        (r#"{"order": {"edits": [{"rotate": {"features": ["z-max"], "axis": [0, 0, 0], "degrees": 1}}]}}"#, "axis"),
+        (r#"{"order": {"edits": [{"displacement": {"file": "/etc/hostname"}}]}}"#, "names no files of this machine"),
         (r#"{"order": {"undo": 1}, "stop": {}}"#, "message"),
         (r#"{"id": 3, "pause": {}}"#, "id"),
         (r#"{"parameter": {"name": "nothing", "value": 1}}"#, "nothing"),

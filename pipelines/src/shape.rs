@@ -200,6 +200,11 @@ impl Shaper {
         &self.surface
     }
 
+    /// The editor of its surface.
+    pub fn editor(&mut self) -> &mut Editor {
+        &mut self.editor
+    }
+
     /// Sets up the operator of the volume, so that the first order need not.
     ///
     /// # Errors

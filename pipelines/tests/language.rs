@@ -82,6 +82,42 @@ fn errors_point_at_the_token() {
 }
 
 #[test]
+fn edits_are_checked_at_the_token() {
+    #[rustfmt::skip]
+    let cases = [
+        (r#"{"order": {"edits": [{"rotate": {"features": ["a"], "axis": [0, 0, 0], "degrees": 1}}]}}"#, 61, "order.edits[0].rotate.axis", "length is not 0"),
+        (r#"{"order": {"stack": [{"translate": {"by": [0, 0, 0]}}]}}"#, 36, "order.stack[0].translate.features", "there is no handle"),
+        (r#"{"order": {"stack": [{"translate": {"by": [0, 0, 0], "region": {"box": {"lower": [0, 3, 0], "upper": [1, 2, 3]}}}}]}}"#, 86, "order.stack[0].translate.region.box.lower[1]", "3 is above"),
+        (r#"{"order": {"stack": [{"translate": {"by": [0, 0, 0], "region": {"ball": {}}}}]}}"#, 65, "order.stack[0].translate.region.ball", "unknown name `ball`"),
+        (r#"{"order": {"stack": [{"affine": {"features": ["a"], "matrix": [[1, 0, 0], [0, 1], [0, 0, 1]]}}]}}"#, 75, "order.stack[0].affine.matrix[1]", "expected an array of 3"),
+        (r#"{"order": {"stack": [{"displacement": {"vertices": [4, 4], "values": [[0, 0, 1], [0, 0, 1]]}}]}}"#, 56, "order.stack[0].displacement.vertices[1]", "vertex 4 is also"),
+        (r#"{"order": {"stack": [{"skeleton": {"at": [1, 2, 3]}}]}}"#, 42, "order.stack[0].skeleton.at", "expected either"),
+    ];
+    for (text, column, path, message) in cases {
+        let error = parse_orders(text, "orders.json").expect_err(text);
+        assert_eq!((error.line, error.column, error.path.as_str()), (1, column, path), "{text}: {error}");
+        assert!(error.message.contains(message), "{error}");
+    }
+}
+
+#[test]
+fn files_lie_beside_the_json_that_names_them() {
+    let order = r#"{"order": {"stack": [{"displacement": {"file": "a.txt"}}, {"displacement": {"file": "/b.txt"}}]}}"#;
+    let files = |text: &str, file: &str| match &parse_orders(text, file).unwrap()[0].command {
+        Command::Order(order) => serde_json::to_value(order.edits()).unwrap(),
+        other => panic!("{other:?}"),
+    };
+    let expected = |first: &str| serde_json::json!([{"displacement": {"file": first, "fixed": []}}, {"displacement": {"file": "/b.txt", "fixed": []}}]);
+    assert_eq!(files(order, "cases/one/orders.json"), expected("cases/one/a.txt"));
+    assert_eq!(files(order, "orders.json"), expected("a.txt"));
+    let config = r#"{"version": 1, "pipelines": [{"name": "a", "at": {"cycle": 1}, "stages": [{"displacement": {"file": "a.txt"}}, {"order": {}}]}]}"#;
+    let Stage::Displacement(import) = &parse(config, "cases/views.json").unwrap().pipelines[0].stages[0] else {
+        panic!()
+    };
+    assert_eq!(import.file.as_deref(), Some("cases/a.txt"));
+}
+
+#[test]
 fn bytes_that_are_no_text_are_named() {
     let error = text(b"{\n \"name\": \"\xff\"}", "a.json").unwrap_err();
     assert_eq!((error.line, error.column), (2, 11));

@@ -31,6 +31,8 @@ export function makeControl(field: Field, label: string, special: Special = () =
     case "choice": return choiceControl(field, label);
     case "boolean": return booleanControl(label);
     case "text": return textControl(label, (text) => text, String);
+    case "matrix": return matrixControl(field, label);
+    case "numbers": return textControl(label, parseNumbers, (value) => (Array.isArray(value) ? value.join(", ") : ""));
     case "names": return textControl(label, (text) => text.split(",").map((name) => name.trim()).filter(Boolean), (value) => (Array.isArray(value) ? value.join(", ") : ""));
     case "optional": return optionalControl(field, label, special);
     case "object": return objectControl(field.properties, special);
@@ -46,6 +48,12 @@ function parseJson(text: string): Json | undefined {
   } catch {
     throw new Error("is not JSON");
   }
+}
+
+function parseNumbers(text: string): Json | undefined {
+  const words = text.split(/[\s,]+/).filter(Boolean);
+  if (words.some((word) => !/^\d+$/.test(word))) throw new Error("must be whole numbers, parted by commas");
+  return words.length > 0 ? words.map(Number) : undefined;
 }
 
 function row(label: string, input: HTMLElement, hint = ""): HTMLElement {
@@ -82,11 +90,12 @@ function numberControl(field: Field & { kind: "number" }, label: string): Contro
 }
 
 function vectorControl(field: Field & { kind: "vector" }, label: string): Control {
-  const start = label === "factors" ? "1" : "0";
+  // What changes nothing, or is at least a direction.
+  const start = (i: number): string => (label === "factors" || ((label === "axis" || label === "normal") && i === field.length - 1) ? "1" : "0");
   const names = field.length <= 3 ? AXES : Array.from({ length: field.length }, (_, i) => String(i + 1));
   const inputs = Array.from({ length: field.length }, (_, i) => {
     const input = numberInput(`${label} ${names[i]}`);
-    input.value = start;
+    input.value = start(i);
     return input;
   });
   const cells = inputs.map((input, i) => element("span", { class: "component" }, element("span", { "aria-hidden": "true" }, names[i]!), input));
@@ -94,7 +103,21 @@ function vectorControl(field: Field & { kind: "vector" }, label: string): Contro
   return {
     root,
     read: () => inputs.map((input, i) => readInput(input, field.item, `${label} ${names[i]}`)),
-    write: (value) => { if (Array.isArray(value)) inputs.forEach((input, i) => { input.value = String(value[i] ?? start); }); },
+    write: (value) => { if (Array.isArray(value)) inputs.forEach((input, i) => { input.value = String(value[i] ?? start(i)); }); },
+  };
+}
+
+/** Rows of numbers; they begin as the identity. */
+function matrixControl(field: Field & { kind: "matrix" }, label: string): Control {
+  const rows = Array.from({ length: field.rows }, (_, i) => {
+    const control = vectorControl(field.row, `${label} row ${i + 1}`);
+    control.write(Array.from({ length: field.row.length }, (_, k) => (k === i ? 1 : 0)));
+    return control;
+  });
+  return {
+    root: element("div", { role: "group", "aria-label": label }, ...rows.map((control) => control.root)),
+    read: () => rows.map((control) => control.read() as Json),
+    write: (value) => { if (Array.isArray(value)) rows.forEach((control, i) => { if (value[i] !== undefined) control.write(value[i]!); }); },
   };
 }
 
@@ -141,7 +164,12 @@ function optionalControl(field: Field & { kind: "optional" }, label: string, spe
   show();
   return {
     root: element("div", { class: "choice" }, element("div", { class: "field" }, element("label", { for: input.id }, `set ${label}`), input), body),
-    read: () => (input.checked ? inner.read() : undefined),
+    read: () => {
+      const value = input.checked ? inner.read() : undefined;
+      // What was ticked and left empty is no wish to leave it out.
+      if (input.checked && value === undefined) throw new InputError(`${label} is empty`, inner.root.querySelector("input, select") ?? input);
+      return value;
+    },
     write: (value) => {
       input.checked = value !== null;
       if (value !== null) inner.write(value);
@@ -164,6 +192,7 @@ export function objectControl(properties: Property[], special: Special = () => n
       for (const { property, control } of parts) {
         const read = control.read();
         if (read !== undefined) value[property.name] = read;
+        else if (property.required) throw new InputError(`${words(property.name)} is empty`, control.root.querySelector("input, select"));
       }
       return value;
     },

@@ -10,6 +10,8 @@ import type { Part, Selection } from "./selection";
 
 type JsonObject = { [key: string]: Json };
 const PARTS: Record<string, Part> = { features: "handle", fixed: "fixed" };
+/** Files lie with the solver: no order over the network may name one. */
+const FILE = "file";
 
 export class EditForm {
   private form: OrderForm | null = null;
@@ -73,7 +75,8 @@ export class EditForm {
       this.root.replaceChildren(element("p", { class: "hint" }, "The simulation does not say which edits it can make."));
       return;
     }
-    const special: Special = (property) => (PARTS[property.name] && property.field.kind === "names" ? this.featureControl(PARTS[property.name]!) : null);
+    const special: Special = (property) => (PARTS[property.name] && property.field.kind === "names" ? this.featureControl(PARTS[property.name]!)
+      : property.name === FILE ? { root: element("span", { hidden: true }), read: () => undefined, write: () => undefined } : null);
     this.edits = this.form.edits.map((edit) => makeControl(edit.field, words(edit.key), special));
     this.action = element("select", { id: "action", onchange: () => this.showAction() }, ...this.form.edits.map((edit, i) => element("option", { value: i }, words(edit.key))));
     const preferred = this.form.edits.findIndex((edit) => edit.key === "scale_direction");
@@ -91,7 +94,10 @@ export class EditForm {
     const root = element("span", { hidden: true });
     return {
       root,
-      read: () => this.selection.chosen(part, this.features.map((feature) => feature.name)),
+      read: () => {
+        const chosen = this.selection.chosen(part, this.features.map((feature) => feature.name));
+        return chosen.length > 0 || part === "fixed" ? chosen : undefined;
+      },
       write: () => undefined,
     };
   }
@@ -137,11 +143,11 @@ export class EditForm {
     if (!this.form || !this.action) throw new InputError("There is no edit to make yet.", null);
     const index = Number(this.action.value);
     const edit = this.form.edits[index]!;
-    const needsHandle = edit.field.kind === "object" && edit.field.properties.some((property) => property.name === "features");
-    if (needsHandle && this.selection.chosen("handle", this.features.map((feature) => feature.name)).length === 0) {
-      throw new InputError("Choose at least one feature as the handle: click it in the picture, or tick it in the list.", this.table.querySelector("input"));
+    const body = (this.edits[index]!.read() ?? {}) as JsonObject;
+    const needed = edit.field.kind === "object" ? edit.field.oneOf ?? [] : [];
+    if (needed.length > 0 && needed.every((name) => body[name] === undefined)) {
+      throw new InputError("Choose at least one feature as the handle (click it in the picture, or tick it in the list), or set a region.", this.table.querySelector("input"));
     }
-    const body = this.edits[index]!.read() ?? {};
     return { edits: [{ [edit.key]: body }], ...((this.settings?.read() ?? {}) as JsonObject) };
   }
 }
@@ -160,9 +166,12 @@ export function describeEdit(edit: Json): string {
   const [key, body] = Object.entries(edit)[0] ?? ["edit", null];
   if (typeof body !== "object" || body === null || Array.isArray(body)) return words(key);
   const features = Array.isArray(body.features) ? ` ${body.features.join(", ")}` : "";
+  const region = typeof body.region === "object" && body.region !== null ? ` in a ${words(Object.keys(body.region)[0] ?? "region")}` : "";
   const amount = [body.by, body.factors, body.distance].find((value) => value !== undefined);
   const numbers = Array.isArray(amount) ? amount : amount === undefined ? [] : [amount];
   const shown = numbers.map((value) => (typeof value === "number" ? digits(value, 3) : String(value)));
-  const joined = body.factors !== undefined ? ` × (${shown.join(", ")})` : body.by !== undefined ? ` by (${shown.join(", ")})` : shown.length ? ` by ${shown[0]}` : "";
-  return `${words(key)}${features}${joined}`;
+  const turn = typeof body.degrees === "number" ? ` by ${digits(body.degrees, 3)}°` : "";
+  const joined = body.factors !== undefined ? ` × (${shown.join(", ")})` : body.by !== undefined ? ` by (${shown.join(", ")})` : shown.length ? ` by ${shown[0]}` : turn;
+  const name = typeof body.name === "string" ? `${body.name}: ` : "";
+  return `${name}${words(key)}${features}${region}${joined}${body.muted === true ? " (muted)" : ""}`;
 }

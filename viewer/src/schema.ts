@@ -12,8 +12,10 @@ export type Field =
   | { kind: "boolean" }
   | { kind: "choice"; options: { value: Json; title: string }[] }
   | { kind: "vector"; item: Field & { kind: "number" }; length: number }
+  | { kind: "matrix"; row: Field & { kind: "vector" }; rows: number }
+  | { kind: "numbers" }
   | { kind: "names" }
-  | { kind: "object"; properties: Property[] }
+  | { kind: "object"; properties: Property[]; oneOf?: string[] }
   | { kind: "variants"; options: { key: string; field: Field; description: string }[] }
   | { kind: "optional"; field: Field }
   | { kind: "json" };
@@ -52,7 +54,7 @@ export function fieldOf(root: Schema, unresolved: Json | undefined, depth = 0): 
     const rest = schema.type.filter((type) => type !== "null");
     return { kind: "optional", field: fieldOf(root, { ...schema, type: rest.length === 1 ? rest[0]! : rest }, depth + 1) };
   }
-  const alternatives = [...list(schema.anyOf), ...list(schema.oneOf)];
+  const alternatives = [...list(schema.anyOf), ...list(schema.oneOf)].filter((entry) => requiredAlone(entry) === null);
   const solid = alternatives.filter((entry) => resolve(root, entry).type !== "null");
   if (alternatives.length > solid.length && solid.length === 1) {
     return { kind: "optional", field: fieldOf(root, solid[0], depth + 1) };
@@ -63,8 +65,20 @@ export function fieldOf(root: Schema, unresolved: Json | undefined, depth = 0): 
   if (hasType(schema, "boolean")) return { kind: "boolean" };
   if (hasType(schema, "string")) return { kind: "text" };
   if (hasType(schema, "array")) return arrayOf(root, schema, depth);
-  if (isObject(schema.properties) || hasType(schema, "object")) return { kind: "object", properties: propertiesOf(root, schema, depth) };
+  if (isObject(schema.properties) || hasType(schema, "object")) return objectOf(root, schema, depth);
   return { kind: "json" };
+}
+
+/** The keys that an alternative asks for where it says nothing else: "at least one of these must be there". */
+function requiredAlone(entry: Json): string[] | null {
+  if (!isObject(entry) || Object.keys(entry).length !== 1 || !Array.isArray(entry.required)) return null;
+  return entry.required.filter((name): name is string => typeof name === "string");
+}
+
+function objectOf(root: Schema, schema: Schema, depth: number): Field {
+  const oneOf = list(schema.anyOf).flatMap((entry) => requiredAlone(entry) ?? []);
+  const properties = propertiesOf(root, schema, depth);
+  return oneOf.length > 0 ? { kind: "object", properties, oneOf } : { kind: "object", properties };
 }
 
 function alternativesOf(root: Schema, entries: Json[], depth: number): Field {
@@ -107,6 +121,8 @@ function arrayOf(root: Schema, schema: Schema, depth: number): Field {
   const item = fieldOf(root, prefix[0] ?? schema.items, depth + 1);
   const length = prefix.length || (typeof schema.minItems === "number" && schema.minItems === schema.maxItems ? schema.minItems : 0);
   if (item.kind === "number" && length > 0 && length <= 9) return { kind: "vector", item, length };
+  if (item.kind === "vector" && length > 0 && length <= 4) return { kind: "matrix", row: item, rows: length };
+  if (item.kind === "number" && item.integer && length === 0) return { kind: "numbers" };
   return item.kind === "text" ? { kind: "names" } : { kind: "json" };
 }
 

@@ -15,12 +15,26 @@ const defaults = { schedule: { steps: 10, every: { steps: 5 } }, guard: { min_sc
 describe("the schema of an order", () => {
   it("holds the edits and what an order can set", () => {
     const form = orderForm(schema)!;
-    expect(form.edits.map((edit) => edit.key)).toEqual(["translate", "scale_normals", "scale_direction"]);
+    expect(form.edits.map((edit) => edit.key)).toEqual(["translate", "rotate", "scale_direction", "scale_normals", "affine", "displacement", "skeleton"]);
     expect(form.settings.map((property) => property.name)).toEqual(["deform", "guard", "schedule"]);
     const scale = form.edits[2]!.field;
     expect(scale.kind === "object" && scale.properties.map((property) => [property.name, property.field.kind])).toEqual([
-      ["factors", "vector"], ["features", "names"], ["fixed", "names"], ["harmonic_order", "choice"], ["center", "optional"],
+      ["factors", "vector"], ["features", "names"], ["fixed", "names"], ["harmonic_order", "choice"], ["muted", "boolean"],
+      ["center", "optional"], ["fixed_region", "optional"], ["name", "optional"], ["region", "optional"],
     ]);
+    const region = scale.kind === "object" && scale.properties.find((property) => property.name === "region")!.field;
+    const choices = region && region.kind === "optional" && region.field.kind === "variants" ? region.field.options : [];
+    expect(choices.map((option) => [option.key, option.field.kind])).toEqual([
+      ["box", "object"], ["sphere", "object"], ["half_space", "object"], ["faces", "numbers"],
+    ]);
+    const kinds = (key: string): unknown => {
+      const field = form.edits.find((edit) => edit.key === key)!.field;
+      return field.kind === "object" && Object.fromEntries(field.properties.map((property) => [property.name, property.field.kind]));
+    };
+    expect(kinds("rotate")).toMatchObject({ axis: "vector", degrees: "number" });
+    expect(kinds("affine")).toMatchObject({ matrix: "matrix", translation: "vector" });
+    expect(kinds("displacement")).toMatchObject({ vertices: "numbers", values: "json", scale: "number" });
+    expect(kinds("skeleton")).toMatchObject({ at: "optional", by: "optional", skinning: "choice" });
     const schedule = form.settings[2]!.field;
     expect(schedule.kind === "optional" && schedule.field.kind === "object" && schedule.field.properties.map((property) => [property.name, property.field.kind])).toEqual([
       ["steps", "number"], ["every", "variants"],
@@ -81,7 +95,7 @@ describe("the form", () => {
     tick("inlet: fixed");
     input("factors z").value = "0.5";
     expect(form.read()).toEqual({
-      edits: [{ scale_direction: { features: ["throat"], fixed: ["inlet", "outlet"], factors: [1, 1, 0.5], harmonic_order: 2 } }],
+      edits: [{ scale_direction: { features: ["throat"], fixed: ["inlet", "outlet"], factors: [1, 1, 0.5], harmonic_order: 2, muted: false } }],
       schedule: { steps: 10, every: { steps: 5 } },
     });
   });
@@ -92,6 +106,53 @@ describe("the form", () => {
     input("factors x").value = "wide";
     expect(() => form.read()).toThrow("factors x “wide” is not a number");
     expect(input("factors x").getAttribute("aria-invalid")).toBe("true");
+  });
+
+  const label = (text: string): HTMLInputElement => {
+    const found = [...root.querySelectorAll<HTMLLabelElement>(".object:not([hidden]) label")].find((entry) => entry.textContent === text && !entry.closest("[hidden]"))!;
+    return document.getElementById(found.htmlFor) as HTMLInputElement;
+  };
+  const choose = (action: string): void => {
+    const select = root.querySelector<HTMLSelectElement>("#action")!;
+    select.value = [...select.options].find((option) => option.textContent === action)!.value;
+    select.dispatchEvent(new Event("change"));
+  };
+  const check = (box: HTMLInputElement): void => {
+    box.checked = !box.checked;
+    box.dispatchEvent(new Event("change"));
+  };
+
+  it("takes a region for a handle, mutes, and names", () => {
+    choose("rotate");
+    label("degrees").value = "15";
+    check(label("muted"));
+    check(label("set name"));
+    label("name").value = "tilt";
+    check(label("set region"));
+    const kind = root.querySelector<HTMLSelectElement>('.object:not([hidden]) select[aria-label="region: kind"]')!;
+    kind.value = [...kind.options].find((option) => option.textContent === "sphere")!.value;
+    kind.dispatchEvent(new Event("change"));
+    label("radius").value = "0.2";
+    expect(form.read().edits).toEqual([{ rotate: {
+      axis: [0, 0, 1], degrees: 15, fixed: [], harmonic_order: 2, muted: true, name: "tilt",
+      region: { sphere: { center: [0, 0, 0], radius: 0.2 } },
+    } }]);
+    kind.value = [...kind.options].find((option) => option.textContent === "faces")!.value;
+    kind.dispatchEvent(new Event("change"));
+    expect(() => form.read()).toThrow("region is empty");
+    label("faces").value = "1, 2 30";
+    expect((form.read().edits as { rotate: Json }[])[0]!.rotate).toMatchObject({ region: { faces: [1, 2, 30] } });
+    label("faces").value = "1, -2";
+    expect(() => form.read()).toThrow("faces must be whole numbers");
+  });
+
+  it("asks for a matrix row by row, and never for a file", () => {
+    choose("affine");
+    tick("throat: handle");
+    input("matrix row 2 x").value = "0.5";
+    expect((form.read().edits as { affine: Json }[])[0]!.affine).toMatchObject({ matrix: [[1, 0, 0], [0.5, 1, 0], [0, 0, 1]], translation: [0, 0, 0] });
+    choose("displacement");
+    expect([...root.querySelectorAll(".object:not([hidden]) label")].some((entry) => entry.textContent?.includes("file"))).toBe(false);
   });
 
   it("keeps list and picture in step", () => {
@@ -134,6 +195,7 @@ describe("an order in words", () => {
     expect(describeOrder({ undo: 1 })).toBe("undo");
     expect(describeOrder({ edits: [{ scale_direction: { features: ["throat"], factors: [1, 1, 0.5] } }] })).toBe("scale direction throat × (1, 1, 0.5)");
     expect(describeOrder({ edits: [{ translate: { features: ["a", "b"], by: [0, -2e-4, 0] } }] })).toBe("translate a, b by (0, −2e−4, 0)");
+    expect(describeOrder({ stack: [{ rotate: { region: { half_space: {} }, axis: [0, 0, 1], degrees: -15, name: "tilt", muted: true } }] })).toBe("tilt: rotate in a half space by −15° (muted)");
     expect(describeOrder({ stack: [] })).toBe("back to the reference shape");
     for (const odd of [null, 3, [], {}, { edits: [null, 3, {}] }] as Json[]) expect(describeOrder(odd)).toBeTypeOf("string");
   });

@@ -119,6 +119,7 @@ layer! {
     /// assert_eq!(edit.name(), "translate");
     /// ```
     #[derive(Default)]
+    #[schemars(extend("anyOf" = [{"required": ["features"]}, {"required": ["region"]}]))]
     pub struct Translate {
         /// How far the handle moves along x, y and z, in units of the mesh.
         pub by: Vector,
@@ -131,6 +132,7 @@ layer! {
 layer! {
     /// Turns the handle as one rigid body about an axis.
     #[derive(Default)]
+    #[schemars(extend("anyOf" = [{"required": ["features"]}, {"required": ["region"]}]))]
     pub struct Rotate {
         /// The direction of the axis, of any length but 0.
         pub axis: Vector,
@@ -149,6 +151,7 @@ layer! {
 layer! {
     /// Scales the handle along the axes about a centre, as one body.
     #[derive(Default)]
+    #[schemars(extend("anyOf" = [{"required": ["features"]}, {"required": ["region"]}]))]
     pub struct ScaleDirection {
         /// The factors along x, y and z; 1 leaves an axis as it is.
         pub factors: Vector,
@@ -165,6 +168,7 @@ layer! {
 layer! {
     /// Moves the handle along its surface normals: outward for a positive distance.
     #[derive(Default)]
+    #[schemars(extend("anyOf" = [{"required": ["features"]}, {"required": ["region"]}]))]
     pub struct ScaleNormals {
         /// How far each vertex of the handle moves along its normal, in units of the mesh; negative moves inward. The normal of
         /// a vertex is the area-weighted mean of the normals of the handle's own faces around it.
@@ -178,6 +182,7 @@ layer! {
 layer! {
     /// Moves the handle by a matrix about a centre and a translation: `x` goes to `matrix (x - center) + center + translation`.
     #[derive(Default)]
+    #[schemars(extend("anyOf" = [{"required": ["features"]}, {"required": ["region"]}]))]
     pub struct Affine {
         /// The rows of the matrix. It may be singular: what is flattened is the guard's business.
         pub matrix: [Vector; 3],

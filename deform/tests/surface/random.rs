@@ -3,8 +3,9 @@
 use super::*;
 use proptest::prelude::*;
 use tombolo_deform::shapes;
+use tombolo_deform::surface::{Affine, BoxRegion, Displacement, HalfSpaceRegion, Region, Rotate, SphereRegion};
 
-fn absurd() -> impl Strategy<Value = f64> {
+fn absurd() -> BoxedStrategy<f64> {
     prop_oneof![
         4 => -2.0..2.0f64,
         1 => any::<f64>(),
@@ -20,6 +21,7 @@ fn absurd() -> impl Strategy<Value = f64> {
             Just(1e150),
         ],
     ]
+    .boxed()
 }
 
 fn feature() -> impl Strategy<Value = String> {
@@ -30,28 +32,101 @@ fn feature() -> impl Strategy<Value = String> {
     ]
 }
 
+fn region() -> BoxedStrategy<Region> {
+    let vector = || [absurd(), absurd(), absurd()];
+    prop_oneof![
+        3 => (vector(), vector()).prop_map(|(lower, upper)| Region::Box(BoxRegion { lower, upper })),
+        3 => (vector(), absurd()).prop_map(|(center, radius)| Region::Sphere(SphereRegion { center, radius })),
+        3 => (vector(), vector()).prop_map(|(origin, normal)| Region::HalfSpace(HalfSpaceRegion { origin, normal })),
+        2 => proptest::collection::vec(0..60u32, 0..4).prop_map(Region::Faces),
+    ]
+    .boxed()
+}
+
+/// Any edit but a skeleton, whose cost is that of a skeleton.
 fn edit() -> impl Strategy<Value = Edit> {
     let features = || proptest::collection::vec(feature(), 0..3);
     let order = (0..3usize).prop_map(|which| ORDERS[which]);
     let vector = || [absurd(), absurd(), absurd()];
-    (features(), features(), order, vector(), proptest::option::of(vector()), 0..3).prop_map(
-        |(features, fixed, harmonic_order, numbers, center, kind)| match kind {
-            0 => Edit::Translate(Translate { features, fixed, by: numbers, harmonic_order, ..Translate::default() }),
-            1 => Edit::ScaleNormals(ScaleNormals {
-                features,
-                fixed,
-                distance: numbers[0],
-                harmonic_order,
-                ..ScaleNormals::default()
-            }),
-            _ => Edit::ScaleDirection(ScaleDirection {
-                features,
-                fixed,
-                factors: numbers,
-                center,
-                harmonic_order,
-                ..ScaleDirection::default()
-            }),
+    let regions = (proptest::option::weighted(0.2, region()), proptest::option::weighted(0.1, region()));
+    let import = proptest::collection::vec((0..100u32, vector()), 0..4);
+    let numbers = (vector(), [vector(), vector(), vector()], absurd(), proptest::option::of(vector()));
+    (features(), features(), regions, order, numbers, import, proptest::bool::weighted(0.2), 0..6).prop_map(
+        |(features, fixed, (region, fixed_region), harmonic_order, numbers, import, muted, kind)| {
+            let (vector, matrix, number, center) = numbers;
+            let name = None;
+            match kind {
+                0 => Edit::Translate(Translate {
+                    features,
+                    region,
+                    fixed,
+                    fixed_region,
+                    by: vector,
+                    harmonic_order,
+                    muted,
+                    name,
+                }),
+                1 => Edit::ScaleNormals(ScaleNormals {
+                    features,
+                    region,
+                    fixed,
+                    fixed_region,
+                    distance: number,
+                    harmonic_order,
+                    muted,
+                    name,
+                }),
+                2 => Edit::ScaleDirection(ScaleDirection {
+                    features,
+                    region,
+                    fixed,
+                    fixed_region,
+                    factors: vector,
+                    center,
+                    harmonic_order,
+                    muted,
+                    name,
+                }),
+                3 => Edit::Rotate(Rotate {
+                    features,
+                    region,
+                    fixed,
+                    fixed_region,
+                    axis: vector,
+                    degrees: number,
+                    center,
+                    harmonic_order,
+                    muted,
+                    name,
+                }),
+                4 => Edit::Affine(Affine {
+                    features,
+                    region,
+                    fixed,
+                    fixed_region,
+                    matrix,
+                    translation: vector,
+                    center,
+                    harmonic_order,
+                    muted,
+                    name,
+                }),
+                _ => {
+                    let (vertices, values) = import.into_iter().unzip();
+                    Edit::Displacement(Displacement {
+                        features,
+                        region,
+                        fixed,
+                        fixed_region,
+                        file: None,
+                        vertices,
+                        values,
+                        scale: number,
+                        muted,
+                        name,
+                    })
+                }
+            }
         },
     )
 }

@@ -24,6 +24,13 @@ pub enum Place {
     Whole,
     /// A line of text, counted from 1.
     Line(usize),
+    /// A character of a line of text, both counted from 1.
+    Column {
+        /// The line.
+        line: usize,
+        /// The character.
+        column: usize,
+    },
     /// A byte, counted from 0.
     Byte(usize),
 }
@@ -33,6 +40,7 @@ impl std::fmt::Display for Place {
         match self {
             Place::Whole => Ok(()),
             Place::Line(line) => write!(f, ", line {line}"),
+            Place::Column { line, column } => write!(f, ", line {line}, column {column}"),
             Place::Byte(byte) => write!(f, ", byte {byte}"),
         }
     }

@@ -7,6 +7,8 @@
 //! | VTK `.vtk` (legacy) | text and binary, file versions 1 to 5 | |
 //! | ParaView `.pvd` | | [`Series`] |
 //!
+//! Displacements of a surface are read from and written to plain text and VTK: [`read_displacement`], [`write_displacement`].
+//!
 //! # Features
 //! Physical surfaces of Gmsh become [`FeatureSource::Faces`]. In a VTK file a cell array named `features` says which feature each
 //! face belongs to (a negative number: none), on cells of dimension 2 beside the volume cells or on the cells of a surface; a
@@ -25,6 +27,7 @@
 //! [`FeatureSource::Vertices`]: tombolo_deform::mesh::FeatureSource::Vertices
 
 mod assemble;
+mod displacement;
 mod error;
 mod gmsh;
 mod scanner;
@@ -37,6 +40,10 @@ use std::path::Path;
 
 use tombolo_deform::mesh::Mesh;
 
+pub use displacement::{
+    SurfaceDisplacement, TOLERANCE, UnreadFile, parse_displacement, read_displacement, read_displacements,
+    write_displacement,
+};
 pub use error::{FileError, Place, Problem};
 pub use vtk::{Compression, Series};
 

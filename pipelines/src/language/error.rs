@@ -72,6 +72,19 @@ impl Problem {
         self
     }
 
+    /// The same, seen from the object that has it at the end of a way such as `region.box.lower[0]`.
+    #[must_use]
+    pub fn within_path(mut self, path: &str) -> Self {
+        for part in path.rsplit('.') {
+            let (key, indices) = part.split_once('[').unwrap_or((part, ""));
+            for index in indices.rsplit('[').filter_map(|index| index.trim_end_matches(']').parse().ok()) {
+                self.path.push(Step::Index(index));
+            }
+            self.path.push(Step::Key(key.to_owned()));
+        }
+        self
+    }
+
     pub(super) fn locate(self, root: &Node, text: &str, file: &str) -> LanguageError {
         let steps: Vec<Step> = self.path.into_iter().rev().collect();
         let (node, _) = walk(root, &steps);

@@ -18,6 +18,7 @@
 //! );
 //! ```
 
+mod beside;
 mod config;
 mod error;
 mod order;
@@ -26,6 +27,7 @@ mod scan;
 mod tree;
 mod validate;
 
+pub use beside::place_beside;
 pub use config::{
     Action, At, Config, Due, ErrorBound, OrderStage, Pipeline, Select, Slice, Stage, Statistics, Steering,
     StreamServer, StreamStage, Write,
@@ -38,10 +40,14 @@ pub(crate) use validate::monitor_names;
 
 /// Reads and checks a configuration.
 ///
+/// Files that edits name lie beside `file` where they are relative.
+///
 /// # Errors
 /// A [`LanguageError`] at the first token that is wrong.
 pub fn parse(text: &str, file: &str) -> Result<Config, LanguageError> {
-    parse_valid(text, file)
+    let mut config = parse_valid(text, file)?;
+    beside::place_config(&mut config, file);
+    Ok(config)
 }
 
 /// The JSON Schema (draft 2020-12) of a configuration.

@@ -362,6 +362,8 @@ impl Validate for JournalEntry {
 /// From a journal come the commands that were accepted and not rejected, at the cycle at which each took effect, or was accepted
 /// where the run ended before. A last line that a killed run left half-written is passed over.
 ///
+/// Files that edits name lie beside `file` where they are relative.
+///
 /// # Errors
 /// A [`LanguageError`] at the first token that is wrong.
 ///
@@ -377,6 +379,12 @@ impl Validate for JournalEntry {
 /// assert_eq!(orders[0].at, Some(At::Cycle(5)));
 /// ```
 pub fn parse_orders(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageError> {
+    let mut commands = parse_commands(text, file)?;
+    super::beside::place_orders(&mut commands, file);
+    Ok(commands)
+}
+
+fn parse_commands(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageError> {
     let start = text.trim_start_matches(['\u{feff}', ' ', '\t', '\r', '\n']);
     if start.is_empty() {
         return Ok(Vec::new());

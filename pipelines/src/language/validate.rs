@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use tombolo_deform::quality::Guard;
 use tombolo_deform::schedule::Schedule;
+use tombolo_deform::surface::Edit;
 use tombolo_deform::volume::Deform;
 
 use super::config::{Action, Config, Due, ErrorBound, OrderStage, Pipeline, Stage, StreamStage, Write};
@@ -141,7 +142,7 @@ impl State {
             return Err(Problem::new("found twice, expected at most once"));
         }
         if let Some(edit) = stage.edit() {
-            edit.validate().map_err(|error| Problem::new(error.to_string()))?;
+            check_edit(&edit)?;
             self.unordered = Some((index, stage.name()));
             return Ok(());
         }
@@ -236,6 +237,14 @@ fn check_bound(bound: ErrorBound) -> Result<(), Problem> {
     Err(Problem::new(format!("found {value}, expected a number above 0{most}")).within(key))
 }
 
+fn check_edit(edit: &Edit) -> Result<(), Problem> {
+    edit.validate().map_err(|error| {
+        let (field, message) = (error.field(), error.to_string());
+        let message = message.strip_prefix(&field).and_then(|rest| rest.strip_prefix(": ")).unwrap_or(&message);
+        Problem::new(message).within_path(&field)
+    })
+}
+
 fn check_deform(deform: &Deform) -> Result<(), Problem> {
     deform.validate().map_err(|error| Problem::new(error.to_string()))
 }
@@ -292,6 +301,14 @@ pub fn file_pattern(pattern: &str, cycle: u64, time: f64) -> Result<String, Prob
     Ok(file)
 }
 
+impl Validate for Vec<Edit> {
+    fn validate(&self) -> Result<(), Problem> {
+        let located =
+            |index: usize, edit: &Edit| check_edit(edit).map_err(|problem| problem.within(edit.name()).at(index));
+        self.iter().enumerate().try_for_each(|(index, edit)| located(index, edit))
+    }
+}
+
 impl Validate for Order {
     fn validate(&self) -> Result<(), Problem> {
         let (key, edits) = match &self.change {
@@ -304,7 +321,7 @@ impl Validate for Order {
         };
         for (index, edit) in edits.iter().enumerate() {
             let located = |problem: Problem| problem.within(edit.name()).at(index).within(key);
-            edit.validate().map_err(|error| located(Problem::new(error.to_string())))?;
+            check_edit(edit).map_err(located)?;
         }
         check_settings(self.deform.as_ref(), self.guard.as_ref(), self.schedule.as_ref())
     }

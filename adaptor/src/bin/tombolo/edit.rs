@@ -7,12 +7,12 @@ use serde::Serialize;
 use tombolo::{
     deform::{
         quality::{Quality, quality},
-        surface::{BrokenSurface, Edit, FeatureSettings, Surface},
+        surface::{BrokenSurface, Edit, FeatureSettings, Layer, Surface},
         volume::Method,
     },
     pipelines::{
-        files::{Compression, read_mesh, write_mesh},
-        language::{Change, Order, parse_valid},
+        files::{Compression, read_displacements, read_mesh, write_displacement, write_mesh},
+        language::{Change, Order, parse_valid, place_beside},
         shape::{Refused, Shaper},
     },
 };
@@ -30,6 +30,9 @@ pub(crate) struct Options {
     /// The file to write: .vtu, or .vtp for a surface
     #[arg(long, value_name = "OUT.vtu")]
     out: PathBuf,
+    /// Also write what each surface vertex was moved by: .txt, .csv or .vtp; an edit `displacement` reads it again
+    #[arg(long, value_name = "OUT.txt")]
+    displacement: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -67,6 +70,8 @@ struct Outcome {
     iterations: Option<usize>,
     sub_steps: Option<usize>,
     fraction: Option<f64>,
+    /// The edits, the oldest first; empty where the order was refused before they were evaluated.
+    layers: Vec<Layer>,
     seconds: Seconds,
 }
 
@@ -82,7 +87,7 @@ struct Seconds {
 }
 
 pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
-    let (edits, order) = read_order(options)?;
+    let (mut edits, order) = read_order(options)?;
     let mut seconds = Seconds::default();
     let mesh_file = timed(&mut seconds.read, || read_mesh(&options.mesh))?;
     let mesh = Arc::new(mesh_file.mesh);
@@ -91,6 +96,7 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
         Shaper::new(Arc::clone(&mesh), surface)
     });
     let mut shaper = shaper?;
+    read_displacements(&mut edits, shaper.surface())?;
 
     let mut outcome = Outcome {
         status: "applied",
@@ -104,6 +110,7 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
         iterations: None,
         sub_steps: None,
         fraction: None,
+        layers: Vec::new(),
         seconds,
     };
     let mut deform = order.deform.unwrap_or_default();
@@ -122,6 +129,7 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
     let spent = shaper.spent();
     (outcome.seconds.surface, outcome.seconds.volume, outcome.seconds.guard) =
         (spent.surface, spent.volume, spent.guard);
+    outcome.layers = shaper.editor().layers(&edits).unwrap_or_default();
     let plan = match plan {
         Ok(plan) => plan,
         Err(refused) => {
@@ -145,6 +153,19 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
     outcome.inverted = Some(after.inverted);
     outcome.after = Some(after);
     timed(&mut outcome.seconds.write, || write_mesh(&options.out, &shaped, &mesh_file.fields, Compression::None))?;
+    if let Some(file) = &options.displacement {
+        let displacement = if target.fraction < 1.0 {
+            // Clamped: what was reached, and not what was asked for.
+            let reached = |&vertex: &u32| {
+                let [reference, end] = [mesh.points(), plan.end()].map(|points| points[vertex as usize]);
+                [0, 1, 2].map(|axis| end[axis] - reference[axis])
+            };
+            shaper.surface().vertices().iter().map(reached).collect()
+        } else {
+            shaper.editor().displacement(&edits)?
+        };
+        write_displacement(file, shaper.surface(), &displacement)?;
+    }
     if options.json { json(&outcome) } else { tell(&outcome, options) }
 }
 
@@ -155,13 +176,16 @@ fn read_order(options: &Options) -> Result<(Vec<Edit>, Order), Failure> {
     // A list of edits is read as an order that holds it, so that both are held to the same rules.
     let is_list = text.trim_start_matches('\u{feff}').trim_start().starts_with('[');
     let order: Order = if is_list {
-        let edits: Vec<Edit> = tombolo::pipelines::language::parse_json(&text, &name)?;
-        Change::Edits(edits).into()
+        Change::Edits(parse_valid::<Vec<Edit>>(&text, &name)?).into()
     } else {
         parse_valid(&text, &name)?
     };
     match &order.change {
-        Change::Edits(edits) | Change::Stack(edits) => Ok((edits.clone(), order)),
+        Change::Edits(edits) | Change::Stack(edits) => {
+            let mut edits = edits.clone();
+            place_beside(&mut edits, &name);
+            Ok((edits, order))
+        }
         Change::Undo(_) => Err(Failure::Wrong(format!("{name}: undo: a mesh from a file has no orders to take back"))),
     }
 }
@@ -185,10 +209,18 @@ fn tell(outcome: &Outcome, options: &Options) -> Result<(), Failure> {
     if let Some(after) = &outcome.after {
         say(format_args!("scaled Jacobian after:  {}", line(after)))?;
     }
+    for (place, layer) in outcome.layers.iter().enumerate() {
+        let Layer { edit, name, muted, handle_vertices, largest_displacement } = layer;
+        let name = name.as_ref().map_or_else(String::new, |name| format!(" \"{name}\""));
+        let does =
+            if *muted { "muted".to_owned() } else { format!("moves the surface by at most {largest_displacement:.6}") };
+        say(format_args!("edit {place} ({edit}){name}: {handle_vertices} vertices in the handle, {does}"))?;
+    }
     let Seconds { read, features, surface, volume, guard, write } = outcome.seconds;
     say(format_args!(
         "seconds: read {read:.3}, features {features:.3}, surface {surface:.3}, volume {volume:.3}, guard {guard:.3}, \
          write {write:.3}"
     ))?;
-    say(format_args!("wrote {}", options.out.display()))
+    say(format_args!("wrote {}", options.out.display()))?;
+    options.displacement.as_ref().map_or(Ok(()), |file| say(format_args!("wrote {}", file.display())))
 }

@@ -1,6 +1,7 @@
 //! Tests of the mesh files.
 
 mod corruption;
+mod displacement_files;
 mod gmsh_files;
 mod vtk_files;
 

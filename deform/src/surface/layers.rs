@@ -1,0 +1,65 @@
+//! What each layer of a stack does, for reports.
+
+use serde::Serialize;
+
+use super::handle::Handle;
+use super::{Edit, EditError, Editor};
+use crate::vector::subtract;
+
+/// What one edit of a stack does.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Layer {
+    /// The kind of edit, as JSON has it.
+    pub edit: &'static str,
+    /// The name that the layer was given.
+    pub name: Option<String>,
+    /// Whether it is passed over.
+    pub muted: bool,
+    /// How many vertices its handle has, those among them that are fixed too.
+    pub handle_vertices: usize,
+    /// How far this layer alone moves a vertex at most, in units of the mesh; 0 where it is muted.
+    pub largest_displacement: f64,
+}
+
+impl Editor {
+    /// What each edit of a stack does, from the oldest to the newest.
+    ///
+    /// Costs an evaluation of every layer.
+    ///
+    /// # Errors
+    /// As [`Editor::displacement`].
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use tombolo_deform::{shapes, surface::{Edit, Editor, FeatureSettings, Surface}};
+    ///
+    /// let mesh = shapes::box_of_tets([4, 2, 2], [0.0; 3], [2.0, 1.0, 1.0]);
+    /// let mut editor = Editor::new(Arc::new(Surface::extract(&mesh, &FeatureSettings::default())?))?;
+    /// let stack: Vec<Edit> = serde_json::from_str(r#"[
+    ///     { "translate": { "features": ["x-max"], "fixed": ["x-min"], "by": [0, 3, 4], "name": "lift the outlet" } }
+    /// ]"#)?;
+    /// let layers = editor.layers(&stack)?;
+    /// assert_eq!((layers[0].handle_vertices, layers[0].largest_displacement), (9, 5.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn layers(&mut self, stack: &[Edit]) -> Result<Vec<Layer>, EditError> {
+        let mut layers = Vec::with_capacity(stack.len());
+        let mut below = self.displacement(&[])?;
+        for (place, edit) in stack.iter().enumerate() {
+            let handle = Handle::find(self.surface(), edit, place)?;
+            let reached = self.displacement(&stack[..=place])?;
+            let lengths = reached.iter().zip(&below).map(|(reached, below)| {
+                subtract(*reached, *below).iter().fold(0.0f64, |length, part| length.hypot(*part))
+            });
+            layers.push(Layer {
+                edit: edit.name(),
+                name: edit.layer_name().map(str::to_owned),
+                muted: edit.muted(),
+                handle_vertices: handle.vertices.len(),
+                largest_displacement: lengths.fold(0.0, f64::max),
+            });
+            below = reached;
+        }
+        Ok(layers)
+    }
+}
