@@ -3,8 +3,9 @@ import { Connection, streamAddress } from "./connection";
 import { InputError } from "./controls";
 import { Decoder } from "./decoder";
 import type { DecodeWorker } from "./decoder";
-import { element, part, write } from "./dom";
-import { EditForm, describeEdit } from "./form";
+import { part, write } from "./dom";
+import { EditForm } from "./form";
+import { showLayers } from "./layers";
 import { publish } from "./inspection";
 import { Orders } from "./orders";
 import { ScalarBar, Triad, showEmpty } from "./overlay";
@@ -114,7 +115,10 @@ function takeHello(body: Hello): void {
   orders.reconcile(body.orders, fresh && everConnected);
   fresh = false;
   everConnected = true;
-  part("stack").replaceChildren(...body.stack.map((edit) => element("li", {}, describeEdit(edit))));
+  showLayers(part("stack"), body.stack, (stack) => {
+    showProblem("");
+    sendOrder({ stack });
+  });
   part("stack-empty").hidden = body.stack.length > 0;
   bar.role(body, status?.driver);
   refresh();

@@ -131,6 +131,92 @@ fn edit() -> impl Strategy<Value = Edit> {
     )
 }
 
+/// A layer that moves a box of [4, 2, 2] cells and 2 by 1 by 1 in size.
+fn layer() -> BoxedStrategy<Edit> {
+    let vector = || [-1.0..1.0f64, -1.0..1.0, -1.0..1.0];
+    let plane = proptest::option::weighted(0.3, 0.1..1.9f64);
+    (0..6usize, 0..6usize, 0..3usize, 0..5, (vector(), -180.0..180.0f64), plane, proptest::bool::weighted(0.2))
+        .prop_filter("a handle that is not fixed", |(handle, fixed, ..)| handle != fixed)
+        .prop_map(|(handle, fixed, order, kind, (vector, number), plane, muted)| {
+            let features = names(&[shapes::BOX_FEATURES[handle]]);
+            let fixed = names(&[shapes::BOX_FEATURES[fixed]]);
+            let fixed_region =
+                plane.map(|x| Region::HalfSpace(HalfSpaceRegion { origin: [x, 0.0, 0.0], normal: [1.0, 0.0, 0.0] }));
+            let harmonic_order = ORDERS[order];
+            let (region, name, center) = (None, None, None);
+            match kind {
+                0 => Edit::Translate(Translate {
+                    features,
+                    region,
+                    fixed,
+                    fixed_region,
+                    by: vector,
+                    harmonic_order,
+                    muted,
+                    name,
+                }),
+                1 => Edit::Rotate(Rotate {
+                    features,
+                    region,
+                    fixed,
+                    fixed_region,
+                    axis: [vector[0], vector[1], 1.0],
+                    degrees: number,
+                    center,
+                    harmonic_order,
+                    muted,
+                    name,
+                }),
+                2 => Edit::ScaleDirection(ScaleDirection {
+                    features,
+                    region,
+                    fixed,
+                    fixed_region,
+                    factors: vector,
+                    center,
+                    harmonic_order,
+                    muted,
+                    name,
+                }),
+                3 => Edit::ScaleNormals(ScaleNormals {
+                    features,
+                    region,
+                    fixed,
+                    fixed_region,
+                    distance: number / 500.0,
+                    harmonic_order,
+                    muted,
+                    name,
+                }),
+                _ => Edit::Affine(Affine {
+                    features,
+                    region,
+                    fixed,
+                    fixed_region,
+                    matrix: [[1.0, 0.0, vector[0]], [0.0, 1.0, vector[1]], [vector[2], 0.0, 1.0]],
+                    translation: vector,
+                    center,
+                    harmonic_order,
+                    muted,
+                    name,
+                }),
+            }
+        })
+        .boxed()
+}
+
+fn set_muted(edit: &mut Edit, muted: bool) {
+    match edit {
+        Edit::Translate(edit) => edit.muted = muted,
+        Edit::Rotate(edit) => edit.muted = muted,
+        Edit::ScaleDirection(edit) => edit.muted = muted,
+        Edit::ScaleNormals(edit) => edit.muted = muted,
+        Edit::Affine(edit) => edit.muted = muted,
+        Edit::Displacement(edit) => edit.muted = muted,
+        Edit::Skeleton(edit) => edit.muted = muted,
+    }
+}
+
 fn random_mesh() -> impl Strategy<Value = Mesh> {
     let counts = [1..5usize, 1..5, 1..5];
     let size = prop_oneof![Just(0.0), Just(1e-300), Just(1e-9), Just(1.0), Just(1e12), Just(1e300)];
@@ -164,6 +250,37 @@ proptest! {
             Err(error) => prop_assert!(error.to_string().starts_with("edit ")),
         }
         prop_assert!(editor.displacement(&[]).unwrap().iter().flatten().all(|value| value.to_bits() == 0));
+    }
+
+    /// Layers are muted, reordered, removed and put back on one editor: what comes out is what a new editor makes of the stack.
+    #[test]
+    fn the_result_depends_on_the_stack_alone(
+        layers in proptest::collection::vec(layer(), 1..5),
+        turns in proptest::collection::vec((0..4usize, 0..4usize, any::<bool>()), 1..6),
+    ) {
+        let mesh = shapes::box_of_tets([4, 2, 2], [0.0; 3], [2.0, 1.0, 1.0]);
+        let surface = Arc::new(extract(&mesh));
+        let fresh = |stack: &[Edit]| Editor::new(Arc::clone(&surface)).unwrap().displacement(stack);
+        let mut editor = Editor::new(Arc::clone(&surface)).unwrap();
+        let mut stack = layers.clone();
+        for (from, to, mute) in turns {
+            let (from, to) = (from % stack.len(), to % stack.len());
+            let mut layer = stack.remove(from);
+            if mute {
+                set_muted(&mut layer, !layer.muted());
+            }
+            stack.insert(to, layer);
+            let displacement = editor.displacement(&stack);
+            prop_assert_eq!(&displacement, &fresh(&stack));
+            let heard: Vec<Edit> = stack.iter().filter(|layer| !layer.muted()).cloned().collect();
+            // A muted layer is still checked, so that it may be what is refused.
+            if displacement.is_ok() {
+                prop_assert_eq!(&displacement, &fresh(&heard));
+            }
+        }
+        let zeros = editor.displacement(&[]).unwrap();
+        prop_assert!(zeros.iter().flatten().all(|value| value.to_bits() == 0));
+        prop_assert_eq!(editor.displacement(&layers), fresh(&layers));
     }
 
     #[test]
