@@ -267,7 +267,8 @@ proptest! {
             let (from, to) = (from % stack.len(), to % stack.len());
             let mut layer = stack.remove(from);
             if mute {
-                set_muted(&mut layer, !layer.muted());
+                let muted = layer.muted();
+                set_muted(&mut layer, !muted);
             }
             stack.insert(to, layer);
             let displacement = editor.displacement(&stack);
