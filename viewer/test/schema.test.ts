@@ -173,7 +173,7 @@ describe("the form", () => {
     const guard = [...details.querySelectorAll("label")].find((label) => label.textContent === "set guard")!;
     const box = document.getElementById(guard.htmlFor) as HTMLInputElement;
     box.checked = true;
-    expect(form.read().guard).toEqual({ min_scaled_jacobian: 0.03, otherwise: "reject" });
+    expect(form.read().guard).toEqual({ min_scaled_jacobian: 0.03, otherwise: "reject", surface: "reject" });
     expect(form.read().deform).toBeUndefined();
   });
 
