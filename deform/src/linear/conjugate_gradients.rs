@@ -1,11 +1,9 @@
 //! Preconditioned conjugate gradients.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
-use super::{
-    BlockPreconditioner, Convergence, Factorization, LinearError, LinearSolver, ROW_CHUNK, SparseMatrix, Tolerance,
-};
-use crate::parallel;
+use super::iteration::{Columns, conjugate_gradients, single_column, single_column_mut};
+use super::{BlockPreconditioner, Convergence, Factorization, LinearError, LinearSolver, SparseMatrix, Tolerance};
 
 /// Conjugate gradients (Hestenes, Stiefel 1952) preconditioned by a [`BlockPreconditioner`].
 ///
@@ -13,7 +11,7 @@ use crate::parallel;
 /// again with symmetric Gauss–Seidel before it is given up.
 #[derive(Debug)]
 pub struct ConjugateGradients<const B: usize> {
-    matrix: SparseMatrix<B>,
+    matrix: Arc<SparseMatrix<B>>,
     preconditioner: BlockPreconditioner<B>,
     fallback: OnceLock<Result<BlockPreconditioner<B>, LinearError>>,
     max_iterations: usize,
@@ -24,7 +22,8 @@ impl<const B: usize> ConjugateGradients<B> {
     ///
     /// # Errors
     /// [`LinearError::Diagonal`].
-    pub fn new(matrix: SparseMatrix<B>) -> Result<Self, LinearError> {
+    pub fn new(matrix: impl Into<Arc<SparseMatrix<B>>>) -> Result<Self, LinearError> {
+        let matrix = matrix.into();
         let preconditioner = BlockPreconditioner::new(&matrix, Factorization::IncompleteCholesky)?;
         Ok(Self { matrix, preconditioner, fallback: OnceLock::new(), max_iterations: 2000 })
     }
@@ -48,53 +47,13 @@ impl<const B: usize> ConjugateGradients<B> {
         solution: &mut [[f64; B]],
         tolerance: Tolerance,
     ) -> Result<Convergence, LinearError> {
-        solution.fill([0.0; B]);
-        let whole = norm(right_side);
-        if !whole.is_finite() {
-            return Err(LinearError::NotFinite { iteration: 0 });
-        }
-        let target = (tolerance.relative * whole).max(tolerance.absolute);
-        let relative = |residual: f64| if whole > 0.0 { residual / whole } else { 0.0 };
-        if whole <= target {
-            return Ok(Convergence { iterations: 0, residual: relative(whole) });
-        }
-        let mut residual = right_side.to_vec();
-        let mut preconditioned = vec![[0.0; B]; residual.len()];
-        preconditioner.apply(&residual, &mut preconditioned);
-        let mut direction = preconditioned.clone();
-        let mut image = vec![[0.0; B]; residual.len()];
-        let mut energy = dot(&residual, &preconditioned);
-        let mut reached = whole;
-        for iteration in 1..=self.max_iterations {
-            self.matrix.multiply(&direction, &mut image);
-            let curvature = dot(&direction, &image);
-            if !(curvature.is_finite() && energy.is_finite()) {
-                return Err(LinearError::NotFinite { iteration });
-            }
-            if curvature <= 0.0 || energy <= 0.0 {
-                return Err(LinearError::Indefinite { iteration, curvature: curvature.min(energy) });
-            }
-            let step = energy / curvature;
-            add_multiple(solution, step, &direction);
-            add_multiple(&mut residual, -step, &image);
-            reached = norm(&residual);
-            if reached <= target {
-                return Ok(Convergence { iterations: iteration, residual: relative(reached) });
-            }
-            preconditioner.apply(&residual, &mut preconditioned);
-            let energy_before = std::mem::replace(&mut energy, dot(&residual, &preconditioned));
-            let factor = energy / energy_before;
-            parallel::for_each_chunk(&mut direction, ROW_CHUNK, |chunk, part| {
-                for (value, new) in part.iter_mut().zip(&preconditioned[chunk * ROW_CHUNK..]) {
-                    *value = std::array::from_fn(|axis| new[axis] + factor * value[axis]);
-                }
-            });
-        }
-        Err(LinearError::NotConverged {
-            iterations: self.max_iterations,
-            residual: relative(reached),
-            tolerance: relative(target),
-        })
+        let apply = |vector: &[Columns<B, 1>], result: &mut [Columns<B, 1>]| {
+            preconditioner.apply(vector.as_flattened(), result.as_flattened_mut());
+        };
+        let (right_side, solution) = (single_column(right_side), single_column_mut(solution));
+        let [convergence] =
+            conjugate_gradients(&self.matrix, apply, right_side, solution, [tolerance], self.max_iterations)?;
+        Ok(convergence)
     }
 }
 
@@ -103,7 +62,7 @@ impl<const B: usize> LinearSolver<B> for ConjugateGradients<B> {
         self.matrix.rows()
     }
 
-    fn solve(
+    fn solve_from(
         &self,
         right_side: &[[f64; B]],
         solution: &mut [[f64; B]],
@@ -121,40 +80,10 @@ impl<const B: usize> LinearSolver<B> for ConjugateGradients<B> {
             other => other,
         }
     }
-}
 
-/// The 2-norm.
-pub(crate) fn norm<const B: usize>(vector: &[[f64; B]]) -> f64 {
-    dot(vector, vector).sqrt()
-}
-
-/// The inner product, summed chunk by chunk.
-fn dot<const B: usize>(a: &[[f64; B]], b: &[[f64; B]]) -> f64 {
-    parallel::map_chunks(a.len(), ROW_CHUNK, |range| {
-        let (a, b) = (a[range.clone()].as_flattened(), b[range].as_flattened());
-        // Four sums side by side, so that one need not wait for another.
-        let mut sums = [0.0; 4];
-        let (chunks_a, chunks_b) = (a.chunks_exact(4), b.chunks_exact(4));
-        let rest: f64 = chunks_a.remainder().iter().zip(chunks_b.remainder()).map(|(a, b)| a * b).sum();
-        for (a, b) in chunks_a.zip(chunks_b) {
-            for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
-                *sum += a * b;
-            }
-        }
-        (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
-    })
-    .into_iter()
-    .sum()
-}
-
-fn add_multiple<const B: usize>(target: &mut [[f64; B]], factor: f64, vector: &[[f64; B]]) {
-    parallel::for_each_chunk(target, ROW_CHUNK, |chunk, part| {
-        for (value, change) in part.iter_mut().zip(&vector[chunk * ROW_CHUNK..]) {
-            for (value, change) in value.iter_mut().zip(change) {
-                *value += factor * change;
-            }
-        }
-    });
+    fn renewed(&self, matrix: SparseMatrix<B>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
+        Ok(Box::new(Self::new(matrix)?.with_max_iterations(self.max_iterations)))
+    }
 }
 
 #[cfg(test)]

@@ -35,6 +35,17 @@ impl<const B: usize> SparseMatrix<B> {
         Self { offsets, columns, values }
     }
 
+    /// As [`SparseMatrix::zeros`], with values, of parts known to fit.
+    pub(super) fn from_parts(offsets: Vec<usize>, columns: Vec<u32>, values: Vec<Block<B>>) -> Self {
+        debug_assert!(offsets.last() == Some(&columns.len()) && columns.len() == values.len());
+        Self { offsets, columns, values }
+    }
+
+    /// Whether the blocks lie at the same places.
+    pub(super) fn has_pattern_of(&self, other: &Self) -> bool {
+        self.offsets == other.offsets && self.columns == other.columns
+    }
+
     /// How many rows of blocks there are.
     #[must_use]
     pub fn rows(&self) -> usize {
@@ -78,11 +89,16 @@ impl<const B: usize> SparseMatrix<B> {
     /// # Panics
     /// Where `result` is not one for each row or `vector` ends before the last column.
     pub fn multiply(&self, vector: &[[f64; B]], result: &mut [[f64; B]]) {
+        self.multiply_columns::<1>(vector.as_chunks().0, result.as_chunks_mut().0);
+    }
+
+    /// The same for `K` vectors side by side.
+    pub(super) fn multiply_columns<const K: usize>(&self, vector: &[[[f64; B]; K]], result: &mut [[[f64; B]; K]]) {
         assert_eq!(result.len(), self.rows(), "one result for each row");
         parallel::for_each_chunk(result, ROW_CHUNK, |chunk, part| {
             for (index, value) in part.iter_mut().enumerate() {
                 let (columns, blocks) = self.row(chunk * ROW_CHUNK + index);
-                let mut sum = [0.0; B];
+                let mut sum = [[0.0; B]; K];
                 for (&column, block) in columns.iter().zip(blocks) {
                     multiply_add(&mut sum, block, &vector[column as usize]);
                 }
@@ -92,12 +108,14 @@ impl<const B: usize> SparseMatrix<B> {
     }
 }
 
-/// `sum += block * vector`.
+/// `sum += block * vector`, for each column of the vector.
 #[inline(always)]
-fn multiply_add<const B: usize>(sum: &mut [f64; B], block: &Block<B>, vector: &[f64; B]) {
-    for (total, row) in sum.iter_mut().zip(block) {
-        for (entry, value) in row.iter().zip(vector) {
-            *total += entry * value;
+fn multiply_add<const B: usize, const K: usize>(sum: &mut [[f64; B]; K], block: &Block<B>, vector: &[[f64; B]; K]) {
+    for (sum, vector) in sum.iter_mut().zip(vector) {
+        for (total, row) in sum.iter_mut().zip(block) {
+            for (entry, value) in row.iter().zip(vector) {
+                *total += entry * value;
+            }
         }
     }
 }

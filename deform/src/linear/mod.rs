@@ -1,20 +1,46 @@
 //! Sparse matrices and the solvers of linear systems.
 //!
 //! A [`LinearSolver`] is set up for one symmetric positive definite matrix and answers any number of right sides.
-//! [`ConjugateGradients`] with a [`BlockPreconditioner`] is the one built in. All of it is deterministic: sums are taken in
-//! chunks whose size does not depend on the number of threads.
+//! [`solver`] chooses one: [`Cholesky`] for small systems, [`Multigrid`] for all others, which falls back on
+//! [`ConjugateGradients`] with a [`BlockPreconditioner`]. All of it is deterministic: sums are taken in chunks whose size does
+//! not depend on the number of threads.
 
+mod aggregation;
+mod cholesky;
 mod conjugate_gradients;
+mod gauss_seidel;
+mod hierarchy;
+mod iteration;
 mod matrix;
+mod multigrid;
 mod ordering;
 mod preconditioner;
+mod real;
 
+pub use cholesky::Cholesky;
 pub use conjugate_gradients::ConjugateGradients;
-pub(crate) use conjugate_gradients::norm;
+pub(crate) use iteration::norm;
 pub use matrix::{Block, SparseMatrix};
 pub(crate) use matrix::{ROW_CHUNK, invert_positive};
+pub use multigrid::{Multigrid, MultigridSettings, Precision};
 pub use ordering::reverse_cuthill_mckee;
 pub use preconditioner::{BlockPreconditioner, Factorization};
+
+/// Systems of at most this many equations are solved directly.
+const DIRECT: usize = 1500;
+
+/// The solver for a symmetric positive definite matrix that is quickest at its size.
+///
+/// # Errors
+/// [`LinearError::Diagonal`].
+pub fn solver<const B: usize>(matrix: SparseMatrix<B>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
+    if B * matrix.rows() <= DIRECT
+        && let Ok(direct) = Cholesky::new(matrix.clone())
+    {
+        return Ok(Box::new(direct));
+    }
+    Ok(Box::new(Multigrid::new(matrix, MultigridSettings::default())?))
+}
 
 /// When an iterative solve may stop: once the residual's 2-norm is at most the larger of the two.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,7 +76,51 @@ pub trait LinearSolver<const B: usize>: std::fmt::Debug + Send + Sync {
         right_side: &[[f64; B]],
         solution: &mut [[f64; B]],
         tolerance: Tolerance,
+    ) -> Result<Convergence, LinearError> {
+        solution.fill([0.0; B]);
+        self.solve_from(right_side, solution, tolerance)
+    }
+
+    /// The same from what `solution` holds, which the iteration leaves as it is where it is good enough already.
+    ///
+    /// # Errors
+    /// As [`LinearSolver::solve`].
+    fn solve_from(
+        &self,
+        right_side: &[[f64; B]],
+        solution: &mut [[f64; B]],
+        tolerance: Tolerance,
     ) -> Result<Convergence, LinearError>;
+
+    /// Solves for three right sides side by side, from what `solutions` holds: quicker than one after the other, where the
+    /// solver reads its matrix once for all three.
+    ///
+    /// # Errors
+    /// As [`LinearSolver::solve`].
+    fn solve_three_from(
+        &self,
+        right_sides: &[[[f64; B]; 3]],
+        solutions: &mut [[[f64; B]; 3]],
+        tolerances: [Tolerance; 3],
+    ) -> Result<[Convergence; 3], LinearError> {
+        let mut result = [Convergence::default(); 3];
+        for (column, result) in result.iter_mut().enumerate() {
+            let right_side: Vec<[f64; B]> = right_sides.iter().map(|value| value[column]).collect();
+            let mut solution: Vec<[f64; B]> = solutions.iter().map(|value| value[column]).collect();
+            *result = self.solve_from(&right_side, &mut solution, tolerances[column])?;
+            for (value, found) in solutions.iter_mut().zip(solution) {
+                value[column] = found;
+            }
+        }
+        Ok(result)
+    }
+
+    /// The same kind of solver for another matrix. Where that has its blocks at the same places, what depends on these alone is
+    /// used again.
+    ///
+    /// # Errors
+    /// [`LinearError::Diagonal`], [`LinearError::Factor`].
+    fn renewed(&self, matrix: SparseMatrix<B>) -> Result<Box<dyn LinearSolver<B>>, LinearError>;
 }
 
 /// Why a linear system was not solved.
@@ -84,6 +154,9 @@ pub enum LinearError {
         /// The row of the block.
         row: usize,
     },
+    /// A matrix could not be factored.
+    #[error("the linear system has no Cholesky factor: it is not positive definite, or too large for memory")]
+    Factor,
     /// The right side, or something computed from it, is NaN or infinite.
     #[error("the linear solve met a value that is not finite at iteration {iteration}")]
     NotFinite {

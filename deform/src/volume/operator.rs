@@ -4,7 +4,7 @@ use super::assembly::{Elastic, Graph, Laplace, stiffness};
 use super::element::Elements;
 use super::rigid::RigidMotion;
 use super::{Deform, Method, VolumeError};
-use crate::linear::{ConjugateGradients, Convergence, LinearError, LinearSolver, SparseMatrix, Tolerance};
+use crate::linear::{Convergence, LinearError, LinearSolver, SparseMatrix, Tolerance};
 use crate::mesh::{Mesh, Vector};
 
 /// A residual this small against the right side is rounding.
@@ -89,11 +89,11 @@ impl VolumeOperator {
             Method::Elasticity => {
                 let form = Elastic::new(settings.poisson_ratio);
                 let (matrix, coupling) = graph.assemble(mesh, &elements, &form, &stiffness);
-                Equations::Elastic { coupling, solver: Box::new(ConjugateGradients::new(matrix)?) }
+                Equations::Elastic { coupling, solver: crate::linear::solver(matrix)? }
             }
             Method::Harmonic => {
                 let (matrix, coupling) = graph.assemble(mesh, &elements, &Laplace, &stiffness);
-                Equations::Harmonic { coupling, solver: Box::new(ConjugateGradients::new(matrix)?) }
+                Equations::Harmonic { coupling, solver: crate::linear::solver(matrix)? }
             }
         };
         let places = |vertices: &[u32]| vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect();

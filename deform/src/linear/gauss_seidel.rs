@@ -1,0 +1,302 @@
+//! Gauss–Seidel sweeps that give the same bits on any number of threads.
+
+use super::matrix::invert_positive;
+use super::real::Real;
+use super::{ROW_CHUNK, SparseMatrix};
+use crate::parallel;
+
+/// Rows are cut into at most this many pieces. Half of it bounds the threads that one sweep can use.
+const PIECES: usize = 32;
+
+/// A piece has at least this many rows.
+const PIECE_ROWS: usize = 256;
+
+/// Rows cut into pieces at least as long as the matrix is wide about its diagonal, so that no piece couples with any but the
+/// ones beside it. Those with even numbers are placed before those with odd numbers.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pieces {
+    rows: usize,
+    piece_rows: usize,
+    even_rows: usize,
+}
+
+impl Pieces {
+    pub(super) fn new<const B: usize>(matrix: &SparseMatrix<B>) -> Self {
+        let rows = matrix.rows();
+        let width = |row: usize| {
+            let columns = matrix.row(row).0;
+            let first = columns.first().map_or(0, |&column| row.saturating_sub(column as usize));
+            columns.last().map_or(0, |&column| (column as usize).saturating_sub(row)).max(first)
+        };
+        let width = (0..rows).map(width).max().unwrap_or(0);
+        let piece_rows = rows.div_ceil(PIECES).max(PIECE_ROWS).max(width);
+        let whole = rows / piece_rows;
+        let rest = rows % piece_rows;
+        let even_rows = whole.div_ceil(2) * piece_rows + if whole % 2 == 0 { rest } else { 0 };
+        Self { rows, piece_rows, even_rows }
+    }
+
+    /// One piece.
+    pub(super) fn whole(rows: usize) -> Self {
+        Self { rows, piece_rows: rows.max(1), even_rows: rows }
+    }
+
+    /// Whether a row is in an odd piece, and which of those rows it is.
+    fn place(&self, row: usize) -> (bool, usize) {
+        let piece = row / self.piece_rows;
+        (piece % 2 == 1, piece / 2 * self.piece_rows + row % self.piece_rows)
+    }
+
+    /// Where a row is placed.
+    pub(super) fn slot(&self, row: usize) -> usize {
+        let (odd, index) = self.place(row);
+        if odd { self.even_rows + index } else { index }
+    }
+
+    /// The row that is placed there.
+    pub(super) fn row(&self, slot: usize) -> usize {
+        let (odd, index) = if slot < self.even_rows { (0, slot) } else { (1, slot - self.even_rows) };
+        (2 * (index / self.piece_rows) + odd) * self.piece_rows + index % self.piece_rows
+    }
+
+    /// Calls `copy` with each run of rows, and of the slots where they are placed.
+    pub(super) fn for_each_run(&self, mut copy: impl FnMut(std::ops::Range<usize>, std::ops::Range<usize>)) {
+        for start in (0..self.rows).step_by(self.piece_rows) {
+            let count = self.piece_rows.min(self.rows - start);
+            let slot = self.slot(start);
+            copy(start..start + count, slot..slot + count);
+        }
+    }
+
+    pub(super) fn rows(&self) -> usize {
+        self.rows
+    }
+}
+
+/// Blocks in compressed rows, each stored column after column.
+#[derive(Debug, Clone)]
+pub(super) struct Rows<T, const B: usize> {
+    offsets: Vec<usize>,
+    columns: Vec<u32>,
+    blocks: Vec<[[T; B]; B]>,
+}
+
+impl<T: Real, const B: usize> Rows<T, B> {
+    /// Rows from what `entries` calls its second argument with for each of them.
+    pub(super) fn new(count: usize, entries: impl Fn(usize, &mut dyn FnMut(u32, &[[f64; B]; B])) + Sync) -> Self {
+        let parts = parallel::map_chunks(count, ROW_CHUNK, |range| {
+            let (mut lengths, mut columns, mut blocks) = (Vec::with_capacity(range.len()), Vec::new(), Vec::new());
+            for row in range {
+                let before = columns.len();
+                entries(row, &mut |column, block| {
+                    columns.push(column);
+                    blocks.push(std::array::from_fn(|j| std::array::from_fn(|i| T::of(block[i][j]))));
+                });
+                lengths.push(columns.len() - before);
+            }
+            (lengths, columns, blocks)
+        });
+        let total = parts.iter().map(|(_, columns, _)| columns.len()).sum();
+        let mut rows = Self {
+            offsets: Vec::with_capacity(count + 1),
+            columns: Vec::with_capacity(total),
+            blocks: Vec::with_capacity(total),
+        };
+        rows.offsets.push(0);
+        let mut end = 0;
+        for (lengths, columns, blocks) in parts {
+            for length in lengths {
+                end += length;
+                rows.offsets.push(end);
+            }
+            rows.columns.extend_from_slice(&columns);
+            rows.blocks.extend_from_slice(&blocks);
+        }
+        rows
+    }
+
+    /// `sum += self[row] vector`; `first` is the column of the vector's first entry.
+    #[inline(always)]
+    pub(super) fn add_product<const K: usize>(
+        &self,
+        row: usize,
+        vector: &[[[T; B]; K]],
+        first: usize,
+        sum: &mut [[T; B]; K],
+    ) {
+        let range = self.offsets[row]..self.offsets[row + 1];
+        for (&column, block) in self.columns[range.clone()].iter().zip(&self.blocks[range]) {
+            multiply_add(sum, block, &vector[column as usize - first]);
+        }
+    }
+}
+
+#[inline(always)]
+fn multiply_add<T: Real, const B: usize, const K: usize>(
+    sum: &mut [[T; B]; K],
+    block: &[[T; B]; B],
+    vector: &[[T; B]; K],
+) {
+    for (sum, vector) in sum.iter_mut().zip(vector) {
+        for (column, &value) in block.iter().zip(vector) {
+            for (total, &entry) in sum.iter_mut().zip(column) {
+                *total += entry * value;
+            }
+        }
+    }
+}
+
+/// The sweeps of Gauss–Seidel through one matrix, its rows in the order of [`Pieces`]: first through all even pieces, then
+/// through all odd ones, or back.
+#[derive(Debug)]
+pub(super) struct GaussSeidel<T, const B: usize> {
+    pieces: Pieces,
+    even: Half<T, B>,
+    odd: Half<T, B>,
+}
+
+/// The rows of all even or all odd pieces.
+#[derive(Debug)]
+struct Half<T, const B: usize> {
+    /// Columns of the same half, before and after the diagonal.
+    lower: Rows<T, B>,
+    upper: Rows<T, B>,
+    /// Columns of the other half.
+    cross: Rows<T, B>,
+    inverse_diagonal: Vec<[[T; B]; B]>,
+}
+
+impl<T: Real, const B: usize> GaussSeidel<T, B> {
+    /// `None` where a diagonal block is missing, or not positive definite, or has no inverse in this precision.
+    pub(super) fn new(matrix: &SparseMatrix<B>, pieces: Pieces) -> Option<Self> {
+        let half = |odd: bool| {
+            let slots = if odd { pieces.even_rows..pieces.rows } else { 0..pieces.even_rows };
+            let (start, count) = (slots.start, slots.len());
+            let part = |wanted: fn(std::cmp::Ordering, bool) -> bool| {
+                Rows::new(count, |index, push| {
+                    let row = pieces.row(start + index);
+                    let (columns, blocks) = matrix.row(row);
+                    for (&column, block) in columns.iter().zip(blocks) {
+                        let (other, place) = pieces.place(column as usize);
+                        if wanted((column as usize).cmp(&row), other != odd) {
+                            #[expect(clippy::cast_possible_truncation, reason = "columns are 32-bit")]
+                            push(place as u32, block);
+                        }
+                    }
+                })
+            };
+            let inverse_diagonal = parallel::map_chunks(count, ROW_CHUNK, |range| {
+                let invert = |index: usize| {
+                    let row = pieces.row(start + index);
+                    let (columns, blocks) = matrix.row(row);
+                    let place = columns.binary_search_by_key(&row, |&column| column as usize).ok()?;
+                    let inverse = invert_positive(&blocks[place])?.map(|entries| entries.map(T::of));
+                    inverse.as_flattened().iter().all(|value| value.wide().is_finite()).then_some(inverse)
+                };
+                range.map(invert).collect::<Option<Vec<_>>>()
+            });
+            Some(Half {
+                lower: part(|order, across| order.is_lt() && !across),
+                upper: part(|order, across| order.is_gt() && !across),
+                cross: part(|_, across| across),
+                inverse_diagonal: inverse_diagonal.into_iter().collect::<Option<Vec<_>>>()?.concat(),
+            })
+        };
+        Some(Self { pieces, even: half(false)?, odd: half(true)? })
+    }
+
+    /// One sweep forwards from zero.
+    pub(super) fn forward<const K: usize>(&self, right_side: &[[[T; B]; K]], solution: &mut [[[T; B]; K]]) {
+        let size = self.pieces.piece_rows;
+        let (even_right, odd_right) = right_side.split_at(self.pieces.even_rows);
+        let (even, odd) = solution.split_at_mut(self.pieces.even_rows);
+        parallel::for_each_chunk(even, size, |chunk, part| {
+            self.even.forward(chunk * size, even_right, part, None);
+        });
+        parallel::for_each_chunk(odd, size, |chunk, part| {
+            self.odd.forward(chunk * size, odd_right, part, Some(even));
+        });
+    }
+
+    /// The residual after [`GaussSeidel::forward`].
+    pub(super) fn residual<const K: usize>(&self, solution: &[[[T; B]; K]], residual: &mut [[[T; B]; K]]) {
+        let (even, odd) = solution.split_at(self.pieces.even_rows);
+        let (even_residual, odd_residual) = residual.split_at_mut(self.pieces.even_rows);
+        for (half, own, other, residual) in
+            [(&self.even, even, Some(odd), even_residual), (&self.odd, odd, None, odd_residual)]
+        {
+            parallel::for_each_chunk(residual, ROW_CHUNK, |chunk, part| {
+                for (index, value) in part.iter_mut().enumerate() {
+                    let row = chunk * ROW_CHUNK + index;
+                    let mut sum = [[T::default(); B]; K];
+                    half.upper.add_product(row, own, 0, &mut sum);
+                    if let Some(other) = other {
+                        half.cross.add_product(row, other, 0, &mut sum);
+                    }
+                    *value = sum.map(|column| column.map(|value| -value));
+                }
+            });
+        }
+    }
+
+    /// One sweep backwards from what `solution` holds.
+    pub(super) fn backward<const K: usize>(&self, right_side: &[[[T; B]; K]], solution: &mut [[[T; B]; K]]) {
+        let size = self.pieces.piece_rows;
+        let (even_right, odd_right) = right_side.split_at(self.pieces.even_rows);
+        let (even, odd) = solution.split_at_mut(self.pieces.even_rows);
+        parallel::for_each_chunk(odd, size, |chunk, part| {
+            self.odd.backward(chunk * size, odd_right, part, even);
+        });
+        parallel::for_each_chunk(even, size, |chunk, part| {
+            self.even.backward(chunk * size, even_right, part, odd);
+        });
+    }
+}
+
+impl<T: Real, const B: usize> Half<T, B> {
+    #[inline]
+    fn forward<const K: usize>(
+        &self,
+        first: usize,
+        right_side: &[[[T; B]; K]],
+        part: &mut [[[T; B]; K]],
+        other: Option<&[[[T; B]; K]]>,
+    ) {
+        for index in 0..part.len() {
+            let row = first + index;
+            let mut sum = [[T::default(); B]; K];
+            if let Some(other) = other {
+                self.cross.add_product(row, other, 0, &mut sum);
+            }
+            self.lower.add_product(row, part, first, &mut sum);
+            part[index] = self.divide(row, &right_side[row], &sum);
+        }
+    }
+
+    #[inline]
+    fn backward<const K: usize>(
+        &self,
+        first: usize,
+        right_side: &[[[T; B]; K]],
+        part: &mut [[[T; B]; K]],
+        other: &[[[T; B]; K]],
+    ) {
+        for index in (0..part.len()).rev() {
+            let row = first + index;
+            let mut sum = [[T::default(); B]; K];
+            self.cross.add_product(row, other, 0, &mut sum);
+            self.lower.add_product(row, part, first, &mut sum);
+            self.upper.add_product(row, part, first, &mut sum);
+            part[index] = self.divide(row, &right_side[row], &sum);
+        }
+    }
+
+    /// `D⁻¹ (right - sum)`.
+    #[inline(always)]
+    fn divide<const K: usize>(&self, row: usize, right: &[[T; B]; K], sum: &[[T; B]; K]) -> [[T; B]; K] {
+        let mut result = [[T::default(); B]; K];
+        let rest = std::array::from_fn(|k| std::array::from_fn(|i| right[k][i] - sum[k][i]));
+        multiply_add(&mut result, &self.inverse_diagonal[row], &rest);
+        result
+    }
+}

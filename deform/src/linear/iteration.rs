@@ -1,0 +1,169 @@
+//! The iteration of conjugate gradients, for any preconditioner and several right sides at once.
+
+use super::{Convergence, LinearError, ROW_CHUNK, SparseMatrix, Tolerance};
+use crate::parallel;
+
+/// The vectors at one unknown: `K` right sides of `B` values each.
+pub(super) type Columns<const B: usize, const K: usize> = [[f64; B]; K];
+
+/// Vectors as one column.
+pub(super) fn single_column<const B: usize>(vector: &[[f64; B]]) -> &[Columns<B, 1>] {
+    vector.as_chunks().0
+}
+
+/// Vectors as one column.
+pub(super) fn single_column_mut<const B: usize>(vector: &mut [[f64; B]]) -> &mut [Columns<B, 1>] {
+    vector.as_chunks_mut().0
+}
+
+/// Conjugate gradients (Hestenes, Stiefel 1952) from what `solution` holds, for each column by itself. `precondition` sets its
+/// second argument to an approximate inverse times its first.
+///
+/// # Errors
+/// The first failure of any column. `solution` then holds the last iterate, which is finite unless the error is
+/// [`LinearError::NotFinite`].
+pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
+    matrix: &SparseMatrix<B>,
+    mut precondition: impl FnMut(&[Columns<B, K>], &mut [Columns<B, K>]),
+    right_side: &[Columns<B, K>],
+    solution: &mut [Columns<B, K>],
+    tolerances: [Tolerance; K],
+    max_iterations: usize,
+) -> Result<[Convergence; K], LinearError> {
+    let whole = dot(right_side, right_side).map(f64::sqrt);
+    if !whole.iter().all(|norm| norm.is_finite()) {
+        return Err(LinearError::NotFinite { iteration: 0 });
+    }
+    let target: [f64; K] =
+        std::array::from_fn(|column| (tolerances[column].relative * whole[column]).max(tolerances[column].absolute));
+    let relative = |column: usize, residual: f64| if whole[column] > 0.0 { residual / whole[column] } else { 0.0 };
+
+    let mut residual = right_side.to_vec();
+    let mut image = vec![[[0.0; B]; K]; residual.len()];
+    if solution.as_flattened().as_flattened().iter().any(|&value| value != 0.0) {
+        matrix.multiply_columns(solution, &mut image);
+        add_multiple(&mut residual, [-1.0; K], &image);
+    }
+    let mut reached = dot(&residual, &residual).map(f64::sqrt);
+    for column in 0..K {
+        if whole[column] <= target[column] && reached[column] > target[column] {
+            // Nothing to solve for: zero answers it, whatever the iteration was to start from.
+            solution.iter_mut().for_each(|value| value[column] = [0.0; B]);
+            residual.iter_mut().zip(right_side).for_each(|(value, right)| value[column] = right[column]);
+            reached[column] = whole[column];
+        }
+    }
+    if !reached.iter().all(|norm| norm.is_finite()) {
+        return Err(LinearError::NotFinite { iteration: 0 });
+    }
+    let mut result: [Convergence; K] =
+        std::array::from_fn(|column| Convergence { iterations: 0, residual: relative(column, reached[column]) });
+    let mut active: [bool; K] = std::array::from_fn(|column| reached[column] > target[column]);
+    if !active.contains(&true) {
+        return Ok(result);
+    }
+    let mut preconditioned = vec![[[0.0; B]; K]; residual.len()];
+    precondition(&residual, &mut preconditioned);
+    let mut direction = preconditioned.clone();
+    let mut energy = dot(&residual, &preconditioned);
+    for iteration in 1..=max_iterations {
+        matrix.multiply_columns(&direction, &mut image);
+        let curvature = dot(&direction, &image);
+        let mut step = [0.0; K];
+        for column in (0..K).filter(|&column| active[column]) {
+            let (curvature, energy) = (curvature[column], energy[column]);
+            if !(curvature.is_finite() && energy.is_finite()) {
+                return Err(LinearError::NotFinite { iteration });
+            }
+            if curvature <= 0.0 || energy <= 0.0 {
+                return Err(LinearError::Indefinite { iteration, curvature: curvature.min(energy) });
+            }
+            step[column] = energy / curvature;
+        }
+        let square = advance(solution, &mut residual, step, &direction, &image);
+        for column in 0..K {
+            if !active[column] {
+                continue;
+            }
+            let norm = square[column].sqrt();
+            reached[column] = norm;
+            result[column] = Convergence { iterations: iteration, residual: relative(column, norm) };
+            active[column] = norm > target[column] || norm.is_nan();
+        }
+        if !active.contains(&true) {
+            return Ok(result);
+        }
+        precondition(&residual, &mut preconditioned);
+        let before = std::mem::replace(&mut energy, dot(&residual, &preconditioned));
+        let factor: [f64; K] =
+            std::array::from_fn(|column| if active[column] { energy[column] / before[column] } else { 0.0 });
+        parallel::for_each_chunk(&mut direction, ROW_CHUNK, |chunk, part| {
+            for (value, new) in part.iter_mut().zip(&preconditioned[chunk * ROW_CHUNK..]) {
+                *value = std::array::from_fn(|column| {
+                    std::array::from_fn(|axis| new[column][axis] + factor[column] * value[column][axis])
+                });
+            }
+        });
+    }
+    let column = active.iter().position(|&active| active).unwrap_or(0);
+    Err(LinearError::NotConverged {
+        iterations: max_iterations,
+        residual: relative(column, reached[column]),
+        tolerance: relative(column, target[column]),
+    })
+}
+
+/// `solution += step direction`, `residual -= step image`; the squares of the new residual's norms.
+fn advance<const B: usize, const K: usize>(
+    solution: &mut [Columns<B, K>],
+    residual: &mut [Columns<B, K>],
+    step: [f64; K],
+    direction: &[Columns<B, K>],
+    image: &[Columns<B, K>],
+) -> [f64; K] {
+    add_multiple(solution, step, direction);
+    add_multiple(residual, step.map(|step| -step), image);
+    dot(residual, residual)
+}
+
+/// The inner product of each column, summed chunk by chunk.
+pub(super) fn dot<const B: usize, const K: usize>(a: &[Columns<B, K>], b: &[Columns<B, K>]) -> [f64; K] {
+    let parts = parallel::map_chunks(a.len(), ROW_CHUNK, |range| {
+        // Four sums side by side, so that one need not wait for another.
+        let mut sums = [[0.0; K]; 4];
+        let (a, b) = (a[range.clone()].chunks(4), b[range].chunks(4));
+        for (a, b) in a.zip(b) {
+            for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
+                for column in 0..K {
+                    for axis in 0..B {
+                        sum[column] += a[column][axis] * b[column][axis];
+                    }
+                }
+            }
+        }
+        std::array::from_fn(|column| (sums[0][column] + sums[1][column]) + (sums[2][column] + sums[3][column]))
+    });
+    parts.into_iter().fold([0.0; K], |total, part: [f64; K]| std::array::from_fn(|column| total[column] + part[column]))
+}
+
+fn add_multiple<const B: usize, const K: usize>(
+    target: &mut [Columns<B, K>],
+    factor: [f64; K],
+    vector: &[Columns<B, K>],
+) {
+    parallel::for_each_chunk(target, ROW_CHUNK, |chunk, part| {
+        for (value, change) in part.iter_mut().zip(&vector[chunk * ROW_CHUNK..]) {
+            for column in 0..K {
+                for axis in 0..B {
+                    value[column][axis] += factor[column] * change[column][axis];
+                }
+            }
+        }
+    });
+}
+
+/// The 2-norm.
+pub(crate) fn norm<const B: usize>(vector: &[[f64; B]]) -> f64 {
+    let [square] = dot(single_column(vector), single_column(vector));
+    square.sqrt()
+}

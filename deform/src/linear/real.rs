@@ -1,0 +1,45 @@
+//! The precisions that a preconditioner can be kept in.
+
+use std::ops::{AddAssign, Mul, Neg, Sub};
+
+/// `f32` or `f64`.
+pub(super) trait Real:
+    Copy
+    + Default
+    + Send
+    + Sync
+    + std::fmt::Debug
+    + AddAssign
+    + Mul<Output = Self>
+    + Sub<Output = Self>
+    + Neg<Output = Self>
+    + 'static
+{
+    fn of(value: f64) -> Self;
+    fn wide(self) -> f64;
+}
+
+impl Real for f32 {
+    #[inline(always)]
+    fn of(value: f64) -> Self {
+        #[expect(clippy::cast_possible_truncation, reason = "single precision is what is wanted")]
+        (value as Self)
+    }
+
+    #[inline(always)]
+    fn wide(self) -> f64 {
+        f64::from(self)
+    }
+}
+
+impl Real for f64 {
+    #[inline(always)]
+    fn of(value: f64) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn wide(self) -> f64 {
+        self
+    }
+}
