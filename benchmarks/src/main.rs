@@ -10,6 +10,7 @@ mod measure;
 mod overhead;
 mod report;
 mod surface_wasm;
+mod volume;
 
 use std::process::ExitCode;
 
@@ -33,6 +34,8 @@ enum Name {
     Overhead,
     /// The surface kernel in the viewer's WebAssembly module, in Node, beside the native one.
     SurfaceWasm,
+    /// Volume motion at the sizes of the paper's meshes, beside the paper and PETSc.
+    Volume,
 }
 
 fn main() -> ExitCode {
@@ -40,6 +43,7 @@ fn main() -> ExitCode {
     let result: Result<Report, Box<dyn std::error::Error>> = match arguments.name {
         Name::Overhead => overhead::run(),
         Name::SurfaceWasm => surface_wasm::run(),
+        Name::Volume => volume::run(),
     };
     match result {
         Ok(report) if arguments.json => println!("{}", report.json()),

@@ -114,7 +114,7 @@ impl Aggregates {
             }
             found
         });
-        collect(matrix.rows(), parts)
+        collect(matrix.rows(), ROW_CHUNK, &parts)
     }
 
     /// How many aggregates there are.
@@ -174,24 +174,22 @@ pub(super) fn galerkin<const B: usize>(
     prolongation: &SparseMatrix<B>,
     count: usize,
 ) -> SparseMatrix<B> {
-    let image = collect(
-        matrix.rows(),
-        parallel::map_chunks(matrix.rows(), ROW_CHUNK, |range| {
-            let mut row = Accumulator::new(count);
-            let mut found = RowsFound::default();
-            for index in range {
-                let (columns, blocks) = matrix.row(index);
-                for (&column, block) in columns.iter().zip(blocks) {
-                    let (aggregates, values) = prolongation.row(column as usize);
-                    for (&aggregate, value) in aggregates.iter().zip(values) {
-                        add_product(row.at(aggregate), block, value);
-                    }
+    let image = parallel::map_chunks(matrix.rows(), ROW_CHUNK, |range| {
+        let mut row = Accumulator::new(count);
+        let mut found = RowsFound::default();
+        for index in range {
+            let (columns, blocks) = matrix.row(index);
+            for (&column, block) in columns.iter().zip(blocks) {
+                let (aggregates, values) = prolongation.row(column as usize);
+                for (&aggregate, value) in aggregates.iter().zip(values) {
+                    add_product(row.at(aggregate), block, value);
                 }
-                row.finish(&mut found);
             }
-            found
-        }),
-    );
+            row.finish(&mut found);
+        }
+        found
+    });
+    let image = collect(matrix.rows(), ROW_CHUNK, &image);
     let (starts, entries) = transpose(prolongation, count);
     let parts = parallel::map_chunks(count, COARSE_CHUNK, |range| {
         let mut row = Accumulator::new(count);
@@ -208,7 +206,7 @@ pub(super) fn galerkin<const B: usize>(
         }
         found
     });
-    collect(count, parts)
+    collect(count, COARSE_CHUNK, &parts)
 }
 
 /// For each column of a matrix the rows that have a block there, and where in the matrix that is.
@@ -247,20 +245,22 @@ impl<const B: usize> Default for RowsFound<B> {
     }
 }
 
-fn collect<const B: usize>(rows: usize, parts: Vec<RowsFound<B>>) -> SparseMatrix<B> {
-    let total = parts.iter().map(|part| part.columns.len()).sum();
+/// One matrix of rows that were built `chunk` at a time.
+fn collect<const B: usize>(rows: usize, chunk: usize, parts: &[RowsFound<B>]) -> SparseMatrix<B> {
     let mut offsets = Vec::with_capacity(rows + 1);
-    let (mut columns, mut blocks) = (Vec::with_capacity(total), Vec::with_capacity(total));
     offsets.push(0);
     let mut end = 0;
-    for part in parts {
-        for length in part.lengths {
-            end += length;
-            offsets.push(end);
-        }
-        columns.extend_from_slice(&part.columns);
-        blocks.extend_from_slice(&part.blocks);
+    for length in parts.iter().flat_map(|part| &part.lengths) {
+        end += length;
+        offsets.push(end);
     }
+    let mut columns = vec![0; end];
+    let mut blocks = vec![[[0.0; B]; B]; end];
+    parallel::for_each_rows(chunk, (&offsets, &mut columns), (&offsets, &mut blocks), |rows, columns, blocks| {
+        let part = &parts[rows.start / chunk];
+        columns.copy_from_slice(&part.columns);
+        blocks.copy_from_slice(&part.blocks);
+    });
     SparseMatrix::from_parts(offsets, columns, blocks)
 }
 

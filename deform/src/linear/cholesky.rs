@@ -1,5 +1,7 @@
 //! Direct solves by a sparse Cholesky factorisation.
 
+use std::sync::Arc;
+
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::cholesky::{self, LltRef, SymbolicCholesky, SymmetricOrdering};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
@@ -18,7 +20,7 @@ const REFINEMENTS: usize = 50;
 /// tolerance is refined by conjugate gradients with the factor as preconditioner.
 #[derive(Debug)]
 pub struct Cholesky<const B: usize> {
-    matrix: SparseMatrix<B>,
+    matrix: Arc<SparseMatrix<B>>,
     factor: Factor<B>,
 }
 
@@ -27,7 +29,8 @@ impl<const B: usize> Cholesky<B> {
     ///
     /// # Errors
     /// [`LinearError::Factor`] where it is not positive definite to rounding, or its factor does not fit in memory.
-    pub fn new(matrix: SparseMatrix<B>) -> Result<Self, LinearError> {
+    pub fn new(matrix: impl Into<Arc<SparseMatrix<B>>>) -> Result<Self, LinearError> {
+        let matrix = matrix.into();
         let factor = Factor::new(&matrix).ok_or(LinearError::Factor)?;
         Ok(Self { matrix, factor })
     }
@@ -52,7 +55,7 @@ impl<const B: usize> LinearSolver<B> for Cholesky<B> {
         Ok(convergence)
     }
 
-    fn renewed(&self, matrix: SparseMatrix<B>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
+    fn renewed(&self, matrix: Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
         Ok(Box::new(Self::new(matrix)?))
     }
 }

@@ -81,7 +81,7 @@ impl<const B: usize> LinearSolver<B> for ConjugateGradients<B> {
         }
     }
 
-    fn renewed(&self, matrix: SparseMatrix<B>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
+    fn renewed(&self, matrix: Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
         Ok(Box::new(Self::new(matrix)?.with_max_iterations(self.max_iterations)))
     }
 }

@@ -2,6 +2,7 @@
 
 use super::matrix::invert_positive;
 use super::real::Real;
+use super::rows::Rows;
 use super::{ROW_CHUNK, SparseMatrix};
 use crate::parallel;
 
@@ -70,79 +71,6 @@ impl Pieces {
 
     pub(super) fn rows(&self) -> usize {
         self.rows
-    }
-}
-
-/// Blocks in compressed rows, each stored column after column.
-#[derive(Debug, Clone)]
-pub(super) struct Rows<T, const B: usize> {
-    offsets: Vec<usize>,
-    columns: Vec<u32>,
-    blocks: Vec<[[T; B]; B]>,
-}
-
-impl<T: Real, const B: usize> Rows<T, B> {
-    /// Rows from what `entries` calls its second argument with for each of them.
-    pub(super) fn new(count: usize, entries: impl Fn(usize, &mut dyn FnMut(u32, &[[f64; B]; B])) + Sync) -> Self {
-        let parts = parallel::map_chunks(count, ROW_CHUNK, |range| {
-            let (mut lengths, mut columns, mut blocks) = (Vec::with_capacity(range.len()), Vec::new(), Vec::new());
-            for row in range {
-                let before = columns.len();
-                entries(row, &mut |column, block| {
-                    columns.push(column);
-                    blocks.push(std::array::from_fn(|j| std::array::from_fn(|i| T::of(block[i][j]))));
-                });
-                lengths.push(columns.len() - before);
-            }
-            (lengths, columns, blocks)
-        });
-        let total = parts.iter().map(|(_, columns, _)| columns.len()).sum();
-        let mut rows = Self {
-            offsets: Vec::with_capacity(count + 1),
-            columns: Vec::with_capacity(total),
-            blocks: Vec::with_capacity(total),
-        };
-        rows.offsets.push(0);
-        let mut end = 0;
-        for (lengths, columns, blocks) in parts {
-            for length in lengths {
-                end += length;
-                rows.offsets.push(end);
-            }
-            rows.columns.extend_from_slice(&columns);
-            rows.blocks.extend_from_slice(&blocks);
-        }
-        rows
-    }
-
-    /// `sum += self[row] vector`; `first` is the column of the vector's first entry.
-    #[inline(always)]
-    pub(super) fn add_product<const K: usize>(
-        &self,
-        row: usize,
-        vector: &[[[T; B]; K]],
-        first: usize,
-        sum: &mut [[T; B]; K],
-    ) {
-        let range = self.offsets[row]..self.offsets[row + 1];
-        for (&column, block) in self.columns[range.clone()].iter().zip(&self.blocks[range]) {
-            multiply_add(sum, block, &vector[column as usize - first]);
-        }
-    }
-}
-
-#[inline(always)]
-fn multiply_add<T: Real, const B: usize, const K: usize>(
-    sum: &mut [[T; B]; K],
-    block: &[[T; B]; B],
-    vector: &[[T; B]; K],
-) {
-    for (sum, vector) in sum.iter_mut().zip(vector) {
-        for (column, &value) in block.iter().zip(vector) {
-            for (total, &entry) in sum.iter_mut().zip(column) {
-                *total += entry * value;
-            }
-        }
     }
 }
 
@@ -295,8 +223,15 @@ impl<T: Real, const B: usize> Half<T, B> {
     #[inline(always)]
     fn divide<const K: usize>(&self, row: usize, right: &[[T; B]; K], sum: &[[T; B]; K]) -> [[T; B]; K] {
         let mut result = [[T::default(); B]; K];
-        let rest = std::array::from_fn(|k| std::array::from_fn(|i| right[k][i] - sum[k][i]));
-        multiply_add(&mut result, &self.inverse_diagonal[row], &rest);
+        let inverse = &self.inverse_diagonal[row];
+        for column in 0..K {
+            for (j, inverse) in inverse.iter().enumerate() {
+                let rest = right[column][j] - sum[column][j];
+                for (total, &entry) in result[column].iter_mut().zip(inverse) {
+                    *total += entry * rest;
+                }
+            }
+        }
         result
     }
 }

@@ -4,8 +4,9 @@ use super::ROW_CHUNK;
 use super::SparseMatrix;
 use super::aggregation::{Aggregates, galerkin, transpose};
 use super::cholesky::Factor;
-use super::gauss_seidel::{GaussSeidel, Pieces, Rows};
+use super::gauss_seidel::{GaussSeidel, Pieces};
 use super::real::Real;
+use super::rows::Rows;
 use crate::parallel;
 
 /// Systems of at most this many equations are solved directly.

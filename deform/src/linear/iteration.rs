@@ -164,6 +164,11 @@ fn add_multiple<const B: usize, const K: usize>(
 
 /// The 2-norm.
 pub(crate) fn norm<const B: usize>(vector: &[[f64; B]]) -> f64 {
-    let [square] = dot(single_column(vector), single_column(vector));
-    square.sqrt()
+    let [norm] = norms(single_column(vector));
+    norm
+}
+
+/// The 2-norm of each column.
+pub(crate) fn norms<const B: usize, const K: usize>(vector: &[Columns<B, K>]) -> [f64; K] {
+    dot(vector, vector).map(f64::sqrt)
 }

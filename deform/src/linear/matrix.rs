@@ -36,7 +36,7 @@ impl<const B: usize> SparseMatrix<B> {
     }
 
     /// As [`SparseMatrix::zeros`], with values, of parts known to fit.
-    pub(super) fn from_parts(offsets: Vec<usize>, columns: Vec<u32>, values: Vec<Block<B>>) -> Self {
+    pub(crate) fn from_parts(offsets: Vec<usize>, columns: Vec<u32>, values: Vec<Block<B>>) -> Self {
         debug_assert!(offsets.last() == Some(&columns.len()) && columns.len() == values.len());
         Self { offsets, columns, values }
     }
@@ -93,7 +93,7 @@ impl<const B: usize> SparseMatrix<B> {
     }
 
     /// The same for `K` vectors side by side.
-    pub(super) fn multiply_columns<const K: usize>(&self, vector: &[[[f64; B]; K]], result: &mut [[[f64; B]; K]]) {
+    pub(crate) fn multiply_columns<const K: usize>(&self, vector: &[[[f64; B]; K]], result: &mut [[[f64; B]; K]]) {
         assert_eq!(result.len(), self.rows(), "one result for each row");
         parallel::for_each_chunk(result, ROW_CHUNK, |chunk, part| {
             for (index, value) in part.iter_mut().enumerate() {

@@ -5,6 +5,8 @@
 //! [`ConjugateGradients`] with a [`BlockPreconditioner`]. All of it is deterministic: sums are taken in chunks whose size does
 //! not depend on the number of threads.
 
+use std::sync::Arc;
+
 mod aggregation;
 mod cholesky;
 mod conjugate_gradients;
@@ -16,10 +18,13 @@ mod multigrid;
 mod ordering;
 mod preconditioner;
 mod real;
+mod rows;
+#[cfg(test)]
+mod tests;
 
 pub use cholesky::Cholesky;
 pub use conjugate_gradients::ConjugateGradients;
-pub(crate) use iteration::norm;
+pub(crate) use iteration::{norm, norms};
 pub use matrix::{Block, SparseMatrix};
 pub(crate) use matrix::{ROW_CHUNK, invert_positive};
 pub use multigrid::{Multigrid, MultigridSettings, Precision};
@@ -33,9 +38,9 @@ const DIRECT: usize = 1500;
 ///
 /// # Errors
 /// [`LinearError::Diagonal`].
-pub fn solver<const B: usize>(matrix: SparseMatrix<B>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
+pub fn solver<const B: usize>(matrix: Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
     if B * matrix.rows() <= DIRECT
-        && let Ok(direct) = Cholesky::new(matrix.clone())
+        && let Ok(direct) = Cholesky::new(Arc::clone(&matrix))
     {
         return Ok(Box::new(direct));
     }
@@ -120,7 +125,7 @@ pub trait LinearSolver<const B: usize>: std::fmt::Debug + Send + Sync {
     ///
     /// # Errors
     /// [`LinearError::Diagonal`], [`LinearError::Factor`].
-    fn renewed(&self, matrix: SparseMatrix<B>) -> Result<Box<dyn LinearSolver<B>>, LinearError>;
+    fn renewed(&self, matrix: Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError>;
 }
 
 /// Why a linear system was not solved.

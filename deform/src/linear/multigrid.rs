@@ -180,8 +180,8 @@ impl<const B: usize> LinearSolver<B> for Multigrid<B> {
         self.solve_columns(right_sides, solutions, tolerances)
     }
 
-    fn renewed(&self, matrix: SparseMatrix<B>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
+    fn renewed(&self, matrix: Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
         let like = self.matrix.has_pattern_of(&matrix).then_some(&self.levels);
-        Ok(Box::new(Self::set_up(Arc::new(matrix), self.settings, like)?))
+        Ok(Box::new(Self::set_up(matrix, self.settings, like)?))
     }
 }

@@ -11,22 +11,56 @@ use crate::vector::dot;
 /// How many cells are worked on at a time.
 const CELL_CHUNK: usize = 4096;
 
+/// How many rows are assembled at a time.
+const ASSEMBLY_CHUNK: usize = 8192;
+
 /// Which vertex is what: free ones are numbered first, then those of the boundary.
 const NONE: u32 = u32::MAX;
 
-/// A bilinear form: what it couples two shape functions with, by their gradients, per unit of volume.
+/// A bilinear form: what it couples two shape functions with, by their gradients. It is linear in the product of these, so
+/// that products are summed over the cells first.
 pub(super) trait Form<const B: usize>: Sync {
-    /// The block in the row of the one and the column of the other.
-    fn block(&self, row: Vector, column: Vector) -> Block<B>;
+    /// A sum of products of gradients.
+    type Sum: Copy + Default;
+
+    /// Adds the product of the gradient in the row, times the weight, with that in the column.
+    fn add(sum: &mut Self::Sum, row: Vector, column: Vector);
+
+    /// The block that a sum of products makes.
+    fn block(&self, sum: &Self::Sum) -> Block<B>;
 }
 
 /// `∫ grad u · grad v`.
 pub(super) struct Laplace;
 
 impl Form<1> for Laplace {
-    #[inline]
-    fn block(&self, row: Vector, column: Vector) -> Block<1> {
-        [[dot(row, column)]]
+    type Sum = f64;
+
+    #[inline(always)]
+    fn add(sum: &mut f64, row: Vector, column: Vector) {
+        *sum += dot(row, column);
+    }
+
+    #[inline(always)]
+    fn block(&self, sum: &f64) -> Block<1> {
+        [[*sum]]
+    }
+}
+
+/// `∫ grad u : grad v`, for the three components of a displacement together.
+pub(super) struct VectorLaplace;
+
+impl Form<3> for VectorLaplace {
+    type Sum = f64;
+
+    #[inline(always)]
+    fn add(sum: &mut f64, row: Vector, column: Vector) {
+        *sum += dot(row, column);
+    }
+
+    #[inline(always)]
+    fn block(&self, sum: &f64) -> Block<3> {
+        std::array::from_fn(|p| std::array::from_fn(|q| if p == q { *sum } else { 0.0 }))
     }
 }
 
@@ -46,12 +80,23 @@ impl Elastic {
 }
 
 impl Form<3> for Elastic {
-    #[inline]
-    fn block(&self, row: Vector, column: Vector) -> Block<3> {
-        let shared = self.mu * dot(row, column);
+    type Sum = [[f64; 3]; 3];
+
+    #[inline(always)]
+    fn add(sum: &mut Self::Sum, row: Vector, column: Vector) {
+        for (sum, row) in sum.iter_mut().zip(row) {
+            for (sum, column) in sum.iter_mut().zip(column) {
+                *sum += row * column;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn block(&self, sum: &Self::Sum) -> Block<3> {
+        let shared = self.mu * (sum[0][0] + sum[1][1] + sum[2][2]);
         std::array::from_fn(|p| {
             std::array::from_fn(|q| {
-                let value = self.lambda * row[p] * column[q] + self.mu * column[p] * row[q];
+                let value = self.lambda * sum[p][q] + self.mu * sum[q][p];
                 if p == q { value + shared } else { value }
             })
         })
@@ -59,6 +104,7 @@ impl Form<3> for Elastic {
 }
 
 /// The graph of a mesh's free vertices, in the order in which they are solved for.
+#[derive(Debug)]
 pub(super) struct Graph {
     /// The vertex of each unknown.
     pub(super) vertices: Vec<u32>,
@@ -71,6 +117,7 @@ pub(super) struct Graph {
 }
 
 /// The volume cells at each vertex.
+#[derive(Debug)]
 struct Incidence {
     offsets: Vec<usize>,
     cells: Vec<u32>,
@@ -163,55 +210,79 @@ impl Graph {
         Ok(Self { vertices, slots, incidence, matrix, coupling })
     }
 
+    /// The unknown of a vertex that is solved for.
+    pub(super) fn unknown(&self, vertex: u32) -> Option<usize> {
+        self.slots.get(vertex as usize).map(|&slot| slot as usize).filter(|&slot| slot < self.vertices.len())
+    }
+
+    /// Whether a vertex's displacement is prescribed.
+    pub(super) fn is_boundary(&self, vertex: u32) -> bool {
+        let slot = self.slots.get(vertex as usize).copied().unwrap_or(NONE);
+        slot != NONE && slot as usize >= self.vertices.len()
+    }
+
+    /// How many vertices the mesh has.
+    pub(super) fn vertex_count(&self) -> usize {
+        self.slots.len()
+    }
+
     /// The matrix of the free vertices, and that which couples them to the boundary. `stiffness` has a factor for each cell.
-    pub(super) fn assemble<const B: usize>(
+    pub(super) fn assemble<const B: usize, F: Form<B>>(
         &self,
         mesh: &Mesh,
         elements: &Elements<'_>,
-        form: &impl Form<B>,
+        form: &F,
         stiffness: &[f64],
     ) -> (SparseMatrix<B>, SparseMatrix<B>) {
         let mut matrix = SparseMatrix::<B>::zeros(self.matrix.0.clone(), self.matrix.1.clone());
         let mut coupling = SparseMatrix::<B>::zeros(self.coupling.0.clone(), self.coupling.1.clone());
         let (offsets, columns, values) = matrix.offsets_and_values_mut();
         let (outer_offsets, outer_columns, outer_values) = coupling.offsets_and_values_mut();
-        #[expect(clippy::cast_possible_truncation, reason = "no more than there are vertices")]
-        let free_count = self.vertices.len() as u32;
-        parallel::for_each_rows(ROW_CHUNK, (offsets, values), (outer_offsets, outer_values), |rows, inner, outer| {
-            let mut scratch = Scratch::default();
-            let (first, outer_first) = (offsets[rows.start], outer_offsets[rows.start]);
-            for row in rows {
-                let (start, end) = (offsets[row], offsets[row + 1]);
-                let (outer_start, outer_end) = (outer_offsets[row], outer_offsets[row + 1]);
-                let vertex = self.vertices[row];
-                for &cell in self.incidence.cells(vertex) {
-                    let cell = cell as usize;
-                    let vertices = mesh.cells().vertices(cell);
-                    let Some(own) = vertices.iter().position(|&other| other == vertex) else { continue };
-                    elements.for_each_point(cell, &mut scratch, |weight, gradients| {
-                        let weight = weight * stiffness[cell];
-                        let own: Vector = gradients[own].map(|value| value * weight);
-                        for (&other, &gradient) in vertices.iter().zip(gradients) {
-                            let slot = self.slots[other as usize];
-                            let target = if slot < free_count {
-                                let place = columns[start..end].partition_point(|&column| column < slot);
-                                &mut inner[start - first + place]
-                            } else {
-                                let slot = slot - free_count;
-                                let place =
-                                    outer_columns[outer_start..outer_end].partition_point(|&column| column < slot);
-                                &mut outer[outer_start - outer_first + place]
-                            };
-                            for (entries, values) in target.iter_mut().zip(form.block(own, gradient)) {
-                                for (entry, value) in entries.iter_mut().zip(values) {
-                                    *entry += value;
-                                }
+        let free_count = self.vertices.len();
+        parallel::for_each_rows(
+            ASSEMBLY_CHUNK,
+            (offsets, values),
+            (outer_offsets, outer_values),
+            |rows, inner, outer| {
+                let mut scratch = Scratch::default();
+                // Where in the present row the block of each vertex of the mesh lies.
+                let mut places = vec![0u32; self.slots.len()];
+                let mut sums: Vec<F::Sum> = Vec::new();
+                let (first, outer_first) = (offsets[rows.start], outer_offsets[rows.start]);
+                for row in rows {
+                    let inner_range = offsets[row]..offsets[row + 1];
+                    let outer_range = outer_offsets[row]..outer_offsets[row + 1];
+                    let inner_columns = columns[inner_range.clone()].iter().map(|&column| column as usize);
+                    let outer_columns =
+                        outer_columns[outer_range.clone()].iter().map(|&column| free_count + column as usize);
+                    for (place, slot) in (0..).zip(inner_columns.chain(outer_columns)) {
+                        places[slot] = place;
+                    }
+                    sums.clear();
+                    sums.resize(inner_range.len() + outer_range.len(), F::Sum::default());
+                    let vertex = self.vertices[row];
+                    for &cell in self.incidence.cells(vertex) {
+                        let cell = cell as usize;
+                        let vertices = mesh.cells().vertices(cell);
+                        let Some(own) = vertices.iter().position(|&other| other == vertex) else { continue };
+                        elements.for_each_point(cell, &mut scratch, |weight, gradients| {
+                            let weight = weight * stiffness[cell];
+                            let own: Vector = gradients[own].map(|value| value * weight);
+                            for (&other, &gradient) in vertices.iter().zip(gradients) {
+                                let place = places[self.slots[other as usize] as usize];
+                                F::add(&mut sums[place as usize], own, gradient);
                             }
-                        }
-                    });
+                        });
+                    }
+                    let (own, other) = sums.split_at(inner_range.len());
+                    let inner = &mut inner[inner_range.start - first..inner_range.end - first];
+                    let outer = &mut outer[outer_range.start - outer_first..outer_range.end - outer_first];
+                    for (block, sum) in inner.iter_mut().zip(own).chain(outer.iter_mut().zip(other)) {
+                        *block = form.block(sum);
+                    }
                 }
-            }
-        });
+            },
+        );
         (matrix, coupling)
     }
 }

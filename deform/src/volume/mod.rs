@@ -11,6 +11,7 @@ mod foldover;
 mod operator;
 mod rigid;
 mod settings;
+mod sliding;
 #[cfg(test)]
 mod tests;
 mod untangle;
@@ -18,6 +19,7 @@ mod untangle;
 pub use adaptive::{BoundaryMotion, FollowError, Route, Stalled, Waypoint, follow};
 pub use operator::{VolumeOperator, VolumeSolution};
 pub use settings::{Deform, Method};
+pub use sliding::Sliding;
 pub use untangle::Untangler;
 
 use crate::mesh::{CellType, Vector};
@@ -58,6 +60,9 @@ pub enum VolumeError {
         /// How many there are.
         cells: usize,
     },
+    /// A mesh with other cells than those of the operator.
+    #[error("the mesh does not have the cells that the volume operator was set up for")]
+    OtherCells,
     /// A boundary vertex that the mesh does not have.
     #[error("boundary vertex {vertex} does not exist; the mesh has {vertex_count} vertices, numbered from 0")]
     BoundaryVertex {
@@ -79,6 +84,22 @@ pub enum VolumeError {
         vertex: usize,
         /// How many there are.
         count: usize,
+    },
+    /// A direction across a sliding surface that is no direction.
+    #[error("the normal of sliding vertex {vertex} is {normal:?}; it must be finite and not zero")]
+    SlidingNormal {
+        /// The vertex.
+        vertex: u32,
+        /// Its normal.
+        normal: Vector,
+    },
+    /// Another number of displacements than there are sliding vertices.
+    #[error("{found} displacements given for {expected} sliding vertices")]
+    SlidingCount {
+        /// How many were given.
+        found: usize,
+        /// How many there are.
+        expected: usize,
     },
     /// Another number of displacements than there are boundary vertices.
     #[error("{found} boundary displacements given for {expected} boundary vertices")]

@@ -1,11 +1,15 @@
 //! The operator that carries boundary motion into a volume.
 
-use super::assembly::{Elastic, Graph, Laplace, stiffness};
+use std::sync::Arc;
+
+use super::assembly::{Elastic, Graph, Laplace, VectorLaplace, stiffness};
 use super::element::Elements;
 use super::rigid::RigidMotion;
+use super::sliding::{Constraint, Sliding, constrain, constraints};
 use super::{Deform, Method, VolumeError};
-use crate::linear::{Convergence, LinearError, LinearSolver, SparseMatrix, Tolerance};
-use crate::mesh::{Mesh, Vector};
+use crate::linear::{Convergence, LinearError, LinearSolver, SparseMatrix, Tolerance, solver};
+use crate::mesh::{Cells, Mesh, Vector};
+use crate::vector::{add, subtract};
 
 /// A residual this small against the right side is rounding.
 const ROUNDING: f64 = 1e-12;
@@ -40,20 +44,54 @@ const ROUNDING: f64 = 1e-12;
 /// ```
 #[derive(Debug)]
 pub struct VolumeOperator {
-    vertex_count: usize,
+    /// What depends on the cells alone.
+    graph: Arc<Graph>,
+    cells: Cells,
+    settings: Deform,
     boundary: Vec<u32>,
     boundary_points: Vec<Vector>,
-    /// The vertex of each unknown, and where it lies.
-    unknowns: Vec<u32>,
+    sliding: Vec<Sliding>,
+    constraints: Vec<Constraint>,
+    /// Where the vertex of each unknown lies.
     unknown_points: Vec<Vector>,
     equations: Equations,
-    tolerance: f64,
 }
 
 #[derive(Debug)]
 enum Equations {
-    Elastic { coupling: SparseMatrix<3>, solver: Box<dyn LinearSolver<3>> },
-    Harmonic { coupling: SparseMatrix<1>, solver: Box<dyn LinearSolver<1>> },
+    /// The three components together: elasticity, and whatever has sliding vertices.
+    Coupled(System<3>),
+    /// Each component by itself.
+    Separate(System<1>),
+}
+
+/// The equations of the free vertices.
+#[derive(Debug)]
+struct System<const B: usize> {
+    matrix: Arc<SparseMatrix<B>>,
+    /// What couples them to the boundary.
+    coupling: SparseMatrix<B>,
+    /// What couples them to the prescribed displacements of sliding vertices.
+    sliding: SparseMatrix<B>,
+    solver: Box<dyn LinearSolver<B>>,
+}
+
+impl<const B: usize> System<B> {
+    /// `slide` brings sliding vertices into the matrix; `like` is a system of the same graph.
+    fn new(
+        (matrix, coupling): (SparseMatrix<B>, SparseMatrix<B>),
+        slide: impl FnOnce(&mut SparseMatrix<B>) -> SparseMatrix<B>,
+        like: Option<&Self>,
+    ) -> Result<Self, LinearError> {
+        let mut matrix = matrix;
+        let sliding = slide(&mut matrix);
+        let matrix = Arc::new(matrix);
+        let solver = match like {
+            Some(like) => like.solver.renewed(Arc::clone(&matrix))?,
+            None => solver(Arc::clone(&matrix))?,
+        };
+        Ok(Self { matrix, coupling, sliding, solver })
+    }
 }
 
 /// The displacement of every vertex of a mesh.
@@ -72,39 +110,86 @@ impl VolumeOperator {
     /// vertices of the mesh's boundary, each once, in any order. Cells of lower dimension are passed over; in a mesh that has
     /// no others, there is nothing to solve for.
     ///
-    /// Memory: about 130 bytes for each pair of neighbouring vertices (elasticity) or 20 (harmonic).
+    /// Memory: about 150 bytes for each pair of neighbouring vertices (elasticity) or 30 (harmonic).
     ///
     /// # Errors
     /// [`VolumeError::Setting`], [`VolumeError::BoundaryVertex`], [`VolumeError::BoundaryTwice`]; [`VolumeError::InvertedCell`]
     /// for a flat or inverted reference cell; [`VolumeError::Unattached`] for cells that no boundary vertex holds.
     pub fn new(mesh: &Mesh, boundary: &[u32], settings: &Deform) -> Result<Self, VolumeError> {
+        Self::with_sliding(mesh, boundary, &[], settings)
+    }
+
+    /// The same where other vertices of the mesh's boundary slide, and those in neither list are free of force. With any that
+    /// slide, all components of a harmonic displacement are solved for together.
+    ///
+    /// Each connected part of the mesh must still have a vertex in `boundary`; enough of them, or of sliding ones, that it cannot
+    /// turn.
+    ///
+    /// # Errors
+    /// Also [`VolumeError::SlidingNormal`], and [`VolumeError::BoundaryTwice`] for a vertex of `boundary` that is said to slide.
+    pub fn with_sliding(
+        mesh: &Mesh,
+        boundary: &[u32],
+        sliding: &[Sliding],
+        settings: &Deform,
+    ) -> Result<Self, VolumeError> {
         settings.validate()?;
         if u32::try_from(mesh.cells().len()).is_err() {
             return Err(VolumeError::TooLarge { cells: mesh.cells().len() });
         }
         let elements = Elements::new(mesh);
         let stiffness = stiffness(mesh, &elements, settings.stiffening)?;
-        let graph = Graph::new(mesh, boundary)?;
-        let equations = match settings.method {
-            Method::Elasticity => {
-                let form = Elastic::new(settings.poisson_ratio);
-                let (matrix, coupling) = graph.assemble(mesh, &elements, &form, &stiffness);
-                Equations::Elastic { coupling, solver: crate::linear::solver(matrix)? }
+        let graph = Arc::new(Graph::new(mesh, boundary)?);
+        for &Sliding { vertex, .. } in sliding {
+            let vertex_count = mesh.points().len();
+            if vertex as usize >= vertex_count {
+                return Err(VolumeError::BoundaryVertex { vertex, vertex_count });
             }
-            Method::Harmonic => {
-                let (matrix, coupling) = graph.assemble(mesh, &elements, &Laplace, &stiffness);
-                Equations::Harmonic { coupling, solver: crate::linear::solver(matrix)? }
+            if graph.is_boundary(vertex) {
+                return Err(VolumeError::BoundaryTwice { vertex });
             }
-        };
+        }
+        let constraints = constraints(sliding, |vertex| graph.unknown(vertex))?;
+        let equations = equations(&graph, mesh, &elements, &stiffness, &constraints, settings, None)?;
         let places = |vertices: &[u32]| vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect();
         Ok(Self {
-            vertex_count: mesh.points().len(),
+            cells: mesh.cells().clone(),
+            settings: *settings,
             boundary_points: places(boundary),
             boundary: boundary.to_vec(),
+            sliding: sliding.to_vec(),
+            constraints,
             unknown_points: places(&graph.vertices),
-            unknowns: graph.vertices,
+            graph,
             equations,
-            tolerance: settings.tolerance,
+        })
+    }
+
+    /// The operator of the same cells with the vertices elsewhere: the stiffness is that of the cells as they lie now, and what
+    /// depends on the cells alone (the graph, its order, the aggregates of multigrid) is used again.
+    ///
+    /// # Errors
+    /// [`VolumeError::OtherCells`] where `mesh` does not have the cells that this operator was set up for;
+    /// [`VolumeError::InvertedCell`].
+    pub fn updated(&self, mesh: &Mesh) -> Result<Self, VolumeError> {
+        if *mesh.cells() != self.cells || mesh.points().len() != self.graph.vertex_count() {
+            return Err(VolumeError::OtherCells);
+        }
+        let elements = Elements::new(mesh);
+        let stiffness = stiffness(mesh, &elements, self.settings.stiffening)?;
+        let like = Some(&self.equations);
+        let equations = equations(&self.graph, mesh, &elements, &stiffness, &self.constraints, &self.settings, like)?;
+        let places = |vertices: &[u32]| vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect();
+        Ok(Self {
+            graph: Arc::clone(&self.graph),
+            cells: self.cells.clone(),
+            settings: self.settings,
+            boundary: self.boundary.clone(),
+            boundary_points: places(&self.boundary),
+            sliding: self.sliding.clone(),
+            constraints: self.constraints.clone(),
+            unknown_points: places(&self.graph.vertices),
+            equations,
         })
     }
 
@@ -117,7 +202,28 @@ impl VolumeOperator {
     /// How many vertices are solved for.
     #[must_use]
     pub fn unknowns(&self) -> usize {
-        self.unknowns.len()
+        self.graph.vertices.len()
+    }
+
+    /// Where the vertices that are solved for lie in the mesh of this operator, in the order of the equations.
+    #[must_use]
+    pub fn unknown_points(&self) -> &[Vector] {
+        &self.unknown_points
+    }
+
+    /// Where the three components are solved for together, as with [`Method::Elasticity`], the matrix and the right side of the equations that [`VolumeOperator::solve`] solves for
+    /// these displacements of the boundary, less the rigid motion nearest to them: to try other solvers on.
+    ///
+    /// # Panics
+    /// Where there is not one displacement for each of [`VolumeOperator::boundary`].
+    #[must_use]
+    pub fn coupled_equations(&self, boundary_displacement: &[Vector]) -> Option<(&SparseMatrix<3>, Vec<Vector>)> {
+        assert_eq!(boundary_displacement.len(), self.boundary.len(), "one displacement for each boundary vertex");
+        let Equations::Coupled(system) = &self.equations else { return None };
+        let (rigid, rest) = self.less_rigid(boundary_displacement);
+        let across = |constraint: &Constraint| constraint.across(rigid.at(self.unknown_points[constraint.row]));
+        let rest_sliding: Vec<Vector> = self.constraints.iter().map(across).collect();
+        Some((&system.matrix, self.coupled_right_side(system, &rest, &rest_sliding)))
     }
 
     /// The displacement of every vertex for these displacements of the boundary vertices, one for each of
@@ -127,13 +233,35 @@ impl VolumeOperator {
     /// [`VolumeError::BoundaryCount`]; [`VolumeError::NotFinite`] for a displacement that is NaN or infinite;
     /// [`VolumeError::Linear`] where the iteration fails, or a displacement is so large that arithmetic overflows.
     pub fn solve(&self, boundary_displacement: &[Vector]) -> Result<VolumeSolution, VolumeError> {
+        self.solve_sliding(boundary_displacement, &vec![[0.0; 3]; self.sliding.len()])
+    }
+
+    /// The same where sliding surfaces move: of each displacement in `sliding_displacement`, one for each of the sliding vertices
+    /// in the order in which they were given, the part across the surface is prescribed. A vertex that is listed several times
+    /// takes the displacement of its first place.
+    ///
+    /// # Errors
+    /// Also [`VolumeError::SlidingCount`].
+    pub fn solve_sliding(
+        &self,
+        boundary_displacement: &[Vector],
+        sliding_displacement: &[Vector],
+    ) -> Result<VolumeSolution, VolumeError> {
+        if sliding_displacement.len() != self.sliding.len() {
+            return Err(VolumeError::SlidingCount { found: sliding_displacement.len(), expected: self.sliding.len() });
+        }
+        for (sliding, &value) in self.sliding.iter().zip(sliding_displacement) {
+            if !value.iter().all(|component| component.is_finite()) {
+                return Err(VolumeError::NotFinite { vertex: sliding.vertex, value });
+            }
+        }
         if boundary_displacement.len() != self.boundary.len() {
             return Err(VolumeError::BoundaryCount {
                 found: boundary_displacement.len(),
                 expected: self.boundary.len(),
             });
         }
-        let mut displacement = vec![[0.0; 3]; self.vertex_count];
+        let mut displacement = vec![[0.0; 3]; self.graph.vertex_count()];
         for (&vertex, &value) in self.boundary.iter().zip(boundary_displacement) {
             if !value.iter().all(|component| component.is_finite()) {
                 return Err(VolumeError::NotFinite { vertex, value });
@@ -141,12 +269,10 @@ impl VolumeOperator {
             displacement[vertex as usize] = value;
         }
         let convergence = match &self.equations {
-            Equations::Elastic { coupling, solver } => {
-                self.solve_elastic(coupling, solver.as_ref(), boundary_displacement, &mut displacement)?
+            Equations::Coupled(system) => {
+                self.solve_coupled(system, boundary_displacement, sliding_displacement, &mut displacement)?
             }
-            Equations::Harmonic { coupling, solver } => {
-                self.solve_harmonic(coupling, solver.as_ref(), boundary_displacement, &mut displacement)?
-            }
+            Equations::Separate(system) => self.solve_separate(system, boundary_displacement, &mut displacement)?,
         };
         if !displacement.as_flattened().iter().all(|value| value.is_finite()) {
             return Err(LinearError::NotFinite { iteration: convergence.iterations }.into());
@@ -154,77 +280,161 @@ impl VolumeOperator {
         Ok(VolumeSolution { displacement, iterations: convergence.iterations, residual: convergence.residual })
     }
 
+    /// The rigid motion nearest to the boundary's, and that motion less the boundary's.
+    fn less_rigid(&self, boundary: &[Vector]) -> (RigidMotion, Vec<Vector>) {
+        let mut rigid = RigidMotion::nearest(&self.boundary_points, boundary);
+        if self.settings.method == Method::Harmonic {
+            // A rotation is no solution where the boundary is free.
+            rigid = rigid.translation();
+        }
+        let rest = self.boundary_points.iter().zip(boundary).map(|(&point, &value)| {
+            let motion = rigid.at(point);
+            std::array::from_fn(|axis| motion[axis] - value[axis])
+        });
+        (rigid, rest.collect())
+    }
+
     /// A rigid motion strains nothing, so the one nearest to the boundary's motion is taken off, and added again at the end.
-    fn solve_elastic(
+    fn solve_coupled(
         &self,
-        coupling: &SparseMatrix<3>,
-        solver: &dyn LinearSolver<3>,
+        system: &System<3>,
         boundary: &[Vector],
+        sliding: &[Vector],
         displacement: &mut [Vector],
     ) -> Result<Convergence, LinearError> {
-        if boundary.iter().all(|value| *value == [0.0; 3]) {
+        if boundary.iter().chain(sliding).all(|value| *value == [0.0; 3]) {
             return Ok(Convergence::default());
         }
-        let rigid = RigidMotion::nearest(&self.boundary_points, boundary);
-        let rest: Vec<Vector> = self
-            .boundary_points
-            .iter()
-            .zip(boundary)
-            .map(|(&point, &value)| {
-                let motion = rigid.at(point);
-                std::array::from_fn(|axis| motion[axis] - value[axis])
-            })
-            .collect();
-        let (solution, convergence) = self.solve_rest(coupling, solver, boundary, &rest)?;
-        for ((&vertex, &point), value) in self.unknowns.iter().zip(&self.unknown_points).zip(solution) {
+        let (rigid, rest) = self.less_rigid(boundary);
+        let across = |part: &dyn Fn(&Constraint) -> Vector| -> Vec<Vector> {
+            self.constraints.iter().map(|constraint| constraint.across(part(constraint))).collect()
+        };
+        let whole_sliding = across(&|constraint| sliding[constraint.first]);
+        let rest_sliding =
+            across(&|constraint| subtract(rigid.at(self.unknown_points[constraint.row]), sliding[constraint.first]));
+        let absolute = ROUNDING * crate::linear::norm(&self.coupled_right_side(system, boundary, &whole_sliding));
+        let right_side = self.coupled_right_side(system, &rest, &rest_sliding);
+        let tolerance = Tolerance { relative: self.settings.tolerance, absolute };
+        let mut solution = vec![[0.0; 3]; right_side.len()];
+        let convergence = system.solver.solve(&right_side, &mut solution, tolerance)?;
+        for (constraint, &rest) in self.constraints.iter().zip(&rest_sliding) {
+            solution[constraint.row] = subtract(constraint.along(solution[constraint.row]), rest);
+        }
+        for ((&vertex, &point), value) in self.graph.vertices.iter().zip(&self.unknown_points).zip(solution) {
             let motion = rigid.at(point);
             displacement[vertex as usize] = std::array::from_fn(|axis| motion[axis] + value[axis]);
         }
         Ok(convergence)
     }
 
-    /// One solve for each component that moves, its mean taken off first.
-    fn solve_harmonic(
+    /// The right side for the boundary motion `-rest`, the prescribed motion of sliding vertices being `-rest_sliding`.
+    fn coupled_right_side(&self, system: &System<3>, rest: &[Vector], rest_sliding: &[Vector]) -> Vec<Vector> {
+        let mut right_side = vec![[0.0; 3]; self.graph.vertices.len()];
+        system.coupling.multiply(rest, &mut right_side);
+        if !self.constraints.is_empty() {
+            let mut other = vec![[0.0; 3]; right_side.len()];
+            system.sliding.multiply(rest_sliding, &mut other);
+            for (value, other) in right_side.iter_mut().zip(other) {
+                *value = add(*value, other);
+            }
+            for constraint in &self.constraints {
+                right_side[constraint.row] = constraint.along(right_side[constraint.row]);
+            }
+        }
+        right_side
+    }
+
+    /// A solve for each component that moves, its mean taken off first; all three at once where more than one does.
+    fn solve_separate(
         &self,
-        coupling: &SparseMatrix<1>,
-        solver: &dyn LinearSolver<1>,
+        system: &System<1>,
         boundary: &[Vector],
         displacement: &mut [Vector],
     ) -> Result<Convergence, LinearError> {
-        let mut worst = Convergence::default();
-        for axis in 0..3 {
-            if boundary.iter().all(|value| value[axis] == 0.0) {
-                continue;
-            }
+        let moving: [bool; 3] = std::array::from_fn(|axis| boundary.iter().any(|value| value[axis] != 0.0));
+        #[expect(clippy::cast_precision_loss, reason = "fewer vertices than 2^53")]
+        let mean: Vector = std::array::from_fn(|axis| {
+            boundary.iter().map(|value| value[axis]).sum::<f64>() / boundary.len().max(1) as f64
+        });
+        if let [axis] = (0..3).filter(|&axis| moving[axis]).collect::<Vec<_>>()[..] {
             let values: Vec<[f64; 1]> = boundary.iter().map(|value| [value[axis]]).collect();
-            #[expect(clippy::cast_precision_loss, reason = "fewer vertices than 2^53")]
-            let mean = values.as_flattened().iter().sum::<f64>() / values.len() as f64;
-            let rest: Vec<[f64; 1]> = values.iter().map(|[value]| [mean - value]).collect();
-            let (solution, convergence) = self.solve_rest(coupling, solver, &values, &rest)?;
-            for (&vertex, [value]) in self.unknowns.iter().zip(solution) {
-                displacement[vertex as usize][axis] = mean + value;
+            let rest: Vec<[f64; 1]> = values.iter().map(|[value]| [mean[axis] - value]).collect();
+            let (solution, convergence) = self.solve_rest(system, &values, &rest)?;
+            for (&vertex, [value]) in self.graph.vertices.iter().zip(solution) {
+                displacement[vertex as usize][axis] = mean[axis] + value;
             }
-            worst.iterations = worst.iterations.max(convergence.iterations);
-            worst.residual = worst.residual.max(convergence.residual);
+            return Ok(convergence);
         }
-        Ok(worst)
+        if !moving.contains(&true) {
+            return Ok(Convergence::default());
+        }
+        let columns = |values: Vec<Vector>| values.into_iter().map(|value| value.map(|entry| [entry])).collect();
+        let values: Vec<[[f64; 1]; 3]> = columns(boundary.to_vec());
+        let rest = boundary.iter().map(|value| std::array::from_fn(|axis| mean[axis] - value[axis])).collect();
+        let rest: Vec<[[f64; 1]; 3]> = columns(rest);
+        let mut right_side = vec![[[0.0]; 3]; self.graph.vertices.len()];
+        system.coupling.multiply_columns(&values, &mut right_side);
+        let absolute = crate::linear::norms(&right_side).map(|norm| ROUNDING * norm);
+        system.coupling.multiply_columns(&rest, &mut right_side);
+        let tolerances = absolute.map(|absolute| Tolerance { relative: self.settings.tolerance, absolute });
+        let mut solution = vec![[[0.0]; 3]; right_side.len()];
+        let convergence = system.solver.solve_three_from(&right_side, &mut solution, tolerances)?;
+        for (&vertex, value) in self.graph.vertices.iter().zip(solution) {
+            for axis in (0..3).filter(|&axis| moving[axis]) {
+                displacement[vertex as usize][axis] = mean[axis] + value[axis][0];
+            }
+        }
+        Ok(convergence.into_iter().fold(Convergence::default(), |worst, column| Convergence {
+            iterations: worst.iterations.max(column.iterations),
+            residual: worst.residual.max(column.residual),
+        }))
     }
 
     /// Solves for the boundary motion `-rest`, what is left of `boundary`: to the tolerance, or to rounding against the whole.
     fn solve_rest<const B: usize>(
         &self,
-        coupling: &SparseMatrix<B>,
-        solver: &dyn LinearSolver<B>,
+        system: &System<B>,
         boundary: &[[f64; B]],
         rest: &[[f64; B]],
     ) -> Result<(Vec<[f64; B]>, Convergence), LinearError> {
-        let mut right_side = vec![[0.0; B]; self.unknowns.len()];
-        coupling.multiply(boundary, &mut right_side);
+        let mut right_side = vec![[0.0; B]; self.graph.vertices.len()];
+        system.coupling.multiply(boundary, &mut right_side);
         let absolute = ROUNDING * crate::linear::norm(&right_side);
-        coupling.multiply(rest, &mut right_side);
-        let mut solution = vec![[0.0; B]; self.unknowns.len()];
-        let tolerance = Tolerance { relative: self.tolerance, absolute };
-        let convergence = solver.solve(&right_side, &mut solution, tolerance)?;
+        system.coupling.multiply(rest, &mut right_side);
+        let mut solution = vec![[0.0; B]; right_side.len()];
+        let tolerance = Tolerance { relative: self.settings.tolerance, absolute };
+        let convergence = system.solver.solve(&right_side, &mut solution, tolerance)?;
         Ok((solution, convergence))
+    }
+}
+
+/// Assembles the equations and sets up their solver. `like` are those of the same graph.
+fn equations(
+    graph: &Graph,
+    mesh: &Mesh,
+    elements: &Elements<'_>,
+    stiffness: &[f64],
+    constraints: &[Constraint],
+    settings: &Deform,
+    like: Option<&Equations>,
+) -> Result<Equations, LinearError> {
+    let coupled = |system| {
+        let like = like.and_then(|like| if let Equations::Coupled(like) = like { Some(like) } else { None });
+        System::new(system, |matrix| constrain(matrix, constraints), like).map(Equations::Coupled)
+    };
+    match settings.method {
+        Method::Elasticity => {
+            let form = Elastic::new(settings.poisson_ratio);
+            coupled(graph.assemble(mesh, elements, &form, stiffness))
+        }
+        Method::Harmonic if !constraints.is_empty() => {
+            coupled(graph.assemble(mesh, elements, &VectorLaplace, stiffness))
+        }
+        Method::Harmonic => {
+            let like = like.and_then(|like| if let Equations::Separate(like) = like { Some(like) } else { None });
+            let system = graph.assemble(mesh, elements, &Laplace, stiffness);
+            let none = |matrix: &mut SparseMatrix<1>| SparseMatrix::zeros(vec![0; matrix.rows() + 1], Vec::new());
+            System::new(system, none, like).map(Equations::Separate)
+        }
     }
 }

@@ -34,6 +34,11 @@ impl RigidMotion {
         Self { centre, translation, rotation }
     }
 
+    /// The same without its rotation.
+    pub(super) fn translation(self) -> Self {
+        Self { rotation: [0.0; 3], ..self }
+    }
+
     pub(super) fn at(&self, point: Vector) -> Vector {
         if self.rotation == [0.0; 3] {
             return self.translation;

@@ -264,6 +264,113 @@ fn a_surface_as_the_whole_domain_has_nothing_to_solve_for() {
     assert_eq!(operator.solve(&motion).unwrap().displacement, motion);
 }
 
+/// The faces of the unit cube that `slides` names by axis and side, as sliding vertices; all its other boundary vertices.
+fn split_boundary(mesh: &Mesh, slides: &[(usize, f64)]) -> (Vec<u32>, Vec<Sliding>) {
+    let mut boundary = Vec::new();
+    let mut sliding = Vec::new();
+    for vertex in cube_boundary(mesh) {
+        let point = mesh.points()[vertex as usize];
+        let held = (0..3).any(|axis| [0.0, 1.0].iter().any(|&side| point[axis] == side && !slides.contains(&(axis, side))));
+        if held {
+            boundary.push(vertex);
+            continue;
+        }
+        for &(axis, side) in slides.iter().filter(|(axis, side)| point[*axis] == *side) {
+            let mut normal = [0.0; 3];
+            normal[axis] = 2.0 * side - 1.0;
+            sliding.push(Sliding { vertex, normal });
+        }
+    }
+    (boundary, sliding)
+}
+
+/// A bar that is pulled while its sides slide stretches evenly, and narrows nowhere.
+#[test]
+fn sliding_sides_follow_a_stretch() {
+    let sides = [(1, 0.0), (1, 1.0), (2, 0.0), (2, 1.0)];
+    for (name, mesh) in all_meshes() {
+        for method in [Method::Elasticity, Method::Harmonic] {
+            let (boundary, sliding) = split_boundary(&mesh, &sides);
+            let settings = Deform { method, tolerance: 1e-12, ..Deform::default() };
+            let operator = VolumeOperator::with_sliding(&mesh, &boundary, &sliding, &settings).unwrap();
+            let stretch = |point: Vector| [0.3 * point[0], 0.0, 0.0];
+            let motion: Vec<Vector> = boundary.iter().map(|&v| stretch(mesh.points()[v as usize])).collect();
+            let solution = operator.solve(&motion).unwrap();
+            for (value, &point) in solution.displacement.iter().zip(mesh.points()) {
+                let exact = stretch(point);
+                assert!((0..3).all(|axis| (value[axis] - exact[axis]).abs() < 1e-9), "{name}, {method:?}: {value:?}");
+            }
+            for sliding in &sliding {
+                let value = solution.displacement[sliding.vertex as usize];
+                assert!(crate::vector::dot(value, sliding.normal).abs() < 1e-14, "{name}, {method:?}: {value:?}");
+            }
+        }
+    }
+}
+
+/// Sides that move are followed across, and every rigid motion of all of them is reproduced.
+#[test]
+fn sliding_sides_may_move() {
+    let (mesh, sides) = (jiggled(&cube(6), 0.02), [(1, 0.0), (2, 1.0)]);
+    let (boundary, sliding) = split_boundary(&mesh, &sides);
+    let operator = VolumeOperator::with_sliding(&mesh, &boundary, &sliding, &Deform::default()).unwrap();
+    let turn = |[x, y, z]: Vector| [0.2 * y - 0.1 * z, -0.2 * x + 0.4 * z + 1.0, 0.1 * x - 0.4 * y];
+    let at = |vertex: u32| turn(mesh.points()[vertex as usize]);
+    let motion: Vec<Vector> = boundary.iter().map(|&vertex| at(vertex)).collect();
+    let sides: Vec<Vector> = sliding.iter().map(|sliding| at(sliding.vertex)).collect();
+    let solution = operator.solve_sliding(&motion, &sides).unwrap();
+    for (value, &point) in solution.displacement.iter().zip(mesh.points()) {
+        let exact = turn(point);
+        assert!((0..3).all(|axis| (value[axis] - exact[axis]).abs() < 1e-9), "{value:?} {exact:?}");
+    }
+    assert_eq!(operator.solve_sliding(&motion, &[]), Err(VolumeError::SlidingCount { found: 0, expected: sliding.len() }));
+    let zero = [Sliding { vertex: sliding[0].vertex, normal: [0.0; 3] }];
+    let error = VolumeOperator::with_sliding(&mesh, &boundary, &zero, &Deform::default()).unwrap_err();
+    assert!(matches!(error, VolumeError::SlidingNormal { .. }), "{error}");
+    let held = [Sliding { vertex: boundary[0], normal: [1.0; 3] }];
+    let error = VolumeOperator::with_sliding(&mesh, &boundary, &held, &Deform::default()).unwrap_err();
+    assert_eq!(error, VolumeError::BoundaryTwice { vertex: boundary[0] });
+}
+
+#[test]
+fn an_updated_operator_is_that_of_the_moved_mesh() {
+    let mesh = jiggled(&cube(10), 0.01);
+    let boundary = cube_boundary(&mesh);
+    let motion: Vec<Vector> = boundary.iter().map(|&vertex| [noise(vertex as usize), 0.0, 0.3]).collect();
+    for method in [Method::Elasticity, Method::Harmonic] {
+        let settings = Deform { method, tolerance: 1e-11, ..Deform::default() };
+        let operator = VolumeOperator::new(&mesh, &boundary, &settings).unwrap();
+        // Where nothing moved it is the same to the bit.
+        assert_eq!(operator.updated(&mesh).unwrap().solve(&motion), operator.solve(&motion));
+        let moved = jiggled(&mesh, 0.015);
+        let fresh = VolumeOperator::new(&moved, &boundary, &settings).unwrap().solve(&motion).unwrap();
+        let updated = operator.updated(&moved).unwrap().solve(&motion).unwrap();
+        for (a, b) in fresh.displacement.iter().zip(&updated.displacement) {
+            assert!((0..3).all(|axis| (a[axis] - b[axis]).abs() < 1e-8), "{a:?} {b:?}");
+        }
+        assert_eq!(operator.updated(&cube(9)).unwrap_err(), VolumeError::OtherCells);
+    }
+}
+
+/// Cells whose volumes differ by a factor of more than 10⁹.
+#[test]
+fn a_nearly_degenerate_mesh_is_solved() {
+    let mesh = cube(12);
+    let squeeze = |z: f64| if z > 0.0 && z < 1.0 { z.powi(8) } else { z };
+    let points: Vec<Vector> = mesh.points().iter().map(|&[x, y, z]| [x, y, squeeze(z)]).collect();
+    let mesh = mesh.with_points(points).unwrap();
+    let volumes = crate::quality::scaled_jacobians(mesh.cells(), mesh.points());
+    assert!(volumes.iter().all(|&value| value > 0.0));
+    let ratio = (1.0 - (11.0f64 / 12.0).powi(8)) / (1.0f64 / 12.0).powi(8);
+    assert!(ratio > 1e8, "{ratio:e}");
+    for method in [Method::Elasticity, Method::Harmonic] {
+        let settings = Deform { method, tolerance: 1e-10, ..Deform::default() };
+        let field = |[x, y, z]: Vector| [0.3 * x - 0.2 * y, 0.5 * y + 0.4 * z, 0.2 * x - 0.7 * z];
+        let error = error_of(&mesh, &settings, field);
+        assert!(error < 1e-6, "{method:?}: off by {error:e}");
+    }
+}
+
 #[cfg(feature = "parallel")]
 #[test]
 fn the_same_bits_whatever_the_number_of_threads() {
