@@ -126,7 +126,7 @@ fn elasticity(mesh: &Mesh, boundary: &[u32], motion: &[Vector]) -> Result<Elasti
         let (matrix, _) = operator.coupled_equations(motion).ok_or("the operator is not elastic")?;
         let matrix = std::sync::Arc::new(matrix.clone());
         let start = Instant::now();
-        Multigrid::new(matrix, MultigridSettings::default())?;
+        Multigrid::<3>::new(matrix, MultigridSettings::default())?;
         set_up.push(start.elapsed().as_secs_f64());
         kept = Some(operator);
     }
@@ -134,7 +134,7 @@ fn elasticity(mesh: &Mesh, boundary: &[u32], motion: &[Vector]) -> Result<Elasti
     let (matrix, right_side) = operator.coupled_equations(motion).ok_or("the operator is not elastic")?;
     let mut solution = vec![[0.0; 3]; right_side.len()];
     let tolerance = Tolerance { relative: TOLERANCE, absolute: 0.0 };
-    Multigrid::new(matrix.clone(), MultigridSettings::default())?.solve(&right_side, &mut solution, tolerance)?;
+    Multigrid::<3>::new(matrix.clone(), MultigridSettings::default())?.solve(&right_side, &mut solution, tolerance)?;
     let set_up = middle(&mut set_up);
     Ok(Elasticity {
         assembly: middle(&mut whole) - set_up,
@@ -267,13 +267,13 @@ fn petsc(system: &Path, solver: &str) -> Result<Peer, Box<dyn Error>> {
         .output()
         .map_err(|error| format!("mpirun: {error}; `scripts/setup --benchmarks` installs it"))?;
     let text = String::from_utf8_lossy(&output.stdout);
-    let line = text.lines().find_map(|line| line.strip_prefix("tombolo "));
-    let Some([set_up, solve, iterations]) = line.map(|line| line.split(' ').collect::<Vec<_>>()).as_deref() else {
+    let line = text.lines().find_map(|line| line.strip_prefix("tombolo ")).unwrap_or_default();
+    let [set_up, solve, iterations] = line.split(' ').collect::<Vec<_>>()[..] else {
         let message = String::from_utf8_lossy(&output.stderr);
         return Err(format!("PETSc failed; `scripts/setup --benchmarks` installs it: {text}{message}").into());
     };
     let bytes = std::fs::read(system.with_extension(solver))?;
-    let values = bytes.get(8..).ok_or("PETSc wrote no solution")?.as_chunks().0;
+    let values = bytes.get(8..).ok_or("PETSc wrote no solution")?.as_chunks::<8>().0;
     let solution = values.iter().map(|&bytes| f64::from_be_bytes(bytes)).collect();
     Ok(Peer { set_up: set_up.parse()?, solve: solve.parse()?, iterations: iterations.parse()?, solution })
 }
