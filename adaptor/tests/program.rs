@@ -91,6 +91,54 @@ fn edit_moves_the_mesh_as_asked() {
 }
 
 #[test]
+fn features_are_listed_written_and_named_by_edits() {
+    let (directory, mesh) =
+        with_box(r#"[{"translate": {"features": ["feature-2"], "fixed": ["feature-1"], "by": [0, 0, 0.25]}}]"#);
+    let at = |more: &[&str]| tombolo(directory.path(), &[&["features", "--mesh", "box.vtu"], more].concat());
+    let own = json(&at(&["--json"]));
+    assert_eq!((&own["source"], &own["features"][0]["name"]), (&"mesh".into(), &"x-min".into()));
+    let found = json(&at(&["--angle", "45", "--out", "parts.vtp", "--faces", "feature-3", "--json"]));
+    assert_eq!((&found["source"], found["features"].as_array().unwrap().len()), (&"sharp edges".into(), 6));
+    for feature in found["features"].as_array().unwrap() {
+        assert_eq!((&feature["faces"], &feature["vertices"]), (&32.into(), &25.into()));
+        assert!((feature["area"].as_f64().unwrap() - 1.0).abs() < 1e-12);
+    }
+    assert_eq!(found["faces"].as_array().unwrap().len(), 32);
+    // Our own reader takes the file back with the same features.
+    let parts =
+        json(&tombolo(directory.path(), &["features", "--mesh", "parts.vtp", "--faces", "feature-3", "--json"]));
+    assert_eq!(
+        (&parts["source"], &parts["features"], &parts["faces"]),
+        (&"mesh".into(), &found["features"], &found["faces"])
+    );
+
+    let output = tombolo(directory.path(), &[&EDIT[..], &["--angle", "45"]].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", error_text(&output));
+    let shaped = read_mesh(directory.path().join("out.vtu")).unwrap().mesh;
+    assert_eq!(shaped.features(), mesh.features(), "the file keeps its own features");
+    let named = at(&["--angle", "200"]);
+    assert!(named.status.code() == Some(1) && error_text(&named).contains("from 0 to 180"), "{}", error_text(&named));
+    let none = at(&["--faces", "x-mon"]);
+    assert!(error_text(&none).contains("did you mean 'x-min'"), "{}", error_text(&none));
+}
+
+#[test]
+fn edit_tells_what_is_wrong_with_the_surface() {
+    let (directory, _) =
+        with_box(r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -1.5]}}]"#);
+    let output = tombolo(directory.path(), &EDIT);
+    assert_eq!(output.status.code(), Some(2));
+    let outcome = json(&output);
+    assert!(outcome["reason"].as_str().unwrap().contains("the surface itself would be broken"), "{outcome}");
+    let broken = &outcome["surface"];
+    assert!(broken["report"]["intersections"]["count"].as_u64() > Some(0), "{outcome}");
+    assert_eq!(broken["report"]["intersections"]["first"][0]["place"].as_array().unwrap().len(), 3);
+    // The walls fold in their own planes where the profile's slope, 1.5 of the mean, takes more than all of the height.
+    let fraction = broken["sound_fraction"].as_f64().unwrap();
+    assert!((0.3..0.7).contains(&fraction), "{fraction}");
+}
+
+#[test]
 fn edit_refuses_with_the_reason_and_writes_nothing() {
     let good = r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -1.5]}}]"#;
     for (edits, more, code, named) in [

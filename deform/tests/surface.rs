@@ -2,6 +2,8 @@
 
 #[path = "surface/actions.rs"]
 mod actions;
+#[path = "surface/checks.rs"]
+mod checks;
 #[path = "surface/editing.rs"]
 mod editing;
 #[path = "surface/extraction.rs"]

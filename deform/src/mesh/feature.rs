@@ -19,7 +19,8 @@ pub enum FeatureSource {
 /// among them make a feature of their own, named `untagged`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TaggedFaces {
-    /// The faces: cells of dimension 2 by the vertex numbers of the mesh.
+    /// The faces: cells of dimension 2 by the vertex numbers of the mesh. A boundary face of four vertices or more may also be
+    /// tagged by the triangles that make it up.
     pub faces: Cells,
     /// The number of each face's feature, one for each of `faces`.
     pub tags: Vec<i64>,

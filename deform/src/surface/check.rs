@@ -17,7 +17,7 @@ const NAMED: usize = 16;
 const CHUNK: usize = 256;
 
 /// After how many intersections such a part is left.
-const ENOUGH: usize = 1000;
+const ENOUGH: usize = 10_000;
 
 /// A triangle is degenerate where its height is this part of its longest side or less, or its longest side this part of what it
 /// was: beyond that the direction of its normal is rounding.
@@ -64,7 +64,7 @@ pub struct FlawedFace {
 pub struct Intersections {
     /// How many pairs of triangles intersect (faces with more than three vertices are split into triangles).
     pub count: usize,
-    /// Whether there are more: the count ends early where a small part of the surface has a thousand.
+    /// Whether there are more: the count ends early where a small part of the surface has ten thousand.
     pub more: bool,
     /// Those with the lowest numbers among those counted, at most 16.
     pub first: Vec<Intersection>,

@@ -1,8 +1,9 @@
 //! The surface of a mesh.
 
+use super::bounds::Bounds;
 use super::faces::{self, FaceBuffer};
-use super::features::{FeatureSettings, Features};
-use crate::mesh::{CellType, Cells, Mesh, MeshError, Vector, check_finite};
+use super::features::{FeatureSettings, FeatureSize, Features};
+use crate::mesh::{CellType, Cells, FeatureSource, Mesh, MeshError, Vector, check_finite};
 use crate::vector::{cross, dot, subtract};
 
 /// The surface of a mesh: its boundary faces, their vertices and their features.
@@ -172,6 +173,57 @@ impl Surface {
     /// The same surface, with the same features and triangles, at other places.
     pub(super) fn with_points(&self, points: Vec<Vector>) -> Self {
         Self { points, ..self.clone() }
+    }
+
+    /// The same surface with the features that its sharp edges make, whatever the mesh says.
+    ///
+    /// # Errors
+    /// [`SurfaceError::SharpAngle`].
+    ///
+    /// ```
+    /// use tombolo_deform::{shapes, surface::{FeatureSettings, Surface}};
+    ///
+    /// let mesh = shapes::box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+    /// let tagged = Surface::extract(&mesh, &FeatureSettings::default())?;
+    /// assert_eq!(tagged.features().names()[0], "x-min");
+    /// let sharp = tagged.with_sharp_features(&FeatureSettings { sharp_angle_degrees: 45.0 })?;
+    /// assert_eq!(sharp.features().names(), ["feature-1", "feature-2", "feature-3", "feature-4", "feature-5", "feature-6"]);
+    /// # Ok::<(), tombolo_deform::surface::SurfaceError>(())
+    /// ```
+    pub fn with_sharp_features(mut self, settings: &FeatureSettings) -> Result<Self, SurfaceError> {
+        settings.validate()?;
+        self.features = Features::find(&FeatureSource::SharpEdges, &self.faces, &self.points, &self.faces, settings);
+        Ok(self)
+    }
+
+    /// The size of each feature, in the order of [`Features::names`].
+    ///
+    /// ```
+    /// use tombolo_deform::{shapes, surface::{FeatureSettings, Surface}};
+    ///
+    /// let mesh = shapes::box_of_tets([4, 4, 4], [0.0; 3], [1.0, 2.0, 3.0]);
+    /// let surface = Surface::extract(&mesh, &FeatureSettings::default())?;
+    /// let top = &surface.feature_sizes()[5];
+    /// assert_eq!((top.name.as_str(), top.faces, top.vertices), ("z-max", 32, 25));
+    /// assert!((top.area - 2.0).abs() < 1e-12);
+    /// assert_eq!(top.bounds, [[0.0, 0.0, 3.0], [1.0, 2.0, 3.0]]);
+    /// # Ok::<(), tombolo_deform::surface::SurfaceError>(())
+    /// ```
+    #[must_use]
+    pub fn feature_sizes(&self) -> Vec<FeatureSize> {
+        let size = |(feature, name): (u32, &String)| {
+            let vertices = self.features.vertices(feature);
+            let bounds = Bounds::around(vertices.iter().map(|&vertex| self.points[vertex as usize]));
+            let faces = self.features.faces(feature).count();
+            let bounds = [bounds.lower, bounds.upper];
+            FeatureSize { name: name.clone(), faces, vertices: vertices.len(), area: 0.0, bounds }
+        };
+        let mut sizes: Vec<FeatureSize> = (0..).zip(self.features.names()).map(size).collect();
+        for (triangle, &face) in self.triangles.iter().zip(&self.triangle_faces) {
+            let normal = polygon_normal(&self.points, triangle);
+            sizes[self.features.face_features()[face as usize] as usize].area += 0.5 * dot(normal, normal).sqrt();
+        }
+        sizes
     }
 
     /// The coordinates of each surface vertex in the mesh the surface was taken from.

@@ -215,6 +215,18 @@ impl FaceBuffer {
     }
 }
 
+/// The number that comes most often, the lowest on a tie.
+pub(super) fn most_frequent(mut numbers: Vec<i64>) -> Option<i64> {
+    numbers.sort_unstable();
+    let mut best: Option<(usize, i64)> = None;
+    for same in numbers.chunk_by(|a, b| a == b) {
+        if best.is_none_or(|(count, _)| same.len() > count) {
+            best = Some((same.len(), same[0]));
+        }
+    }
+    best.map(|(_, number)| number)
+}
+
 /// Tags of faces, looked up by their vertices in any order.
 pub(super) struct TagLookup {
     small: HashMap<[u32; 4], i64>,
@@ -238,8 +250,29 @@ impl TagLookup {
         lookup
     }
 
-    /// The tag of the face with these vertices.
+    /// The tag of the face with these vertices; of a face whose tags stand on triangles that make it up, the one that most of them
+    /// carry, the lowest on a tie.
     pub fn get(&self, vertices: &[u32]) -> Option<i64> {
+        self.get_whole(vertices).or_else(|| self.get_by_triangles(vertices))
+    }
+
+    fn get_by_triangles(&self, vertices: &[u32]) -> Option<i64> {
+        let count = vertices.len();
+        // Larger faces have too many triangles to try.
+        if !(4..=12).contains(&count) {
+            return None;
+        }
+        let mut tags = Vec::new();
+        for first in 0..count {
+            for second in first + 1..count {
+                let corners = |third: usize| [vertices[first], vertices[second], vertices[third]];
+                tags.extend((second + 1..count).filter_map(|third| self.get_whole(&corners(third))));
+            }
+        }
+        if tags.len() < count - 2 { None } else { most_frequent(tags) }
+    }
+
+    fn get_whole(&self, vertices: &[u32]) -> Option<i64> {
         if vertices.len() <= 4 {
             self.small.get(&key(vertices)).copied()
         } else {

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::SurfaceError;
-use super::faces::TagLookup;
+use super::faces::{TagLookup, most_frequent};
 use super::sharp_edges::parts_between_sharp_edges;
 pub(super) use super::sharp_edges::{Parts, edges};
 use crate::mesh::{Cells, FeatureSource, MeshError, Vector};
@@ -47,6 +47,21 @@ pub struct Features {
     face_features: Vec<u32>,
     offsets: Vec<usize>,
     vertices: Vec<u32>,
+}
+
+/// How large a feature is.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct FeatureSize {
+    /// Its name.
+    pub name: String,
+    /// How many faces it has.
+    pub faces: usize,
+    /// How many vertices these have.
+    pub vertices: usize,
+    /// Their area, in the mesh's unit of length squared.
+    pub area: f64,
+    /// The lowest and the highest coordinates.
+    pub bounds: [Vector; 2],
 }
 
 /// The name of the feature of all faces that the mesh's tags leave out.
@@ -100,6 +115,23 @@ impl Features {
     #[must_use]
     pub fn face_features(&self) -> &[u32] {
         &self.face_features
+    }
+
+    /// The faces of a feature, rising, as the region `faces` of an edit takes them; none for a feature that does not exist.
+    ///
+    /// ```
+    /// use tombolo_deform::{shapes, surface::{FeatureSettings, Surface}};
+    ///
+    /// let mesh = shapes::box_of_hexahedra([2, 2, 2], [0.0; 3], [1.0; 3]);
+    /// let surface = Surface::extract(&mesh, &FeatureSettings::default())?;
+    /// let floor = surface.features().index("z-min")?;
+    /// assert!(surface.features().faces(floor).all(|face| {
+    ///     surface.faces().vertices(face as usize).iter().all(|&vertex| surface.points()[vertex as usize][2] == 0.0)
+    /// }));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn faces(&self, feature: u32) -> impl Iterator<Item = u32> {
+        (0..).zip(&self.face_features).filter(move |(_, other)| **other == feature).map(|(face, _)| face)
     }
 
     /// The index of the feature with this name.
@@ -174,15 +206,7 @@ fn near(name: &str, names: &[String]) -> Vec<String> {
 
 /// The number that most of the vertices carry, the lowest on a tie.
 fn majority(tags: &[i64], vertices: &[u32]) -> Option<i64> {
-    let mut carried: Vec<i64> = vertices.iter().filter_map(|&vertex| tags.get(vertex as usize).copied()).collect();
-    carried.sort_unstable();
-    let mut best: Option<(usize, i64)> = None;
-    for same in carried.chunk_by(|a, b| a == b) {
-        if best.is_none_or(|(count, _)| same.len() > count) {
-            best = Some((same.len(), same[0]));
-        }
-    }
-    best.map(|(_, tag)| tag)
+    most_frequent(vertices.iter().filter_map(|&vertex| tags.get(vertex as usize).copied()).collect())
 }
 
 fn named_features(tags: Vec<Option<i64>>, names: &[(i64, String)]) -> (Vec<String>, Vec<u32>) {

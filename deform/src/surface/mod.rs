@@ -112,6 +112,6 @@ pub use edit::{
 pub use edit_error::{EditError, InvalidEdit};
 pub use editor::Editor;
 pub use extraction::{Surface, SurfaceError};
-pub use features::{FeatureSettings, Features, UnknownFeature};
+pub use features::{FeatureSettings, FeatureSize, Features, UnknownFeature};
 pub use layers::Layer;
 pub use region::{BoxRegion, HalfSpaceRegion, Region, RegionError, SphereRegion};

@@ -220,10 +220,11 @@ fn cones_are_apart(a: &Triangle, b: &Triangle) -> bool {
         let [[low_a, high_a], [low_b, high_b]] = [range(a), range(b)];
         // A cone may touch the plane; the other must clear it by far more than rounding.
         let [touch, clear] = [1e-12 * length, 1e-6 * length];
-        (high_a <= touch && low_b >= clear)
+        let parted = (high_a <= touch && low_b >= clear)
             || (low_a >= -touch && high_b <= -clear)
             || (high_b <= touch && low_a >= clear)
-            || (low_b >= -touch && high_a <= -clear)
+            || (low_b >= -touch && high_a <= -clear);
+        length > 0.0 && parted
     };
     let middle = |[x, y]: [Vector; 2]| unit(std::array::from_fn(|axis| x[axis] + y[axis]));
     if parts(subtract(middle(a), middle(b))) {

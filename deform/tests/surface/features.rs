@@ -49,6 +49,28 @@ fn faces_without_a_tag_are_untagged_and_names_come_from_the_mesh() {
 }
 
 #[test]
+fn quadrilaterals_may_be_tagged_as_two_triangles() {
+    let mesh = shapes::box_of_hexahedra([2, 3, 2], [0.0; 3], [1.0; 3]);
+    let FeatureSource::Faces(tagged) = mesh.features() else { panic!("a box is tagged") };
+    let [mut faces, mut tags] = [Cells::new(), Cells::new()].map(|cells| (cells, Vec::new()));
+    for ((number, (_, quad)), &tag) in tagged.faces.iter().enumerate().zip(&tagged.tags) {
+        // Along either diagonal; in the second list one triangle of each is missing.
+        let [a, b, c, d] = if number % 2 == 0 { [0, 1, 2, 3] } else { [1, 2, 3, 0] }.map(|place| quad[place]);
+        faces.0.push(CellType::Triangle, &[c, a, b]).unwrap();
+        faces.0.push(CellType::Triangle, &[a, c, d]).unwrap();
+        faces.1.extend([tag; 2]);
+        tags.0.push(CellType::Triangle, &[a, b, c]).unwrap();
+        tags.1.push(tag);
+    }
+    let of = |(faces, tags): (Cells, Vec<i64>)| {
+        let names = tagged.names.clone();
+        extract(&with_features(&mesh, FeatureSource::Faces(TaggedFaces { faces, tags, names })))
+    };
+    assert_eq!(of(faces).features(), extract(&mesh).features());
+    assert_eq!(of(tags).features().names(), ["untagged"]);
+}
+
+#[test]
 fn vertices_vote_for_the_feature_of_their_face() {
     let cube = shapes::single_cell(CellType::Hexahedron);
     let surface = extract(&with_features(&cube, FeatureSource::Vertices(vec![7, 7, 7, 7, 2, 2, 2, 2])));

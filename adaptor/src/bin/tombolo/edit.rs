@@ -7,7 +7,7 @@ use serde::Serialize;
 use tombolo::{
     deform::{
         quality::{Quality, quality},
-        surface::{BrokenSurface, Edit, FeatureSettings, Layer, Surface},
+        surface::{BrokenSurface, Edit, Layer},
         volume::Method,
     },
     pipelines::{
@@ -17,7 +17,7 @@ use tombolo::{
     },
 };
 
-use crate::{Failure, json, read, say};
+use crate::{Failure, features::surface, json, read, say};
 
 #[derive(Debug, Args)]
 pub(crate) struct Options {
@@ -36,6 +36,10 @@ pub(crate) struct Options {
     /// Print one JSON object
     #[arg(long)]
     json: bool,
+    /// Name the parts between edges of this many degrees or more feature-1, feature-2, ..., whatever features the mesh names; see
+    /// `tombolo features`
+    #[arg(long, value_name = "DEGREES")]
+    angle: Option<f64>,
     /// How the volume follows; wins over the order's
     #[arg(long)]
     method: Option<VolumeMethod>,
@@ -92,7 +96,7 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
     let mesh_file = timed(&mut seconds.read, || read_mesh(&options.mesh))?;
     let mesh = Arc::new(mesh_file.mesh);
     let shaper = timed(&mut seconds.features, || {
-        let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default())?);
+        let surface = Arc::new(surface(&mesh, options.angle)?);
         Shaper::new(Arc::clone(&mesh), surface)
     });
     let mut shaper = shaper?;

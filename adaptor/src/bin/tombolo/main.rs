@@ -1,6 +1,7 @@
 //! The program `tombolo`: see `tombolo --help`.
 
 mod edit;
+mod features;
 mod mesh;
 
 use std::{
@@ -33,6 +34,8 @@ enum Task {
     /// Look at a mesh
     #[command(subcommand)]
     Mesh(MeshTask),
+    /// List the features of a mesh, the named parts of its surface that edits move or hold
+    Features(features::Options),
     /// Give a mesh another shape; exit code 2 where the order is refused, and nothing is written then
     Edit(edit::Options),
 }
@@ -68,6 +71,7 @@ fn main() -> ExitCode {
         Task::Check { file } => check(&file),
         Task::Schema => json(&language::config_schema()),
         Task::Mesh(MeshTask::Info { file, json }) => mesh::info(&file, json),
+        Task::Features(options) => features::features(&options),
         Task::Edit(options) => edit::edit(&options),
     };
     match done {
