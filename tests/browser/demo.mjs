@@ -90,14 +90,19 @@ page.on("console", (message) => {
   if (pathname === "/favicon.ico" || pathname === "/ws") return;
   if (message.type() === "error" && !/WebSocket|ERR_|status of 401/.test(message.text())) complaints.push(`the page complained: ${message.text()}`);
 });
+/** What the page has sent, and how often it has asked for the reference surface. */
+const traffic = { messages: 0, surfaces: 0, requests: 0 };
+page.on("websocket", (socket) => socket.on("framesent", () => { traffic.messages++; }));
 page.on("request", (request) => {
+  traffic.requests++;
+  if (new URL(request.url()).pathname === "/surface") traffic.surfaces++;
   const { hostname } = new URL(request.url());
   if (hostname && hostname !== "127.0.0.1") complaints.push(`the page asked another host: ${request.url()}`);
 });
 
 const look = () => page.evaluate(() => {
-  const { connection, role, cycle, frames, orders, status, quality, stack, selection, errors, views } = window.tombolo;
-  return { connection, role, cycle, frames, orders, status, quality, stack, selection, errors, views };
+  const { connection, role, cycle, frames, orders, status, quality, stack, selection, preview, errors, views } = window.tombolo;
+  return { connection, role, cycle, frames, orders, status, quality, stack, selection, preview, errors, views };
 });
 const extent = () => page.evaluate((name) => {
   const box = window.tombolo.featureBounds(name);
@@ -211,6 +216,58 @@ const steps = [
     check(/half/.test(problem) && /not a number/.test(problem), `the form says "${problem}"`);
     check((await look()).orders.every((order) => order.status !== "sent"), "an order was sent although the form was wrong");
   }],
+  ["what is typed is seen before anything is sent", async () => {
+    const factor = (axis, value) => page.fill(`.object:not([hidden]) input[aria-label="factors ${axis}"]`, String(value));
+    const { messages } = traffic;
+    for (const axis of ["x", "y"]) await factor(axis, 1);
+    const times = [], computing = [];
+    for (let z = 0.95; z > FACTOR - 0.01; z -= 0.05) {
+      await factor("z", z.toFixed(2));
+      const { preview } = await until(`the preview of ${z.toFixed(2)}`, ({ preview: now }) => {
+        check(now.state !== "failed", `there is no preview: ${now.reason}`);
+        return now.state === "shown";
+      }, 20000);
+      times.push(preview.milliseconds);
+      computing.push(preview.computing);
+      shared.preview = preview;
+    }
+    check(traffic.messages === messages, `${traffic.messages - messages} messages were sent for previews`);
+    check(traffic.surfaces === 1, `the reference surface was asked for ${traffic.surfaces} times`);
+    const text = await page.locator("#preview").innerText();
+    check(/moves the surface by up to/.test(text), `the form says "${text}"`);
+    const late = (list) => list.slice(1).sort((a, b) => a - b).at(-1).toFixed(0);
+    console.log(`    from a key to its picture: first ${times[0].toFixed(0)} ms, then ${late(times)} ms at most, ${late(computing)} ms of it in the kernel; moves by up to ${shared.preview.largest}`);
+    await picture("preview");
+    await page.click('[data-camera="0"]');
+    await page.waitForTimeout(500);
+    await picture("preview-side");
+    // The same by hand: the throat is dragged across the picture.
+    const place = await page.evaluate((name) => window.tombolo.featurePlace(name), HANDLE);
+    check(place, "the throat cannot be seen along x");
+    const dragged = [];
+    await page.keyboard.down("Control");
+    await page.mouse.move(...place);
+    await page.mouse.down();
+    for (let step = 1; step <= 20; step++) {
+      await page.mouse.move(place[0] + 3 * step, place[1] - step);
+      const { preview } = await until("the preview of the drag", ({ preview: now }) => now.state === "shown", 20000);
+      dragged.push(preview.milliseconds);
+    }
+    await page.mouse.up();
+    await page.keyboard.up("Control");
+    const by = await Promise.all(["x", "y", "z"].map((axis) => page.inputValue(`.object:not([hidden]) input[aria-label="by ${axis}"]`)));
+    check(Number(by[0]) === 0 && Number(by[1]) !== 0 && Number(by[2]) > 0, `a drag to the right and up, seen along x, is a translation by ${by}`);
+    const { preview: last } = await look();
+    check(Math.abs(last.largest - Math.hypot(...by.map(Number))) < 1e-12, `the form says ${by}, the preview moves by up to ${last.largest}`);
+    dragged.sort((a, b) => a - b);
+    console.log(`    from a drag to its picture: median ${dragged[10].toFixed(0)} ms, 95th percentile ${dragged[18].toFixed(0)} ms`);
+    check(traffic.messages === messages, "messages were sent while dragging");
+    await picture("preview-dragged");
+    await page.click("#cancel");
+    check((await look()).preview.state === "none" && (await page.locator("#preview").isHidden()), "the preview is still there after Cancel");
+    await page.selectOption("#action", { label: "scale direction" });
+    await page.click('[data-camera="reset"]');
+  }],
   ["the pinch is applied and the throat narrows", async () => {
     await page.click('[data-camera="0"]');
     await page.waitForTimeout(500);
@@ -224,7 +281,9 @@ const steps = [
     for (const [axis, factor] of [["x", 1], ["y", 1], ["z", FACTOR]]) await page.fill(`.object:not([hidden]) input[aria-label="factors ${axis}"]`, String(factor));
     await page.getByLabel("steps", { exact: true }).first().fill(scheduleSteps);
     await page.getByLabel("every", { exact: true }).first().fill(scheduleEvery);
+    await until("the preview of the order", (now) => now.preview.state === "shown", 20000);
     await page.click("#apply");
+    check((await look()).preview.state === "none", "the preview is still there after Apply");
     const phases = new Set();
     const seen = await until("the order applied", (now) => {
       const order = now.orders.find((entry) => !known.has(entry.id));
@@ -234,6 +293,8 @@ const steps = [
     });
     const order = seen.orders.find((entry) => !known.has(entry.id));
     check(Number.isInteger(order.cycle_applied), "an applied order without the cycle at which it was");
+    check(Math.abs(order.largest_displacement - shared.preview.largest) <= 1e-9 * shared.preview.largest,
+      `the preview moved by up to ${shared.preview.largest}, the order by ${order.largest_displacement}`);
     check(order.min_scaled_jacobian > 0, `an applied order with quality ${order.min_scaled_jacobian}`);
     console.log(`    seen: ${[...phases].join(", ")}; cycle ${order.cycle_applied}, quality ${order.min_scaled_jacobian}`);
     await until("the throat at half its height", async () => Math.abs((await extent()) / shared.extent - FACTOR) < 0.005, 30000);

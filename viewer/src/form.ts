@@ -138,6 +138,16 @@ export class EditForm {
     this.table.hidden = this.form?.edits[index]?.field.kind !== "object";
   }
 
+  /** Chooses an action and fills in some of its fields; false where there is no such action. */
+  compose(key: string, values: JsonObject): boolean {
+    const index = this.form?.edits.findIndex((edit) => edit.key === key) ?? -1;
+    if (index < 0 || !this.action) return false;
+    this.action.value = String(index);
+    this.edits[index]!.write(values);
+    this.showAction();
+    return true;
+  }
+
   /** The order that the form describes. Throws `InputError` when something is missing or wrong. */
   read(): JsonObject {
     if (!this.form || !this.action) throw new InputError("There is no edit to make yet.", null);

@@ -2,6 +2,7 @@
 import { Connection, streamAddress } from "./connection";
 import { InputError } from "./controls";
 import { Decoder } from "./decoder";
+import { watchDrags } from "./drag";
 import type { DecodeWorker } from "./decoder";
 import { part, write } from "./dom";
 import { EditForm } from "./form";
@@ -223,6 +224,9 @@ part("edit").addEventListener("input", () => preview.changed());
 part("edit").addEventListener("change", () => preview.changed());
 part("cancel").addEventListener("click", () => preview.clear());
 selection.onChange(() => preview.chosen());
+watchDrags(part("stage"), scene, selection, (by) => {
+  if (form.compose("translate", { by })) preview.changed();
+});
 
 publish({
   get connection() { return connection.state; },

@@ -78,9 +78,11 @@ export class PreviewPanel {
     return this.preview;
   }
 
-  private take({ points, largest, asked, computing }: PreviewShape): void {
+  private take({ points, largest, asked, computing, newest }: PreviewShape): void {
+    const { shown } = this;
     this.scene.setPreview(points, undefined, () => {
-      this.seen = { ...NOTHING, state: "shown", largest, computing, milliseconds: performance.now() - asked };
+      // A wish that came while the picture was drawn is answered by a later one.
+      if (newest && shown === this.shown) this.seen = { ...NOTHING, state: "shown", largest, computing, milliseconds: performance.now() - asked };
     });
     this.say("shown", largest > 0 ? `Preview: moves the surface by up to ${digits(largest, 4)}` : "Preview: nothing moves");
   }

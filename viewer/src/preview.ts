@@ -15,8 +15,11 @@ export interface PreviewWorker {
 }
 
 export interface PreviewSurface { triangles: Uint32Array; triangleFeatures: Uint32Array; features: string[] }
-/** A shape: its points, how far the edits move any of them, when it was asked for, and the milliseconds that the kernel took. */
-export interface PreviewShape { points: Float32Array; largest: number; asked: number; computing: number }
+/**
+ * A shape: its points, how far the edits move any of them, when it was asked for, and the milliseconds that the kernel took.
+ * `newest` says whether nothing newer is wished for already.
+ */
+export interface PreviewShape { points: Float32Array; largest: number; asked: number; computing: number; newest: boolean }
 
 export interface PreviewEvents {
   surface(surface: PreviewSurface): void;
@@ -112,7 +115,10 @@ export class Preview {
       // One that was taken away or overtaken meanwhile is not shown.
       if (asked?.number === this.number) {
         if ("error" in answer) this.events.failed(answer.kind, answer.error);
-        else this.events.shape({ points: answer.points, largest: answer.largest, asked: asked.at, computing: answer.milliseconds });
+        else {
+          const { points, largest, milliseconds } = answer;
+          this.events.shape({ points, largest, asked: asked.at, computing: milliseconds, newest: this.waiting === null });
+        }
       }
     }
     this.next();

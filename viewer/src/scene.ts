@@ -176,10 +176,26 @@ export class Scene {
 
   /** The feature under a place of the page; null when there is none. */
   featureAt(clientX: number, clientY: number): string | null {
+    return this.pick(clientX, clientY)?.feature ?? null;
+  }
+
+  /** A place of the page on the canvas: x and y from its lower left corner, in its own pixels. */
+  private onCanvas(clientX: number, clientY: number): [number, number] {
     const box = this.container.getBoundingClientRect();
     const [width, height] = this.canvas.getSize();
-    const x = ((clientX - box.left) / box.width) * width;
-    const y = (1 - (clientY - box.top) / box.height) * height;
+    return [((clientX - box.left) / box.width) * width, (1 - (clientY - box.top) / box.height) * height];
+  }
+
+  /** The point at a place of the page that is as deep in the picture as another point. */
+  pointAt(clientX: number, clientY: number, as: Vector): Vector {
+    const [x, y] = this.onCanvas(clientX, clientY);
+    const depth = (this.canvas.worldToDisplay(...as, this.renderer) as Vector)[2];
+    return this.canvas.displayToWorld(x, y, depth, this.renderer) as Vector;
+  }
+
+  /** The feature under a place of the page, and where it is met; null when there is none. */
+  pick(clientX: number, clientY: number): { feature: string; point: Vector } | null {
+    const [x, y] = this.onCanvas(clientX, clientY);
     const near = this.canvas.displayToWorld(x, y, 0, this.renderer) as Vector;
     const far = this.canvas.displayToWorld(x, y, 1, this.renderer) as Vector;
     const direction: Vector = [far[0] - near[0], far[1] - near[1], far[2] - near[2]];
@@ -193,7 +209,9 @@ export class Scene {
       nearest = hit.distance;
       feature = this.features[topology.triangleFeatures[hit.triangle] ?? -1] ?? null;
     }
-    return feature;
+    if (feature === null) return null;
+    const point = [0, 1, 2].map((axis) => near[axis]! + nearest * direction[axis]!) as Vector;
+    return { feature, point };
   }
 
   /** A place of the page at which this feature is seen and would be picked; null when nothing of it is. */
