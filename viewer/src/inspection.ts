@@ -17,6 +17,8 @@ export interface PreviewInspection {
   computing: number | null;
   bounds: [Vector, Vector] | null;
   reason: string | null;
+  /** What is wrong with the shape; empty where it is sound, null as long as it was not looked at. */
+  faults: string | null;
 }
 
 export interface Inspection {

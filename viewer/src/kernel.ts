@@ -6,7 +6,7 @@
  */
 import type { Json } from "./protocol";
 
-export type FailureKind = "handle" | "input" | "json" | "frame" | "surface" | "edit" | "memory" | "trap";
+export type FailureKind = "handle" | "input" | "json" | "frame" | "surface" | "edit" | "skeleton" | "memory" | "trap";
 
 export class KernelError extends Error {
   constructor(readonly kind: FailureKind, message: string) {
@@ -35,6 +35,12 @@ export interface SurfaceDescription {
   features: string[];
 }
 
+/** What is wrong with a shape, in a line; the triangles where it is seen first. Null for a sound one. */
+export interface ShapeFaults { text: string; triangles: Uint32Array }
+
+/** Curves through a surface: places of the nodes, the nodes of each curve, and the node that carries each vertex. */
+export interface SkeletonDescription { nodes: Float64Array; curves: Uint32Array[]; nodeOfVertex: Uint32Array }
+
 /** A frame as the module reads it: its header, and the arrays behind it. */
 export interface DecodedFrame { header: { [key: string]: Json }; arrays: (Uint32Array | Float32Array)[] }
 
@@ -46,6 +52,8 @@ interface Exports {
   close_surface(surface: number): void;
   describe_surface(surface: number): number;
   displacement(surface: number): number;
+  check(surface: number): number;
+  skeleton(surface: number): number;
   decode_frame(): number;
   arrays(): number;
   array(index: number): number;
@@ -186,6 +194,27 @@ export class KernelSurface {
     const surface = this.here();
     const input = encoder.encode(JSON.stringify(stack));
     return this.kernel.call([input], (exports) => exports.displacement(surface), () => new Float64Array(this.kernel.bytes(0))).answer;
+  }
+
+  /** What is wrong with the shape of the displacement that was last asked for. */
+  check(): ShapeFaults | null {
+    const surface = this.here();
+    return this.kernel.call([], (exports) => exports.check(surface), () => {
+      const text = this.kernel.text(0);
+      return text === "" ? null : { text, triangles: new Uint32Array(this.kernel.bytes(1)) };
+    }).answer;
+  }
+
+  /** The skeleton, extracted when it is first asked for. */
+  skeleton(): SkeletonDescription {
+    const surface = this.here();
+    return this.kernel.call([], (exports) => exports.skeleton(surface), () => {
+      const sizes = new Uint32Array(this.kernel.bytes(1));
+      const nodes = new Uint32Array(this.kernel.bytes(2));
+      let at = 0;
+      const curves = Array.from(sizes, (size) => nodes.subarray(at, (at += size)));
+      return { nodes: new Float64Array(this.kernel.bytes(0)), curves, nodeOfVertex: new Uint32Array(this.kernel.bytes(3)) };
+    }).answer;
   }
 
   close(): void {

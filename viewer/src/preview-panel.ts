@@ -2,6 +2,7 @@
 import { InputError } from "./controls";
 import { part, write } from "./dom";
 import type { PreviewInspection } from "./inspection";
+import type { ShapeFaults } from "./kernel";
 import { digits } from "./number";
 import { Preview } from "./preview";
 import type { PreviewShape, PreviewWorker } from "./preview";
@@ -15,6 +16,8 @@ export class PreviewPanel {
   /** The edits that are previewed, as JSON; empty for none. */
   private shown = "";
   private seen: PreviewInspection = NOTHING;
+  private points: Float32Array = new Float32Array(0);
+  private text = "";
 
   /** `edits` reads the form; it throws an `InputError` as long as something is missing there. */
   constructor(private readonly scene: Scene, private readonly address: string, private readonly edits: () => Json[]) {}
@@ -44,7 +47,7 @@ export class PreviewPanel {
     const text = JSON.stringify(edits);
     if (text === this.shown) return;
     this.shown = text;
-    this.seen = { ...this.seen, state: "waiting" };
+    this.seen = { ...this.seen, state: "waiting", faults: null };
     this.started().show(this.stack, edits);
   }
 
@@ -70,6 +73,7 @@ export class PreviewPanel {
     this.preview = new Preview(worker as unknown as PreviewWorker, () => fetchSurface(this.address), {
       surface: (surface) => this.scene.setPreviewSurface(surface),
       shape: (shape) => this.take(shape),
+      checked: (faults) => this.judge(faults),
       failed: (_, reason) => this.fail(reason),
       cleared: () => this.cleared(),
     });
@@ -82,9 +86,18 @@ export class PreviewPanel {
     const { shown } = this;
     this.scene.setPreview(points, undefined, () => {
       // A wish that came while the picture was drawn is answered by a later one.
-      if (newest && shown === this.shown) this.seen = { ...NOTHING, state: "shown", largest, computing, milliseconds: performance.now() - asked };
+      if (newest && shown === this.shown) this.seen = { ...NOTHING, faults: this.seen.faults, state: "shown", largest, computing, milliseconds: performance.now() - asked };
     });
-    this.say("shown", largest > 0 ? `Preview: moves the surface by up to ${digits(largest, 4)}` : "Preview: nothing moves");
+    this.points = points;
+    this.text = largest > 0 ? `Preview: moves the surface by up to ${digits(largest, 4)}` : "Preview: nothing moves";
+    this.say("shown", this.text);
+  }
+
+  private judge(faults: ShapeFaults | null): void {
+    this.seen = { ...this.seen, faults: faults?.text ?? "" };
+    if (!faults) return;
+    this.scene.setPreview(this.points, faults.triangles);
+    this.say("broken", `${this.text}. The surface would be broken: ${faults.text}`);
   }
 
   private fail(reason: string): void {
@@ -99,16 +112,16 @@ export class PreviewPanel {
     this.say("none", "");
   }
 
-  private say(state: PreviewInspection["state"], text: string): void {
+  private say(state: PreviewInspection["state"] | "broken", text: string): void {
     const notice = part("preview");
     notice.hidden = text === "";
     notice.dataset.state = state;
     write(notice, text);
-    part("cancel").hidden = state !== "shown";
+    part("cancel").hidden = state !== "shown" && state !== "broken";
   }
 }
 
-const NOTHING: PreviewInspection = { state: "none", largest: null, milliseconds: null, computing: null, bounds: null, reason: null };
+const NOTHING: PreviewInspection = { state: "none", largest: null, milliseconds: null, computing: null, bounds: null, reason: null, faults: null };
 
 async function fetchSurface(address: string): Promise<ArrayBuffer> {
   const response = await fetch(address, { cache: "no-store", redirect: "error" });

@@ -5,7 +5,7 @@
  * computed the newest wish waits and those before it are forgotten, so that a preview never falls behind the hand that makes it.
  */
 import type { Json, SurfaceInformation } from "./protocol";
-import type { FailureKind } from "./kernel";
+import type { FailureKind, ShapeFaults } from "./kernel";
 import type { PreviewAnswer, PreviewRequest } from "./preview.worker";
 
 /** What computes: a Worker, or something that looks like one in a test. */
@@ -24,10 +24,15 @@ export interface PreviewShape { points: Float32Array; largest: number; asked: nu
 export interface PreviewEvents {
   surface(surface: PreviewSurface): void;
   shape(shape: PreviewShape): void;
+  /** What is wrong with the shape that was shown last; null where it is sound. */
+  checked(faults: ShapeFaults | null): void;
   /** An edit that cannot be previewed, or nothing to preview it with. */
   failed(kind: FailureKind | "surface-missing", reason: string): void;
   cleared(): void;
 }
+
+/** Milliseconds without a new wish after which a shape is looked at. */
+const REST = 120;
 
 interface Wish { stack: Json[]; edits: Json[]; at: number }
 
@@ -37,6 +42,7 @@ export class Preview {
   private waiting: Wish | null = null;
   private computing: { number: number; at: number } | null = null;
   private number = 0;
+  private resting: ReturnType<typeof setTimeout> | undefined;
 
   constructor(
     private readonly worker: PreviewWorker,
@@ -63,12 +69,14 @@ export class Preview {
   /** Asks for the shape that `edits` make of the one that `stack` has made. */
   show(stack: Json[], edits: Json[]): void {
     if (this.known === null) return;
+    clearTimeout(this.resting);
     this.waiting = { stack, edits, at: performance.now() };
     this.next();
   }
 
   /** Takes the preview away; what is still computed for it is not shown. */
   clear(): void {
+    clearTimeout(this.resting);
     this.waiting = null;
     this.number++;
     this.events.cleared();
@@ -82,6 +90,13 @@ export class Preview {
     this.waiting = null;
     this.computing = { number: ++this.number, at };
     this.worker.postMessage({ number: this.number, stack, edits }, []);
+  }
+
+  /** Looks at a shape at which the hand rests: that may take longer than the shape itself. */
+  private check(shown: { number: number; at: number }): void {
+    if (this.computing !== null || shown.number !== this.number) return;
+    this.computing = shown;
+    this.worker.postMessage({ check: shown.number }, []);
   }
 
   private async fetch(): Promise<void> {
@@ -109,6 +124,9 @@ export class Preview {
       if ("error" in answer) return this.without(answer.kind, answer.error);
       this.state = "ready";
       this.events.surface(answer.surface);
+    } else if ("check" in answer) {
+      this.computing = null;
+      if (answer.check === this.number && this.waiting === null) this.events.checked(answer.faults);
     } else {
       const asked = this.computing;
       this.computing = null;
@@ -118,6 +136,7 @@ export class Preview {
         else {
           const { points, largest, milliseconds } = answer;
           this.events.shape({ points, largest, asked: asked.at, computing: milliseconds, newest: this.waiting === null });
+          this.resting = setTimeout(() => this.check(asked), REST);
         }
       }
     }

@@ -1,17 +1,20 @@
 /** Computes previews of edits away from the thread that draws. */
 import { Kernel, KernelError } from "./kernel";
-import type { FailureKind, KernelSurface, SurfaceDescription } from "./kernel";
+import type { FailureKind, KernelSurface, ShapeFaults, SurfaceDescription } from "./kernel";
 import type { Json } from "./protocol";
 
 export type PreviewRequest =
   /** A reference surface, as the server sends it. */
   | { id: string; surface: ArrayBuffer }
   /** The edits that the shape has now, and those to be previewed with them. */
-  | { number: number; stack: Json[]; edits: Json[] };
+  | { number: number; stack: Json[]; edits: Json[] }
+  /** Whether the shape of the last preview is sound. */
+  | { check: number };
 
 export type PreviewAnswer =
   | { id: string; surface: Pick<SurfaceDescription, "triangles" | "triangleFeatures" | "features"> }
   | { number: number; points: Float32Array; largest: number; milliseconds: number }
+  | { check: number; faults: ShapeFaults | null }
   | { number: number; kind: FailureKind; error: string }
   | { id: string; kind: FailureKind; error: string };
 
@@ -38,6 +41,10 @@ async function answer(request: PreviewRequest): Promise<void> {
     return;
   }
   if (!surface) throw new KernelError("handle", "the reference surface has not arrived yet");
+  if ("check" in request) {
+    worker.postMessage({ check: request.check, faults: surface.check() }, []);
+    return;
+  }
   const start = performance.now();
   const stack = JSON.stringify(request.stack);
   if (now.stack !== stack) now = { stack, displacement: surface.displacement(request.stack) };
@@ -60,7 +67,7 @@ let last = Promise.resolve();
 worker.onmessage = ({ data }) => {
   last = last.then(() => answer(data)).catch((error: unknown) => {
     const kind = error instanceof KernelError ? error.kind : "trap";
-    const which = "number" in data ? { number: data.number } : { id: data.id };
+    const which = "number" in data ? { number: data.number } : "check" in data ? { number: data.check } : { id: data.id };
     worker.postMessage({ ...which, kind, error: error instanceof Error ? error.message : String(error) }, []);
   });
 };

@@ -17,6 +17,7 @@ function setUp(fetchSurface = async () => new ArrayBuffer(8)) {
     return fetchSurface();
   }, {
     surface: () => heard.push("surface"), shape: ({ largest }) => heard.push(`shape ${largest}`),
+    checked: (faults) => heard.push(`checked ${faults?.text ?? "sound"}`),
     failed: (kind, reason) => heard.push(`${kind}: ${reason}`), cleared: () => heard.push("cleared"),
   });
   const answer = (data: PreviewAnswer): void => worker.onmessage?.({ data } as MessageEvent<PreviewAnswer>);
@@ -70,6 +71,22 @@ describe("the preview", () => {
     preview.show([], edit(5));
     work();
     expect(heard.at(-1)).toBe("shape 5");
+  });
+
+  it("looks at the shape at which the hand rests", async () => {
+    const { preview, heard, asked, answer, opened, work } = setUp();
+    preview.offer(A);
+    preview.show([], edit(1));
+    await settled();
+    opened("a");
+    work();
+    preview.show([], edit(2));
+    work();
+    await new Promise((resolve) => setTimeout(resolve, 200));
+    const checks = asked.filter((request) => "check" in request);
+    expect(checks.length).toBe(1);
+    answer({ check: checks[0]!.check, faults: { text: "it folds", triangles: Uint32Array.from([1]) } });
+    expect(heard.slice(-2)).toEqual(["shape 2", "checked it folds"]);
   });
 
   it("asks for another surface when the server measures shapes from another one", async () => {

@@ -1,10 +1,11 @@
 //! What the exports do, without the border.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use serde_json::json;
 use tombolo_deform::mesh::{CellType, Cells, Vector};
+use tombolo_deform::skeleton::SkeletonError;
 use tombolo_deform::surface::{Edit, EditError, Editor, Surface, SurfaceError};
 use tombolo_pipelines::encode::{DecodeError, Decoded, decode};
 
@@ -15,8 +16,15 @@ use crate::Array;
 pub struct Kernel {
     input: Vec<u8>,
     answer: Vec<Array>,
-    surfaces: BTreeMap<u32, Editor>,
+    surfaces: BTreeMap<u32, Open>,
     opened: u32,
+}
+
+/// A surface that is open.
+struct Open {
+    editor: Editor,
+    /// The last displacement that was asked for.
+    displacement: Vec<Vector>,
 }
 
 /// Why a call failed. Its name in an answer is in brackets.
@@ -53,6 +61,9 @@ pub enum Failure {
     /// Edits that this surface cannot follow (`edit`).
     #[error(transparent)]
     Edit(#[from] EditError),
+    /// A surface that has no skeleton (`skeleton`).
+    #[error(transparent)]
+    Skeleton(#[from] SkeletonError),
 }
 
 impl Failure {
@@ -66,6 +77,7 @@ impl Failure {
             Failure::Frame(_) | Failure::Kind { .. } => "frame",
             Failure::Surface(_) => "surface",
             Failure::Edit(_) => "edit",
+            Failure::Skeleton(_) => "skeleton",
         }
     }
 }
@@ -109,7 +121,8 @@ impl Kernel {
         match make(&input).and_then(|surface| Ok(Editor::new(Arc::new(surface))?)) {
             Ok(editor) => {
                 self.opened = self.opened.wrapping_add(1).max(1);
-                self.surfaces.insert(self.opened, editor);
+                let displacement = vec![[0.0; 3]; editor.surface().points().len()];
+                self.surfaces.insert(self.opened, Open { editor, displacement });
                 self.settle(Ok(Vec::new()));
                 self.opened
             }
@@ -128,8 +141,8 @@ impl Kernel {
 
     /// See [`describe_surface`](crate::describe_surface).
     pub fn describe_surface(&mut self, surface: u32) -> bool {
-        let answer = self.editor(surface).map(|editor| {
-            let surface = editor.surface();
+        let answer = self.surface(surface).map(|open| {
+            let surface = open.editor.surface();
             let features = surface.features();
             let of_triangles =
                 surface.triangle_faces().iter().map(|&face| features.face_features()[face as usize]).collect();
@@ -148,8 +161,48 @@ impl Kernel {
     pub fn displacement(&mut self, surface: u32) -> bool {
         let input = std::mem::take(&mut self.input);
         let answer = serde_json::from_slice::<Vec<Edit>>(&input).map_err(Failure::from).and_then(|stack| {
-            let displacement = self.editor(surface)?.displacement(&stack)?;
-            Ok(vec![Array::Vectors(displacement)])
+            let open = self.surface(surface)?;
+            open.displacement = open.editor.displacement(&stack)?;
+            Ok(vec![Array::Vectors(open.displacement.clone())])
+        });
+        self.settle(answer)
+    }
+
+    /// See [`check`](crate::check).
+    pub fn check(&mut self, surface: u32) -> bool {
+        let answer = self.surface(surface).map(|open| {
+            let surface = open.editor.surface();
+            let reference = surface.points();
+            let shape: Vec<Vector> = reference
+                .iter()
+                .zip(&open.displacement)
+                .map(|(point, by)| std::array::from_fn(|axis| point[axis] + by[axis]))
+                .collect();
+            let report = tombolo_deform::surface::check(surface, reference, &shape);
+            let flawed = report.degenerate.first.iter().chain(&report.flipped.first).map(|flaw| flaw.face);
+            let crossing = report.intersections.first.iter().flat_map(|pair| pair.faces);
+            let faces: BTreeSet<u32> = flawed.chain(crossing).collect();
+            let triangles =
+                surface.triangle_faces().iter().zip(0..).filter(|(face, _)| faces.contains(face)).map(|(_, triangle)| triangle);
+            let text = if report.is_sound() { String::new() } else { report.to_string() };
+            vec![Array::Text(text), Array::Numbers(triangles.collect())]
+        });
+        self.settle(answer)
+    }
+
+    /// See [`skeleton`](crate::skeleton).
+    pub fn skeleton(&mut self, surface: u32) -> bool {
+        let answer = self.surface(surface).and_then(|open| {
+            let skeleton = open.editor.skeleton()?;
+            let curves = skeleton.curves();
+            let sizes = curves.iter().map(|curve| curve.nodes().len() as u32).collect();
+            let nodes = curves.iter().flat_map(|curve| curve.nodes().iter().copied()).collect();
+            Ok(vec![
+                Array::Vectors(skeleton.nodes().to_vec()),
+                Array::Numbers(sizes),
+                Array::Numbers(nodes),
+                Array::Numbers(skeleton.node_of_vertex().to_vec()),
+            ])
         });
         self.settle(answer)
     }
@@ -189,7 +242,7 @@ impl Kernel {
         self.settle(answer)
     }
 
-    fn editor(&mut self, surface: u32) -> Result<&mut Editor, Failure> {
+    fn surface(&mut self, surface: u32) -> Result<&mut Open, Failure> {
         self.surfaces.get_mut(&surface).ok_or(Failure::Handle(surface))
     }
 

@@ -11,6 +11,8 @@
 //! | [`close_surface`] | | | |
 //! | [`describe_surface`] | | 1 | points `f64`, triangles `u32`, the feature of each triangle `u32`, mesh vertices `u32`, names of features (JSON) |
 //! | [`displacement`] | a stack of edits (JSON) | 1 | the displacement of each vertex `f64` |
+//! | [`check`] | | 1 | what is wrong with the shape of the last displacement (a line, empty where it is sound), the first triangles at fault `u32` |
+//! | [`skeleton`] | | 1 | nodes `f64`, the number of nodes of each curve `u32`, their nodes `u32`, the node of each vertex `u32` |
 //! | [`decode_frame`] | a frame of kind 1 or 2 | 1 | its header (JSON), then the arrays that it names |
 //!
 //! Nothing here panics on any input. Should the kernel do so all the same, the module traps: its memory can no longer be relied
@@ -74,6 +76,19 @@ pub extern "C" fn describe_surface(surface: u32) -> u32 {
 #[unsafe(no_mangle)]
 pub extern "C" fn displacement(surface: u32) -> u32 {
     lock(&KERNEL).displacement(surface).into()
+}
+
+/// What is wrong with the shape that the last [`displacement`] of a surface leads to, and which triangles are at fault: those of
+/// the faces that the report names.
+#[unsafe(no_mangle)]
+pub extern "C" fn check(surface: u32) -> u32 {
+    lock(&KERNEL).check(surface).into()
+}
+
+/// The skeleton of a surface, extracted when it is first needed.
+#[unsafe(no_mangle)]
+pub extern "C" fn skeleton(surface: u32) -> u32 {
+    lock(&KERNEL).skeleton(surface).into()
 }
 
 /// The header and the arrays of a frame: integers as they were before they were packed, all other values as they are
