@@ -26,13 +26,14 @@ export class Ghost {
     this.broken = new Piece(this.points, renderer);
     const shell = this.shell.actor.getProperty();
     shell.setColor(...SHELL);
-    shell.setOpacity(0.35);
+    shell.setOpacity(0.45);
     shell.setAmbient(0.4);
     shell.setDiffuse(0.6);
     shell.setInterpolationToFlat();
     const edges = this.edges.actor.getProperty();
     edges.setColor(...SHELL);
     edges.setLighting(false);
+    edges.setLineWidth(2);
     const broken = this.broken.actor.getProperty();
     broken.setColor(...BROKEN);
     broken.setLighting(false);

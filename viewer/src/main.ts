@@ -220,7 +220,11 @@ part("tools").addEventListener("click", (event) => {
   looking = camera;
 });
 
-part("edit").addEventListener("input", () => preview.changed());
+part("edit").addEventListener("input", () => {
+  // What was wrong when Apply was pressed may be mended now.
+  showProblem("");
+  preview.changed();
+});
 part("edit").addEventListener("change", () => preview.changed());
 part("cancel").addEventListener("click", () => preview.clear());
 selection.onChange(() => preview.chosen());

@@ -182,8 +182,12 @@ impl Kernel {
             let flawed = report.degenerate.first.iter().chain(&report.flipped.first).map(|flaw| flaw.face);
             let crossing = report.intersections.first.iter().flat_map(|pair| pair.faces);
             let faces: BTreeSet<u32> = flawed.chain(crossing).collect();
-            let triangles =
-                surface.triangle_faces().iter().zip(0..).filter(|(face, _)| faces.contains(face)).map(|(_, triangle)| triangle);
+            let triangles = surface
+                .triangle_faces()
+                .iter()
+                .zip(0..)
+                .filter(|(face, _)| faces.contains(face))
+                .map(|(_, triangle)| triangle);
             let text = if report.is_sound() { String::new() } else { report.to_string() };
             vec![Array::Text(text), Array::Numbers(triangles.collect())]
         });
