@@ -126,7 +126,7 @@ impl std::fmt::Display for SurfaceReport {
 /// - **Flipped**: judged by the angles between normals only, before and after, so that a part that is turned as a whole, by
 ///   180° too, is never flipped. Sharp edges that the reference has, however sharp, do not count.
 /// - **Intersections**: by exact predicates, so that no rounding hides or makes one; touching counts. Triangles without area are
-///   left out.
+///   left out, and so are pairs that met or touched in the reference (to 10⁻⁹ of their size): parts in contact may move together.
 ///
 /// Pairs of triangles none of which moves are not looked at. Cost: a sort of the triangles and, for each, its neighbours in a
 /// hierarchy of boxes; on all threads. The same input gives the same report whatever their number.
@@ -363,7 +363,7 @@ impl Shapes<'_> {
                 }
             }
         }
-        if shared.intersect() && !Shared::of(self.reference, a, b).intersect() {
+        if shared.intersect() && Shared::of(self.reference, a, b).is_clear() {
             part.intersect(pair);
         }
     }

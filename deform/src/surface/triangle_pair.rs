@@ -11,6 +11,12 @@ use crate::vector::{cross, dot, subtract};
 
 type Triangle = [Vector; 3];
 
+/// What rounding can add to a distance, as a part of the size of both triangles together; well above what it does.
+const ROUNDING: f64 = 1e-14;
+
+/// The least distance of triangles that are clear of each other, as a part of their size.
+const CLEARANCE: f64 = 1e-9;
+
 /// Two triangles by what they share by number.
 pub(super) enum Shared {
     Nothing([Triangle; 2]),
@@ -59,7 +65,15 @@ impl Shared {
             Self::Vertex([a, b]) => {
                 !cones_are_apart(a, b) && (segment_meets(a, [b[1], b[2]]) || segment_meets(b, [a[1], a[2]]))
             }
-            Self::Nothing([a, b]) => !are_apart(a, b) && meet(a, b),
+            Self::Nothing([a, b]) => !are_apart(a, b, ROUNDING) && meet(a, b),
+        }
+    }
+
+    /// Whether the triangles neither meet nor, where they share nothing, lie so close that rounding could make them.
+    pub fn is_clear(&self) -> bool {
+        match self {
+            Self::Nothing([a, b]) => are_apart(a, b, CLEARANCE),
+            _ => !self.intersect(),
         }
     }
 }
@@ -174,13 +188,13 @@ impl Plane {
     }
 }
 
-/// Whether a plane is found that parts the triangles.
-fn are_apart(a: &Triangle, b: &Triangle) -> bool {
+/// Whether a plane is found that parts the triangles and leaves a gap of `margin` of their size; it is wherever there is one.
+fn are_apart(a: &Triangle, b: &Triangle, margin: f64) -> bool {
     let origin = a[0];
     let [a, b] = [a, b].map(|triangle| triangle.map(|point| subtract(point, origin)));
     let size = a.iter().chain(&b).flatten().fold(0.0f64, |size, value| size.max(value.abs()));
     let parts = |axis: Vector| {
-        let margin = 1e-14 * size * (axis[0].abs() + axis[1].abs() + axis[2].abs());
+        let margin = margin * size * (axis[0].abs() + axis[1].abs() + axis[2].abs());
         let range = |triangle: &Triangle| {
             let [x, y, z] = triangle.map(|point| dot(axis, point));
             [x.min(y).min(z), x.max(y).max(z)]
@@ -201,6 +215,7 @@ fn are_apart(a: &Triangle, b: &Triangle) -> bool {
         || parts(normal_b)
         || sides_a.into_iter().any(|side| parts(cross(normal_a, side)))
         || sides_b.into_iter().any(|side| parts(cross(normal_b, side)))
+        || sides_a.into_iter().any(|side| sides_b.into_iter().any(|other| parts(cross(side, other))))
 }
 
 /// Whether a plane through the first vertex, which is both triangles', is found that parts the cones they span there.
