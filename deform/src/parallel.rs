@@ -60,6 +60,18 @@ pub(crate) fn for_each_rows<T: Send, U: Send>(
     }
 }
 
+/// Does two things, at the same time where there are threads.
+pub(crate) fn join<A: Send, B: Send>(first: impl FnOnce() -> A + Send, second: impl FnOnce() -> B + Send) -> (A, B) {
+    #[cfg(feature = "parallel")]
+    {
+        rayon::join(first, second)
+    }
+    #[cfg(not(feature = "parallel"))]
+    {
+        (first(), second())
+    }
+}
+
 /// Whether `test` holds for any chunk of `0..count`.
 pub(crate) fn any_chunk(count: usize, chunk: usize, test: impl Fn(std::ops::Range<usize>) -> bool + Sync) -> bool {
     let range = |index: usize| index * chunk..((index + 1) * chunk).min(count);

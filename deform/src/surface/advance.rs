@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::adjacency::Adjacency;
 use super::features::Parts;
 use super::handle::{Handle, Role};
 use super::laplacian::Laplacian;
@@ -80,9 +81,11 @@ impl Advance {
 
     fn solve(&self, surface: &Surface, fields: &mut [Vec<f64>; 3]) -> Result<(), String> {
         let mut reason = String::new();
+        let adjacency = Adjacency::new(surface).map_err(|error| error.to_string())?;
         for (level, slack) in SLACKS.into_iter().enumerate() {
-            let laplacian = Laplacian::new(surface, slack).map_err(|error| error.to_string())?;
-            match Polyharmonic::new(&laplacian, level, self.order, self.prescribed.clone(), &self.parts) {
+            let laplacian = Laplacian::new(surface, &adjacency, slack);
+            let prescribed = self.prescribed.clone();
+            match Polyharmonic::new(surface.points(), &laplacian, level, self.order, prescribed, &self.parts) {
                 Ok(operator) => {
                     operator.solve(&laplacian, &self.parts, fields);
                     return Ok(());

@@ -226,6 +226,19 @@ pub enum EditError {
         /// What is wrong.
         source: Box<SkeletonEditError>,
     },
+    /// Two vertices at the same place, on open rims that are not joined, would part.
+    #[error(
+        "edit {edit} ({name}): mesh vertices {} and {} are at the same place but not joined, and the edit would part them; merge them, or move both sides of the seam together",
+        vertices[0], vertices[1]
+    )]
+    OpensSeam {
+        /// The place of the edit.
+        edit: usize,
+        /// Its kind.
+        name: &'static str,
+        /// The vertices, by mesh vertex numbers.
+        vertices: [u32; 2],
+    },
     /// A coordinate would overflow.
     #[error("edit {edit} ({name}): mesh vertex {vertex} would leave the range of floating-point numbers")]
     OutOfRange {

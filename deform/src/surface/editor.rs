@@ -1,7 +1,9 @@
 //! The editor: from a stack of edits to the displacement of a surface.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::adjacency::Adjacency;
 use super::features::Parts;
 use super::handle::{Handle, Role};
 use super::laplacian::Laplacian;
@@ -9,12 +11,22 @@ use super::motion::{self, Motion};
 use super::polyharmonic::{NotFactored, Polyharmonic};
 use super::{Edit, EditError, HarmonicOrder, Surface, SurfaceError};
 use crate::mesh::Vector;
+use crate::parallel;
 use crate::skeleton::{Skeleton, SkeletonEditor, SkeletonError, SkinError};
 use crate::vector::add;
 
 /// How many factored operators are kept, and how many numbers they may hold together (8 bytes each); the newest is always kept.
 const OPERATORS_KEPT: usize = 8;
 const NUMBERS_KEPT: usize = 1 << 26;
+
+/// How many numbers the kept layers may hold together; the newest is always kept.
+const FIELDS_KEPT: usize = 1 << 24;
+
+/// Vertices that one thread adds up in one go.
+const CHUNK: usize = 1 << 14;
+
+/// How much the two sides of a seam may part, in units of the largest motion.
+const SEAM: f64 = 1e-6;
 
 /// How much slack the triangles of the Laplacian must have (see [`Laplacian`]). The first is for rounding alone; the others are
 /// tried one after the other on surfaces whose triangles are so thin that the operator cannot be factored accurately.
@@ -29,7 +41,11 @@ const SLACKS: [f64; 4] = [1e-9, 1e-5, 1e-3, 1e-1];
 ///   translation, so does the whole component, exactly. Axes along which nothing is prescribed to move do not move.
 /// - The free vertices solve the polyharmonic equation on the reference surface with the handle's motion and the fixed vertices
 ///   prescribed. Components on which nothing is prescribed stay where they are.
+/// - Without a fixed feature nothing holds the surface back: a component then moves as a whole with a handle that is translated,
+///   and takes the smoothest shape that fits its motion otherwise.
 /// - Every edit acts on the shape that the edits before it have reached.
+/// - No seam opens: where two open rims lie at the same place without being joined, an edit that would part them is refused
+///   ([`EditError::OpensSeam`]).
 ///
 /// # What it does not
 /// On surfaces with triangles so thin that the operator cannot be factored to six digits, it is that of a slightly inflated
@@ -40,9 +56,11 @@ const SLACKS: [f64; 4] = [1e-9, 1e-5, 1e-3, 1e-1];
 /// slope, one two rings wide a curvature. At an open rim that nothing is prescribed on, the displacement has no slope across it.
 ///
 /// # Performance
-/// [`Editor::new`] sets up the Laplacian. Each new choice of handle, fixed features and order factors one sparse matrix; a few
-/// are kept, so that changing an amount costs one pair of triangular solves, and editing the last layer does not evaluate those
-/// below it again.
+/// [`Editor::new`] sets up the Laplacian, in linear time. Each new choice of handle, fixed features and order factors one sparse
+/// matrix, by nested dissection: `O(n^1.5)` operations and `O(n log n)` numbers for `n` vertices. What follows is linear in the
+/// handle's motion, so that it is solved once for each scalar field that the motion is made of (one for a translation, up to
+/// four for an affine map) on the shape below; another amount of the same edit costs one multiplication and addition for each
+/// vertex and field. A few operators and layers are kept, so that editing the last layer does not evaluate those below it again.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -75,25 +93,155 @@ pub struct Editor {
     parts: Vec<u32>,
     operators: Vec<Polyharmonic>,
     skeletons: SkeletonEditor,
-    /// The stack without its last edit, as it was last evaluated.
-    below: Option<(Vec<Edit>, Vec<Vector>)>,
+    /// Rim vertices at the same place.
+    seams: Vec<[u32; 2]>,
+    /// The most recently used last.
+    layers: Vec<Layer>,
+}
+
+/// An edit as it was evaluated, with what is below it in its stack.
+struct Layer {
+    lower: Vec<Edit>,
+    /// The displacement that those lead to.
+    below: Vec<Vector>,
+    followed: Option<Followed>,
+}
+
+impl Layer {
+    /// How many numbers it holds for each vertex.
+    fn fields(&self) -> usize {
+        3 + self.followed.as_ref().map_or(0, |followed| followed.bases.iter().flatten().count())
+    }
+}
+
+/// What the whole surface makes of each base of a handle's motion.
+struct Followed {
+    /// The edit but for its amount.
+    setting: Edit,
+    /// That of its [`Motion`].
+    unit: f64,
+    /// For each base its value at each vertex, once it has been needed.
+    bases: Vec<Option<Vec<f64>>>,
+}
+
+impl Followed {
+    fn is_for(&self, edit: &Edit) -> bool {
+        !edit.muted() && edit.harmonic_order().is_some() && without_amount(edit) == self.setting
+    }
+
+    /// The bases that an edit has a part of and that have not been solved for.
+    fn missing(&self, edit: &Edit) -> impl Iterator<Item = usize> {
+        let coefficients = Motion::coefficients(edit, self.unit);
+        self.bases
+            .iter()
+            .zip(coefficients)
+            .enumerate()
+            .filter(|(_, (base, coefficient))| base.is_none() && *coefficient != [0.0; 3])
+            .map(|(base, _)| base)
+    }
+
+    fn has_bases_of(&self, edit: &Edit) -> bool {
+        self.missing(edit).next().is_none()
+    }
+
+    /// Adds the displacement of an edit; whether all places reached are finite.
+    fn add(&self, points: &[Vector], edit: &Edit, displacement: &mut [Vector]) -> bool {
+        let coefficients = Motion::coefficients(edit, self.unit);
+        let terms: Vec<(&[f64], Vector)> = self
+            .bases
+            .iter()
+            .zip(coefficients)
+            .filter(|(_, coefficient)| *coefficient != [0.0; 3])
+            .filter_map(|(base, coefficient)| Some((base.as_deref()?, coefficient)))
+            .collect();
+        match terms.as_slice() {
+            [a] => add_terms([a], points, displacement),
+            [a, b] => add_terms([a, b], points, displacement),
+            [a, b, c] => add_terms([a, b, c], points, displacement),
+            [a, b, c, d] => add_terms([a, b, c, d], points, displacement),
+            _ => true,
+        }
+    }
+}
+
+/// Adds each base times its coefficient; whether all places reached are finite.
+fn add_terms<const COUNT: usize>(
+    terms: [&(&[f64], Vector); COUNT],
+    points: &[Vector],
+    displacement: &mut [Vector],
+) -> bool {
+    let all_finite = AtomicBool::new(true);
+    parallel::for_each_chunk(displacement, CHUNK, |chunk, part| {
+        let range = CHUNK * chunk..CHUNK * chunk + part.len();
+        let terms = terms.map(|(base, coefficient)| (&base[range.clone()], *coefficient));
+        let mut finite = true;
+        for (index, (moved, point)) in part.iter_mut().zip(&points[range.clone()]).enumerate() {
+            let mut sum = [0.0; 3];
+            for (base, coefficient) in terms {
+                for axis in 0..3 {
+                    sum[axis] += base[index] * coefficient[axis];
+                }
+            }
+            for axis in 0..3 {
+                moved[axis] += sum[axis];
+                finite &= (point[axis] + moved[axis]).is_finite();
+            }
+        }
+        if !finite {
+            all_finite.store(false, Ordering::Relaxed);
+        }
+    });
+    all_finite.into_inner()
+}
+
+/// An edit but for what its coefficients ([`Motion::coefficients`]) depend on, and for its name.
+fn without_amount(edit: &Edit) -> Edit {
+    let mut edit = edit.clone();
+    let name = match &mut edit {
+        Edit::Translate(edit) => {
+            edit.by = [0.0; 3];
+            &mut edit.name
+        }
+        Edit::Rotate(edit) => {
+            (edit.axis, edit.degrees) = ([0.0; 3], 0.0);
+            &mut edit.name
+        }
+        Edit::ScaleDirection(edit) => {
+            edit.factors = [0.0; 3];
+            &mut edit.name
+        }
+        Edit::ScaleNormals(edit) => {
+            edit.distance = 0.0;
+            &mut edit.name
+        }
+        Edit::Affine(edit) => {
+            (edit.matrix, edit.translation) = ([[0.0; 3]; 3], [0.0; 3]);
+            &mut edit.name
+        }
+        Edit::Displacement(_) | Edit::Skeleton(_) => return edit,
+    };
+    *name = None;
+    edit
 }
 
 impl Editor {
     /// An editor of a surface.
     ///
     /// # Errors
-    /// [`SurfaceError::NonManifoldEdge`].
+    /// [`SurfaceError::NonManifoldEdge`], [`SurfaceError::NonManifoldVertex`].
     pub fn new(surface: Arc<Surface>) -> Result<Self, SurfaceError> {
-        let laplacians = vec![Laplacian::new(&surface, SLACKS[0])?];
+        let adjacency = Adjacency::new(&surface)?;
+        adjacency.check_vertices(&surface)?;
+        let laplacians = vec![Laplacian::new(&surface, &adjacency, SLACKS[0])];
         let mut parts = Parts::new(surface.points().len());
         for &[a, b, c] in surface.triangles() {
             parts.join(a, b);
             parts.join(b, c);
         }
         let parts = (0..surface.points().len() as u32).map(|vertex| parts.root(vertex)).collect();
+        let seams = adjacency.seams(&surface);
         let skeletons = SkeletonEditor::new(Arc::clone(&surface));
-        Ok(Self { surface, laplacians, parts, operators: Vec::new(), skeletons, below: None })
+        Ok(Self { surface, laplacians, parts, operators: Vec::new(), skeletons, seams, layers: Vec::new() })
     }
 
     /// The surface.
@@ -108,7 +256,7 @@ impl Editor {
     /// [`SkinError::OtherSurface`], where it does not carry as many vertices as the surface has.
     pub fn with_skeleton(mut self, skeleton: Arc<Skeleton>) -> Result<Self, SkinError> {
         self.skeletons.set(skeleton)?;
-        self.below = None;
+        self.layers.clear();
         Ok(self)
     }
 
@@ -126,100 +274,380 @@ impl Editor {
     /// [`EditError`], naming the edit by its place in the stack, counted from 0. Nothing is evaluated unless every edit of the
     /// stack is valid on this surface.
     pub fn displacement(&mut self, stack: &[Edit]) -> Result<Vec<Vector>, EditError> {
-        let handles = stack
-            .iter()
-            .enumerate()
-            .map(|(edit, what)| Handle::find(&self.surface, what, edit))
-            .collect::<Result<Vec<_>, _>>()?;
-        for (edit, what) in stack.iter().enumerate() {
-            if let Edit::Skeleton(drag) = what
-                && !drag.muted
-            {
-                self.skeletons.nodes(drag).map_err(|source| EditError::skeleton(edit, source))?;
-            }
-        }
-        let Some((_, lower)) = stack.split_last() else {
-            return Ok(vec![[0.0; 3]; self.surface.points().len()]);
-        };
-        let (done, mut displacement) = match self.below.take() {
-            Some((edits, displacement)) if edits == lower => (lower.len(), displacement),
-            _ => (0, vec![[0.0; 3]; self.surface.points().len()]),
-        };
-        for (edit, handle) in handles.iter().enumerate().skip(done) {
-            if edit + 1 == stack.len() {
-                self.below = Some((lower.to_vec(), displacement.clone()));
-            }
-            self.apply(edit, &stack[edit], handle, &mut displacement)?;
-        }
+        let mut displacement = Vec::new();
+        self.displacement_into(stack, &mut displacement)?;
         Ok(displacement)
     }
 
-    fn apply(
-        &mut self,
-        edit: usize,
-        what: &Edit,
-        handle: &Handle,
-        displacement: &mut [Vector],
-    ) -> Result<(), EditError> {
-        if what.muted() {
-            return Ok(());
+    /// [`Editor::displacement`] into memory that is there already. After an error it holds nothing of meaning.
+    ///
+    /// # Errors
+    /// Those of [`Editor::displacement`].
+    pub fn displacement_into(&mut self, stack: &[Edit], displacement: &mut Vec<Vector>) -> Result<(), EditError> {
+        let kept = self.kept_layer(stack);
+        let known = kept.map_or(0, |kept| self.layers[kept].lower.len());
+        let mut handles = Vec::with_capacity(stack.len() - known);
+        for (place, edit) in stack.iter().enumerate().skip(known) {
+            let followed = kept.and_then(|kept| self.layers[kept].followed.as_ref());
+            handles.push(if place == known && followed.is_some_and(|followed| followed.is_for(edit)) {
+                edit.validate().map_err(|source| EditError::Invalid { edit: place, name: edit.name(), source })?;
+                None
+            } else {
+                Some(Handle::find(&self.surface, edit, place)?)
+            });
         }
-        let fields = match what {
-            Edit::Displacement(import) => axes(&motion::displacement(&self.surface, import, handle)),
-            Edit::Skeleton(drag) => {
-                let held = handle.roles.iter().map(|role| *role != Role::Handle).collect();
-                let moved = self.skeletons.displacement(drag, held, displacement);
-                axes(&moved.map_err(|source| EditError::skeleton(edit, source))?)
+        for (place, edit) in stack.iter().enumerate().skip(known) {
+            if let Edit::Skeleton(drag) = edit
+                && !drag.muted
+            {
+                self.skeletons.nodes(drag).map_err(|source| EditError::skeleton(place, source))?;
             }
-            _ => self.follow(edit, what, handle, displacement)?,
-        };
-        for (vertex, moved) in displacement.iter_mut().enumerate() {
-            let reference = self.surface.points()[vertex];
-            for axis in 0..3 {
-                moved[axis] += fields[axis][vertex];
-                if !(reference[axis] + moved[axis]).is_finite() {
-                    return Err(EditError::OutOfRange {
-                        edit,
-                        name: what.name(),
-                        vertex: self.surface.vertices()[vertex],
-                    });
-                }
-            }
+        }
+        displacement.resize(self.surface.points().len(), [0.0; 3]);
+        if kept.is_none() {
+            displacement.fill([0.0; 3]);
+        }
+        let mut layer = kept.map(|kept| self.layers.remove(kept));
+        for ((place, edit), handle) in stack.iter().enumerate().skip(known).zip(handles) {
+            let mut layer = layer.take().unwrap_or_else(|| Layer {
+                lower: stack[..place].to_vec(),
+                below: displacement.clone(),
+                followed: None,
+            });
+            let result = self.apply(place, edit, handle, &mut layer, displacement);
+            self.keep_layer(layer);
+            result?;
         }
         Ok(())
     }
 
-    /// The displacement along each axis of an edit whose handle makes a [`Motion`] that the free surface follows.
+    /// The kept layer that has the most of a stack below it, and best fits the edit above.
+    fn kept_layer(&self, stack: &[Edit]) -> Option<usize> {
+        let fit = |layer: &Layer| {
+            let edit = stack.get(layer.lower.len())?;
+            let fits = layer.followed.as_ref().is_some_and(|followed| followed.is_for(edit));
+            stack.starts_with(&layer.lower).then_some((layer.lower.len(), fits))
+        };
+        (0..self.layers.len()).filter_map(|kept| Some((fit(&self.layers[kept])?, kept))).max().map(|(_, kept)| kept)
+    }
+
+    fn keep_layer(&mut self, layer: Layer) {
+        let mut room = FIELDS_KEPT / self.surface.points().len().max(1);
+        room = room.saturating_sub(layer.fields());
+        let kept = self.layers.iter().rev().take_while(|layer| {
+            let fits = layer.fields() <= room;
+            room = room.saturating_sub(layer.fields());
+            fits
+        });
+        let dropped = self.layers.len() - kept.count();
+        self.layers.drain(..dropped);
+        self.layers.push(layer);
+    }
+
+    /// `displacement` becomes what the edits below and this one lead to. `handle` may be missing where the layer has been followed
+    /// before.
+    fn apply(
+        &mut self,
+        place: usize,
+        edit: &Edit,
+        handle: Option<Handle>,
+        layer: &mut Layer,
+        displacement: &mut [Vector],
+    ) -> Result<(), EditError> {
+        displacement.copy_from_slice(&layer.below);
+        if edit.muted() {
+            return Ok(());
+        }
+        if edit.harmonic_order().is_some() {
+            self.follow(place, edit, handle, layer)?;
+        }
+        let finite = match (edit, &layer.followed) {
+            (Edit::Displacement(import), _) => {
+                let handle = handle.map_or_else(|| Handle::find(&self.surface, edit, place), Ok)?;
+                self.add(&motion::displacement(&self.surface, import, &handle), displacement)
+            }
+            (Edit::Skeleton(drag), _) => {
+                let handle = handle.map_or_else(|| Handle::find(&self.surface, edit, place), Ok)?;
+                let held = handle.roles.iter().map(|role| *role != Role::Handle).collect();
+                let moved = self.skeletons.displacement(drag, held, displacement);
+                self.add(&moved.map_err(|source| EditError::skeleton(place, source))?, displacement)
+            }
+            (_, Some(followed)) => followed.add(self.surface.points(), edit, displacement),
+            (_, None) => true,
+        };
+        if !finite {
+            all_finite.store(false, Ordering::Relaxed);
+        }
+    });
+    all_finite.into_inner()
+}
+
+fn is_finite(points: &[Vector], displacement: &[Vector]) -> bool {
+    points.iter().zip(displacement).all(|(point, moved)| add(*point, *moved).iter().all(|value| value.is_finite()))
+}
+
+/// An edit but for what its coefficients ([`Motion::coefficients`]) depend on, and for its name.
+fn without_amount(edit: &Edit) -> Edit {
+    let mut edit = edit.clone();
+    let name = match &mut edit {
+        Edit::Translate(edit) => {
+            edit.by = [0.0; 3];
+            &mut edit.name
+        }
+        Edit::Rotate(edit) => {
+            (edit.axis, edit.degrees) = ([0.0; 3], 0.0);
+            &mut edit.name
+        }
+        Edit::ScaleDirection(edit) => {
+            edit.factors = [0.0; 3];
+            &mut edit.name
+        }
+        Edit::ScaleNormals(edit) => {
+            edit.distance = 0.0;
+            &mut edit.name
+        }
+        Edit::Affine(edit) => {
+            (edit.matrix, edit.translation) = ([[0.0; 3]; 3], [0.0; 3]);
+            &mut edit.name
+        }
+        Edit::Displacement(_) | Edit::Skeleton(_) => return edit,
+    };
+    *name = None;
+    edit
+}
+
+impl Editor {
+    /// An editor of a surface.
+    ///
+    /// # Errors
+    /// [`SurfaceError::NonManifoldEdge`], [`SurfaceError::NonManifoldVertex`].
+    pub fn new(surface: Arc<Surface>) -> Result<Self, SurfaceError> {
+        let adjacency = Adjacency::new(&surface)?;
+        adjacency.check_vertices(&surface)?;
+        let laplacians = vec![Laplacian::new(&surface, &adjacency, SLACKS[0])];
+        let mut parts = Parts::new(surface.points().len());
+        for &[a, b, c] in surface.triangles() {
+            parts.join(a, b);
+            parts.join(b, c);
+        }
+        let parts = (0..surface.points().len() as u32).map(|vertex| parts.root(vertex)).collect();
+        let seams = adjacency.seams(&surface);
+        let skeletons = SkeletonEditor::new(Arc::clone(&surface));
+        Ok(Self { surface, laplacians, parts, operators: Vec::new(), skeletons, seams, layers: Vec::new() })
+    }
+
+    /// The surface.
+    #[must_use]
+    pub fn surface(&self) -> &Arc<Surface> {
+        &self.surface
+    }
+
+    /// The same with this skeleton, in place of the one that would be extracted when the first skeleton edit needs it.
+    ///
+    /// # Errors
+    /// [`SkinError::OtherSurface`], where it does not carry as many vertices as the surface has.
+    pub fn with_skeleton(mut self, skeleton: Arc<Skeleton>) -> Result<Self, SkinError> {
+        self.skeletons.set(skeleton)?;
+        self.layers.clear();
+        Ok(self)
+    }
+
+    /// The skeleton of the reference surface, that skeleton edits drag. The first call extracts it, unless it was given.
+    ///
+    /// # Errors
+    /// [`SkeletonError`], where the surface has none.
+    pub fn skeleton(&mut self) -> Result<Arc<Skeleton>, SkeletonError> {
+        self.skeletons.skeleton()
+    }
+
+    /// The displacement of each surface vertex from [`Surface::points`] that a stack of edits asks for.
+    ///
+    /// # Errors
+    /// [`EditError`], naming the edit by its place in the stack, counted from 0. Nothing is evaluated unless every edit of the
+    /// stack is valid on this surface.
+    pub fn displacement(&mut self, stack: &[Edit]) -> Result<Vec<Vector>, EditError> {
+        let mut displacement = Vec::new();
+        self.displacement_into(stack, &mut displacement)?;
+        Ok(displacement)
+    }
+
+    /// [`Editor::displacement`] into memory that is there already. After an error it holds nothing of meaning.
+    ///
+    /// # Errors
+    /// Those of [`Editor::displacement`].
+    pub fn displacement_into(&mut self, stack: &[Edit], displacement: &mut Vec<Vector>) -> Result<(), EditError> {
+        let kept = self.kept_layer(stack);
+        let known = kept.map_or(0, |kept| self.layers[kept].lower.len());
+        let mut handles = Vec::with_capacity(stack.len() - known);
+        for (place, edit) in stack.iter().enumerate().skip(known) {
+            let followed = kept.and_then(|kept| self.layers[kept].followed.as_ref());
+            handles.push(if place == known && followed.is_some_and(|followed| followed.is_for(edit)) {
+                edit.validate().map_err(|source| EditError::Invalid { edit: place, name: edit.name(), source })?;
+                None
+            } else {
+                Some(Handle::find(&self.surface, edit, place)?)
+            });
+        }
+        for (place, edit) in stack.iter().enumerate().skip(known) {
+            if let Edit::Skeleton(drag) = edit
+                && !drag.muted
+            {
+                self.skeletons.nodes(drag).map_err(|source| EditError::skeleton(place, source))?;
+            }
+        }
+        displacement.resize(self.surface.points().len(), [0.0; 3]);
+        if kept.is_none() {
+            displacement.fill([0.0; 3]);
+        }
+        let mut layer = kept.map(|kept| self.layers.remove(kept));
+        for ((place, edit), handle) in stack.iter().enumerate().skip(known).zip(handles) {
+            let mut layer = layer.take().unwrap_or_else(|| Layer {
+                lower: stack[..place].to_vec(),
+                below: displacement.clone(),
+                followed: None,
+            });
+            let result = self.apply(place, edit, handle, &mut layer, displacement);
+            self.keep_layer(layer);
+            result?;
+        }
+        Ok(())
+    }
+
+    /// The kept layer that has the most of a stack below it, and best fits the edit above.
+    fn kept_layer(&self, stack: &[Edit]) -> Option<usize> {
+        let fit = |layer: &Layer| {
+            let edit = stack.get(layer.lower.len())?;
+            let fits = layer.followed.as_ref().is_some_and(|followed| followed.is_for(edit));
+            stack.starts_with(&layer.lower).then_some((layer.lower.len(), fits))
+        };
+        (0..self.layers.len()).filter_map(|kept| Some((fit(&self.layers[kept])?, kept))).max().map(|(_, kept)| kept)
+    }
+
+    fn keep_layer(&mut self, layer: Layer) {
+        let mut room = FIELDS_KEPT / self.surface.points().len().max(1);
+        room = room.saturating_sub(layer.fields());
+        let kept = self.layers.iter().rev().take_while(|layer| {
+            let fits = layer.fields() <= room;
+            room = room.saturating_sub(layer.fields());
+            fits
+        });
+        let dropped = self.layers.len() - kept.count();
+        self.layers.drain(..dropped);
+        self.layers.push(layer);
+    }
+
+    /// `displacement` becomes what the edits below and this one lead to. `handle` may be missing where the layer has been followed
+    /// before.
+    fn apply(
+        &mut self,
+        place: usize,
+        edit: &Edit,
+        handle: Option<Handle>,
+        layer: &mut Layer,
+        displacement: &mut [Vector],
+    ) -> Result<(), EditError> {
+        displacement.copy_from_slice(&layer.below);
+        if edit.muted() {
+            return Ok(());
+        }
+        let finite = match edit {
+            Edit::Displacement(import) => {
+                let handle = handle.map_or_else(|| Handle::find(&self.surface, edit, place), Ok)?;
+                let moved = motion::displacement(&self.surface, import, &handle);
+                displacement.iter_mut().zip(&moved).for_each(|(sum, moved)| *sum = add(*sum, *moved));
+                is_finite(self.surface.points(), displacement)
+            }
+            Edit::Skeleton(_) => {
+                let reason = "this build does not carry skeletons onto the surface".into();
+                return Err(EditError::Skeleton { edit: place, reason });
+            }
+            _ => {
+                self.follow(place, edit, handle, layer)?;
+                match &layer.followed {
+                    Some(followed) => followed.add(self.surface.points(), edit, displacement),
+                    None => true,
+                }
+            }
+        };
+        if !finite {
+            let reached = self.surface.points().iter().zip(displacement.iter()).map(|(a, b)| add(*a, *b));
+            let vertex = reached.into_iter().position(|point| !point.iter().all(|value| value.is_finite())).unwrap_or(0);
+            let vertex = self.surface.vertices()[vertex];
+            return Err(EditError::OutOfRange { edit: place, name: edit.name(), vertex });
+        }
+        self.check_seams(place, edit, displacement)
+    }
+
+    /// Adds a displacement; whether all places reached are finite.
+    fn add(&self, moved: &[Vector], displacement: &mut [Vector]) -> bool {
+        displacement.iter_mut().zip(moved).for_each(|(sum, moved)| *sum = add(*sum, *moved));
+        let mut reached = self.surface.points().iter().zip(displacement).map(|(point, moved)| add(*point, *moved));
+        reached.all(|point| point.iter().all(|value| value.is_finite()))
+    }
+
+    /// Solves for what the free surface makes of each base of the handle's motion that this edit has a part of.
     fn follow(
         &mut self,
-        edit: usize,
-        what: &Edit,
-        handle: &Handle,
-        displacement: &[Vector],
-    ) -> Result<[Vec<f64>; 3], EditError> {
-        let shape: Vec<Vector> =
-            self.surface.points().iter().zip(displacement).map(|(point, moved)| add(*point, *moved)).collect();
-        let mut fields = [0, 1, 2].map(|_| vec![0.0; shape.len()]);
-        let motion = Motion::new(&self.surface, what, edit, handle, &shape)?;
-        let (Some(motion), Some(order)) = (motion, what.harmonic_order()) else { return Ok(fields) };
-        for (&vertex, motion) in handle.vertices.iter().zip(&motion.displacement()) {
-            if handle.roles[vertex as usize] == Role::Handle {
-                for axis in 0..3 {
-                    fields[axis][vertex as usize] = motion[axis];
+        place: usize,
+        edit: &Edit,
+        handle: Option<Handle>,
+        layer: &mut Layer,
+    ) -> Result<(), EditError> {
+        let Some(order) = edit.harmonic_order() else { return Ok(()) };
+        if layer.followed.as_ref().is_some_and(|followed| followed.is_for(edit) && followed.has_bases_of(edit)) {
+            return Ok(());
+        }
+        let handle = handle.map_or_else(|| Handle::find(&self.surface, edit, place), Ok)?;
+        let points = self.surface.points().iter();
+        let shape: Vec<Vector> = points.zip(&layer.below).map(|(point, moved)| add(*point, *moved)).collect();
+        let Some(motion) = Motion::new(&self.surface, edit, place, &handle, &shape)? else { return Ok(()) };
+
+        let old = layer.followed.take().filter(|followed| followed.is_for(edit));
+        let mut followed = old.unwrap_or_else(|| Followed {
+            setting: without_amount(edit),
+            unit: motion.unit,
+            bases: vec![None; motion.bases.len()],
+        });
+        let wanted: Vec<usize> = followed.missing(edit).collect();
+        let mut fields = vec![vec![0.0; shape.len()]; wanted.len()];
+        for (field, &base) in fields.iter_mut().zip(&wanted) {
+            for (&vertex, &value) in handle.vertices.iter().zip(&motion.bases[base]) {
+                if handle.roles[vertex as usize] == Role::Handle {
+                    field[vertex as usize] = value;
                 }
             }
         }
         let prescribed: Vec<bool> = handle.roles.iter().map(|role| *role != Role::Free).collect();
         self.choose_operator(order, prescribed).map_err(|reason| EditError::NotSolvable {
-            edit,
-            name: what.name(),
+            edit: place,
+            name: edit.name(),
             order,
             reason,
         })?;
         if let Some(operator) = self.operators.last() {
             operator.solve(&self.laplacians[operator.level()], &self.parts, &mut fields);
         }
-        Ok(fields)
+        for (field, base) in fields.into_iter().zip(wanted) {
+            followed.bases[base] = Some(field);
+        }
+        layer.followed = Some(followed);
+        Ok(())
+    }
+
+    /// Refuses what would open a seam.
+    fn check_seams(&self, place: usize, edit: &Edit, displacement: &[Vector]) -> Result<(), EditError> {
+        if self.seams.is_empty() {
+            return Ok(());
+        }
+        let largest = displacement.iter().flatten().fold(0.0f64, |largest, value| largest.max(value.abs()));
+        for &seam in &self.seams {
+            let [a, b] = seam.map(|vertex| displacement[vertex as usize]);
+            if (0..3).any(|axis| (a[axis] - b[axis]).abs() > SEAM * largest) {
+                let vertices = seam.map(|vertex| self.surface.vertices()[vertex as usize]);
+                return Err(EditError::OpensSeam { edit: place, name: edit.name(), vertices });
+            }
+        }
+        Ok(())
     }
 
     /// Brings the operator for an order and a set of prescribed vertices to the end of the kept ones: kept from before, or
@@ -246,9 +674,12 @@ impl Editor {
         let mut reason = String::new();
         for (level, slack) in SLACKS.into_iter().enumerate() {
             if self.laplacians.len() == level {
-                self.laplacians.push(Laplacian::new(&self.surface, slack).map_err(|error| error.to_string())?);
+                let adjacency = Adjacency::new(&self.surface).map_err(|error| error.to_string())?;
+                self.laplacians.push(Laplacian::new(&self.surface, &adjacency, slack));
             }
-            match Polyharmonic::new(&self.laplacians[level], level, order, prescribed.clone(), &self.parts) {
+            let laplacian = &self.laplacians[level];
+            let points = self.surface.points();
+            match Polyharmonic::new(points, laplacian, level, order, prescribed.clone(), &self.parts) {
                 Ok(operator) => return Ok(operator),
                 Err(NotFactored::NotPositive) => reason = NotFactored::NotPositive.to_string(),
                 Err(other) => return Err(other.to_string()),
@@ -265,8 +696,4 @@ impl std::fmt::Debug for Editor {
             .field("operators", &self.operators.len())
             .finish_non_exhaustive()
     }
-}
-
-fn axes(vectors: &[Vector]) -> [Vec<f64>; 3] {
-    [0, 1, 2].map(|axis| vectors.iter().map(|vector| vector[axis]).collect())
 }

@@ -392,6 +392,14 @@ pub enum SurfaceError {
         /// The surface vertex.
         vertex: usize,
     },
+    /// A vertex whose triangles hang together by nothing but the vertex.
+    #[error(
+        "the surface is not a manifold: the faces around mesh vertex {vertex} do not hang together by their edges; split the vertex in two, or join the faces"
+    )]
+    NonManifoldVertex {
+        /// The vertex, by mesh vertex number.
+        vertex: u32,
+    },
     /// A sharp angle that is no angle between faces.
     #[error("sharp_angle_degrees is {0}; expected an angle from 0 to 180 degrees")]
     SharpAngle(f64),

@@ -1,7 +1,9 @@
 //! The Laplacian of a surface, robust against bad triangles.
 
-use super::features::edges;
-use super::{Surface, SurfaceError};
+use super::Surface;
+use super::adjacency::{Adjacency, OPEN, around};
+use crate::parallel;
+use crate::vector::subtract;
 
 /// The cotangent Laplacian of a surface with its lumped mass, on the intrinsic Delaunay triangulation.
 ///
@@ -22,18 +24,19 @@ pub(super) struct Laplacian {
     offsets: Vec<usize>,
     columns: Vec<u32>,
     weights: Vec<f64>,
+    diagonal: Vec<f64>,
     mass: Vec<f64>,
 }
 
 impl Laplacian {
-    /// # Errors
-    /// [`SurfaceError::NonManifoldEdge`].
-    pub fn new(surface: &Surface, slack: f64) -> Result<Self, SurfaceError> {
-        let mut triangulation = Triangulation::new(surface, slack)?;
+    /// Time and memory are linear in the surface, but for the flips.
+    pub fn new(surface: &Surface, adjacency: &Adjacency, slack: f64) -> Self {
+        let mut triangulation = Triangulation::new(surface, adjacency, slack);
         triangulation.make_delaunay();
-        let (mass, sides) = triangulation.mass_and_weights(surface.points().len());
-        let (offsets, columns, weights) = compressed_rows(surface.points().len(), &sides);
-        Ok(Self { offsets, columns, weights, mass })
+        let mass = triangulation.mass(surface.points().len());
+        let (offsets, columns, weights) = triangulation.compressed_rows(surface.points().len());
+        let diagonal = offsets.windows(2).map(|row| weights[row[0]..row[1]].iter().sum()).collect();
+        Self { offsets, columns, weights, diagonal, mass }
     }
 
     /// How many vertices the surface has.
@@ -54,8 +57,7 @@ impl Laplacian {
 
     /// The row of `L` of a vertex, its diagonal first.
     pub fn row(&self, vertex: usize) -> impl Iterator<Item = (usize, f64)> {
-        let diagonal = self.neighbours(vertex).map(|(_, weight)| weight).sum();
-        std::iter::once((vertex, diagonal)).chain(self.neighbours(vertex).map(|(column, weight)| (column, -weight)))
+        std::iter::once((vertex, self.diagonal[vertex])).chain(self.neighbours(vertex).map(|(column, weight)| (column, -weight)))
     }
 
     /// `L u`. Constants give exact zeros.
@@ -81,60 +83,52 @@ impl Laplacian {
     }
 }
 
-const OPEN: u32 = u32::MAX;
-
 /// A cotangent sum above this is no reason to flip: the four points lie on a circle up to rounding.
 const FLIP_BELOW: f64 = -1e-10;
+
+/// Triangles that one thread looks at in one go.
+const CHUNK: usize = 1 << 13;
 
 /// An intrinsic triangulation: side `3 t + s` of triangle `t` runs from its corner `s` to the next one.
 struct Triangulation {
     corners: Vec<u32>,
     lengths: Vec<f64>,
+    /// The cotangent of the angle opposite each side.
+    cotangents: Vec<f64>,
     twins: Vec<u32>,
 }
 
 impl Triangulation {
-    fn new(surface: &Surface, least_slack: f64) -> Result<Self, SurfaceError> {
-        let triangles = surface.triangles();
-        let mut twins = vec![OPEN; 3 * triangles.len()];
-        let sides = edges(triangles.iter().map(|triangle| triangle.as_slice()));
-        for same in sides.chunk_by(|a, b| a.ends == b.ends) {
-            match same {
-                // Triangles that walk their edge the same way have no common side to flip in; both keep their weight.
-                [first, second] if first.forward != second.forward => {
-                    let [a, b] = [first, second].map(|side| {
-                        let [low, high] = side.ends;
-                        let from = if side.forward { low } else { high };
-                        let triangle = triangles[side.face as usize];
-                        3 * side.face + (0..3).find(|&corner| triangle[corner as usize] == from).unwrap_or(0)
-                    });
-                    twins[a as usize] = b;
-                    twins[b as usize] = a;
-                }
-                [_] | [_, _] | [] => {}
-                more => {
-                    return Err(SurfaceError::NonManifoldEdge {
-                        edge: more[0].ends.map(|vertex| surface.vertices()[vertex as usize]),
-                        faces: more.len(),
-                    });
-                }
+    fn new(surface: &Surface, adjacency: &Adjacency, least_slack: f64) -> Self {
+        let corners = surface.triangles().as_flattened().to_vec();
+        let lengths = edge_lengths(surface, least_slack);
+        let mut cotangents = vec![0.0; lengths.len()];
+        parallel::for_each_chunk(&mut cotangents, 3 * CHUNK, |chunk, part| {
+            for (sides, lengths) in part.chunks_exact_mut(3).zip(lengths[3 * CHUNK * chunk..].chunks_exact(3)) {
+                sides.copy_from_slice(&three_cotangents(lengths[0], lengths[1], lengths[2]));
             }
-        }
-        Ok(Self { corners: triangles.concat(), lengths: edge_lengths(surface, least_slack), twins })
-    }
-
-    /// The cotangent of the angle opposite a side.
-    fn cotangent(&self, side: usize) -> f64 {
-        let [a, b, c] = around(side).map(|side| self.lengths[side]);
-        cotangent(a, b, c)
+        });
+        // Triangles that walk their edge the same way have no common side to flip in; both keep their weight.
+        let twin = |(side, &other): (usize, &u32)| {
+            if other != OPEN && corners[side] != corners[other as usize] { other } else { OPEN }
+        };
+        let twins = adjacency.across().iter().enumerate().map(twin).collect();
+        Self { corners, lengths, cotangents, twins }
     }
 
     /// Flips sides until no inner edge has a negative sum of cotangents.
     fn make_delaunay(&mut self) {
+        let sum = |side: usize, twin: u32| self.cotangents[side] + self.cotangents[twin as usize];
         let mut waiting: Vec<usize> = (0..self.twins.len())
             .rev()
-            .filter(|&side| self.twins[side] != OPEN && self.twins[side] as usize > side)
+            .filter(|&side| {
+                let twin = self.twins[side];
+                twin != OPEN && twin as usize > side && sum(side, twin) < FLIP_BELOW
+            })
             .collect();
+        if waiting.is_empty() {
+            return;
+        }
         let mut is_waiting = vec![false; self.twins.len()];
         for &side in &waiting {
             is_waiting[side] = true;
@@ -148,7 +142,8 @@ impl Triangulation {
                 continue;
             }
             let twin = twin as usize;
-            if self.cotangent(side) + self.cotangent(twin) >= FLIP_BELOW || flips_left == 0 || !self.flip(side, twin) {
+            let sum = self.cotangents[side] + self.cotangents[twin];
+            if sum >= FLIP_BELOW || flips_left == 0 || !self.flip(side, twin) {
                 continue;
             }
             flips_left -= 1;
@@ -186,6 +181,13 @@ impl Triangulation {
         for (slot, length) in [(h, diagonal), (h1, ca), (h2, ad), (g, diagonal), (g1, db), (g2, bc)] {
             self.lengths[slot] = length;
         }
+        for [first, second, third] in [[h, h1, h2], [g, g1, g2]] {
+            let cotangents =
+                three_cotangents(self.lengths[first], self.lengths[second], self.lengths[third]);
+            for (slot, cotangent) in [first, second, third].into_iter().zip(cotangents) {
+                self.cotangents[slot] = cotangent;
+            }
+        }
         // Outer sides have moved: b-c to g2, c-a to h1, a-d to h2, d-b to g1. Two of them may be twins of each other.
         let moved = |old: u32| match old {
             old if old == OPEN => OPEN,
@@ -205,26 +207,20 @@ impl Triangulation {
         true
     }
 
-    fn mass_and_weights(&self, vertex_count: usize) -> (Vec<f64>, Vec<(u32, u32, f64)>) {
+    fn mass(&self, vertex_count: usize) -> Vec<f64> {
         let mut mass = vec![0.0; vertex_count];
-        let mut sides = Vec::with_capacity(self.corners.len());
         for triangle in 0..self.corners.len() / 3 {
             let [a, b, c] = [0, 1, 2].map(|side| self.lengths[3 * triangle + side]);
             let [i, j, k] = [0, 1, 2].map(|corner| self.corners[3 * triangle + corner]);
             // The cotangents of the angles at k, i and j: opposite the sides i-j, j-k and k-i.
-            let opposite = [cotangent(a, b, c), cotangent(b, c, a), cotangent(c, a, b)];
-            for (from, to, cotangent) in [(i, j, opposite[0]), (j, k, opposite[1]), (k, i, opposite[2])] {
-                if from != to {
-                    sides.push((from, to, 0.5 * cotangent));
-                }
-            }
-            let area = area(a, b, c);
+            let opposite = [0, 1, 2].map(|side| self.cotangents[3 * triangle + side]);
+            let obtuse = opposite.iter().any(|&cotangent| cotangent < 0.0);
+            let area = if obtuse { area(a, b, c) } else { 0.0 };
             let corners = [
                 (i, opposite[1], a * a * opposite[0] + c * c * opposite[2]),
                 (j, opposite[2], a * a * opposite[0] + b * b * opposite[1]),
                 (k, opposite[0], b * b * opposite[1] + c * c * opposite[2]),
             ];
-            let obtuse = opposite.iter().any(|&cotangent| cotangent < 0.0);
             for (vertex, own, voronoi) in corners {
                 mass[vertex as usize] += match obtuse {
                     false => voronoi / 8.0,
@@ -237,14 +233,63 @@ impl Triangulation {
         for value in &mut mass {
             *value = (*value / mean).max(1e-12);
         }
-        (mass, sides)
+        mass
+    }
+
+    /// The weights of the neighbours of each vertex, rising.
+    fn compressed_rows(&self, vertex_count: usize) -> (Vec<usize>, Vec<u32>, Vec<f64>) {
+        // Each edge once, at the lower one of its sides; edges may join the same vertices, or one with itself.
+        let edges = || {
+            (0..self.corners.len()).filter_map(|side| {
+                let [from, to] = [side, around(side)[1]].map(|side| self.corners[side]);
+                let twin = self.twins[side];
+                let weight = 0.5 * self.cotangents[side];
+                match twin {
+                    _ if from == to => None,
+                    OPEN => Some((from, to, weight)),
+                    twin if (twin as usize) < side => None,
+                    twin => Some((from, to, weight + 0.5 * self.cotangents[twin as usize])),
+                }
+            })
+        };
+        let mut starts = vec![0usize; vertex_count + 1];
+        for (from, to, _) in edges() {
+            starts[from as usize + 1] += 1;
+            starts[to as usize + 1] += 1;
+        }
+        for row in 0..vertex_count {
+            starts[row + 1] += starts[row];
+        }
+        let mut entries = vec![(0u32, 0.0f64); starts[vertex_count]];
+        let mut next = starts.clone();
+        for (from, to, weight) in edges() {
+            for (row, column) in [(from, to), (to, from)] {
+                entries[next[row as usize]] = (column, weight);
+                next[row as usize] += 1;
+            }
+        }
+        let mut offsets = Vec::with_capacity(vertex_count + 1);
+        offsets.push(0);
+        let mut columns = Vec::with_capacity(entries.len());
+        let mut weights = Vec::with_capacity(entries.len());
+        for row in starts.windows(2) {
+            let entries = &mut entries[row[0]..row[1]];
+            entries.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+            for same in entries.chunk_by(|a, b| a.0 == b.0) {
+                columns.push(same[0].0);
+                weights.push(same.iter().map(|(_, weight)| weight).sum());
+            }
+            offsets.push(columns.len());
+        }
+        (offsets, columns, weights)
     }
 }
 
-/// The three sides of a triangle, from one of them on.
-fn around(side: usize) -> [usize; 3] {
-    let first = side - side % 3;
-    [side, first + (side + 1) % 3, first + (side + 2) % 3]
+/// The cotangents of the angles opposite each side of a triangle.
+fn three_cotangents(a: f64, b: f64, c: f64) -> [f64; 3] {
+    let area = 4.0 * area(a, b, c);
+    let [a, b, c] = [a * a, b * b, c * c];
+    [(b + c - a) / area, (c + a - b) / area, (a + b - c) / area]
 }
 
 /// The cotangent of the angle opposite the side of length `a`.
@@ -271,14 +316,17 @@ fn edge_lengths(surface: &Surface, least_slack: f64) -> Vec<f64> {
     let points = surface.points();
     let scale = points.iter().flatten().fold(0.0f64, |largest, value| largest.max(value.abs()));
     let scale = if scale > 0.0 { scale } else { 1.0 };
-    let mut lengths = Vec::with_capacity(3 * surface.triangles().len());
-    for triangle in surface.triangles() {
-        for side in 0..3 {
-            let [from, to] = [triangle[side], triangle[(side + 1) % 3]].map(|vertex| points[vertex as usize]);
-            let [x, y, z] = [0, 1, 2].map(|axis| to[axis] / scale - from[axis] / scale);
-            lengths.push(x.hypot(y).hypot(z));
+    let triangles = surface.triangles();
+    let mut lengths = vec![0.0; 3 * triangles.len()];
+    parallel::for_each_chunk(&mut lengths, 3 * CHUNK, |chunk, part| {
+        for (sides, triangle) in part.chunks_exact_mut(3).zip(&triangles[CHUNK * chunk..]) {
+            let corners = triangle.map(|vertex| points[vertex as usize].map(|value| value / scale));
+            for side in 0..3 {
+                let [x, y, z] = subtract(corners[(side + 1) % 3], corners[side]);
+                sides[side] = (x * x + y * y + z * z).sqrt();
+            }
         }
-    }
+    });
     let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;
     if mean > 0.0 {
         for length in &mut lengths {
@@ -301,39 +349,6 @@ fn edge_lengths(surface: &Surface, least_slack: f64) -> Vec<f64> {
     lengths
 }
 
-fn compressed_rows(count: usize, sides: &[(u32, u32, f64)]) -> (Vec<usize>, Vec<u32>, Vec<f64>) {
-    let mut starts = vec![0usize; count + 1];
-    for &(from, to, _) in sides {
-        starts[from as usize + 1] += 1;
-        starts[to as usize + 1] += 1;
-    }
-    for row in 0..count {
-        starts[row + 1] += starts[row];
-    }
-    let mut entries = vec![(0u32, 0.0f64); 2 * sides.len()];
-    let mut next = starts.clone();
-    for &(from, to, weight) in sides {
-        for (row, column) in [(from, to), (to, from)] {
-            entries[next[row as usize]] = (column, weight);
-            next[row as usize] += 1;
-        }
-    }
-    let mut offsets = Vec::with_capacity(count + 1);
-    offsets.push(0);
-    let mut columns = Vec::with_capacity(sides.len());
-    let mut weights = Vec::with_capacity(sides.len());
-    for row in 0..count {
-        let entries = &mut entries[starts[row]..starts[row + 1]];
-        entries.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        for same in entries.chunk_by(|a, b| a.0 == b.0) {
-            columns.push(same[0].0);
-            weights.push(same.iter().map(|(_, weight)| weight).sum());
-        }
-        offsets.push(columns.len());
-    }
-    (offsets, columns, weights)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -345,7 +360,7 @@ mod tests {
         let points = mesh.points().iter().map(|&point| place(point)).collect();
         let mesh = Mesh::new(points, mesh.cells().clone(), FeatureSource::SharpEdges).unwrap();
         let surface = Surface::extract(&mesh, &FeatureSettings::default()).unwrap();
-        let laplacian = Laplacian::new(&surface, 1e-9).unwrap();
+        let laplacian = Laplacian::new(&surface, &Adjacency::new(&surface).unwrap(), 1e-9);
         (surface, laplacian)
     }
 

@@ -80,15 +80,18 @@
 //! A displacement says nothing about whether the shape it leads to can be meshed: [`check`] finds folds and self-intersections of
 //! the surface, [`crate::quality`] inversions of the volume. Surfaces that are no manifold can be extracted and looked at, but not edited.
 
+mod adjacency;
 mod advance;
 mod amount;
 mod bounds;
 mod check;
+mod dissection;
 mod edit;
 mod edit_error;
 mod edit_validate;
 mod editor;
 mod extraction;
+mod factor;
 mod faces;
 mod features;
 mod handle;

@@ -14,13 +14,13 @@ use crate::vector::{add, cross, dot, scale, subtract};
 pub(super) struct Motion {
     /// For each base its value at each vertex of the handle, of the order of 1.
     pub bases: Vec<Vec<f64>>,
-    /// For each base the vector that it is multiplied with.
-    pub coefficients: Vec<Vector>,
+    /// What coordinates are divided by in the bases.
+    pub unit: f64,
 }
 
 impl Motion {
-    /// The motion that `edit` asks of its handle on the shape that the edits before it have reached; `None` for edits that give
-    /// each vertex its own displacement ([`displacement`], skeletons).
+    /// The bases of the motion that `edit` asks of its handle on the shape that the edits before it have reached, whatever its
+    /// amount; `None` for edits that give each vertex its own displacement ([`displacement`], skeletons).
     ///
     /// # Errors
     /// [`EditError::NoNormal`].
@@ -31,48 +31,49 @@ impl Motion {
         handle: &Handle,
         shape: &[Vector],
     ) -> Result<Option<Self>, EditError> {
+        let ones = || vec![1.0; handle.vertices.len()];
         Ok(Some(match edit {
-            Edit::Translate(edit) => {
-                Self { bases: vec![vec![1.0; handle.vertices.len()]], coefficients: vec![edit.by] }
-            }
-            Edit::Rotate(edit) => {
-                Self::linear(handle, shape, edit.center, rotation_minus_identity(edit.axis, edit.degrees), [0.0; 3])
-            }
-            Edit::ScaleDirection(edit) => {
-                let [x, y, z] = edit.factors.map(|factor| factor - 1.0);
-                Self::linear(handle, shape, edit.center, [[x, 0.0, 0.0], [0.0, y, 0.0], [0.0, 0.0, z]], [0.0; 3])
-            }
+            Edit::Translate(_) => Self { bases: vec![ones()], unit: 1.0 },
+            Edit::Rotate(edit) => Self::coordinates(handle, shape, edit.center),
+            Edit::ScaleDirection(edit) => Self::coordinates(handle, shape, edit.center),
             Edit::Affine(edit) => {
-                let mut columns = [0, 1, 2].map(|column| edit.matrix.map(|row| row[column]));
-                for (axis, column) in columns.iter_mut().enumerate() {
-                    column[axis] -= 1.0;
-                }
-                Self::linear(handle, shape, edit.center, columns, edit.translation)
+                let mut motion = Self::coordinates(handle, shape, edit.center);
+                motion.bases.push(ones());
+                motion
             }
-            Edit::ScaleNormals(edit) => {
+            Edit::ScaleNormals(_) => {
                 let normals = handle_normals(surface, handle, shape, place)?;
-                let along = |axis: usize| {
-                    let mut vector = [0.0; 3];
-                    vector[axis] = edit.distance;
-                    vector
-                };
-                Self {
-                    bases: [0, 1, 2].map(|axis| normals.iter().map(|normal| normal[axis]).collect()).to_vec(),
-                    coefficients: [0, 1, 2].map(along).to_vec(),
-                }
+                let bases = [0, 1, 2].map(|axis| normals.iter().map(|normal| normal[axis]).collect());
+                Self { bases: bases.to_vec(), unit: 1.0 }
             }
             Edit::Displacement(_) | Edit::Skeleton(_) => return Ok(None),
         }))
     }
 
-    /// `displacement(x) = columns (x - center) + translation`.
-    fn linear(
-        handle: &Handle,
-        shape: &[Vector],
-        center: Option<Vector>,
-        columns: [Vector; 3],
-        translation: Vector,
-    ) -> Self {
+    /// What the bases of [`Motion::new`] are multiplied with for the amount of an edit; none for edits that have no bases.
+    pub fn coefficients(edit: &Edit, unit: f64) -> Vec<Vector> {
+        match edit {
+            Edit::Translate(edit) => vec![edit.by],
+            Edit::Rotate(edit) => {
+                rotation_minus_identity(edit.axis, edit.degrees).map(|column| scale(column, unit)).to_vec()
+            }
+            Edit::ScaleDirection(edit) => diagonal(edit.factors.map(|factor| (factor - 1.0) * unit)),
+            Edit::Affine(edit) => {
+                let mut columns = [0, 1, 2].map(|column| edit.matrix.map(|row| row[column])).to_vec();
+                for (axis, column) in columns.iter_mut().enumerate() {
+                    column[axis] -= 1.0;
+                    *column = scale(*column, unit);
+                }
+                columns.push(edit.translation);
+                columns
+            }
+            Edit::ScaleNormals(edit) => diagonal([edit.distance; 3]),
+            Edit::Displacement(_) | Edit::Skeleton(_) => Vec::new(),
+        }
+    }
+
+    /// The coordinates from a centre, in units of about their largest.
+    fn coordinates(handle: &Handle, shape: &[Vector], center: Option<Vector>) -> Self {
         let points = || handle.vertices.iter().map(|&vertex| shape[vertex as usize]);
         let [lower, upper] = bounds(points());
         let center = center.unwrap_or_else(|| [0, 1, 2].map(|axis| 0.5 * lower[axis] + 0.5 * upper[axis]));
@@ -83,30 +84,18 @@ impl Motion {
             .fold(0.0f64, |largest, value| largest.max(value.abs()));
         // A power of two changes no digit.
         let unit = if reach.is_normal() { reach.log2().ceil().clamp(-1000.0, 1000.0).exp2() } else { 1.0 };
-        let mut motion = Self {
-            bases: [0, 1, 2]
-                .map(|axis| points().map(|point| (point[axis] - center[axis]) / unit).collect::<Vec<f64>>())
-                .to_vec(),
-            coefficients: columns.map(|column| scale(column, unit)).to_vec(),
-        };
-        if translation != [0.0; 3] {
-            motion.bases.push(vec![1.0; handle.vertices.len()]);
-            motion.coefficients.push(translation);
-        }
-        motion
+        let bases = [0, 1, 2].map(|axis| points().map(|point| (point[axis] - center[axis]) / unit).collect());
+        Self { bases: bases.to_vec(), unit }
     }
+}
 
-    /// The displacement of each vertex of the handle.
-    pub fn displacement(&self) -> Vec<Vector> {
-        let count = self.bases.first().map_or(0, Vec::len);
-        let mut sum = vec![[0.0; 3]; count];
-        for (base, &coefficient) in self.bases.iter().zip(&self.coefficients) {
-            for (sum, &value) in sum.iter_mut().zip(base) {
-                *sum = add(*sum, scale(coefficient, value));
-            }
-        }
-        sum
-    }
+fn diagonal(values: Vector) -> Vec<Vector> {
+    let along = |axis: usize| {
+        let mut vector = [0.0; 3];
+        vector[axis] = values[axis];
+        vector
+    };
+    [0, 1, 2].map(along).to_vec()
 }
 
 /// The columns of `R - 1` for the rotation `R` about an axis through the origin (Rodrigues), without the digits that the

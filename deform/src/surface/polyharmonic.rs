@@ -1,15 +1,16 @@
 //! Polyharmonic equations on a surface.
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::sparse::linalg::cholesky::{self, LltRef, SymbolicCholesky, SymmetricOrdering};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, Mat, Par, Side};
-
 use super::HarmonicOrder;
+use super::dissection::dissect;
+use super::factor::{Factor, NoFactor, Rows};
 use super::laplacian::Laplacian;
+use crate::mesh::Vector;
 
 /// The largest error that one step of refinement, which squares it, still brings below what matters.
 const LARGEST_ERROR: f64 = 1e-3;
+
+/// More couplings than this for each vertex, in the mean, are too many: some vertices then have most others for neighbours.
+const COUPLINGS: f64 = 4096.0;
 
 /// The factored polyharmonic operator `L`, `L M^-1 L` or `L M^-1 L M^-1 L` with some vertices prescribed.
 ///
@@ -22,15 +23,16 @@ pub(super) struct Polyharmonic {
     /// Which of the editor's Laplacians it is made from.
     level: usize,
     free: Vec<u32>,
-    symbolic: Option<SymbolicCholesky<u32>>,
-    values: Vec<f64>,
+    factor: Option<Factor>,
 }
 
 impl Polyharmonic {
-    /// `parts` gives each vertex its component; components without a prescribed vertex take no part.
+    /// `points` are the places of the vertices, from which the order of elimination is found. `parts` gives each vertex its
+    /// component; components without a prescribed vertex take no part.
     ///
     /// The operator is tried out on a known solution, so that one that has lost too many digits is refused as well.
     pub fn new(
+        points: &[Vector],
         laplacian: &Laplacian,
         level: usize,
         order: HarmonicOrder,
@@ -45,13 +47,34 @@ impl Polyharmonic {
             .filter(|&vertex| !prescribed[vertex] && held[parts[vertex] as usize])
             .map(|vertex| vertex as u32)
             .collect();
-        let mut operator = Self { order, prescribed, level, free, symbolic: None, values: Vec::new() };
+        let mut operator = Self { order, prescribed, level, free, factor: None };
         if operator.free.is_empty() {
             return Ok(operator);
         }
-        let matrix = assemble(laplacian, order, &operator.free).ok_or(NotFactored::TooLarge)?;
-        let (symbolic, values) = factor(&matrix, operator.free.len())?;
-        (operator.symbolic, operator.values) = (Some(symbolic), values);
+        let couplings: f64 =
+            (0..laplacian.len()).map(|vertex| (laplacian.neighbours(vertex).count() as f64).powi(order as i32)).sum();
+        if order != HarmonicOrder::Harmonic && couplings > COUPLINGS * laplacian.len() as f64 {
+            return Err(NotFactored::TooLarge);
+        }
+        let neighbours = |vertex: usize| laplacian.neighbours(vertex).map(|(other, _)| other);
+        let branch = dissect(points, &neighbours, order as usize, &mut operator.free);
+        let mut places = vec![NONE; laplacian.len()];
+        for (place, &vertex) in operator.free.iter().enumerate() {
+            places[vertex as usize] = place as u32;
+        }
+        let rows = || OperatorRows {
+            laplacian,
+            order,
+            free: &operator.free,
+            places: &places,
+            row: SparseRow::new(laplacian.len()),
+            product: SparseRow::new(laplacian.len()),
+        };
+        let factor = Factor::new(&branch, &rows).map_err(|reason| match reason {
+            NoFactor::OutOfMemory => NotFactored::TooLarge,
+            NoFactor::NotPositive => NotFactored::NotPositive,
+        })?;
+        operator.factor = Some(factor);
         if operator.error_on_ones(laplacian) < LARGEST_ERROR { Ok(operator) } else { Err(NotFactored::NotPositive) }
     }
 
@@ -62,10 +85,10 @@ impl Polyharmonic {
             ones[vertex as usize] = 1.0;
         }
         let image = laplacian.apply_power(self.order as usize, &ones);
-        let mut solution = Mat::from_fn(self.free.len(), 1, |row, _| image[self.free[row] as usize]);
+        let mut solution: Vec<f64> = self.free.iter().map(|&vertex| image[vertex as usize]).collect();
         self.solve_in_place(&mut solution);
         // A maximum that keeps NaN.
-        (0..self.free.len()).map(|row| (solution[(row, 0)] - 1.0).abs()).fold(0.0, |a, b| if b <= a { a } else { b })
+        solution.iter().map(|value| (value - 1.0).abs()).fold(0.0, |a, b| if b <= a { a } else { b })
     }
 
     /// Whether this operator answers for an order and a set of prescribed vertices.
@@ -80,7 +103,7 @@ impl Polyharmonic {
 
     /// How many numbers the factor holds.
     pub fn size(&self) -> usize {
-        self.values.len()
+        self.factor.as_ref().map_or(0, Factor::len)
     }
 
     /// Fills in the free vertices of fields whose prescribed values are given, and leaves all others as they are.
@@ -116,12 +139,14 @@ impl Polyharmonic {
         for _ in 0..corrections {
             let residuals: Vec<Vec<f64>> =
                 active.iter().map(|(_, _, work)| laplacian.apply_power(self.order as usize, work)).collect();
-            let mut correction =
-                Mat::from_fn(self.free.len(), active.len(), |row, column| -residuals[column][self.free[row] as usize]);
+            let mut correction: Vec<f64> = residuals
+                .iter()
+                .flat_map(|residual| self.free.iter().map(|&vertex| -residual[vertex as usize]))
+                .collect();
             self.solve_in_place(&mut correction);
             for (column, (_, _, work)) in active.iter_mut().enumerate() {
                 for (row, &vertex) in self.free.iter().enumerate() {
-                    work[vertex as usize] += correction[(row, column)];
+                    work[vertex as usize] += correction[column * self.free.len() + row];
                 }
             }
         }
@@ -147,15 +172,9 @@ impl Polyharmonic {
         bases.into_iter().map(|base| base.unwrap_or(0.0)).collect()
     }
 
-    fn solve_in_place(&self, right_hand_sides: &mut Mat<f64>) {
-        if let Some(symbolic) = &self.symbolic {
-            let scratch = symbolic.solve_in_place_scratch::<f64>(right_hand_sides.ncols(), Par::Seq);
-            LltRef::new(symbolic, &self.values).solve_in_place_with_conj(
-                Conj::No,
-                right_hand_sides.as_mut(),
-                Par::Seq,
-                MemStack::new(&mut MemBuffer::new(scratch)),
-            );
+    fn solve_in_place(&self, right_hand_sides: &mut [f64]) {
+        if let Some(factor) = &self.factor {
+            factor.solve_in_place(right_hand_sides);
         }
     }
 }
@@ -169,49 +188,42 @@ pub(super) enum NotFactored {
     NotPositive,
 }
 
-/// The upper triangle of a symmetric matrix, column after column.
-struct UpperTriangle {
-    starts: Vec<u32>,
-    rows: Vec<u32>,
-    values: Vec<f64>,
+/// The rows of the operator, by places in the order of elimination.
+struct OperatorRows<'a> {
+    laplacian: &'a Laplacian,
+    order: HarmonicOrder,
+    free: &'a [u32],
+    /// The place of each vertex; [`NONE`] for one that is not free.
+    places: &'a [u32],
+    row: SparseRow,
+    product: SparseRow,
 }
 
-/// The operator among the free vertices; `None` where it has more entries than can be numbered.
-fn assemble(laplacian: &Laplacian, order: HarmonicOrder, free: &[u32]) -> Option<UpperTriangle> {
-    const NONE: u32 = u32::MAX;
-    let mut slots = vec![NONE; laplacian.len()];
-    for (slot, &vertex) in free.iter().enumerate() {
-        slots[vertex as usize] = slot as u32;
-    }
-    let mut matrix = UpperTriangle { starts: vec![0], rows: Vec::new(), values: Vec::new() };
-    let mut row = SparseRow::new(laplacian.len());
-    let mut product = SparseRow::new(laplacian.len());
-    for (column, &vertex) in free.iter().enumerate() {
+const NONE: u32 = u32::MAX;
+
+impl Rows for OperatorRows<'_> {
+    fn row(&mut self, place: usize, mut entry: impl FnMut(usize, f64)) {
+        let (row, product) = (&mut self.row, &mut self.product);
         row.clear();
-        for (neighbour, value) in laplacian.row(vertex as usize) {
+        for (neighbour, value) in self.laplacian.row(self.free[place] as usize) {
             row.add(neighbour, value);
         }
-        for _ in 1..order as usize {
+        for _ in 1..self.order as usize {
             product.clear();
             for &middle in &row.pattern {
-                let factor = row.values[middle] / laplacian.mass()[middle];
-                for (neighbour, value) in laplacian.row(middle) {
+                let factor = row.values[middle] / self.laplacian.mass()[middle];
+                for (neighbour, value) in self.laplacian.row(middle) {
                     product.add(neighbour, factor * value);
                 }
             }
-            std::mem::swap(&mut row, &mut product);
+            std::mem::swap(row, product);
         }
-        row.pattern.sort_unstable();
         for &neighbour in &row.pattern {
-            // Free vertices rise, and so do their slots.
-            if slots[neighbour] != NONE && slots[neighbour] as usize <= column {
-                matrix.rows.push(slots[neighbour]);
-                matrix.values.push(row.values[neighbour]);
+            if self.places[neighbour] != NONE {
+                entry(self.places[neighbour] as usize, row.values[neighbour]);
             }
         }
-        matrix.starts.push(i32::try_from(matrix.rows.len()).ok()? as u32);
     }
-    Some(matrix)
 }
 
 /// A row that is dense to look up and sparse to walk.
@@ -241,33 +253,4 @@ impl SparseRow {
             self.present[column] = false;
         }
     }
-}
-
-fn factor(matrix: &UpperTriangle, size: usize) -> Result<(SymbolicCholesky<u32>, Vec<f64>), NotFactored> {
-    let pattern = SymbolicSparseColMatRef::new_checked(size, size, &matrix.starts, None, &matrix.rows);
-    let symbolic = cholesky::factorize_symbolic_cholesky(
-        pattern,
-        Side::Upper,
-        SymmetricOrdering::Amd,
-        cholesky::CholeskySymbolicParams::default(),
-    )
-    .map_err(|_| NotFactored::TooLarge)?;
-    let mut values = Vec::new();
-    values.try_reserve_exact(symbolic.len_val()).map_err(|_| NotFactored::TooLarge)?;
-    values.resize(symbolic.len_val(), 0.0);
-    let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, faer::Spec::default());
-    let mut memory = MemBuffer::try_new(scratch).map_err(|_| NotFactored::TooLarge)?;
-    symbolic
-        .factorize_numeric_llt(
-            &mut values,
-            SparseColMatRef::new(pattern, &matrix.values),
-            Side::Upper,
-            faer::linalg::cholesky::llt::factor::LltRegularization::default(),
-            Par::Seq,
-            MemStack::new(&mut memory),
-            faer::Spec::default(),
-        )
-        .map_err(|_| NotFactored::NotPositive)?;
-    // A factor that is not finite would poison every solution without a word.
-    if values.iter().all(|value| value.is_finite()) { Ok((symbolic, values)) } else { Err(NotFactored::NotPositive) }
 }

@@ -1,0 +1,131 @@
+//! Which triangles of a surface meet.
+
+use super::{Surface, SurfaceError};
+
+/// The sides of the triangles of a surface: side `3 t + s` runs from corner `s` of triangle `t` to the next one.
+pub(super) struct Adjacency {
+    /// The other side at the edge of each side, [`OPEN`] at a rim.
+    across: Vec<u32>,
+}
+
+/// No triangle on the other side.
+pub(super) const OPEN: u32 = u32::MAX;
+
+impl Adjacency {
+    /// Time and memory are linear in the surface.
+    ///
+    /// # Errors
+    /// [`SurfaceError::NonManifoldEdge`].
+    pub fn new(surface: &Surface) -> Result<Self, SurfaceError> {
+        let triangles = surface.triangles();
+        let ends = |side: usize| {
+            let triangle = &triangles[side / 3];
+            let [a, b] = [triangle[side % 3], triangle[(side + 1) % 3]];
+            (a.min(b), a.max(b))
+        };
+        let sides = 3 * triangles.len();
+        let mut starts = vec![0u32; surface.points().len() + 1];
+        for side in 0..sides {
+            starts[ends(side).0 as usize + 1] += 1;
+        }
+        for vertex in 1..starts.len() {
+            starts[vertex] += starts[vertex - 1];
+        }
+        let mut by_lower = vec![(0u32, 0u32); sides];
+        let mut next = starts.clone();
+        for side in 0..sides {
+            let (lower, upper) = ends(side);
+            by_lower[next[lower as usize] as usize] = (upper, side as u32);
+            next[lower as usize] += 1;
+        }
+        let mut across = vec![OPEN; sides];
+        for (lower, range) in starts.windows(2).enumerate() {
+            let around = &mut by_lower[range[0] as usize..range[1] as usize];
+            around.sort_unstable();
+            for same in around.chunk_by(|a, b| a.0 == b.0) {
+                match *same {
+                    [(_, first), (_, second)] => {
+                        across[first as usize] = second;
+                        across[second as usize] = first;
+                    }
+                    [_] | [] => {}
+                    [(upper, _), ..] => {
+                        return Err(SurfaceError::NonManifoldEdge {
+                            edge: [lower as u32, upper].map(|vertex| surface.vertices()[vertex as usize]),
+                            faces: same.len(),
+                        });
+                    }
+                }
+            }
+        }
+        Ok(Self { across })
+    }
+
+    /// The other side at the edge of each side, [`OPEN`] at a rim.
+    pub fn across(&self) -> &[u32] {
+        &self.across
+    }
+
+    /// Makes sure that the triangles around each vertex hang together by their edges.
+    ///
+    /// # Errors
+    /// [`SurfaceError::NonManifoldVertex`].
+    pub fn check_vertices(&self, surface: &Surface) -> Result<(), SurfaceError> {
+        let triangles = surface.triangles();
+        let mut corners = vec![0u32; surface.points().len()];
+        let mut seen = vec![false; surface.points().len()];
+        for &vertex in triangles.as_flattened() {
+            corners[vertex as usize] += 1;
+        }
+        for (corner, &vertex) in triangles.as_flattened().iter().enumerate() {
+            if std::mem::replace(&mut seen[vertex as usize], true) {
+                continue;
+            }
+            let first = corner - corner % 3;
+            // Along the side that leaves the vertex, and, where a rim ends that, along the one that comes to it.
+            let mut found = 1;
+            for start in [corner, first + (corner + 2) % 3] {
+                let mut side = start;
+                while self.across[side] != OPEN && found <= corners[vertex as usize] {
+                    let other = self.across[side] as usize;
+                    if other / 3 == first / 3 {
+                        break;
+                    }
+                    found += 1;
+                    let [own, next, last] = around(other);
+                    side = if triangles[own / 3][own % 3] == vertex { last } else { next };
+                }
+                if self.across[side] != OPEN {
+                    break;
+                }
+            }
+            if found != corners[vertex as usize] {
+                return Err(SurfaceError::NonManifoldVertex { vertex: surface.vertices()[vertex as usize] });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Adjacency {
+    /// Pairs of rim vertices at the same place, the lower one first.
+    pub fn seams(&self, surface: &Surface) -> Vec<[u32; 2]> {
+        let triangles = surface.triangles().as_flattened();
+        let mut rim: Vec<u32> = (0..self.across.len())
+            .filter(|&side| self.across[side] == OPEN)
+            .flat_map(|side| [triangles[side], triangles[around(side)[1]]])
+            .collect();
+        rim.sort_unstable();
+        rim.dedup();
+        // -0 and 0 are the same place.
+        let key = |vertex: u32| surface.points()[vertex as usize].map(|value| (value + 0.0).to_bits());
+        rim.sort_by_key(|&vertex| key(vertex));
+        rim.chunk_by(|&a, &b| key(a) == key(b)).flat_map(|same| same[1..].iter().map(|&other| [same[0], other])).collect()
+    }
+}
+
+/// The three sides of a triangle, from one of them on.
+pub(super) fn around(side: usize) -> [usize; 3] {
+    let first = side - side % 3;
+    [side, first + (side + 1) % 3, first + (side + 2) % 3]
+}
