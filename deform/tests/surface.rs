@@ -1,5 +1,7 @@
 //! Surfaces: what is extracted, which features are found, and what edits do.
 
+#[path = "surface/accuracy.rs"]
+mod accuracy;
 #[path = "surface/actions.rs"]
 mod actions;
 #[path = "surface/checks.rs"]

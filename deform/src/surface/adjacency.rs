@@ -1,5 +1,6 @@
 //! Which triangles of a surface meet.
 
+use super::features::Parts;
 use super::{Surface, SurfaceError};
 
 /// The sides of the triangles of a surface: side `3 t + s` runs from corner `s` of triangle `t` to the next one.
@@ -108,19 +109,29 @@ impl Adjacency {
 }
 
 impl Adjacency {
-    /// Pairs of rim vertices at the same place, the lower one first.
+    /// Pairs of rim vertices at the same place that no edges without length join, the lower one first.
     pub fn seams(&self, surface: &Surface) -> Vec<[u32; 2]> {
-        let triangles = surface.triangles().as_flattened();
-        let mut rim: Vec<u32> = (0..self.across.len())
-            .filter(|&side| self.across[side] == OPEN)
-            .flat_map(|side| [triangles[side], triangles[around(side)[1]]])
-            .collect();
+        let corners = surface.triangles().as_flattened();
+        let ends = |side: usize| [corners[side], corners[around(side)[1]]];
+        let mut rim: Vec<u32> =
+            (0..self.across.len()).filter(|&side| self.across[side] == OPEN).flat_map(ends).collect();
         rim.sort_unstable();
         rim.dedup();
         // -0 and 0 are the same place.
         let key = |vertex: u32| surface.points()[vertex as usize].map(|value| (value + 0.0).to_bits());
         rim.sort_by_key(|&vertex| key(vertex));
-        rim.chunk_by(|&a, &b| key(a) == key(b)).flat_map(|same| same[1..].iter().map(|&other| [same[0], other])).collect()
+        let mut seams: Vec<[u32; 2]> = rim
+            .chunk_by(|&a, &b| key(a) == key(b))
+            .flat_map(|same| same[1..].iter().map(|&other| [same[0], other]))
+            .collect();
+        if !seams.is_empty() {
+            let mut joined = Parts::new(surface.points().len());
+            for [a, b] in (0..corners.len()).map(ends).filter(|&[a, b]| key(a) == key(b)) {
+                joined.join(a, b);
+            }
+            seams.retain(|&[a, b]| joined.root(a) != joined.root(b));
+        }
+        seams
     }
 }
 

@@ -321,196 +321,60 @@ impl Editor {
         Ok(())
     }
 
-    /// The kept layer that has the most of a stack below it, and best fits the edit above.
-    fn kept_layer(&self, stack: &[Edit]) -> Option<usize> {
-        let fit = |layer: &Layer| {
-            let edit = stack.get(layer.lower.len())?;
-            let fits = layer.followed.as_ref().is_some_and(|followed| followed.is_for(edit));
-            stack.starts_with(&layer.lower).then_some((layer.lower.len(), fits))
-        };
-        (0..self.layers.len()).filter_map(|kept| Some((fit(&self.layers[kept])?, kept))).max().map(|(_, kept)| kept)
-    }
-
-    fn keep_layer(&mut self, layer: Layer) {
-        let mut room = FIELDS_KEPT / self.surface.points().len().max(1);
-        room = room.saturating_sub(layer.fields());
-        let kept = self.layers.iter().rev().take_while(|layer| {
-            let fits = layer.fields() <= room;
-            room = room.saturating_sub(layer.fields());
-            fits
-        });
-        let dropped = self.layers.len() - kept.count();
-        self.layers.drain(..dropped);
-        self.layers.push(layer);
-    }
-
-    /// `displacement` becomes what the edits below and this one lead to. `handle` may be missing where the layer has been followed
-    /// before.
-    fn apply(
-        &mut self,
-        place: usize,
-        edit: &Edit,
-        handle: Option<Handle>,
-        layer: &mut Layer,
-        displacement: &mut [Vector],
-    ) -> Result<(), EditError> {
-        displacement.copy_from_slice(&layer.below);
-        if edit.muted() {
-            return Ok(());
-        }
-        if edit.harmonic_order().is_some() {
-            self.follow(place, edit, handle, layer)?;
-        }
-        let finite = match (edit, &layer.followed) {
-            (Edit::Displacement(import), _) => {
-                let handle = handle.map_or_else(|| Handle::find(&self.surface, edit, place), Ok)?;
-                self.add(&motion::displacement(&self.surface, import, &handle), displacement)
-            }
-            (Edit::Skeleton(drag), _) => {
-                let handle = handle.map_or_else(|| Handle::find(&self.surface, edit, place), Ok)?;
-                let held = handle.roles.iter().map(|role| *role != Role::Handle).collect();
-                let moved = self.skeletons.displacement(drag, held, displacement);
-                self.add(&moved.map_err(|source| EditError::skeleton(place, source))?, displacement)
-            }
-            (_, Some(followed)) => followed.add(self.surface.points(), edit, displacement),
-            (_, None) => true,
-        };
-        if !finite {
-            all_finite.store(false, Ordering::Relaxed);
-        }
-    });
-    all_finite.into_inner()
-}
-
-fn is_finite(points: &[Vector], displacement: &[Vector]) -> bool {
-    points.iter().zip(displacement).all(|(point, moved)| add(*point, *moved).iter().all(|value| value.is_finite()))
-}
-
-/// An edit but for what its coefficients ([`Motion::coefficients`]) depend on, and for its name.
-fn without_amount(edit: &Edit) -> Edit {
-    let mut edit = edit.clone();
-    let name = match &mut edit {
-        Edit::Translate(edit) => {
-            edit.by = [0.0; 3];
-            &mut edit.name
-        }
-        Edit::Rotate(edit) => {
-            (edit.axis, edit.degrees) = ([0.0; 3], 0.0);
-            &mut edit.name
-        }
-        Edit::ScaleDirection(edit) => {
-            edit.factors = [0.0; 3];
-            &mut edit.name
-        }
-        Edit::ScaleNormals(edit) => {
-            edit.distance = 0.0;
-            &mut edit.name
-        }
-        Edit::Affine(edit) => {
-            (edit.matrix, edit.translation) = ([[0.0; 3]; 3], [0.0; 3]);
-            &mut edit.name
-        }
-        Edit::Displacement(_) | Edit::Skeleton(_) => return edit,
-    };
-    *name = None;
-    edit
-}
-
-impl Editor {
-    /// An editor of a surface.
+    /// How far [`Editor::displacement`] of a stack is from the exact solution of its equations, at the vertex where it is
+    /// farthest and in units of the largest motion that the last edit prescribes: the error that rounding has left. What the
+    /// edits below the last one add to it is not counted; where the last edit solves no equation it is 0.
     ///
-    /// # Errors
-    /// [`SurfaceError::NonManifoldEdge`], [`SurfaceError::NonManifoldVertex`].
-    pub fn new(surface: Arc<Surface>) -> Result<Self, SurfaceError> {
-        let adjacency = Adjacency::new(&surface)?;
-        adjacency.check_vertices(&surface)?;
-        let laplacians = vec![Laplacian::new(&surface, &adjacency, SLACKS[0])];
-        let mut parts = Parts::new(surface.points().len());
-        for &[a, b, c] in surface.triangles() {
-            parts.join(a, b);
-            parts.join(b, c);
-        }
-        let parts = (0..surface.points().len() as u32).map(|vertex| parts.root(vertex)).collect();
-        let seams = adjacency.seams(&surface);
-        let skeletons = SkeletonEditor::new(Arc::clone(&surface));
-        Ok(Self { surface, laplacians, parts, operators: Vec::new(), skeletons, seams, layers: Vec::new() })
-    }
-
-    /// The surface.
-    #[must_use]
-    pub fn surface(&self) -> &Arc<Surface> {
-        &self.surface
-    }
-
-    /// The same with this skeleton, in place of the one that would be extracted when the first skeleton edit needs it.
-    ///
-    /// # Errors
-    /// [`SkinError::OtherSurface`], where it does not carry as many vertices as the surface has.
-    pub fn with_skeleton(mut self, skeleton: Arc<Skeleton>) -> Result<Self, SkinError> {
-        self.skeletons.set(skeleton)?;
-        self.layers.clear();
-        Ok(self)
-    }
-
-    /// The skeleton of the reference surface, that skeleton edits drag. The first call extracts it, unless it was given.
-    ///
-    /// # Errors
-    /// [`SkeletonError`], where the surface has none.
-    pub fn skeleton(&mut self) -> Result<Arc<Skeleton>, SkeletonError> {
-        self.skeletons.skeleton()
-    }
-
-    /// The displacement of each surface vertex from [`Surface::points`] that a stack of edits asks for.
-    ///
-    /// # Errors
-    /// [`EditError`], naming the edit by its place in the stack, counted from 0. Nothing is evaluated unless every edit of the
-    /// stack is valid on this surface.
-    pub fn displacement(&mut self, stack: &[Edit]) -> Result<Vec<Vector>, EditError> {
-        let mut displacement = Vec::new();
-        self.displacement_into(stack, &mut displacement)?;
-        Ok(displacement)
-    }
-
-    /// [`Editor::displacement`] into memory that is there already. After an error it holds nothing of meaning.
+    /// The exact solution is found by refinement with residuals in twice the digits, which takes some ten times as long as the
+    /// displacement itself.
     ///
     /// # Errors
     /// Those of [`Editor::displacement`].
-    pub fn displacement_into(&mut self, stack: &[Edit], displacement: &mut Vec<Vector>) -> Result<(), EditError> {
-        let kept = self.kept_layer(stack);
-        let known = kept.map_or(0, |kept| self.layers[kept].lower.len());
-        let mut handles = Vec::with_capacity(stack.len() - known);
-        for (place, edit) in stack.iter().enumerate().skip(known) {
-            let followed = kept.and_then(|kept| self.layers[kept].followed.as_ref());
-            handles.push(if place == known && followed.is_some_and(|followed| followed.is_for(edit)) {
-                edit.validate().map_err(|source| EditError::Invalid { edit: place, name: edit.name(), source })?;
-                None
-            } else {
-                Some(Handle::find(&self.surface, edit, place)?)
-            });
-        }
-        for (place, edit) in stack.iter().enumerate().skip(known) {
-            if let Edit::Skeleton(drag) = edit
-                && !drag.muted
-            {
-                self.skeletons.nodes(drag).map_err(|source| EditError::skeleton(place, source))?;
-            }
-        }
-        displacement.resize(self.surface.points().len(), [0.0; 3]);
-        if kept.is_none() {
-            displacement.fill([0.0; 3]);
-        }
-        let mut layer = kept.map(|kept| self.layers.remove(kept));
-        for ((place, edit), handle) in stack.iter().enumerate().skip(known).zip(handles) {
-            let mut layer = layer.take().unwrap_or_else(|| Layer {
-                lower: stack[..place].to_vec(),
-                below: displacement.clone(),
-                followed: None,
-            });
-            let result = self.apply(place, edit, handle, &mut layer, displacement);
-            self.keep_layer(layer);
-            result?;
-        }
-        Ok(())
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use tombolo_deform::{shapes, surface::{Edit, Editor, FeatureSettings, Surface}};
+    ///
+    /// let mesh = shapes::box_of_tets([8, 2, 2], [0.0; 3], [4.0, 1.0, 1.0]);
+    /// let mut editor = Editor::new(Arc::new(Surface::extract(&mesh, &FeatureSettings::default())?))?;
+    /// let edit: Edit = serde_json::from_str(
+    ///     r#"{ "translate": { "features": ["x-max"], "fixed": ["x-min"], "by": [0, 0, 1], "harmonic_order": 3 } }"#,
+    /// )?;
+    /// assert!(editor.forward_error(&[edit])? < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn forward_error(&mut self, stack: &[Edit]) -> Result<f64, EditError> {
+        self.displacement(stack)?;
+        let Some((place, edit, order)) = stack
+            .last()
+            .filter(|edit| !edit.muted())
+            .and_then(|edit| Some((stack.len() - 1, edit, edit.harmonic_order()?)))
+        else {
+            return Ok(0.0);
+        };
+        let handle = Handle::find(&self.surface, edit, place)?;
+        let prescribed: Vec<bool> = handle.roles.iter().map(|role| *role != Role::Free).collect();
+        self.choose_operator(order, prescribed.clone()).map_err(|reason| EditError::NotSolvable {
+            edit: place,
+            name: edit.name(),
+            order,
+            reason,
+        })?;
+        let operator = self.operators.last();
+        let followed = self.layers.last().and_then(|layer| layer.followed.as_ref());
+        let (Some(operator), Some(followed)) = (operator, followed) else { return Ok(0.0) };
+        let laplacian = &self.laplacians[operator.level()];
+        let errors =
+            followed.bases.iter().map(|base| base.as_ref().map(|base| operator.error(laplacian, base))).collect();
+        let errors = Followed { setting: followed.setting.clone(), unit: followed.unit, bases: errors };
+        let size = |moved: &Vector| moved.iter().fold(0.0f64, |largest, part| largest.max(part.abs()));
+        let points = self.surface.points();
+        let [mut moved, mut wrong] = [0, 1].map(|_| vec![[0.0; 3]; points.len()]);
+        followed.add(points, edit, &mut moved);
+        errors.add(points, edit, &mut wrong);
+        let motion = moved.iter().zip(&prescribed).filter(|(_, prescribed)| **prescribed).map(|(moved, _)| size(moved));
+        let motion = motion.fold(0.0, f64::max);
+        Ok(if motion > 0.0 { wrong.iter().map(size).fold(0.0, f64::max) / motion } else { 0.0 })
     }
 
     /// The kept layer that has the most of a stack below it, and best fits the edit above.
@@ -553,25 +417,24 @@ impl Editor {
         let finite = match edit {
             Edit::Displacement(import) => {
                 let handle = handle.map_or_else(|| Handle::find(&self.surface, edit, place), Ok)?;
-                let moved = motion::displacement(&self.surface, import, &handle);
-                displacement.iter_mut().zip(&moved).for_each(|(sum, moved)| *sum = add(*sum, *moved));
-                is_finite(self.surface.points(), displacement)
+                self.add(&motion::displacement(&self.surface, import, &handle), displacement)
             }
-            Edit::Skeleton(_) => {
-                let reason = "this build does not carry skeletons onto the surface".into();
-                return Err(EditError::Skeleton { edit: place, reason });
+            Edit::Skeleton(drag) => {
+                let handle = handle.map_or_else(|| Handle::find(&self.surface, edit, place), Ok)?;
+                let held = handle.roles.iter().map(|role| *role != Role::Handle).collect();
+                let moved = self.skeletons.displacement(drag, held, displacement);
+                self.add(&moved.map_err(|source| EditError::skeleton(place, source))?, displacement)
             }
             _ => {
                 self.follow(place, edit, handle, layer)?;
-                match &layer.followed {
-                    Some(followed) => followed.add(self.surface.points(), edit, displacement),
-                    None => true,
-                }
+                let points = self.surface.points();
+                layer.followed.as_ref().is_none_or(|followed| followed.add(points, edit, displacement))
             }
         };
         if !finite {
             let reached = self.surface.points().iter().zip(displacement.iter()).map(|(a, b)| add(*a, *b));
-            let vertex = reached.into_iter().position(|point| !point.iter().all(|value| value.is_finite())).unwrap_or(0);
+            let vertex =
+                reached.into_iter().position(|point| !point.iter().all(|value| value.is_finite())).unwrap_or(0);
             let vertex = self.surface.vertices()[vertex];
             return Err(EditError::OutOfRange { edit: place, name: edit.name(), vertex });
         }

@@ -334,8 +334,7 @@ mod tests {
     /// Two chains that meet in two vertices, one of which a branch with a single part eliminates.
     fn example() -> (Branch, Vec<Vec<f64>>) {
         let leaf = |own| Branch { own, parts: vec![] };
-        let branch =
-            Branch { own: 7..8, parts: vec![Branch { own: 6..7, parts: vec![leaf(0..3), leaf(3..6)] }] };
+        let branch = Branch { own: 7..8, parts: vec![Branch { own: 6..7, parts: vec![leaf(0..3), leaf(3..6)] }] };
         let mut matrix = vec![vec![0.0; 8]; 8];
         for (i, j) in [(0, 1), (1, 2), (2, 6), (3, 4), (4, 5), (5, 7), (6, 7), (3, 6), (0, 7)] {
             let value = -1.0 - 0.1 * (i + j) as f64;

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::SurfaceError;
 use super::faces::{TagLookup, most_frequent};
+pub(super) use super::sharp_edges::Parts;
 use super::sharp_edges::parts_between_sharp_edges;
-pub(super) use super::sharp_edges::{Parts, edges};
 use crate::mesh::{Cells, FeatureSource, MeshError, Vector};
 
 /// How features are found where the mesh does not name them.

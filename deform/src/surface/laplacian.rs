@@ -2,6 +2,7 @@
 
 use super::Surface;
 use super::adjacency::{Adjacency, OPEN, around};
+use super::double_double::DoubleDouble;
 use crate::parallel;
 use crate::vector::subtract;
 
@@ -57,7 +58,8 @@ impl Laplacian {
 
     /// The row of `L` of a vertex, its diagonal first.
     pub fn row(&self, vertex: usize) -> impl Iterator<Item = (usize, f64)> {
-        std::iter::once((vertex, self.diagonal[vertex])).chain(self.neighbours(vertex).map(|(column, weight)| (column, -weight)))
+        std::iter::once((vertex, self.diagonal[vertex]))
+            .chain(self.neighbours(vertex).map(|(column, weight)| (column, -weight)))
     }
 
     /// `L u`. Constants give exact zeros.
@@ -78,6 +80,25 @@ impl Laplacian {
                 *value /= mass;
             }
             result = self.apply(&result);
+        }
+        result
+    }
+
+    /// [`Laplacian::apply_power`] in twice the digits.
+    pub fn apply_power_exactly(&self, order: usize, values: &[DoubleDouble]) -> Vec<DoubleDouble> {
+        let apply = |values: &[DoubleDouble]| -> Vec<DoubleDouble> {
+            let row = |vertex: usize| {
+                let terms =
+                    self.neighbours(vertex).map(|(column, weight)| (values[vertex] - values[column]).times(weight));
+                terms.fold(DoubleDouble::default(), |sum, term| sum + term)
+            };
+            (0..self.len()).map(row).collect()
+        };
+        let mut result = apply(values);
+        for _ in 1..order {
+            let divided: Vec<DoubleDouble> =
+                result.iter().zip(&self.mass).map(|(value, &mass)| value.over(mass)).collect();
+            result = apply(&divided);
         }
         result
     }
@@ -182,8 +203,7 @@ impl Triangulation {
             self.lengths[slot] = length;
         }
         for [first, second, third] in [[h, h1, h2], [g, g1, g2]] {
-            let cotangents =
-                three_cotangents(self.lengths[first], self.lengths[second], self.lengths[third]);
+            let cotangents = three_cotangents(self.lengths[first], self.lengths[second], self.lengths[third]);
             for (slot, cotangent) in [first, second, third].into_iter().zip(cotangents) {
                 self.cotangents[slot] = cotangent;
             }

@@ -67,7 +67,9 @@
 //! | 3 | the same curvature | the three outermost rings |
 //!
 //! The conditions hold half a face (order 2) or one face (order 3) inside the prescribed part, so that the shape converges at
-//! first order as the mesh is refined. At an open rim with nothing prescribed, no slope runs across the rim.
+//! first order as the mesh is refined. A part with fewer rings leaves the derivatives that it cannot prescribe free. An open rim
+//! is a mirror: where nothing is prescribed no slope runs across it, and a part that ends at a rim counts its rings twice but
+//! for the rim itself, so that one ring clamps the slope for order 2 and two rings the curvature for order 3.
 //!
 //! # What is guaranteed
 //! - The same mesh, settings and stack give the same bits, whatever was evaluated before. Renumbering the vertices changes
@@ -86,13 +88,14 @@ mod amount;
 mod bounds;
 mod check;
 mod dissection;
+mod double_double;
 mod edit;
 mod edit_error;
 mod edit_validate;
 mod editor;
 mod extraction;
-mod factor;
 mod faces;
+mod factor;
 mod features;
 mod handle;
 mod laplacian;

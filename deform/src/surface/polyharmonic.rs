@@ -2,12 +2,16 @@
 
 use super::HarmonicOrder;
 use super::dissection::dissect;
+use super::double_double::DoubleDouble;
 use super::factor::{Factor, NoFactor, Rows};
 use super::laplacian::Laplacian;
 use crate::mesh::Vector;
 
 /// The largest error that one step of refinement, which squares it, still brings below what matters.
 const LARGEST_ERROR: f64 = 1e-3;
+
+/// Steps of refinement in twice the digits: each brings three digits at the least.
+const REFINEMENTS: usize = 6;
 
 /// More couplings than this for each vertex, in the mean, are too many: some vertices then have most others for neighbours.
 const COUPLINGS: f64 = 4096.0;
@@ -155,6 +159,23 @@ impl Polyharmonic {
                 fields[index][vertex as usize] += work[vertex as usize] * scale;
             }
         }
+    }
+
+    /// How far a solved field is from the exact solution for its prescribed values, at each vertex.
+    ///
+    /// The exact solution is found from the field by refinement, with residuals evaluated in twice the digits.
+    pub fn error(&self, laplacian: &Laplacian, field: &[f64]) -> Vec<f64> {
+        let mut exact: Vec<DoubleDouble> = field.iter().map(|&value| value.into()).collect();
+        for _ in 0..REFINEMENTS {
+            let residual = laplacian.apply_power_exactly(self.order as usize, &exact);
+            let mut correction: Vec<f64> =
+                self.free.iter().map(|&vertex| -residual[vertex as usize].rounded()).collect();
+            self.solve_in_place(&mut correction);
+            for (&vertex, correction) in self.free.iter().zip(correction) {
+                exact[vertex as usize] = exact[vertex as usize] + correction.into();
+            }
+        }
+        exact.iter().zip(field).map(|(exact, &value)| (*exact - value.into()).rounded()).collect()
     }
 
     /// For each component the prescribed value nearest to 0, from which the others are counted.
