@@ -3,12 +3,14 @@
 //! ```sh
 //! cargo run --release -p tombolo-benchmarks -- overhead
 //! cargo run --release -p tombolo-benchmarks -- overhead --json
+//! cargo run --release -p tombolo-benchmarks -- surface --json
 //! cargo run --release -p tombolo-benchmarks -- surface-wasm --json
 //! ```
 
 mod measure;
 mod overhead;
 mod report;
+mod surface;
 mod surface_wasm;
 mod volume;
 
@@ -32,6 +34,8 @@ struct Arguments {
 enum Name {
     /// What `execute` costs with nothing to do, and what each stage costs against a step of the solver.
     Overhead,
+    /// Polyharmonic deformation of surfaces, beside libigl.
+    Surface,
     /// The surface kernel in the viewer's WebAssembly module, in Node, beside the native one.
     SurfaceWasm,
     /// Volume motion at the sizes of the paper's meshes, beside the paper and PETSc.
@@ -42,6 +46,7 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let result: Result<Report, Box<dyn std::error::Error>> = match arguments.name {
         Name::Overhead => overhead::run(),
+        Name::Surface => surface::run(),
         Name::SurfaceWasm => surface_wasm::run(),
         Name::Volume => volume::run(),
     };
