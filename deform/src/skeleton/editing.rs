@@ -19,6 +19,8 @@ const NEAR: f64 = 0.02;
 pub(crate) struct SkeletonEditor {
     surface: Arc<Surface>,
     skeleton: Option<Result<Arc<Skeleton>, SkeletonError>>,
+    /// How far from each node of the skeleton a place may be that means it.
+    near: Vec<f64>,
     /// The most recently used at the end.
     skins: Vec<Bound>,
 }
@@ -33,7 +35,7 @@ struct Bound {
 
 impl SkeletonEditor {
     pub fn new(surface: Arc<Surface>) -> Self {
-        Self { surface, skeleton: None, skins: Vec::new() }
+        Self { surface, skeleton: None, near: Vec::new(), skins: Vec::new() }
     }
 
     /// The skeleton of the reference surface.
@@ -51,6 +53,7 @@ impl SkeletonEditor {
             return Err(SkinError::OtherSurface { vertices, carried, held: vertices });
         }
         self.skeleton = Some(Ok(skeleton));
+        self.near.clear();
         self.skins.clear();
         Ok(())
     }
@@ -58,8 +61,10 @@ impl SkeletonEditor {
     /// The node that each drag of an edit means.
     pub fn nodes(&mut self, edit: &SkeletonEdit) -> Result<Vec<usize>, SkeletonEditError> {
         let skeleton = self.skeleton()?;
-        let radii = skeleton.radii(self.surface.points());
-        let near = NEAR * diagonal(skeleton.nodes());
+        if self.near.is_empty() {
+            let least = NEAR * diagonal(skeleton.nodes());
+            self.near = skeleton.radii(self.surface.points()).iter().map(|radius| radius.max(least)).collect();
+        }
         let nodes = edit
             .moves()
             .iter()
@@ -68,7 +73,7 @@ impl SkeletonEditor {
                 let node = skeleton.nearest_node(drag.at);
                 let nearest = skeleton.nodes()[node];
                 let away = subtract(nearest, drag.at);
-                let (distance, within) = (dot(away, away).sqrt(), radii[node].max(near));
+                let (distance, within) = (dot(away, away).sqrt(), self.near[node]);
                 if distance <= within {
                     Ok(node)
                 } else {
