@@ -82,5 +82,5 @@ fn one_drag_of_the_skeleton_makes_the_outlet_of_the_bypass_less_steep() {
         }
     }
     let [before, after] = [surface.points(), &points].map(|points| outlet_angle(surface.triangles(), points));
-    assert!((12.0..18.0).contains(&(before - after)), "from {before:.1} to {after:.1} degrees");
+    assert!((11.0..19.0).contains(&(before - after)), "from {before:.1} to {after:.1} degrees");
 }
