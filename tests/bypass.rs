@@ -72,7 +72,7 @@ fn one_drag_of_the_skeleton_makes_the_outlet_of_the_bypass_less_steep() {
     let report: Value = serde_json::from_str(&text).expect("a report");
     assert_eq!((&report["status"], &report["inverted"]), (&"applied".into(), &0.into()), "{report}");
 
-    let [before, after] = [&project().join(MESH), out.as_ref()].map(|path| read_mesh(path).expect("a mesh").mesh);
+    let [before, after] = [project().join(MESH), out.into()].map(|path| read_mesh(&path).expect("a mesh").mesh);
     let surface = Surface::extract(&before, &FeatureSettings::default()).expect("a surface");
     let points: Vec<Vector> = surface.vertices().iter().map(|&vertex| after.points()[vertex as usize]).collect();
     for name in ["artery", "inlet", "outlet"] {
