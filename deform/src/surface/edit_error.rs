@@ -153,7 +153,7 @@ pub enum EditError {
         source: RegionError,
     },
     /// A region without a vertex of the surface.
-    #[error("edit {edit} ({name}): {field}: {}", empty(*nearest, *bounds))]
+    #[error("edit {edit} ({name}): {field}: no vertex of the surface lies in it{surroundings}")]
     EmptyRegion {
         /// The place of the edit.
         edit: usize,
@@ -161,10 +161,8 @@ pub enum EditError {
         name: &'static str,
         /// The field that holds the region: region or fixed_region.
         field: &'static str,
-        /// The nearest mesh vertex, where it lies, and its distance from the region.
-        nearest: Option<(u32, Vector, f64)>,
-        /// The bounding box of the reference surface.
-        bounds: [Vector; 2],
+        /// Where the surface is.
+        surroundings: Box<Surroundings>,
     },
     /// No vertex of the features lies in the region.
     #[error("edit {edit} ({name}): region: no vertex of {features:?} lies in it, though {vertices} other vertices do")]
@@ -263,11 +261,23 @@ pub enum EditError {
     },
 }
 
-fn empty(nearest: Option<(u32, Vector, f64)>, [lower, upper]: [Vector; 2]) -> String {
-    let nearest = nearest.map_or_else(String::new, |(vertex, point, distance)| {
-        format!("; the nearest, mesh vertex {vertex} at {point:?}, is {distance:.6} away")
-    });
-    format!("no vertex of the surface lies in it{nearest}; the surface reaches from {lower:?} to {upper:?}")
+/// Where a surface is that has nothing in a region.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Surroundings {
+    /// The nearest mesh vertex, where it lies, and its distance from the region.
+    pub nearest: Option<(u32, Vector, f64)>,
+    /// The bounding box of the reference surface.
+    pub bounds: [Vector; 2],
+}
+
+impl std::fmt::Display for Surroundings {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if let Some((vertex, point, distance)) = self.nearest {
+            write!(f, "; the nearest, mesh vertex {vertex} at {point:?}, is {distance:.6} away")?;
+        }
+        let [lower, upper] = self.bounds;
+        write!(f, "; the surface reaches from {lower:?} to {upper:?}")
+    }
 }
 
 impl EditError {

@@ -1,6 +1,6 @@
 //! Handles: which vertices of a surface an edit moves and which it holds.
 
-use super::{Displacement, Edit, EditError, Region, Surface};
+use super::{Displacement, Edit, EditError, Region, Surface, Surroundings};
 use crate::mesh::Vector;
 
 /// What an edit does with a vertex.
@@ -145,7 +145,8 @@ impl Finder<'_> {
             let nearest = region.nearest(self.surface).map(|(vertex, distance)| {
                 (self.surface.vertices()[vertex as usize], points[vertex as usize], distance)
             });
-            return Err(EditError::EmptyRegion { edit, name, field, nearest, bounds: bounds(points.iter().copied()) });
+            let surroundings = Box::new(Surroundings { nearest, bounds: bounds(points.iter().copied()) });
+            return Err(EditError::EmptyRegion { edit, name, field, surroundings });
         }
         let mut inside = vec![false; self.surface.points().len()];
         for vertex in found {

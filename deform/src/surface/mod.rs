@@ -115,7 +115,7 @@ pub use edit::{
     Affine, Displacement, Edit, HarmonicOrder, Rotate, ScaleDirection, ScaleNormals, Skeleton, SkeletonMove, Skinning,
     Translate,
 };
-pub use edit_error::{EditError, InvalidEdit};
+pub use edit_error::{EditError, InvalidEdit, Surroundings};
 pub use editor::Editor;
 pub use extraction::{Surface, SurfaceError};
 pub use features::{FeatureSettings, FeatureSize, Features, UnknownFeature};
