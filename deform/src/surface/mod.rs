@@ -79,8 +79,9 @@
 //!   the feature or the number at fault.
 //!
 //! # What is not
-//! A displacement says nothing about whether the shape it leads to can be meshed: [`check`] finds folds and self-intersections of
-//! the surface, [`crate::quality`] inversions of the volume. Surfaces that are no manifold can be extracted and looked at, but not edited.
+//! A displacement says nothing about whether the shape it leads to can be meshed: [`check`](fn@check) finds folds and
+//! self-intersections of the surface, [`crate::quality`] inversions of the volume. Surfaces that are no manifold can be extracted and
+//! looked at, but not edited.
 
 mod adjacency;
 mod advance;
