@@ -93,7 +93,7 @@ fn edit_moves_the_mesh_as_asked() {
 #[test]
 fn features_are_listed_written_and_named_by_edits() {
     let (directory, mesh) =
-        with_box(r#"[{"translate": {"features": ["feature-2"], "fixed": ["feature-1"], "by": [0, 0, 0.25]}}]"#);
+        with_box(r#"[{"translate": {"features": ["feature-2"], "fixed": ["feature-1"], "by": [0, 0, 0.02]}}]"#);
     let at = |more: &[&str]| tombolo(directory.path(), &[&["features", "--mesh", "box.vtu"], more].concat());
     let own = json(&at(&["--json"]));
     assert_eq!((&own["source"], &own["features"][0]["name"]), (&"mesh".into(), &"x-min".into()));
