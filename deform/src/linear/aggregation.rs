@@ -147,11 +147,11 @@ fn group<const B: usize>(matrix: &SparseMatrix<B>, strong: &[bool]) -> (Vec<u32>
         }
     }
     let first = of_row.clone();
-    for row in 0..matrix.rows() {
-        if of_row[row] == NONE
+    for (row, own) in of_row.iter_mut().enumerate() {
+        if *own == NONE
             && let Some(other) = neighbours(row).find(|&other| first[other] != NONE)
         {
-            of_row[row] = first[other];
+            *own = first[other];
         }
     }
     for row in 0..matrix.rows() {

@@ -33,7 +33,7 @@ impl Pieces {
         let piece_rows = rows.div_ceil(PIECES).max(PIECE_ROWS).max(width);
         let whole = rows / piece_rows;
         let rest = rows % piece_rows;
-        let even_rows = whole.div_ceil(2) * piece_rows + if whole % 2 == 0 { rest } else { 0 };
+        let even_rows = whole.div_ceil(2) * piece_rows + if whole.is_multiple_of(2) { rest } else { 0 };
         Self { rows, piece_rows, even_rows }
     }
 

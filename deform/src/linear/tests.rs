@@ -208,7 +208,7 @@ fn a_renewed_solver_is_the_one_of_the_new_matrix() {
     let (solution, _) = solved(other.as_ref(), &right_side);
     assert!(residual(&springs(1), &right_side, &solution) < 1e-10);
     // Another pattern: nothing is used again.
-    let small = first.renewed(Arc::new(grid(8, |edge| positive::<3>(edge)))).unwrap();
+    let small = first.renewed(Arc::new(grid(8, positive::<3>))).unwrap();
     assert_eq!(small.unknowns(), 512);
 }
 
@@ -230,7 +230,7 @@ fn matrices_that_are_not_positive_are_refused() {
 #[cfg(feature = "parallel")]
 #[test]
 fn the_same_bits_whatever_the_number_of_threads() {
-    let matrix = Arc::new(grid(22, |edge| positive::<3>(edge)));
+    let matrix = Arc::new(grid(22, positive::<3>));
     let right_side = right_side(matrix.rows());
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
