@@ -4,11 +4,13 @@
 //! cargo run --release -p tombolo-benchmarks -- overhead
 //! cargo run --release -p tombolo-benchmarks -- overhead --json
 //! cargo run --release -p tombolo-benchmarks -- surface --json
+//! cargo run --release -p tombolo-benchmarks -- paper --json
 //! cargo run --release -p tombolo-benchmarks -- surface-wasm --json
 //! ```
 
 mod measure;
 mod overhead;
+mod paper;
 mod report;
 mod surface;
 mod surface_wasm;
@@ -36,6 +38,8 @@ enum Name {
     Overhead,
     /// Polyharmonic deformation of surfaces, beside libigl.
     Surface,
+    /// The paper's experiments on the quality of deformed meshes, beside its tables.
+    Paper,
     /// The surface kernel in the viewer's WebAssembly module, in Node, beside the native one.
     SurfaceWasm,
     /// Volume motion at the sizes of the paper's meshes, beside the paper and PETSc.
@@ -45,14 +49,22 @@ enum Name {
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let result: Result<Report, Box<dyn std::error::Error>> = match arguments.name {
+        Name::Paper => {
+            return said(
+                paper::run().map(|report| if arguments.json { report.json() + "\n" } else { report.to_string() }),
+            );
+        }
         Name::Overhead => overhead::run(),
         Name::Surface => surface::run(),
         Name::SurfaceWasm => surface_wasm::run(),
         Name::Volume => volume::run(),
     };
+    said(result.map(|report| if arguments.json { report.json() + "\n" } else { report.to_string() }))
+}
+
+fn said(result: Result<String, Box<dyn std::error::Error>>) -> ExitCode {
     match result {
-        Ok(report) if arguments.json => println!("{}", report.json()),
-        Ok(report) => print!("{report}"),
+        Ok(text) => print!("{text}"),
         Err(error) => {
             eprintln!("tombolo-benchmarks: {error}");
             return ExitCode::FAILURE;

@@ -5,8 +5,8 @@ use std::num::{NonZeroU32, NonZeroU64};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How a change of shape is spread over the run: in `steps` shapes of equal distance, one `every` so many cycles or so much
-/// simulated time.
+/// How a change of shape is spread over the run: in `steps` shapes, one `every` so many cycles or so much simulated time, at equal
+/// distances or eased.
 ///
 /// # Example
 /// ```
@@ -24,6 +24,20 @@ pub struct Schedule {
     pub steps: NonZeroU32,
     /// The distance between one shape and the next: solver steps, or simulated time.
     pub every: Every,
+    /// How far apart the shapes lie.
+    pub ease: Ease,
+}
+
+/// How the shapes of a [`Schedule`] lie on the way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Ease {
+    /// At equal distances: the mesh sets off and stops at full speed.
+    #[default]
+    Linear,
+    /// Closer together at both ends (the smooth step `3 s² - 2 s³`): the mesh sets off and stops gently, and is 1.5 times as
+    /// fast in the middle.
+    Smooth,
 }
 
 /// The distance between two shapes of a [`Schedule`].
@@ -80,13 +94,13 @@ impl From<Interval> for f64 {
 impl Default for Schedule {
     /// The whole change at once.
     fn default() -> Self {
-        Self { steps: NonZeroU32::MIN, every: Every::Steps(NonZeroU64::MIN) }
+        Self { steps: NonZeroU32::MIN, every: Every::Steps(NonZeroU64::MIN), ease: Ease::Linear }
     }
 }
 
 impl Schedule {
-    /// How far along the way from the present shape to the new one each shape lies: `k / steps` for `k` in `1..=steps`, the
-    /// last exactly 1.
+    /// How far along the way from the present shape to the new one each shape lies: `k / steps` for `k` in `1..=steps`, eased,
+    /// the last exactly 1.
     #[must_use]
     pub fn fractions(&self) -> Vec<f64> {
         (1..=self.steps.get()).map(|step| self.fraction(step)).collect()
@@ -95,7 +109,11 @@ impl Schedule {
     /// How far along the way shape `step` lies (from 1; 0 is the present shape, and beyond the last is the last).
     #[must_use]
     pub fn fraction(&self, step: u32) -> f64 {
-        f64::from(step.min(self.steps.get())) / f64::from(self.steps.get())
+        let even = f64::from(step.min(self.steps.get())) / f64::from(self.steps.get());
+        match self.ease {
+            Ease::Linear => even,
+            Ease::Smooth => even * even * (3.0 - 2.0 * even),
+        }
     }
 
     /// Whether the next shape is due when `shapes_taken` have been taken, and `cycles` and `time` have gone by since the first
@@ -129,13 +147,22 @@ mod tests {
 
     #[test]
     fn the_last_fraction_is_exactly_one() {
-        for steps in [1, 3, 7, 10, 49, 100, 1013] {
-            let schedule = Schedule { steps: NonZeroU32::new(steps).unwrap(), ..Schedule::default() };
+        for (steps, ease) in
+            [1, 3, 7, 10, 49, 100, 1013].into_iter().flat_map(|n| [(n, Ease::Linear), (n, Ease::Smooth)])
+        {
+            let schedule = Schedule { steps: NonZeroU32::new(steps).unwrap(), ease, ..Schedule::default() };
             let fractions = schedule.fractions();
             assert_eq!(fractions.len(), steps as usize);
             assert!(fractions.windows(2).all(|pair| pair[0] < pair[1]));
             assert_eq!(fractions.last().unwrap().to_bits(), 1.0f64.to_bits());
         }
+    }
+
+    #[test]
+    fn an_eased_schedule_starts_and_stops_gently() {
+        let schedule = parse(r#"{"steps": 4, "ease": "smooth"}"#).unwrap();
+        assert_eq!(schedule.fractions(), [0.15625, 0.5, 0.84375, 1.0]);
+        assert!(parse(r#"{"ease": "fast"}"#).unwrap_err().contains("smooth"));
     }
 
     #[test]

@@ -1,0 +1,256 @@
+//! `paper`: the paper's experiments on the quality of deformed meshes, its row beside ours, and a sphere in its boundary layer.
+//!
+//! The meshes have the paper's geometry and, within 5 %, its number of tetrahedra; they are not the paper's own.
+
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Arc;
+use std::time::Instant;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use tombolo::deform::mesh::{Mesh, Vector};
+use tombolo::deform::quality::{Guard, Otherwise, SurfaceRule, change, quality};
+use tombolo::deform::schedule::Schedule;
+use tombolo::deform::surface::{Edit, FeatureSettings, Surface};
+use tombolo::deform::volume::Deform;
+use tombolo::pipelines::files::read_mesh;
+use tombolo::pipelines::shape::Shaper;
+
+/// The paper's tables: amount, then mean, least and largest normalised scaled Jacobian.
+const TABLES: &str = include_str!("paper.json");
+
+#[derive(Deserialize)]
+struct Table {
+    tets: usize,
+    rows: Vec<[f64; 4]>,
+}
+
+/// Everything measured.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    rows: Vec<Row>,
+    targets: Vec<Target>,
+}
+
+/// One deformation.
+#[derive(Debug, Serialize)]
+struct Row {
+    case: String,
+    /// Radii, percent or degrees.
+    amount: f64,
+    tets: usize,
+    seconds: f64,
+    /// Sub-steps beyond one solve from the reference; 0 where that one was enough.
+    sub_steps: usize,
+    ours: Figures,
+    /// One linear solve from the reference and nothing else.
+    one_solve: Figures,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    paper_tets: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    paper: Option<Paper>,
+    /// Why it was not reached.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rejected: Option<String>,
+}
+
+/// The normalised scaled Jacobian over the cells, and the cells turned inside out.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct Figures {
+    mean: f64,
+    min: f64,
+    max: f64,
+    inverted: usize,
+}
+
+#[derive(Debug, Clone, Copy, Serialize)]
+struct Paper {
+    mean: f64,
+    min: f64,
+    max: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Target {
+    name: String,
+    value: f64,
+    target: f64,
+    holds: bool,
+}
+
+/// Repeats the experiments. The meshes are those in `meshes/`, or are made there.
+pub fn run() -> Result<Report, Box<dyn Error>> {
+    let tables: BTreeMap<String, Table> = serde_json::from_str(TABLES)?;
+    let mut rows = Vec::new();
+    for (mesh, name) in [("cylinder-coarse", "shear, coarse"), ("cylinder-fine", "shear, fine")] {
+        let amounts: Vec<f64> = (1..=12).map(f64::from).collect();
+        rows.extend(measured(
+            mesh,
+            name,
+            &amounts,
+            tables.get(name),
+            |radii| json!([{"translate": {"features": ["moved"], "fixed": ["fixed"], "by": [0.15 * radii, 0, 0]}}]),
+        )?);
+    }
+    for (name, order) in [("compression, harmonic", 1), ("compression, biharmonic", 2)] {
+        let amounts: Vec<f64> = (1..=9).map(|tenth| 10.0 * f64::from(tenth)).collect();
+        rows.extend(measured("boundary-layer", name, &amounts, tables.get(name), |percent| {
+            json!([{"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, -1e-3 * percent],
+                "harmonic_order": order}}])
+        })?);
+    }
+    let sphere = |body: Value| {
+        let (name, mut body) = match body {
+            Value::Object(body) => body.into_iter().next().unwrap_or_default(),
+            _ => Default::default(),
+        };
+        body["features"] = json!(["sphere"]);
+        body["fixed"] = json!(["walls"]);
+        json!([{ name: body }])
+    };
+    rows.extend(measured("sphere-layer", "sphere, gap of 3 radii closed by %", &[80.0, 95.0], None, |percent| {
+        sphere(json!({"translate": {"by": [0, 0.03 * percent, 0]}}))
+    })?);
+    for mesh in ["sphere-layer", "sphere-layer-fine"] {
+        rows.extend(measured(mesh, "sphere, moved by radii", &[10.0], None, |radii| {
+            sphere(json!({"translate": {"by": [radii, 0, 0]}}))
+        })?);
+    }
+    rows.extend(measured("sphere-layer", "sphere, turned by degrees", &[180.0], None, |degrees| {
+        sphere(json!({"rotate": {"axis": [0, 0, 1], "degrees": degrees, "center": [0, 0, 0]}}))
+    })?);
+    let targets = targets(&rows);
+    Ok(Report { rows, targets })
+}
+
+fn targets(rows: &[Row]) -> Vec<Target> {
+    #[expect(clippy::cast_precision_loss, reason = "few")]
+    let count = |test: &dyn Fn(&&Row) -> bool| rows.iter().filter(test).count() as f64;
+    let none = |name: &str, value: f64| Target { name: name.into(), value, target: 0.0, holds: value == 0.0 };
+    let below = |part: fn(&Figures, &Paper) -> bool| {
+        count(&move |row| row.paper.as_ref().is_some_and(|paper| part(&row.ours, paper)))
+    };
+    let mut targets = vec![
+        none("rows with inverted cells", count(&|row| row.ours.inverted > 0)),
+        none("rows rejected", count(&|row| row.rejected.is_some())),
+        none("rows with a mean below the paper's", below(|ours, paper| ours.mean < paper.mean)),
+        none("rows with a least value below the paper's", below(|ours, paper| ours.min < paper.min)),
+    ];
+    if let Some(large) = rows.iter().find(|row| row.tets > 600_000) {
+        let name = "sphere, moved by 10 radii, fine [s]".into();
+        targets.push(Target { name, value: large.seconds, target: 15.0, holds: large.seconds <= 15.0 });
+    }
+    targets
+}
+
+/// One case at several amounts, each from the reference with everything set up anew.
+fn measured(
+    name: &str,
+    case: &str,
+    amounts: &[f64],
+    table: Option<&Table>,
+    edits: impl Fn(f64) -> Value,
+) -> Result<Vec<Row>, Box<dyn Error>> {
+    let mesh = Arc::new(read_mesh(&mesh_file(name)?)?.mesh);
+    let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default())?);
+    let guard = Guard { min_scaled_jacobian: 0.0, otherwise: Otherwise::Untangle, ..Guard::default() };
+    let mut rows = Vec::new();
+    for &amount in amounts {
+        let stack: Vec<Edit> = serde_json::from_value(edits(amount))?;
+        let mut shaper = Shaper::new(Arc::clone(&mesh), Arc::clone(&surface))?;
+        let one_solve = figures(&mesh, &shaper.target(&stack, &Deform::default(), SurfaceRule::Allow)?.points);
+        let mut shaper = Shaper::new(Arc::clone(&mesh), Arc::clone(&surface))?;
+        let reference = Arc::clone(shaper.reference());
+        let start = Instant::now();
+        let plan = shaper.plan(&stack, reference, &Deform::default(), &Schedule::default(), &guard);
+        let seconds = start.elapsed().as_secs_f64();
+        let (ours, sub_steps, rejected) = match &plan {
+            Ok(plan) => (figures(&mesh, plan.end()), plan.target().sub_steps, None),
+            Err(refused) => (figures(&mesh, mesh.points()), 0, Some(refused.to_string())),
+        };
+        let paper = table.and_then(|table| table.rows.iter().find(|row| row[0] == amount));
+        rows.push(Row {
+            case: case.into(),
+            amount,
+            tets: mesh.cells().len(),
+            seconds,
+            sub_steps,
+            ours,
+            one_solve,
+            paper_tets: paper.and(table).map(|table| table.tets),
+            paper: paper.map(|&[_, mean, min, max]| Paper { mean, min, max }),
+            rejected,
+        });
+    }
+    Ok(rows)
+}
+
+fn figures(mesh: &Mesh, points: &[Vector]) -> Figures {
+    let spread = change(mesh.cells(), mesh.points(), points).normalized_scaled_jacobian;
+    let inverted = quality(mesh.cells(), points).inverted;
+    Figures { mean: spread.mean, min: spread.min, max: spread.max, inverted }
+}
+
+/// A mesh of `scripts/meshes`, made where it is not there yet.
+fn mesh_file(name: &str) -> Result<PathBuf, Box<dyn Error>> {
+    let project = Path::new(env!("CARGO_MANIFEST_DIR")).parent().ok_or("the project is not there")?;
+    let directory = std::env::var_os("TOMBOLO_MESHES").map_or_else(|| project.join("meshes"), PathBuf::from);
+    let file = directory.join(format!("{name}.msh"));
+    if !file.exists() {
+        let python = project.join(".venv/bin/python");
+        let status = Command::new(&python)
+            .arg(project.join("scripts/meshes"))
+            .args([name, "--out"])
+            .arg(&directory)
+            .stdout(std::process::Stdio::null())
+            .status()
+            .map_err(|error| format!("{}: {error}; scripts/setup installs it", python.display()))?;
+        if !status.success() {
+            return Err(format!("scripts/meshes could not make {name}").into());
+        }
+    }
+    Ok(file)
+}
+
+impl Report {
+    /// As one line of JSON.
+    pub fn json(&self) -> String {
+        serde_json::to_string(self).unwrap_or_else(|error| format!("{{\"error\": \"{error}\"}}"))
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{:<36} {:>6} {:>8} {:>8} {:>5} {:>9} {:>9} {:>5} {:>9} {:>9} {:>9}",
+            "case", "amount", "tets", "seconds", "steps", "mean", "least", "inv.", "paper", "least", "one solve"
+        )?;
+        for row in &self.rows {
+            let Row { case, amount, tets, seconds, sub_steps, ours, .. } = row;
+            let Figures { mean, min, inverted, .. } = ours;
+            write!(
+                f,
+                "{case:<36} {amount:>6} {tets:>8} {seconds:>8.2} {sub_steps:>5} {mean:>9.5} {min:>9.5} {inverted:>5}"
+            )?;
+            match row.paper {
+                Some(paper) => write!(f, " {:>9.5} {:>9.5}", paper.mean, paper.min)?,
+                None => write!(f, " {:>9} {:>9}", "", "")?,
+            }
+            writeln!(f, " {:>5} inv.", row.one_solve.inverted)?;
+            if let Some(reason) = &row.rejected {
+                writeln!(f, "    rejected: {reason}")?;
+            }
+        }
+        writeln!(f, "\n{:<44} {:>12} {:>14}", "target", "value", "at most")?;
+        for target in &self.targets {
+            let verdict = if target.holds { "holds" } else { "does not hold" };
+            writeln!(f, "{:<44} {:>12.3e} {:>14.3e}  {verdict}", target.name, target.value, target.target)?;
+        }
+        Ok(())
+    }
+}
