@@ -72,7 +72,7 @@ fn stacks(handle: &str, fixed: &str) -> Vec<Value> {
         ("scale_direction", json!({"factors": [0.9, 1.2, 0.8], "center": [0.3, 0.1, -0.2]})),
         ("scale_normals", json!({"distance": 0.07})),
         ("affine", json!({"matrix": [[1, 0.2, 0], [0, 1.1, 0.1], [-0.1, 0, 0.9]], "translation": [0, 0.1, 0]})),
-        ("translate", json!({"by": [0, 0.1, 0], "region": {"sphere": {"center": [1, 0, 0], "radius": 1.5}}})),
+        ("translate", json!({"by": [0, 0.1, 0], "region": {"sphere": {"center": [1, 0, 0], "radius": 3.2}}})),
         ("translate", json!({"by": [0, 9, 0], "muted": true, "name": "not this one"})),
     ];
     let mut stacks = vec![json!([])];
