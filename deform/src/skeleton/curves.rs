@@ -3,10 +3,14 @@
 use std::collections::HashMap;
 
 use super::SkeletonSettings;
+use super::medial::NearestPoints;
 use super::thinning::Graph;
 use super::triangulation::length;
 use crate::mesh::Vector;
 use crate::vector::{add, scale, subtract};
+
+/// How fast the distance to the surface falls along an end that runs straight at it, as a part of the way.
+const STRAIGHT: f64 = 0.5;
 
 /// The skeleton of one piece.
 pub(super) struct Curves {
@@ -17,9 +21,13 @@ pub(super) struct Curves {
 }
 
 impl Curves {
-    /// `originals` are vertices of the surface: the vertex of the graph each one has become part of, and where it lies.
-    pub fn new(graph: Graph, originals: &[(u32, Vector)], settings: &SkeletonSettings) -> Self {
-        let mut pruning = Pruning::new(graph, originals);
+    /// `originals` are surface vertices, each with the vertex of the graph it has become part of; `surface` has the points that
+    /// the graph lies amid.
+    pub fn new(graph: Graph, originals: &[(u32, u32)], surface: &NearestPoints, settings: &SkeletonSettings) -> Self {
+        let radii = graph.points.iter().map(|&point| surface.distance(point)).collect();
+        let mut pruning = Pruning { graph, radii };
+        pruning.prune(settings.shortest_branch);
+        pruning.trim();
         pruning.prune(settings.shortest_branch);
         pruning.smooth();
         pruning.into_curves(originals)
@@ -28,7 +36,7 @@ impl Curves {
 
 struct Pruning {
     graph: Graph,
-    /// The mean distance of the originals carried by each vertex.
+    /// The distance of each vertex from the surface.
     radii: Vec<f64>,
 }
 
@@ -39,30 +47,6 @@ struct Chain {
 }
 
 impl Pruning {
-    fn new(graph: Graph, originals: &[(u32, Vector)]) -> Self {
-        let count = graph.points.len();
-        let mut sums = vec![(0.0f64, 0u32); count];
-        for &(number, place) in originals {
-            let vertex = graph.merged[number as usize] as usize;
-            sums[vertex].0 += length(subtract(place, graph.points[vertex]));
-            sums[vertex].1 += 1;
-        }
-        let mut radii: Vec<f64> =
-            sums.iter().map(|&(sum, count)| if count > 0 { sum / f64::from(count) } else { -1.0 }).collect();
-        let mut queue: Vec<usize> = (0..count).filter(|&vertex| radii[vertex] >= 0.0).collect();
-        let mut next = 0;
-        while let Some(&vertex) = queue.get(next) {
-            next += 1;
-            for &other in &graph.neighbours[vertex] {
-                if radii[other as usize] < 0.0 {
-                    radii[other as usize] = radii[vertex];
-                    queue.push(other as usize);
-                }
-            }
-        }
-        Self { graph, radii }
-    }
-
     fn is_alive(&self, vertex: u32) -> bool {
         self.graph.merged[vertex as usize] == vertex
     }
@@ -126,12 +110,16 @@ impl Pruning {
                 let [first, last] = [chain.vertices[0], chain.vertices[chain.vertices.len() - 1]];
                 let [radius_first, radius_last] = [first, last].map(|end| self.radii[end as usize]);
                 match (self.degree(first) == 1, self.degree(last) == 1) {
-                    (true, true) => (alone && chain.length < shortest * radius_first.max(radius_last))
-                        .then(|| (chain.vertices[chain.vertices.len() / 2], chain)),
+                    (true, true) => {
+                        let widest =
+                            chain.vertices.iter().map(|&vertex| self.radii[vertex as usize]).fold(0.0, f64::max);
+                        (alone && chain.length < shortest * widest)
+                            .then(|| (chain.vertices[chain.vertices.len() / 2], chain))
+                    }
                     (true, false) => (chain.length < shortest * radius_last).then_some((last, chain)),
                     (false, true) => (chain.length < shortest * radius_first).then_some((first, chain)),
                     (false, false) => (first != last
-                        && chain.length < 0.5 * shortest * radius_first.max(radius_last)
+                        && chain.length < 0.25 * shortest * radius_first.max(radius_last)
                         && self.may_join(first, last, &chain.vertices))
                     .then_some((first, chain)),
                 }
@@ -139,6 +127,36 @@ impl Pruning {
             match found {
                 Some((kept, chain)) => self.merge(kept, &chain.vertices),
                 None => return,
+            }
+        }
+    }
+
+    /// Cuts off what of an end runs straight at the surface, as the contracted middle of a flat cap does: there the distance to
+    /// the surface falls nearly as fast as the curve runs, where along the middle of a tube it does not.
+    fn trim(&mut self) {
+        for chain in self.chains() {
+            for mut vertices in [chain.vertices.clone(), chain.vertices.into_iter().rev().collect()] {
+                if self.degree(vertices[0]) != 1 {
+                    continue;
+                }
+                // Half a curve with two free ends for each of them.
+                if self.degree(vertices[vertices.len() - 1]) == 1 {
+                    vertices.truncate(vertices.len().div_ceil(2));
+                }
+                let first = self.radii[vertices[0] as usize];
+                let mut run = 0.0;
+                let mut excess = vec![0.0];
+                for pair in vertices.windows(2) {
+                    let [from, to] = [pair[0] as usize, pair[1] as usize];
+                    run += length(subtract(self.graph.points[to], self.graph.points[from]));
+                    excess.push(self.radii[to] - first - STRAIGHT * run);
+                }
+                let most = excess.iter().copied().fold(0.0, f64::max);
+                // Not to the last node before the turn: where exactly it lies is blurred by the spacing of the vertices.
+                let cut = excess.iter().position(|&excess| excess >= 0.7 * most).unwrap_or(0);
+                if cut > 0 {
+                    self.merge(vertices[cut], &vertices[..=cut]);
+                }
             }
         }
     }
@@ -191,7 +209,7 @@ impl Pruning {
         }
     }
 
-    fn into_curves(mut self, originals: &[(u32, Vector)]) -> Curves {
+    fn into_curves(mut self, originals: &[(u32, u32)]) -> Curves {
         for vertex in 0..self.graph.merged.len() {
             let mut root = vertex as u32;
             while self.graph.merged[root as usize] != root {
@@ -211,7 +229,7 @@ impl Pruning {
         let polylines: Vec<Vec<u32>> =
             chains.iter().map(|chain| chain.vertices.iter().map(|&vertex| number(vertex)).collect()).collect();
         let node_of_original =
-            originals.iter().map(|&(vertex, _)| number(self.graph.merged[vertex as usize])).collect();
+            originals.iter().map(|&(_, vertex)| number(self.graph.merged[vertex as usize])).collect();
         Curves { nodes, polylines, node_of_original }
     }
 }

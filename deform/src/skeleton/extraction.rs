@@ -2,6 +2,7 @@
 
 use super::closing::closed_pieces;
 use super::curves::Curves;
+use super::medial::NearestPoints;
 use super::{InvalidSkeleton, Skeleton, flow, resolution, thinning};
 use crate::surface::Surface;
 
@@ -38,7 +39,7 @@ impl Default for SkeletonSettings {
             iterations: 500,
             least_vertices: 2000,
             most_vertices: 8000,
-            shortest_branch: 0.75,
+            shortest_branch: 1.75,
         }
     }
 }
@@ -135,14 +136,9 @@ impl Skeleton {
         let mut node_of_vertex = vec![0u32; surface.points().len()];
         for mut piece in closed_pieces(surface)? {
             resolution::resample(&mut piece.mesh, settings.least_vertices, settings.most_vertices);
-            flow::contract(&mut piece.mesh, settings);
-            let graph = thinning::thin(&piece.mesh);
-            let originals: Vec<_> = piece
-                .vertices
-                .iter()
-                .map(|&(vertex, number)| (number, piece.frame.enter(surface.points()[vertex as usize])))
-                .collect();
-            let found = Curves::new(graph, &originals, settings);
+            let tree = NearestPoints::of(&piece.mesh);
+            flow::contract(&mut piece.mesh, &tree, settings);
+            let found = Curves::new(thinning::thin(&piece.mesh), &piece.vertices, &tree, settings);
             let offset = nodes.len() as u32;
             for (&(vertex, _), node) in piece.vertices.iter().zip(&found.node_of_original) {
                 node_of_vertex[vertex as usize] = node + offset;

@@ -2,9 +2,10 @@
 
 use faer::Mat;
 
+use super::SkeletonSettings;
+use super::medial::{self, NearestPoints};
 use super::system::{Row, least_squares};
 use super::triangulation::{Triangulation, length};
-use super::{SkeletonSettings, medial};
 use crate::mesh::Vector;
 use crate::vector::{add, dot, scale, subtract};
 
@@ -16,14 +17,17 @@ const SPLIT_COSINE: f64 = -0.342_020_143_325_668_7;
 const LARGEST_COTANGENT: f64 = 1e3;
 
 /// A pole counts as inside while it lies deeper than this below its vertex, in units of the shortest edge kept.
-const DEPTH: f64 = 0.25;
+const DEPTH: f64 = 0.5;
+
+/// How far about a vertex the surface is looked at to see whether it has closed to a curve, in units of the shortest edge kept.
+const REACH: f64 = 2.0;
 
 /// Contracts a surface of diagonal 1 until it hardly has an area (Tagliasacchi, Alhashim, Olson and Zhang 2012).
-pub(super) fn contract(mesh: &mut Triangulation, settings: &SkeletonSettings) {
+pub(super) fn contract(mesh: &mut Triangulation, tree: &NearestPoints, settings: &SkeletonSettings) {
     let first_area = mesh.area();
     let mut flow = Flow {
         shortest: settings.shortest_edge,
-        poles: medial::poles(mesh).into_iter().map(Some).collect(),
+        poles: medial::poles(mesh, tree),
         fixed: vec![false; mesh.points.len()],
         mesh,
         work: [Vec::new(), Vec::new()],
@@ -201,8 +205,9 @@ impl Flow<'_> {
         }
     }
 
-    /// Fixes the vertices about which the surface within the shortest edge length is no disc: it has closed to a curve there.
+    /// Fixes the vertices about which the surface within [`REACH`] is no disc: it has closed to a curve there.
     fn fix_degenerate(&mut self) {
+        let reach = REACH * self.shortest;
         let mut disc: Vec<u32> = Vec::new();
         let mut triangles: Vec<u32> = Vec::new();
         let mut around = Vec::new();
@@ -217,7 +222,7 @@ impl Flow<'_> {
                 next += 1;
                 self.mesh.neighbours(inside, &mut around);
                 for &other in &around {
-                    if self.mesh.length(vertex, other) < self.shortest && !disc.contains(&other) {
+                    if self.mesh.length(vertex, other) < reach && !disc.contains(&other) {
                         disc.push(other);
                     }
                 }

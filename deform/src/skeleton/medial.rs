@@ -7,24 +7,32 @@ use crate::vector::{dot, scale, subtract};
 /// Two touching points seen from the centre under less than this angle are taken for noise (its cosine: 25 degrees).
 const LEAST_SEPARATION: f64 = 0.906;
 
+/// A ball counts from this many times the mean distance to the neighbours on.
+const LEAST_RADIUS: f64 = 1.2;
+
 /// Shrinking stops after this many balls, each smaller than the one before.
 const MOST_BALLS: usize = 40;
 
 /// The pole of each vertex that is there: the centre of the ball that touches the surface there from inside and holds no other
 /// vertex (Ma, Bae and Choi 2012: a ball is shrunk to the vertex nearest to its centre until there is none inside).
 ///
-/// A vertex without a normal is its own pole. Of noisy vertices the last ball is taken whose two touching points are well apart.
-pub(super) fn poles(mesh: &Triangulation) -> Vec<Vector> {
+/// There is none where the vertex has no normal, nor where the ball is not much larger than the space between vertices: at
+/// sharp edges it says nothing of the middle. Of noisy vertices the last ball is taken whose touching points are well apart.
+pub(super) fn poles(mesh: &Triangulation, tree: &NearestPoints) -> Vec<Option<Vector>> {
     let normals = mesh.vertex_normals();
     let largest = 0.5 * mesh.diagonal();
-    let alive: Vec<u32> = (0..mesh.points.len() as u32).filter(|&vertex| mesh.is_alive(vertex)).collect();
-    let tree = NearestPoints::new(alive.iter().map(|&vertex| (mesh.points[vertex as usize], vertex)).collect());
-    let mut poles = mesh.points.clone();
-    for &vertex in &alive {
+    let mut around = Vec::new();
+    let mut poles = Vec::with_capacity(mesh.points.len());
+    for vertex in 0..mesh.points.len() as u32 {
         let [point, normal] = [mesh.points[vertex as usize], normals[vertex as usize]];
-        if normal != [0.0; 3] {
-            poles[vertex as usize] = shrink(&tree, vertex, point, normal, largest);
+        if !mesh.is_alive(vertex) || normal == [0.0; 3] {
+            poles.push(None);
+            continue;
         }
+        mesh.neighbours(vertex, &mut around);
+        let spacing = around.iter().map(|&other| mesh.length(vertex, other)).sum::<f64>() / around.len() as f64;
+        let pole = shrink(tree, vertex, point, normal, largest);
+        poles.push((length(subtract(pole, point)) > LEAST_RADIUS * spacing).then_some(pole));
     }
     poles
 }
@@ -56,7 +64,7 @@ fn shrink(tree: &NearestPoints, vertex: u32, point: Vector, normal: Vector, larg
 }
 
 /// A k-d tree (Bentley 1975): the middle of each range parts it along the axis of its largest extent.
-struct NearestPoints {
+pub(super) struct NearestPoints {
     points: Vec<(Vector, u32)>,
     axes: Vec<u8>,
 }
@@ -65,6 +73,17 @@ struct NearestPoints {
 const LEAF: usize = 8;
 
 impl NearestPoints {
+    /// The tree of the vertices that are there.
+    pub fn of(mesh: &Triangulation) -> Self {
+        let alive = (0..mesh.points.len() as u32).filter(|&vertex| mesh.is_alive(vertex));
+        Self::new(alive.map(|vertex| (mesh.points[vertex as usize], vertex)).collect())
+    }
+
+    /// The distance from a place to the nearest point; infinite where there is none.
+    pub fn distance(&self, place: Vector) -> f64 {
+        self.nearest(place, u32::MAX).map_or(f64::INFINITY, |(point, _)| length(subtract(point, place)))
+    }
+
     fn new(mut points: Vec<(Vector, u32)>) -> Self {
         let mut axes = vec![0; points.len()];
         let mut ranges = vec![(0, points.len())];
@@ -161,7 +180,9 @@ mod tests {
     fn the_poles_of_a_torus_lie_on_its_core() {
         let mesh = shapes::torus(1.0, 0.3, [90, 40]);
         let triangles = mesh.cells().connectivity().chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
-        for [x, y, z] in poles(&Triangulation::new(mesh.points().to_vec(), triangles)) {
+        let mesh = Triangulation::new(mesh.points().to_vec(), triangles);
+        for pole in poles(&mesh, &NearestPoints::of(&mesh)) {
+            let [x, y, z] = pole.unwrap();
             assert!((x.hypot(y) - 1.0).hypot(z) < 0.02, "{x} {y} {z}");
         }
     }
