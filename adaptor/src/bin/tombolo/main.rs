@@ -3,6 +3,7 @@
 mod edit;
 mod features;
 mod mesh;
+mod skeleton;
 
 use std::{
     fmt::Display,
@@ -38,6 +39,8 @@ enum Task {
     Features(features::Options),
     /// Give a mesh another shape; exit code 2 where the order is refused, and nothing is written then
     Edit(edit::Options),
+    /// Find the curve skeleton of a mesh's surface
+    Skeleton(skeleton::Options),
 }
 
 #[derive(Debug, Subcommand)]
@@ -73,6 +76,7 @@ fn main() -> ExitCode {
         Task::Mesh(MeshTask::Info { file, json }) => mesh::info(&file, json),
         Task::Features(options) => features::features(&options),
         Task::Edit(options) => edit::edit(&options),
+        Task::Skeleton(options) => skeleton::skeleton(&options),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
