@@ -236,7 +236,7 @@ impl Steerer {
             }
             Done::Planned(plan) => {
                 if let Some(computing) = self.computing.take() {
-                    self.commit(computing, plan, moment, Instant::now(), step_seconds);
+                    self.commit(computing, *plan, moment, Instant::now(), step_seconds);
                 }
             }
         }

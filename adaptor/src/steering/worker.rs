@@ -85,7 +85,7 @@ enum Job {
 pub(crate) enum Done {
     /// The quality of the reference mesh.
     Prepared(Box<Quality>),
-    Planned(Result<Plan, Rejection>),
+    Planned(Box<Result<Plan, Rejection>>),
 }
 
 /// The thread. It ends when this is dropped, after the job at hand.
@@ -104,7 +104,7 @@ impl Worker {
             for job in next {
                 let message = match job {
                     Job::Prepare(deform) => Done::Prepared(Box::new(prepare(&shaper, &deform))),
-                    Job::Plan(wish) => Done::Planned(wish.plan(&shaper)),
+                    Job::Plan(wish) => Done::Planned(Box::new(wish.plan(&shaper))),
                 };
                 if tell.send(message).is_err() {
                     return;
@@ -148,7 +148,7 @@ impl Worker {
 }
 
 fn gone() -> Done {
-    Done::Planned(Err(Rejection::from("the thread that plans shapes has ended")))
+    Done::Planned(Box::new(Err(Rejection::from("the thread that plans shapes has ended"))))
 }
 
 fn prepare(shaper: &Mutex<Shaper>, deform: &Deform) -> Quality {
