@@ -6,12 +6,14 @@
 //! cargo run --release -p tombolo-benchmarks -- surface --json
 //! cargo run --release -p tombolo-benchmarks -- paper --json
 //! cargo run --release -p tombolo-benchmarks -- surface-wasm --json
+//! cargo run --release -p tombolo-benchmarks -- skeleton --json
 //! ```
 
 mod measure;
 mod overhead;
 mod paper;
 mod report;
+mod skeleton;
 mod surface;
 mod surface_wasm;
 mod volume;
@@ -42,6 +44,8 @@ enum Name {
     Paper,
     /// The surface kernel in the viewer's WebAssembly module, in Node, beside the native one.
     SurfaceWasm,
+    /// Curve skeletons, beside CGAL's.
+    Skeleton,
     /// Volume motion at the sizes of the paper's meshes, beside the paper and PETSc.
     Volume,
 }
@@ -57,6 +61,7 @@ fn main() -> ExitCode {
         Name::Overhead => overhead::run(),
         Name::Surface => surface::run(),
         Name::SurfaceWasm => surface_wasm::run(),
+        Name::Skeleton => skeleton::run(),
         Name::Volume => volume::run(),
     };
     said(result.map(|report| if arguments.json { report.json() + "\n" } else { report.to_string() }))

@@ -97,7 +97,7 @@ fn stack(order: usize, drag: usize) -> Result<Vec<Edit>, serde_json::Error> {
 }
 
 /// The torus from `meshes/`, made where it is not there.
-fn torus(project: &Path, count: usize) -> Result<Surface, Box<dyn Error>> {
+pub(crate) fn torus(project: &Path, count: usize) -> Result<Surface, Box<dyn Error>> {
     let file = project.join(format!("meshes/torus-{count}.msh"));
     if !file.exists() {
         fs::create_dir_all(project.join("meshes"))?;

@@ -11,14 +11,18 @@
 #include <chrono>
 #include <cstdlib>
 #include <iostream>
+#include <sstream>
 
 using Kernel = CGAL::Simple_cartesian<double>;
 using Mesh = CGAL::Surface_mesh<Kernel::Point_3>;
 using Skeleton = CGAL::Mean_curvature_flow_skeletonization<Mesh>::Skeleton;
 
 int main() {
+    // CGAL seeks in what it reads, which a pipe does not allow.
+    std::stringstream text;
+    text << std::cin.rdbuf();
     Mesh mesh;
-    if (!CGAL::IO::read_OFF(std::cin, mesh)) {
+    if (!CGAL::IO::read_OFF(text, mesh)) {
         std::cerr << "expected an OFF file\n";
         return EXIT_FAILURE;
     }

@@ -2,6 +2,7 @@
 //! lines; programs over CGAL.
 
 mod cgal;
+mod curves;
 mod generated;
 mod mesh;
 mod run;
@@ -9,6 +10,7 @@ mod small;
 mod viewer;
 
 pub use cgal::{cgal, cgal_program, off};
+pub use curves::CurveGraph;
 pub use generated::generated_surfaces;
 pub use mesh::{NOZZLE_FEATURES, write_nozzle};
 pub use run::{Run, program, programs, tombolo};
@@ -26,15 +28,16 @@ pub fn project() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests/ lies in the project")
 }
 
-/// The directory that cargo builds in, for what tests make once and keep.
+/// The directory that cargo builds in, for what tests and benchmarks make once and keep.
 ///
 /// # Panics
-/// Outside of a test that cargo built.
+/// Outside of a program that cargo built.
 #[must_use]
 pub fn target() -> PathBuf {
-    // A test lies in target/debug/deps.
-    let test = std::env::current_exe().expect("a running test has a path");
-    test.ancestors().nth(3).expect("a test lies in target/debug/deps").to_owned()
+    let program = std::env::current_exe().expect("a running program has a path");
+    // A test lies in target/debug/deps, a benchmark in target/release.
+    let profile = program.ancestors().skip(1).find(|directory| !directory.ends_with("deps"));
+    profile.and_then(Path::parent).expect("a program lies in target/debug or target/release").to_owned()
 }
 
 /// The programs of the book, run as tests.
