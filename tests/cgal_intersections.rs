@@ -60,7 +60,7 @@ fn on_surfaces_pushed_about_at_random() {
             met += agree(&format!("{name} with noise {seed}"), surface, &shape);
         }
     }
-    assert!(met > 1000, "{met}");
+    assert!(met > 100, "{met}");
 }
 
 #[test]

@@ -135,7 +135,7 @@ fn a_refused_order_leaves_the_schedule_under_way_alone() {
     let list = json!([
         at(0, scheduled(squeeze(0.4), 6, 1)),
         at(3, through_itself),
-        at(3, squeeze(1.5)),
+        at(3, squeeze(0.8)),
         at(
             3,
             json!({"edits": [

@@ -108,7 +108,13 @@ fn volume(measure: &Measure<'_>, cell: usize, points: &[Vector], scratch: &mut S
             sum += dot(subtract(middle, centre), cross(a, b));
         }
     });
-    measure.sign(cell) * sum / 6.0
+    outwards(measure, cell) * sum / 6.0
+}
+
+/// 1 where the faces of a cell look outwards, -1 where they look inwards: those of a wedge look outwards where it is ordered
+/// against its corners.
+fn outwards(measure: &Measure<'_>, cell: usize) -> f64 {
+    if measure.cells.cell_type(cell) == CellType::Wedge { -measure.sign(cell) } else { 1.0 }
 }
 
 /// The volume that a face sweeps while its vertices go straight from `start` to `end`, positive where it moves along its normal
@@ -199,7 +205,7 @@ mod tests {
                     }).collect()
                 };
                 let (start, end) = (shift(0), shift(36));
-                let sign = Measure::new(mesh.cells(), &start).sign(0);
+                let sign = outwards(&Measure::new(mesh.cells(), &start), 0);
                 let mut swept = 0.0;
                 mesh.cells().for_each_face(0, |face| {
                     let at = |points: &[Vector]| face.iter().map(|&vertex| points[vertex as usize]).collect::<Vec<_>>();
