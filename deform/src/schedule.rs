@@ -25,7 +25,6 @@ pub struct Schedule {
     /// The distance between one shape and the next: solver steps, or simulated time.
     pub every: Every,
     /// How far apart the shapes lie.
-    #[serde(skip_serializing_if = "Ease::is_linear")]
     pub ease: Ease,
 }
 
@@ -39,12 +38,6 @@ pub enum Ease {
     /// Closer together at both ends (the smooth step `3 s² - 2 s³`): the mesh sets off and stops gently, and is 1.5 times as
     /// fast in the middle.
     Smooth,
-}
-
-impl Ease {
-    fn is_linear(&self) -> bool {
-        *self == Self::Linear
-    }
 }
 
 /// The distance between two shapes of a [`Schedule`].
