@@ -38,16 +38,11 @@ impl Advance {
     pub fn new(surface: &Arc<Surface>, edit: &Edit, place: usize) -> Result<Option<Self>, EditError> {
         let Some(order) = edit.harmonic_order() else { return Ok(None) };
         let handle = Handle::find(surface, edit, place)?;
-        let mut parts = Parts::new(surface.points().len());
-        for &[a, b, c] in surface.triangles() {
-            parts.join(a, b);
-            parts.join(b, c);
-        }
         Ok(Some(Self {
             surface: Arc::clone(surface),
             prescribed: handle.roles.iter().map(|role| *role != Role::Free).collect(),
             order,
-            parts: (0..surface.points().len() as u32).map(|vertex| parts.root(vertex)).collect(),
+            parts: Parts::components(surface.points().len(), surface.triangles()),
             edit: place,
             name: edit.name(),
         }))

@@ -233,12 +233,7 @@ impl Editor {
         let adjacency = Adjacency::new(&surface)?;
         adjacency.check_vertices(&surface)?;
         let laplacians = vec![Laplacian::new(&surface, &adjacency, SLACKS[0])];
-        let mut parts = Parts::new(surface.points().len());
-        for &[a, b, c] in surface.triangles() {
-            parts.join(a, b);
-            parts.join(b, c);
-        }
-        let parts = (0..surface.points().len() as u32).map(|vertex| parts.root(vertex)).collect();
+        let parts = Parts::components(surface.points().len(), surface.triangles());
         let seams = adjacency.seams(&surface);
         let skeletons = SkeletonEditor::new(Arc::clone(&surface));
         Ok(Self { surface, laplacians, parts, operators: Vec::new(), skeletons, seams, layers: Vec::new() })

@@ -159,6 +159,16 @@ impl Parts {
         Self { parents: (0..count as u32).collect() }
     }
 
+    /// The connected component of each of `count` vertices that triangles hold together, by its lowest vertex.
+    pub fn components(count: usize, triangles: &[[u32; 3]]) -> Vec<u32> {
+        let mut parts = Self::new(count);
+        for &[a, b, c] in triangles {
+            parts.join(a, b);
+            parts.join(b, c);
+        }
+        (0..count as u32).map(|vertex| parts.root(vertex)).collect()
+    }
+
     pub fn root(&mut self, mut member: u32) -> u32 {
         while self.parents[member as usize] != member {
             let grandparent = self.parents[self.parents[member as usize] as usize];
