@@ -1,0 +1,26 @@
+//! A drop-in `libcatalyst.so.3`: the Catalyst 2 API with its loader and stub, Conduit's node behind its C interface, and
+//! Blueprint's checks, in Rust and with no library behind it but the C library.
+//!
+//! Solvers that were written for Catalyst 2 link to it unchanged; `scripts/install-catalyst PREFIX` puts the library, its headers
+//! (C, C++, Fortran), its CMake package and its pkg-config file into a prefix.
+//!
+//! # Guarantees
+//! - The shared library exports exactly the names in `symbols.txt`.
+//! - A null node, a wrong type, a number out of range, a path that is not there, a length that is negative: each is told to the
+//!   error handler, with the node's path, what was found and what was expected.
+//! - No panic leaves a function. Where no handler is set an error is thrown as a C++ `std::runtime_error`, if the process has a
+//!   C++ runtime; else it is printed and the function returns 0 or null.
+//!
+//! # What it does not
+//! An address that is not a node, an array that is shorter than it is said to be, and two threads that use one tree at once are
+//! not noticed.
+
+mod c_api;
+pub mod compare;
+pub mod datatype;
+pub mod error;
+pub mod information;
+pub mod leaf;
+pub mod memory;
+pub mod node;
+pub mod transfer;
