@@ -15,12 +15,21 @@
 //! An address that is not a node, an array that is shorter than it is said to be, and two threads that use one tree at once are
 //! not noticed.
 
+pub mod base64;
 mod c_api;
 pub mod compare;
 pub mod datatype;
 pub mod error;
+pub mod files;
 pub mod information;
+pub mod json;
 pub mod leaf;
+pub mod loader;
 pub mod memory;
 pub mod node;
+pub mod print;
+pub mod ranks;
+pub mod schema;
+pub mod stub;
 pub mod transfer;
+pub mod yaml;

@@ -1,1 +1,136 @@
-fn main() {}
+//! Plays back to an implementation what the stub wrote to a directory: `catalyst_replay DIRECTORY`, on as many ranks.
+//!
+//! The library is taken from `../lib` beside this program, else from where the linker looks. Under a launcher of MPI, MPI is
+//! loaded and initialized first, as implementations that use it expect.
+
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::os::unix::ffi::OsStrExt;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::{env, ptr};
+
+#[path = "../ranks.rs"]
+#[allow(dead_code, reason = "shared with the library")]
+mod ranks;
+
+type Make = unsafe extern "C-unwind" fn() -> *mut c_void;
+type Unmake = unsafe extern "C-unwind" fn(*mut c_void);
+type Load = unsafe extern "C-unwind" fn(*mut c_void, *const c_char, *const c_char);
+type Call = unsafe extern "C-unwind" fn(*const c_void) -> c_int;
+
+/// The functions of the library that are used.
+struct Catalyst {
+    make: Make,
+    unmake: Unmake,
+    load: Load,
+    initialize: Call,
+    execute: Call,
+    finalize: Call,
+}
+
+fn open(path: &Path) -> Option<*mut c_void> {
+    let path = CString::new(path.as_os_str().as_bytes()).ok()?;
+    // SAFETY: the path is a C string.
+    let handle = unsafe { libc::dlopen(path.as_ptr(), libc::RTLD_NOW | libc::RTLD_GLOBAL) };
+    (!handle.is_null()).then_some(handle)
+}
+
+fn symbol(handle: *mut c_void, name: &CStr) -> Result<*mut c_void, String> {
+    // SAFETY: the handle is open and the name a C string.
+    let found = unsafe { libc::dlsym(handle, name.as_ptr()) };
+    if found.is_null() { Err(format!("the library has no {name:?}")) } else { Ok(found) }
+}
+
+impl Catalyst {
+    fn find() -> Result<Self, String> {
+        let beside = env::current_exe().ok().and_then(|path| Some(path.parent()?.join("../lib/libcatalyst.so.3")));
+        let handle = beside
+            .and_then(|path| open(&path))
+            .or_else(|| open(Path::new("libcatalyst.so.3")))
+            .ok_or("libcatalyst.so.3 is not found; put its directory into LD_LIBRARY_PATH")?;
+        // SAFETY: the library of this name exports these functions with these signatures.
+        unsafe {
+            Ok(Self {
+                make: std::mem::transmute::<*mut c_void, Make>(symbol(handle, c"catalyst_conduit_node_create")?),
+                unmake: std::mem::transmute::<*mut c_void, Unmake>(symbol(handle, c"catalyst_conduit_node_destroy")?),
+                load: std::mem::transmute::<*mut c_void, Load>(symbol(handle, c"catalyst_conduit_node_load")?),
+                initialize: std::mem::transmute::<*mut c_void, Call>(symbol(handle, c"catalyst_initialize")?),
+                execute: std::mem::transmute::<*mut c_void, Call>(symbol(handle, c"catalyst_execute")?),
+                finalize: std::mem::transmute::<*mut c_void, Call>(symbol(handle, c"catalyst_finalize")?),
+            })
+        }
+    }
+
+    fn play(&self, path: &Path, call: Call) -> Result<(), String> {
+        let file = CString::new(path.as_os_str().as_bytes()).map_err(|_| "a path with a nul in it".to_owned())?;
+        // SAFETY: the node is made, filled, used and destroyed here; the path is a C string.
+        let status = unsafe {
+            let node = (self.make)();
+            (self.load)(node, file.as_ptr(), c"conduit_bin".as_ptr());
+            let status = call(node);
+            (self.unmake)(node);
+            status
+        };
+        if status == 0 { Ok(()) } else { Err(format!("'{}' was answered with status {status}", path.display())) }
+    }
+}
+
+/// Initializes MPI where a launcher started this; gives what ends it.
+fn start_mpi() -> Option<unsafe extern "C" fn() -> c_int> {
+    ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"].iter().find_map(env::var_os)?;
+    let handle = ["libmpi.so.40", "libmpi.so.12", "libmpich.so.12", "libmpi.so"].iter().find_map(|name| open(Path::new(name)))?;
+    let (begin, end) = (symbol(handle, c"MPI_Init").ok()?, symbol(handle, c"MPI_Finalize").ok()?);
+    // SAFETY: MPI's C interface gives these functions these signatures; null arguments are allowed since MPI 2.
+    unsafe {
+        let begin = std::mem::transmute::<*mut c_void, unsafe extern "C" fn(*mut c_int, *mut c_void) -> c_int>(begin);
+        if begin(ptr::null_mut(), ptr::null_mut()) != 0 {
+            return None;
+        }
+        Some(std::mem::transmute::<*mut c_void, unsafe extern "C" fn() -> c_int>(end))
+    }
+}
+
+fn dumped(directory: &Path, stage: &str, (rank, size): (i32, i32)) -> PathBuf {
+    directory.join(format!("{stage}_params.conduit_bin.{size}.{rank}"))
+}
+
+fn replay(directory: &Path) -> Result<(), String> {
+    let world = ranks::rank_and_size();
+    let catalyst = Catalyst::find()?;
+    let first = dumped(directory, "initialize", world);
+    if !first.exists() {
+        let (rank, size) = world;
+        return Err(format!("'{}' is not there; this is rank {rank} of {size}: were there as many then?", first.display()));
+    }
+    catalyst.play(&first, catalyst.initialize)?;
+    for invocation in 0_u64.. {
+        let path = dumped(directory, &format!("execute_invc{invocation}"), world);
+        if !path.exists() {
+            break;
+        }
+        catalyst.play(&path, catalyst.execute)?;
+    }
+    let last = dumped(directory, "finalize", world);
+    if last.exists() { catalyst.play(&last, catalyst.finalize) } else { Ok(()) }
+}
+
+fn main() -> ExitCode {
+    let arguments: Vec<_> = env::args_os().skip(1).collect();
+    let [directory] = arguments.as_slice() else {
+        eprintln!("usage: catalyst_replay DIRECTORY");
+        return ExitCode::from(2);
+    };
+    let end_mpi = start_mpi();
+    let outcome = replay(Path::new(directory));
+    if let Some(end_mpi) = end_mpi {
+        // SAFETY: MPI was initialized by `start_mpi` and is ended once.
+        unsafe { end_mpi() };
+    }
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("catalyst_replay: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}

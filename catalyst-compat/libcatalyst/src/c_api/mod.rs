@@ -6,9 +6,10 @@
 //! null. No panic leaves a function.
 
 
-
+mod catalyst;
 mod datatype;
 mod node;
+mod text;
 
 mod tree;
 mod values;

@@ -1,0 +1,186 @@
+//! Trees from and to text and files.
+
+use std::ffi::{c_char, c_void};
+use std::io::Write;
+use std::ptr;
+
+use super::{hand_out, node, node_mut, run, string};
+use crate::error::{Error, Result};
+use crate::node::Node;
+use crate::print::{Detail, Style};
+use crate::schema::{self, Protocol};
+use crate::files;
+
+/// A text that may be absent.
+///
+/// # Safety
+/// As the functions of [`super`].
+unsafe fn optional(text: *const c_char) -> Result<String> {
+    // SAFETY: as the caller promises.
+    if text.is_null() { Ok(String::new()) } else { unsafe { string(text, "the text") } }
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C-unwind" fn catalyst_conduit_node_parse(
+    target: *mut Node,
+    text: *const c_char,
+    protocol: *const c_char,
+) {
+    run((), || {
+        // SAFETY: the caller keeps to `c_api`'s rules.
+        unsafe {
+            let parsed = schema::parse(&string(text, "the text")?, Protocol::from_name(&optional(protocol)?)?)?;
+            node_mut(target)?.take(parsed)
+        }
+    });
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C-unwind" fn catalyst_conduit_node_generate(
+    target: *mut Node,
+    text: *const c_char,
+    protocol: *const c_char,
+    data: *mut c_void,
+) {
+    run((), || {
+        // SAFETY: the caller keeps to `c_api`'s rules: the data are what the schema describes.
+        unsafe {
+            let protocol = Protocol::from_name(&optional(protocol)?)?;
+            let copy = schema::over(&string(text, "the schema")?, protocol, data.cast())?.copy()?;
+            node_mut(target)?.take(copy)
+        }
+    });
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C-unwind" fn catalyst_conduit_node_generate_external(
+    target: *mut Node,
+    text: *const c_char,
+    protocol: *const c_char,
+    data: *mut c_void,
+) {
+    run((), || {
+        // SAFETY: the caller keeps to `c_api`'s rules: the data are what the schema describes, for as long as the node lives.
+        unsafe {
+            let protocol = Protocol::from_name(&optional(protocol)?)?;
+            let tree = schema::over(&string(text, "the schema")?, protocol, data.cast())?;
+            node_mut(target)?.take(tree)
+        }
+    });
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C-unwind" fn catalyst_conduit_node_save(
+    source: *mut Node,
+    path: *const c_char,
+    protocol: *const c_char,
+) {
+    // SAFETY: the caller keeps to `c_api`'s rules.
+    run((), || unsafe { files::save(node(source)?, &string(path, "the path")?, &optional(protocol)?) });
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C-unwind" fn catalyst_conduit_node_load(
+    target: *mut Node,
+    path: *const c_char,
+    protocol: *const c_char,
+) {
+    run((), || {
+        // SAFETY: the caller keeps to `c_api`'s rules.
+        unsafe {
+            let loaded = files::load(&string(path, "the path")?, &optional(protocol)?)?;
+            node_mut(target)?.take(loaded)
+        }
+    });
+}
+
+/// The options of a call over a style.
+fn styled(options: Option<&Node>, mut style: Style, protocol: &str) -> Result<(Style, String)> {
+    let Some(options) = options else {
+        return Ok((style, protocol.to_owned()));
+    };
+    let count = |name: &str, otherwise: usize| match options.get(name) {
+        None => Ok(otherwise),
+        Some(node) => match node.integer().and_then(|value| usize::try_from(value).ok()) {
+            Some(value) => Ok(value),
+            None => Err(Error::new(format!("the option '{name}' is a number that is not negative"))),
+        },
+    };
+    let text = |name: &str, otherwise: &str| match options.get(name) {
+        None => Ok(otherwise.to_owned()),
+        Some(node) => node.text().ok_or_else(|| Error::new(format!("the option '{name}' is a text"))),
+    };
+    style.indent = count("indent", style.indent)?.min(1 << 10);
+    style.depth = count("depth", style.depth)?.min(1 << 10);
+    style.pad = text("pad", &style.pad)?;
+    style.end = text("eoe", &style.end)?;
+    style.children = count("num_children_threshold", style.children)?;
+    style.elements = count("num_elements_threshold", style.elements)?;
+    Ok((style, text("protocol", protocol)?))
+}
+
+fn write(source: &Node, style: &Style, protocol: &str) -> Result<String> {
+    Ok(match protocol {
+        "yaml" => source.to_yaml(style),
+        "json" => source.to_json(style, Detail::Values),
+        _ => match Protocol::from_name(protocol)? {
+            Protocol::Base64 => schema::to_base64_json(source)?,
+            _ => source.to_json(style, Detail::Everything),
+        },
+    })
+}
+
+macro_rules! writers {
+    ($($name:literal: $protocol:literal, $style:expr;)*) => { $(
+        const _: () = {
+            #[unsafe(export_name = concat!("catalyst_conduit_node_", $name))]
+            unsafe extern "C-unwind" fn plain(source: *const Node) -> *mut c_char {
+                // SAFETY: the caller keeps to `c_api`'s rules.
+                run(ptr::null_mut(), || Ok(hand_out(&write(unsafe { node(source)? }, &$style, $protocol)?)))
+            }
+
+            #[unsafe(export_name = concat!("catalyst_conduit_node_", $name, "_with_options"))]
+            unsafe extern "C-unwind" fn with_options(source: *const Node, options: *const Node) -> *mut c_char {
+                run(ptr::null_mut(), || {
+                    // SAFETY: the caller keeps to `c_api`'s rules.
+                    let (source, options) = unsafe { (node(source)?, options.as_ref()) };
+                    let (style, protocol) = styled(options, $style, $protocol)?;
+                    Ok(hand_out(&write(source, &style, &protocol)?))
+                })
+            }
+        };
+    )* };
+}
+writers! {
+    "to_json": "json", Style::default();
+    "to_yaml": "yaml", Style::default();
+    "to_string": "yaml", Style::default();
+    "to_summary_string": "yaml", Style::summary();
+}
+
+/// What is printed goes where `printf` of the C library goes, in the same order.
+fn show(text: &str) {
+    // SAFETY: a null stream flushes all that the C library holds back.
+    unsafe { libc::fflush(ptr::null_mut()) };
+    let mut output = std::io::stdout().lock();
+    // A closed standard output is no reason to stop a solver.
+    let _ = output.write_all(text.as_bytes()).and_then(|()| output.flush());
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C-unwind" fn catalyst_conduit_node_print(source: *mut Node) {
+    run((), || {
+        // SAFETY: the caller keeps to `c_api`'s rules.
+        show(&format!("{}\n", unsafe { node(source)? }.to_yaml(&Style::summary())));
+        Ok(())
+    });
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C-unwind" fn catalyst_conduit_node_print_detailed(source: *mut Node) {
+    run((), || {
+        // SAFETY: the caller keeps to `c_api`'s rules.
+        show(&format!("{}\n", unsafe { node(source)? }.to_json(&Style::default(), Detail::Everything)));
+        Ok(())
+    });
+}

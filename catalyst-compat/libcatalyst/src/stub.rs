@@ -1,0 +1,133 @@
+//! The implementation that answers where none is named: it does nothing, and where `CATALYST_DATA_DUMP_DIRECTORY` is set it writes
+//! the nodes that it gets, for `catalyst_replay`.
+
+use std::ffi::c_int;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::{env, fs};
+
+use crate::error::{Error, Result};
+use crate::loader::{Implementation, Status};
+use crate::node::Node;
+use crate::{files, ranks};
+
+/// The version of Catalyst that is spoken.
+pub const VERSION: &str = "2.0.0";
+/// The version of its binary interface, which is that of the library's name.
+pub const INTERFACE_VERSION: &str = "3";
+/// The version of Conduit whose interface is spoken.
+pub const CONDUIT_VERSION: &str = "0.9.2";
+
+/// The stub as a table of functions.
+pub const IMPLEMENTATION: Implementation = Implementation { initialize, execute, finalize, about, results };
+
+static EXECUTED: AtomicU64 = AtomicU64::new(0);
+
+/// The file in which a stage's node is kept.
+#[must_use]
+pub fn dump_path(directory: &Path, stage: &str, invocation: Option<u64>, size: i32, rank: i32) -> PathBuf {
+    let count = invocation.map(|count| format!("_invc{count}")).unwrap_or_default();
+    directory.join(format!("{stage}{count}_params.conduit_bin.{size}.{rank}"))
+}
+
+fn dump(stage: &str, invocation: Option<u64>, node: *const Node) -> c_int {
+    let Some(directory) = env::var_os("CATALYST_DATA_DUMP_DIRECTORY").filter(|path| !path.is_empty()) else {
+        return Status::Ok as c_int;
+    };
+    let written = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| -> Result<()> {
+        let (rank, size) = ranks::rank_and_size();
+        let directory = PathBuf::from(directory);
+        fs::create_dir_all(&directory)
+            .map_err(|error| Error::new(format!("'{}' cannot be made: {error}", directory.display())))?;
+        let path = dump_path(&directory, stage, invocation, size, rank);
+        let empty = Node::new();
+        // SAFETY: the caller of a Catalyst function hands over null or a live node.
+        let node = unsafe { node.as_ref() }.unwrap_or(&empty);
+        files::save(node, &path.to_string_lossy(), "conduit_bin")
+    }));
+    match written {
+        Ok(Ok(())) => {}
+        Ok(Err(error)) => eprintln!("catalyst: the node of {stage} is not written: {error}"),
+        Err(_) => eprintln!("catalyst: the node of {stage} is not written: a defect of this library"),
+    }
+    Status::Ok as c_int
+}
+
+/// `catalyst_stub_initialize`.
+///
+/// # Safety
+/// The node is null or live.
+pub unsafe extern "C-unwind" fn initialize(parameters: *const Node) -> c_int {
+    dump("initialize", None, parameters)
+}
+
+/// `catalyst_stub_execute`.
+///
+/// # Safety
+/// The node is null or live.
+pub unsafe extern "C-unwind" fn execute(parameters: *const Node) -> c_int {
+    dump("execute", Some(EXECUTED.fetch_add(1, Ordering::Relaxed)), parameters)
+}
+
+/// `catalyst_stub_finalize`.
+///
+/// # Safety
+/// The node is null or live.
+pub unsafe extern "C-unwind" fn finalize(parameters: *const Node) -> c_int {
+    dump("finalize", None, parameters)
+}
+
+/// `catalyst_stub_about`.
+///
+/// # Safety
+/// The node is null or live, and nobody else uses it.
+pub unsafe extern "C-unwind" fn about(parameters: *mut Node) -> c_int {
+    // SAFETY: as the caller promises.
+    if let Some(node) = unsafe { parameters.as_mut() } {
+        if let Err(error) = describe(node) {
+            eprintln!("catalyst: {error}");
+        }
+    }
+    Status::Ok as c_int
+}
+
+/// `catalyst_stub_results`.
+///
+/// # Safety
+/// The node is null or live, and nobody else uses it.
+pub unsafe extern "C-unwind" fn results(_parameters: *mut Node) -> c_int {
+    Status::Ok as c_int
+}
+
+fn describe(node: &mut Node) -> Result<()> {
+    node.at("catalyst/version")?.set_text(VERSION)?;
+    node.at("catalyst/abi_version")?.set_text(INTERFACE_VERSION)?;
+    node.at("catalyst/implementation")?.set_text("stub")?;
+    node.at("catalyst/use_mpi")?.set_number(i32::from(ranks::has_mpi()))?;
+    about_conduit(node.at("catalyst/tpl/conduit")?)
+}
+
+/// What is said of the Conduit whose interface this is.
+///
+/// # Errors
+/// There is no memory.
+pub fn about_conduit(node: &mut Node) -> Result<()> {
+    node.at("version")?.set_text(CONDUIT_VERSION)?;
+    node.at("implementation")?.set_text(concat!("tombolo-libcatalyst ", env!("CARGO_PKG_VERSION")))?;
+    node.at("index_t")?.set_text("int64")?;
+    for (name, width) in [
+        ("char", "int8"),
+        ("short", "int16"),
+        ("int", "int32"),
+        ("long", "int64"),
+        ("unsigned_char", "uint8"),
+        ("unsigned_short", "uint16"),
+        ("unsigned_int", "uint32"),
+        ("unsigned_long", "uint64"),
+        ("float", "float32"),
+        ("double", "float64"),
+    ] {
+        node.at("native_typemap")?.child_named(name)?.set_text(width)?;
+    }
+    Ok(())
+}
