@@ -53,9 +53,8 @@ pub fn save(node: &Node, path: &str, protocol: &str) -> Result<()> {
 /// # Errors
 /// The file cannot be read, or is not what the protocol says.
 pub fn load(path: &str, protocol: &str) -> Result<Node> {
-    let read = |path: &str| {
-        fs::read(Path::new(path)).map_err(|error| Error::new(format!("'{path}' cannot be read: {error}")))
-    };
+    let read =
+        |path: &str| fs::read(Path::new(path)).map_err(|error| Error::new(format!("'{path}' cannot be read: {error}")));
     let text = |path: &str| read(path).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     let inside = |error: Error| Error::new(format!("'{path}': {error}"));
     match format(path, protocol)? {

@@ -205,7 +205,11 @@ impl Node {
     pub unsafe fn set_elements(&mut self, kind: Kind, data: *const u8, layout: Datatype) -> Result<()> {
         let layout = described(kind, data, layout)?;
         if data.is_null() && layout.elements > 0 {
-            return Err(Error::new(format!("an array of {}: {} elements at a null address", kind.name(), layout.elements)));
+            return Err(Error::new(format!(
+                "an array of {}: {} elements at a null address",
+                kind.name(),
+                layout.elements
+            )));
         }
         // What is copied may lie in the memory that this node is about to let go.
         let kept = self.memory.clone();

@@ -16,6 +16,7 @@
 //! not noticed.
 
 pub mod base64;
+pub mod blueprint;
 mod c_api;
 pub mod compare;
 pub mod datatype;

@@ -111,7 +111,9 @@ pub fn load(parameters: Option<&Node>) -> Result<Implementation, Status> {
         .filter(|name| !name.is_empty())
         .map(OsString::from_vec);
     let from_environment = variable("CATALYST_IMPLEMENTATION_NAME");
-    debug(|| format!("'catalyst_load/implementation' is {from_node:?}, CATALYST_IMPLEMENTATION_NAME is {from_environment:?}"));
+    debug(|| {
+        format!("'catalyst_load/implementation' is {from_node:?}, CATALYST_IMPLEMENTATION_NAME is {from_environment:?}")
+    });
     let name = if prefer_environment { from_environment.or(from_node) } else { from_node.or(from_environment) };
     let implementation = match name {
         None => {
@@ -152,7 +154,9 @@ fn directories(parameters: Option<&Node>, prefer_environment: bool) -> Vec<PathB
     let from_node = parameters
         .and_then(|node| node.find("catalyst_load/search_paths"))
         .into_iter()
-        .flat_map(|paths| if paths.count() == 0 { vec![paths] } else { paths.children().map(|(_, path)| path).collect() })
+        .flat_map(
+            |paths| if paths.count() == 0 { vec![paths] } else { paths.children().map(|(_, path)| path).collect() },
+        )
         .filter_map(Node::text_bytes)
         .map(|path| PathBuf::from(OsString::from_vec(path)));
     let listed = variable("CATALYST_IMPLEMENTATION_PATHS").unwrap_or_default();

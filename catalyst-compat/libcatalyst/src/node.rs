@@ -295,7 +295,11 @@ impl Node {
                 }
                 here.parent.cast_mut()
             } else {
-                let listed = if here.kind() == Kind::List { list_index(name).filter(|index| *index < here.count()) } else { None };
+                let listed = if here.kind() == Kind::List {
+                    list_index(name).filter(|index| *index < here.count())
+                } else {
+                    None
+                };
                 match listed.and_then(|index| here.children.get(index)) {
                     Some(child) => child.node.as_ptr(),
                     None => here.child_named(name)?,
@@ -369,7 +373,8 @@ impl Node {
     /// This is no object, the child is not there, or the new name is taken.
     pub fn rename(&mut self, old: &str, new: &str) -> Result<()> {
         if self.kind() != Kind::Object {
-            let message = format!("{} holds {}; only an object's children have names", self.place(), self.kind().name());
+            let message =
+                format!("{} holds {}; only an object's children have names", self.place(), self.kind().name());
             return Err(Error::new(message));
         }
         if self.position(new).is_some() {

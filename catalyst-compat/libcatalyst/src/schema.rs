@@ -48,7 +48,9 @@ pub fn parse(text: &str, protocol: Protocol) -> Result<Node> {
     match protocol {
         Protocol::Json => plain(&json::parse(text)?, &mut node)?,
         Protocol::Yaml => plain(&yaml::parse(text)?, &mut node)?,
-        Protocol::Schema => Layout { data: std::ptr::null_mut(), length: None }.read(&json::parse(text)?, &mut node, &mut 0)?,
+        Protocol::Schema => {
+            Layout { data: std::ptr::null_mut(), length: None }.read(&json::parse(text)?, &mut node, &mut 0)?
+        }
         Protocol::Base64 => return parse_base64(text),
     }
     Ok(node)
@@ -141,8 +143,10 @@ fn plain(value: &Value, node: &mut Node) -> Result<()> {
                 node.become_tree(Kind::List);
                 return values.iter().try_for_each(|value| plain(value, node.append()?));
             }
-            let integers: Option<Vec<i64>> =
-                values.iter().map(|value| if let Value::Integer(value) = value { Some(*value) } else { None }).collect();
+            let integers: Option<Vec<i64>> = values
+                .iter()
+                .map(|value| if let Value::Integer(value) = value { Some(*value) } else { None })
+                .collect();
             match integers {
                 Some(integers) => node.set_numbers(&integers),
                 None => node.set_numbers(&values.iter().filter_map(Value::real).collect::<Vec<_>>()),
@@ -229,9 +233,11 @@ impl Layout {
         if self.data.is_null() {
             node.make_room(Datatype::compact(kind, elements))?;
         } else {
-            let fits = |length: i64| datatype.offset >= 0 && datatype.stride >= 0 && end.is_some_and(|end| end <= length);
+            let fits =
+                |length: i64| datatype.offset >= 0 && datatype.stride >= 0 && end.is_some_and(|end| end <= length);
             if let Some(length) = self.length.filter(|length| !fits(*length)) {
-                let message = format!("{elements} {} at {} reach beyond {length} bytes of data", kind.name(), datatype.offset);
+                let message =
+                    format!("{elements} {} at {} reach beyond {length} bytes of data", kind.name(), datatype.offset);
                 return Err(Error::new(message));
             }
             node.borrow_elements(kind, self.data, datatype)?;

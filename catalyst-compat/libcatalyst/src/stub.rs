@@ -83,10 +83,8 @@ pub unsafe extern "C-unwind" fn finalize(parameters: *const Node) -> c_int {
 /// The node is null or live, and nobody else uses it.
 pub unsafe extern "C-unwind" fn about(parameters: *mut Node) -> c_int {
     // SAFETY: as the caller promises.
-    if let Some(node) = unsafe { parameters.as_mut() } {
-        if let Err(error) = describe(node) {
-            eprintln!("catalyst: {error}");
-        }
+    if let Some(Err(error)) = unsafe { parameters.as_mut() }.map(describe) {
+        eprintln!("catalyst: {error}");
     }
     Status::Ok as c_int
 }

@@ -230,7 +230,8 @@ impl Node {
     /// Bytes that the tree has allocated itself.
     #[must_use]
     pub fn allocated_bytes(&self) -> i64 {
-        let own = if let Memory::Owned(block) = &self.memory { i64::try_from(block.len()).unwrap_or(i64::MAX) } else { 0 };
+        let own =
+            if let Memory::Owned(block) = &self.memory { i64::try_from(block.len()).unwrap_or(i64::MAX) } else { 0 };
         self.children().fold(own, |sum, (_, child)| child.allocated_bytes().saturating_add(sum))
     }
 

@@ -251,9 +251,8 @@ fn split_key(text: &str) -> Option<(&str, &str)> {
         b'[' | b'{' => return None,
         _ => 0,
     };
-    let colon = (start..bytes.len()).find(|index| {
-        bytes[*index] == b':' && bytes.get(index + 1).is_none_or(u8::is_ascii_whitespace)
-    })?;
+    let colon = (start..bytes.len())
+        .find(|index| bytes[*index] == b':' && bytes.get(index + 1).is_none_or(u8::is_ascii_whitespace))?;
     Some((text[..colon].trim(), text[colon + 1..].trim()))
 }
 

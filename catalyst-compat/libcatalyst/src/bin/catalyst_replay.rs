@@ -78,7 +78,9 @@ impl Catalyst {
 /// Initializes MPI where a launcher started this; gives what ends it.
 fn start_mpi() -> Option<unsafe extern "C" fn() -> c_int> {
     ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"].iter().find_map(env::var_os)?;
-    let handle = ["libmpi.so.40", "libmpi.so.12", "libmpich.so.12", "libmpi.so"].iter().find_map(|name| open(Path::new(name)))?;
+    let handle = ["libmpi.so.40", "libmpi.so.12", "libmpich.so.12", "libmpi.so"]
+        .iter()
+        .find_map(|name| open(Path::new(name)))?;
     let (begin, end) = (symbol(handle, c"MPI_Init").ok()?, symbol(handle, c"MPI_Finalize").ok()?);
     // SAFETY: MPI's C interface gives these functions these signatures; null arguments are allowed since MPI 2.
     unsafe {
@@ -100,7 +102,10 @@ fn replay(directory: &Path) -> Result<(), String> {
     let first = dumped(directory, "initialize", world);
     if !first.exists() {
         let (rank, size) = world;
-        return Err(format!("'{}' is not there; this is rank {rank} of {size}: were there as many then?", first.display()));
+        return Err(format!(
+            "'{}' is not there; this is rank {rank} of {size}: were there as many then?",
+            first.display()
+        ));
     }
     catalyst.play(&first, catalyst.initialize)?;
     for invocation in 0_u64.. {

@@ -5,7 +5,7 @@
 //! A null node or text is an error, not undefined. Errors go to the handler; where that returns, so does the function, with 0 or
 //! null. No panic leaves a function.
 
-
+mod blueprint;
 mod catalyst;
 mod datatype;
 mod node;

@@ -33,7 +33,8 @@ unsafe fn borrow(target: *mut Node, path: Option<*const c_char>, source: *const 
             }
             let (here, there) = (node(target)?, node(source)?);
             if here.holds(there) || there.holds(here) {
-                let message = format!("{} cannot borrow from {}, which it holds or lies in", here.place(), there.place());
+                let message =
+                    format!("{} cannot borrow from {}, which it holds or lies in", here.place(), there.place());
                 return Err(Error::new(message));
             }
             node_mut(target)?.take(mirror)

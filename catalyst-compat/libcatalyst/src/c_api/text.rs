@@ -6,10 +6,10 @@ use std::ptr;
 
 use super::{hand_out, node, node_mut, run, string};
 use crate::error::{Error, Result};
+use crate::files;
 use crate::node::Node;
 use crate::print::{Detail, Style};
 use crate::schema::{self, Protocol};
-use crate::files;
 
 /// A text that may be absent.
 ///

@@ -1,0 +1,57 @@
+# Finds this Catalyst: the targets catalyst::catalyst and, where it was installed, catalyst::catalyst_fortran. The component SDK
+# brings the function catalyst_implementation.
+cmake_policy(PUSH)
+cmake_policy(VERSION 3.13...3.31)
+
+get_filename_component(_catalyst_library_directory "${CMAKE_CURRENT_LIST_DIR}/../.." ABSOLUTE)
+get_filename_component(_catalyst_prefix "${_catalyst_library_directory}/.." ABSOLUTE)
+set(_catalyst_include "${_catalyst_prefix}/include/catalyst-2.0")
+
+if (NOT TARGET catalyst::catalyst)
+  add_library(catalyst::catalyst SHARED IMPORTED)
+  set_target_properties(catalyst::catalyst PROPERTIES
+    IMPORTED_LOCATION "${_catalyst_library_directory}/libcatalyst.so.3"
+    IMPORTED_SONAME "libcatalyst.so.3"
+    INTERFACE_INCLUDE_DIRECTORIES "${_catalyst_include}"
+    INTERFACE_COMPILE_FEATURES "c_std_99;cxx_std_11")
+  # Headers of ParaView's examples ask for this target.
+  add_library(catalyst::conduit_headers INTERFACE IMPORTED)
+  set_target_properties(catalyst::conduit_headers PROPERTIES
+    INTERFACE_INCLUDE_DIRECTORIES "${_catalyst_include}")
+  add_library(catalyst::catalyst_headers INTERFACE IMPORTED)
+  set_target_properties(catalyst::catalyst_headers PROPERTIES
+    INTERFACE_INCLUDE_DIRECTORIES "${_catalyst_include}")
+endif ()
+
+set(catalyst_VERSION "2.0.0")
+set(CATALYST_USE_MPI OFF)
+set(CATALYST_WRAP_PYTHON OFF)
+set(CATALYST_WRAP_FORTRAN OFF)
+set(catalyst_SDK_FOUND 1)
+set(catalyst_Fortran_FOUND 0)
+set(catalyst_FORTRAN_FOUND 0)
+if (EXISTS "${_catalyst_library_directory}/libcatalyst_fortran.so")
+  set(CATALYST_WRAP_FORTRAN ON)
+  set(catalyst_Fortran_FOUND 1)
+  set(catalyst_FORTRAN_FOUND 1)
+  if (NOT TARGET catalyst::catalyst_fortran)
+    add_library(catalyst::catalyst_fortran SHARED IMPORTED)
+    set_target_properties(catalyst::catalyst_fortran PROPERTIES
+      IMPORTED_LOCATION "${_catalyst_library_directory}/libcatalyst_fortran.so"
+      INTERFACE_INCLUDE_DIRECTORIES "${_catalyst_include}"
+      INTERFACE_LINK_LIBRARIES catalyst::catalyst)
+  endif ()
+endif ()
+
+if ("SDK" IN_LIST catalyst_FIND_COMPONENTS)
+  include("${CMAKE_CURRENT_LIST_DIR}/catalyst-macros.cmake")
+endif ()
+
+set(catalyst_FOUND 1)
+foreach (_catalyst_component IN LISTS catalyst_FIND_COMPONENTS)
+  if (catalyst_FIND_REQUIRED_${_catalyst_component} AND NOT catalyst_${_catalyst_component}_FOUND)
+    set(catalyst_FOUND 0)
+    list(APPEND catalyst_NOT_FOUND_MESSAGE "the component ${_catalyst_component} is not installed")
+  endif ()
+endforeach ()
+cmake_policy(POP)

@@ -1,0 +1,13 @@
+/* The order of the bytes of a number. */
+#ifndef conduit_endianness_types_h
+#define conduit_endianness_types_h
+
+#define CONDUIT_ENDIANNESS_DEFAULT_ID 0
+#define CONDUIT_ENDIANNESS_BIG_ID 1
+#define CONDUIT_ENDIANNESS_LITTLE_ID 2
+
+#define CONDUIT_ENDIANNESS_DEFAULT_T CONDUIT_ENDIANNESS_DEFAULT_ID
+#define CONDUIT_ENDIANNESS_BIG_T CONDUIT_ENDIANNESS_BIG_ID
+#define CONDUIT_ENDIANNESS_LITTLE_T CONDUIT_ENDIANNESS_LITTLE_ID
+
+#endif

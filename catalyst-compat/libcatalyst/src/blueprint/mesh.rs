@@ -1,0 +1,140 @@
+//! Meshes: coordinate sets, topologies, fields, and what refers to them.
+
+use crate::blueprint::parts;
+use crate::blueprint::report::{Report, described};
+use crate::blueprint::{index, sets};
+use crate::datatype::Kind;
+use crate::node::Node;
+
+/// Whether a tree holds several domains rather than one mesh.
+#[must_use]
+pub fn is_multi_domain(node: &Node) -> bool {
+    node.get("coordsets").is_none() && node.get("topologies").is_none() && {
+        let holds = |child: &Node| child.get("coordsets").is_some() || child.get("topologies").is_some();
+        matches!(node.kind(), Kind::Object | Kind::List) && node.children().any(|(_, child)| holds(child))
+    }
+}
+
+/// The domains of a mesh: itself, or its children.
+#[must_use]
+pub fn domains(node: &Node) -> Vec<&Node> {
+    if is_multi_domain(node) { node.children().map(|(_, domain)| domain).collect() } else { vec![node] }
+}
+
+/// Verifies a mesh of one domain or several.
+pub fn verify(node: &Node, report: &mut Report) {
+    if !is_multi_domain(node) {
+        return verify_domain(node, report);
+    }
+    for (number, (name, domain)) in node.children().enumerate() {
+        let name = if name.is_empty() { format!("[{number}]") } else { name.to_owned() };
+        verify_domain(domain, report.below(&name, "mesh"));
+    }
+}
+
+type Check = fn(&Node, &mut Report);
+
+fn verify_domain(mesh: &Node, report: &mut Report) {
+    if mesh.kind() != Kind::Object {
+        return report.wrong(mesh, &format!("a mesh is an object, not {}", described(mesh)));
+    }
+    let needed: [(&str, &str, Check); 2] =
+        [("coordsets", "coordset", parts::coordset), ("topologies", "topology", parts::topology)];
+    for (group, protocol, check) in needed {
+        if let Some(children) = report.object(mesh, group) {
+            each(children, group, protocol, check, report);
+        }
+    }
+    let optional: [(&str, &str, Check); 5] = [
+        ("fields", "field", parts::field),
+        ("matsets", "matset", sets::matset),
+        ("specsets", "specset", sets::specset),
+        ("adjsets", "adjset", sets::adjset),
+        ("nestsets", "nestset", sets::nestset),
+    ];
+    for (group, protocol, check) in optional {
+        match mesh.get(group) {
+            Some(children) if children.kind() == Kind::Object => each(children, group, protocol, check, report),
+            Some(other) if other.kind() != Kind::Empty => {
+                report.wrong(other, &format!("an object is expected, not {}", described(other)));
+            }
+            _ => {}
+        }
+    }
+    for (group, reference, target) in [
+        ("topologies", "coordset", "coordsets"),
+        ("fields", "topology", "topologies"),
+        ("matsets", "topology", "topologies"),
+        ("adjsets", "topology", "topologies"),
+        ("nestsets", "topology", "topologies"),
+        ("fields", "matset", "matsets"),
+        ("specsets", "matset", "matsets"),
+    ] {
+        refer(mesh, group, reference, target, report);
+    }
+}
+
+fn each(children: &Node, group: &str, protocol: &str, check: Check, report: &mut Report) {
+    let below = report.below(group, "mesh");
+    for (name, child) in children.children() {
+        check(child, below.below(name, &format!("mesh/{protocol}")));
+    }
+}
+
+/// Checks that what the members of a group name is there.
+fn refer(mesh: &Node, group: &str, reference: &str, target: &str, report: &mut Report) {
+    let Some(members) = mesh.get(group).filter(|members| members.kind() == Kind::Object) else {
+        return;
+    };
+    for (name, member) in members.children() {
+        let Some(named) = member.get(reference).and_then(Node::text) else {
+            continue;
+        };
+        if mesh.get(target).is_none_or(|targets| targets.get(&named).is_none()) {
+            let known: Vec<_> = mesh.get(target).into_iter().flat_map(Node::children).map(|(name, _)| name).collect();
+            let message = format!("there is no '{named}' in '{target}'; there are [{}]", known.join(", "));
+            let place = member.get(reference).unwrap_or(member);
+            report.below(group, "mesh").below(name, "mesh").wrong(place, &message);
+        }
+    }
+}
+
+/// Verifies a part of a mesh by its protocol, such as `coordset` or `topology/shape`.
+pub fn verify_part(protocol: &str, node: &Node, report: &mut Report) {
+    let check: Check = match protocol {
+        "coordset" => parts::coordset,
+        "coordset/uniform" => parts::uniform_coordset,
+        "coordset/rectilinear" => parts::rectilinear_coordset,
+        "coordset/explicit" => parts::explicit_coordset,
+        "coordset/uniform/origin" | "coordset/uniform/spacing" => parts::axes_values,
+        "coordset/type" => |node, report| parts::word(node, &parts::COORDSETS, report),
+        "coordset/coord_system" => index::coord_system,
+        "topology" => parts::topology,
+        "topology/points" => parts::points_topology,
+        "topology/uniform" => parts::uniform_topology,
+        "topology/rectilinear" => parts::rectilinear_topology,
+        "topology/structured" => parts::structured_topology,
+        "topology/unstructured" => parts::unstructured_topology,
+        "topology/type" => |node, report| parts::word(node, &parts::TOPOLOGIES, report),
+        "topology/shape" => |node, report| parts::word(node, &parts::SHAPES, report),
+        "topology/shape_map" => parts::shape_map,
+        "field" => parts::field,
+        "field/association" | "association" => |node, report| parts::word(node, &parts::ASSOCIATIONS, report),
+        "field/basis" => |node, report| {
+            if node.text().is_none() {
+                report.wrong(node, &format!("a text is expected, not {}", described(node)));
+            }
+        },
+        "logical_dims" => parts::logical_dims,
+        "matset" => sets::matset,
+        "specset" => sets::specset,
+        "adjset" => sets::adjset,
+        "nestset" => sets::nestset,
+        "index" => index::verify,
+        "index/coordset" => index::coordset,
+        "index/topology" => index::topology,
+        "index/field" => index::field,
+        _ => return report.wrong(node, &format!("a mesh has no part '{protocol}'")),
+    };
+    check(node, report);
+}

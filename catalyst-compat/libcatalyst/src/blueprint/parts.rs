@@ -1,0 +1,279 @@
+//! The parts that most meshes have: coordinate sets, topologies and fields.
+
+use crate::blueprint::mcarray;
+use crate::blueprint::report::{Report, described};
+use crate::datatype::Kind;
+use crate::node::Node;
+
+/// The types of coordinate sets.
+pub const COORDSETS: [&str; 3] = ["uniform", "rectilinear", "explicit"];
+/// The types of topologies.
+pub const TOPOLOGIES: [&str; 5] = ["points", "uniform", "rectilinear", "structured", "unstructured"];
+/// The shapes of elements.
+pub const SHAPES: [&str; 11] =
+    ["point", "line", "tri", "quad", "tet", "hex", "wedge", "pyramid", "polygonal", "polyhedral", "mixed"];
+/// Where the values of a field are.
+pub const ASSOCIATIONS: [&str; 2] = ["vertex", "element"];
+/// The names of coordinates.
+pub const AXES: [&str; 6] = ["x", "y", "z", "r", "theta", "phi"];
+
+/// Verifies a text that must be one of some words.
+pub fn word(node: &Node, allowed: &[&str], report: &mut Report) {
+    match node.text() {
+        Some(text) if allowed.contains(&text.as_str()) => {}
+        Some(text) => report.wrong(node, &format!("'{text}' is none of {}", allowed.join(", "))),
+        None => report.wrong(node, &format!("a text is expected, not {}", described(node))),
+    }
+}
+
+/// Verifies a coordinate set.
+pub fn coordset(node: &Node, report: &mut Report) {
+    match report.one_of(node, "type", &COORDSETS).as_deref() {
+        Some("uniform") => uniform_coordset(node, report),
+        Some("rectilinear") => rectilinear_coordset(node, report),
+        Some(_) => explicit_coordset(node, report),
+        None => {}
+    }
+}
+
+/// Verifies a uniform coordinate set: `dims`, and perhaps `origin` and `spacing`.
+pub fn uniform_coordset(node: &Node, report: &mut Report) {
+    if let Some(dims) = report.object(node, "dims") {
+        logical_dims(dims, report);
+    }
+    for name in ["origin", "spacing"] {
+        if let Some(values) = node.get(name) {
+            axes_values(values, report);
+        }
+    }
+}
+
+/// Verifies one number for each axis.
+pub fn axes_values(node: &Node, report: &mut Report) {
+    if node.kind() != Kind::Object || node.count() == 0 {
+        return report.wrong(node, &format!("an object of numbers is expected, not {}", described(node)));
+    }
+    for (name, value) in node.children() {
+        let axis = name.strip_prefix('d').unwrap_or(name);
+        if !AXES.contains(&axis) {
+            report.wrong(value, &format!("'{name}' is no axis; axes are {}", AXES.join(", ")));
+        } else if !value.kind().is_number() {
+            report.wrong(value, &format!("a number is expected, not {}", described(value)));
+        }
+    }
+}
+
+/// Verifies numbers of points or elements by `i`, `j`, `k`.
+pub fn logical_dims(node: &Node, report: &mut Report) {
+    if node.kind() != Kind::Object || node.get("i").is_none() {
+        return report.wrong(node, &format!("'i' (and 'j', 'k') is expected, not {}", described(node)));
+    }
+    for (name, value) in node.children().filter(|(name, _)| ["i", "j", "k"].contains(name)) {
+        match value.integer() {
+            _ if !value.kind().is_integer() => {
+                report.wrong(value, &format!("an integer is expected, not {}", described(value)));
+            }
+            Some(count) if count >= 0 => {}
+            Some(count) => report.wrong(value, &format!("'{name}' is {count}; it cannot be negative")),
+            None => report.wrong(value, "an integer is expected; there is none"),
+        }
+    }
+}
+
+/// Verifies a rectilinear coordinate set: an array for each axis.
+pub fn rectilinear_coordset(node: &Node, report: &mut Report) {
+    if let Some(values) = report.object(node, "values") {
+        axes_values(values, report);
+    }
+}
+
+/// Verifies an explicit coordinate set: arrays of one length.
+pub fn explicit_coordset(node: &Node, report: &mut Report) {
+    if let Some(values) = report.object(node, "values") {
+        axes_values(values, report);
+        mcarray::verify(values, report);
+    }
+}
+
+/// Verifies a topology.
+pub fn topology(node: &Node, report: &mut Report) {
+    report.text(node, "coordset");
+    match report.one_of(node, "type", &TOPOLOGIES).as_deref() {
+        Some("structured") => structured(node, report),
+        Some("unstructured") => unstructured(node, report),
+        _ => {}
+    }
+    if let Some(other) = node.get("grid_function").filter(|name| name.text().is_none()) {
+        report.wrong(other, &format!("a text is expected, not {}", described(other)));
+    }
+}
+
+fn typed(node: &Node, allowed: &str, report: &mut Report) {
+    report.text(node, "coordset");
+    report.one_of(node, "type", &[allowed]);
+}
+
+/// Verifies a topology of points.
+pub fn points_topology(node: &Node, report: &mut Report) {
+    typed(node, "points", report);
+}
+
+/// Verifies a uniform topology.
+pub fn uniform_topology(node: &Node, report: &mut Report) {
+    typed(node, "uniform", report);
+}
+
+/// Verifies a rectilinear topology.
+pub fn rectilinear_topology(node: &Node, report: &mut Report) {
+    typed(node, "rectilinear", report);
+}
+
+/// Verifies a structured topology.
+pub fn structured_topology(node: &Node, report: &mut Report) {
+    typed(node, "structured", report);
+    structured(node, report);
+}
+
+/// Verifies an unstructured topology.
+pub fn unstructured_topology(node: &Node, report: &mut Report) {
+    typed(node, "unstructured", report);
+    unstructured(node, report);
+}
+
+fn structured(node: &Node, report: &mut Report) {
+    if let Some(elements) = report.object(node, "elements")
+        && let Some(dims) = report.object(elements, "dims")
+    {
+        logical_dims(dims, report);
+    }
+}
+
+fn unstructured(node: &Node, report: &mut Report) {
+    let Some(elements) = report.object(node, "elements") else {
+        return;
+    };
+    if elements.get("shape").is_some() || elements.get("connectivity").is_some() {
+        elements_of(elements, report);
+        if elements.get("shape").and_then(Node::text).as_deref() == Some("polyhedral") {
+            faces_of(node, report);
+        }
+        return;
+    }
+    // Several groups of elements, by name.
+    for (name, group) in elements.children() {
+        elements_of(group, report.below(name, "mesh/topology"));
+    }
+}
+
+fn elements_of(elements: &Node, report: &mut Report) {
+    let shape = report.one_of(elements, "shape", &SHAPES);
+    let connectivity = report.integers(elements, "connectivity");
+    match shape.as_deref() {
+        Some("polygonal" | "polyhedral") => {
+            report.integers(elements, "sizes");
+            optional_integers(elements, "offsets", report);
+        }
+        Some("mixed") => {
+            if let Some(map) = report.object(elements, "shape_map") {
+                shape_map(map, report);
+            }
+            let shapes = report.integers(elements, "shapes").map(|shapes| shapes.datatype().elements);
+            for name in ["sizes", "offsets"] {
+                let found = report.integers(elements, name).filter(|found| shapes != Some(found.datatype().elements));
+                if let (Some(found), Some(shapes)) = (found, shapes) {
+                    report.wrong(found, &format!("{} entries for {shapes} shapes", found.datatype().elements));
+                }
+            }
+        }
+        Some(shape) => {
+            let size = vertices_of(shape).unwrap_or(1);
+            let count = connectivity.map_or(0, |connectivity| connectivity.datatype().elements);
+            if let Some(connectivity) = connectivity.filter(|_| count % size != 0) {
+                report.wrong(
+                    connectivity,
+                    &format!("{count} vertices are no whole number of '{shape}', which has {size}"),
+                );
+            }
+            optional_integers(elements, "offsets", report);
+        }
+        None => {}
+    }
+}
+
+fn faces_of(topology: &Node, report: &mut Report) {
+    if let Some(faces) = report.object(topology, "subelements") {
+        // The faces are polygons of any size, or all of one shape.
+        report.one_of(faces, "shape", &["polygonal", "tri", "quad", "mixed"]);
+        report.integers(faces, "connectivity");
+        if faces.get("shape").and_then(Node::text).as_deref() == Some("polygonal") {
+            report.integers(faces, "sizes");
+        }
+        optional_integers(faces, "offsets", report);
+    }
+}
+
+fn optional_integers(node: &Node, name: &str, report: &mut Report) {
+    if node.get(name).is_some() {
+        report.integers(node, name);
+    }
+}
+
+/// Verifies a map from the names of shapes to numbers.
+pub fn shape_map(node: &Node, report: &mut Report) {
+    if node.kind() != Kind::Object || node.count() == 0 {
+        return report.wrong(node, &format!("shapes with their numbers are expected, not {}", described(node)));
+    }
+    for (name, value) in node.children() {
+        if !SHAPES.contains(&name) || name == "mixed" {
+            report.wrong(value, &format!("'{name}' is none of {}", SHAPES[..10].join(", ")));
+        } else if !value.kind().is_integer() {
+            report.wrong(value, &format!("an integer is expected, not {}", described(value)));
+        }
+    }
+}
+
+/// How many vertices an element of a shape has; `None` where that differs.
+#[must_use]
+pub fn vertices_of(shape: &str) -> Option<i64> {
+    Some(match shape {
+        "point" => 1,
+        "line" => 2,
+        "tri" => 3,
+        "quad" | "tet" => 4,
+        "pyramid" => 5,
+        "wedge" => 6,
+        "hex" => 8,
+        _ => return None,
+    })
+}
+
+/// Verifies a field.
+pub fn field(node: &Node, report: &mut Report) {
+    if node.get("association").is_some() {
+        report.one_of(node, "association", &ASSOCIATIONS);
+    } else if node.get("basis").is_some() {
+        report.text(node, "basis");
+    } else {
+        report.wrong(node, "neither 'association' nor 'basis' is there");
+    }
+    if let Some(flag) = node.get("volume_dependent") {
+        word(flag, &["true", "false"], report);
+    }
+    let by_material = node.get("matset").is_some();
+    if node.get("topology").is_some() || !by_material {
+        report.text(node, "topology");
+    }
+    if by_material {
+        report.text(node, "matset");
+        if let Some(values) = report.needed(node, "matset_values") {
+            if !values.kind().is_number() && values.count() == 0 {
+                report.wrong(values, &format!("values by material are expected, not {}", described(values)));
+            }
+        }
+    }
+    if node.get("values").is_some() || !by_material {
+        if let Some(values) = report.needed(node, "values") {
+            mcarray::verify_values(values, report);
+        }
+    }
+}
