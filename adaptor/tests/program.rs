@@ -8,7 +8,7 @@ use std::{
 use serde_json::Value;
 use tombolo::{
     deform::{
-        mesh::{FeatureSource, Mesh},
+        mesh::{CellType, Cells, FeatureSource, Mesh},
         shapes::box_of_tets,
     },
     pipelines::files::{Compression, read_mesh, write_mesh},
@@ -215,4 +215,42 @@ fn a_displacement_file_that_is_wrong_is_named_by_line_and_column() {
     let text = error_text(&output);
     assert!(text.contains("edit 0 (displacement): file: lift.txt, line 2, column 9: found \"zero\""), "{text}");
     assert!(!directory.path().join("out.vtu").exists());
+}
+
+/// What `tombolo edit` says to an edit of a surface of triangles.
+fn refused_on(points: &[[f64; 3]], corners: &[u32], tags: &[i64], edit: &str) -> String {
+    let directory = tempfile::tempdir().unwrap();
+    let cells = Cells::uniform(CellType::Triangle, corners.to_vec()).unwrap();
+    let mesh = Mesh::new(points.to_vec(), cells, FeatureSource::Vertices(tags.to_vec())).unwrap();
+    write_mesh(directory.path().join("box.vtu"), &mesh, &[], Compression::None).unwrap();
+    std::fs::write(directory.path().join("edits.json"), format!("[{edit}]")).unwrap();
+    let output = tombolo(directory.path(), &EDIT[..7]);
+    assert_ne!(output.status.code(), Some(0));
+    assert!(!directory.path().join("out.vtu").exists());
+    error_text(&output)
+}
+
+#[test]
+fn surfaces_that_cannot_be_edited_are_named_to_the_user() {
+    let square = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+    let lift = r#"{"translate": {"features": ["feature-1"], "fixed": ["feature-0"], "by": [0, 0, 1]}}"#;
+    // Three faces at one edge.
+    let book = [&square[..], &[[0.5, 0.5, 1.0]]].concat();
+    let text = refused_on(&book, &[0, 1, 2, 0, 2, 3, 0, 2, 4], &[0, 0, 0, 0, 1], lift);
+    assert!(text.contains("mesh vertices 0 and 2") && text.contains("3 faces"), "{text}");
+    // Two faces at one vertex.
+    let bow = [&square[..], &[[2.0, 1.0, 0.0], [2.0, 2.0, 0.0]]].concat();
+    let text = refused_on(&bow, &[0, 1, 2, 0, 2, 3, 2, 4, 5], &[0, 0, 0, 0, 1, 1], lift);
+    assert!(text.contains("mesh vertex 2"), "{text}");
+    // The same face twice.
+    let text = refused_on(&square, &[0, 1, 2, 0, 2, 3, 2, 0, 1], &[0, 0, 1, 1], lift);
+    assert!(text.contains("cells 0 and 2"), "{text}");
+    // Two vertices at one place, which the edit would part.
+    let seam = [&square[..], &[square[1], square[2], [2.0, 0.0, 0.0], [2.0, 1.0, 0.0]]].concat();
+    let text = refused_on(&seam, &[0, 1, 2, 0, 2, 3, 4, 6, 7, 4, 7, 5], &[0, 0, 0, 0, 1, 1, 1, 1], lift);
+    assert!(text.contains("seam") && text.contains("mesh vertices"), "{text}");
+    // All that should move is held.
+    let held = r#"{"translate": {"features": ["feature-1"], "fixed": ["feature-1"], "by": [0, 0, 1]}}"#;
+    let text = refused_on(&square, &[0, 1, 2, 0, 2, 3], &[0, 0, 1, 1], held);
+    assert!(text.contains("feature-1"), "{text}");
 }

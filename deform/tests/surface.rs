@@ -12,6 +12,8 @@ mod editing;
 mod extraction;
 #[path = "surface/features.rs"]
 mod features;
+#[path = "surface/orientation.rs"]
+mod orientation;
 #[path = "surface/random.rs"]
 mod random;
 

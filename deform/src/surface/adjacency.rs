@@ -2,6 +2,10 @@
 
 use super::features::Parts;
 use super::{Surface, SurfaceError};
+use crate::parallel;
+
+/// Vertices that one thread looks at in one go.
+const CHUNK: usize = 1 << 14;
 
 /// The sides of the triangles of a surface: side `3 t + s` runs from corner `s` of triangle `t` to the next one.
 pub(super) struct Adjacency {
@@ -72,39 +76,47 @@ impl Adjacency {
     /// # Errors
     /// [`SurfaceError::NonManifoldVertex`].
     pub fn check_vertices(&self, surface: &Surface) -> Result<(), SurfaceError> {
-        let triangles = surface.triangles();
-        let mut corners = vec![0u32; surface.points().len()];
-        let mut seen = vec![false; surface.points().len()];
-        for &vertex in triangles.as_flattened() {
-            corners[vertex as usize] += 1;
+        let corners = surface.triangles().as_flattened();
+        let mut around_vertices = vec![(0u32, 0u32); surface.points().len()];
+        for (corner, &vertex) in corners.iter().enumerate() {
+            let (first, count) = &mut around_vertices[vertex as usize];
+            *first = corner as u32;
+            *count += 1;
         }
-        for (corner, &vertex) in triangles.as_flattened().iter().enumerate() {
-            if std::mem::replace(&mut seen[vertex as usize], true) {
-                continue;
-            }
-            let first = corner - corner % 3;
-            // Along the side that leaves the vertex, and, where a rim ends that, along the one that comes to it.
-            let mut found = 1;
-            for start in [corner, first + (corner + 2) % 3] {
-                let mut side = start;
-                while self.across[side] != OPEN && found <= corners[vertex as usize] {
-                    let other = self.across[side] as usize;
-                    if other / 3 == first / 3 {
-                        break;
-                    }
-                    found += 1;
-                    let [own, next, last] = around(other);
-                    side = if triangles[own / 3][own % 3] == vertex { last } else { next };
-                }
-                if self.across[side] != OPEN {
+        let failures = parallel::map_chunks(around_vertices.len(), CHUNK, |vertices| {
+            vertices.into_iter().find(|&vertex| {
+                let (first, count) = around_vertices[vertex];
+                count > 0 && self.fan(corners, vertex as u32, first as usize, count) != count
+            })
+        });
+        match failures.into_iter().flatten().next() {
+            Some(vertex) => Err(SurfaceError::NonManifoldVertex { vertex: surface.vertices()[vertex] }),
+            None => Ok(()),
+        }
+    }
+
+    /// How many triangles hang together around a vertex, one of whose corners is `corner`; it has `count` of them.
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    fn fan(&self, corners: &[u32], vertex: u32, corner: usize, count: u32) -> u32 {
+        let triangle = corner / 3;
+        // Along the side that leaves the vertex, and, where a rim ends that, along the one that comes to it.
+        let mut found = 1;
+        for start in [corner, around(corner)[2]] {
+            let mut side = start;
+            while self.across[side] != OPEN && found <= count {
+                let other = self.across[side] as usize;
+                if other / 3 == triangle {
                     break;
                 }
+                found += 1;
+                let [own, next, last] = around(other);
+                side = if corners[own] == vertex { last } else { next };
             }
-            if found != corners[vertex as usize] {
-                return Err(SurfaceError::NonManifoldVertex { vertex: surface.vertices()[vertex as usize] });
+            if self.across[side] != OPEN {
+                break;
             }
         }
-        Ok(())
+        found
     }
 }
 

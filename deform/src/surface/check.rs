@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::Surface;
 use super::bounds::{Bounds, Hierarchy};
+use super::inside_out::turned_inside_out;
 use super::triangle_pair::{Shared, place};
 use crate::mesh::Vector;
 use crate::parallel;
@@ -37,6 +38,8 @@ pub struct SurfaceReport {
     /// Faces folded over: turned by more than 120° against most of what was smoothly connected to them around, or lying on a
     /// neighbour with less than 1° between.
     pub flipped: FlawedFaces,
+    /// Faces of closed pieces that are turned inside out as a whole: what was inside them is outside.
+    pub inside_out: FlawedFaces,
     /// Faces that pass through each other or touch, but for the vertices and edges they share.
     pub intersections: Intersections,
 }
@@ -84,7 +87,8 @@ impl SurfaceReport {
     /// Whether nothing is wrong.
     #[must_use]
     pub fn is_sound(&self) -> bool {
-        self.degenerate.count == 0 && self.flipped.count == 0 && self.intersections.count == 0
+        [&self.degenerate, &self.flipped, &self.inside_out].iter().all(|flawed| flawed.count == 0)
+            && self.intersections.count == 0
     }
 }
 
@@ -93,7 +97,11 @@ impl std::fmt::Display for SurfaceReport {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let at = |[x, y, z]: Vector| format!("({x:.6}, {y:.6}, {z:.6})");
         let mut parts = Vec::new();
-        for (flawed, what) in [(&self.degenerate, "lose their area"), (&self.flipped, "fold over")] {
+        for (flawed, what) in [
+            (&self.degenerate, "lose their area"),
+            (&self.flipped, "fold over"),
+            (&self.inside_out, "of closed pieces are turned inside out"),
+        ] {
             if let Some(first) = flawed.first.first() {
                 parts.push(format!(
                     "{} face(s) {what}, the first is face {} at {}",
@@ -125,6 +133,7 @@ impl std::fmt::Display for SurfaceReport {
 /// - **Degenerate**: a triangle whose height is under 10⁻⁸ of its longest side, or whose sides are under 10⁻⁸ of what they were.
 /// - **Flipped**: judged by the angles between normals only, before and after, so that a part that is turned as a whole, by
 ///   180° too, is never flipped. Sharp edges that the reference has, however sharp, do not count.
+/// - **Inside out**: the volume that a closed piece encloses has another sign than before.
 /// - **Intersections**: by exact predicates, so that no rounding hides or makes one; touching counts. Triangles without area are
 ///   left out, and so are pairs that met or touched in the reference (to 10⁻⁹ of their size): parts in contact may move together.
 ///
@@ -185,6 +194,7 @@ pub fn check(surface: &Surface, reference: &[Vector], shape: &[Vector]) -> Surfa
         degenerate: faces(found.degenerate),
         intersections: Intersections { count: found.count, more: found.more, first: first.collect() },
         flipped: faces(found.flipped),
+        inside_out: faces(turned_inside_out(surface.triangles(), reference, shape)),
     }
 }
 

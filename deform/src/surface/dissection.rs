@@ -7,7 +7,7 @@ use crate::parallel;
 const LEAF: usize = 40;
 
 /// Pieces of fewer vertices are not worth a thread.
-const PIECE: usize = 1 << 14;
+const PIECE: usize = 1 << 12;
 
 /// A set of vertices that is eliminated after its parts, which do not couple with each other.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -89,8 +89,12 @@ impl<'a, N: Iterator<Item = usize>, F: Fn(usize) -> N + Sync> Search<'a, F> {
         for &vertex in vertices {
             let point = self.points[vertex as usize];
             for axis in 0..3 {
-                lower[axis] = lower[axis].min(point[axis]);
-                upper[axis] = upper[axis].max(point[axis]);
+                if point[axis] < lower[axis] {
+                    lower[axis] = point[axis];
+                }
+                if point[axis] > upper[axis] {
+                    upper[axis] = point[axis];
+                }
             }
         }
         // Halved, so that no extent is infinite.

@@ -196,6 +196,16 @@ pub enum EditError {
         /// The vertex, by mesh vertex number.
         vertex: u32,
     },
+    /// The faces of a handle that is to be offset do not run the same way round, and cannot be made to.
+    #[error(
+        "edit {edit} (scale_normals): the handle has one side only, as a Moebius strip: face {face} meets a neighbour that faces the other way, so that no side is the outer one"
+    )]
+    OneSided {
+        /// The place of the edit.
+        edit: usize,
+        /// The face, as in [`Surface::faces`](super::Surface::faces).
+        face: u32,
+    },
     /// A displacement names a vertex that is not on the surface.
     #[error("edit {edit} (displacement): vertices[{index}]: mesh vertex {vertex} is not on the surface")]
     NotOnSurface {

@@ -88,6 +88,8 @@ const SLACKS: [f64; 4] = [1e-9, 1e-5, 1e-3, 1e-1];
 /// ```
 pub struct Editor {
     surface: Arc<Surface>,
+    /// The largest coordinate.
+    farthest: f64,
     /// One for each of the first [`SLACKS`] so far needed.
     laplacians: Vec<Laplacian>,
     parts: Vec<u32>,
@@ -144,8 +146,8 @@ impl Followed {
         self.missing(edit).next().is_none()
     }
 
-    /// Adds the displacement of an edit; whether all places reached are finite.
-    fn add(&self, points: &[Vector], edit: &Edit, displacement: &mut [Vector]) -> bool {
+    /// `displacement` becomes `below` and what an edit adds to it; whether it is everywhere at most `limit`.
+    fn add(&self, edit: &Edit, below: &[Vector], limit: f64, displacement: &mut [Vector]) -> bool {
         let coefficients = Motion::coefficients(edit, self.unit);
         let terms: Vec<(&[f64], Vector)> = self
             .bases
@@ -155,27 +157,28 @@ impl Followed {
             .filter_map(|(base, coefficient)| Some((base.as_deref()?, coefficient)))
             .collect();
         match terms.as_slice() {
-            [a] => add_terms([a], points, displacement),
-            [a, b] => add_terms([a, b], points, displacement),
-            [a, b, c] => add_terms([a, b, c], points, displacement),
-            [a, b, c, d] => add_terms([a, b, c, d], points, displacement),
-            _ => true,
+            [a] => add_terms([a], below, limit, displacement),
+            [a, b] => add_terms([a, b], below, limit, displacement),
+            [a, b, c] => add_terms([a, b, c], below, limit, displacement),
+            [a, b, c, d] => add_terms([a, b, c, d], below, limit, displacement),
+            _ => add_terms([], below, limit, displacement),
         }
     }
 }
 
-/// Adds each base times its coefficient; whether all places reached are finite.
+/// Each base times its coefficient and what is below; whether all of it is at most `limit`.
 fn add_terms<const COUNT: usize>(
     terms: [&(&[f64], Vector); COUNT],
-    points: &[Vector],
+    below: &[Vector],
+    limit: f64,
     displacement: &mut [Vector],
 ) -> bool {
-    let all_finite = AtomicBool::new(true);
+    let all_within = AtomicBool::new(true);
     parallel::for_each_chunk(displacement, CHUNK, |chunk, part| {
         let range = CHUNK * chunk..CHUNK * chunk + part.len();
         let terms = terms.map(|(base, coefficient)| (&base[range.clone()], *coefficient));
-        let mut finite = true;
-        for (index, (moved, point)) in part.iter_mut().zip(&points[range.clone()]).enumerate() {
+        let mut within = true;
+        for (index, (moved, below)) in part.iter_mut().zip(&below[range.clone()]).enumerate() {
             let mut sum = [0.0; 3];
             for (base, coefficient) in terms {
                 for axis in 0..3 {
@@ -183,15 +186,15 @@ fn add_terms<const COUNT: usize>(
                 }
             }
             for axis in 0..3 {
-                moved[axis] += sum[axis];
-                finite &= (point[axis] + moved[axis]).is_finite();
+                moved[axis] = below[axis] + sum[axis];
+                within &= moved[axis].abs() <= limit;
             }
         }
-        if !finite {
-            all_finite.store(false, Ordering::Relaxed);
+        if !within {
+            all_within.store(false, Ordering::Relaxed);
         }
     });
-    all_finite.into_inner()
+    all_within.into_inner()
 }
 
 /// An edit but for what its coefficients ([`Motion::coefficients`]) depend on, and for its name.
@@ -236,7 +239,12 @@ impl Editor {
         let parts = Parts::components(surface.points().len(), surface.triangles());
         let seams = adjacency.seams(&surface);
         let skeletons = SkeletonEditor::new(Arc::clone(&surface));
-        Ok(Self { surface, laplacians, parts, operators: Vec::new(), skeletons, seams, layers: Vec::new() })
+        let farthest = surface
+            .points()
+            .as_flattened()
+            .iter()
+            .fold(0.0, |farthest, value| if value.abs() > farthest { value.abs() } else { farthest });
+        Ok(Self { surface, farthest, laplacians, parts, operators: Vec::new(), skeletons, seams, layers: Vec::new() })
     }
 
     /// The surface.
@@ -363,10 +371,10 @@ impl Editor {
             followed.bases.iter().map(|base| base.as_ref().map(|base| operator.error(laplacian, base))).collect();
         let errors = Followed { setting: followed.setting.clone(), unit: followed.unit, bases: errors };
         let size = |moved: &Vector| moved.iter().fold(0.0f64, |largest, part| largest.max(part.abs()));
-        let points = self.surface.points();
-        let [mut moved, mut wrong] = [0, 1].map(|_| vec![[0.0; 3]; points.len()]);
-        followed.add(points, edit, &mut moved);
-        errors.add(points, edit, &mut wrong);
+        let below = vec![[0.0; 3]; self.surface.points().len()];
+        let [mut moved, mut wrong] = [below.clone(), below.clone()];
+        followed.add(edit, &below, f64::MAX, &mut moved);
+        errors.add(edit, &below, f64::MAX, &mut wrong);
         let motion = moved.iter().zip(&prescribed).filter(|(_, prescribed)| **prescribed).map(|(moved, _)| size(moved));
         let motion = motion.fold(0.0, f64::max);
         Ok(if motion > 0.0 { wrong.iter().map(size).fold(0.0, f64::max) / motion } else { 0.0 })
@@ -405,16 +413,18 @@ impl Editor {
         layer: &mut Layer,
         displacement: &mut [Vector],
     ) -> Result<(), EditError> {
-        displacement.copy_from_slice(&layer.below);
         if edit.muted() {
+            displacement.copy_from_slice(&layer.below);
             return Ok(());
         }
         let finite = match edit {
             Edit::Displacement(import) => {
+                displacement.copy_from_slice(&layer.below);
                 let handle = handle.map_or_else(|| Handle::find(&self.surface, edit, place), Ok)?;
                 self.add(&motion::displacement(&self.surface, import, &handle), displacement)
             }
             Edit::Skeleton(drag) => {
+                displacement.copy_from_slice(&layer.below);
                 let handle = handle.map_or_else(|| Handle::find(&self.surface, edit, place), Ok)?;
                 let held = handle.roles.iter().map(|role| *role != Role::Handle).collect();
                 let moved = self.skeletons.displacement(drag, held, displacement);
@@ -422,8 +432,17 @@ impl Editor {
             }
             _ => {
                 self.follow(place, edit, handle, layer)?;
-                let points = self.surface.points();
-                layer.followed.as_ref().is_none_or(|followed| followed.add(points, edit, displacement))
+                match &layer.followed {
+                    Some(followed) => {
+                        // Places are read only where a sum might not be finite.
+                        followed.add(edit, &layer.below, f64::MAX - self.farthest, displacement)
+                            || self.all_finite(displacement)
+                    }
+                    None => {
+                        displacement.copy_from_slice(&layer.below);
+                        true
+                    }
+                }
             }
         };
         if !finite {
@@ -439,6 +458,10 @@ impl Editor {
     /// Adds a displacement; whether all places reached are finite.
     fn add(&self, moved: &[Vector], displacement: &mut [Vector]) -> bool {
         displacement.iter_mut().zip(moved).for_each(|(sum, moved)| *sum = add(*sum, *moved));
+        self.all_finite(displacement)
+    }
+
+    fn all_finite(&self, displacement: &[Vector]) -> bool {
         let mut reached = self.surface.points().iter().zip(displacement).map(|(point, moved)| add(*point, *moved));
         reached.all(|point| point.iter().all(|value| value.is_finite()))
     }

@@ -3,6 +3,7 @@
 use super::bounds::Bounds;
 use super::faces::{self, FaceBuffer};
 use super::features::{FeatureSettings, FeatureSize, Features};
+use super::orientation::faces_to_turn;
 use crate::mesh::{CellType, Cells, FeatureSource, Mesh, MeshError, Vector, check_finite};
 use crate::vector::{cross, dot, subtract};
 
@@ -91,12 +92,13 @@ impl Surface {
             local[vertex as usize] = number as u32;
         }
         let points: Vec<Vector> = vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect();
-        let mut faces = Cells::new();
-        let mut renumbered = Vec::new();
-        for (cell_type, vertices) in global_faces.iter() {
-            renumbered.clear();
-            renumbered.extend(vertices.iter().map(|&vertex| local[vertex as usize]));
-            let _ = faces.push(cell_type, &renumbered);
+        let mut faces = renumbered(&global_faces, &local, |_| false);
+        // The faces of other volume cells are known to run the same way round.
+        if dimension == 2 || cells.types().contains(&CellType::Polyhedron) {
+            let turned = faces_to_turn(&points, &faces);
+            if turned.contains(&true) {
+                faces = renumbered(&global_faces, &local, |face| turned[face]);
+            }
         }
 
         let (triangles, triangle_faces) = split_into_triangles(&points, &faces);
@@ -239,7 +241,9 @@ impl Surface {
     }
 
     /// The faces (triangles, quadrilaterals and polygons) by surface vertex numbers, counter-clockwise seen from outside the
-    /// volume; those of a mesh of dimension 2 run as they were given.
+    /// volume. Those of a mesh of dimension 2 run the same way round in each piece of the surface, as most of it was given, and
+    /// closed pieces so that they enclose a positive volume; only a piece with one side, as a Moebius strip, is left as it was
+    /// given.
     #[must_use]
     pub fn faces(&self) -> &Cells {
         &self.faces
@@ -268,6 +272,22 @@ impl Surface {
     pub fn features(&self) -> &Features {
         &self.features
     }
+}
+
+/// Faces by other vertex numbers, some of them turned round.
+fn renumbered(faces: &Cells, numbers: &[u32], is_turned: impl Fn(usize) -> bool) -> Cells {
+    let mut renumbered = Cells::new();
+    let mut corners: Vec<u32> = Vec::new();
+    for (face, (cell_type, vertices)) in faces.iter().enumerate() {
+        corners.clear();
+        corners.extend(vertices.iter().map(|&vertex| numbers[vertex as usize]));
+        if is_turned(face) {
+            corners[1..].reverse();
+        }
+        // What was a face before is one again.
+        let _ = renumbered.push(cell_type, &corners);
+    }
+    renumbered
 }
 
 /// Whether a cell is a wedge whose first triangle faces its second, as mesh generators number it, and not outwards, as VTK's

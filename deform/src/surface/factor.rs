@@ -2,13 +2,8 @@
 
 use std::ops::Range;
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt;
-use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::linalg::triangular_solve;
-use faer::{Accum, MatMut, Par, Spec};
-
 use super::dissection::Branch;
+use super::front::{self, LANES, Lanes, strips, trapezoid, triangle};
 use crate::parallel;
 
 /// The rows of a symmetric matrix, by places in the order of elimination.
@@ -29,13 +24,13 @@ pub(super) struct Factor {
     size: usize,
 }
 
-/// Some columns of the factor: rows `own`, then those of `boundary`.
+/// Some columns of the factor: rows `own`, then those of `boundary`, either filled up to whole strips.
 struct Front {
     own: Range<usize>,
     /// The later places that its columns reach, rising.
     boundary: Vec<u32>,
-    /// Column after column; what is above the diagonal has no meaning.
-    values: Vec<f64>,
+    /// Strip after strip, see [`trapezoid`].
+    values: Vec<Lanes>,
 }
 
 /// Why there is no factor.
@@ -54,20 +49,20 @@ impl Factor {
         let size = branch.own.end;
         let worker = Worker::new(rows, size);
         // Few pieces whatever the number of threads: each takes memory.
-        let piece = (size / 8).max(1 << 13);
+        let piece = (size / 8).max(1 << 11);
         let (fronts, _) = worker.eliminate(branch, piece)?;
         Ok(Self { fronts, size })
     }
 
     /// How many numbers it holds.
     pub fn len(&self) -> usize {
-        self.fronts.iter().map(|front| front.values.len()).sum()
+        self.fronts.iter().map(|front| LANES * front.values.len()).sum()
     }
 
     /// Solves `A x = b` for columns one after the other in `values`.
     pub fn solve_in_place(&self, values: &mut [f64]) {
-        let longest = self.fronts.iter().map(Front::rows).max().unwrap_or(0);
-        let mut work = vec![0.0; longest];
+        let longest = self.fronts.iter().map(Front::strips).max().unwrap_or(0);
+        let mut work = vec![[0.0; LANES]; longest];
         for front in &self.fronts {
             for values in values.chunks_exact_mut(self.size) {
                 front.forward(values, &mut work);
@@ -82,60 +77,40 @@ impl Factor {
 }
 
 impl Front {
-    fn rows(&self) -> usize {
-        self.own.len() + self.boundary.len()
+    fn strips(&self) -> usize {
+        strips(self.own.len()) + strips(self.boundary.len())
     }
 
     /// `C y = b`.
-    fn forward(&self, values: &mut [f64], work: &mut [f64]) {
-        let (own, rows) = (self.own.len(), self.rows());
-        let work = &mut work[..rows];
-        work[..own].copy_from_slice(&values[self.own.clone()]);
-        work[own..].fill(0.0);
-        for (column, entries) in self.values.chunks_exact(rows.max(1)).enumerate() {
-            let value = work[column] / entries[column];
-            work[column] = value;
-            for (work, entry) in work[column + 1..].iter_mut().zip(&entries[column + 1..]) {
-                *work -= entry * value;
-            }
-        }
-        values[self.own.clone()].copy_from_slice(&work[..own]);
-        for (&place, change) in self.boundary.iter().zip(&work[own..]) {
+    fn forward(&self, values: &mut [f64], work: &mut [Lanes]) {
+        let own = strips(self.own.len());
+        let work = &mut work[..self.strips()];
+        work.fill([0.0; LANES]);
+        work.as_flattened_mut()[..self.own.len()].copy_from_slice(&values[self.own.clone()]);
+        front::forward(&self.values, own, work);
+        values[self.own.clone()].copy_from_slice(&work.as_flattened()[..self.own.len()]);
+        for (&place, change) in self.boundary.iter().zip(work[own..].as_flattened()) {
             values[place as usize] += change;
         }
     }
 
     /// `C^T x = y`.
-    fn backward(&self, values: &mut [f64], work: &mut [f64]) {
-        let (own, rows) = (self.own.len(), self.rows());
-        let work = &mut work[..rows];
-        work[..own].copy_from_slice(&values[self.own.clone()]);
-        for (&place, work) in self.boundary.iter().zip(&mut work[own..]) {
+    fn backward(&self, values: &mut [f64], work: &mut [Lanes]) {
+        let own = strips(self.own.len());
+        let work = &mut work[..self.strips()];
+        work.fill([0.0; LANES]);
+        work.as_flattened_mut()[..self.own.len()].copy_from_slice(&values[self.own.clone()]);
+        for (&place, work) in self.boundary.iter().zip(work[own..].as_flattened_mut()) {
             *work = values[place as usize];
         }
-        for (column, entries) in self.values.chunks_exact(rows.max(1)).enumerate().rev() {
-            work[column] = (work[column] - dot(&entries[column + 1..], &work[column + 1..])) / entries[column];
-        }
-        values[self.own.clone()].copy_from_slice(&work[..own]);
+        front::backward(&self.values, own, work);
+        values[self.own.clone()].copy_from_slice(&work.as_flattened()[..self.own.len()]);
     }
 }
 
-/// In eight sums side by side, for which processors have room.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (a, b) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in a.zip(b) {
-        for lane in 0..8 {
-            sums[lane] += a[lane] * b[lane];
-        }
-    }
-    sums.iter().sum::<f64>() + rest
-}
-
-/// What the eliminations of a branch have left over: the lower triangle of a dense matrix among the boundary of its front, column
-/// after column from the start; the rest of the memory has no meaning.
-type LeftOver = Vec<f64>;
+/// What the eliminations of a branch have left over: the lower triangle of a dense matrix among the boundary of its front, strip
+/// after strip ([`triangle`]).
+type LeftOver = Vec<Lanes>;
 
 struct Worker<'a, R, F> {
     make_rows: &'a F,
@@ -194,26 +169,30 @@ impl<'a, R: Rows, F: Fn() -> R + Sync> Worker<'a, R, F> {
         let Range { start, end } = branch.own;
         let own = end - start;
         let boundary = self.read_rows(start..end, parts.iter().map(|(part, _)| &fronts[*part].boundary));
-        let rows = own + boundary.len();
+        let [own_strips, strips] = [strips(own), strips(own) + strips(boundary.len())];
         let local = |place: u32| match place as usize {
             place if place < end => place - start,
             place => self.local[place] as usize - 1,
         };
 
         let mut values = Vec::new();
-        resize(&mut values, rows, own)?;
+        resize(&mut values, trapezoid(own_strips, strips))?;
         for &(column, place, value) in &self.entries {
-            values[column as usize * rows + local(place)] = value;
+            let row = local(place);
+            values[trapezoid(own_strips, row / LANES) + column as usize][row % LANES] = value;
         }
-        let moved: Vec<Vec<usize>> =
+        // What fills up the last strip stays by itself.
+        for row in own..LANES * own_strips {
+            values[triangle(row / LANES) + row][row % LANES] = 1.0;
+        }
+        let mut moved: Vec<Vec<usize>> =
             parts.iter().map(|(part, _)| fronts[*part].boundary.iter().map(|&place| local(place)).collect()).collect();
         for ((_, from), moved) in parts.iter().zip(&moved) {
-            let columns = moved.iter().take_while(|&&column| column < own);
-            for (index, &column) in columns.enumerate() {
-                let target = &mut values[column * rows..(column + 1) * rows];
-                for (&row, entry) in moved[index..].iter().zip(&from[index * moved.len() + index..]) {
-                    target[row] += entry;
-                }
+            let inside = moved.partition_point(|&row| row < own);
+            for (place, &row) in moved.iter().enumerate() {
+                let lanes = [row, place].map(|row| row % LANES);
+                let target = &mut values[trapezoid(own_strips, row / LANES)..];
+                add_row(target, from[triangle(place / LANES)..].iter(), &moved[..inside.min(place + 1)], lanes);
             }
         }
         for &place in &boundary {
@@ -221,17 +200,18 @@ impl<'a, R: Rows, F: Fn() -> R + Sync> Worker<'a, R, F> {
         }
 
         let mut left_over = self.pool.pop().unwrap_or_default();
-        if left_over.len() < boundary.len().saturating_mul(boundary.len()) {
-            resize(&mut left_over, boundary.len(), boundary.len())?;
-        }
-        factor_front(&mut values, own, boundary.len(), &mut left_over)?;
-        for ((_, from), moved) in parts.iter().zip(&moved) {
-            for (index, &column) in moved.iter().enumerate().skip_while(|(_, column)| **column < own) {
-                let target = &mut left_over[(column - own) * boundary.len()..(column - own + 1) * boundary.len()];
-                for (&row, entry) in moved[index..].iter().zip(&from[index * moved.len() + index..]) {
-                    target[row - own] += entry;
-                }
+        resize(&mut left_over, triangle(strips - own_strips))?;
+        for ((_, from), moved) in parts.iter().zip(&mut moved) {
+            let inside = moved.partition_point(|&row| row < own);
+            moved[inside..].iter_mut().for_each(|row| *row -= LANES * own_strips);
+            for (place, &row) in moved.iter().enumerate().skip(inside) {
+                let lanes = [row, place].map(|row| row % LANES);
+                let target = &mut left_over[triangle(row / LANES)..];
+                add_row(target, from[triangle(place / LANES)..].iter().skip(inside), &moved[inside..=place], lanes);
             }
+        }
+        if !front::eliminate(&mut values, own_strips, strips, &mut left_over) {
+            return Err(NoFactor::NotPositive);
         }
         self.pool.extend(parts.into_iter().map(|(_, left_over)| left_over));
         fronts.push(Front { own: start..end, boundary, values });
@@ -260,7 +240,7 @@ impl<'a, R: Rows, F: Fn() -> R + Sync> Worker<'a, R, F> {
         parts.flatten().for_each(|&place| reach(place));
         boundary.sort_unstable();
         for (number, &place) in boundary.iter().enumerate() {
-            self.local[place as usize] = (end - start + number + 1) as u32;
+            self.local[place as usize] = (LANES * strips(end - start) + number + 1) as u32;
         }
         boundary
     }
@@ -273,45 +253,26 @@ impl Branch {
     }
 }
 
-fn resize(values: &mut Vec<f64>, rows: usize, columns: usize) -> Result<(), NoFactor> {
-    let size = rows.checked_mul(columns).filter(|&size| size <= LARGEST).ok_or(NoFactor::OutOfMemory)?;
-    values.clear();
-    values.try_reserve_exact(size).map_err(|_| NoFactor::OutOfMemory)?;
-    values.resize(size, 0.0);
-    Ok(())
+/// Adds one row of what was left over to a row of another matrix: its lane of each entry to that lane of the given columns.
+#[cfg_attr(target_arch = "wasm32", inline(never))]
+fn add_row<'a>(
+    target: &mut [Lanes],
+    from: impl Iterator<Item = &'a Lanes>,
+    columns: &[usize],
+    [target_lane, from_lane]: [usize; 2],
+) {
+    for (&column, entry) in columns.iter().zip(from) {
+        target[column][target_lane] += entry[from_lane];
+    }
 }
 
-/// Eliminates the `own` columns of a symmetric matrix, and puts `-B B^T` into `left_over` for the rows `B` of its boundary.
-fn factor_front(values: &mut [f64], own: usize, boundary: usize, left_over: &mut [f64]) -> Result<(), NoFactor> {
-    let (mut top, mut bottom) = MatMut::from_column_major_slice_mut(values, own + boundary, own).split_at_row_mut(own);
-    let scratch = llt::factor::cholesky_in_place_scratch::<f64>(own, Par::Seq, Spec::default());
-    let mut memory = MemBuffer::try_new(scratch).map_err(|_| NoFactor::OutOfMemory)?;
-    llt::factor::cholesky_in_place(
-        top.as_mut(),
-        llt::factor::LltRegularization::default(),
-        Par::Seq,
-        MemStack::new(&mut memory),
-        Spec::default(),
-    )
-    .map_err(|_| NoFactor::NotPositive)?;
-    // A factor that is not finite would poison every solution without a word.
-    if !(0..own).all(|place| top[(place, place)].is_finite()) {
-        return Err(NoFactor::NotPositive);
+fn resize(values: &mut Vec<Lanes>, size: usize) -> Result<(), NoFactor> {
+    values.clear();
+    if size > LARGEST / LANES {
+        return Err(NoFactor::OutOfMemory);
     }
-    if boundary > 0 {
-        triangular_solve::solve_lower_triangular_in_place(top.as_ref(), bottom.as_mut().transpose_mut(), Par::Seq);
-        triangular::matmul(
-            MatMut::from_column_major_slice_mut(&mut left_over[..boundary * boundary], boundary, boundary),
-            BlockStructure::TriangularLower,
-            Accum::Replace,
-            bottom.as_ref(),
-            BlockStructure::Rectangular,
-            bottom.as_ref().transpose(),
-            BlockStructure::Rectangular,
-            -1.0,
-            Par::Seq,
-        );
-    }
+    values.try_reserve_exact(size).map_err(|_| NoFactor::OutOfMemory)?;
+    values.resize(size, [0.0; LANES]);
     Ok(())
 }
 

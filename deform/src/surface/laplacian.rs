@@ -251,7 +251,10 @@ impl Triangulation {
         }
         let mean = mass.iter().sum::<f64>() / vertex_count as f64;
         for value in &mut mass {
-            *value = (*value / mean).max(1e-12);
+            *value /= mean;
+            if *value < 1e-12 {
+                *value = 1e-12;
+            }
         }
         mass
     }
@@ -306,6 +309,7 @@ impl Triangulation {
 }
 
 /// The cotangents of the angles opposite each side of a triangle.
+#[cfg_attr(target_arch = "wasm32", inline(never))]
 fn three_cotangents(a: f64, b: f64, c: f64) -> [f64; 3] {
     let area = 4.0 * area(a, b, c);
     let [a, b, c] = [a * a, b * b, c * c];
@@ -319,9 +323,9 @@ fn cotangent(a: f64, b: f64, c: f64) -> f64 {
 
 /// The area of a triangle from its sides, without loss of digits (Kahan 2014).
 fn area(a: f64, b: f64, c: f64) -> f64 {
-    let (a, b) = (a.max(b), a.min(b));
-    let (b, c) = (b.max(c), b.min(c));
-    let (a, b) = (a.max(b), a.min(b));
+    let (a, b) = if a < b { (b, a) } else { (a, b) };
+    let (b, c) = if b < c { (c, b) } else { (b, c) };
+    let (a, b) = if a < b { (b, a) } else { (a, b) };
     0.25 * ((a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c))).max(0.0).sqrt()
 }
 
@@ -334,7 +338,8 @@ fn apex(base: f64, from_origin: f64, from_end: f64) -> (f64, f64) {
 /// The lengths of all sides, in units of their mean, lengthened where a triangle would have no area.
 fn edge_lengths(surface: &Surface, least_slack: f64) -> Vec<f64> {
     let points = surface.points();
-    let scale = points.iter().flatten().fold(0.0f64, |largest, value| largest.max(value.abs()));
+    let larger = |largest: f64, value: &f64| if value.abs() > largest { value.abs() } else { largest };
+    let scale = points.iter().flatten().fold(0.0, larger);
     let scale = if scale > 0.0 { scale } else { 1.0 };
     let triangles = surface.triangles();
     let mut lengths = vec![0.0; 3 * triangles.len()];
@@ -356,11 +361,11 @@ fn edge_lengths(surface: &Surface, least_slack: f64) -> Vec<f64> {
     let missing = lengths
         .chunks_exact(3)
         .map(|sides| {
-            let longest = sides.iter().copied().fold(0.0, f64::max);
+            let longest = sides.iter().fold(0.0, |longest, &side| if side > longest { side } else { longest });
             let slack = sides.iter().sum::<f64>() - 2.0 * longest;
-            least_slack * longest.max(1e-6) - slack
+            least_slack * if longest > 1e-6 { longest } else { 1e-6 } - slack
         })
-        .fold(0.0, f64::max);
+        .fold(0.0, |most, missing| if missing > most { missing } else { most });
     if missing > 0.0 {
         for length in &mut lengths {
             *length += missing;

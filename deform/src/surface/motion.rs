@@ -153,6 +153,9 @@ fn handle_normals(
             }
         }
     }
+    if let Some(face) = first_turned(surface, handle) {
+        return Err(EditError::OneSided { edit: place, face });
+    }
     let unit_normal = |&vertex: &u32| {
         let local = vertex as usize;
         if handle.roles[local] == Role::Fixed {
@@ -167,6 +170,17 @@ fn handle_normals(
         }
     };
     handle.vertices.iter().map(unit_normal).collect()
+}
+
+/// The first face of the handle that walks an edge the same way as another one of it.
+fn first_turned(surface: &Surface, handle: &Handle) -> Option<u32> {
+    let triangles = surface.triangles().iter().zip(surface.triangle_faces());
+    let mut sides: Vec<([u32; 2], u32)> = triangles
+        .filter(|(_, face)| handle.faces[**face as usize])
+        .flat_map(|(&[a, b, c], &face)| [([a, b], face), ([b, c], face), ([c, a], face)])
+        .collect();
+    sides.sort_unstable();
+    sides.windows(2).filter(|pair| pair[0].0 == pair[1].0).map(|pair| pair[1].1).min()
 }
 
 /// What an imported displacement adds to each surface vertex.

@@ -127,7 +127,8 @@ impl Polyharmonic {
                 )
                 .collect();
             // In units of the largest value, so that nothing overflows on the way.
-            let scale = work.iter().fold(0.0f64, |largest, value| largest.max(value.abs()));
+            let larger = |largest: f64, value: &f64| if value.abs() > largest { value.abs() } else { largest };
+            let scale = work.iter().fold(0.0, larger);
             for &vertex in &self.free {
                 field[vertex as usize] = bases[parts[vertex as usize] as usize];
             }

@@ -190,3 +190,40 @@ fn each_ring_of_prescribed_vertices_clamps_one_derivative_more() {
         assert!(fine < 1e-8 || (1.6..4.6).contains(&(coarse / fine)), "{rings} rings, order {order}: {coarse} {fine}");
     }
 }
+
+#[test]
+fn a_vertex_with_too_many_neighbours_is_refused_before_memory_is_asked_for() {
+    // A wheel: every vertex of the rim is coupled with every other one through the hub.
+    let count = 9000;
+    let mut points = vec![[0.0; 3]];
+    points.extend((0..count).map(|place| {
+        let angle = std::f64::consts::TAU * f64::from(place) / f64::from(count);
+        [angle.cos(), angle.sin(), 0.0]
+    }));
+    let corners: Vec<u32> = (0..count).flat_map(|place| [0, 1 + place, 1 + (place + 1) % count]).collect();
+    let mut editor = editor(&triangles(&points, &corners));
+    let edit = |order| [translate(&["feature-1"], &[], [0.0, 0.0, 1.0], order)];
+    let error = editor.displacement(&edit(HarmonicOrder::Biharmonic)).unwrap_err();
+    assert!(matches!(error, EditError::NotSolvable { edit: 0, .. }), "{error}");
+    assert!(error.to_string().contains("does not fit in memory"), "{error}");
+    assert!(editor.displacement(&edit(HarmonicOrder::Harmonic)).is_ok());
+}
+
+#[cfg(feature = "parallel")]
+#[test]
+fn no_bit_depends_on_the_number_of_threads() {
+    let mesh = torus([300, 120]);
+    let shaped = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut editor = editor(&mesh);
+            ORDERS.map(|order| {
+                editor.displacement(&[translate(&["feature-0"], &["feature-1"], [0.1, 0.2, 0.3], order)]).unwrap()
+            })
+        })
+    };
+    let one = shaped(1);
+    for threads in [2, 3, 8] {
+        assert!(shaped(threads) == one, "{threads} threads");
+    }
+}

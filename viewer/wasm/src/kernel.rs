@@ -179,7 +179,13 @@ impl Kernel {
                 .map(|(point, by)| std::array::from_fn(|axis| point[axis] + by[axis]))
                 .collect();
             let report = tombolo_deform::surface::check(surface, reference, &shape);
-            let flawed = report.degenerate.first.iter().chain(&report.flipped.first).map(|flaw| flaw.face);
+            let flawed = report
+                .degenerate
+                .first
+                .iter()
+                .chain(&report.flipped.first)
+                .chain(&report.inside_out.first)
+                .map(|flaw| flaw.face);
             let crossing = report.intersections.first.iter().flat_map(|pair| pair.faces);
             let faces: BTreeSet<u32> = flawed.chain(crossing).collect();
             let triangles = surface
