@@ -103,10 +103,14 @@ impl<T: Real, const B: usize> GaussSeidel<T, B> {
             let part = |wanted: fn(std::cmp::Ordering, bool) -> bool| {
                 Rows::new(count, |index, push| {
                     let row = pieces.row(start + index);
+                    let own = row / pieces.piece_rows * pieces.piece_rows;
                     let (columns, blocks) = matrix.row(row);
                     for (&column, block) in columns.iter().zip(blocks) {
-                        let (other, place) = pieces.place(column as usize);
-                        if wanted((column as usize).cmp(&row), other != odd) {
+                        let column = column as usize;
+                        // No piece couples with any but the ones beside it.
+                        let across = column < own || column >= own + pieces.piece_rows;
+                        if wanted(column.cmp(&row), across) {
+                            let place = if across { pieces.place(column).1 } else { index + column - row };
                             #[expect(clippy::cast_possible_truncation, reason = "columns are 32-bit")]
                             push(place as u32, block);
                         }

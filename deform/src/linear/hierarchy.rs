@@ -1,12 +1,15 @@
 //! The levels of a multigrid method, and one cycle through them.
 
+use std::sync::Arc;
+
 use super::ROW_CHUNK;
 use super::SparseMatrix;
-use super::aggregation::{Aggregates, galerkin, transpose};
+use super::aggregation::{Aggregates, Bodies, couplings};
 use super::cholesky::Factor;
 use super::gauss_seidel::{GaussSeidel, Pieces};
 use super::real::Real;
-use super::rows::Rows;
+use super::transfer::{Interpolation, Transfer, galerkin};
+use crate::mesh::Vector;
 use crate::parallel;
 
 /// Systems of at most this many equations are solved directly.
@@ -18,21 +21,30 @@ const THRESHOLD: f64 = 0.08;
 /// How far interpolation is smoothed.
 const DAMPING: f64 = 2.0 / 3.0;
 
-/// A system and ever coarser ones, by smoothed aggregation.
+/// A system of `B` by `B` blocks and ever coarser ones of `C` by `C`, by smoothed aggregation. `C` is `B`, or 6 where aggregates
+/// turn as rigid bodies.
 #[derive(Debug)]
-pub(super) struct Hierarchy<T, const B: usize> {
-    levels: Vec<Level<T, B>>,
-    coarsest: Factor<B>,
-    coarsest_rows: usize,
+pub(super) struct Hierarchy<T, const B: usize, const C: usize> {
+    finest: Option<Level<T, B>>,
+    coarser: Vec<Level<T, C>>,
+    coarsest: Coarsest<B, C>,
+}
+
+/// The smallest system of all.
+#[derive(Debug)]
+enum Coarsest<const B: usize, const C: usize> {
+    /// The one to be solved is small.
+    Finest(Factor<B>, usize),
+    Coarse(Factor<C>, usize),
 }
 
 #[derive(Debug)]
 struct Level<T, const B: usize> {
-    aggregates: Aggregates,
+    aggregates: Arc<Aggregates>,
     pieces: Pieces,
     smoother: GaussSeidel<T, B>,
-    prolongation: Rows<T, B>,
-    restriction: Rows<T, B>,
+    interpolation: Transfer<T>,
+    restriction: Transfer<T>,
 }
 
 /// The vectors of one level.
@@ -52,52 +64,61 @@ impl<T: Real, const B: usize, const K: usize> Vectors<T, B, K> {
 
 /// The memory of cycles with `K` right sides.
 #[derive(Debug)]
-pub(super) struct Workspace<T, const B: usize, const K: usize>(Vec<Vectors<T, B, K>>);
+pub(super) struct Workspace<T, const B: usize, const C: usize, const K: usize> {
+    finest: Vectors<T, B, K>,
+    coarser: Vec<Vectors<T, C, K>>,
+}
 
-impl<T: Real, const B: usize> Hierarchy<T, B> {
+/// Where rows lie, and the size that a turn of theirs is told by (0 where they do not turn).
+type Places = (Vec<Vector>, f64);
+
+impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
     /// `None` where a diagonal block of any level is not positive definite. `like` is a hierarchy of a matrix with the same
-    /// pattern, whose aggregates are used again.
-    pub(super) fn new(matrix: &SparseMatrix<B>, like: Option<&Self>) -> Option<Self> {
-        let mut levels: Vec<Level<T, B>> = Vec::new();
-        let mut coarse: Option<SparseMatrix<B>> = None;
-        let mut pieces = Pieces::new(matrix);
-        let mut threshold = THRESHOLD;
-        loop {
-            let current = coarse.as_ref().unwrap_or(matrix);
-            if B * current.rows() <= COARSEST {
-                let coarsest = Factor::new(current)?;
-                return Some(Self { levels, coarsest, coarsest_rows: current.rows() });
-            }
-            let aggregates = match like.and_then(|like| like.levels.get(levels.len())) {
-                Some(level) => level.aggregates.clone(),
-                None => Aggregates::new(current, threshold),
-            };
-            let prolongation = aggregates.prolongation(current, DAMPING);
-            let next = galerkin(current, &prolongation, aggregates.count());
-            let next_pieces = if B * next.rows() <= COARSEST { Pieces::whole(next.rows()) } else { Pieces::new(&next) };
-            levels.push(Level::new(current, &prolongation, pieces, next_pieces, aggregates)?);
-            coarse = Some(next);
-            pieces = next_pieces;
-            threshold *= 0.5;
+    /// pattern, whose aggregates are used again. `places` are those of the rows where aggregates are to turn.
+    pub(super) fn new(matrix: &SparseMatrix<B>, like: Option<&Self>, places: Option<&[Vector]>) -> Option<Self> {
+        if B * matrix.rows() <= COARSEST {
+            let coarsest = Coarsest::Finest(Factor::new(matrix)?, matrix.rows());
+            return Some(Self { finest: None, coarser: Vec::new(), coarsest });
         }
+        let mut places = places.map(|places| (places.to_vec(), 0.0));
+        let known = like.and_then(|like| like.finest.as_ref()).map(|level| Arc::clone(&level.aggregates));
+        let (finest, mut current, mut pieces) =
+            coarsened::<T, B, C>(matrix, Pieces::new(matrix), known, THRESHOLD, &mut places)?;
+        let mut coarser: Vec<Level<T, C>> = Vec::new();
+        let mut threshold = THRESHOLD;
+        while C * current.rows() > COARSEST {
+            threshold *= 0.5;
+            let known = like.and_then(|like| like.coarser.get(coarser.len()));
+            let known = known.map(|level| Arc::clone(&level.aggregates));
+            let (level, next, next_pieces) = coarsened::<T, C, C>(&current, pieces, known, threshold, &mut places)?;
+            coarser.push(level);
+            (current, pieces) = (next, next_pieces);
+        }
+        let coarsest = Coarsest::Coarse(Factor::new(&current)?, current.rows());
+        Some(Self { finest: Some(finest), coarser, coarsest })
     }
 
-    pub(super) fn workspace<const K: usize>(&self) -> Workspace<T, B, K> {
-        let rows = self.levels.iter().map(|level| level.pieces.rows()).chain([self.coarsest_rows]);
-        Workspace(rows.map(Vectors::new).collect())
+    pub(super) fn workspace<const K: usize>(&self) -> Workspace<T, B, C, K> {
+        let coarsest = match self.coarsest {
+            Coarsest::Finest(_, rows) => return Workspace { finest: Vectors::new(rows), coarser: Vec::new() },
+            Coarsest::Coarse(_, rows) => rows,
+        };
+        let rows = self.coarser.iter().map(|level| level.pieces.rows()).chain([coarsest]);
+        let finest = self.finest.as_ref().map_or(0, |level| level.pieces.rows());
+        Workspace { finest: Vectors::new(finest), coarser: rows.map(Vectors::new).collect() }
     }
 
     /// One V-cycle: `result` becomes an approximate inverse of the matrix times `vector`, a symmetric positive definite one.
     /// `scale` brings each column of the vector to the order of 1.
     pub(super) fn apply<const K: usize>(
         &self,
-        Workspace(vectors): &mut Workspace<T, B, K>,
+        workspace: &mut Workspace<T, B, C, K>,
         scale: [f64; K],
         vector: &[[[f64; B]; K]],
         result: &mut [[[f64; B]; K]],
     ) {
-        let pieces = self.levels.first().map_or_else(|| Pieces::whole(self.coarsest_rows), |level| level.pieces);
-        let Some(finest) = vectors.first_mut() else { return };
+        let Workspace { finest, coarser } = workspace;
+        let pieces = self.finest.as_ref().map_or_else(|| Pieces::whole(vector.len()), |level| level.pieces);
         pieces.for_each_run(|rows, slots| {
             parallel::for_each_chunk(&mut finest.right_side[slots], ROW_CHUNK, |chunk, part| {
                 for (value, wide) in part.iter_mut().zip(&vector[rows.start + chunk * ROW_CHUNK..rows.end]) {
@@ -105,8 +126,17 @@ impl<T: Real, const B: usize> Hierarchy<T, B> {
                 }
             });
         });
-        self.cycle(&self.levels, vectors);
-        let Some(finest) = vectors.first() else { return };
+        match (&self.finest, &self.coarsest, coarser.first_mut()) {
+            (Some(level), _, Some(next)) => {
+                level.down(finest, next);
+                self.cycle(&self.coarser, coarser);
+                if let Some(next) = coarser.first() {
+                    level.up(finest, next);
+                }
+            }
+            (_, Coarsest::Finest(factor, _), _) => solve(factor, finest),
+            _ => {}
+        }
         let scale = scale.map(|scale| 1.0 / scale);
         pieces.for_each_run(|rows, slots| {
             parallel::for_each_chunk(&mut result[rows], ROW_CHUNK, |chunk, part| {
@@ -117,64 +147,100 @@ impl<T: Real, const B: usize> Hierarchy<T, B> {
         });
     }
 
-    fn cycle<const K: usize>(&self, levels: &[Level<T, B>], vectors: &mut [Vectors<T, B, K>]) {
+    fn cycle<const K: usize>(&self, levels: &[Level<T, C>], vectors: &mut [Vectors<T, C, K>]) {
         let Some((own, coarser)) = vectors.split_first_mut() else { return };
         let Some((level, coarser_levels)) = levels.split_first() else {
-            let wide: Vec<[[f64; B]; K]> =
-                own.right_side.iter().map(|value| value.map(|column| column.map(T::wide))).collect();
-            let mut solution = wide.clone();
-            self.coarsest.solve(&wide, &mut solution);
-            for (value, wide) in own.solution.iter_mut().zip(&solution) {
-                *value = wide.map(|column| column.map(T::of));
+            if let Coarsest::Coarse(factor, _) = &self.coarsest {
+                solve(factor, own);
             }
             return;
         };
-        level.smoother.forward(&own.right_side, &mut own.solution);
-        level.smoother.residual(&own.solution, &mut own.residual);
         let Some(next) = coarser.first_mut() else { return };
-        parallel::for_each_chunk(&mut next.right_side, ROW_CHUNK / 8, |chunk, part| {
-            for (index, value) in part.iter_mut().enumerate() {
-                *value = [[T::default(); B]; K];
-                level.restriction.add_product(chunk * (ROW_CHUNK / 8) + index, &own.residual, 0, value);
-            }
-        });
+        level.down(own, next);
         self.cycle(coarser_levels, coarser);
-        let Some(next) = coarser.first() else { return };
-        parallel::for_each_chunk(&mut own.solution, ROW_CHUNK, |chunk, part| {
-            for (index, value) in part.iter_mut().enumerate() {
-                level.prolongation.add_product(chunk * ROW_CHUNK + index, &next.solution, 0, value);
-            }
-        });
-        level.smoother.backward(&own.right_side, &mut own.solution);
+        if let Some(next) = coarser.first() {
+            level.up(own, next);
+        }
     }
+}
+
+fn solve<T: Real, const B: usize, const K: usize>(factor: &Factor<B>, vectors: &mut Vectors<T, B, K>) {
+    let wide: Vec<[[f64; B]; K]> =
+        vectors.right_side.iter().map(|value| value.map(|column| column.map(T::wide))).collect();
+    let mut solution = wide.clone();
+    factor.solve(&wide, &mut solution);
+    for (value, wide) in vectors.solution.iter_mut().zip(&solution) {
+        *value = wide.map(|column| column.map(T::of));
+    }
+}
+
+/// The level of a matrix, the next coarser matrix, and the pieces of its rows. `places` becomes that of the coarser rows.
+fn coarsened<T: Real, const B: usize, const C: usize>(
+    matrix: &SparseMatrix<B>,
+    pieces: Pieces,
+    known: Option<Arc<Aggregates>>,
+    threshold: f64,
+    places: &mut Option<Places>,
+) -> Option<(Level<T, B>, SparseMatrix<C>, Pieces)> {
+    let couplings = couplings(matrix);
+    let aggregates = known.unwrap_or_else(|| Arc::new(Aggregates::new(matrix, &couplings, threshold)));
+    let bodies = places.take().map(|(places, size)| Bodies::new(&aggregates, places, size));
+    let interpolation = aggregates.interpolation(matrix, &couplings, DAMPING, bodies.as_ref());
+    let (starts, entries) = interpolation.transposed(aggregates.count());
+    let sizes = bodies.as_ref().map_or(&[][..], Bodies::sizes);
+    let next = galerkin::<B, C>(matrix, &interpolation, (&starts, &entries), sizes);
+    *places = bodies.map(Bodies::into_coarse);
+    let next_pieces = if C * next.rows() <= COARSEST { Pieces::whole(next.rows()) } else { Pieces::new(&next) };
+    let level = Level::new(matrix, &interpolation, (&starts, &entries), pieces, next_pieces, aggregates)?;
+    Some((level, next, next_pieces))
 }
 
 impl<T: Real, const B: usize> Level<T, B> {
     fn new(
         matrix: &SparseMatrix<B>,
-        prolongation: &SparseMatrix<B>,
+        interpolation: &Interpolation,
+        transposed: (&[usize], &[(u32, u32)]),
         pieces: Pieces,
         coarse: Pieces,
-        aggregates: Aggregates,
+        aggregates: Arc<Aggregates>,
     ) -> Option<Self> {
-        let smoother = GaussSeidel::new(matrix, pieces)?;
-        #[expect(clippy::cast_possible_truncation, reason = "rows are 32-bit")]
-        let rows = Rows::new(matrix.rows(), |slot, push| {
-            let (columns, blocks) = prolongation.row(pieces.row(slot));
-            for (&column, block) in columns.iter().zip(blocks) {
-                push(coarse.slot(column as usize) as u32, block);
+        Some(Self {
+            aggregates,
+            pieces,
+            smoother: GaussSeidel::new(matrix, pieces)?,
+            interpolation: Transfer::interpolation(
+                interpolation,
+                |slot| pieces.row(slot),
+                |column| coarse.slot(column),
+            ),
+            restriction: Transfer::restriction(
+                interpolation,
+                transposed,
+                |slot| coarse.row(slot),
+                |row| pieces.slot(row),
+            ),
+        })
+    }
+
+    /// A sweep, and what it leaves to the coarser level.
+    fn down<const C: usize, const K: usize>(&self, own: &mut Vectors<T, B, K>, next: &mut Vectors<T, C, K>) {
+        self.smoother.forward(&own.right_side, &mut own.solution);
+        self.smoother.residual(&own.solution, &mut own.residual);
+        parallel::for_each_chunk(&mut next.right_side, ROW_CHUNK / 8, |chunk, part| {
+            for (index, value) in part.iter_mut().enumerate() {
+                *value = [[T::default(); C]; K];
+                self.restriction.restrict(chunk * (ROW_CHUNK / 8) + index, &own.residual, value);
             }
         });
-        let (starts, entries) = transpose(prolongation, aggregates.count());
-        #[expect(clippy::cast_possible_truncation, reason = "rows are 32-bit")]
-        let restriction = Rows::new(aggregates.count(), |slot, push| {
-            let row = coarse.row(slot);
-            for &(fine, place) in &entries[starts[row]..starts[row + 1]] {
-                let block = &prolongation.values()[place as usize];
-                let transposed = std::array::from_fn(|i| std::array::from_fn(|j| block[j][i]));
-                push(pieces.slot(fine as usize) as u32, &transposed);
+    }
+
+    /// What the coarser level has found, and a sweep back.
+    fn up<const C: usize, const K: usize>(&self, own: &mut Vectors<T, B, K>, next: &Vectors<T, C, K>) {
+        parallel::for_each_chunk(&mut own.solution, ROW_CHUNK, |chunk, part| {
+            for (index, value) in part.iter_mut().enumerate() {
+                self.interpolation.interpolate(chunk * ROW_CHUNK + index, &next.solution, value);
             }
         });
-        Some(Self { aggregates, pieces, smoother, prolongation: rows, restriction })
+        self.smoother.backward(&own.right_side, &mut own.solution);
     }
 }

@@ -16,8 +16,15 @@ pub(super) fn single_column_mut<const B: usize>(vector: &mut [[f64; B]]) -> &mut
     vector.as_chunks_mut().0
 }
 
+/// How much larger than the tolerance the last correction may be, each by the largest value of its vector.
+const CORRECTION: f64 = 10.0;
+
 /// Conjugate gradients (Hestenes, Stiefel 1952) from what `solution` holds, for each column by itself. `precondition` sets its
 /// second argument to an approximate inverse times its first.
+///
+/// A column is done once its residual is small enough, and the preconditioner says the same of the error: it must not want to
+/// change any value by more than [`CORRECTION`] times the relative tolerance. On a mesh whose cells differ much in stiffness the
+/// residual is that of the stiff ones, and tells next to nothing of the error in the soft ones.
 ///
 /// # Errors
 /// The first failure of any column. `solution` then holds the last iterate, which is finite unless the error is
@@ -30,6 +37,10 @@ pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
     tolerances: [Tolerance; K],
     max_iterations: usize,
 ) -> Result<[Convergence; K], LinearError> {
+    assert!(
+        right_side.len() == matrix.rows() && solution.len() == matrix.rows(),
+        "one value for each row of the matrix"
+    );
     let whole = dot(right_side, right_side).map(f64::sqrt);
     if !whole.iter().all(|norm| norm.is_finite()) {
         return Err(LinearError::NotFinite { iteration: 0 });
@@ -58,12 +69,16 @@ pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
     }
     let mut result: [Convergence; K] =
         std::array::from_fn(|column| Convergence { iterations: 0, residual: relative(column, reached[column]) });
-    let mut active: [bool; K] = std::array::from_fn(|column| reached[column] > target[column]);
-    if !active.contains(&true) {
+    // Exact zeros, and what only rounding has left, need no preconditioner.
+    if (0..K).all(|column| reached[column] <= tolerances[column].absolute || reached[column] == 0.0) {
         return Ok(result);
     }
     let mut preconditioned = vec![[[0.0; B]; K]; residual.len()];
     precondition(&residual, &mut preconditioned);
+    let mut active = unfinished(tolerances, target, reached, solution, &preconditioned);
+    if !active.contains(&true) {
+        return Ok(result);
+    }
     let mut direction = preconditioned.clone();
     let mut energy = dot(&residual, &preconditioned);
     for iteration in 1..=max_iterations {
@@ -81,19 +96,21 @@ pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
             step[column] = energy / curvature;
         }
         let square = advance(solution, &mut residual, step, &direction, &image);
-        for column in 0..K {
-            if !active[column] {
-                continue;
-            }
-            let norm = square[column].sqrt();
-            reached[column] = norm;
-            result[column] = Convergence { iterations: iteration, residual: relative(column, norm) };
-            active[column] = norm > target[column] || norm.is_nan();
+        for column in (0..K).filter(|&column| active[column]) {
+            reached[column] = square[column].sqrt();
+            result[column] = Convergence { iterations: iteration, residual: relative(column, reached[column]) };
         }
-        if !active.contains(&true) {
+        if (0..K)
+            .all(|column| !active[column] || reached[column] <= tolerances[column].absolute || reached[column] == 0.0)
+        {
             return Ok(result);
         }
         precondition(&residual, &mut preconditioned);
+        let still = unfinished(tolerances, target, reached, solution, &preconditioned);
+        active = std::array::from_fn(|column| active[column] && still[column]);
+        if !active.contains(&true) {
+            return Ok(result);
+        }
         let before = std::mem::replace(&mut energy, dot(&residual, &preconditioned));
         let factor: [f64; K] =
             std::array::from_fn(|column| if active[column] { energy[column] / before[column] } else { 0.0 });
@@ -111,6 +128,37 @@ pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
         residual: relative(column, reached[column]),
         tolerance: relative(column, target[column]),
     })
+}
+
+/// Which columns are not solved yet; `correction` is what the preconditioner makes of their residuals.
+fn unfinished<const B: usize, const K: usize>(
+    tolerances: [Tolerance; K],
+    target: [f64; K],
+    reached: [f64; K],
+    solution: &[Columns<B, K>],
+    correction: &[Columns<B, K>],
+) -> [bool; K] {
+    let met: [bool; K] = std::array::from_fn(|column| reached[column] <= target[column]);
+    if !met.contains(&true) {
+        return [true; K];
+    }
+    let (size, change) = (largest(solution), largest(correction));
+    std::array::from_fn(|column| {
+        let small = change[column] <= CORRECTION * tolerances[column].relative * size[column];
+        !(met[column] && (small || reached[column] <= tolerances[column].absolute))
+    })
+}
+
+/// The largest value of each column.
+fn largest<const B: usize, const K: usize>(vector: &[Columns<B, K>]) -> [f64; K] {
+    let parts = parallel::map_chunks(vector.len(), ROW_CHUNK, |range| {
+        vector[range].iter().fold([0.0; K], |most: [f64; K], value| {
+            std::array::from_fn(|column| value[column].iter().fold(most[column], |most, entry| most.max(entry.abs())))
+        })
+    });
+    parts
+        .into_iter()
+        .fold([0.0; K], |most: [f64; K], part| std::array::from_fn(|column| most[column].max(part[column])))
 }
 
 /// `solution += step direction`, `residual -= step image`; the squares of the new residual's norms.

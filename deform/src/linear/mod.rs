@@ -7,6 +7,8 @@
 
 use std::sync::Arc;
 
+use crate::mesh::Vector;
+
 mod aggregation;
 mod cholesky;
 mod conjugate_gradients;
@@ -21,6 +23,7 @@ mod real;
 mod rows;
 #[cfg(test)]
 mod tests;
+mod transfer;
 
 pub use cholesky::Cholesky;
 pub use conjugate_gradients::ConjugateGradients;
@@ -39,15 +42,38 @@ const DIRECT: usize = 1500;
 /// # Errors
 /// [`LinearError::Diagonal`].
 pub fn solver<const B: usize>(matrix: Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
-    if B * matrix.rows() <= DIRECT
-        && let Ok(direct) = Cholesky::new(Arc::clone(&matrix))
-    {
-        return Ok(Box::new(direct));
+    match direct(&matrix) {
+        Some(direct) => Ok(direct),
+        None => Ok(Box::new(Multigrid::new(matrix, MultigridSettings::default())?)),
     }
-    Ok(Box::new(Multigrid::new(matrix, MultigridSettings::default())?))
 }
 
-/// When an iterative solve may stop: once the residual's 2-norm is at most the larger of the two.
+/// The same for an elastic body that may slide: its large systems are solved with [`Multigrid::with_rigid_bodies`]; `places` are
+/// where the vertices of the unknowns lie.
+///
+/// # Errors
+/// [`LinearError::Diagonal`], [`LinearError::Places`].
+pub fn solver_of_body(
+    matrix: Arc<SparseMatrix<3>>,
+    places: &[Vector],
+) -> Result<Box<dyn LinearSolver<3>>, LinearError> {
+    match direct(&matrix) {
+        Some(direct) => Ok(direct),
+        None => Ok(Box::new(Multigrid::with_rigid_bodies(matrix, places, MultigridSettings::default())?)),
+    }
+}
+
+fn direct<const B: usize>(matrix: &Arc<SparseMatrix<B>>) -> Option<Box<dyn LinearSolver<B>>> {
+    if B * matrix.rows() > DIRECT {
+        return None;
+    }
+    Some(Box::new(Cholesky::new(Arc::clone(matrix)).ok()?))
+}
+
+/// When an iterative solve may stop: once the residual's 2-norm is at most the larger of the two, and the error as the
+/// preconditioner estimates it (the largest change that it would make to any value, by the largest value) at most ten times the
+/// relative one. The second matters where stiffnesses differ by many orders of magnitude: the residual is then that of the
+/// stiff unknowns. What has come to the absolute one is rounding and needs no estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
     /// A multiple of the 2-norm of the right side.
@@ -76,6 +102,9 @@ pub trait LinearSolver<const B: usize>: std::fmt::Debug + Send + Sync {
     ///
     /// # Errors
     /// [`LinearError`]; `solution` then holds nothing of use.
+    ///
+    /// # Panics
+    /// Where either has another number of entries.
     fn solve(
         &self,
         right_side: &[[f64; B]],
@@ -158,6 +187,18 @@ pub enum LinearError {
     Diagonal {
         /// The row of the block.
         row: usize,
+    },
+    /// Rigid bodies need a place for each row of 3 by 3 blocks.
+    #[error(
+        "{found} places given for {expected} rows of {block} by {block} blocks; rigid bodies need one for each row of 3 by 3 blocks"
+    )]
+    Places {
+        /// How many places were given.
+        found: usize,
+        /// How many rows there are.
+        expected: usize,
+        /// How large the blocks are.
+        block: usize,
     },
     /// A matrix could not be factored.
     #[error("the linear system has no Cholesky factor: it is not positive definite, or too large for memory")]

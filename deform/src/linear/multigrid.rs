@@ -6,6 +6,7 @@ use super::hierarchy::Hierarchy;
 use super::iteration::{Columns, conjugate_gradients, dot, single_column, single_column_mut};
 use super::real::Real;
 use super::{ConjugateGradients, Convergence, LinearError, LinearSolver, SparseMatrix, Tolerance};
+use crate::mesh::Vector;
 
 /// The precision that a preconditioner is kept and applied in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -52,8 +53,10 @@ pub struct Multigrid<const B: usize> {
 
 #[derive(Debug)]
 enum Levels<const B: usize> {
-    Single(Hierarchy<f32, B>),
-    Double(Hierarchy<f64, B>),
+    Single(Hierarchy<f32, B, B>),
+    Double(Hierarchy<f64, B, B>),
+    /// Aggregates turn as rigid bodies; where the unknowns lie.
+    Bodies(Box<Hierarchy<f32, B, 6>>, Arc<[Vector]>),
     /// A diagonal block of some level was not positive definite.
     None,
 }
@@ -64,7 +67,31 @@ impl<const B: usize> Multigrid<B> {
     /// # Errors
     /// [`LinearError::Diagonal`].
     pub fn new(matrix: impl Into<Arc<SparseMatrix<B>>>, settings: MultigridSettings) -> Result<Self, LinearError> {
-        Self::set_up(matrix.into(), settings, None)
+        let matrix = matrix.into();
+        let levels = match settings.precision {
+            Precision::Single => Hierarchy::new(&matrix, None, None).map(Levels::Single),
+            Precision::Double => Hierarchy::new(&matrix, None, None).map(Levels::Double),
+        };
+        Self::with_levels(matrix, settings, levels)
+    }
+
+    /// The same where each aggregate of unknowns may turn about its centre as well as shift: `places` are where the vertices of
+    /// the unknowns lie. An iteration costs up to twice as much; elastic bodies that are held at few places, or slide, need
+    /// fewer of them.
+    ///
+    /// # Errors
+    /// [`LinearError::Places`], [`LinearError::Diagonal`].
+    pub fn with_rigid_bodies(
+        matrix: impl Into<Arc<SparseMatrix<B>>>,
+        places: impl Into<Arc<[Vector]>>,
+        settings: MultigridSettings,
+    ) -> Result<Self, LinearError> {
+        let (matrix, places) = (matrix.into(), places.into());
+        if B != 3 || places.len() != matrix.rows() {
+            return Err(LinearError::Places { found: places.len(), expected: matrix.rows(), block: B });
+        }
+        let levels = Hierarchy::new(&matrix, None, Some(&places));
+        Self::with_levels(matrix, settings, levels.map(|levels| Levels::Bodies(Box::new(levels), places)))
     }
 
     /// The matrix.
@@ -73,21 +100,11 @@ impl<const B: usize> Multigrid<B> {
         &self.matrix
     }
 
-    fn set_up(
+    fn with_levels(
         matrix: Arc<SparseMatrix<B>>,
         settings: MultigridSettings,
-        like: Option<&Levels<B>>,
+        levels: Option<Levels<B>>,
     ) -> Result<Self, LinearError> {
-        let levels = match settings.precision {
-            Precision::Single => {
-                let like = like.and_then(|like| if let Levels::Single(like) = like { Some(like) } else { None });
-                Hierarchy::new(&matrix, like).map(Levels::Single)
-            }
-            Precision::Double => {
-                let like = like.and_then(|like| if let Levels::Double(like) = like { Some(like) } else { None });
-                Hierarchy::new(&matrix, like).map(Levels::Double)
-            }
-        };
         let solver = Self { matrix, settings, levels: levels.unwrap_or(Levels::None), fallback: OnceLock::new() };
         if matches!(solver.levels, Levels::None) {
             solver.fallback()?;
@@ -99,9 +116,9 @@ impl<const B: usize> Multigrid<B> {
         self.fallback.get_or_init(|| ConjugateGradients::new(Arc::clone(&self.matrix))).as_ref().map_err(|error| *error)
     }
 
-    fn iterate<T: Real, const K: usize>(
+    fn iterate<T: Real, const C: usize, const K: usize>(
         &self,
-        hierarchy: &Hierarchy<T, B>,
+        hierarchy: &Hierarchy<T, B, C>,
         right_side: &[Columns<B, K>],
         solution: &mut [Columns<B, K>],
         tolerances: [Tolerance; K],
@@ -127,6 +144,7 @@ impl<const B: usize> Multigrid<B> {
         let result = match &self.levels {
             Levels::Single(hierarchy) => self.iterate(hierarchy, right_side, solution, tolerances),
             Levels::Double(hierarchy) => self.iterate(hierarchy, right_side, solution, tolerances),
+            Levels::Bodies(hierarchy, _) => self.iterate(hierarchy, right_side, solution, tolerances),
             Levels::None => {
                 Err(LinearError::NotConverged { iterations: 0, residual: f64::NAN, tolerance: tolerances[0].relative })
             }
@@ -181,7 +199,16 @@ impl<const B: usize> LinearSolver<B> for Multigrid<B> {
     }
 
     fn renewed(&self, matrix: Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
-        let like = self.matrix.has_pattern_of(&matrix).then_some(&self.levels);
-        Ok(Box::new(Self::set_up(matrix, self.settings, like)?))
+        let same = self.matrix.has_pattern_of(&matrix);
+        let levels = match &self.levels {
+            Levels::Single(like) => Hierarchy::new(&matrix, same.then_some(like), None).map(Levels::Single),
+            Levels::Double(like) => Hierarchy::new(&matrix, same.then_some(like), None).map(Levels::Double),
+            Levels::Bodies(like, places) => (places.len() == matrix.rows())
+                .then(|| Hierarchy::new(&matrix, same.then_some(&**like), Some(places)))
+                .flatten()
+                .map(|levels| Levels::Bodies(Box::new(levels), Arc::clone(places))),
+            Levels::None => return Ok(Box::new(Self::new(matrix, self.settings)?)),
+        };
+        Ok(Box::new(Self::with_levels(matrix, self.settings, levels)?))
     }
 }

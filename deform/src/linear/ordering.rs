@@ -3,7 +3,7 @@
 /// The reverse Cuthill–McKee order of a symmetric graph (E. Cuthill, J. McKee 1969; A. George 1971): `result[new] = old`.
 ///
 /// `neighbours(i)` are the vertices that share an edge with vertex `i` of `0..count`. Each component starts from a vertex far
-/// from its others. The order depends on the graph and its numbering alone. Cost: three visits of each edge.
+/// from its others. The order depends on the graph and its numbering alone. Cost: two visits of each edge.
 pub fn reverse_cuthill_mckee<'a>(count: usize, neighbours: impl Fn(u32) -> &'a [u32]) -> Vec<u32> {
     let mut order: Vec<u32> = Vec::with_capacity(count);
     // The number of the walk that saw a vertex last.
@@ -16,13 +16,10 @@ pub fn reverse_cuthill_mckee<'a>(count: usize, neighbours: impl Fn(u32) -> &'a [
         }
         // The last vertex that a breadth-first walk meets lies far from where it started.
         let begin = order.len();
-        let mut start = first;
-        for _ in 0..2 {
-            walk += 1;
-            breadth_first(start, walk, &neighbours, &mut seen, &mut order, begin, false);
-            start = order[order.len() - 1];
-            order.truncate(begin);
-        }
+        walk += 1;
+        breadth_first(first, walk, &neighbours, &mut seen, &mut order, begin, false);
+        let start = order[order.len() - 1];
+        order.truncate(begin);
         walk += 1;
         breadth_first(start, walk, &neighbours, &mut seen, &mut order, begin, true);
     }

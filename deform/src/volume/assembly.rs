@@ -2,7 +2,7 @@
 
 use super::VolumeError;
 use super::element::{Elements, Scratch};
-use crate::linear::{Block, ROW_CHUNK, SparseMatrix, reverse_cuthill_mckee};
+use crate::linear::{Block, SparseMatrix, reverse_cuthill_mckee};
 use crate::mesh::{Mesh, Vector};
 use crate::parallel;
 use crate::quality::centroid;
@@ -185,24 +185,29 @@ impl Graph {
             let row = row(index);
             row.split_at(row.partition_point(|&slot| slot < free_count))
         };
-        check_attached(&free, split)?;
         let order = reverse_cuthill_mckee(free.len(), |index| split(index).0);
 
         let mut place = vec![0u32; free.len()];
         for (new, &old) in (0..).zip(&order) {
             place[old as usize] = new;
         }
-        let mut matrix = (vec![0], Vec::new());
-        let mut coupling = (vec![0], Vec::new());
-        for &old in &order {
-            let (inner, outer) = split(old);
-            let start = matrix.1.len();
-            matrix.1.extend(inner.iter().map(|&slot| place[slot as usize]));
-            matrix.1[start..].sort_unstable();
-            matrix.0.push(matrix.1.len());
-            coupling.1.extend(outer.iter().map(|&slot| slot - free_count));
-            coupling.0.push(coupling.1.len());
-        }
+        let parts = parallel::map_chunks(order.len(), ASSEMBLY_CHUNK, |range| {
+            let mut inner_rows = (Vec::with_capacity(range.len()), Vec::new());
+            let mut outer_rows = (Vec::with_capacity(range.len()), Vec::new());
+            for &old in &order[range] {
+                let (inner, outer) = split(old);
+                let start = inner_rows.1.len();
+                inner_rows.1.extend(inner.iter().map(|&slot| place[slot as usize]));
+                inner_rows.1[start..].sort_unstable();
+                inner_rows.0.push(inner.len());
+                outer_rows.1.extend(outer.iter().map(|&slot| slot - free_count));
+                outer_rows.0.push(outer.len());
+            }
+            (inner_rows, outer_rows)
+        });
+        let (inner, outer): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+        let (matrix, coupling) = (compressed(inner), compressed(outer));
+        check_attached(&order, &free, (&matrix.0, &matrix.1), &coupling.0)?;
         let vertices: Vec<u32> = order.iter().map(|&old| free[old as usize]).collect();
         for (slot, &vertex) in (0..).zip(&vertices) {
             slots[vertex as usize] = slot;
@@ -289,24 +294,33 @@ impl Graph {
 
 /// The slots of the vertices that share a cell with each free vertex (itself among them), rising, in compressed rows.
 fn neighbours(mesh: &Mesh, incidence: &Incidence, free: &[u32], slots: &[u32]) -> (Vec<usize>, Vec<u32>) {
-    let parts = parallel::map_chunks(free.len(), ROW_CHUNK, |range| {
+    let parts = parallel::map_chunks(free.len(), ASSEMBLY_CHUNK, |range| {
         let mut lengths = Vec::with_capacity(range.len());
         let mut found: Vec<u32> = Vec::new();
-        let mut row = Vec::new();
-        for &vertex in &free[range] {
-            row.clear();
+        // The last row that has met a slot, counted from 1.
+        let mut met = vec![0u32; slots.len()];
+        for (row, &vertex) in (1..).zip(&free[range]) {
+            let start = found.len();
             for &cell in incidence.cells(vertex) {
-                // A vertex that is neither free nor on the boundary is in no volume cell, so every slot is one.
-                row.extend(mesh.cells().vertices(cell as usize).iter().map(|&other| slots[other as usize]));
+                for &other in mesh.cells().vertices(cell as usize) {
+                    // A vertex that is neither free nor on the boundary is in no volume cell, so every slot is one.
+                    let slot = slots[other as usize];
+                    if std::mem::replace(&mut met[slot as usize], row) != row {
+                        found.push(slot);
+                    }
+                }
             }
-            row.sort_unstable();
-            row.dedup();
-            found.extend_from_slice(&row);
-            lengths.push(row.len());
+            found[start..].sort_unstable();
+            lengths.push(found.len() - start);
         }
         (lengths, found)
     });
-    let mut offsets = Vec::with_capacity(free.len() + 1);
+    compressed(parts)
+}
+
+/// One array of rows whose lengths and entries were found part by part.
+fn compressed(parts: Vec<(Vec<usize>, Vec<u32>)>) -> (Vec<usize>, Vec<u32>) {
+    let mut offsets = Vec::with_capacity(1 + parts.iter().map(|(lengths, _)| lengths.len()).sum::<usize>());
     let mut all = Vec::with_capacity(parts.iter().map(|(_, found)| found.len()).sum());
     offsets.push(0);
     let mut end = 0;
@@ -320,25 +334,30 @@ fn neighbours(mesh: &Mesh, incidence: &Incidence, free: &[u32], slots: &[u32]) -
     (offsets, all)
 }
 
-/// Every free vertex must be connected to the boundary.
-fn check_attached<'a>(free: &[u32], split: impl Fn(u32) -> (&'a [u32], &'a [u32])) -> Result<(), VolumeError> {
-    let mut attached = vec![false; free.len()];
-    let mut waiting: Vec<u32> =
-        (0..).zip(free).map(|(index, _)| index).filter(|&index| !split(index).1.is_empty()).collect();
-    for &index in &waiting {
-        attached[index as usize] = true;
-    }
-    while let Some(index) = waiting.pop() {
-        for &other in split(index).0 {
-            if !std::mem::replace(&mut attached[other as usize], true) {
-                waiting.push(other);
+/// Every free vertex must be connected to the boundary. `order` is that of Cuthill and McKee, reversed: every vertex but the last
+/// of its component has a neighbour after it.
+fn check_attached(
+    order: &[u32],
+    free: &[u32],
+    (offsets, columns): (&[usize], &[u32]),
+    outer_offsets: &[usize],
+) -> Result<(), VolumeError> {
+    let mut component = vec![0usize; order.len()];
+    let mut attached: Vec<bool> = Vec::new();
+    for row in (0..order.len()).rev() {
+        component[row] = match columns[offsets[row]..offsets[row + 1]].last() {
+            Some(&last) if last as usize > row => component[last as usize],
+            _ => {
+                attached.push(false);
+                attached.len() - 1
             }
-        }
+        };
+        attached[component[row]] |= outer_offsets[row] < outer_offsets[row + 1];
     }
-    let mut loose = free.iter().zip(&attached).filter(|(_, attached)| !**attached).map(|(&vertex, _)| vertex);
-    match loose.next() {
+    let loose = || (0..order.len()).filter(|&row| !attached[component[row]]).map(|row| free[order[row] as usize]);
+    match loose().min() {
         None => Ok(()),
-        Some(vertex) => Err(VolumeError::Unattached { vertex: vertex as usize, count: 1 + loose.count() }),
+        Some(vertex) => Err(VolumeError::Unattached { vertex: vertex as usize, count: loose().count() }),
     }
 }
 

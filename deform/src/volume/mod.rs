@@ -101,6 +101,14 @@ pub enum VolumeError {
         /// How many there are.
         expected: usize,
     },
+    /// A displacement to start from that is not one of every vertex.
+    #[error("{found} displacements given to start from; the mesh has {expected} vertices")]
+    StartCount {
+        /// How many were given.
+        found: usize,
+        /// How many there are.
+        expected: usize,
+    },
     /// Another number of displacements than there are boundary vertices.
     #[error("{found} boundary displacements given for {expected} boundary vertices")]
     BoundaryCount {

@@ -7,7 +7,7 @@ use super::element::Elements;
 use super::rigid::RigidMotion;
 use super::sliding::{Constraint, Sliding, constrain, constraints};
 use super::{Deform, Method, VolumeError};
-use crate::linear::{Convergence, LinearError, LinearSolver, SparseMatrix, Tolerance, solver};
+use crate::linear::{Convergence, LinearError, LinearSolver, SparseMatrix, Tolerance, solver, solver_of_body};
 use crate::mesh::{Cells, Mesh, Vector};
 use crate::vector::{add, subtract};
 
@@ -77,18 +77,20 @@ struct System<const B: usize> {
 }
 
 impl<const B: usize> System<B> {
-    /// `slide` brings sliding vertices into the matrix; `like` is a system of the same graph.
+    /// `slide` brings sliding vertices into the matrix; `like` is a system of the same graph, and `fresh` makes a solver where
+    /// there is none.
     fn new(
         (matrix, coupling): (SparseMatrix<B>, SparseMatrix<B>),
         slide: impl FnOnce(&mut SparseMatrix<B>) -> SparseMatrix<B>,
         like: Option<&Self>,
+        fresh: impl FnOnce(Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError>,
     ) -> Result<Self, LinearError> {
         let mut matrix = matrix;
         let sliding = slide(&mut matrix);
         let matrix = Arc::new(matrix);
         let solver = match like {
             Some(like) => like.solver.renewed(Arc::clone(&matrix))?,
-            None => solver(Arc::clone(&matrix))?,
+            None => fresh(Arc::clone(&matrix))?,
         };
         Ok(Self { matrix, coupling, sliding, solver })
     }
@@ -236,6 +238,27 @@ impl VolumeOperator {
         self.solve_sliding(boundary_displacement, &vec![[0.0; 3]; self.sliding.len()])
     }
 
+    /// The same from a displacement of every vertex that is near to it, such as that of a like motion: fewer iterations where it
+    /// is. Within the tolerance the result then depends on where it started from; where orders must come out to the same bits
+    /// whatever came before, start from zero.
+    ///
+    /// # Errors
+    /// Also [`VolumeError::StartCount`], and [`VolumeError::NotFinite`] for a start that is not.
+    pub fn solve_from(
+        &self,
+        boundary_displacement: &[Vector],
+        start: &[Vector],
+    ) -> Result<VolumeSolution, VolumeError> {
+        if start.len() != self.graph.vertex_count() {
+            return Err(VolumeError::StartCount { found: start.len(), expected: self.graph.vertex_count() });
+        }
+        let bad = start.iter().zip(0..).find(|(value, _)| !value.iter().all(|entry| entry.is_finite()));
+        if let Some((&value, vertex)) = bad {
+            return Err(VolumeError::NotFinite { vertex, value });
+        }
+        self.solve_all(boundary_displacement, &vec![[0.0; 3]; self.sliding.len()], Some(start))
+    }
+
     /// The same where sliding surfaces move: of each displacement in `sliding_displacement`, one for each of the sliding vertices
     /// in the order in which they were given, the part across the surface is prescribed. A vertex that is listed several times
     /// takes the displacement of its first place.
@@ -246,6 +269,15 @@ impl VolumeOperator {
         &self,
         boundary_displacement: &[Vector],
         sliding_displacement: &[Vector],
+    ) -> Result<VolumeSolution, VolumeError> {
+        self.solve_all(boundary_displacement, sliding_displacement, None)
+    }
+
+    fn solve_all(
+        &self,
+        boundary_displacement: &[Vector],
+        sliding_displacement: &[Vector],
+        start: Option<&[Vector]>,
     ) -> Result<VolumeSolution, VolumeError> {
         if sliding_displacement.len() != self.sliding.len() {
             return Err(VolumeError::SlidingCount { found: sliding_displacement.len(), expected: self.sliding.len() });
@@ -270,9 +302,11 @@ impl VolumeOperator {
         }
         let convergence = match &self.equations {
             Equations::Coupled(system) => {
-                self.solve_coupled(system, boundary_displacement, sliding_displacement, &mut displacement)?
+                self.solve_coupled(system, boundary_displacement, sliding_displacement, start, &mut displacement)?
             }
-            Equations::Separate(system) => self.solve_separate(system, boundary_displacement, &mut displacement)?,
+            Equations::Separate(system) => {
+                self.solve_separate(system, boundary_displacement, start, &mut displacement)?
+            }
         };
         if !displacement.as_flattened().iter().all(|value| value.is_finite()) {
             return Err(LinearError::NotFinite { iteration: convergence.iterations }.into());
@@ -300,6 +334,7 @@ impl VolumeOperator {
         system: &System<3>,
         boundary: &[Vector],
         sliding: &[Vector],
+        start: Option<&[Vector]>,
         displacement: &mut [Vector],
     ) -> Result<Convergence, LinearError> {
         if boundary.iter().chain(sliding).all(|value| *value == [0.0; 3]) {
@@ -316,7 +351,15 @@ impl VolumeOperator {
         let right_side = self.coupled_right_side(system, &rest, &rest_sliding);
         let tolerance = Tolerance { relative: self.settings.tolerance, absolute };
         let mut solution = vec![[0.0; 3]; right_side.len()];
-        let convergence = system.solver.solve(&right_side, &mut solution, tolerance)?;
+        if let Some(start) = start {
+            for ((value, &vertex), &point) in solution.iter_mut().zip(&self.graph.vertices).zip(&self.unknown_points) {
+                *value = subtract(start[vertex as usize], rigid.at(point));
+            }
+            for constraint in &self.constraints {
+                solution[constraint.row] = constraint.along(solution[constraint.row]);
+            }
+        }
+        let convergence = system.solver.solve_from(&right_side, &mut solution, tolerance)?;
         for (constraint, &rest) in self.constraints.iter().zip(&rest_sliding) {
             solution[constraint.row] = subtract(constraint.along(solution[constraint.row]), rest);
         }
@@ -349,8 +392,10 @@ impl VolumeOperator {
         &self,
         system: &System<1>,
         boundary: &[Vector],
+        start: Option<&[Vector]>,
         displacement: &mut [Vector],
     ) -> Result<Convergence, LinearError> {
+        let from = |vertex: u32, axis: usize, mean: f64| start.map_or(0.0, |start| start[vertex as usize][axis] - mean);
         let moving: [bool; 3] = std::array::from_fn(|axis| boundary.iter().any(|value| value[axis] != 0.0));
         #[expect(clippy::cast_precision_loss, reason = "fewer vertices than 2^53")]
         let mean: Vector = std::array::from_fn(|axis| {
@@ -359,7 +404,14 @@ impl VolumeOperator {
         if let [axis] = (0..3).filter(|&axis| moving[axis]).collect::<Vec<_>>()[..] {
             let values: Vec<[f64; 1]> = boundary.iter().map(|value| [value[axis]]).collect();
             let rest: Vec<[f64; 1]> = values.iter().map(|[value]| [mean[axis] - value]).collect();
-            let (solution, convergence) = self.solve_rest(system, &values, &rest)?;
+            let mut right_side = vec![[0.0]; self.graph.vertices.len()];
+            system.coupling.multiply(&values, &mut right_side);
+            let absolute = ROUNDING * crate::linear::norm(&right_side);
+            system.coupling.multiply(&rest, &mut right_side);
+            let mut solution: Vec<[f64; 1]> =
+                self.graph.vertices.iter().map(|&vertex| [from(vertex, axis, mean[axis])]).collect();
+            let tolerance = Tolerance { relative: self.settings.tolerance, absolute };
+            let convergence = system.solver.solve_from(&right_side, &mut solution, tolerance)?;
             for (&vertex, [value]) in self.graph.vertices.iter().zip(solution) {
                 displacement[vertex as usize][axis] = mean[axis] + value;
             }
@@ -377,7 +429,10 @@ impl VolumeOperator {
         let absolute = crate::linear::norms(&right_side).map(|norm| ROUNDING * norm);
         system.coupling.multiply_columns(&rest, &mut right_side);
         let tolerances = absolute.map(|absolute| Tolerance { relative: self.settings.tolerance, absolute });
-        let mut solution = vec![[[0.0]; 3]; right_side.len()];
+        let at = |&vertex: &u32| {
+            std::array::from_fn(|axis| [if moving[axis] { from(vertex, axis, mean[axis]) } else { 0.0 }])
+        };
+        let mut solution: Vec<[[f64; 1]; 3]> = self.graph.vertices.iter().map(at).collect();
         let convergence = system.solver.solve_three_from(&right_side, &mut solution, tolerances)?;
         for (&vertex, value) in self.graph.vertices.iter().zip(solution) {
             for axis in (0..3).filter(|&axis| moving[axis]) {
@@ -388,23 +443,6 @@ impl VolumeOperator {
             iterations: worst.iterations.max(column.iterations),
             residual: worst.residual.max(column.residual),
         }))
-    }
-
-    /// Solves for the boundary motion `-rest`, what is left of `boundary`: to the tolerance, or to rounding against the whole.
-    fn solve_rest<const B: usize>(
-        &self,
-        system: &System<B>,
-        boundary: &[[f64; B]],
-        rest: &[[f64; B]],
-    ) -> Result<(Vec<[f64; B]>, Convergence), LinearError> {
-        let mut right_side = vec![[0.0; B]; self.graph.vertices.len()];
-        system.coupling.multiply(boundary, &mut right_side);
-        let absolute = ROUNDING * crate::linear::norm(&right_side);
-        system.coupling.multiply(rest, &mut right_side);
-        let mut solution = vec![[0.0; B]; right_side.len()];
-        let tolerance = Tolerance { relative: self.settings.tolerance, absolute };
-        let convergence = system.solver.solve(&right_side, &mut solution, tolerance)?;
-        Ok((solution, convergence))
     }
 }
 
@@ -419,8 +457,20 @@ fn equations(
     like: Option<&Equations>,
 ) -> Result<Equations, LinearError> {
     let coupled = |system| {
-        let like = like.and_then(|like| if let Equations::Coupled(like) = like { Some(like) } else { None });
-        System::new(system, |matrix| constrain(matrix, constraints), like).map(Equations::Coupled)
+        let like = like.and_then(|like| match like {
+            // Bodies turn about where their vertices lie, which is elsewhere now.
+            Equations::Coupled(like) if constraints.is_empty() => Some(like),
+            _ => None,
+        });
+        // With the whole boundary held, rigid bodies cost more than they save.
+        let fresh = |matrix| match settings.method {
+            Method::Elasticity if !constraints.is_empty() => {
+                let place = |&vertex: &u32| mesh.points()[vertex as usize];
+                solver_of_body(matrix, &graph.vertices.iter().map(place).collect::<Vec<_>>())
+            }
+            _ => solver(matrix),
+        };
+        System::new(system, |matrix| constrain(matrix, constraints), like, fresh).map(Equations::Coupled)
     };
     match settings.method {
         Method::Elasticity => {
@@ -434,7 +484,7 @@ fn equations(
             let like = like.and_then(|like| if let Equations::Separate(like) = like { Some(like) } else { None });
             let system = graph.assemble(mesh, elements, &Laplace, stiffness);
             let none = |matrix: &mut SparseMatrix<1>| SparseMatrix::zeros(vec![0; matrix.rows() + 1], Vec::new());
-            System::new(system, none, like).map(Equations::Separate)
+            System::new(system, none, like, solver).map(Equations::Separate)
         }
     }
 }

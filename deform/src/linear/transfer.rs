@@ -1,0 +1,386 @@
+//! Between a system and the next coarser one.
+
+use super::real::Real;
+use super::{Block, ROW_CHUNK, SparseMatrix};
+use crate::mesh::Vector;
+use crate::parallel;
+use crate::vector::cross;
+
+/// How many coarse rows are worked on at a time.
+const COARSE_CHUNK: usize = 64;
+
+/// A column that the present row has no block in.
+const NONE: u32 = u32::MAX;
+
+/// How much stiffer against turning an aggregate is made than it is, in parts of its stiffness against shifts: what lies on one
+/// line, or is one vertex, does not resist all turns.
+const TURNING: f64 = 1e-4;
+
+/// How coarse values make fine ones, in compressed rows: each by a weight.
+///
+/// Coarse values of 6 entries are a shift and a turn; there is an arm for each weight then, and a fine shift is the sum of
+/// `weight shift + turn × arm`, a fine turn that of `turn_factor weight turn`.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Interpolation {
+    pub(super) offsets: Vec<usize>,
+    pub(super) columns: Vec<u32>,
+    pub(super) weights: Vec<f64>,
+    pub(super) arms: Vec<Vector>,
+    pub(super) turn: f64,
+}
+
+impl Interpolation {
+    pub(super) fn rows(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    fn arm(&self, place: usize) -> Vector {
+        self.arms.get(place).copied().unwrap_or_default()
+    }
+
+    /// For each column the rows that have a weight there, and the places of these.
+    pub(super) fn transposed(&self, columns: usize) -> (Vec<usize>, Vec<(u32, u32)>) {
+        let mut starts = vec![0usize; columns + 2];
+        for &column in &self.columns {
+            starts[column as usize + 2] += 1;
+        }
+        for column in 2..starts.len() {
+            starts[column] += starts[column - 1];
+        }
+        let mut entries = vec![(0, 0); self.columns.len()];
+        #[expect(clippy::cast_possible_truncation, reason = "rows are 32-bit, and they have few weights")]
+        for row in 0..self.rows() {
+            for place in self.offsets[row]..self.offsets[row + 1] {
+                let next = &mut starts[self.columns[place] as usize + 1];
+                entries[*next] = (row as u32, place as u32);
+                *next += 1;
+            }
+        }
+        starts.pop();
+        (starts, entries)
+    }
+}
+
+/// A block of a coarse column in a fine row.
+type Image<const F: usize, const C: usize> = [[f64; C]; F];
+
+/// `Pᵀ A P` for the matrix `A` and interpolation `P`, with as many rows as `P` has columns; `transposed` is that of `P`. `sizes`
+/// are those of the aggregates, where they turn.
+pub(super) fn galerkin<const F: usize, const C: usize>(
+    matrix: &SparseMatrix<F>,
+    interpolation: &Interpolation,
+    (starts, entries): (&[usize], &[(u32, u32)]),
+    sizes: &[f64],
+) -> SparseMatrix<C> {
+    let count = starts.len() - 1;
+    let image: Vec<RowsFound<Image<F, C>>> = parallel::map_chunks(matrix.rows(), ROW_CHUNK, |range| {
+        let mut row = Accumulator::new(count, [[0.0; C]; F]);
+        let mut found = RowsFound::default();
+        for index in range {
+            let (columns, blocks) = matrix.row(index);
+            for (&column, block) in columns.iter().zip(blocks) {
+                let column = column as usize;
+                for place in interpolation.offsets[column]..interpolation.offsets[column + 1] {
+                    let sum = row.at(interpolation.columns[place]);
+                    let (weight, arm) = (interpolation.weights[place], interpolation.arm(place));
+                    for (sum, entries) in sum.iter_mut().zip(block) {
+                        add_row(sum, entries, weight, arm, interpolation.turn);
+                    }
+                }
+            }
+            row.finish(&mut found);
+        }
+        found
+    });
+    let parts = parallel::map_chunks(count, COARSE_CHUNK, |range| {
+        let mut row = Accumulator::new(count, [[0.0; C]; C]);
+        let mut found = RowsFound::default();
+        for coarse in range {
+            for &(fine, place) in &entries[starts[coarse]..starts[coarse + 1]] {
+                let (fine, place) = (fine as usize, place as usize);
+                let (weight, arm) = (interpolation.weights[place], interpolation.arm(place));
+                let (columns, blocks) = image[fine / ROW_CHUNK].row(fine % ROW_CHUNK);
+                for (&column, block) in columns.iter().zip(blocks) {
+                    add_rows(row.at(column), block, weight, arm, interpolation.turn);
+                }
+            }
+            if C == 6 {
+                #[expect(clippy::cast_possible_truncation, reason = "rows are 32-bit")]
+                let own = row.at(coarse as u32);
+                let stiffness = TURNING * sizes[coarse] * sizes[coarse] * (own[0][0] + own[1][1] + own[2][2]) / 3.0;
+                for (axis, entries) in own.iter_mut().enumerate().skip(3) {
+                    entries[axis] += stiffness;
+                }
+            }
+            row.finish(&mut found);
+        }
+        found
+    });
+    collect(&parts)
+}
+
+/// `sum += row P_block` for one row of a block of the matrix.
+#[inline(always)]
+fn add_row<const F: usize, const C: usize>(
+    sum: &mut [f64; C],
+    row: &[f64; F],
+    weight: f64,
+    arm: Vector,
+    turn_factor: f64,
+) {
+    for (sum, entry) in sum.iter_mut().zip(row).take(if C == 6 { 3 } else { C }) {
+        *sum += weight * entry;
+    }
+    if C == 6 {
+        for (axis, turn) in cross(arm, first_three(row)).into_iter().enumerate() {
+            sum[3 + axis] += turn;
+            if F == 6 {
+                sum[3 + axis] += turn_factor * weight * row[3 + axis];
+            }
+        }
+    }
+}
+
+/// `sum += P_blockᵀ block`.
+#[inline(always)]
+fn add_rows<const F: usize, const C: usize>(
+    sum: &mut Block<C>,
+    block: &Image<F, C>,
+    weight: f64,
+    arm: Vector,
+    turn_factor: f64,
+) {
+    for (sum, row) in sum.iter_mut().zip(block).take(if C == 6 { 3 } else { C }) {
+        for (sum, entry) in sum.iter_mut().zip(row) {
+            *sum += weight * entry;
+        }
+    }
+    if C == 6 && F >= 3 {
+        for column in 0..C {
+            let turn = cross(arm, [block[0][column], block[1][column], block[2][column]]);
+            for (axis, turn) in turn.into_iter().enumerate() {
+                sum[3 + axis][column] += turn;
+                if F == 6 {
+                    sum[3 + axis][column] += turn_factor * weight * block[3 + axis][column];
+                }
+            }
+        }
+    }
+}
+
+fn first_three<const F: usize>(row: &[f64; F]) -> Vector {
+    row.first_chunk().copied().unwrap_or_default()
+}
+
+/// Some rows of a matrix while it is built.
+#[derive(Debug)]
+struct RowsFound<T> {
+    /// Where each row ends.
+    ends: Vec<usize>,
+    columns: Vec<u32>,
+    blocks: Vec<T>,
+}
+
+impl<T> Default for RowsFound<T> {
+    fn default() -> Self {
+        Self { ends: Vec::new(), columns: Vec::new(), blocks: Vec::new() }
+    }
+}
+
+impl<T> RowsFound<T> {
+    fn row(&self, row: usize) -> (&[u32], &[T]) {
+        let range = row.checked_sub(1).map_or(0, |before| self.ends[before])..self.ends[row];
+        (&self.columns[range.clone()], &self.blocks[range])
+    }
+}
+
+/// One matrix of rows that were built [`COARSE_CHUNK`] at a time.
+fn collect<const B: usize>(parts: &[RowsFound<Block<B>>]) -> SparseMatrix<B> {
+    let mut offsets = vec![0];
+    let mut base = 0;
+    for part in parts {
+        offsets.extend(part.ends.iter().map(|end| base + end));
+        base += part.columns.len();
+    }
+    let mut columns = vec![0; base];
+    let mut blocks = vec![[[0.0; B]; B]; base];
+    parallel::for_each_rows(
+        COARSE_CHUNK,
+        (&offsets, &mut columns),
+        (&offsets, &mut blocks),
+        |rows, columns, blocks| {
+            let part = &parts[rows.start / COARSE_CHUNK];
+            columns.copy_from_slice(&part.columns);
+            blocks.copy_from_slice(&part.blocks);
+        },
+    );
+    SparseMatrix::from_parts(offsets, columns, blocks)
+}
+
+/// A row that is dense to look up and sparse to walk.
+struct Accumulator<T> {
+    places: Vec<u32>,
+    entries: Vec<(u32, T)>,
+    zero: T,
+}
+
+impl<T: Copy> Accumulator<T> {
+    fn new(columns: usize, zero: T) -> Self {
+        Self { places: vec![NONE; columns], entries: Vec::new(), zero }
+    }
+
+    #[inline]
+    fn at(&mut self, column: u32) -> &mut T {
+        let place = &mut self.places[column as usize];
+        if *place == NONE {
+            #[expect(clippy::cast_possible_truncation, reason = "a row has fewer blocks than there are columns")]
+            (*place = self.entries.len() as u32);
+            self.entries.push((column, self.zero));
+        }
+        &mut self.entries[*place as usize].1
+    }
+
+    fn finish(&mut self, found: &mut RowsFound<T>) {
+        for (column, _) in &self.entries {
+            self.places[*column as usize] = NONE;
+        }
+        self.entries.sort_unstable_by_key(|(column, _)| *column);
+        for (column, block) in self.entries.drain(..) {
+            found.columns.push(column);
+            found.blocks.push(block);
+        }
+        found.ends.push(found.columns.len());
+    }
+}
+
+/// An [`Interpolation`] or its transpose, as cycles use it.
+#[derive(Debug)]
+pub(super) struct Transfer<T> {
+    offsets: Vec<usize>,
+    columns: Vec<u32>,
+    weights: Vec<T>,
+    arms: Vec<[T; 3]>,
+    turn: T,
+}
+
+impl<T: Real> Transfer<T> {
+    /// The interpolation with row `rows(slot)` in place of `slot` and `columns(column)` in place of a column.
+    pub(super) fn interpolation(
+        from: &Interpolation,
+        rows: impl Fn(usize) -> usize + Sync,
+        columns: impl Fn(usize) -> usize + Sync,
+    ) -> Self {
+        Self::new(from.rows(), from, |slot, push| {
+            let row = rows(slot);
+            for place in from.offsets[row]..from.offsets[row + 1] {
+                push(columns(from.columns[place] as usize), place);
+            }
+        })
+    }
+
+    /// The same for its transpose.
+    pub(super) fn restriction(
+        from: &Interpolation,
+        (starts, entries): (&[usize], &[(u32, u32)]),
+        rows: impl Fn(usize) -> usize + Sync,
+        columns: impl Fn(usize) -> usize + Sync,
+    ) -> Self {
+        Self::new(starts.len() - 1, from, |slot, push| {
+            let row = rows(slot);
+            for &(fine, place) in &entries[starts[row]..starts[row + 1]] {
+                push(columns(fine as usize), place as usize);
+            }
+        })
+    }
+
+    fn new(count: usize, from: &Interpolation, row: impl Fn(usize, &mut dyn FnMut(usize, usize)) + Sync) -> Self {
+        let parts = parallel::map_chunks(count, ROW_CHUNK, |range| {
+            let (mut ends, mut found) = (Vec::with_capacity(range.len()), Vec::new());
+            for slot in range {
+                row(slot, &mut |column, place| found.push((column, place)));
+                ends.push(found.len());
+            }
+            (ends, found)
+        });
+        let mut result = Self {
+            offsets: vec![0],
+            columns: Vec::with_capacity(from.columns.len()),
+            weights: Vec::with_capacity(from.columns.len()),
+            arms: Vec::with_capacity(from.arms.len()),
+            turn: T::of(from.turn),
+        };
+        for (ends, found) in parts {
+            let base = result.columns.len();
+            result.offsets.extend(ends.into_iter().map(|end| base + end));
+            #[expect(clippy::cast_possible_truncation, reason = "rows are 32-bit")]
+            result.columns.extend(found.iter().map(|&(column, _)| column as u32));
+            result.weights.extend(found.iter().map(|&(_, place)| T::of(from.weights[place])));
+            if !from.arms.is_empty() {
+                result.arms.extend(found.iter().map(|&(_, place)| from.arms[place].map(T::of)));
+            }
+        }
+        result
+    }
+
+    /// `value += P coarse` for one row.
+    #[inline(always)]
+    pub(super) fn interpolate<const F: usize, const C: usize, const K: usize>(
+        &self,
+        row: usize,
+        coarse: &[[[T; C]; K]],
+        value: &mut [[T; F]; K],
+    ) {
+        for place in self.offsets[row]..self.offsets[row + 1] {
+            let weight = self.weights[place];
+            for (value, coarse) in value.iter_mut().zip(&coarse[self.columns[place] as usize]) {
+                for (value, &coarse) in value.iter_mut().zip(coarse).take(if C == 6 { 3 } else { C }) {
+                    *value += weight * coarse;
+                }
+                if C == 6 && F >= 3 {
+                    let turn = [coarse[3], coarse[4], coarse[5]];
+                    for (value, moved) in value.iter_mut().zip(product(turn, self.arms[place])) {
+                        *value += moved;
+                    }
+                    if F == 6 {
+                        for (value, &coarse) in value.iter_mut().zip(coarse).skip(3) {
+                            *value += self.turn * weight * coarse;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// `value += Pᵀ fine` for one row of the transpose.
+    #[inline(always)]
+    pub(super) fn restrict<const F: usize, const C: usize, const K: usize>(
+        &self,
+        row: usize,
+        fine: &[[[T; F]; K]],
+        value: &mut [[T; C]; K],
+    ) {
+        for place in self.offsets[row]..self.offsets[row + 1] {
+            let weight = self.weights[place];
+            for (value, fine) in value.iter_mut().zip(&fine[self.columns[place] as usize]) {
+                for (value, &fine) in value.iter_mut().zip(fine).take(if C == 6 { 3 } else { C }) {
+                    *value += weight * fine;
+                }
+                if C == 6 && F >= 3 {
+                    let turned = product(self.arms[place], [fine[0], fine[1], fine[2]]);
+                    for (axis, turned) in turned.into_iter().enumerate() {
+                        value[3 + axis] += turned;
+                        if F == 6 {
+                            value[3 + axis] += self.turn * weight * fine[3 + axis];
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The cross product.
+#[inline(always)]
+fn product<T: Real>(a: [T; 3], b: [T; 3]) -> [T; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
