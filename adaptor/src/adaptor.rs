@@ -1,6 +1,10 @@
 //! The three calls.
 
-use std::{net::SocketAddr, sync::Arc, time::Instant};
+use std::{
+    net::SocketAddr,
+    sync::{Arc, OnceLock},
+    time::Instant,
+};
 
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Value, json};
@@ -11,7 +15,7 @@ use tombolo_deform::{
 use tombolo_pipelines::{
     extract::Channel,
     files::{UnreadFile, read_displacements},
-    language::{self, Command, Config, Due, Stage, TimedCommand, Validate},
+    language::{self, Command, Config, Due, Question, Stage, TimedCommand, Validate},
     shape::Shaper,
 };
 
@@ -21,7 +25,7 @@ use crate::{
     report::{Durations, Report},
     settings::{ExecuteError, FinalizeError, InitializeError, MeshMotion, Settings, Steering, Step},
     stages::Pipelines,
-    steering::{Defaults, Log, Moment, Parameters, Queue, Received, Source, Steerer, Timed},
+    steering::{Defaults, Forecaster, Log, Moment, Parameters, Queue, Received, Source, Steerer, Timed},
     stream::{CommandSink, Hub, ReferenceSurface, Server},
 };
 
@@ -38,6 +42,8 @@ pub struct Adaptor {
     queue: Arc<Queue>,
     log: Arc<Log>,
     hub: Option<Arc<Hub>>,
+    /// Answers viewers, once there is a mesh.
+    forecaster: Arc<OnceLock<Forecaster>>,
     server: Option<Server>,
     mesh: SteeredMesh,
     told: Told,
@@ -100,9 +106,15 @@ impl Adaptor {
         let queue = Arc::new(Queue::default());
         let hub = config.stream.as_ref().filter(|_| first).map(|_| Arc::new(Hub::default()));
         let log = Arc::new(Log::new(journal, hub.clone()));
+        let forecaster = Arc::default();
         let server = match (&config.stream, &hub) {
             (Some(stream), Some(hub)) => {
-                let intake = Intake { queue: Arc::clone(&queue), log: Arc::clone(&log), hub: Arc::clone(hub) };
+                let intake = Intake {
+                    queue: Arc::clone(&queue),
+                    log: Arc::clone(&log),
+                    hub: Arc::clone(hub),
+                    forecaster: Arc::clone(&forecaster),
+                };
                 Some(Server::start(stream, Arc::clone(hub), Arc::new(intake))?)
             }
             _ => None,
@@ -117,6 +129,7 @@ impl Adaptor {
             queue,
             log,
             hub,
+            forecaster,
             server,
             mesh: SteeredMesh::Unknown,
             told: Told { schema: language::order_schema(), ..Told::default() },
@@ -287,6 +300,7 @@ impl Adaptor {
         }
         let SteeredMesh::Steered(steerer, _) = &mut self.mesh else { return Ok(false) };
         let moved = steerer.next_shape(moment, step.time_step);
+        steerer.look_ahead(self.timed.next_order());
         if moved {
             self.tell_conditions();
         }
@@ -420,9 +434,12 @@ impl Adaptor {
         );
         self.told.channel = channel.name.to_owned();
         self.told.fields = fields.collect();
-        if let SteeredMesh::Steered(_, surface) = &self.mesh {
+        if let SteeredMesh::Steered(steerer, surface) = &self.mesh {
             self.told.features = features(surface);
             if let Some(hub) = &self.hub {
+                if let Some(forecaster) = steerer.forecaster() {
+                    let _ = self.forecaster.set(forecaster);
+                }
                 let surface = ReferenceSurface::new(Arc::clone(surface));
                 self.told.surface = surface.described();
                 hub.offer_surface(Arc::new(surface));
@@ -440,10 +457,11 @@ impl Adaptor {
         let shaper = Shaper::new(mesh, Arc::clone(&surface)).map_err(|error| error.to_string())?;
         let steerer = Steerer::new(
             shaper,
-            self.defaults,
+            self.defaults.clone(),
             Arc::clone(&self.log),
             Arc::clone(&self.queue),
-            self.config.stream.is_some(),
+            // Whoever drives can drag it at any time.
+            self.config.stream.is_some() || self.timed.drags_skeleton() || self.pipelines.drags_skeleton(),
         )
         .map_err(|error| format!("a thread could not be started: {error}"))?;
         Ok((steerer, surface))
@@ -457,7 +475,7 @@ impl Adaptor {
             _ => Vec::new(),
         };
         let list = |value: &Value| if value.is_null() { json!([]) } else { value.clone() };
-        let Defaults { deform, guard, schedule } = self.defaults;
+        let Defaults { deform, guard, schedule } = &self.defaults;
         let description = json!({
             "protocol": 1,
             "views": self.pipelines.views(),
@@ -524,7 +542,7 @@ fn defaults(config: &Config) -> Defaults {
     let stages = config.pipelines.iter().filter(|pipeline| pipeline.due == Due::OnOrder).flat_map(|it| &it.stages);
     for stage in stages {
         match stage {
-            Stage::Deform(deform) => defaults.deform = *deform,
+            Stage::Deform(deform) => defaults.deform.clone_from(deform),
             Stage::Guard(guard) => defaults.guard = *guard,
             Stage::Schedule(schedule) => defaults.schedule = *schedule,
             _ => {}
@@ -538,17 +556,48 @@ struct Intake {
     queue: Arc<Queue>,
     log: Arc<Log>,
     hub: Arc<Hub>,
+    forecaster: Arc<OnceLock<Forecaster>>,
+}
+
+impl Intake {
+    /// Has a viewer told what an order would come to.
+    fn forecast(&self, client: u64, id: Option<String>, question: &str) -> Result<(), String> {
+        let Question::Forecast(order) =
+            language::parse_valid(question, "message").map_err(|error| error.to_string())?;
+        let command = Command::Order(order);
+        check_files(&command)?;
+        let Command::Order(order) = command else { return Ok(()) };
+        let forecaster = self.forecaster.get().ok_or("there is no mesh yet whose shape could be changed")?;
+        let hub = Arc::clone(&self.hub);
+        forecaster.ask(client, &order, move |forecast| {
+            hub.tell_client(client, &json!({"forecast": {"id": id, "order": forecast}}));
+        });
+        Ok(())
+    }
+}
+
+/// What comes over the network names no files of this machine.
+fn check_files(command: &Command) -> Result<(), String> {
+    match command.file() {
+        None => Ok(()),
+        Some((edit, file)) => Err(format!(
+            "edit {edit} (displacement): file: found {file:?}; an order over the network names no files of this machine, \
+             expected `vertices` and `values`"
+        )),
+    }
+}
+
+fn is_question(message: &str) -> bool {
+    matches!(serde_json::from_str::<Value>(message), Ok(Value::Object(members)) if members.contains_key("forecast"))
 }
 
 impl CommandSink for Intake {
     fn receive(&self, client: u64, id: Option<String>, command: &str) -> Result<(), String> {
-        let command: Command = language::parse_valid(command, "message").map_err(|error| error.to_string())?;
-        if let Some((edit, file)) = command.file() {
-            return Err(format!(
-                "edit {edit} (displacement): file: found {file:?}; an order over the network names no files of this machine, \
-                 expected `vertices` and `values`"
-            ));
+        if is_question(command) {
+            return self.forecast(client, id, command);
         }
+        let command: Command = language::parse_valid(command, "message").map_err(|error| error.to_string())?;
+        check_files(&command)?;
         if !self.queue.has_room() {
             return Err("the solver has not come to the commands before this one yet; try again later".into());
         }

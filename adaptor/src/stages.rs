@@ -30,6 +30,7 @@ pub(crate) struct Pipelines {
     views: Vec<(String, Arc<Mutex<Encoder>>)>,
     description: Value,
     can_order: bool,
+    drags_skeleton: bool,
     output: PathBuf,
     writer: Writer,
 }
@@ -61,6 +62,8 @@ impl Pipelines {
             description: json!(views),
             views: views.into_iter().map(|view| (view.name, Arc::default())).collect(),
             can_order,
+            drags_skeleton: (config.pipelines.iter().flat_map(|pipeline| &pipeline.stages))
+                .any(|stage| matches!(stage, Stage::Skeleton(_))),
             output: output.into(),
             writer: Writer::default(),
         })
@@ -74,6 +77,11 @@ impl Pipelines {
     /// Whether a pipeline can give an order of a new shape.
     pub(crate) fn can_order(&self) -> bool {
         self.can_order
+    }
+
+    /// Whether any of these orders drags the skeleton.
+    pub(crate) fn drags_skeleton(&self) -> bool {
+        self.drags_skeleton
     }
 
     /// Lets the views use a surface of the first channel that is known already.

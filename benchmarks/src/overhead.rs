@@ -11,11 +11,10 @@ use tombolo::deform::quality::Guard;
 use tombolo::deform::schedule::Schedule;
 use tombolo::deform::shapes::box_of_tets;
 use tombolo::deform::surface::{Edit, FeatureSettings, Surface};
-use tombolo::deform::volume::Deform;
 use tombolo::pipelines::encode::Encoder;
 use tombolo::pipelines::extract::{Association, Channel, FieldView, Snapshot};
 use tombolo::pipelines::files;
-use tombolo::pipelines::language::{self, Config};
+use tombolo::pipelines::language::{self, Config, DeformStage};
 use tombolo::pipelines::run::{Output, Runner};
 use tombolo::pipelines::shape::Shaper;
 use tombolo::{Adaptor, Settings, Step};
@@ -271,7 +270,7 @@ fn order(mesh: &Mesh) -> Result<Order, Box<dyn Error>> {
         serde_json::from_value(json!([{"scale_direction": {
             "features": ["throat"], "fixed": ["inlet", "outlet"], "factors": [1, 1, factor], "harmonic_order": 2}}]))
     };
-    let (deform, guard) = (Deform::default(), Guard::default());
+    let (deform, guard) = (DeformStage::default(), Guard::default());
     let schedule: Schedule = serde_json::from_value(json!({"steps": 10, "every": {"steps": 10}}))?;
     let mut shape: Arc<[_]> = mesh.points().into();
     let mut plan = |factor: f64| -> Result<_, Box<dyn Error>> {

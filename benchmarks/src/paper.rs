@@ -16,8 +16,8 @@ use tombolo::deform::mesh::{Mesh, Vector};
 use tombolo::deform::quality::{Guard, Otherwise, SurfaceRule, change, quality};
 use tombolo::deform::schedule::Schedule;
 use tombolo::deform::surface::{Edit, FeatureSettings, Surface};
-use tombolo::deform::volume::Deform;
 use tombolo::pipelines::files::read_mesh;
+use tombolo::pipelines::language::DeformStage;
 use tombolo::pipelines::shape::Shaper;
 
 /// The paper's tables: amount, then mean, least and largest normalised scaled Jacobian.
@@ -162,11 +162,11 @@ fn measured(
     for &amount in amounts {
         let stack: Vec<Edit> = serde_json::from_value(edits(amount))?;
         let mut shaper = Shaper::new(Arc::clone(&mesh), Arc::clone(&surface))?;
-        let one_solve = figures(&mesh, &shaper.target(&stack, &Deform::default(), SurfaceRule::Allow)?.points);
+        let one_solve = figures(&mesh, &shaper.target(&stack, &DeformStage::default(), SurfaceRule::Allow)?.points);
         let mut shaper = Shaper::new(Arc::clone(&mesh), Arc::clone(&surface))?;
         let reference = Arc::clone(shaper.reference());
         let start = Instant::now();
-        let plan = shaper.plan(&stack, reference, &Deform::default(), &Schedule::default(), &guard);
+        let plan = shaper.plan(&stack, reference, &DeformStage::default(), &Schedule::default(), &guard);
         let seconds = start.elapsed().as_secs_f64();
         let (ours, sub_steps, rejected) = match &plan {
             Ok(plan) => (figures(&mesh, plan.end()), plan.target().sub_steps, None),

@@ -1,5 +1,6 @@
 //! From a stack of edits to the shapes that a solver is handed.
 
+mod carry;
 mod forecast;
 mod mend;
 mod plan;
@@ -11,10 +12,12 @@ use tombolo_deform::{
     mesh::{Mesh, Vector},
     quality::{Guard, Refusal, SurfaceRule},
     schedule::Schedule,
-    surface::{BrokenSurface, Edit, EditError, Editor, Surface, SurfaceError, require_sound},
-    volume::{Deform, Untangler, VolumeError, VolumeOperator},
+    surface::{BrokenSurface, Edit, EditError, Editor, Surface, SurfaceError, UnknownFeature, require_sound},
+    volume::{Untangler, VolumeError},
 };
 
+use crate::language::DeformStage;
+use carry::Carrier;
 pub use forecast::{Forecast, Outcome};
 use mend::Mended;
 pub use plan::{Place, Plan};
@@ -43,6 +46,14 @@ pub enum Refused {
     /// The surface folds over or intersects itself.
     #[error(transparent)]
     Surface(#[from] Box<BrokenSurface>),
+    /// A feature that should slide or be free is none of the surface.
+    #[error("deform.{field}: {source}")]
+    Feature {
+        /// `sliding` or `free`.
+        field: &'static str,
+        /// The name, and those that there are.
+        source: UnknownFeature,
+    },
     /// The volume cannot follow.
     #[error(transparent)]
     Volume(#[from] VolumeError),
@@ -133,9 +144,8 @@ impl Target {
 ///
 /// ```
 /// use std::sync::Arc;
-/// use tombolo_deform::{quality::Guard, schedule::Schedule, shapes::box_of_tets, surface::{Edit, FeatureSettings, Surface},
-///     volume::Deform};
-/// use tombolo_pipelines::shape::Shaper;
+/// use tombolo_deform::{quality::Guard, schedule::Schedule, shapes::box_of_tets, surface::{Edit, FeatureSettings, Surface}};
+/// use tombolo_pipelines::{language::DeformStage, shape::Shaper};
 ///
 /// let mesh = Arc::new(box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]));
 /// let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default())?);
@@ -145,10 +155,10 @@ impl Target {
 /// ]))?;
 /// let mut shaper = Shaper::new(Arc::clone(&mesh), surface)?;
 /// let reference: Arc<[_]> = mesh.points().into();
-/// let plan = shaper.plan(&edits, reference, &Deform::default(), &Schedule::default(), &Guard::default())?;
+/// let plan = shaper.plan(&edits, reference, &DeformStage::default(), &Schedule::default(), &Guard::default())?;
 /// assert!(plan.quality().min_scaled_jacobian > 0.02);
 ///
-/// let back = shaper.plan(&[], Arc::clone(plan.end()), &Deform::default(), &Schedule::default(), &Guard::default())?;
+/// let back = shaper.plan(&[], Arc::clone(plan.end()), &DeformStage::default(), &Schedule::default(), &Guard::default())?;
 /// assert_eq!(&**back.end(), mesh.points());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -156,7 +166,7 @@ pub struct Shaper {
     mesh: Arc<Mesh>,
     surface: Arc<Surface>,
     editor: Editor,
-    operators: Vec<(Deform, Arc<VolumeOperator>)>,
+    operators: Vec<(DeformStage, Arc<Carrier>)>,
     reference: Arc<[Vector]>,
     untangler: Option<Arc<Untangler>>,
     /// Shapes that took more than one solve, the newest last.
@@ -205,12 +215,17 @@ impl Shaper {
         &mut self.editor
     }
 
+    /// Extracts the skeleton of the surface when it is called, on whatever thread that is, so that the first order need not.
+    pub fn skeleton_in_advance(&self) -> impl FnOnce() + Send + 'static + use<> {
+        self.editor.skeleton_in_advance()
+    }
+
     /// Sets up the operator of the volume, so that the first order need not.
     ///
     /// # Errors
-    /// [`Refused::Volume`] where the mesh has none.
-    pub fn prepare(&mut self, deform: &Deform) -> Result<(), Refused> {
-        Ok(self.operator(deform).map(drop)?)
+    /// [`Refused::Volume`] where the mesh has none; [`Refused::Feature`].
+    pub fn prepare(&mut self, deform: &DeformStage) -> Result<(), Refused> {
+        self.operator(deform).map(drop)
     }
 
     /// Holds a shape of the surface (coordinates of each of its vertices) to `rule`.
@@ -221,7 +236,7 @@ impl Shaper {
         }
     }
 
-    fn operator(&mut self, deform: &Deform) -> Result<Arc<VolumeOperator>, VolumeError> {
+    fn operator(&mut self, deform: &DeformStage) -> Result<Arc<Carrier>, Refused> {
         if let Some(found) = self.operators.iter().position(|(settings, _)| settings == deform) {
             // The newest last, so that the oldest is the first to go.
             let entry = self.operators.remove(found);
@@ -232,8 +247,8 @@ impl Shaper {
         if self.operators.len() >= OPERATORS {
             self.operators.remove(0);
         }
-        let operator = Arc::new(VolumeOperator::new(&self.mesh, self.surface.vertices(), deform)?);
-        self.operators.push((*deform, Arc::clone(&operator)));
+        let operator = Arc::new(Carrier::new(&self.mesh, &self.surface, deform)?);
+        self.operators.push((deform.clone(), Arc::clone(&operator)));
         Ok(operator)
     }
 
@@ -241,15 +256,18 @@ impl Shaper {
     /// volume is not judged yet.
     ///
     /// # Errors
-    /// [`Refused::Edit`], [`Refused::Surface`], [`Refused::Volume`].
-    pub fn target(&mut self, stack: &[Edit], deform: &Deform, rule: SurfaceRule) -> Result<Target, Refused> {
-        deform.validate()?;
+    /// [`Refused::Edit`], [`Refused::Surface`], [`Refused::Feature`], [`Refused::Volume`].
+    pub fn target(&mut self, stack: &[Edit], deform: &DeformStage, rule: SurfaceRule) -> Result<Target, Refused> {
+        deform.equation.validate()?;
         let mut seconds = ShapeSeconds::default();
         let watch = Stopwatch::start();
         let surface = self.editor.displacement(stack).map_err(Refused::from).and_then(|surface| {
             let reference = self.surface.points();
-            let shape: Vec<Vector> = reference.iter().zip(&surface).map(|(&point, &by)| moved(point, by)).collect();
-            self.require_sound(&shape, rule)?;
+            // Where a part of the surface is let go, it is looked at where it ends.
+            if !deform.lets_go() {
+                let shape: Vec<Vector> = reference.iter().zip(&surface).map(|(&point, &by)| moved(point, by)).collect();
+                self.require_sound(&shape, rule)?;
+            }
             Ok(surface)
         });
         seconds.surface = watch.seconds();
@@ -267,7 +285,16 @@ impl Shaper {
         seconds.volume = watch.seconds();
         self.spent.volume += seconds.volume;
         let solution = solution?;
-        let points = reference.iter().zip(&solution.displacement).map(|(&point, &by)| moved(point, by)).collect();
+        let points: Arc<[Vector]> =
+            reference.iter().zip(&solution.displacement).map(|(&point, &by)| moved(point, by)).collect();
+        if deform.lets_go() {
+            let watch = Stopwatch::start();
+            let shape: Vec<Vector> = self.surface.vertices().iter().map(|&vertex| points[vertex as usize]).collect();
+            let sound = self.require_sound(&shape, rule);
+            seconds.surface += watch.seconds();
+            self.spent.surface += watch.seconds();
+            sound?;
+        }
         let (way, fraction, iterations, sub_steps) = (Vec::new(), 1.0, solution.iterations, 0);
         Ok(Target { points, reference, way, fraction, seconds, iterations, sub_steps })
     }
@@ -281,7 +308,7 @@ impl Shaper {
         &mut self,
         stack: &[Edit],
         start: Arc<[Vector]>,
-        deform: &Deform,
+        deform: &DeformStage,
         schedule: &Schedule,
         guard: &Guard,
     ) -> Result<Plan, Refused> {

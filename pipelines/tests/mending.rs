@@ -10,9 +10,11 @@ use tombolo_deform::{
     schedule::Schedule,
     shapes,
     surface::{Edit, FeatureSettings, Surface},
-    volume::Deform,
 };
-use tombolo_pipelines::shape::{Outcome, Place, Plan, Refused, Shaper};
+use tombolo_pipelines::{
+    language::DeformStage,
+    shape::{Outcome, Place, Plan, Refused, Shaper},
+};
 
 fn shaper(mesh: Mesh) -> Shaper {
     let mesh = Arc::new(mesh);
@@ -41,7 +43,7 @@ fn schedule(steps: u32) -> Schedule {
 }
 
 fn reach(shaper: &mut Shaper, stack: &[Edit], start: &Place, steps: u32, guard: &Guard) -> Result<Plan, Refused> {
-    shaper.reach(stack, 0, start, &Deform::default(), &schedule(steps), guard)
+    shaper.reach(stack, 0, start, &DeformStage::default(), &schedule(steps), guard)
 }
 
 /// Goes along a plan shape by shape as a solver does, and looks at every step; the place where it ends.
@@ -169,7 +171,7 @@ fn the_largest_feasible_fraction_is_done_and_reported() {
         let again = reach(&mut shaper, &scaled(fraction), &start, 3, &guard(Otherwise::Reject)).unwrap();
         assert_eq!(again.end(), plan.end());
         assert!(reach(&mut shaper, &scaled(fraction + 0.02), &start, 3, &guard(Otherwise::Reject)).is_err());
-        let forecast = shaper.forecast(&stack, 0, &start, &Deform::default(), &schedule(3), &clamping);
+        let forecast = shaper.forecast(&stack, 0, &start, &DeformStage::default(), &schedule(3), &clamping);
         assert_eq!((forecast.outcome, forecast.fraction), (Outcome::Clamped, Some(fraction)));
         assert_eq!(forecast.quality.unwrap().inverted, 0);
     }
@@ -185,13 +187,13 @@ fn edits_that_are_there_already_are_not_clamped() {
     ]));
     let clamping = guard(Otherwise::Clamp);
     let first =
-        shaper.plan(&stack[..1], Arc::clone(&start.points), &Deform::default(), &schedule(1), &clamping).unwrap();
+        shaper.plan(&stack[..1], Arc::clone(&start.points), &DeformStage::default(), &schedule(1), &clamping).unwrap();
     let place = first.place(1, Arc::clone(first.end()));
-    let plan = shaper.reach(&stack, 1, &place, &Deform::default(), &schedule(1), &clamping).unwrap();
+    let plan = shaper.reach(&stack, 1, &place, &DeformStage::default(), &schedule(1), &clamping).unwrap();
     let fraction = plan.target().fraction;
     let top = plan.end().iter().map(|point| point[2]).fold(0.0, f64::max);
     assert!((top - (2.5 - 4.0 * fraction)).abs() < 1e-9 && fraction < 0.6, "{top} {fraction}");
-    let whole = shaper.reach(&stack, 2, &place, &Deform::default(), &schedule(1), &clamping);
+    let whole = shaper.reach(&stack, 2, &place, &DeformStage::default(), &schedule(1), &clamping);
     assert!(matches!(whole, Err(Refused::Guard(_) | Refused::Surface(_))), "nothing is left to clamp");
 }
 
@@ -257,7 +259,7 @@ proptest! {
             let kept = stack.len();
             let mut wanted = stack.clone();
             wanted.extend(edits(Value::Array(order)));
-            match shaper.reach(&wanted, kept, &place, &Deform::default(), &schedule(steps), &guard) {
+            match shaper.reach(&wanted, kept, &place, &DeformStage::default(), &schedule(steps), &guard) {
                 Ok(plan) => {
                     prop_assert_eq!(&plan.start()[..], &place.points[..]);
                     place = walk(&mesh, &plan, &guard);
@@ -271,7 +273,7 @@ proptest! {
                 Err(refused) => prop_assert!(!refused.to_string().is_empty()),
             }
         }
-        let back = shaper.reach(&[], 0, &place, &Deform::default(), &schedule(steps), &guard);
+        let back = shaper.reach(&[], 0, &place, &DeformStage::default(), &schedule(steps), &guard);
         if let Ok(plan) = back {
             let home = walk(&mesh, &plan, &guard);
             prop_assert_eq!(&*home.points, mesh.points());

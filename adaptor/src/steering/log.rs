@@ -11,7 +11,7 @@ use tombolo_pipelines::{
     shape::ShapeSeconds,
 };
 
-use super::worker::Rejection;
+use super::planner::Rejection;
 use crate::{
     journal::Journal,
     report::{ORDERS_KEPT, OrderReport, OrderStatus},

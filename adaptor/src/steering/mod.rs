@@ -10,8 +10,10 @@
 //! meanwhile. Where the mesh has moved since, the way from its present shape is judged again before the first shape is handed
 //! out, so that what a journal replays is the same bits: the start of each motion depends only on the cycle at which it began.
 
+mod forecaster;
 mod log;
 mod parameters;
+mod planner;
 mod queue;
 mod stack;
 mod timed;
@@ -19,7 +21,7 @@ mod worker;
 
 use std::{
     collections::VecDeque,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex},
     time::Instant,
 };
 
@@ -27,30 +29,50 @@ use tombolo_deform::{
     mesh::Vector,
     quality::{Guard, Quality},
     schedule::Schedule,
-    volume::Deform,
 };
 use tombolo_pipelines::{
-    language::Order,
+    language::{DeformStage, Order},
     shape::{Place, Plan, Shaper},
 };
 
+pub(crate) use forecaster::Forecaster;
 pub(crate) use log::{Log, Moment, Source};
 pub(crate) use parameters::Parameters;
 pub use parameters::{Parameter, ParameterError};
 pub(crate) use queue::{Queue, Received};
 pub(crate) use stack::EditStack;
-use stack::ShapeSettings;
+use stack::{ShapeSettings, StackError};
 pub(crate) use timed::Timed;
 
 use crate::report::OrderStatus;
-use worker::{Done, Rejection, Wish, Worker, caught};
+use forecaster::Present;
+use planner::{Planner, Rejection, Wish};
+use worker::{Done, Worker, lock};
 
 /// The settings of orders that bring none.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Defaults {
-    pub(crate) deform: Deform,
+    pub(crate) deform: DeformStage,
     pub(crate) guard: Guard,
     pub(crate) schedule: Schedule,
+}
+
+impl Defaults {
+    /// The stack that an order makes of `stack`, and what its plan from the place `start` is made from.
+    fn wish(&self, stack: &EditStack, start: Place, order: &Order) -> Result<(EditStack, Wish), StackError> {
+        let default = ShapeSettings { deform: self.deform.clone(), guard: self.guard };
+        let (after, settings) = stack.after(&order.change, order.deform.as_ref(), order.guard, &default)?;
+        let ShapeSettings { deform, guard } = settings;
+        let wish = Wish {
+            stack: after.edits(),
+            kept: stack.shared(&after),
+            start,
+            deform,
+            schedule: order.schedule.unwrap_or(self.schedule),
+            guard,
+        };
+        Ok((after, wish))
+    }
 }
 
 /// An order waiting for its turn.
@@ -89,8 +111,12 @@ pub(crate) struct Shape {
 pub(crate) struct Steerer {
     log: Arc<Log>,
     defaults: Defaults,
-    shaper: Arc<Mutex<Shaper>>,
+    planner: Arc<Mutex<Planner>>,
     worker: Option<Worker>,
+    /// The stack and the place once more, for other threads.
+    present: Arc<Mutex<Present>>,
+    /// Whether the next order of a file was looked ahead to from the present shape.
+    foreseen: bool,
     stack: EditStack,
     place: Place,
     waiting: VecDeque<Task>,
@@ -103,26 +129,33 @@ pub(crate) struct Steerer {
 }
 
 impl Steerer {
-    /// Takes over a mesh at its reference shape. `prepare` sets the volume operator up on the worker's thread at once.
+    /// Takes over a mesh at its reference shape, and makes ready on other threads what no order changes: the operator of the
+    /// volume and, where an order could need it, the skeleton.
     pub(crate) fn new(
         shaper: Shaper,
         defaults: Defaults,
         log: Arc<Log>,
         queue: Arc<Queue>,
-        prepare: bool,
+        skeleton: bool,
     ) -> std::io::Result<Self> {
-        let place = Arc::clone(shaper.reference()).into();
-        let shaper = Arc::new(Mutex::new(shaper));
-        let worker = prepare.then(|| Worker::start(Arc::clone(&shaper), queue)).transpose()?;
-        if let Some(worker) = &worker {
-            worker.prepare(defaults.deform);
+        let place: Place = Arc::clone(shaper.reference()).into();
+        let in_advance = skeleton.then(|| shaper.skeleton_in_advance());
+        let planner = Arc::new(Mutex::new(Planner::new(shaper)));
+        let mut worker = Worker::start(Arc::clone(&planner), queue)?;
+        worker.prepare(defaults.deform.clone());
+        if let Some(in_advance) = in_advance {
+            worker.beside(in_advance)?;
         }
+        let stack = EditStack::default();
+        let present = Arc::new(Mutex::new(Present { stack: stack.clone(), place: place.clone() }));
         Ok(Self {
             log,
             defaults,
-            shaper,
-            worker,
-            stack: EditStack::default(),
+            planner,
+            worker: Some(worker),
+            present,
+            foreseen: false,
+            stack,
             place,
             waiting: VecDeque::new(),
             computing: None,
@@ -131,6 +164,26 @@ impl Steerer {
             quality: None,
             reference_quality: None,
         })
+    }
+
+    /// What answers forecasts; `None` where the worker has ended.
+    pub(crate) fn forecaster(&self) -> Option<Forecaster> {
+        let jobs = Arc::clone(self.worker.as_ref()?.jobs());
+        Some(Forecaster { defaults: self.defaults.clone(), present: Arc::clone(&self.present), jobs })
+    }
+
+    /// Has the plan of an order that will come made ahead, as far as it can be known now; once for each shape.
+    pub(crate) fn look_ahead(&mut self, order: Option<&Order>) {
+        let Some(order) = order.filter(|_| !self.foreseen && self.is_at_rest() && self.computing.is_none()) else {
+            return;
+        };
+        self.foreseen = true;
+        // What is wrong with it is told when its turn comes.
+        if let (Some(worker), Ok((_, wish))) =
+            (&self.worker, self.defaults.wish(&self.stack, self.place.clone(), order))
+        {
+            worker.look_ahead(wish);
+        }
     }
 
     /// How many vertices the mesh has.
@@ -198,21 +251,11 @@ impl Steerer {
 
     fn start(&mut self, task: Task, moment: Moment, step_seconds: Option<f64>) {
         let Task { id, order, background } = task;
-        let default = ShapeSettings { deform: self.defaults.deform, guard: self.defaults.guard };
-        let (stack, settings) = match self.stack.after(&order.change, order.deform, order.guard, default) {
-            Ok(after) => after,
+        let (stack, wish) = match self.defaults.wish(&self.stack, self.place.clone(), &order) {
+            Ok(wish) => wish,
             Err(error) => return self.log.reject(&id, moment, &error.into()),
         };
-        let ShapeSettings { deform, guard } = settings;
-        let kept = self.stack.shared(&stack);
-        let wish = Wish {
-            stack: stack.edits(),
-            kept,
-            start: self.place.clone(),
-            deform,
-            schedule: order.schedule.unwrap_or(self.defaults.schedule),
-            guard,
-        };
+        let (kept, guard) = (wish.kept, wish.guard);
         self.log.update(&id, |order| order.status = OrderStatus::Computing);
         let computing = Computing { id, stack, kept, guard };
         match &self.worker {
@@ -222,7 +265,7 @@ impl Steerer {
             }
             _ => {
                 let begun = Instant::now();
-                let plan = wish.plan(&self.shaper);
+                let plan = lock(&self.planner).plan(&wish);
                 self.commit(computing, plan, moment, begun, step_seconds);
             }
         }
@@ -265,6 +308,8 @@ impl Steerer {
         }
         let fraction = plan.target().fraction;
         self.stack = if fraction < 1.0 { stack.clamped(kept, fraction) } else { stack };
+        self.foreseen = false;
+        lock(&self.present).stack.clone_from(&self.stack);
         let clamped = (fraction < 1.0).then_some(fraction);
         self.log.begin(&id, moment, plan.quality().min_scaled_jacobian, clamped);
         self.log.update(&id, |order| {
@@ -285,8 +330,7 @@ impl Steerer {
         if Arc::ptr_eq(plan.start(), &self.place.points) {
             return Ok(plan);
         }
-        let mut shaper = self.shaper.lock().unwrap_or_else(PoisonError::into_inner);
-        caught(|| shaper.go(&self.place, plan.target(), plan.asked(), guard))
+        lock(&self.planner).go(&self.place, &plan, guard)
     }
 
     /// The last change of the mesh and the coordinates at its end.
@@ -324,6 +368,7 @@ impl Steerer {
         shape.shape = (motion.taken, motion.plan.shapes());
         shape.order.clone_from(&motion.id);
         self.place = motion.plan.place(motion.taken, points);
+        lock(&self.present).place.clone_from(&self.place);
         if let Some(quality) = motion.plan.quality().shapes.get(motion.taken as usize - 1) {
             self.quality = Some((quality.min, quality.mean));
         }

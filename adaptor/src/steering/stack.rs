@@ -2,8 +2,8 @@
 
 use std::num::NonZeroU32;
 
-use tombolo_deform::{quality::Guard, surface::Edit, volume::Deform};
-use tombolo_pipelines::language::Change;
+use tombolo_deform::{quality::Guard, surface::Edit};
+use tombolo_pipelines::language::{Change, DeformStage};
 
 /// Orders that a stack may hold.
 const ORDERS: usize = 4096;
@@ -19,9 +19,9 @@ struct Entry {
 }
 
 /// What the shape of a stack depends on besides its edits.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct ShapeSettings {
-    pub(crate) deform: Deform,
+    pub(crate) deform: DeformStage,
     pub(crate) guard: Guard,
 }
 
@@ -48,13 +48,13 @@ impl EditStack {
     pub(crate) fn after(
         &self,
         change: &Change,
-        deform: Option<Deform>,
+        deform: Option<&DeformStage>,
         guard: Option<Guard>,
-        default: ShapeSettings,
+        default: &ShapeSettings,
     ) -> Result<(Self, ShapeSettings), StackError> {
         let mut entries = self.entries.clone();
-        let own = |before: ShapeSettings| ShapeSettings {
-            deform: deform.unwrap_or(before.deform),
+        let own = |before: &ShapeSettings| ShapeSettings {
+            deform: deform.unwrap_or(&before.deform).clone(),
             guard: guard.unwrap_or(before.guard),
         };
         match change {
@@ -68,7 +68,7 @@ impl EditStack {
                 entries.truncate(kept);
             }
         }
-        let settings = own(entries.last().map_or(default, |entry| entry.settings));
+        let settings = own(entries.last().map_or(default, |entry| &entry.settings));
         let stack = Self { entries };
         let (orders, edits) = (stack.entries.len(), stack.edits().len());
         if orders > ORDERS || edits > EDITS {
@@ -118,7 +118,7 @@ mod tests {
     }
 
     fn after(stack: &EditStack, change: Change) -> EditStack {
-        stack.after(&change, None, None, ShapeSettings::default()).unwrap().0
+        stack.after(&change, None, None, &ShapeSettings::default()).unwrap().0
     }
 
     fn undo(count: u32) -> Change {
@@ -137,20 +137,20 @@ mod tests {
         assert_eq!(after(&more, undo(1)), replaced);
         assert_eq!(after(&more, undo(2)), two);
         assert_eq!(after(&more, undo(4)), none);
-        let error = more.after(&undo(5), None, None, ShapeSettings::default()).unwrap_err();
+        let error = more.after(&undo(5), None, None, &ShapeSettings::default()).unwrap_err();
         assert!(error.to_string().contains("only 4"), "{error}");
     }
 
     #[test]
     fn an_undo_deforms_as_the_shape_it_goes_back_to() {
-        let stiff = Deform { stiffening: 2.0, ..Deform::default() };
+        let stiff = DeformStage { sliding: vec!["a".into()], ..DeformStage::default() };
         let mending = Guard { otherwise: Otherwise::Untangle, ..Guard::default() };
         let none = EditStack::default();
         let default = ShapeSettings::default();
-        let (one, _) = none.after(&Change::Edits(vec![edit(1.0)]), Some(stiff), Some(mending), default).unwrap();
+        let (one, _) = none.after(&Change::Edits(vec![edit(1.0)]), Some(&stiff), Some(mending), &default).unwrap();
         let two = after(&one, Change::Edits(vec![edit(2.0)]));
         let settings = ShapeSettings { deform: stiff, guard: mending };
-        assert_eq!(two.after(&undo(1), None, None, default).unwrap(), (one, settings));
+        assert_eq!(two.after(&undo(1), None, None, &default).unwrap(), (one, settings));
     }
 
     #[test]
@@ -166,6 +166,6 @@ mod tests {
     #[test]
     fn a_stack_does_not_grow_without_end() {
         let edits = vec![edit(1.0); EDITS + 1];
-        assert!(EditStack::default().after(&Change::Edits(edits), None, None, ShapeSettings::default()).is_err());
+        assert!(EditStack::default().after(&Change::Edits(edits), None, None, &ShapeSettings::default()).is_err());
     }
 }

@@ -1,6 +1,6 @@
 //! Commands that were given beforehand.
 
-use tombolo_pipelines::language::{At, TimedCommand};
+use tombolo_pipelines::language::{At, Command, Order, TimedCommand};
 
 use super::Moment;
 
@@ -35,6 +35,25 @@ impl Timed {
         self.commands.is_empty()
     }
 
+    /// The next order, as far as that can be known.
+    pub(crate) fn next_order(&self) -> Option<&Order> {
+        let cycle = |command: &TimedCommand| match command.at {
+            None => (0, 0.0),
+            Some(At::Cycle(cycle)) => (cycle, 0.0),
+            Some(At::Time(time)) => (u64::MAX, time),
+        };
+        let orders = self.commands.iter().filter_map(|command| match &command.command {
+            Command::Order(order) => Some((cycle(command), order)),
+            _ => None,
+        });
+        orders.min_by(|(a, _), (b, _)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))).map(|(_, order)| order)
+    }
+
+    /// Whether any order drags the skeleton.
+    pub(crate) fn drags_skeleton(&self) -> bool {
+        self.commands.iter().any(|timed| matches!(&timed.command, Command::Order(order) if order.drags_skeleton()))
+    }
+
     /// Whether [`Timed::take_due`] would find one; two comparisons.
     #[inline]
     pub(crate) fn is_due(&self, moment: Moment) -> bool {
@@ -58,7 +77,6 @@ impl Timed {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tombolo_pipelines::language::Command;
 
     fn at(at: Option<At>) -> TimedCommand {
         TimedCommand { at, id: None, command: Command::Stop {} }

@@ -1,85 +1,29 @@
 //! The thread on which shapes are planned while the solver keeps stepping.
+//!
+//! It computes on threads of its own: were they the solver's, a solver would wait for the plan in its own loops. Orders come
+//! first, then forecasts, then what is only made ready.
 
 use std::{
+    collections::VecDeque,
+    num::NonZeroUsize,
     sync::{
-        Arc, Mutex, PoisonError,
+        Arc, Condvar, Mutex, MutexGuard, PoisonError,
         mpsc::{Receiver, RecvError, Sender, TryRecvError, channel},
     },
     thread::JoinHandle,
 };
 
-use tombolo_deform::{
-    quality::{Guard, Quality, quality},
-    schedule::Schedule,
-    surface::Edit,
-    volume::Deform,
+use rayon::ThreadPool;
+use tombolo_deform::quality::{Quality, quality};
+use tombolo_pipelines::{
+    language::DeformStage,
+    shape::{Forecast, Plan},
 };
-use tombolo_pipelines::shape::{Place, Plan, Refused, ShapeSeconds, Shaper};
 
-use super::queue::Queue;
-
-/// What a plan is made from.
-#[derive(Debug, Clone)]
-pub(crate) struct Wish {
-    pub(crate) stack: Vec<Edit>,
-    /// How many of them the present shape has already.
-    pub(crate) kept: usize,
-    pub(crate) start: Place,
-    pub(crate) deform: Deform,
-    pub(crate) schedule: Schedule,
-    pub(crate) guard: Guard,
-}
-
-impl Wish {
-    pub(crate) fn plan(&self, shaper: &Mutex<Shaper>) -> Result<Plan, Rejection> {
-        // A panic in the kernel leaves at worst a cache without its entry.
-        let mut shaper = shaper.lock().unwrap_or_else(PoisonError::into_inner);
-        let plan =
-            caught(|| shaper.reach(&self.stack, self.kept, &self.start, &self.deform, &self.schedule, &self.guard));
-        plan.map_err(|rejection| Rejection { seconds: shaper.spent(), ..rejection })
-    }
-}
-
-/// Why an order is not carried out, and what it took to find out.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Rejection {
-    pub(crate) reason: String,
-    /// What the way would have come down to, where the guard did not let it through.
-    pub(crate) min_scaled_jacobian: Option<f64>,
-    /// What fraction would have passed.
-    pub(crate) fraction: Option<f64>,
-    pub(crate) seconds: ShapeSeconds,
-}
-
-impl<T: ToString> From<T> for Rejection {
-    fn from(reason: T) -> Self {
-        Self { reason: reason.to_string(), min_scaled_jacobian: None, fraction: None, seconds: ShapeSeconds::default() }
-    }
-}
-
-/// Runs a piece of the kernel so that a fault in it rejects one order instead of ending the solver.
-pub(crate) fn caught<T>(attempt: impl FnOnce() -> Result<T, Refused>) -> Result<T, Rejection> {
-    match std::panic::catch_unwind(std::panic::AssertUnwindSafe(attempt)) {
-        Ok(result) => result.map_err(|refused| Rejection {
-            min_scaled_jacobian: refused.min_scaled_jacobian(),
-            fraction: refused.feasible_fraction(),
-            ..Rejection::from(&refused)
-        }),
-        Err(panic) => {
-            let message = panic
-                .downcast_ref::<&str>()
-                .map(|text| (*text).to_owned())
-                .or_else(|| panic.downcast_ref::<String>().cloned())
-                .unwrap_or_else(|| "no reason given".into());
-            Err(Rejection::from(format!("the geometry kernel failed, which is a defect of it: {message}")))
-        }
-    }
-}
-
-enum Job {
-    Prepare(Deform),
-    Plan(Wish),
-}
+use super::{
+    planner::{Planner, Rejection, Wish},
+    queue::Queue,
+};
 
 /// What the worker has to say.
 pub(crate) enum Done {
@@ -88,48 +32,121 @@ pub(crate) enum Done {
     Planned(Box<Result<Plan, Rejection>>),
 }
 
+/// Takes the answer to a forecast, on the worker's thread.
+pub(crate) type Answer = Box<dyn FnOnce(Forecast) + Send>;
+
+/// A forecast that waits, and who asked for it.
+struct Asked {
+    asker: u64,
+    wish: Wish,
+    answer: Answer,
+}
+
+#[derive(Default)]
+struct State {
+    plans: VecDeque<Wish>,
+    /// The newest of each asker.
+    forecasts: VecDeque<Asked>,
+    prepare: Option<DeformStage>,
+    ahead: Option<Wish>,
+    closed: bool,
+}
+
+enum Job {
+    Plan(Wish),
+    Forecast(Asked),
+    Prepare(DeformStage),
+    Ahead(Wish),
+}
+
+/// What there is to do.
+#[derive(Default)]
+pub(crate) struct Jobs {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+impl Jobs {
+    fn change(&self, change: impl FnOnce(&mut State)) {
+        change(&mut lock(&self.state));
+        self.changed.notify_one();
+    }
+
+    /// The most urgent job; waits for one. `None` once the worker is to end.
+    fn next(&self) -> Option<Job> {
+        let mut state = lock(&self.state);
+        loop {
+            if state.closed {
+                return None;
+            }
+            let job = (state.plans.pop_front().map(Job::Plan))
+                .or_else(|| state.forecasts.pop_front().map(Job::Forecast))
+                .or_else(|| state.prepare.take().map(Job::Prepare))
+                .or_else(|| state.ahead.take().map(Job::Ahead));
+            if job.is_some() {
+                return job;
+            }
+            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// Asks what a wish would come to, in place of what the same asker wanted to know before and was not told yet.
+    pub(crate) fn forecast(&self, asker: u64, wish: Wish, answer: Answer) {
+        self.change(|state| {
+            state.forecasts.retain(|waiting| waiting.asker != asker);
+            state.forecasts.push_back(Asked { asker, wish, answer });
+        });
+    }
+}
+
 /// The thread. It ends when this is dropped, after the job at hand.
 pub(crate) struct Worker {
-    jobs: Option<Sender<Job>>,
+    jobs: Arc<Jobs>,
     done: Receiver<Done>,
-    thread: Option<JoinHandle<()>>,
+    threads: Vec<JoinHandle<()>>,
 }
 
 impl Worker {
     /// Starts the thread; `queue` is called whenever it is done with something.
-    pub(crate) fn start(shaper: Arc<Mutex<Shaper>>, queue: Arc<Queue>) -> std::io::Result<Self> {
-        let (jobs, next) = channel();
+    pub(crate) fn start(planner: Arc<Mutex<Planner>>, queue: Arc<Queue>) -> std::io::Result<Self> {
         let (tell, done) = channel();
-        let work = move || {
-            for job in next {
-                let message = match job {
-                    Job::Prepare(deform) => Done::Prepared(Box::new(prepare(&shaper, &deform))),
-                    Job::Plan(wish) => Done::Planned(Box::new(wish.plan(&shaper))),
-                };
-                if tell.send(message).is_err() {
-                    return;
-                }
-                queue.call();
-            }
+        // The core that the solver has not less of is left to it.
+        let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+        let pool = pool("tombolo-plan", cores.saturating_sub(1).max(1))?;
+        let jobs = Arc::new(Jobs::default());
+        let work = {
+            let jobs = Arc::clone(&jobs);
+            move || pool.install(|| work(&jobs, &planner, &tell, &queue))
         };
         let thread = std::thread::Builder::new().name("tombolo-shape".into()).spawn(work)?;
-        Ok(Self { jobs: Some(jobs), done, thread: Some(thread) })
+        Ok(Self { jobs, done, threads: vec![thread] })
+    }
+
+    /// Runs `work` beside everything else, on one more thread.
+    pub(crate) fn beside(&mut self, work: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
+        let pool = pool("tombolo-beside", 1)?;
+        let work = move || pool.install(work);
+        self.threads.push(std::thread::Builder::new().name("tombolo-ready".into()).spawn(work)?);
+        Ok(())
+    }
+
+    /// What can be asked of it from other threads.
+    pub(crate) fn jobs(&self) -> &Arc<Jobs> {
+        &self.jobs
     }
 
     /// Sets up the operator of the volume.
-    pub(crate) fn prepare(&self, deform: Deform) {
-        self.send(Job::Prepare(deform));
+    pub(crate) fn prepare(&self, deform: DeformStage) {
+        self.jobs.change(|state| state.prepare = Some(deform));
+    }
+
+    /// Makes a plan that will be asked for.
+    pub(crate) fn look_ahead(&self, wish: Wish) {
+        self.jobs.change(|state| state.ahead = Some(wish));
     }
 
     pub(crate) fn plan(&self, wish: Wish) {
-        self.send(Job::Plan(wish));
-    }
-
-    fn send(&self, job: Job) {
-        if let Some(jobs) = &self.jobs {
-            // A thread that is gone shows when its answer is asked for.
-            let _ = jobs.send(job);
-        }
+        self.jobs.change(|state| state.plans.push_back(wish));
     }
 
     /// What is done, if anything is.
@@ -147,24 +164,60 @@ impl Worker {
     }
 }
 
+impl Drop for Worker {
+    fn drop(&mut self) {
+        self.jobs.change(|state| state.closed = true);
+        for thread in self.threads.drain(..) {
+            let _ = thread.join();
+        }
+    }
+}
+
+fn work(jobs: &Jobs, planner: &Mutex<Planner>, tell: &Sender<Done>, queue: &Queue) {
+    while let Some(job) = jobs.next() {
+        let done = match job {
+            Job::Plan(wish) => Done::Planned(Box::new(lock(planner).plan(&wish))),
+            Job::Prepare(deform) => Done::Prepared(Box::new(prepare(planner, &deform))),
+            Job::Forecast(Asked { wish, answer, .. }) => {
+                let forecast = lock(planner).forecast(&wish);
+                answer(forecast);
+                continue;
+            }
+            Job::Ahead(wish) => {
+                // Whoever asks for it is told what is wrong with it.
+                let _ = lock(planner).plan(&wish);
+                continue;
+            }
+        };
+        if tell.send(done).is_err() {
+            return;
+        }
+        queue.call();
+    }
+}
+
+fn prepare(planner: &Mutex<Planner>, deform: &DeformStage) -> Quality {
+    let mesh = {
+        let mut planner = lock(planner);
+        planner.prepare(deform);
+        Arc::clone(planner.shaper().mesh())
+    };
+    quality(mesh.cells(), mesh.points())
+}
+
+fn pool(name: &'static str, threads: usize) -> std::io::Result<ThreadPool> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(move |thread| format!("{name}-{thread}"))
+        .build()
+        .map_err(std::io::Error::other)
+}
+
 fn gone() -> Done {
     Done::Planned(Box::new(Err(Rejection::from("the thread that plans shapes has ended"))))
 }
 
-fn prepare(shaper: &Mutex<Shaper>, deform: &Deform) -> Quality {
-    let mut shaper = shaper.lock().unwrap_or_else(PoisonError::into_inner);
-    let mesh = Arc::clone(shaper.mesh());
-    // An operator that cannot be made is reported by the order that needs it.
-    let _ = caught(|| shaper.prepare(deform));
-    drop(shaper);
-    quality(mesh.cells(), mesh.points())
-}
-
-impl Drop for Worker {
-    fn drop(&mut self) {
-        self.jobs = None;
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
-    }
+/// A panic in the kernel leaves at worst a cache without its entry.
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

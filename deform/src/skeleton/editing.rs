@@ -1,6 +1,6 @@
 //! Edits by the skeleton: from places near it to the motion of a surface.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use super::{DragError, Skeleton, SkeletonDrag, SkeletonError, SkeletonSettings, Skin, SkinError};
 use crate::mesh::Vector;
@@ -18,7 +18,8 @@ const NEAR: f64 = 0.02;
 #[derive(Debug)]
 pub(crate) struct SkeletonEditor {
     surface: Arc<Surface>,
-    skeleton: Option<Result<Arc<Skeleton>, SkeletonError>>,
+    /// Shared with whoever extracts it in advance.
+    skeleton: Arc<OnceLock<Result<Arc<Skeleton>, SkeletonError>>>,
     /// How far from each node of the skeleton a place may be that means it.
     near: Vec<f64>,
     /// The most recently used at the end.
@@ -35,15 +36,18 @@ struct Bound {
 
 impl SkeletonEditor {
     pub fn new(surface: Arc<Surface>) -> Self {
-        Self { surface, skeleton: None, near: Vec::new(), skins: Vec::new() }
+        Self { surface, skeleton: Arc::default(), near: Vec::new(), skins: Vec::new() }
     }
 
-    /// The skeleton of the reference surface.
-    pub fn skeleton(&mut self) -> Result<Arc<Skeleton>, SkeletonError> {
-        let surface = &self.surface;
-        self.skeleton
-            .get_or_insert_with(|| Skeleton::extract(surface, &SkeletonSettings::default()).map(Arc::new))
-            .clone()
+    /// The skeleton of the reference surface. Where another thread extracts it just now, waits for that.
+    pub fn skeleton(&self) -> Result<Arc<Skeleton>, SkeletonError> {
+        extracted(&self.skeleton, &self.surface)
+    }
+
+    /// Extracts the skeleton when it is called, on whatever thread that is.
+    pub fn in_advance(&self) -> impl FnOnce() + Send + 'static + use<> {
+        let (skeleton, surface) = (Arc::clone(&self.skeleton), Arc::clone(&self.surface));
+        move || drop(extracted(&skeleton, &surface))
     }
 
     /// Takes this skeleton for that of the surface.
@@ -52,7 +56,7 @@ impl SkeletonEditor {
         if carried != vertices {
             return Err(SkinError::OtherSurface { vertices, carried, held: vertices });
         }
-        self.skeleton = Some(Ok(skeleton));
+        self.skeleton = Arc::new(OnceLock::from(Ok(skeleton)));
         self.near.clear();
         self.skins.clear();
         Ok(())
@@ -129,6 +133,13 @@ impl SkeletonEditor {
         self.skins.push(bound);
         Ok(displacement)
     }
+}
+
+fn extracted(
+    skeleton: &OnceLock<Result<Arc<Skeleton>, SkeletonError>>,
+    surface: &Surface,
+) -> Result<Arc<Skeleton>, SkeletonError> {
+    skeleton.get_or_init(|| Skeleton::extract(surface, &SkeletonSettings::default()).map(Arc::new)).clone()
 }
 
 /// The field that gives the place of a drag.

@@ -271,6 +271,12 @@ impl Editor {
         self.skeletons.skeleton()
     }
 
+    /// Extracts the skeleton when it is called, on whatever thread that is: the first skeleton edit then finds it there, or waits
+    /// for it. Nothing is extracted where a skeleton was given.
+    pub fn skeleton_in_advance(&self) -> impl FnOnce() + Send + 'static + use<> {
+        self.skeletons.in_advance()
+    }
+
     /// The displacement of each surface vertex from [`Surface::points`] that a stack of edits asks for.
     ///
     /// # Errors

@@ -34,6 +34,7 @@ mod boundary;
 pub mod case;
 mod error;
 mod geometry;
+pub mod history;
 pub mod linear;
 mod momentum;
 pub mod program;

@@ -34,6 +34,9 @@ struct Arguments {
     /// Write the final state (final.vtu), and what the pipelines write, into this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Write the flow at the end of each step (pressure drop, mass in and out) and the seconds since the start, as a table
+    #[arg(long, value_name = "HISTORY.csv")]
+    history: Option<PathBuf>,
     /// Where viewers connect to, in place of what the pipelines say; port 0 takes any free one
     #[arg(long, value_name = "ADDRESS:PORT", conflicts_with = "headless")]
     listen: Option<SocketAddr>,
@@ -64,6 +67,7 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn std::error::Error>> {
         headless: arguments.headless,
         listen: arguments.listen,
         out: arguments.out,
+        history: arguments.history,
     })?;
     if let Some(link) = run.link() {
         let mut output = std::io::stdout();

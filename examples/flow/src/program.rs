@@ -14,6 +14,7 @@ use tombolo_pipelines::language::{self, Config, LanguageError, StreamServer, Tim
 
 use crate::SolverError;
 use crate::case::{Case, CaseError};
+use crate::history::History;
 use crate::report::{FlowReport, MeshReport, Report};
 use crate::solver::{Motion, Settings as SolverSettings, Solver};
 
@@ -34,6 +35,8 @@ pub struct Options {
     pub listen: Option<SocketAddr>,
     /// Where the final state is written, and what the pipelines write.
     pub out: Option<PathBuf>,
+    /// Where the flow is written step by step, as comma-separated values.
+    pub history: Option<PathBuf>,
 }
 
 /// Why a run could not be done, or ended early.
@@ -92,6 +95,7 @@ pub struct Run {
     parameters: Vec<f64>,
     worst: MeshReport,
     flow: FlowReport,
+    history: Option<History>,
 }
 
 impl Run {
@@ -131,6 +135,7 @@ impl Run {
             },
             points: mesh.points().to_vec(),
             flow: FlowReport::default(),
+            history: options.history.as_deref().map(History::create).transpose().map_err(unwritten)?,
             out: options.out.clone(),
             steps,
             case,
@@ -155,7 +160,7 @@ impl Run {
     /// [`ProgramError`] where a file cannot be written.
     pub fn finish(mut self) -> Result<Report, ProgramError> {
         let begun = Instant::now();
-        let error = match self.advance() {
+        let error = match self.advance(begun) {
             Ok(()) => None,
             Err(error @ ProgramError::Solver(_)) => Some(error.to_string()),
             Err(error) => return Err(error),
@@ -186,7 +191,7 @@ impl Run {
         })
     }
 
-    fn advance(&mut self) -> Result<(), ProgramError> {
+    fn advance(&mut self, begun: Instant) -> Result<(), ProgramError> {
         let time_step = self.case.time_step;
         let (mut velocity, mut pressure) = (self.solver.velocity(), self.solver.pressure());
         while self.steps.is_none_or(|steps| self.solver.cycle() < steps) {
@@ -227,6 +232,9 @@ impl Run {
             let motion = moved.then_some(Motion { points: &self.points });
             let outcome = self.solver.step(time_step, motion)?;
             self.flow.count(&outcome, &self.solver);
+            if let Some(history) = &mut self.history {
+                history.add(&self.solver, begun.elapsed().as_secs_f64()).map_err(unwritten)?;
+            }
             self.solver.velocity_into(&mut velocity);
             self.solver.pressure_into(&mut pressure);
         }
@@ -250,6 +258,10 @@ impl Run {
         let mesh = self.mesh.with_points(self.points.clone())?;
         Ok(files::write_mesh(file, &mesh, &[velocity, pressure], Compression::default())?)
     }
+}
+
+fn unwritten((file, source): (PathBuf, std::io::Error)) -> ProgramError {
+    ProgramError::File { file, source }
 }
 
 fn read(file: &Path) -> Result<Vec<u8>, ProgramError> {

@@ -6,7 +6,7 @@ use serde::Serialize;
 use tombolo::stream::StreamCounts;
 use tombolo::{OrderReport, Spread};
 
-use crate::Condition;
+use crate::history::Through;
 use crate::solver::{Solver, StepOutcome};
 
 /// The report of a run.
@@ -95,27 +95,11 @@ impl FlowReport {
         let steps = self.steps.max(1) as f64;
         self.momentum_iterations /= steps;
         self.pressure_iterations /= steps;
-        let (mut inlets, mut outlets) = ((0.0, 0.0), (0.0, 0.0));
         for (index, patch) in solver.patches().iter().enumerate() {
-            let flux = solver.flux(index);
-            let (pressure, area) = solver.mean_pressure(index);
-            self.fluxes.insert(patch.name.clone(), flux);
-            self.mean_pressures.insert(patch.name.clone(), pressure);
-            match patch.condition {
-                Condition::Velocity(_) => {
-                    self.mass_in -= flux;
-                    inlets = (inlets.0 + pressure * area, inlets.1 + area);
-                }
-                Condition::Pressure(_) => {
-                    self.mass_out += flux;
-                    outlets = (outlets.0 + pressure * area, outlets.1 + area);
-                }
-                Condition::NoSlip | Condition::Slip => {}
-            }
+            self.fluxes.insert(patch.name.clone(), solver.flux(index));
+            self.mean_pressures.insert(patch.name.clone(), solver.mean_pressure(index).0);
         }
-        if inlets.1 > 0.0 && outlets.1 > 0.0 {
-            self.pressure_drop = inlets.0 / inlets.1 - outlets.0 / outlets.1;
-        }
+        Through { mass_in: self.mass_in, mass_out: self.mass_out, pressure_drop: self.pressure_drop } = Through::now(solver);
         self.max_velocity = solver.max_velocity();
         self.courant = solver.courant(time_step);
     }

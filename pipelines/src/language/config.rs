@@ -9,7 +9,7 @@ use tombolo_deform::mesh::Vector;
 use tombolo_deform::quality::Guard;
 use tombolo_deform::schedule::{Every, Schedule};
 use tombolo_deform::surface::{Affine, Displacement, Edit, Rotate, ScaleDirection, ScaleNormals, Skeleton, Translate};
-use tombolo_deform::volume::Deform;
+use super::DeformStage;
 
 /// A whole configuration file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -230,7 +230,7 @@ pub enum Stage {
     /// Orders the edits of the stages before it.
     Order(OrderStage),
     /// How the motion of the surface is carried into the volume. Only with `"on": "order"`.
-    Deform(Deform),
+    Deform(DeformStage),
     /// What the mesh must keep to. Only with `"on": "order"`.
     Guard(Guard),
     /// In how many steps the shape is reached. Only with `"on": "order"`.
@@ -388,7 +388,7 @@ pub struct OrderStage {
     pub schedule: Option<Schedule>,
     /// How the motion of the surface is carried into the volume.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub deform: Option<Deform>,
+    pub deform: Option<DeformStage>,
     /// What the mesh must keep to.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub guard: Option<Guard>,

@@ -20,6 +20,7 @@
 
 mod beside;
 mod config;
+mod deform;
 mod error;
 mod order;
 mod parse;
@@ -32,8 +33,9 @@ pub use config::{
     Action, At, Config, Due, ErrorBound, OrderStage, Pipeline, Select, Slice, Stage, Statistics, Steering,
     StreamServer, StreamStage, Write,
 };
+pub use deform::DeformStage;
 pub use error::{LanguageError, Problem, nearest};
-pub use order::{Change, Command, JournalEntry, Order, OrderStatus, Parameter, TimedCommand, parse_orders};
+pub use order::{Change, Command, JournalEntry, Order, OrderStatus, Parameter, Question, TimedCommand, parse_orders};
 pub use parse::{Validate, parse_json, parse_valid, text};
 pub use validate::file_pattern;
 pub(crate) use validate::monitor_names;

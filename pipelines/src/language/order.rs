@@ -8,10 +8,9 @@ use serde::{Deserialize, Serialize};
 use tombolo_deform::quality::Guard;
 use tombolo_deform::schedule::Schedule;
 use tombolo_deform::surface::Edit;
-use tombolo_deform::volume::Deform;
 
 use super::parse::{Validate, parse_valid};
-use super::{At, LanguageError, Problem};
+use super::{At, DeformStage, LanguageError, Problem};
 
 /// An order of a new shape: what becomes of the stack of edits, and how the mesh gets there.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -22,7 +21,7 @@ pub struct Order {
     /// In how many steps the shape is reached; `None` is the configuration's.
     pub schedule: Option<Schedule>,
     /// How the motion of the surface is carried into the volume; `None` is the configuration's.
-    pub deform: Option<Deform>,
+    pub deform: Option<DeformStage>,
     /// What the mesh must keep to; `None` is the configuration's.
     pub guard: Option<Guard>,
 }
@@ -36,6 +35,14 @@ pub enum Change {
     Stack(Vec<Edit>),
     /// Takes this many of the last orders back.
     Undo(NonZeroU32),
+}
+
+impl Order {
+    /// Whether any of its edits drags the skeleton.
+    #[must_use]
+    pub fn drags_skeleton(&self) -> bool {
+        self.edits().iter().any(|edit| matches!(edit, Edit::Skeleton(_)))
+    }
 }
 
 impl From<Change> for Order {
@@ -64,7 +71,7 @@ struct OrderFields {
     schedule: Option<Schedule>,
     /// How the motion of the surface is carried into the volume.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    deform: Option<Deform>,
+    deform: Option<DeformStage>,
     /// What the mesh must keep to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     guard: Option<Guard>,
@@ -121,6 +128,14 @@ pub enum Command {
     Stop {},
     /// A parameter that the solver has declared gets a new value.
     Parameter(Parameter),
+}
+
+/// What a viewer can ask without steering.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Question {
+    /// What an order would come to, were it given now.
+    Forecast(Order),
 }
 
 /// A new value of a parameter.

@@ -5,12 +5,11 @@ use std::collections::HashSet;
 use tombolo_deform::quality::Guard;
 use tombolo_deform::schedule::Schedule;
 use tombolo_deform::surface::Edit;
-use tombolo_deform::volume::Deform;
 
 use super::config::{Action, Config, Due, ErrorBound, OrderStage, Pipeline, Stage, StreamStage, Write};
-use super::order::{Change, Command, Order, TimedCommand};
+use super::order::{Change, Command, Order, Question, TimedCommand};
 use super::parse::Validate;
-use super::{At, Problem, nearest};
+use super::{At, DeformStage, Problem, nearest};
 use crate::expression::Expression;
 
 impl Validate for Config {
@@ -176,7 +175,7 @@ impl State {
             Stage::Stream(stream) => self.stream(stream),
             Stage::Write(write) => self.write(write),
             Stage::Order(order) => self.order(order),
-            Stage::Deform(deform) => check_deform(deform),
+            Stage::Deform(deform) => deform.check(),
             Stage::Guard(guard) => check_guard(guard),
             _ => Ok(()),
         }
@@ -245,10 +244,6 @@ fn check_edit(edit: &Edit) -> Result<(), Problem> {
     })
 }
 
-fn check_deform(deform: &Deform) -> Result<(), Problem> {
-    deform.validate().map_err(|error| Problem::new(error.to_string()))
-}
-
 fn check_guard(guard: &Guard) -> Result<(), Problem> {
     if (0.0..=1.0).contains(&guard.min_scaled_jacobian) {
         return Ok(());
@@ -257,8 +252,8 @@ fn check_guard(guard: &Guard) -> Result<(), Problem> {
     Err(Problem::new(message).within("min_scaled_jacobian"))
 }
 
-fn check_settings(deform: Option<&Deform>, guard: Option<&Guard>, _: Option<&Schedule>) -> Result<(), Problem> {
-    deform.map_or(Ok(()), check_deform).map_err(|problem| problem.within("deform"))?;
+fn check_settings(deform: Option<&DeformStage>, guard: Option<&Guard>, _: Option<&Schedule>) -> Result<(), Problem> {
+    deform.map_or(Ok(()), DeformStage::check).map_err(|problem| problem.within("deform"))?;
     guard.map_or(Ok(()), check_guard).map_err(|problem| problem.within("guard"))
 }
 
@@ -336,6 +331,13 @@ impl Validate for Command {
             }
             Command::Pause {} | Command::Resume {} | Command::Stop {} => Ok(()),
         }
+    }
+}
+
+impl Validate for Question {
+    fn validate(&self) -> Result<(), Problem> {
+        let Question::Forecast(order) = self;
+        order.validate().map_err(|problem| problem.within("forecast"))
     }
 }
 

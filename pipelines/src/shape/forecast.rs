@@ -5,10 +5,11 @@ use tombolo_deform::{
     quality::{Change, Guard, Quality, change, quality},
     schedule::Schedule,
     surface::Edit,
-    volume::Deform,
 };
 
-use super::{Place, Refused, ShapeSeconds, Shaper};
+use crate::language::DeformStage;
+
+use super::{Place, Plan, ShapeSeconds, Shaper};
 
 /// Whether an order would be carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -33,6 +34,8 @@ pub struct Forecast {
     pub fraction: Option<f64>,
     /// The least scaled Jacobian on the way.
     pub min_scaled_jacobian: Option<f64>,
+    /// The longest way that a vertex of the surface would go, in units of the mesh.
+    pub largest_displacement: Option<f64>,
     /// In how many shapes it would be reached.
     pub shapes: u32,
     /// Sub-steps that its shape takes beyond one solve from the reference.
@@ -71,42 +74,60 @@ impl Shaper {
         stack: &[Edit],
         kept: usize,
         start: &Place,
-        deform: &Deform,
+        deform: &DeformStage,
         schedule: &Schedule,
         guard: &Guard,
     ) -> Forecast {
         match self.reach(stack, kept, start, deform, schedule, guard) {
-            Ok(plan) => {
-                let target = plan.target();
-                Forecast {
-                    outcome: if target.fraction < 1.0 { Outcome::Clamped } else { Outcome::Applied },
-                    reason: None,
-                    fraction: Some(target.fraction),
-                    min_scaled_jacobian: Some(plan.quality().min_scaled_jacobian),
-                    shapes: plan.shapes(),
-                    sub_steps: target.sub_steps,
-                    quality: Some(quality(self.mesh.cells(), plan.end())),
-                    change: Some(change(self.mesh.cells(), self.mesh.points(), plan.end())),
-                    seconds: plan.seconds(),
-                }
-            }
-            Err(refused) => Forecast::rejected(&refused),
+            Ok(plan) => self.outlook(&plan),
+            Err(refused) => Forecast::rejected(
+                refused.to_string(),
+                refused.feasible_fraction(),
+                refused.min_scaled_jacobian(),
+                self.spent(),
+            ),
+        }
+    }
+
+    /// What a plan comes to.
+    #[must_use]
+    pub fn outlook(&self, plan: &Plan) -> Forecast {
+        let target = plan.target();
+        Forecast {
+            outcome: if target.fraction < 1.0 { Outcome::Clamped } else { Outcome::Applied },
+            reason: None,
+            fraction: Some(target.fraction),
+            min_scaled_jacobian: Some(plan.quality().min_scaled_jacobian),
+            largest_displacement: Some(plan.largest_displacement()),
+            shapes: plan.shapes(),
+            sub_steps: target.sub_steps,
+            quality: Some(quality(self.mesh.cells(), plan.end())),
+            change: Some(change(self.mesh.cells(), self.mesh.points(), plan.end())),
+            seconds: plan.seconds(),
         }
     }
 }
 
 impl Forecast {
-    fn rejected(refused: &Refused) -> Self {
+    /// The forecast of an order that would be rejected; `fraction` of it would pass.
+    #[must_use]
+    pub fn rejected(
+        reason: String,
+        fraction: Option<f64>,
+        min_scaled_jacobian: Option<f64>,
+        seconds: ShapeSeconds,
+    ) -> Self {
         Self {
             outcome: Outcome::Rejected,
-            reason: Some(refused.to_string()),
-            fraction: refused.feasible_fraction(),
-            min_scaled_jacobian: refused.min_scaled_jacobian(),
+            reason: Some(reason),
+            fraction,
+            min_scaled_jacobian,
+            largest_displacement: None,
             shapes: 0,
             sub_steps: 0,
             quality: None,
             change: None,
-            seconds: ShapeSeconds::default(),
+            seconds,
         }
     }
 }

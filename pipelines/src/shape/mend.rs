@@ -6,10 +6,13 @@ use tombolo_deform::{
     mesh::Vector,
     quality::{Guard, Otherwise, Refusal, keeps},
     schedule::Schedule,
-    surface::{Advance, Edit, EditError, Editor, Surface},
-    volume::{BoundaryMotion, Deform, FollowError, Route, Untangler, follow},
+    surface::{Advance, Edit, Editor, Surface},
+    volume::{BoundaryMotion, FollowError, Route, Untangler, follow},
 };
 
+use crate::language::DeformStage;
+
+use super::carry::Carrier;
 use super::plan::{Place, Plan, travel};
 use super::{Refused, ShapeSeconds, Shaper, Stopwatch, Target, moved};
 
@@ -23,7 +26,7 @@ const FINE: f64 = 1.0 / 128.0;
 /// A shape and all that it is a function of.
 pub(super) struct Mended {
     stack: Vec<Edit>,
-    deform: Deform,
+    deform: DeformStage,
     guard: Guard,
     target: Target,
 }
@@ -31,6 +34,8 @@ pub(super) struct Mended {
 /// An edit evaluated on the reference surface, as it is for a shape of one solve.
 struct OnReference<'a> {
     editor: &'a mut Editor,
+    /// Where a part of the surface is let go: what says where it ends.
+    carrier: Option<Arc<Carrier>>,
     surface: Arc<Surface>,
     stack: Vec<Edit>,
     edit: Edit,
@@ -39,13 +44,13 @@ struct OnReference<'a> {
 }
 
 impl BoundaryMotion for OnReference<'_> {
-    type Error = EditError;
+    type Error = Refused;
 
-    fn at(&mut self, _: f64, to: f64, _: &[Vector]) -> Result<Vec<Vector>, EditError> {
+    fn at(&mut self, _: f64, to: f64, _: &[Vector]) -> Result<Vec<Vector>, Refused> {
         if let Some(last) = self.stack.last_mut() {
             *last = self.edit.scaled(to);
         }
-        let displacement = self.editor.displacement(&self.stack)?;
+        let displacement = displacement(self.editor, &self.stack, self.carrier.as_deref())?;
         Ok(match &self.ground {
             None => self.surface.points().iter().zip(&displacement).map(|(&point, &by)| moved(point, by)).collect(),
             Some((places, ground)) => places
@@ -69,9 +74,9 @@ struct OnShape<'a> {
 }
 
 impl BoundaryMotion for OnShape<'_> {
-    type Error = EditError;
+    type Error = Refused;
 
-    fn at(&mut self, from: f64, to: f64, shape: &[Vector]) -> Result<Vec<Vector>, EditError> {
+    fn at(&mut self, from: f64, to: f64, shape: &[Vector]) -> Result<Vec<Vector>, Refused> {
         let mut places = self.on_reference.at(from, to, shape)?;
         let vertices = self.on_reference.surface.vertices();
         let now: Vec<Vector> = vertices.iter().map(|&vertex| shape[vertex as usize]).collect();
@@ -81,6 +86,15 @@ impl BoundaryMotion for OnShape<'_> {
 
     fn folds(&self, shape: &[Vector], places: &[Vector]) -> bool {
         self.on_reference.folds(shape, places)
+    }
+}
+
+/// The displacement of the surface that a stack makes, with what is let go of it where it ends.
+fn displacement(editor: &mut Editor, stack: &[Edit], carrier: Option<&Carrier>) -> Result<Vec<Vector>, Refused> {
+    let surface = editor.displacement(stack)?;
+    match carrier {
+        Some(carrier) => Ok(carrier.settle(surface)?),
+        None => Ok(surface),
     }
 }
 
@@ -112,7 +126,7 @@ impl Shaper {
         stack: &[Edit],
         kept: usize,
         start: &Place,
-        deform: &Deform,
+        deform: &DeformStage,
         schedule: &Schedule,
         guard: &Guard,
     ) -> Result<Plan, Refused> {
@@ -148,7 +162,7 @@ impl Shaper {
 
     /// The shape of a stack: of one linear solve from the reference where the guard lets that through, else the shape of the
     /// edits below the last one, from which the last one is followed in sub-steps.
-    fn settled(&mut self, stack: &[Edit], deform: &Deform, guard: &Guard) -> Result<Target, Refused> {
+    fn settled(&mut self, stack: &[Edit], deform: &DeformStage, guard: &Guard) -> Result<Target, Refused> {
         let mut lower = stack.len();
         let mut target = loop {
             let known =
@@ -180,20 +194,21 @@ impl Shaper {
                 self.mended.remove(0);
             }
             let stack = stack[..=place].to_vec();
-            self.mended.push(Mended { stack, deform: *deform, guard: *guard, target: target.clone() });
+            self.mended.push(Mended { stack, deform: deform.clone(), guard: *guard, target: target.clone() });
         }
         Ok(target)
     }
 
     /// The shape of a stack whose edits below the last one make the shape `base`.
-    fn followed(&mut self, stack: &[Edit], base: Target, deform: &Deform, guard: &Guard) -> Result<Target, Refused> {
+    fn followed(&mut self, stack: &[Edit], base: Target, deform: &DeformStage, guard: &Guard) -> Result<Target, Refused> {
         let Some((edit, below)) = stack.split_last().filter(|(edit, _)| !edit.muted()) else { return Ok(base) };
         let watch = Stopwatch::start();
         let untangler = Arc::clone(
             self.untangler.get_or_insert_with(|| Arc::new(Untangler::new(&self.mesh, self.surface.vertices()))),
         );
         let places: Vec<Vector> = self.surface.vertices().iter().map(|&vertex| base.points[vertex as usize]).collect();
-        let ground = self.editor.displacement(below)?;
+        let carrier = if deform.lets_go() { Some(self.operator(deform)?) } else { None };
+        let ground = displacement(&mut self.editor, below, carrier.as_deref())?;
         let as_stated = self
             .surface
             .points()
@@ -203,19 +218,21 @@ impl Shaper {
             .all(|((&point, &by), place)| moved(point, by) == *place);
         let mut motion = OnReference {
             editor: &mut self.editor,
+            carrier,
             surface: Arc::clone(&self.surface),
             stack: stack.to_vec(),
             edit: edit.clone(),
             ground: (!as_stated).then_some((places, ground)),
         };
         let vertices = self.surface.vertices();
-        let mut route = follow(&self.mesh, vertices, &base.points, &mut motion, deform, guard, Some(&untangler));
+        let mut route = follow(&self.mesh, vertices, &base.points, &mut motion, &deform.equation, guard, Some(&untangler));
         // No volume can follow a surface that folds or shrinks to nothing: it is asked for in another way.
         if matches!(route, Err(FollowError::Stalled(_)))
+            && !deform.lets_go()
             && let Some(advance) = Advance::new(&motion.surface, edit, stack.len() - 1)?
         {
             let mut motion = OnShape { on_reference: motion, advance };
-            let second = follow(&self.mesh, vertices, &base.points, &mut motion, deform, guard, Some(&untangler));
+            let second = follow(&self.mesh, vertices, &base.points, &mut motion, &deform.equation, guard, Some(&untangler));
             if further(&second) > further(&route) {
                 route = second;
             }
@@ -232,7 +249,7 @@ impl Shaper {
         stack: &[Edit],
         kept: usize,
         start: &Place,
-        deform: &Deform,
+        deform: &DeformStage,
         schedule: &Schedule,
         guard: &Guard,
     ) -> Result<Plan, Refused> {
@@ -288,9 +305,9 @@ fn further<E>(route: &Result<Route, FollowError<E>>) -> f64 {
     }
 }
 
-fn refused(error: FollowError<EditError>, edit: usize, what: &Edit) -> Refused {
+fn refused(error: FollowError<Refused>, edit: usize, what: &Edit) -> Refused {
     match error {
-        FollowError::Boundary(error) => error.into(),
+        FollowError::Boundary(error) => error,
         FollowError::Volume(error) => error.into(),
         FollowError::Stalled(stalled) => Refused::Stalled {
             edit,

@@ -13,7 +13,7 @@ use tombolo::{
     pipelines::{
         files::{Compression, read_displacements, read_mesh, write_displacement, write_mesh},
         language::{Change, Order, parse_valid, place_beside},
-        shape::{Refused, Shaper},
+        shape::{Forecast, Outcome as Expected, Place, Refused, Shaper},
     },
 };
 
@@ -28,8 +28,11 @@ pub(crate) struct Options {
     #[arg(long, value_name = "EDITS.json")]
     edits: PathBuf,
     /// The file to write: .vtu, or .vtp for a surface
-    #[arg(long, value_name = "OUT.vtu")]
-    out: PathBuf,
+    #[arg(long, value_name = "OUT.vtu", required_unless_present = "forecast")]
+    out: Option<PathBuf>,
+    /// Say what the edits would come to, and write nothing; it succeeds also where they would be rejected
+    #[arg(long, conflicts_with_all = ["out", "displacement"])]
+    forecast: bool,
     /// Also write what each surface vertex was moved by: .txt, .csv or .vtp; an edit `displacement` reads it again
     #[arg(long, value_name = "OUT.txt")]
     displacement: Option<PathBuf>,
@@ -118,17 +121,23 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
         seconds,
     };
     let mut deform = order.deform.unwrap_or_default();
-    deform.method = match options.method {
-        None => deform.method,
+    let equation = &mut deform.equation;
+    equation.method = match options.method {
+        None => equation.method,
         Some(VolumeMethod::Elasticity) => Method::Elasticity,
         Some(VolumeMethod::Harmonic) => Method::Harmonic,
     };
-    deform.stiffening = options.stiffening.unwrap_or(deform.stiffening);
+    equation.stiffening = options.stiffening.unwrap_or(equation.stiffening);
     let mut guard = order.guard.unwrap_or_default();
     guard.min_scaled_jacobian = options.min_quality.unwrap_or(guard.min_scaled_jacobian);
     let mut schedule = order.schedule.unwrap_or_default();
     schedule.steps = options.steps.unwrap_or(schedule.steps);
 
+    if options.forecast {
+        let here = Place::from(Arc::clone(shaper.reference()));
+        let forecast = shaper.forecast(&edits, 0, &here, &deform, &schedule, &guard);
+        return if options.json { json(&forecast) } else { foretell(&forecast, &outcome.before) };
+    }
     let plan = shaper.plan(&edits, Arc::clone(shaper.reference()), &deform, &schedule, &guard);
     let spent = shaper.spent();
     (outcome.seconds.surface, outcome.seconds.volume, outcome.seconds.guard) =
@@ -156,7 +165,9 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
     let after = quality(shaped.cells(), shaped.points());
     outcome.inverted = Some(after.inverted);
     outcome.after = Some(after);
-    timed(&mut outcome.seconds.write, || write_mesh(&options.out, &shaped, &mesh_file.fields, Compression::None))?;
+    if let Some(out) = &options.out {
+        timed(&mut outcome.seconds.write, || write_mesh(out, &shaped, &mesh_file.fields, Compression::None))?;
+    }
     if let Some(file) = &options.displacement {
         let displacement = if target.fraction < 1.0 {
             // Clamped: what was reached, and not what was asked for.
@@ -201,10 +212,35 @@ fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
     done
 }
 
+fn line(quality: &Quality) -> String {
+    format!("least {:.4}, mean {:.4}, {} inverted", quality.min, quality.mean, quality.inverted)
+}
+
+fn foretell(forecast: &Forecast, before: &Quality) -> Result<(), Failure> {
+    match (forecast.outcome, &forecast.reason) {
+        (Expected::Rejected, reason) => {
+            say(format_args!("would be rejected: {}", reason.as_deref().unwrap_or("no reason given")))?;
+            if let Some(fraction) = forecast.fraction {
+                say(format_args!("{:.2} % of the amounts would pass", 100.0 * fraction))?;
+            }
+        }
+        (Expected::Clamped, _) => {
+            let fraction = forecast.fraction.unwrap_or_default();
+            say(format_args!("would be clamped to {:.2} % of the edits' amounts", 100.0 * fraction))?;
+        }
+        (Expected::Applied, _) => say(format_args!("would be applied"))?,
+    }
+    say(format_args!("scaled Jacobian before: {}", line(before)))?;
+    if let Some(quality) = &forecast.quality {
+        say(format_args!("scaled Jacobian after:  {}", line(quality)))?;
+    }
+    match forecast.min_scaled_jacobian {
+        Some(least) => say(format_args!("scaled Jacobian on the way: least {least:.4}")),
+        None => Ok(()),
+    }
+}
+
 fn tell(outcome: &Outcome, options: &Options) -> Result<(), Failure> {
-    let line = |quality: &Quality| {
-        format!("least {:.4}, mean {:.4}, {} inverted", quality.min, quality.mean, quality.inverted)
-    };
     say(format_args!("{} vertices, {} cells", outcome.vertices, outcome.cells))?;
     say(format_args!("scaled Jacobian before: {}", line(&outcome.before)))?;
     if let Some(fraction) = outcome.fraction.filter(|fraction| *fraction < 1.0) {
@@ -225,6 +261,6 @@ fn tell(outcome: &Outcome, options: &Options) -> Result<(), Failure> {
         "seconds: read {read:.3}, features {features:.3}, surface {surface:.3}, volume {volume:.3}, guard {guard:.3}, \
          write {write:.3}"
     ))?;
-    say(format_args!("wrote {}", options.out.display()))?;
-    options.displacement.as_ref().map_or(Ok(()), |file| say(format_args!("wrote {}", file.display())))
+    let written = options.out.iter().chain(&options.displacement);
+    written.into_iter().try_for_each(|file| say(format_args!("wrote {}", file.display())))
 }

@@ -1,0 +1,43 @@
+//! What an order would give, for a viewer that asks while the solver keeps stepping.
+
+use std::sync::{Arc, Mutex};
+
+use tombolo_pipelines::{
+    language::Order,
+    shape::{Forecast, Place},
+};
+
+use super::{
+    Defaults, EditStack,
+    planner::Rejection,
+    worker::{Jobs, lock},
+};
+
+/// The shape that the mesh has now, as those see it who are not the solver's thread.
+#[derive(Debug, Clone)]
+pub(super) struct Present {
+    pub(super) stack: EditStack,
+    pub(super) place: Place,
+}
+
+/// Asks the worker without going through the solver's thread, so that an answer does not wait for the end of a step.
+pub(crate) struct Forecaster {
+    pub(super) defaults: Defaults,
+    pub(super) present: Arc<Mutex<Present>>,
+    pub(super) jobs: Arc<Jobs>,
+}
+
+impl Forecaster {
+    /// Has `answer` called with what `order` would come to, were it given now. What the same `asker` asked for before and was
+    /// not told yet is forgotten: its answer never comes.
+    pub(crate) fn ask(&self, asker: u64, order: &Order, answer: impl FnOnce(Forecast) + Send + 'static) {
+        let Present { stack, place } = lock(&self.present).clone();
+        match self.defaults.wish(&stack, place, order) {
+            Ok((_, wish)) => self.jobs.forecast(asker, wish, Box::new(answer)),
+            Err(error) => {
+                let Rejection { reason, seconds, .. } = Rejection::from(error);
+                answer(Forecast::rejected(reason, None, None, seconds));
+            }
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! What is asked of the kernel, and what it answered last.
+
+use std::{collections::VecDeque, sync::Arc};
+
+use tombolo_deform::{
+    quality::{Guard, Otherwise},
+    schedule::Schedule,
+    surface::Edit,
+};
+use tombolo_pipelines::{
+    language::DeformStage,
+    shape::{Forecast, Place, Plan, Refused, ShapeSeconds, Shaper},
+};
+
+/// Plans that are remembered: that of a forecast and that of the next order of a file.
+const REMEMBERED: usize = 2;
+
+/// What a plan is made from.
+#[derive(Debug, Clone)]
+pub(crate) struct Wish {
+    pub(crate) stack: Vec<Edit>,
+    /// How many of them the present shape has already.
+    pub(crate) kept: usize,
+    pub(crate) start: Place,
+    pub(crate) deform: DeformStage,
+    pub(crate) schedule: Schedule,
+    pub(crate) guard: Guard,
+}
+
+impl Wish {
+    /// Whether both ask for the same shape, wherever they start.
+    fn ends_like(&self, other: &Self) -> bool {
+        self.stack == other.stack
+            && self.kept == other.kept
+            && self.deform == other.deform
+            && self.guard == other.guard
+    }
+
+    pub(crate) fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.start.points, &other.start.points)
+            && self.schedule == other.schedule
+            && self.ends_like(other)
+    }
+}
+
+/// Why an order is not carried out, and what it took to find out.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Rejection {
+    pub(crate) reason: String,
+    /// What the way would have come down to, where the guard did not let it through.
+    pub(crate) min_scaled_jacobian: Option<f64>,
+    /// What fraction would have passed.
+    pub(crate) fraction: Option<f64>,
+    pub(crate) seconds: ShapeSeconds,
+}
+
+impl<T: ToString> From<T> for Rejection {
+    fn from(reason: T) -> Self {
+        Self { reason: reason.to_string(), min_scaled_jacobian: None, fraction: None, seconds: ShapeSeconds::default() }
+    }
+}
+
+/// The kernel, and the plans that it has made last: what a forecast or a look ahead has found serves the order itself.
+pub(crate) struct Planner {
+    shaper: Shaper,
+    known: VecDeque<(Wish, Result<Plan, Rejection>)>,
+}
+
+impl Planner {
+    pub(crate) fn new(shaper: Shaper) -> Self {
+        Self { shaper, known: VecDeque::new() }
+    }
+
+    pub(crate) fn shaper(&self) -> &Shaper {
+        &self.shaper
+    }
+
+    /// The plan for a wish. Whether it was made now or before, it is the same bits.
+    pub(crate) fn plan(&mut self, wish: &Wish) -> Result<Plan, Rejection> {
+        if let Some((_, plan)) = self.known.iter().find(|(known, _)| known.is(wish)) {
+            return plan.clone();
+        }
+        // How far a clamped shape goes depends on where it is reached from.
+        let same_end = |(known, plan): &&(Wish, Result<Plan, Rejection>)| {
+            plan.is_ok() && known.ends_like(wish) && wish.guard.otherwise != Otherwise::Clamp
+        };
+        let target = match self.known.iter().find(same_end) {
+            Some((_, Ok(plan))) => Some(plan.target().clone()),
+            _ => None,
+        };
+        let Wish { stack, kept, start, deform, schedule, guard } = wish;
+        let shaper = &mut self.shaper;
+        let plan = match target {
+            Some(target) => caught(|| shaper.go(start, &target, schedule, guard)),
+            None => caught(|| shaper.reach(stack, *kept, start, deform, schedule, guard)),
+        };
+        let plan = plan.map_err(|rejection| Rejection { seconds: self.shaper.spent(), ..rejection });
+        if self.known.len() >= REMEMBERED {
+            self.known.pop_front();
+        }
+        self.known.push_back((wish.clone(), plan.clone()));
+        plan
+    }
+
+    /// What a wish would come to.
+    pub(crate) fn forecast(&mut self, wish: &Wish) -> Forecast {
+        match self.plan(wish) {
+            Ok(plan) => self.shaper.outlook(&plan),
+            Err(Rejection { reason, min_scaled_jacobian, fraction, seconds }) => {
+                Forecast::rejected(reason, fraction, min_scaled_jacobian, seconds)
+            }
+        }
+    }
+
+    /// From the shape `start` on to where a plan leads that was made from another.
+    pub(crate) fn go(&mut self, start: &Place, plan: &Plan, guard: &Guard) -> Result<Plan, Rejection> {
+        caught(|| self.shaper.go(start, plan.target(), plan.asked(), guard))
+    }
+
+    /// Sets the operator of the volume up. One that cannot be made is reported by the order that needs it.
+    pub(crate) fn prepare(&mut self, deform: &DeformStage) {
+        let _ = caught(|| self.shaper.prepare(deform));
+    }
+}
+
+/// Runs a piece of the kernel so that a fault in it rejects one order instead of ending the solver. A panic leaves at worst a
+/// cache without its entry.
+fn caught<T>(attempt: impl FnOnce() -> Result<T, Refused>) -> Result<T, Rejection> {
+    match std::panic::catch_unwind(std::panic::AssertUnwindSafe(attempt)) {
+        Ok(result) => result.map_err(|refused| Rejection {
+            min_scaled_jacobian: refused.min_scaled_jacobian(),
+            fraction: refused.feasible_fraction(),
+            ..Rejection::from(&refused)
+        }),
+        Err(panic) => {
+            let message = panic
+                .downcast_ref::<&str>()
+                .map(|text| (*text).to_owned())
+                .or_else(|| panic.downcast_ref::<String>().cloned())
+                .unwrap_or_else(|| "no reason given".into());
+            Err(Rejection::from(format!("the geometry kernel failed, which is a defect of it: {message}")))
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! The flow step by step, as a table.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use crate::Condition;
+use crate::solver::Solver;
+
+/// What flows through the domain, and the pressure that it takes.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Through {
+    /// Volume per time that flows in where the velocity is prescribed.
+    pub mass_in: f64,
+    /// Volume per time that flows out where the pressure is prescribed.
+    pub mass_out: f64,
+    /// Mean pressure where the velocity is prescribed less that where the pressure is; 0 where one of them is nowhere.
+    pub pressure_drop: f64,
+}
+
+impl Through {
+    /// As it is now.
+    #[must_use]
+    pub fn now(solver: &Solver) -> Self {
+        let mut through = Self::default();
+        let (mut inlets, mut outlets) = ((0.0, 0.0), (0.0, 0.0));
+        for (index, patch) in solver.patches().iter().enumerate() {
+            let flux = solver.flux(index);
+            let (pressure, area) = solver.mean_pressure(index);
+            match patch.condition {
+                Condition::Velocity(_) => {
+                    through.mass_in -= flux;
+                    inlets = (inlets.0 + pressure * area, inlets.1 + area);
+                }
+                Condition::Pressure(_) => {
+                    through.mass_out += flux;
+                    outlets = (outlets.0 + pressure * area, outlets.1 + area);
+                }
+                Condition::NoSlip | Condition::Slip => {}
+            }
+        }
+        if inlets.1 > 0.0 && outlets.1 > 0.0 {
+            through.pressure_drop = inlets.0 / inlets.1 - outlets.0 / outlets.1;
+        }
+        through
+    }
+}
+
+/// A file of comma-separated values that gets one line for each step.
+#[derive(Debug)]
+pub(crate) struct History {
+    file: PathBuf,
+    lines: BufWriter<File>,
+}
+
+impl History {
+    /// Creates the file, with the names of its columns: the state at the end of each step, and the seconds since the run began.
+    pub(crate) fn create(file: &Path) -> Result<Self, (PathBuf, std::io::Error)> {
+        let failed = |error| (file.to_owned(), error);
+        let mut lines = BufWriter::new(File::create(file).map_err(failed)?);
+        writeln!(lines, "cycle,time,pressure_drop,mass_in,mass_out,seconds").map_err(failed)?;
+        Ok(Self { file: file.into(), lines })
+    }
+
+    /// Adds the state as it is now.
+    pub(crate) fn add(&mut self, solver: &Solver, seconds: f64) -> Result<(), (PathBuf, std::io::Error)> {
+        let Through { mass_in, mass_out, pressure_drop } = Through::now(solver);
+        let (cycle, time) = (solver.cycle(), solver.time());
+        writeln!(self.lines, "{cycle},{time},{pressure_drop},{mass_in},{mass_out},{seconds:.6}")
+            // A run may be watched through it, and may be ended by force.
+            .and_then(|()| self.lines.flush())
+            .map_err(|error| (self.file.clone(), error))
+    }
+}

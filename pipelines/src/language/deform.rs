@@ -1,0 +1,118 @@
+//! How the volume follows, as it is said in JSON.
+
+use std::borrow::Cow;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::{Deserialize, Serialize};
+use tombolo_deform::volume::{Deform, Method};
+
+use super::Problem;
+
+/// How the motion of the surface is carried into the volume: the equation, and the features whose vertices are not taken along as
+/// they are.
+///
+/// Of the other features every vertex gets the displacement that the edits make.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(from = "Fields", into = "Fields")]
+pub struct DeformStage {
+    /// The equation, and how it is solved.
+    pub equation: Deform,
+    /// Features whose vertices slide along their surface.
+    pub sliding: Vec<String>,
+    /// Features whose vertices follow the volume.
+    pub free: Vec<String>,
+}
+
+impl From<Deform> for DeformStage {
+    /// Every feature gets the displacement that the edits make.
+    fn from(equation: Deform) -> Self {
+        Self { equation, ..Self::default() }
+    }
+}
+
+impl DeformStage {
+    /// Whether any feature slides or is free.
+    #[must_use]
+    pub fn lets_go(&self) -> bool {
+        !(self.sliding.is_empty() && self.free.is_empty())
+    }
+
+    /// What is wrong with it whatever the mesh.
+    pub(super) fn check(&self) -> Result<(), Problem> {
+        self.equation.validate().map_err(|error| Problem::new(error.to_string()))?;
+        for (key, names) in [("sliding", &self.sliding), ("free", &self.free)] {
+            for (index, name) in names.iter().enumerate() {
+                if names[..index].contains(name) {
+                    return Err(Problem::new("found the same feature twice").at(index).within(key));
+                }
+            }
+        }
+        match self.free.iter().position(|name| self.sliding.contains(name)) {
+            Some(index) => {
+                let message = format!("found `{}`, which is among `sliding` too", self.free[index]);
+                Err(Problem::new(message).at(index).within("free"))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// How the motion of the surface is carried into the volume.
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(rename = "Deform")]
+struct Fields {
+    /// The equation that is solved for the displacement.
+    method: Method,
+    /// How much stiffer small cells are than large ones: the stiffness of a cell is (mean volume / volume) to this power.
+    /// 0 is a uniform material; 1 keeps thin boundary layers in shape; 0.5 is what the paper used. 0 to 4.
+    #[schemars(range(min = 0.0, max = 4.0))]
+    stiffening: f64,
+    /// Poisson's ratio of the elastic material: how far it resists a change of volume. Above -1 and below 0.5; for
+    /// `elasticity` only.
+    #[schemars(extend("exclusiveMinimum" = -1.0, "exclusiveMaximum" = 0.5))]
+    poisson_ratio: f64,
+    /// The relative residual at which the iterative solve stops. Above 0, at most 0.1.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 0.1))]
+    tolerance: f64,
+    /// Features whose vertices slide along their surface as it lies in the reference mesh: of the displacement that the edits
+    /// make only the part across it is prescribed, and along it the vertices go where the volume takes them. Where such a
+    /// feature meets one that is in neither list, its rim gets the whole displacement; where two of them meet, vertices slide
+    /// along their edge. Exact on flat features; on curved ones a vertex leaves the surface by about the square of how far
+    /// it slides over twice the radius.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    sliding: Vec<String>,
+    /// Features whose vertices follow the volume without force, whatever the edits make of them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    free: Vec<String>,
+}
+
+impl Default for Fields {
+    fn default() -> Self {
+        DeformStage::default().into()
+    }
+}
+
+impl From<Fields> for DeformStage {
+    fn from(fields: Fields) -> Self {
+        let Fields { method, stiffening, poisson_ratio, tolerance, sliding, free } = fields;
+        Self { equation: Deform { method, stiffening, poisson_ratio, tolerance }, sliding, free }
+    }
+}
+
+impl From<DeformStage> for Fields {
+    fn from(stage: DeformStage) -> Self {
+        let Deform { method, stiffening, poisson_ratio, tolerance } = stage.equation;
+        Self { method, stiffening, poisson_ratio, tolerance, sliding: stage.sliding, free: stage.free }
+    }
+}
+
+impl JsonSchema for DeformStage {
+    fn schema_name() -> Cow<'static, str> {
+        Fields::schema_name()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        Fields::json_schema(generator)
+    }
+}
