@@ -105,6 +105,43 @@ fn a_viewer_sees_the_run_and_changes_its_shape() {
 }
 
 #[test]
+fn a_forecast_is_told_while_the_solver_is_busy_and_changes_nothing() {
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    solver.step();
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    // Nothing steps the solver here: the answers come from the worker.
+    viewer.send(&json!({"id": "f1", "forecast": squeeze(0.3)}));
+    let told = viewer.wait_for("forecast", |forecast| forecast["id"] == "f1");
+    assert_eq!(told["order"]["outcome"], "applied", "{told}");
+    assert_eq!(told["order"]["quality"]["inverted"], 0);
+    viewer.send(&json!({"id": "f2", "forecast": squeeze(1.5)}));
+    let refused = viewer.wait_for("forecast", |forecast| forecast["id"] == "f2");
+    assert_eq!(refused["order"]["outcome"], "rejected");
+    assert!(refused["order"]["fraction"].as_f64().is_some_and(|fraction| fraction < 0.7), "{refused}");
+    viewer.send(&json!({"id": "f3", "forecast": {"undo": 1}}));
+    let nothing = viewer.wait_for("forecast", |forecast| forecast["id"] == "f3");
+    assert!(nothing["order"]["reason"].as_str().is_some_and(|reason| reason.contains("undo")), "{nothing}");
+    viewer.send(&json!({"id": "f4", "forecast": {"edits": []}}));
+    assert!(viewer.wait_for("error", |error| error["id"] == "f4")["message"].as_str().is_some());
+    solver.step();
+    assert!(solver.is_at_reference());
+
+    viewer.send(&json!({"id": "squeeze", "order": squeeze(0.3)}));
+    let applied = solver.step_until_told(&mut viewer, "order", |order| order["status"] == "applied");
+    for key in ["min_scaled_jacobian", "largest_displacement", "shapes"] {
+        assert_eq!(applied[key], told["order"][key], "{key}");
+    }
+    let mut other = Solver::new(Settings {
+        orders: parse_orders(&json!([{"order": squeeze(0.3)}]).to_string(), "orders.json").expect("orders"),
+        ..Settings::default()
+    });
+    other.step();
+    assert_eq!(bits(&solver.mesh), bits(&other.mesh));
+    assert_eq!(solver.finish().orders.len(), 1);
+}
+
+#[test]
 fn what_a_viewer_gets_wrong_is_told_and_changes_nothing() {
     let mut solver = Solver::with_config(LINK_TO_ALL);
     solver.step();

@@ -3,6 +3,7 @@
  * a copy; the numbers of `views` and `featureBounds` are those of the newest frame.
  */
 import type { ConnectionState } from "./connection";
+import type { ForecastInspection } from "./forecast";
 import type { OrderRecord } from "./orders";
 import type { QualitySummary, Role, Status, Vector } from "./protocol";
 
@@ -41,6 +42,8 @@ export interface Inspection {
   readonly selection: { handle: string[]; fixed: string[] };
   /** The preview that is drawn, or why there is none. */
   readonly preview: PreviewInspection;
+  /** What the order in the form would come to, as the simulation told it. */
+  readonly forecast: ForecastInspection;
   /** What went wrong, newest last: frames or messages that could not be read. */
   readonly errors: readonly string[];
   /** The box around a feature as it is now; null when no view shows it. */

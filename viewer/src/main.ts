@@ -5,6 +5,7 @@ import { Decoder } from "./decoder";
 import { watchDrags } from "./drag";
 import type { DecodeWorker } from "./decoder";
 import { part, write } from "./dom";
+import { Forecasts } from "./forecast";
 import { EditForm } from "./form";
 import { showLayers } from "./layers";
 import { publish } from "./inspection";
@@ -30,6 +31,7 @@ let frames = 0;
 let sequence = 0;
 let everConnected = false;
 let fresh = false;
+let stack = "";
 let noticed = 0;
 const errors: string[] = [];
 const session = Array.from(crypto.getRandomValues(new Uint8Array(4)), (byte) => byte.toString(16).padStart(2, "0")).join("");
@@ -58,6 +60,33 @@ const preview = new PreviewPanel(scene, addresses.surface, () => {
   const { edits } = form.read();
   return Array.isArray(edits) ? edits : [];
 });
+
+const forecasts = new Forecasts(
+  (order) => (hello?.role === "driver" && connection.state === "connected" && status?.stopped !== true ? ask({ forecast: order }) : null),
+  (tone, text) => {
+    const notice = part("forecast");
+    notice.hidden = text === "";
+    notice.dataset.tone = tone;
+    write(notice, text);
+  },
+);
+
+/** The order in the form, once it asks for anything. */
+function wished(): Json | null {
+  if (preview.inspect().state === "none") return null;
+  try {
+    return form.read();
+  } catch (error) {
+    if (!(error instanceof InputError)) throw error;
+    return null;
+  }
+}
+
+/** What stands in the form is another order. */
+function composed(): void {
+  preview.changed();
+  forecasts.changed(wished());
+}
 
 const worker = new Worker(new URL("./decode.worker.ts", import.meta.url), { type: "module" });
 const decoder = new Decoder(worker as unknown as DecodeWorker, takeFrame, report);
@@ -90,10 +119,11 @@ function takeMessage(message: ServerMessage): void {
       if (hello) bar.role(hello, status.driver);
       return refresh();
     case "order": return orders.update(message.body);
+    case "forecast": return forecasts.answer(message.body, status?.quality ?? null);
     case "monitor": return monitors.update(message.body);
     case "error": {
       const { id, message: text } = message.body;
-      if (!(id && orders.refused(id, text))) showProblem(text);
+      if (!(id && (orders.refused(id, text) || forecasts.refused(id, text)))) showProblem(text);
     }
   }
 }
@@ -111,7 +141,10 @@ function takeHello(body: Hello): void {
   colours.set(body.fields);
   form.setSchema(body.schemas.order, body.defaults);
   form.setFeatures(body.features);
+  const moved = JSON.stringify(body.stack) !== stack;
+  stack = JSON.stringify(body.stack);
   preview.set(body.surface ?? null, body.stack);
+  if (moved) forecasts.outdated(wished());
   parameters.set(body.parameters, body.role === "driver");
   orders.reconcile(body.orders, fresh && everConnected);
   fresh = false;
@@ -170,9 +203,15 @@ function showProblem(text: string): void {
   problem.hidden = text === "";
 }
 
-function send(message: ClientMessage): string | null {
+/** Sends a message, and says under what name; null where there is no connection. */
+function ask(message: ClientMessage): string | null {
   const id = `${session}-${++sequence}`;
-  if (connection.send({ id, ...message })) return id;
+  return connection.send({ id, ...message }) ? id : null;
+}
+
+function send(message: ClientMessage): string | null {
+  const id = ask(message);
+  if (id) return id;
   showProblem("There is no connection to the simulation; nothing was sent.");
   return null;
 }
@@ -188,6 +227,7 @@ part("edit").addEventListener("submit", (event) => {
   try {
     sendOrder(form.read());
     preview.clear();
+    forecasts.clear();
   } catch (error) {
     if (!(error instanceof InputError)) throw error;
     showProblem(error.message);
@@ -223,13 +263,19 @@ part("tools").addEventListener("click", (event) => {
 part("edit").addEventListener("input", () => {
   // What was wrong when Apply was pressed may be mended now.
   showProblem("");
-  preview.changed();
+  composed();
 });
-part("edit").addEventListener("change", () => preview.changed());
-part("cancel").addEventListener("click", () => preview.clear());
-selection.onChange(() => preview.chosen());
+part("edit").addEventListener("change", composed);
+part("cancel").addEventListener("click", () => {
+  preview.clear();
+  forecasts.clear();
+});
+selection.onChange(() => {
+  preview.chosen();
+  forecasts.changed(wished());
+});
 watchDrags(part("stage"), scene, selection, (by) => {
-  if (form.compose("translate", { by })) preview.changed();
+  if (form.compose("translate", { by })) composed();
 });
 
 publish({
@@ -253,6 +299,7 @@ publish({
     return { handle: selection.chosen("handle", names), fixed: selection.chosen("fixed", names) };
   },
   get preview() { return preview.inspect(); },
+  get forecast() { return forecasts.inspect(); },
   get errors() { return [...errors]; },
   featureBounds: (name) => scene.featureBounds(name),
   featurePlace: (name) => scene.featurePlace(name),

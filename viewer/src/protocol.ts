@@ -74,6 +74,22 @@ export interface OrderStatus {
   added_steps?: number | null;
 }
 
+/** What an order would come to, for the viewer that asked. */
+export interface ForecastAnswer {
+  id?: string | null;
+  order: {
+    outcome: "applied" | "clamped" | "rejected";
+    reason?: string | null;
+    fraction?: number | null;
+    min_scaled_jacobian?: number | null;
+    largest_displacement?: number | null;
+    shapes?: number | null;
+    sub_steps?: number | null;
+    quality?: QualitySummary | null;
+    seconds?: { surface?: number; volume?: number; guard?: number } | null;
+  };
+}
+
 export interface Monitor { pipeline: string; cycle: number; values: Record<string, number> }
 export interface ServerError { message: string; id?: string | null }
 
@@ -81,11 +97,12 @@ export type ServerMessage =
   | { kind: "hello"; body: Hello }
   | { kind: "status"; body: Status }
   | { kind: "order"; body: OrderStatus }
+  | { kind: "forecast"; body: ForecastAnswer }
   | { kind: "monitor"; body: Monitor }
   | { kind: "error"; body: ServerError };
 
 export type ClientMessage = { id?: string } & (
-  | { order: Json } | { pause: object } | { resume: object } | { stop: object }
+  | { order: Json } | { forecast: Json } | { pause: object } | { resume: object } | { stop: object }
   | { parameter: { name: string; value: number } } | { drive: object }
 );
 
@@ -143,10 +160,11 @@ export function parseServerMessage(text: string): ServerMessage {
     throw new ProtocolError("a text message that is not JSON");
   }
   if (!isObject(parsed)) throw new ProtocolError("a text message that is not a JSON object");
-  for (const kind of ["hello", "status", "order", "monitor", "error"] as const) {
+  for (const kind of ["hello", "status", "order", "forecast", "monitor", "error"] as const) {
     const body: unknown = parsed[kind];
     if (body === undefined) continue;
     if (!isObject(body)) throw new ProtocolError(`the message "${kind}" is not an object`);
+    if (kind === "forecast" && !isObject(body.order)) throw new ProtocolError('the message "forecast" has no order');
     return { kind, body: kind === "hello" ? completeHello(body) : body } as unknown as ServerMessage;
   }
   throw new ProtocolError(`an unknown message: ${Object.keys(parsed).slice(0, 3).join(", ") || "{}"}`);

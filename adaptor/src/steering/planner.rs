@@ -142,3 +142,46 @@ fn caught<T>(attempt: impl FnOnce() -> Result<T, Refused>) -> Result<T, Rejectio
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use tombolo_deform::{
+        quality::Guard,
+        shapes::box_of_tets,
+        surface::{FeatureSettings, Surface},
+    };
+
+    use super::*;
+
+    #[test]
+    fn what_was_planned_before_is_not_planned_again() {
+        let mesh = Arc::new(box_of_tets([3, 3, 3], [0.0; 3], [1.0; 3]));
+        let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).unwrap());
+        let mut planner = Planner::new(Shaper::new(mesh, surface).unwrap());
+        let reference = Place::from(Arc::clone(planner.shaper().reference()));
+        let wish = |by: f64| Wish {
+            stack: serde_json::from_value(serde_json::json!([
+                {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, by]}}
+            ]))
+            .unwrap(),
+            kept: 0,
+            start: reference.clone(),
+            deform: DeformStage::default(),
+            schedule: Schedule::default(),
+            guard: Guard::default(),
+        };
+        let forecast = planner.forecast(&wish(-0.2));
+        let plan = planner.plan(&wish(-0.2)).unwrap();
+        assert_eq!(planner.known.len(), 1);
+        assert_eq!(forecast.min_scaled_jacobian, Some(plan.quality().min_scaled_jacobian));
+        // From elsewhere: the same end by a way of its own.
+        let aside = planner.plan(&wish(0.1)).unwrap();
+        let from_there = Wish { start: aside.place(1, Arc::clone(aside.end())), ..wish(-0.2) };
+        let again = planner.plan(&from_there).unwrap();
+        assert!(Arc::ptr_eq(again.end(), plan.end()) && Arc::ptr_eq(again.start(), aside.end()));
+        let mut fresh = Planner::new(Shaper::new(Arc::clone(planner.shaper.mesh()), Arc::clone(planner.shaper.surface())).unwrap());
+        assert_eq!(*fresh.plan(&from_there).unwrap().way(), *again.way());
+        assert!(planner.plan(&wish(-3.0)).is_err());
+        assert_eq!(planner.known.len(), REMEMBERED);
+    }
+}

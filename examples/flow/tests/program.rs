@@ -171,3 +171,63 @@ fn every_case_that_comes_with_the_program_is_well_formed() {
         .unwrap_or_else(|error| panic!("{error}"));
     }
 }
+
+/// A uniform stream through a box whose walls let it pass, and pipelines that stop the run at the first step at which it is not one.
+#[test]
+fn a_uniform_stream_stays_uniform_through_any_schedule() {
+    const STREAM: &str = r#"{
+      "mesh": "channel.vtu", "density": 1.0, "viscosity": 0.01,
+      "boundary": {
+        "x-min": { "velocity": [0.9, 0.3, -0.2] }, "x-max": { "pressure": 0 },
+        "y-min": { "velocity": [0.9, 0.3, -0.2] }, "y-max": { "velocity": [0.9, 0.3, -0.2] },
+        "z-min": { "velocity": [0.9, 0.3, -0.2] }, "z-max": { "velocity": [0.9, 0.3, -0.2] }
+      },
+      "initial": { "velocity": [0.9, 0.3, -0.2] }, "time_step": 0.05, "steps": 16, "pipelines": "watch.json" }"#;
+    const WATCH: &str = r#"{ "version": 1, "pipelines": [
+      { "name": "stream", "stages": [ { "statistics": { "field": "velocity" } }, { "statistics": { "field": "pressure" } } ],
+        "when": "velocity.min < 0.969535971483 || velocity.max > 0.969535971484 || pressure.min < -1e-10 || pressure.max > 1e-10",
+        "then": [ { "stop": {} } ] } ] }"#;
+    const EDITS: &str = r#"[ { "translate": { "features": ["y-max"], "fixed": ["y-min"], "by": [0.1, -0.3, 0.05] } },
+                             { "scale_direction": { "features": ["x-min"], "fixed": ["y-min"], "factors": [1, 1, 1.3] } } ]"#;
+    const FURTHER: &str = r#"[ { "translate": { "features": ["z-max"], "fixed": ["z-min"], "by": [0.2, 0, 0.3] } } ]"#;
+    let schedules = [
+        r#"{ "steps": 1 }"#,
+        r#"{ "steps": 5, "every": { "steps": 2 } }"#,
+        r#"{ "steps": 8, "ease": "smooth" }"#,
+        r#"{ "steps": 6, "every": { "time": 0.05 } }"#,
+        r#"{ "steps": 3, "every": { "time": 0.13 }, "ease": "smooth" }"#,
+    ];
+    let first = |schedule: &str| format!(r#"{{ "at": {{ "cycle": 1 }}, "order": {{ "edits": {EDITS}, "schedule": {schedule} }} }}"#);
+    let then = |change: &str, schedule: &str| format!(r#"{{ "at": {{ "cycle": 5 }}, "order": {{ {change}, "schedule": {schedule} }} }}"#);
+    let mut runs: Vec<(String, usize)> = schedules.iter().map(|schedule| (format!("[{}]", first(schedule)), 1)).collect();
+    // In the midst of one schedule another begins: more edits, or those of the first taken back.
+    for (under_way, next) in [(schedules[1], schedules[2]), (schedules[2], schedules[4]), (schedules[4], schedules[0])] {
+        for change in [format!(r#""edits": {FURTHER}"#), r#""undo": 1"#.to_owned()] {
+            runs.push((format!("[{}, {}]", first(under_way), then(&change, next)), 2));
+        }
+    }
+    let (folder, case) = folder(STREAM);
+    std::fs::write(folder.path().join("watch.json"), WATCH).unwrap();
+    let orders = folder.path().join("orders.json");
+    for (text, count) in runs {
+        std::fs::write(&orders, &text).unwrap();
+        let report = run(&Options {
+            orders: Some(orders.clone()),
+            out: Some(folder.path().into()),
+            history: Some(folder.path().join("history.csv")),
+            ..headless(&case)
+        });
+        assert_eq!((report.cycles, report.error.as_deref()), (16, None), "not uniform any more: {text}");
+        let json = serde_json::to_value(&report.orders).unwrap();
+        let orders = json.as_array().unwrap();
+        assert!(orders.len() == count && orders.iter().all(|order| order["status"] == "applied"), "{json:#}");
+        let end = files::read_mesh(folder.path().join("final.vtu")).unwrap();
+        assert_eq!(report.mesh.inverted, 0);
+        let velocity = end.fields.iter().find(|field| field.name == "velocity").unwrap();
+        let worst = velocity.values.chunks(3).flat_map(|u| [u[0] - 0.9, u[1] - 0.3, u[2] + 0.2]).fold(0.0, |a: f64, b| a.max(b.abs()));
+        assert!(worst < 1e-12, "{worst}: {text}");
+        let table = std::fs::read_to_string(folder.path().join("history.csv")).unwrap();
+        let lines: Vec<&str> = table.lines().collect();
+        assert!(lines.len() == 17 && lines[0].starts_with("cycle,time,pressure_drop,") && lines[16].starts_with("16,0.8"), "{table}");
+    }
+}
