@@ -270,6 +270,11 @@ impl Adaptor {
             let begun = Instant::now();
             self.take_reference(step, channels)?;
             self.timing.reference.add(begun.elapsed());
+            if let Some(hub) = self.hub.as_ref().filter(|_| self.config.steering.wait_for_viewer) {
+                let begun = Instant::now();
+                hub.wait_for_viewer();
+                self.timing.paused.add(begun.elapsed());
+            }
         }
         if self.pipelines.is_due(moment) {
             let begun = Instant::now();

@@ -15,7 +15,7 @@ use tombolo::{
     Adaptor, InitializeError, OrderStatus, Parameter, Settings,
     pipelines::{
         encode::{Decoded, decode},
-        language::parse_orders,
+        language::{self, parse_orders},
     },
     stream::StreamError,
 };
@@ -72,6 +72,7 @@ fn a_viewer_sees_the_run_and_changes_its_shape() {
     assert!(applied["cycle_applied"].is_u64() && applied["min_scaled_jacobian"].as_f64() > Some(0.02));
     assert!(solver.mesh.points().contains(&[0.0, 0.0, 0.7]), "the lid has come down");
     let stack = viewer.wait_for("hello", |hello| hello["stack"] != json!([]));
+    assert_eq!(stack["orders"][0]["order"]["edits"], squeeze(0.3)["edits"]);
     assert_eq!(stack["stack"][0]["translate"]["features"], json!(["z-max"]));
 
     viewer.send(&json!({"parameter": {"name": "inflow", "value": 2.0}}));
@@ -301,6 +302,26 @@ fn a_paused_solver_waits_and_still_listens() {
     viewer.send(&json!({"stop": {}}));
     solver.step_until("the stop", |solver| solver.stopped);
     assert!(solver.finish().adaptor_seconds["paused"].count >= 1);
+}
+
+#[test]
+fn a_solver_may_wait_for_its_first_viewer() {
+    let waiting = LINK_TO_ALL.replace(r#""pipelines""#, r#""steering": {"wait_for_viewer": true}, "pipelines""#);
+    let mut solver = Solver::with_config(&waiting);
+    let address = socket_url(&solver.adaptor);
+    let late = std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_millis(300));
+        Viewer::try_connect(&address).expect("connected")
+    });
+    let begun = Instant::now();
+    solver.step();
+    assert!(begun.elapsed() > Duration::from_millis(250), "it did not wait");
+    let mut viewer = late.join().expect("a viewer");
+    viewer.hello();
+    drop(viewer);
+    solver.steps(3);
+    let alone = language::parse(r#"{"version": 1, "steering": {"wait_for_viewer": true}}"#, "alone.json");
+    assert!(alone.unwrap_err().to_string().contains("wait_for_viewer"));
 }
 
 #[test]

@@ -35,7 +35,7 @@ export class Orders {
 
   update(status: OrderStatus): void {
     const known = this.records.get(status.id);
-    const record: OrderRecord = { ...known, ...status, text: known?.text ?? `order ${status.id}`, sentAt: known?.sentAt ?? null };
+    const record: OrderRecord = { ...known, ...status, text: known?.text ?? (status.order === undefined ? `order ${status.id}` : describeOrder(status.order)), sentAt: known?.sentAt ?? null };
     this.put(record);
     if (known?.status !== record.status && (record.status === "applied" || record.status === "rejected")) {
       this.announce(`Order ${record.text}: ${record.status}${record.reason ? `, ${record.reason}` : ""}`);

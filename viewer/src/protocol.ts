@@ -64,6 +64,8 @@ export type OrderState = "accepted" | "computing" | "applying" | "applied" | "re
 export interface OrderStatus {
   id: string;
   status: OrderState;
+  /** What was asked for; told when it comes in, and in `hello`. */
+  order?: Json;
   reason?: string | null;
   cycle_applied?: number | null;
   shape?: number | null;

@@ -199,6 +199,11 @@ export function startFakeServer({ port = 0, token = "0123456789abcdef0123456789a
         if (message.drive) { driver = client; return greet(); }
         if (driver !== client) return viewer.send(JSON.stringify({ error: { id: message.id, message: "only the driver steers; this viewer watches" } }));
         if (message.order) take(message.id, message.order);
+        if (message.forecast) {
+          const quality = { min: 0.214 * scale, mean: 0.7, inverted: 0 };
+          const order = { outcome: "applied", reason: null, fraction: 1, min_scaled_jacobian: quality.min, shapes: 10, quality, seconds: { surface: 0.041, volume: 0.52, guard: 0.067 } };
+          setTimeout(() => viewer.send(JSON.stringify({ forecast: { id: message.id, order } })), 300);
+        }
         if (message.pause) paused = true;
         if (message.resume) paused = false;
         if (message.parameter) {

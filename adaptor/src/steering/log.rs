@@ -20,6 +20,8 @@ use crate::{
 
 /// Orders that a viewer is told of when it connects.
 const ORDERS_TOLD: usize = 100;
+/// Bytes of JSON up to which an order itself is told too; a longer one holds the numbers of a displacement.
+const TOLD_WHOLE: usize = 16 << 10;
 
 /// Who gave a command.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -42,6 +44,8 @@ pub(crate) struct Moment {
 #[derive(Default)]
 struct State {
     orders: VecDeque<OrderReport>,
+    /// The newest orders as they were given, by their names.
+    given: VecDeque<(String, Value)>,
     /// Names of the other commands, so that none is given twice.
     others: VecDeque<String>,
     counted: u64,
@@ -81,7 +85,14 @@ impl Log {
                 Some(id) => id,
                 None => state.next_id(),
             };
-            if matches!(command, Command::Order(_)) {
+            if let Command::Order(order) = command {
+                if state.given.len() >= ORDERS_TOLD {
+                    state.given.pop_front();
+                }
+                let given = json!(order);
+                if given.to_string().len() <= TOLD_WHOLE {
+                    state.given.push_back((id.clone(), given));
+                }
                 if state.orders.len() >= ORDERS_KEPT {
                     state.orders.pop_front();
                 }
@@ -178,8 +189,11 @@ impl Log {
 
     fn tell(&self, id: &str) {
         let Some(hub) = &self.hub else { return };
-        if let Some(order) = self.lock().orders.iter().rev().find(|order| order.id == id) {
-            hub.tell(&json!({ "order": order }));
+        let state = self.lock();
+        if let Some(order) = state.orders.iter().rev().find(|order| order.id == id) {
+            // What it asks for is told once: to those who are there when it comes in, and to others when they come.
+            let told = if order.status == OrderStatus::Accepted { state.told(order) } else { json!(order) };
+            hub.tell(&json!({ "order": told }));
         }
     }
 
@@ -187,7 +201,7 @@ impl Log {
     pub(crate) fn told(&self) -> Value {
         let state = self.lock();
         let skipped = state.orders.len().saturating_sub(ORDERS_TOLD);
-        json!(state.orders.iter().skip(skipped).collect::<Vec<_>>())
+        state.orders.iter().skip(skipped).map(|order| state.told(order)).collect()
     }
 
     pub(crate) fn reports(&self) -> Vec<OrderReport> {
@@ -196,6 +210,15 @@ impl Log {
 }
 
 impl State {
+    /// An order's report, with what was asked for.
+    fn told(&self, order: &OrderReport) -> Value {
+        let mut told = json!(order);
+        if let Some((_, given)) = self.given.iter().rev().find(|(id, _)| *id == order.id) {
+            told["order"] = given.clone();
+        }
+        told
+    }
+
     fn has(&self, id: &str) -> bool {
         self.orders.iter().any(|order| order.id == id) || self.others.iter().any(|other| other == id)
     }

@@ -30,16 +30,11 @@ pub(crate) struct Wish {
 impl Wish {
     /// Whether both ask for the same shape, wherever they start.
     fn ends_like(&self, other: &Self) -> bool {
-        self.stack == other.stack
-            && self.kept == other.kept
-            && self.deform == other.deform
-            && self.guard == other.guard
+        self.stack == other.stack && self.kept == other.kept && self.deform == other.deform && self.guard == other.guard
     }
 
     pub(crate) fn is(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.start.points, &other.start.points)
-            && self.schedule == other.schedule
-            && self.ends_like(other)
+        Arc::ptr_eq(&self.start.points, &other.start.points) && self.schedule == other.schedule && self.ends_like(other)
     }
 }
 
@@ -179,7 +174,8 @@ mod tests {
         let from_there = Wish { start: aside.place(1, Arc::clone(aside.end())), ..wish(-0.2) };
         let again = planner.plan(&from_there).unwrap();
         assert!(Arc::ptr_eq(again.end(), plan.end()) && Arc::ptr_eq(again.start(), aside.end()));
-        let mut fresh = Planner::new(Shaper::new(Arc::clone(planner.shaper.mesh()), Arc::clone(planner.shaper.surface())).unwrap());
+        let mut fresh =
+            Planner::new(Shaper::new(Arc::clone(planner.shaper.mesh()), Arc::clone(planner.shaper.surface())).unwrap());
         assert_eq!(*fresh.plan(&from_there).unwrap().way(), *again.way());
         assert!(planner.plan(&wish(-3.0)).is_err());
         assert_eq!(planner.known.len(), REMEMBERED);

@@ -22,6 +22,8 @@ use super::{ReferenceSurface, StreamCounts};
 pub(super) const WHEEL_KEPT: Duration = Duration::from_secs(3);
 /// Texts that may wait for a viewer; one that leaves more unread is let go.
 const TEXTS: usize = 1024;
+/// How often it is looked for a viewer that is waited for.
+const LOOK_AGAIN: Duration = Duration::from_millis(20);
 /// Monitor values that may wait for a viewer; older ones make way.
 const MONITORS: usize = 256;
 
@@ -187,6 +189,13 @@ impl Hub {
         let mut state = lock(&self.state);
         state.conditions = conditions;
         state.status_dirty = true;
+    }
+
+    /// Returns once a viewer is connected.
+    pub(crate) fn wait_for_viewer(&self) {
+        while lock(&self.state).clients.is_empty() {
+            std::thread::sleep(LOOK_AGAIN);
+        }
     }
 
     /// Tells every viewer, one after the other, and drops none of it.

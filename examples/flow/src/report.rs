@@ -99,7 +99,8 @@ impl FlowReport {
             self.fluxes.insert(patch.name.clone(), solver.flux(index));
             self.mean_pressures.insert(patch.name.clone(), solver.mean_pressure(index).0);
         }
-        Through { mass_in: self.mass_in, mass_out: self.mass_out, pressure_drop: self.pressure_drop } = Through::now(solver);
+        Through { mass_in: self.mass_in, mass_out: self.mass_out, pressure_drop: self.pressure_drop } =
+            Through::now(solver);
         self.max_velocity = solver.max_velocity();
         self.courant = solver.courant(time_step);
     }

@@ -197,11 +197,17 @@ fn a_uniform_stream_stays_uniform_through_any_schedule() {
         r#"{ "steps": 6, "every": { "time": 0.05 } }"#,
         r#"{ "steps": 3, "every": { "time": 0.13 }, "ease": "smooth" }"#,
     ];
-    let first = |schedule: &str| format!(r#"{{ "at": {{ "cycle": 1 }}, "order": {{ "edits": {EDITS}, "schedule": {schedule} }} }}"#);
-    let then = |change: &str, schedule: &str| format!(r#"{{ "at": {{ "cycle": 5 }}, "order": {{ {change}, "schedule": {schedule} }} }}"#);
-    let mut runs: Vec<(String, usize)> = schedules.iter().map(|schedule| (format!("[{}]", first(schedule)), 1)).collect();
+    let first = |schedule: &str| {
+        format!(r#"{{ "at": {{ "cycle": 1 }}, "order": {{ "edits": {EDITS}, "schedule": {schedule} }} }}"#)
+    };
+    let then = |change: &str, schedule: &str| {
+        format!(r#"{{ "at": {{ "cycle": 5 }}, "order": {{ {change}, "schedule": {schedule} }} }}"#)
+    };
+    let mut runs: Vec<(String, usize)> =
+        schedules.iter().map(|schedule| (format!("[{}]", first(schedule)), 1)).collect();
     // In the midst of one schedule another begins: more edits, or those of the first taken back.
-    for (under_way, next) in [(schedules[1], schedules[2]), (schedules[2], schedules[4]), (schedules[4], schedules[0])] {
+    for (under_way, next) in [(schedules[1], schedules[2]), (schedules[2], schedules[4]), (schedules[4], schedules[0])]
+    {
         for change in [format!(r#""edits": {FURTHER}"#), r#""undo": 1"#.to_owned()] {
             runs.push((format!("[{}, {}]", first(under_way), then(&change, next)), 2));
         }
@@ -224,10 +230,17 @@ fn a_uniform_stream_stays_uniform_through_any_schedule() {
         let end = files::read_mesh(folder.path().join("final.vtu")).unwrap();
         assert_eq!(report.mesh.inverted, 0);
         let velocity = end.fields.iter().find(|field| field.name == "velocity").unwrap();
-        let worst = velocity.values.chunks(3).flat_map(|u| [u[0] - 0.9, u[1] - 0.3, u[2] + 0.2]).fold(0.0, |a: f64, b| a.max(b.abs()));
+        let worst = velocity
+            .values
+            .chunks(3)
+            .flat_map(|u| [u[0] - 0.9, u[1] - 0.3, u[2] + 0.2])
+            .fold(0.0, |a: f64, b| a.max(b.abs()));
         assert!(worst < 1e-12, "{worst}: {text}");
         let table = std::fs::read_to_string(folder.path().join("history.csv")).unwrap();
         let lines: Vec<&str> = table.lines().collect();
-        assert!(lines.len() == 17 && lines[0].starts_with("cycle,time,pressure_drop,") && lines[16].starts_with("16,0.8"), "{table}");
+        assert!(
+            lines.len() == 17 && lines[0].starts_with("cycle,time,pressure_drop,") && lines[16].starts_with("16,0.8"),
+            "{table}"
+        );
     }
 }

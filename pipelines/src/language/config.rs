@@ -3,13 +3,13 @@
 use std::borrow::Cow;
 use std::net::SocketAddr;
 
+use super::DeformStage;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 use tombolo_deform::mesh::Vector;
 use tombolo_deform::quality::Guard;
 use tombolo_deform::schedule::{Every, Schedule};
 use tombolo_deform::surface::{Affine, Displacement, Edit, Rotate, ScaleDirection, ScaleNormals, Skeleton, Translate};
-use super::DeformStage;
 
 /// A whole configuration file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -58,11 +58,13 @@ pub struct Steering {
     /// Whether the solver keeps stepping while a new shape is computed. The motion then starts at the first step after it is
     /// ready, so that the cycle depends on the machine's speed; otherwise the solver waits and the cycle is that of the order.
     pub background: bool,
+    /// Whether the solver waits before its first step until a viewer has connected. Needs `stream`.
+    pub wait_for_viewer: bool,
 }
 
 impl Default for Steering {
     fn default() -> Self {
-        Self { background: true }
+        Self { background: true, wait_for_viewer: false }
     }
 }
 

@@ -27,6 +27,10 @@ impl Validate for Config {
                 return Err(Problem::new(message).within("token").within("stream"));
             }
         }
+        if self.steering.wait_for_viewer && self.stream.is_none() {
+            let message = "there is no `stream`, so that no viewer could connect";
+            return Err(Problem::new(message).within("wait_for_viewer").within("steering"));
+        }
         if self.journal.as_deref() == Some("") {
             return Err(Problem::new("expected the name of a file").within("journal"));
         }

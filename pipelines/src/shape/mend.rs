@@ -200,7 +200,13 @@ impl Shaper {
     }
 
     /// The shape of a stack whose edits below the last one make the shape `base`.
-    fn followed(&mut self, stack: &[Edit], base: Target, deform: &DeformStage, guard: &Guard) -> Result<Target, Refused> {
+    fn followed(
+        &mut self,
+        stack: &[Edit],
+        base: Target,
+        deform: &DeformStage,
+        guard: &Guard,
+    ) -> Result<Target, Refused> {
         let Some((edit, below)) = stack.split_last().filter(|(edit, _)| !edit.muted()) else { return Ok(base) };
         let watch = Stopwatch::start();
         let untangler = Arc::clone(
@@ -225,14 +231,16 @@ impl Shaper {
             ground: (!as_stated).then_some((places, ground)),
         };
         let vertices = self.surface.vertices();
-        let mut route = follow(&self.mesh, vertices, &base.points, &mut motion, &deform.equation, guard, Some(&untangler));
+        let mut route =
+            follow(&self.mesh, vertices, &base.points, &mut motion, &deform.equation, guard, Some(&untangler));
         // No volume can follow a surface that folds or shrinks to nothing: it is asked for in another way.
         if matches!(route, Err(FollowError::Stalled(_)))
             && !deform.lets_go()
             && let Some(advance) = Advance::new(&motion.surface, edit, stack.len() - 1)?
         {
             let mut motion = OnShape { on_reference: motion, advance };
-            let second = follow(&self.mesh, vertices, &base.points, &mut motion, &deform.equation, guard, Some(&untangler));
+            let second =
+                follow(&self.mesh, vertices, &base.points, &mut motion, &deform.equation, guard, Some(&untangler));
             if further(&second) > further(&route) {
                 route = second;
             }

@@ -64,8 +64,11 @@ pub(in super::super) fn from_mesh(
                     cells.push(cell_type, vertices)?;
                 }
                 numbers.extend(tags);
-                let by_face = owners_of_faces(mesh.cells());
-                owners.extend(tagged.faces.iter().map(|(_, face)| by_face.get(&sorted(face)).copied()));
+                // Only element fields ask whose a face is.
+                if fields.iter().any(|field| field.association == Association::Element) {
+                    let by_face = owners_of_faces(mesh.cells());
+                    owners.extend(tagged.faces.iter().map(|(_, face)| by_face.get(&sorted(face)).copied()));
+                }
             } else {
                 // The faces are the cells themselves; any other face has no place in such a mesh.
                 let by_face: HashMap<Vec<u32>, i64> =

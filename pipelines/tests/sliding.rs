@@ -1,0 +1,105 @@
+//! Features that slide along their surface, or follow the volume.
+
+use std::sync::Arc;
+
+use serde_json::{Value, json};
+use tombolo_deform::{
+    mesh::Mesh,
+    quality::{Guard, Otherwise, quality},
+    schedule::Schedule,
+    shapes::{box_of_hexahedra, box_of_tets},
+    surface::{Edit, FeatureSettings, Surface},
+};
+use tombolo_pipelines::{
+    language::{DeformStage, Order, parse_valid},
+    shape::{Plan, Refused, Shaper},
+};
+
+const SIDES: [&str; 4] = ["x-min", "x-max", "y-min", "y-max"];
+
+fn shaper(mesh: Mesh) -> Shaper {
+    let mesh = Arc::new(mesh);
+    let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).unwrap());
+    Shaper::new(mesh, surface).unwrap()
+}
+
+fn lowered(by: f64) -> Vec<Edit> {
+    serde_json::from_value(json!([
+        {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -by], "harmonic_order": 2}}
+    ]))
+    .unwrap()
+}
+
+fn plan(shaper: &mut Shaper, edits: &[Edit], deform: Value, guard: &Guard) -> Result<Plan, Refused> {
+    let deform: DeformStage = serde_json::from_value(deform).unwrap();
+    let here = Arc::clone(shaper.reference());
+    shaper.plan(edits, here, &deform, &Schedule::default(), guard)
+}
+
+/// Between sides that let it slide, a block is compressed evenly, however the edit would bend the sides; so it can be pressed
+/// further than where the surface of the edit itself folds.
+#[test]
+fn a_block_between_sliding_sides_is_pressed_evenly() {
+    for mesh in
+        [box_of_tets([3, 3, 6], [0.0; 3], [1.0, 1.0, 2.0]), box_of_hexahedra([3, 3, 6], [0.0; 3], [1.0, 1.0, 2.0])]
+    {
+        let mut shaper = shaper(mesh);
+        let edits = lowered(1.6);
+        let refused = plan(&mut shaper, &edits, json!({}), &Guard::default());
+        assert!(matches!(refused, Err(Refused::Surface(_))), "{refused:?}");
+        for method in ["elasticity", "harmonic"] {
+            let sliding = json!({"method": method, "sliding": SIDES, "tolerance": 1e-12});
+            let plan = plan(&mut shaper, &edits, sliding, &Guard::default()).unwrap();
+            for (point, reference) in plan.end().iter().zip(shaper.mesh().points()) {
+                let expected = [reference[0], reference[1], 0.2 * reference[2]];
+                let off = (0..3).map(|axis| (point[axis] - expected[axis]).abs()).fold(0.0, f64::max);
+                assert!(off < 1e-9, "{method}: {reference:?} came to {point:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn free_features_follow_and_are_judged_as_any_other() {
+    let mut shaper = shaper(box_of_tets([4, 4, 8], [0.0; 3], [1.0, 1.0, 2.0]));
+    let turned: Vec<Edit> = serde_json::from_value(json!([
+        {"rotate": {"features": ["z-max"], "fixed": ["z-min"], "origin": [0.5, 0.5, 2], "axis": [0, 0, 1], "degrees": 150}}
+    ]))
+    .unwrap();
+    let free = json!({"free": SIDES});
+    let refused = plan(&mut shaper, &turned, free.clone(), &Guard::default()).unwrap_err();
+    assert!(refused.feasible_fraction().is_some_and(|fraction| (0.1..0.9).contains(&fraction)), "{refused}");
+    let guard = Guard { otherwise: Otherwise::Untangle, ..Guard::default() };
+    let plan = plan(&mut shaper, &turned, free, &guard).unwrap();
+    let after = quality(shaper.mesh().cells(), plan.end());
+    assert!(after.inverted == 0 && after.min >= guard.min_scaled_jacobian, "{after:?}");
+    let surface = Arc::clone(shaper.surface());
+    let top = surface.features().index("z-max").unwrap();
+    let told = shaper.editor().displacement(&turned).unwrap();
+    let off = |vertex: u32| {
+        let at = surface.vertices()[vertex as usize] as usize;
+        let (end, start) = (plan.end()[at], surface.points()[vertex as usize]);
+        (0..3).map(|axis| (end[axis] - start[axis] - told[vertex as usize][axis]).abs()).fold(0.0, f64::max)
+    };
+    assert!(surface.features().vertices(top).iter().all(|&vertex| off(vertex) < 1e-12));
+    assert!((0..told.len() as u32).any(|vertex| off(vertex) > 0.01));
+}
+
+#[test]
+fn what_cannot_let_go_is_told_by_name() {
+    let mut shaper = shaper(box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]));
+    let refused = plan(&mut shaper, &lowered(0.1), json!({"sliding": ["x_min"]}), &Guard::default()).unwrap_err();
+    assert!(refused.to_string().starts_with("deform.sliding: there is no feature 'x_min'; did you mean"), "{refused}");
+    let all = ["x-min", "x-max", "y-min", "y-max", "z-min", "z-max"];
+    let refused = plan(&mut shaper, &lowered(0.1), json!({"free": all}), &Guard::default()).unwrap_err();
+    assert!(matches!(refused, Refused::Volume(_)), "{refused}");
+    for (deform, named) in [
+        (r#"{"sliding": ["a", "a"]}"#, "sliding[1]"),
+        (r#"{"sliding": ["a"], "free": ["b", "a"]}"#, "free[1]"),
+        (r#"{"slidng": ["a"]}"#, "slidng"),
+    ] {
+        let order = format!(r#"{{"undo": 1, "deform": {deform}}}"#);
+        let error = parse_valid::<Order>(&order, "order").unwrap_err().to_string();
+        assert!(error.contains(named), "{error}");
+    }
+}
