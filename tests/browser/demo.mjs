@@ -92,7 +92,8 @@ page.on("console", (message) => {
 });
 /** What the page has sent, and how often it has asked for the reference surface. */
 const traffic = { messages: 0, surfaces: 0, requests: 0 };
-page.on("websocket", (socket) => socket.on("framesent", () => { traffic.messages++; }));
+// Forecasts are questions: they change nothing.
+page.on("websocket", (socket) => socket.on("framesent", ({ payload }) => { traffic.messages += String(payload).includes('"forecast"') ? 0 : 1; }));
 page.on("request", (request) => {
   traffic.requests++;
   if (new URL(request.url()).pathname === "/surface") traffic.surfaces++;
@@ -101,8 +102,8 @@ page.on("request", (request) => {
 });
 
 const look = () => page.evaluate(() => {
-  const { connection, role, cycle, frames, orders, status, quality, stack, selection, preview, errors, views } = window.tombolo;
-  return { connection, role, cycle, frames, orders, status, quality, stack, selection, preview, errors, views };
+  const { connection, role, cycle, frames, orders, status, quality, stack, selection, preview, forecast, errors, views } = window.tombolo;
+  return { connection, role, cycle, frames, orders, status, quality, stack, selection, preview, forecast, errors, views };
 });
 const extent = () => page.evaluate((name) => {
   const box = window.tombolo.featureBounds(name);
@@ -233,6 +234,14 @@ const steps = [
     }
     check(traffic.messages === messages, `${traffic.messages - messages} messages were sent for previews`);
     check(traffic.surfaces === 1, `the reference surface was asked for ${traffic.surfaces} times`);
+    const { forecast } = await until("the forecast", ({ forecast: now }) => {
+      check(now.state !== "failed", `there is no forecast: ${now.reason}`);
+      return now.state === "told";
+    }, 60000);
+    check(forecast.outcome === "applied" && forecast.inverted === 0 && forecast.min > 0, `the forecast is ${JSON.stringify(forecast)}`);
+    const foretold = await page.locator("#forecast").innerText();
+    check(/least quality 0\.\d+.*0 inverted/.test(foretold), `the form says "${foretold}"`);
+    console.log(`    ${foretold}`);
     const text = await page.locator("#preview").innerText();
     check(/moves the surface by up to/.test(text), `the form says "${text}"`);
     const late = (list) => list.slice(1).sort((a, b) => a - b).at(-1).toFixed(0);
