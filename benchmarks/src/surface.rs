@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use serde_json::json;
 use tombolo::deform::mesh::Vector;
-use tombolo::deform::surface::{Edit, Editor, FeatureSettings, Surface};
+use tombolo::deform::surface::{Edit, Editor, FeatureSettings, Surface, check};
 use tombolo::pipelines::files::read_mesh;
 
 use crate::measure::middle;
@@ -37,7 +37,9 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
             let ours = measure(&surface, order)?;
             let peer = libigl(project, &surface, &ours, order, peer_runs)?;
             let case = |what: &str| format!("{name}, order {order}, {what}");
-            for (what, seconds) in [("cold", ours.cold), ("cold, libigl", peer.0), ("drag", ours.drag)] {
+            let rows =
+                [("cold", ours.cold), ("cold, libigl", peer.0), ("drag", ours.drag), ("surface check", ours.check)];
+            for (what, seconds) in rows {
                 report.rows.push(Row { case: case(what), seconds, steps: None });
             }
             let mut at_most = |what: &str, value: f64, most: f64| {
@@ -61,6 +63,8 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
 struct Ours {
     cold: f64,
     drag: f64,
+    /// What looking at the surface that it leads to takes.
+    check: f64,
     forward_error: f64,
     displacement: Vec<Vector>,
 }
@@ -84,8 +88,21 @@ fn measure(surface: &Arc<Surface>, order: usize) -> Result<Ours, Box<dyn Error>>
         editor.displacement_into(&stack, &mut moved)?;
         drag.push(start.elapsed().as_secs_f64());
     }
+    let points = surface.points();
+    let shape: Vec<Vector> = points
+        .iter()
+        .zip(&displacement)
+        .map(|(point, by)| std::array::from_fn(|axis| point[axis] + by[axis]))
+        .collect();
+    let mut looked = Vec::new();
+    for _ in 0..RUNS {
+        let start = Instant::now();
+        std::hint::black_box(check(surface, points, &shape));
+        looked.push(start.elapsed().as_secs_f64());
+    }
     let forward_error = editor.forward_error(&stack(order, 0)?)?;
-    Ok(Ours { cold: middle(&mut cold), drag: middle(&mut drag), forward_error, displacement })
+    let [cold, drag, check] = [cold, drag, looked].map(|mut seconds| middle(&mut seconds));
+    Ok(Ours { cold, drag, check, forward_error, displacement })
 }
 
 fn stack(order: usize, drag: usize) -> Result<Vec<Edit>, serde_json::Error> {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::handle::Handle;
+use super::handle::{Handle, Role};
 use super::{Edit, EditError, Editor};
 use crate::vector::subtract;
 
@@ -17,6 +17,8 @@ pub struct Layer {
     pub muted: bool,
     /// How many vertices its handle has, those among them that are fixed too.
     pub handle_vertices: usize,
+    /// How many vertices it holds where they are. Where there are none, whole pieces of the surface go with the handle.
+    pub fixed_vertices: usize,
     /// How far this layer alone moves a vertex at most, in units of the mesh; 0 where it is muted.
     pub largest_displacement: f64,
 }
@@ -39,7 +41,8 @@ impl Editor {
     ///     { "translate": { "features": ["x-max"], "fixed": ["x-min"], "by": [0, 3, 4], "name": "lift the outlet" } }
     /// ]"#)?;
     /// let layers = editor.layers(&stack)?;
-    /// assert_eq!((layers[0].handle_vertices, layers[0].largest_displacement), (9, 5.0));
+    /// let layer = &layers[0];
+    /// assert_eq!((layer.handle_vertices, layer.fixed_vertices, layer.largest_displacement), (9, 9, 5.0));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn layers(&mut self, stack: &[Edit]) -> Result<Vec<Layer>, EditError> {
@@ -56,6 +59,7 @@ impl Editor {
                 name: edit.layer_name().map(str::to_owned),
                 muted: edit.muted(),
                 handle_vertices: handle.vertices.len(),
+                fixed_vertices: handle.roles.iter().filter(|role| **role == Role::Fixed).count(),
                 largest_displacement: lengths.fold(0.0, f64::max),
             });
             below = reached;

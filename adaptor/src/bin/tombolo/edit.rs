@@ -41,16 +41,16 @@ pub(crate) struct Options {
     json: bool,
     /// Name the parts between edges of this many degrees or more feature-1, feature-2, ..., whatever features the mesh names; see
     /// `tombolo features`
-    #[arg(long, value_name = "DEGREES")]
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     angle: Option<f64>,
     /// How the volume follows; wins over the order's
     #[arg(long)]
     method: Option<VolumeMethod>,
     /// How much stiffer small cells are, from 0 to 4; wins over the order's
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     stiffening: Option<f64>,
     /// The least scaled Jacobian allowed, from 0 to 1; wins over the order's
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     min_quality: Option<f64>,
     /// In how many shapes the way is looked at; wins over the order's
     #[arg(long)]
@@ -250,11 +250,17 @@ fn tell(outcome: &Outcome, options: &Options) -> Result<(), Failure> {
         say(format_args!("scaled Jacobian after:  {}", line(after)))?;
     }
     for (place, layer) in outcome.layers.iter().enumerate() {
-        let Layer { edit, name, muted, handle_vertices, largest_displacement } = layer;
+        let Layer { edit, name, muted, handle_vertices, fixed_vertices, largest_displacement } = layer;
         let name = name.as_ref().map_or_else(String::new, |name| format!(" \"{name}\""));
         let does =
             if *muted { "muted".to_owned() } else { format!("moves the surface by at most {largest_displacement:.6}") };
         say(format_args!("edit {place} ({edit}){name}: {handle_vertices} vertices in the handle, {does}"))?;
+        // Those that say of each vertex where it goes move no others.
+        if *fixed_vertices == 0 && !muted && !["displacement", "skeleton"].contains(edit) {
+            say(format_args!(
+                "edit {place} holds nothing fixed, so that whole pieces of the surface go with its handle"
+            ))?;
+        }
     }
     let Seconds { read, features, surface, volume, guard, write } = outcome.seconds;
     say(format_args!(

@@ -20,7 +20,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "IN")]
     mesh: PathBuf,
     /// Part the surface where it turns by this many degrees or more, from 0 to 180, whatever features the mesh names
-    #[arg(long, value_name = "DEGREES")]
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     angle: Option<f64>,
     /// A surface file to write, with a cell array `features` and the names: .vtp or .vtu
     #[arg(long, value_name = "OUT.vtp")]
