@@ -240,6 +240,8 @@ impl Reader<'_> {
             };
             self.at += 1;
             match byte {
+                // As in YAML, two single quotes stand for one.
+                b'\'' if quote == Some(b'\'') && self.take(b'\'') => text.push(b'\''),
                 _ if Some(byte) == quote => return Ok(String::from_utf8_lossy(&text).into_owned()),
                 b'\\' => {
                     let character = self.escaped()?;

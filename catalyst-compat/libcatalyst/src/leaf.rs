@@ -266,6 +266,24 @@ impl Node {
         Ok(())
     }
 
+    /// Writes one element of a leaf of the same type over one of this leaf.
+    ///
+    /// # Errors
+    /// The types differ, or one of the elements is not there.
+    pub fn write_one(&mut self, to: i64, source: &Node, from: i64) -> Result<()> {
+        source.expect(self.kind())?;
+        let (Some(mut bytes), Some(_)) = (source.bytes(from), self.readable(to)) else {
+            return Err(Error::new(format!("{} has no element {from}", source.place())));
+        };
+        let size = usize::try_from(self.datatype.element_bytes).unwrap_or(0).min(8);
+        if !self.datatype.matches_machine() {
+            bytes[..size].reverse();
+        }
+        // SAFETY: the element lies inside of the block, or in memory that its owner described and lent for writing.
+        unsafe { ptr::copy_nonoverlapping(bytes.as_ptr(), self.element(to), size) };
+        Ok(())
+    }
+
     /// Borrows elements: the caller keeps them alive for as long as the node refers to them.
     ///
     /// # Errors

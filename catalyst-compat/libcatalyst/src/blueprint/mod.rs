@@ -1,8 +1,11 @@
 //! Blueprint: what a tree must hold to be a mesh, a multi-component array or a table, and what can be made of it then.
 
+pub mod domain;
+pub mod flatten;
 pub mod index;
 pub mod mcarray;
 pub mod mesh;
+pub mod partition;
 pub mod parts;
 pub mod report;
 pub mod sets;

@@ -119,3 +119,36 @@ unsafe extern "C-unwind" fn catalyst_conduit_blueprint_mesh_generate_index(
         }
     });
 }
+
+/// # Safety
+/// As the functions of [`super`].
+unsafe fn transform(mesh: *const Node, options: *const Node, target: *mut Node, how: fn(&Node, &Node) -> Result<Node>) {
+    run((), || {
+        // SAFETY: the caller keeps to `c_api`'s rules; the output is built before the target is borrowed.
+        unsafe {
+            let none = Node::new();
+            let made = how(node(mesh)?, options.as_ref().unwrap_or(&none))?;
+            node_mut(target)?.take(made)
+        }
+    });
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C-unwind" fn catalyst_conduit_blueprint_mesh_partition(
+    mesh: *const Node,
+    options: *const Node,
+    output: *mut Node,
+) {
+    // SAFETY: the caller keeps to `c_api`'s rules.
+    unsafe { transform(mesh, options, output, blueprint::partition::partition) }
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C-unwind" fn catalyst_conduit_blueprint_mesh_flatten(
+    mesh: *const Node,
+    options: *const Node,
+    output: *mut Node,
+) {
+    // SAFETY: the caller keeps to `c_api`'s rules.
+    unsafe { transform(mesh, options, output, blueprint::flatten::flatten) }
+}

@@ -1,0 +1,273 @@
+//! One domain of a mesh as points and elements, whatever its coordinate set and topology.
+
+use crate::blueprint::parts::vertices_of;
+use crate::error::{Error, Result};
+use crate::node::Node;
+
+/// An element: its shape and its vertices.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Element {
+    /// The shape, as Blueprint names it.
+    pub shape: String,
+    /// The vertices, in the order of the shape.
+    pub vertices: Vec<usize>,
+}
+
+/// Points, elements and fields of a domain.
+pub struct Domain<'a> {
+    /// The name of the coordinate set.
+    pub coordset: String,
+    /// The name of the topology.
+    pub topology: String,
+    /// The axes, each with the coordinates of all points along it.
+    pub axes: Vec<(String, Vec<f64>)>,
+    /// The elements.
+    pub elements: Vec<Element>,
+    /// Numbers of elements along `i`, `j`, `k` where the topology has them.
+    pub cells: Option<[usize; 3]>,
+    /// The fields of the topology: name, whether they belong to vertices, and the field.
+    pub fields: Vec<(String, bool, &'a Node)>,
+}
+
+/// The most points that implicit coordinates are written out for.
+const MOST_POINTS: usize = 1 << 28;
+
+impl<'a> Domain<'a> {
+    /// Reads a domain; without a name its first topology.
+    ///
+    /// # Errors
+    /// Something is missing, refers to what is not there, or is polyhedral.
+    pub fn read(mesh: &'a Node, topology: Option<&str>) -> Result<Self> {
+        let topologies = mesh.existing("topologies")?;
+        let name = topology.map_or_else(|| topologies.name_of(0).to_owned(), str::to_owned);
+        let found = topologies.existing(&name)?;
+        let coordset = text(found, "coordset")?;
+        let (axes, points) = points(mesh.existing(&format!("coordsets/{coordset}"))?)?;
+        let count = axes.first().map_or(0, |(_, values)| values.len());
+        let kind = text(found, "type")?;
+        let cells = match kind.as_str() {
+            "structured" => Some(dims(found.existing("elements/dims")?)?),
+            "uniform" | "rectilinear" => Some(points.map(|count| count.saturating_sub(1))),
+            _ => None,
+        };
+        let corners = cells.and_then(|cells| {
+            cells.iter().try_fold(1_usize, |product, cells| product.checked_mul(cells.checked_add(1)?))
+        });
+        if cells.is_some() && corners.is_none_or(|corners| corners > count) {
+            return Err(Error::new(format!(
+                "{}: a grid of {cells:?} elements needs more than {count} points",
+                found.place()
+            )));
+        }
+        let elements = match (kind.as_str(), cells) {
+            ("points", _) => (0..count).map(|index| Element { shape: "point".into(), vertices: vec![index] }).collect(),
+            (_, Some(cells)) => grid(cells),
+            _ => unstructured(found.existing("elements")?)?,
+        };
+        if let Some(wrong) = elements.iter().flat_map(|element| &element.vertices).find(|vertex| **vertex >= count) {
+            return Err(Error::new(format!("{}: vertex {wrong} of {count} points", found.place())));
+        }
+        let mut fields = Vec::new();
+        for (field, node) in mesh.get("fields").into_iter().flat_map(Node::children) {
+            let association = node.get("association").and_then(Node::text).unwrap_or_default();
+            let here = node.get("topology").and_then(Node::text).as_deref() == Some(name.as_str());
+            let Some(values) = node.get("values").filter(|_| here && !association.is_empty()) else {
+                continue;
+            };
+            let wanted = if association == "vertex" { count } else { elements.len() };
+            let fits = |leaf: &Node| usize::try_from(leaf.datatype().elements) == Ok(wanted);
+            if !(if values.count() == 0 { fits(values) } else { values.children().all(|(_, leaf)| fits(leaf)) }) {
+                return Err(Error::new(format!("{}: {wanted} values are expected", values.place())));
+            }
+            fields.push((field.to_owned(), association == "vertex", node));
+        }
+        Ok(Self { coordset, topology: name, axes, elements, cells, fields })
+    }
+
+    /// The number of points.
+    #[must_use]
+    pub fn points(&self) -> usize {
+        self.axes.first().map_or(0, |(_, values)| values.len())
+    }
+}
+
+fn text(node: &Node, name: &str) -> Result<String> {
+    let found = node.existing(name)?;
+    found.text().ok_or_else(|| Error::new(format!("{} is no text", found.place())))
+}
+
+/// Numbers by `i`, `j`, `k`; 1 where there is none.
+fn dims(node: &Node) -> Result<[usize; 3]> {
+    let mut dims = [1; 3];
+    for (dim, name) in dims.iter_mut().zip(["i", "j", "k"]) {
+        if let Some(value) = node.get(name) {
+            let count = value.integer().and_then(|count| usize::try_from(count).ok());
+            *dim = count.ok_or_else(|| Error::new(format!("{} is no number of points or elements", value.place())))?;
+        }
+    }
+    if node.get("j").is_none() {
+        dims[1] = 0;
+    }
+    if node.get("k").is_none() {
+        dims[2] = 0;
+    }
+    Ok(dims)
+}
+
+/// The axes of a coordinate set with all coordinates, and the numbers of points along each, 1 where there is no such direction.
+#[expect(clippy::cast_precision_loss, reason = "no grid has so many points along one axis")]
+fn points(coordset: &Node) -> Result<(Vec<(String, Vec<f64>)>, [usize; 3])> {
+    const NAMES: [&str; 3] = ["x", "y", "z"];
+    let along: Vec<(String, Vec<f64>)> = match text(coordset, "type")?.as_str() {
+        "uniform" => {
+            let dims = dims(coordset.existing("dims")?)?;
+            let number = |path: String, otherwise: f64| {
+                coordset.find(&path).and_then(|node| node.number(0)).map_or(otherwise, |number| number.as_f64())
+            };
+            let axis = |(index, count): (usize, &usize)| {
+                let (first, step) = (
+                    number(format!("origin/{}", NAMES[index]), 0.0),
+                    number(format!("spacing/d{}", NAMES[index]), 1.0),
+                );
+                (
+                    NAMES[index].to_owned(),
+                    (0..(*count).min(MOST_POINTS)).map(|point| first + step * point as f64).collect(),
+                )
+            };
+            dims.iter().enumerate().filter(|(_, count)| **count > 0).map(axis).collect()
+        }
+        kind => {
+            let values = coordset.existing("values")?;
+            let axes: Vec<_> = values
+                .children()
+                .map(|(name, leaf)| (name.to_owned(), leaf.numbers().map(|number| number.as_f64()).collect::<Vec<_>>()))
+                .collect();
+            if kind == "explicit" {
+                let count = axes.first().map_or(0, |(_, values)| values.len());
+                if axes.iter().any(|(_, values)| values.len() != count) {
+                    return Err(Error::new(format!("{}: components of different lengths", values.place())));
+                }
+                return Ok((axes, [count, 1, 1]));
+            }
+            axes
+        }
+    };
+    let mut counts = [1; 3];
+    for (count, (_, values)) in counts.iter_mut().zip(&along) {
+        *count = values.len();
+    }
+    let total = counts.iter().try_fold(1_usize, |product, count| product.checked_mul(*count));
+    let total = total.filter(|total| *total <= MOST_POINTS).ok_or_else(|| Error::new("too many points"))?;
+    let stride = [1, counts[0], counts[0] * counts[1]];
+    let spread = |(axis, (name, values)): (usize, (String, Vec<f64>))| {
+        let all = (0..total).map(|point| values[point / stride[axis] % counts[axis]]).collect();
+        (name, all)
+    };
+    Ok((along.into_iter().take(3).enumerate().map(spread).collect(), counts))
+}
+
+/// The elements of a grid, with `i` fastest.
+fn grid(cells: [usize; 3]) -> Vec<Element> {
+    let dimension = cells.iter().filter(|count| **count > 0).count();
+    let shape = ["point", "line", "quad", "hex"][dimension];
+    let row = cells[0] + 1;
+    let layer = row * (cells[1] + 1);
+    let corners: &[usize] = &[0, 1, 1 + row, row, layer, layer + 1, layer + 1 + row, layer + row];
+    let many = cells.map(|count| count.max(1));
+    let mut elements = Vec::new();
+    for k in 0..many[2] {
+        for j in 0..many[1] {
+            for i in 0..many[0] {
+                let first = i + j * row + k * layer;
+                let vertices = corners.iter().take(1 << dimension).map(|corner| first + corner).collect();
+                elements.push(Element { shape: shape.to_owned(), vertices });
+            }
+        }
+    }
+    elements
+}
+
+fn unstructured(elements: &Node) -> Result<Vec<Element>> {
+    let integers = |name: &str| -> Result<Vec<i64>> {
+        let node = elements.existing(name)?;
+        let all: Option<Vec<i64>> = node.numbers().map(|number| number.as_i64()).collect();
+        all.ok_or_else(|| Error::new(format!("{} holds something else than integers", node.place())))
+    };
+    let shape = text(elements, "shape")?;
+    let connectivity = integers("connectivity")?;
+    let vertices = |from: i64, count: i64| -> Result<Vec<usize>> {
+        let end = from.checked_add(count);
+        let range = usize::try_from(from).ok().zip(end.and_then(|end| usize::try_from(end).ok()));
+        let found = range.and_then(|(from, end)| connectivity.get(from..end));
+        let found = found
+            .ok_or_else(|| Error::new(format!("{}: an element reaches beyond the connectivity", elements.place())))?;
+        let all: Option<Vec<usize>> = found.iter().map(|vertex| usize::try_from(*vertex).ok()).collect();
+        all.ok_or_else(|| Error::new(format!("{}: a vertex is negative", elements.place())))
+    };
+    if let Some(size) = vertices_of(&shape) {
+        let count = i64::try_from(connectivity.len()).unwrap_or(i64::MAX) / size;
+        return (0..count)
+            .map(|index| Ok(Element { shape: shape.clone(), vertices: vertices(index * size, size)? }))
+            .collect();
+    }
+    if shape == "polyhedral" {
+        return Err(Error::new(format!("{}: polyhedra cannot be taken apart into vertices", elements.place())));
+    }
+    let sizes = integers("sizes")?;
+    let offsets = match elements.get("offsets") {
+        Some(_) => integers("offsets")?,
+        None => sizes.iter().scan(0, |sum, size| Some(std::mem::replace(sum, *sum + size))).collect(),
+    };
+    let shapes: Vec<String> = if shape == "mixed" {
+        let map: Vec<_> = elements.existing("shape_map")?.children().collect();
+        let name = |number: &i64| {
+            map.iter().find(|(_, value)| value.integer() == Some(*number)).map(|(name, _)| (*name).to_owned())
+        };
+        let named: Option<Vec<_>> = integers("shapes")?.iter().map(name).collect();
+        named.ok_or_else(|| Error::new(format!("{}: a shape is not in the shape map", elements.place())))?
+    } else {
+        vec![shape; sizes.len()]
+    };
+    if shapes.len() != sizes.len() || offsets.len() != sizes.len() {
+        return Err(Error::new(format!("{}: sizes, offsets and shapes of different lengths", elements.place())));
+    }
+    let each = shapes.into_iter().zip(offsets.iter().zip(&sizes));
+    each.map(|(shape, (offset, size))| Ok(Element { shape, vertices: vertices(*offset, *size)? })).collect()
+}
+
+/// Gathers rows of leaves of one type into a new leaf.
+///
+/// # Errors
+/// The leaves are of different types, or a row is not there.
+pub fn gather(rows: &[(&Node, usize)]) -> Result<Node> {
+    let mut gathered = Node::new();
+    let Some((first, _)) = rows.first() else {
+        return Ok(gathered);
+    };
+    let count = i64::try_from(rows.len()).unwrap_or(i64::MAX);
+    gathered.make_room(crate::datatype::Datatype::compact(first.kind(), count))?;
+    for (index, (leaf, row)) in rows.iter().enumerate() {
+        let to = i64::try_from(index).unwrap_or(i64::MAX);
+        gathered.write_one(to, leaf, i64::try_from(*row).unwrap_or(i64::MAX))?;
+    }
+    Ok(gathered)
+}
+
+/// As [`gather`], for values that may have components.
+///
+/// # Errors
+/// As [`gather`], or a component is missing.
+pub fn gather_values(rows: &[(&Node, usize)]) -> Result<Node> {
+    let Some((first, _)) = rows.first() else {
+        return Ok(Node::new());
+    };
+    if first.count() == 0 {
+        return gather(rows);
+    }
+    let mut gathered = Node::new();
+    for (name, _) in first.children() {
+        let components: Result<Vec<_>> = rows.iter().map(|(values, row)| Ok((values.existing(name)?, *row))).collect();
+        gathered.child_named(name)?.take(gather(&components?)?)?;
+    }
+    Ok(gathered)
+}

@@ -1,0 +1,189 @@
+//! The library as it is installed: its symbols, and programs in C, C++ and Fortran that are built against a prefix by CMake and by
+//! pkg-config.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+/// The directory of this package.
+fn package() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The shared library that cargo built beside this test.
+fn library() -> PathBuf {
+    let mut path = std::env::current_exe().expect("a running test has a path");
+    path.set_file_name("libcatalyst.so");
+    path
+}
+
+fn output(command: &mut Command) -> Output {
+    command.output().unwrap_or_else(|error| panic!("{command:?} does not run ({error}); scripts/setup installs it"))
+}
+
+#[track_caller]
+fn succeed(command: &mut Command) -> String {
+    let output = output(command);
+    let (told, errors) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{command:?}: {}\n{told}\n{errors}", output.status);
+    format!("{told}{errors}")
+}
+
+/// A prefix with everything in it, and the programs built by CMake against it.
+struct Built {
+    prefix: PathBuf,
+    build: PathBuf,
+}
+
+impl Built {
+    fn get() -> &'static Self {
+        static BUILT: OnceLock<Built> = OnceLock::new();
+        BUILT.get_or_init(|| {
+            let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).join("libcatalyst");
+            let (prefix, build) = (directory.join("prefix"), directory.join("build"));
+            succeed(
+                Command::new(package().join("../../scripts/install-catalyst"))
+                    .arg(&prefix)
+                    .args(["--library".as_ref(), library().as_os_str()])
+                    .args(["--replay", env!("CARGO_BIN_EXE_catalyst_replay")]),
+            );
+            let mut configure = Command::new("cmake");
+            configure.arg("-S").arg(package().join("tests/programs")).arg("-B").arg(&build);
+            succeed(configure.arg(format!("-DCMAKE_PREFIX_PATH={}", prefix.display())));
+            succeed(Command::new("cmake").arg("--build").arg(&build));
+            Built { prefix, build }
+        })
+    }
+
+    /// A program, with nothing of the caller's environment that Catalyst reads.
+    fn program(&self, name: &str) -> Command {
+        let mut command = Command::new(self.build.join(name));
+        for variable in ["NAME", "PATHS", "PREFER_ENV"] {
+            command.env_remove(format!("CATALYST_IMPLEMENTATION_{variable}"));
+        }
+        command.env_remove("CATALYST_DATA_DUMP_DIRECTORY");
+        command
+    }
+
+    fn implementations(&self) -> PathBuf {
+        self.build.join("lib/catalyst")
+    }
+}
+
+#[test]
+fn exactly_the_listed_symbols_are_exported() {
+    let listed = include_str!("../symbols.txt");
+    let told = succeed(Command::new("nm").args(["-D", "--defined-only"]).arg(library()));
+    let mut exported: Vec<&str> = told.lines().filter_map(|line| line.split_whitespace().nth(2)).collect();
+    let mut wanted: Vec<&str> = listed.split_whitespace().collect();
+    exported.sort_unstable();
+    wanted.sort_unstable();
+    assert_eq!(wanted.len(), 477);
+    assert_eq!(exported, wanted);
+    let dynamic = succeed(Command::new("readelf").arg("-d").arg(library()));
+    assert!(dynamic.contains("Library soname: [libcatalyst.so.3]"), "{dynamic}");
+}
+
+#[test]
+fn nodes_work_from_c_cpp_and_fortran() {
+    let built = Built::get();
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let told = succeed(built.program("node_c").arg(directory.path()));
+    assert!(told.contains("node.c: ok") && told.contains("conduit: the conduit node is null"), "{told}");
+    let implementations = built.implementations();
+    let told = succeed(built.program("node_cpp").env("CATALYST_IMPLEMENTATION_PATHS", &implementations));
+    assert!(told.contains("node.cpp: ok"), "{told}");
+    assert!(succeed(&mut built.program("node_f90")).contains("ok with stub"));
+    let mut echoed = built.program("node_f90");
+    echoed.env("CATALYST_IMPLEMENTATION_PATHS", implementations).env("CATALYST_IMPLEMENTATION_NAME", "echo");
+    assert!(succeed(&mut echoed).contains("ok with echo"));
+}
+
+#[test]
+fn valgrind_finds_nothing() {
+    let built = Built::get();
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let options = ["-q", "--error-exitcode=9", "--leak-check=full", "--errors-for-leak-kinds=definite"];
+    succeed(Command::new("valgrind").args(options).arg(built.build.join("node_c")).arg(directory.path()));
+    let mut session = Command::new("valgrind");
+    session.args(options).arg(built.build.join("session")).args(["0", "echo"]).arg(built.implementations());
+    assert!(succeed(&mut session).contains("echo"));
+}
+
+#[test]
+fn pkg_config_builds_the_same_programs() {
+    let built = Built::get();
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    for (compiler, source, name) in [
+        ("gcc", "session.c", "catalyst"),
+        ("g++", "node.cpp", "catalyst"),
+        ("gfortran", "node.f90", "catalyst_fortran"),
+    ] {
+        let mut query = Command::new("pkg-config");
+        query.env("PKG_CONFIG_PATH", built.prefix.join("lib/pkgconfig")).args(["--cflags", "--libs", name]);
+        let flags = succeed(&mut query);
+        let program = directory.path().join(compiler);
+        let mut compile = Command::new(compiler);
+        compile.arg(package().join("tests/programs").join(source)).arg("-o").arg(&program);
+        succeed(compile.args(flags.split_whitespace()));
+        succeed(Command::new(&program).arg("0").env_remove("CATALYST_IMPLEMENTATION_NAME"));
+    }
+}
+
+#[test]
+fn the_loader_finds_what_is_asked_for() {
+    let built = Built::get();
+    let here = built.implementations();
+    let with = |arguments: &[&str], environment: &[(&str, &str)]| {
+        let mut command = built.program("session");
+        command.args(arguments).envs(environment.iter().copied());
+        succeed(&mut command)
+    };
+    let path = here.to_str().expect("the target directory's name is UTF-8");
+    let paths = ("CATALYST_IMPLEMENTATION_PATHS", path);
+    let name = |name| ("CATALYST_IMPLEMENTATION_NAME", name);
+    let prefer = ("CATALYST_IMPLEMENTATION_PREFER_ENV", "1");
+    assert_eq!(with(&["0"], &[]), "stub\n");
+    assert_eq!(with(&["0", "echo", path], &[]), "echo\n");
+    assert_eq!(with(&["0", "echo"], &[paths]), "echo\n");
+    assert_eq!(with(&["0"], &[paths, name("echo")]), "echo\n");
+    // The node comes before the environment, unless the environment is preferred.
+    assert_eq!(with(&["0", "echo"], &[paths, name("nothing")]), "echo\n");
+    assert_eq!(with(&["0", "nothing"], &[paths, name("echo"), prefer]), "echo\n");
+    let told = with(&["3", "nothing", "/no/such/directory"], &[paths]);
+    assert!(
+        told.contains("no 'libcatalyst-nothing.so'") && told.contains("/no/such/directory") && told.contains(path),
+        "{told}"
+    );
+    with(&["4", "NO_TABLE"], &[paths]);
+    with(&["5", "WITHOUT_FUNCTION"], &[paths]);
+    with(&["6", "OTHER_VERSION"], &[paths]);
+    let told = with(&["0", "echo"], &[paths, ("CATALYST_DEBUG", "1")]);
+    assert!(told.contains("catalyst: loaded '"), "{told}");
+}
+
+#[test]
+fn what_is_dumped_is_played_back() {
+    let built = Built::get();
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let dumped = directory.path().join("dump");
+    let mut record = built.program("session");
+    succeed(record.args(["0", "echo"]).arg(built.implementations()).env("CATALYST_DATA_DUMP_DIRECTORY", &dumped));
+    for stage in ["initialize", "execute_invc0", "finalize"] {
+        assert!(dumped.join(format!("{stage}_params.conduit_bin.1.0")).exists(), "{stage}");
+        assert!(dumped.join(format!("{stage}_params.conduit_bin.1.0_json")).exists(), "{stage}");
+    }
+    let again = directory.path().join("again");
+    let replay = || {
+        let mut command = Command::new(built.prefix.join("bin/catalyst_replay"));
+        command.env("CATALYST_DATA_DUMP_DIRECTORY", &again).env_remove("CATALYST_IMPLEMENTATION_NAME");
+        command
+    };
+    succeed(replay().arg(&dumped));
+    let read =
+        |directory: &Path| std::fs::read(directory.join("execute_invc0_params.conduit_bin.1.0")).expect("was dumped");
+    assert_eq!(read(&dumped), read(&again));
+    let refused = output(replay().arg(directory.path().join("nothing")));
+    assert!(!refused.status.success());
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("rank 0 of 1"), "{refused:?}");
+}
