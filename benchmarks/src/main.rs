@@ -14,6 +14,7 @@ mod overhead;
 mod paper;
 mod report;
 mod skeleton;
+mod stiffening;
 mod surface;
 mod surface_wasm;
 mod volume;
@@ -46,6 +47,8 @@ enum Name {
     SurfaceWasm,
     /// Curve skeletons, beside CGAL's.
     Skeleton,
+    /// The quality of deformed meshes at several exponents of the stiffening.
+    Stiffening,
     /// Volume motion at the sizes of the paper's meshes, beside the paper and PETSc.
     Volume,
 }
@@ -56,6 +59,11 @@ fn main() -> ExitCode {
         Name::Paper => {
             return said(
                 paper::run().map(|report| if arguments.json { report.json() + "\n" } else { report.to_string() }),
+            );
+        }
+        Name::Stiffening => {
+            return said(
+                stiffening::run().map(|report| if arguments.json { report.json() + "\n" } else { report.to_string() }),
             );
         }
         Name::Overhead => overhead::run(),

@@ -60,11 +60,15 @@ struct Row {
 
 /// The normalised scaled Jacobian over the cells, and the cells turned inside out.
 #[derive(Debug, Clone, Copy, Serialize)]
-struct Figures {
-    mean: f64,
-    min: f64,
-    max: f64,
-    inverted: usize,
+pub struct Figures {
+    /// Its mean.
+    pub mean: f64,
+    /// The least.
+    pub min: f64,
+    /// The largest.
+    pub max: f64,
+    /// How many cells are inverted.
+    pub inverted: usize,
 }
 
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -189,14 +193,15 @@ fn measured(
     Ok(rows)
 }
 
-fn figures(mesh: &Mesh, points: &[Vector]) -> Figures {
+/// The figures of a mesh whose vertices have moved to `points`.
+pub fn figures(mesh: &Mesh, points: &[Vector]) -> Figures {
     let spread = change(mesh.cells(), mesh.points(), points).normalized_scaled_jacobian;
     let inverted = quality(mesh.cells(), points).inverted;
     Figures { mean: spread.mean, min: spread.min, max: spread.max, inverted }
 }
 
 /// A mesh of `scripts/meshes`, made where it is not there yet.
-fn mesh_file(name: &str) -> Result<PathBuf, Box<dyn Error>> {
+pub fn mesh_file(name: &str) -> Result<PathBuf, Box<dyn Error>> {
     let project = Path::new(env!("CARGO_MANIFEST_DIR")).parent().ok_or("the project is not there")?;
     let directory = std::env::var_os("TOMBOLO_MESHES").map_or_else(|| project.join("meshes"), PathBuf::from);
     let file = directory.join(format!("{name}.msh"));
