@@ -10,10 +10,10 @@ use std::sync::Arc;
 use serde::Serialize;
 use tombolo_deform::{
     mesh::{Mesh, Vector},
-    quality::{Guard, Refusal, SurfaceRule},
+    quality::{Guard, Refusal, SurfaceRule, keeps},
     schedule::Schedule,
     surface::{BrokenSurface, Edit, EditError, Editor, Surface, SurfaceError, UnknownFeature, require_sound},
-    volume::{Untangler, VolumeError},
+    volume::{Improver, Untangler, VolumeError},
 };
 
 use crate::language::DeformStage;
@@ -169,6 +169,7 @@ pub struct Shaper {
     operators: Vec<(DeformStage, Arc<Carrier>)>,
     reference: Arc<[Vector]>,
     untangler: Option<Arc<Untangler>>,
+    improver: Option<Arc<Improver>>,
     /// Shapes that took more than one solve, the newest last.
     mended: Vec<Mended>,
     spent: ShapeSeconds,
@@ -182,8 +183,18 @@ impl Shaper {
     pub fn new(mesh: Arc<Mesh>, surface: Arc<Surface>) -> Result<Self, SurfaceError> {
         let editor = Editor::new(Arc::clone(&surface))?;
         let reference = mesh.points().into();
-        let (operators, untangler, mended, spent) = (Vec::new(), None, Vec::new(), ShapeSeconds::default());
-        Ok(Self { mesh, surface, editor, operators, reference, untangler, mended, spent })
+        let spent = ShapeSeconds::default();
+        Ok(Self {
+            mesh,
+            surface,
+            editor,
+            operators: Vec::new(),
+            reference,
+            untangler: None,
+            improver: None,
+            mended: Vec::new(),
+            spent,
+        })
     }
 
     /// The reference mesh.
@@ -281,12 +292,15 @@ impl Shaper {
             return Ok(Target { points, reference, way, fraction, seconds, iterations, sub_steps });
         }
         let watch = Stopwatch::start();
-        let solution = self.operator(deform)?.solve(&surface);
+        let solution = self.operator(deform)?.solve(&surface).map(|solution| {
+            let moved = reference.iter().zip(&solution.displacement).map(|(&point, &by)| moved(point, by));
+            let points: Arc<[Vector]> = moved.collect();
+            let improved = self.improved(&points, deform).filter(|improved| self.straight(improved));
+            (improved.unwrap_or(points), solution.iterations)
+        });
         seconds.volume = watch.seconds();
         self.spent.volume += seconds.volume;
-        let solution = solution?;
-        let points: Arc<[Vector]> =
-            reference.iter().zip(&solution.displacement).map(|(&point, &by)| moved(point, by)).collect();
+        let (points, iterations) = solution?;
         if deform.lets_go() {
             let watch = Stopwatch::start();
             let shape: Vec<Vector> = self.surface.vertices().iter().map(|&vertex| points[vertex as usize]).collect();
@@ -295,8 +309,24 @@ impl Shaper {
             self.spent.surface += watch.seconds();
             sound?;
         }
-        let (way, fraction, iterations, sub_steps) = (Vec::new(), 1.0, solution.iterations, 0);
+        let (way, fraction, sub_steps) = (Vec::new(), 1.0, 0);
         Ok(Target { points, reference, way, fraction, seconds, iterations, sub_steps })
+    }
+
+    /// The shape with its worst cells lifted, where that could be done.
+    fn improved(&mut self, points: &[Vector], deform: &DeformStage) -> Option<Arc<[Vector]>> {
+        if deform.equation.improve == 0 {
+            return None;
+        }
+        let improver =
+            self.improver.get_or_insert_with(|| Arc::new(Improver::new(&self.mesh, self.surface.vertices())));
+        let mut points = points.to_vec();
+        improver.improve(&mut points, deform.equation.improve).then(|| points.into())
+    }
+
+    /// Whether every cell stays valid on the straight way from the reference.
+    fn straight(&self, points: &[Vector]) -> bool {
+        keeps(&self.mesh, &self.reference, points, &Guard { min_scaled_jacobian: 0.0, ..Guard::default() })
     }
 
     /// The way from the shape `start` (coordinates of every vertex) to that of a stack: [`Shaper::reach`] where no way back is

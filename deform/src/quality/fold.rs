@@ -5,6 +5,14 @@ use crate::vector::{dot, mean};
 
 use super::cell::vector_area;
 
+/// Whether a face (its corners in order) that lay at `before` has no area at `after`, or has turned by a right angle or more. A
+/// face without area to begin with has no side to turn to.
+#[must_use]
+pub fn turns_over(before: &[Vector], after: &[Vector]) -> bool {
+    let normal = vector_area(before);
+    normal != [0.0; 3] && dot(normal, vector_area(after)) <= 0.0
+}
+
 /// The boundary faces whose normal at `end` points against that at `start`: how many, and the place (at `start`) of the first.
 /// For a mesh of polygons, the polygons themselves.
 pub(super) fn folded_faces(cells: &Cells, start: &[Vector], end: &[Vector]) -> (usize, Option<Vector>) {
@@ -16,7 +24,7 @@ pub(super) fn folded_faces(cells: &Cells, start: &[Vector], end: &[Vector]) -> (
         before.extend(face.iter().map(|&vertex| start[vertex as usize]));
         after.clear();
         after.extend(face.iter().map(|&vertex| end[vertex as usize]));
-        if dot(vector_area(&before), vector_area(&after)) < 0.0 {
+        if turns_over(&before, &after) {
             count += 1;
             place.get_or_insert_with(|| mean(before.iter().copied()));
         }

@@ -209,8 +209,9 @@ pub fn shape_at(start: Vector, end: Vector, fraction: f64) -> Vector {
 /// - Every shape keeps to the guard's floor, or to the least scaled Jacobian of the reference mesh (`mesh` as it lies) where
 ///   that is lower; a slack of one part in 10⁹ allows for rounding.
 /// - No cell is turned inside out at any place of the path, between the shapes too. A tetrahedron's determinant along a straight
-///   path is a cubic, of which the least value is found in closed form; of other cells the determinants at the corners are
-///   looked at, or of the tetrahedra they are split into (see [`scaled_jacobian`](super::scaled_jacobian)).
+///   path is a cubic, of which the least value is found in closed form; of hexahedra, wedges and pyramids
+///   the determinants at the corners are looked at in the same way, and bounds of it everywhere inside; of prisms and polyhedra
+///   the tetrahedra that they are split into (see [`scaled_jacobian`](super::scaled_jacobian)).
 /// - In a mesh of polygons, no corner turns against the polygon's normal at the start.
 ///
 /// Cost: one pass over the cells, on all threads. Only a refusal costs more (the bisection for the feasible fraction).

@@ -6,6 +6,7 @@
 mod cell;
 mod change;
 mod fold;
+mod inside;
 mod judge;
 mod path;
 #[cfg(test)]
@@ -17,6 +18,7 @@ use serde::Serialize;
 pub use cell::scaled_jacobian;
 pub(crate) use cell::{HEXAHEDRON_CORNERS, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, corner_tets};
 pub use change::{Change, Spread, change, swept_volume, volumes};
+pub use fold::turns_over;
 pub use judge::{
     BrokenPath, FailingCell, Guard, Otherwise, PathQuality, Refusal, ShapeQuality, SurfaceRule, judge, keeps, shape_at,
 };
@@ -25,6 +27,7 @@ use crate::mesh::{CellType, Cells, Vector};
 use crate::parallel;
 use crate::vector::{determinant, mean, subtract};
 use cell::{Scratch, scaled_jacobian_of};
+use inside::least_inside;
 
 /// How many cells are measured at a time.
 const CHUNK: usize = 4096;
@@ -46,8 +49,8 @@ pub struct Quality {
     pub mean: f64,
     /// The largest scaled Jacobian.
     pub max: f64,
-    /// How many cells are turned inside out or flat: a volume cell with a corner whose determinant is not positive, a
-    /// polygon with a corner turned against its normal, any cell with a coordinate that is not finite.
+    /// How many cells are turned inside out or flat: a volume cell with a corner whose determinant is not positive
+    /// (hexahedra, wedges and pyramids: any place inside whose determinant may not be), a polygon with a corner turned against its normal, any cell with a coordinate that is not finite.
     pub inverted: usize,
     /// How many cells have a scaled Jacobian in each of 20 equal classes from -1 to 1.
     pub histogram: [u64; CLASSES],
@@ -227,7 +230,12 @@ impl<'a> Measure<'a> {
             cell_type if cell_type.dimension() == 2 => value > 0.0,
             _ => {
                 corner_tets(self.cells, cell, at, &mut scratch.tets);
-                scratch.tets.iter().all(|&tet| sign * tet_determinant(tet) > 0.0)
+                scratch.tets.iter().all(|&tet| sign * tet_determinant(tet) > 0.0) && {
+                    let Scratch { points, .. } = scratch;
+                    points.clear();
+                    points.extend(self.cells.vertices(cell).iter().map(|&vertex| at(vertex)));
+                    least_inside(self.cells.cell_type(cell), points, points, sign, 1.0).positive
+                }
             }
         };
         Some((value, !valid))

@@ -2,7 +2,8 @@
 
 use super::Measure;
 use super::cell::{Scratch, corner_tets, vector_area};
-use crate::mesh::Vector;
+use super::inside::least_inside;
+use crate::mesh::{CellType, Vector};
 use crate::vector::{cross, determinant, dot, subtract};
 
 /// The least value of a polynomial in the path parameter over `0..=1`, and where it is taken.
@@ -15,19 +16,25 @@ pub(super) struct Least {
 }
 
 impl Least {
-    const NONE: Self = Self { value: f64::INFINITY, at: 0.0, positive: true };
+    pub(super) const NONE: Self = Self { value: f64::INFINITY, at: 0.0, positive: true };
 
-    fn worse(self, other: Self) -> Self {
+    pub(super) fn worse(self, other: Self) -> Self {
         let first = if other.positive == self.positive { other.value < self.value } else { self.positive };
         if first { other } else { self }
     }
 }
 
 /// The determinant of a tetrahedron whose corners go straight from `start` to `end`: a cubic `c0 + c1 t + c2 t² + c3 t³`.
-fn tet_cubic(start: [Vector; 4], end: [Vector; 4]) -> [f64; 4] {
+fn tet_cubic(start: [Vector; 4], end: [Vector; 4]) -> Cubic {
     let edges = |tet: [Vector; 4]| [subtract(tet[1], tet[0]), subtract(tet[2], tet[0]), subtract(tet[3], tet[0])];
-    let [a1, a2, a3] = edges(start);
-    let [b1, b2, b3] = edges(end);
+    triple(edges(start), edges(end))
+}
+
+/// A cubic by its coefficients, the constant first.
+pub(super) type Cubic = [f64; 4];
+
+/// The determinant of three vectors that go straight from the first three to the others.
+pub(super) fn triple([a1, a2, a3]: [Vector; 3], [b1, b2, b3]: [Vector; 3]) -> Cubic {
     let (d1, d2, d3) = (subtract(b1, a1), subtract(b2, a2), subtract(b3, a3));
     [
         determinant(a1, a2, a3),
@@ -41,7 +48,7 @@ fn tet_cubic(start: [Vector; 4], end: [Vector; 4]) -> [f64; 4] {
 ///
 /// The cubic's Bernstein coefficients bound it from below; where they are all positive nothing else is computed. Else the ends
 /// and the roots of the derivative are compared.
-fn least_of_cubic(c: [f64; 4], until: f64) -> Least {
+pub(super) fn least_of_cubic(c: Cubic, until: f64) -> Least {
     let evaluate = |t: f64| c[0] + t * (c[1] + t * (c[2] + t * c[3]));
     let magnitude = c.iter().map(|value| value.abs()).sum::<f64>();
     if !magnitude.is_finite() {
@@ -79,8 +86,8 @@ fn quadratic_roots(a: f64, b: f64, c: f64) -> [f64; 2] {
     [q / a, c / q]
 }
 
-/// The least determinant of any corner of a cell on its way from `start` to `start + until (end - start)`; for polygons, the
-/// least of each corner's area against the cell's normal at the start.
+/// The least determinant of a cell on its way from `start` to `start + until (end - start)`, at its corners and, where that is not
+/// positive, inside; for polygons, the least of each corner's area against the cell's normal at the start.
 pub(super) fn least_on_path(
     measure: &Measure<'_>,
     cell: usize,
@@ -91,11 +98,11 @@ pub(super) fn least_on_path(
 ) -> Least {
     let cells = measure.cells;
     let vertices = cells.vertices(cell);
+    let gather = |points: &[Vector], into: &mut Vec<Vector>| {
+        into.clear();
+        into.extend(vertices.iter().map(|&vertex| points[vertex as usize]));
+    };
     if cells.cell_type(cell).dimension() == 2 {
-        let gather = |points: &[Vector], into: &mut Vec<Vector>| {
-            into.clear();
-            into.extend(vertices.iter().map(|&vertex| points[vertex as usize]));
-        };
         gather(start, &mut first.points);
         gather(end, &mut last.points);
         return least_of_polygon(&first.points, &last.points, until);
@@ -103,12 +110,23 @@ pub(super) fn least_on_path(
     let sign = measure.sign(cell);
     corner_tets(cells, cell, |vertex| start[vertex as usize], &mut first.tets);
     corner_tets(cells, cell, |vertex| end[vertex as usize], &mut last.tets);
-    first
+    let corners = first
         .tets
         .iter()
         .zip(&last.tets)
         .map(|(&start, &end)| least_of_cubic(tet_cubic(start, end).map(|value| sign * value), until))
-        .fold(Least::NONE, Least::worse)
+        .fold(Least::NONE, Least::worse);
+    if !corners.positive || !has_inside(cells.cell_type(cell)) {
+        return corners;
+    }
+    gather(start, &mut first.points);
+    gather(end, &mut last.points);
+    corners.worse(least_inside(cells.cell_type(cell), &first.points, &last.points, sign, until))
+}
+
+/// Whether the determinant of a cell can be least elsewhere than at the corners that are looked at.
+pub(super) fn has_inside(cell_type: CellType) -> bool {
+    matches!(cell_type, CellType::Hexahedron | CellType::Voxel | CellType::Wedge | CellType::Pyramid)
 }
 
 fn least_of_polygon(start: &[Vector], end: &[Vector], until: f64) -> Least {

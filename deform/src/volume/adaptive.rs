@@ -122,16 +122,20 @@ pub fn follow<M: BoundaryMotion>(
     let mut route = Route { waypoints: Vec::new(), rejected: 0, untangled: 0, iterations: 0 };
     let mut shape = Arc::clone(start);
     let (mut reached, mut step) = (0.0, FIRST);
+    let mut latest: Option<VolumeOperator> = None;
     while reached < 1.0 {
         let stiffened = mesh.with_points(shape.to_vec()).map_err(|_| FollowError::Volume(overflow()))?;
-        let operator = VolumeOperator::new(&stiffened, boundary, &settings).map_err(FollowError::Volume)?;
+        let renewed = match &latest {
+            Some(operator) => operator.updated(&stiffened),
+            None => VolumeOperator::new(&stiffened, boundary, &settings),
+        };
+        let operator = latest.insert(renewed.map_err(FollowError::Volume)?);
         drop(stiffened);
         loop {
             // A last sub-step that would leave next to nothing takes it along.
             let next = if reached + 1.25 * step >= 1.0 { 1.0 } else { reached + step };
             let places = motion.at(reached, next, &shape).map_err(FollowError::Boundary)?;
-            let mut candidate =
-                moved(&operator, &shape, &places, &mut route.iterations).map_err(FollowError::Volume)?;
+            let mut candidate = moved(operator, &shape, &places, &mut route.iterations).map_err(FollowError::Volume)?;
             let mut holds = keeps(mesh, &shape, &candidate, guard);
             let folds = !holds && motion.folds(&shape, &places);
             if let Some(untangler) = untangler

@@ -8,6 +8,7 @@ mod adaptive;
 mod assembly;
 mod element;
 mod foldover;
+mod improve;
 mod operator;
 mod rigid;
 mod settings;
@@ -17,6 +18,7 @@ mod tests;
 mod untangle;
 
 pub use adaptive::{BoundaryMotion, FollowError, Route, Stalled, Waypoint, follow};
+pub use improve::Improver;
 pub use operator::{VolumeOperator, VolumeSolution};
 pub use settings::{Deform, Method};
 pub use sliding::Sliding;

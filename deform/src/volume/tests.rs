@@ -7,7 +7,8 @@ use crate::linear::{Cholesky, LinearError, LinearSolver, Multigrid, MultigridSet
 use crate::mesh::{Cells, FeatureSource, Mesh};
 use crate::shapes;
 
-const TIGHT: Deform = Deform { method: Method::Elasticity, stiffening: 0.0, poisson_ratio: 0.3, tolerance: 1e-13 };
+const TIGHT: Deform =
+    Deform { method: Method::Elasticity, stiffening: 0.0, poisson_ratio: 0.3, tolerance: 1e-13, improve: 0 };
 
 /// A number from -1 to 1 that looks random.
 fn noise(seed: usize) -> f64 {

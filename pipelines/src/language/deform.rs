@@ -65,7 +65,7 @@ struct Fields {
     /// The equation that is solved for the displacement.
     method: Method,
     /// How much stiffer small cells are than large ones: the stiffness of a cell is (mean volume / volume) to this power.
-    /// 0 is a uniform material; 1 keeps thin boundary layers in shape; 0.5 is what the paper used. 0 to 4.
+    /// 0 is a uniform material; 1 keeps thin boundary layers more nearly rigid and bends the cells about them the more. 0 to 4.
     #[schemars(range(min = 0.0, max = 4.0))]
     stiffening: f64,
     /// Poisson's ratio of the elastic material: how far it resists a change of volume. Above -1 and below 0.5; for
@@ -75,6 +75,11 @@ struct Fields {
     /// The relative residual at which the iterative solve stops. Above 0, at most 0.1.
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 0.1))]
     tolerance: f64,
+    /// How often the vertices inside are gone through after the solve: each moves to where its worst cells are more like those
+    /// of the reference. Vertices whose cells have all kept 95 % of their scaled Jacobian stay. 0 leaves the shape as it was
+    /// solved for. 0 to 100.
+    #[schemars(range(min = 0, max = 100))]
+    improve: u32,
     /// Features whose vertices slide along their surface as it lies in the reference mesh: of the displacement that the edits
     /// make only the part across it is prescribed, and along it the vertices go where the volume takes them. Where such a
     /// feature meets one that is in neither list, its rim gets the whole displacement; where two of them meet, vertices slide
@@ -95,15 +100,15 @@ impl Default for Fields {
 
 impl From<Fields> for DeformStage {
     fn from(fields: Fields) -> Self {
-        let Fields { method, stiffening, poisson_ratio, tolerance, sliding, free } = fields;
-        Self { equation: Deform { method, stiffening, poisson_ratio, tolerance }, sliding, free }
+        let Fields { method, stiffening, poisson_ratio, tolerance, improve, sliding, free } = fields;
+        Self { equation: Deform { method, stiffening, poisson_ratio, tolerance, improve }, sliding, free }
     }
 }
 
 impl From<DeformStage> for Fields {
     fn from(stage: DeformStage) -> Self {
-        let Deform { method, stiffening, poisson_ratio, tolerance } = stage.equation;
-        Self { method, stiffening, poisson_ratio, tolerance, sliding: stage.sliding, free: stage.free }
+        let Deform { method, stiffening, poisson_ratio, tolerance, improve } = stage.equation;
+        Self { method, stiffening, poisson_ratio, tolerance, improve, sliding: stage.sliding, free: stage.free }
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tombolo_deform::{
     mesh::Vector,
-    quality::{Guard, Otherwise, Refusal, keeps},
+    quality::{Guard, Otherwise, Refusal, keeps, turns_over},
     schedule::Schedule,
     surface::{Advance, Edit, Editor, Surface},
     volume::{BoundaryMotion, FollowError, Route, Untangler, follow},
@@ -98,17 +98,12 @@ fn displacement(editor: &mut Editor, stack: &[Edit], carrier: Option<&Carrier>) 
     }
 }
 
-/// Whether a triangle of the surface turns its back on where it looked.
+/// Whether a triangle of the surface turns over.
 fn folds(surface: &Surface, shape: &[Vector], places: &[Vector]) -> bool {
-    let normal = |[a, b, c]: [Vector; 3]| {
-        let (u, v): (Vector, Vector) = (std::array::from_fn(|k| b[k] - a[k]), std::array::from_fn(|k| c[k] - a[k]));
-        [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
-    };
     let vertices = surface.vertices();
     surface.triangles().iter().any(|triangle| {
-        let before = normal(triangle.map(|vertex| shape[vertices[vertex as usize] as usize]));
-        let after = normal(triangle.map(|vertex| places[vertex as usize]));
-        before.iter().zip(after).map(|(a, b)| a * b).sum::<f64>() <= 0.0
+        let before = triangle.map(|vertex| shape[vertices[vertex as usize] as usize]);
+        turns_over(&before, &triangle.map(|vertex| places[vertex as usize]))
     })
 }
 
@@ -245,10 +240,24 @@ impl Shaper {
                 route = second;
             }
         }
+        let place = stack.len() - 1;
+        let mut target = match route {
+            Ok(route) => extended(base, route),
+            Err(error) => {
+                self.spent.volume += watch.seconds();
+                return Err(refused(error, place, edit));
+            }
+        };
+        if let Some(improved) = self.improved(&target.points, deform)
+            && keeps(&self.mesh, &target.points, &improved, guard)
+        {
+            target.points = Arc::clone(&improved);
+            target.way.push(improved);
+        }
         let seconds = watch.seconds();
         self.spent.volume += seconds;
-        let route = route.map_err(|error| refused(error, stack.len() - 1, edit))?;
-        Ok(extended(base, route, seconds))
+        target.seconds.volume += seconds;
+        Ok(target)
     }
 
     /// The largest fraction of the edits after the first `kept` ones that the guard lets through.
@@ -328,9 +337,8 @@ fn refused(error: FollowError<Refused>, edit: usize, what: &Edit) -> Refused {
 }
 
 /// The target that a route from `base` leads to.
-fn extended(base: Target, route: Route, seconds: f64) -> Target {
+fn extended(base: Target, route: Route) -> Target {
     let mut target = base;
-    target.seconds.volume += seconds;
     target.iterations += route.iterations;
     target.sub_steps += route.waypoints.len();
     if Arc::ptr_eq(&target.points, &target.reference) {
