@@ -19,7 +19,7 @@ const GAP: f64 = 0.05;
 const LOST: f64 = 0.05;
 
 /// The weight of the mean against the barrier.
-const MEAN: f64 = 0.03;
+const MEAN: f64 = 0.01;
 
 /// Longest and shortest step tried along a direction, as powers of 2.
 const LONGER: usize = 30;
@@ -33,7 +33,7 @@ const FIRST: [[usize; 4]; 4] = [[0, 1, 2, 3], [1, 0, 3, 2], [2, 0, 1, 3], [3, 0,
 /// The quality of a cell is its scaled Jacobian by that of the same cell in the reference. One sweep moves every free vertex
 /// that has a cell of less than 0.95, one after the other, down
 ///
-/// `Σ (δ / (q - τ))² - 0.03 ln q`
+/// `Σ (δ / (q - τ))² - 0.01 ln q`
 ///
 /// over the corners `q` of its cells (a corner's determinant by the product of its edges) by one step of Newton's method with a
 /// line search both ways. The barrier `τ` stands `δ` below the least `q` of the mesh and rises with it from sweep to sweep, so
