@@ -25,9 +25,6 @@ const TRIES: usize = 200;
 /// Sub-steps are solved no finer than this: what a solve leaves out is small against a sub-step.
 const TOLERANCE: f64 = 1e-6;
 
-/// They are solved with at least this stiffening: where a motion is too large for one solve, small cells are the first to break.
-const STIFFENING: f64 = 1.0;
-
 /// A shape on the way of [`follow`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Waypoint {
@@ -121,11 +118,7 @@ pub fn follow<M: BoundaryMotion>(
     guard: &Guard,
     untangler: Option<&Untangler>,
 ) -> Result<Route, FollowError<M::Error>> {
-    let settings = Deform {
-        tolerance: settings.tolerance.max(TOLERANCE),
-        stiffening: settings.stiffening.max(STIFFENING),
-        ..*settings
-    };
+    let settings = Deform { tolerance: settings.tolerance.max(TOLERANCE), ..*settings };
     let mut route = Route { waypoints: Vec::new(), rejected: 0, untangled: 0, iterations: 0 };
     let mut shape = Arc::clone(start);
     let (mut reached, mut step) = (0.0, FIRST);
