@@ -7,8 +7,6 @@
 
 use std::sync::Arc;
 
-use crate::mesh::Vector;
-
 mod aggregation;
 mod cholesky;
 mod conjugate_gradients;
@@ -42,32 +40,12 @@ const DIRECT: usize = 1500;
 /// # Errors
 /// [`LinearError::Diagonal`].
 pub fn solver<const B: usize>(matrix: Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
-    match direct(&matrix) {
-        Some(direct) => Ok(direct),
-        None => Ok(Box::new(Multigrid::new(matrix, MultigridSettings::default())?)),
+    if B * matrix.rows() <= DIRECT
+        && let Ok(direct) = Cholesky::new(Arc::clone(&matrix))
+    {
+        return Ok(Box::new(direct));
     }
-}
-
-/// The same for an elastic body that may slide: its large systems are solved with [`Multigrid::with_rigid_bodies`]; `places` are
-/// where the vertices of the unknowns lie.
-///
-/// # Errors
-/// [`LinearError::Diagonal`], [`LinearError::Places`].
-pub fn solver_of_body(
-    matrix: Arc<SparseMatrix<3>>,
-    places: &[Vector],
-) -> Result<Box<dyn LinearSolver<3>>, LinearError> {
-    match direct(&matrix) {
-        Some(direct) => Ok(direct),
-        None => Ok(Box::new(Multigrid::with_rigid_bodies(matrix, places, MultigridSettings::default())?)),
-    }
-}
-
-fn direct<const B: usize>(matrix: &Arc<SparseMatrix<B>>) -> Option<Box<dyn LinearSolver<B>>> {
-    if B * matrix.rows() > DIRECT {
-        return None;
-    }
-    Some(Box::new(Cholesky::new(Arc::clone(matrix)).ok()?))
+    Ok(Box::new(Multigrid::new(matrix, MultigridSettings::default())?))
 }
 
 /// When an iterative solve may stop: once the residual's 2-norm is at most the larger of the two, and the error as the

@@ -7,7 +7,7 @@ use super::element::Elements;
 use super::rigid::RigidMotion;
 use super::sliding::{Constraint, Sliding, constrain, constraints};
 use super::{Deform, Method, VolumeError};
-use crate::linear::{Convergence, LinearError, LinearSolver, SparseMatrix, Tolerance, solver, solver_of_body};
+use crate::linear::{Convergence, LinearError, LinearSolver, SparseMatrix, Tolerance, solver};
 use crate::mesh::{Cells, Mesh, Vector};
 use crate::vector::{add, subtract};
 
@@ -457,20 +457,8 @@ fn equations(
     like: Option<&Equations>,
 ) -> Result<Equations, LinearError> {
     let coupled = |system| {
-        let like = like.and_then(|like| match like {
-            // Bodies turn about where their vertices lie, which is elsewhere now.
-            Equations::Coupled(like) if constraints.is_empty() => Some(like),
-            _ => None,
-        });
-        // With the whole boundary held, rigid bodies cost more than they save.
-        let fresh = |matrix| match settings.method {
-            Method::Elasticity if !constraints.is_empty() => {
-                let place = |&vertex: &u32| mesh.points()[vertex as usize];
-                solver_of_body(matrix, &graph.vertices.iter().map(place).collect::<Vec<_>>())
-            }
-            _ => solver(matrix),
-        };
-        System::new(system, |matrix| constrain(matrix, constraints), like, fresh).map(Equations::Coupled)
+        let like = like.and_then(|like| if let Equations::Coupled(like) = like { Some(like) } else { None });
+        System::new(system, |matrix| constrain(matrix, constraints), like, solver).map(Equations::Coupled)
     };
     match settings.method {
         Method::Elasticity => {
