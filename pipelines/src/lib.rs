@@ -6,6 +6,7 @@
 #![warn(missing_docs)]
 
 pub mod communicator;
+pub mod distributed;
 pub mod encode;
 pub mod expression;
 pub mod extract;

@@ -35,7 +35,7 @@ fn area(extract: &Extract, normal: Vector) -> f64 {
 fn cut(mesh: &Mesh, fields: &[FieldView], origin: Vector, normal: Vector) -> Arc<Extract> {
     let channel = Channel { name: "fluid", mesh: MeshView::from(mesh), fields };
     let source = Source::new(&channel).unwrap();
-    source.slice(&channel, &Slice { origin, normal }, 0, &|_| true).unwrap().extract
+    source.slice(&channel, &Slice { origin, normal }, 0, &|_| true, &|furthest| furthest).unwrap().extract
 }
 
 #[test]

@@ -5,7 +5,7 @@ use super::{CellType, MeshError};
 /// Cells of any mix of linear types, as compressed rows of vertex numbers.
 ///
 /// A polyhedron's row lists its distinct vertices; its faces are kept beside it.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Cells {
     types: Vec<CellType>,
     offsets: Vec<usize>,
@@ -18,6 +18,13 @@ pub struct Cells {
 struct PolyhedronFaces {
     cell: usize,
     faces: Vec<Vec<u32>>,
+}
+
+impl Default for Cells {
+    /// No cells.
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 impl Cells {

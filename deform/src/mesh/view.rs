@@ -338,6 +338,9 @@ pub struct MeshView<'a> {
     pub generation: u64,
     /// The vertices' numbers in the whole, distributed mesh, where the solver knows them.
     pub global_vertices: Option<Indices<'a>>,
+    /// The cells' numbers in the whole, distributed mesh, where the solver knows them. With both, what is made of the whole mesh
+    /// does not depend on how it is distributed.
+    pub global_cells: Option<Indices<'a>>,
     /// For each cell, whether it is a ghost (a copy of a cell that another rank owns); `None`: none is.
     pub ghost_cells: Option<&'a [bool]>,
 }
@@ -352,6 +355,7 @@ impl<'a> MeshView<'a> {
             features: &FeatureSource::SharpEdges,
             generation: 0,
             global_vertices: None,
+            global_cells: None,
             ghost_cells: None,
         }
     }

@@ -1,10 +1,10 @@
 //! The surface of a mesh.
 
 use super::bounds::Bounds;
-use super::faces::{self, FaceBuffer};
 use super::features::{FeatureSettings, FeatureSize, Features};
 use super::orientation::faces_to_turn;
-use crate::mesh::{CellType, Cells, FeatureSource, Mesh, MeshError, Vector, check_finite};
+use super::part::{BoundaryFaces, FaceTags, face_tags};
+use crate::mesh::{CellType, Cells, Mesh, MeshError, Vector, check_finite};
 use crate::vector::{cross, dot, subtract};
 
 /// The surface of a mesh: its boundary faces, their vertices and their features.
@@ -51,39 +51,13 @@ impl Surface {
         if dimension < 2 {
             return Err(SurfaceError::NoFaces { cells: cells.len(), dimension });
         }
-        let boundary = faces::boundary_faces(cells, mesh.points().len())?;
-        if boundary.is_empty() {
+        let boundary = BoundaryFaces::find(mesh.points(), cells, dimension, None)?;
+        if boundary.faces.is_empty() {
             return Err(SurfaceError::NoBoundary);
         }
-
-        let mut faces = Cells::new();
-        let mut owner_cells = Vec::with_capacity(boundary.len());
-        let mut buffer = FaceBuffer::default();
-        for same_cell in boundary.chunk_by(|a, b| a.cell == b.cell) {
-            let mut wanted = same_cell.iter().peekable();
-            buffer.for_each(cells, same_cell[0].cell as usize, dimension, |place, vertices| {
-                if wanted.next_if(|face| face.face == place).is_some() {
-                    let cell_type = match vertices.len() {
-                        3 => CellType::Triangle,
-                        4 => CellType::Quad,
-                        _ => CellType::Polygon,
-                    };
-                    let cell = same_cell[0].cell;
-                    let mut vertices = vertices.to_vec();
-                    if is_right_handed_wedge(mesh, cell as usize) {
-                        vertices.reverse();
-                    }
-                    // A face has three vertices at least, so that it is always taken.
-                    if faces.push(cell_type, &vertices).is_ok() {
-                        owner_cells.push(cell);
-                    }
-                }
-            });
-        }
-        let global_faces = faces;
-
+        let BoundaryFaces { faces: mesh_faces, cells: owner_cells, .. } = boundary;
         let mut used = vec![false; mesh.points().len()];
-        for &vertex in global_faces.connectivity() {
+        for &vertex in mesh_faces.connectivity() {
             used[vertex as usize] = true;
         }
         let vertices: Vec<u32> = (0..used.len()).filter(|&vertex| used[vertex]).map(|vertex| vertex as u32).collect();
@@ -92,18 +66,25 @@ impl Surface {
             local[vertex as usize] = number as u32;
         }
         let points: Vec<Vector> = vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect();
-        let mut faces = renumbered(&global_faces, &local, |_| false);
-        // The faces of other volume cells are known to run the same way round.
-        if dimension == 2 || cells.types().contains(&CellType::Polyhedron) {
-            let turned = faces_to_turn(&points, &faces);
-            if turned.contains(&true) {
-                faces = renumbered(&global_faces, &local, |face| turned[face]);
-            }
+        let mut faces = renumbered(&mesh_faces, &local, |_| false);
+        if may_run_either_way(dimension, cells) {
+            turn_alike(&points, &mut faces);
         }
+        let tags = face_tags(mesh.features(), &mesh_faces);
+        Ok(Self::put_together(points, vertices, faces, owner_cells, tags.as_ref(), settings))
+    }
 
+    pub(super) fn put_together(
+        points: Vec<Vector>,
+        vertices: Vec<u32>,
+        faces: Cells,
+        owner_cells: Vec<u32>,
+        tags: Option<&FaceTags>,
+        settings: &FeatureSettings,
+    ) -> Self {
         let (triangles, triangle_faces) = split_into_triangles(&points, &faces);
-        let features = Features::find(mesh.features(), &global_faces, &points, &faces, settings);
-        Ok(Self { points, vertices, faces, owner_cells, triangles, triangle_faces, features })
+        let features = Features::of_tags(tags, &points, &faces, settings);
+        Self { points, vertices, faces, owner_cells, triangles, triangle_faces, features }
     }
 
     /// A surface from its parts, as those of another surface were sent from elsewhere: edits of it give what edits of that one
@@ -137,35 +118,7 @@ impl Surface {
         names: Vec<String>,
         face_features: Vec<u32>,
     ) -> Result<Self, SurfaceError> {
-        check_finite(&points)?;
-        if faces.is_empty() {
-            return Err(SurfaceError::NoBoundary);
-        }
-        if vertices.len() != points.len() {
-            return Err(MeshError::PointCount { found: points.len(), expected: vertices.len() }.into());
-        }
-        if let Some(place) = vertices.windows(2).position(|pair| pair[0] >= pair[1]) {
-            return Err(SurfaceError::VertexOrder { vertex: place + 1 });
-        }
-        faces.validate(points.len())?;
-        let mut referenced = vec![false; points.len()];
-        let mut sorted = Vec::new();
-        for (cell, (found, corners)) in faces.iter().enumerate() {
-            if !matches!(found, CellType::Triangle | CellType::Quad | CellType::Polygon) {
-                return Err(MeshError::CellType { cell, found, expected: "a face" }.into());
-            }
-            sorted.clear();
-            sorted.extend_from_slice(corners);
-            sorted.sort_unstable();
-            sorted.dedup();
-            if sorted.len() < corners.len() {
-                return Err(MeshError::VertexCount { cell, cell_type: found, found: sorted.len() }.into());
-            }
-            corners.iter().for_each(|&vertex| referenced[vertex as usize] = true);
-        }
-        if let Some(vertex) = referenced.iter().position(|referenced| !referenced) {
-            return Err(SurfaceError::Unreferenced { vertex });
-        }
+        check_parts(&points, &vertices, &faces)?;
         let features = Features::of_faces(names, face_features, &faces)?;
         let owner_cells = (0..faces.len() as u32).collect();
         let (triangles, triangle_faces) = split_into_triangles(&points, &faces);
@@ -194,7 +147,7 @@ impl Surface {
     /// ```
     pub fn with_sharp_features(mut self, settings: &FeatureSettings) -> Result<Self, SurfaceError> {
         settings.validate()?;
-        self.features = Features::find(&FeatureSource::SharpEdges, &self.faces, &self.points, &self.faces, settings);
+        self.features = Features::of_tags(None, &self.points, &self.faces, settings);
         Ok(self)
     }
 
@@ -290,16 +243,53 @@ fn renumbered(faces: &Cells, numbers: &[u32], is_turned: impl Fn(usize) -> bool)
     renumbered
 }
 
-/// Whether a cell is a wedge whose first triangle faces its second, as mesh generators number it, and not outwards, as VTK's
-/// manual has it: its faces then come out inside first.
-fn is_right_handed_wedge(mesh: &Mesh, cell: usize) -> bool {
-    if mesh.cells().cell_type(cell) != CellType::Wedge {
-        return false;
+/// Whether the faces of these cells may run one way or the other round: those of volume cells other than polyhedra are known to
+/// run the same way round.
+pub(super) fn may_run_either_way(dimension: usize, cells: &Cells) -> bool {
+    dimension == 2 || cells.types().contains(&CellType::Polyhedron)
+}
+
+/// Turns the faces that run the other way round than those around them.
+pub(super) fn turn_alike(points: &[Vector], faces: &mut Cells) {
+    let turned = faces_to_turn(points, faces);
+    if turned.contains(&true) {
+        let same: Vec<u32> = (0..points.len() as u32).collect();
+        *faces = renumbered(faces, &same, |face| turned[face]);
     }
-    let point = |place: usize| mesh.points()[mesh.cells().vertices(cell)[place] as usize];
-    let normal = cross(subtract(point(1), point(0)), subtract(point(2), point(0)));
-    let along: f64 = (0..3).map(|place| dot(normal, subtract(point(place + 3), point(place)))).sum();
-    along > 0.0
+}
+
+/// Refuses what makes no surface: `vertices` are the mesh vertices of the `points`, `faces` are by surface vertex numbers.
+pub(super) fn check_parts(points: &[Vector], vertices: &[u32], faces: &Cells) -> Result<(), SurfaceError> {
+    check_finite(points)?;
+    if faces.is_empty() {
+        return Err(SurfaceError::NoBoundary);
+    }
+    if vertices.len() != points.len() {
+        return Err(MeshError::PointCount { found: points.len(), expected: vertices.len() }.into());
+    }
+    if let Some(place) = vertices.windows(2).position(|pair| pair[0] >= pair[1]) {
+        return Err(SurfaceError::VertexOrder { vertex: place + 1 });
+    }
+    faces.validate(points.len())?;
+    let mut referenced = vec![false; points.len()];
+    let mut sorted = Vec::new();
+    for (cell, (found, corners)) in faces.iter().enumerate() {
+        if !matches!(found, CellType::Triangle | CellType::Quad | CellType::Polygon) {
+            return Err(MeshError::CellType { cell, found, expected: "a face" }.into());
+        }
+        sorted.clear();
+        sorted.extend_from_slice(corners);
+        sorted.sort_unstable();
+        sorted.dedup();
+        if sorted.len() < corners.len() {
+            return Err(MeshError::VertexCount { cell, cell_type: found, found: sorted.len() }.into());
+        }
+        corners.iter().for_each(|&vertex| referenced[vertex as usize] = true);
+    }
+    match referenced.iter().position(|referenced| !referenced) {
+        Some(vertex) => Err(SurfaceError::Unreferenced { vertex }),
+        None => Ok(()),
+    }
 }
 
 fn split_into_triangles(points: &[Vector], faces: &Cells) -> (Vec<[u32; 3]>, Vec<u32>) {

@@ -12,16 +12,22 @@ pub(super) struct CellFace {
     pub face: u32,
 }
 
-/// Faces of a mesh's highest dimension that belong to one cell only, in the order of the cells and of the faces in a cell.
+/// Faces of cells of this dimension that belong to one cell only, in the order of the cells and of the faces in a cell. Cells
+/// marked in `left_out` are none.
 ///
 /// A face of a collapsed cell (one that names a vertex twice) counts with its distinct vertices, and not at all where fewer than
 /// three are left.
-pub(super) fn boundary_faces(cells: &Cells, vertex_count: usize) -> Result<Vec<CellFace>, SurfaceError> {
-    let dimension = cells.dimension();
+pub(super) fn boundary_faces(
+    cells: &Cells,
+    vertex_count: usize,
+    dimension: usize,
+    left_out: Option<&[bool]>,
+) -> Result<Vec<CellFace>, SurfaceError> {
+    let counts = |cell: &usize| !left_out.is_some_and(|left_out| left_out.get(*cell).is_some_and(|&out| out));
     let mut starts = vec![0usize; vertex_count + 1];
     let mut buffer = FaceBuffer::default();
     let mut any_large = false;
-    for cell in 0..cells.len() {
+    for cell in (0..cells.len()).filter(counts) {
         buffer.for_each(cells, cell, dimension, |_, face| {
             any_large |= face.len() > 4;
             starts[face.iter().copied().min().unwrap_or(0) as usize + 1] += 1;
@@ -33,7 +39,7 @@ pub(super) fn boundary_faces(cells: &Cells, vertex_count: usize) -> Result<Vec<C
     // Faces are dealt into a bucket for each lowest vertex, so that all of it is linear in time and local in memory.
     let mut entries = vec![Entry::default(); starts[vertex_count]];
     let mut next = starts.clone();
-    for cell in 0..cells.len() {
+    for cell in (0..cells.len()).filter(counts) {
         buffer.for_each(cells, cell, dimension, |face, vertices| {
             let key = key(vertices);
             let slot = &mut next[key[0] as usize];

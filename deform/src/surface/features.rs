@@ -6,10 +6,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::SurfaceError;
-use super::faces::{TagLookup, most_frequent};
+use super::part::FaceTags;
 pub(super) use super::sharp_edges::Parts;
 use super::sharp_edges::parts_between_sharp_edges;
-use crate::mesh::{Cells, FeatureSource, MeshError, Vector};
+use crate::mesh::{Cells, MeshError, Vector};
 
 /// How features are found where the mesh does not name them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -68,25 +68,16 @@ pub struct FeatureSize {
 const UNTAGGED: &str = "untagged";
 
 impl Features {
-    /// `mesh_faces` and `faces` are the same faces by the vertex numbers of the mesh and of the surface.
-    pub(super) fn find(
-        source: &FeatureSource,
-        mesh_faces: &Cells,
+    /// The features that the tags of the faces name; where there are none, those between sharp edges.
+    pub(super) fn of_tags(
+        tags: Option<&FaceTags>,
         points: &[Vector],
         faces: &Cells,
         settings: &FeatureSettings,
     ) -> Self {
-        let (names, face_features) = match source {
-            FeatureSource::SharpEdges => sharp_features(points, faces, settings),
-            FeatureSource::Faces(tagged) => {
-                let lookup = TagLookup::new(&tagged.faces, &tagged.tags);
-                let tags = mesh_faces.iter().map(|(_, vertices)| lookup.get(vertices)).collect();
-                named_features(tags, &tagged.names)
-            }
-            FeatureSource::Vertices(tags) => {
-                let tags = mesh_faces.iter().map(|(_, vertices)| majority(tags, vertices)).collect();
-                named_features(tags, &[])
-            }
+        let (names, face_features) = match tags {
+            None => sharp_features(points, faces, settings),
+            Some(tags) => named_features(&tags.tags, &tags.names),
         };
         let (offsets, vertices) = feature_vertices(names.len(), &face_features, faces);
         Self { names, face_features, offsets, vertices }
@@ -204,12 +195,7 @@ fn near(name: &str, names: &[String]) -> Vec<String> {
     scored.into_iter().take(3).map(|(_, known)| known.clone()).collect()
 }
 
-/// The number that most of the vertices carry, the lowest on a tie.
-fn majority(tags: &[i64], vertices: &[u32]) -> Option<i64> {
-    most_frequent(vertices.iter().filter_map(|&vertex| tags.get(vertex as usize).copied()).collect())
-}
-
-fn named_features(tags: Vec<Option<i64>>, names: &[(i64, String)]) -> (Vec<String>, Vec<u32>) {
+fn named_features(tags: &[Option<i64>], names: &[(i64, String)]) -> (Vec<String>, Vec<u32>) {
     let given: HashMap<i64, &String> = names.iter().rev().map(|(tag, name)| (*tag, name)).collect();
     // In the order of the numbers, untagged last; numbers with one name are one feature.
     let mut order: BTreeMap<(bool, i64), u32> = tags.iter().map(|tag| ((tag.is_none(), tag.unwrap_or(0)), 0)).collect();

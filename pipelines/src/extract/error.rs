@@ -48,6 +48,9 @@ pub enum ExtractError {
     /// The cells are not those of a mesh.
     #[error(transparent)]
     Mesh(#[from] MeshError),
+    /// The parts that the ranks have do not make a mesh.
+    #[error(transparent)]
+    Distributed(#[from] crate::distributed::DistributedError),
     /// The mesh has no surface that could be taken.
     #[error(transparent)]
     Surface(#[from] SurfaceError),

@@ -56,7 +56,7 @@ pub(super) fn fields(
 }
 
 /// Refuses a field that has not one tuple for each vertex or cell.
-pub(super) fn check_length(channel: &Channel, view: &FieldView) -> Result<(), ExtractError> {
+pub(crate) fn check_length(channel: &Channel, view: &FieldView) -> Result<(), ExtractError> {
     let expected = match view.association {
         Association::Vertex => channel.mesh.points.len(),
         Association::Element => channel.mesh.cells.len(),

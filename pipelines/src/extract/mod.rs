@@ -5,13 +5,16 @@
 
 mod error;
 mod gather;
+mod merge;
 mod slice;
 mod source;
 mod statistics;
 
 pub use error::ExtractError;
+pub(crate) use gather::check_length;
+pub(crate) use merge::merged;
 pub use source::{Extracted, Source};
-pub use statistics::{FieldStatistics, statistics};
+pub use statistics::{FieldStatistics, statistics, statistics_of};
 
 use std::sync::Arc;
 

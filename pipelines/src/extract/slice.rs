@@ -44,19 +44,39 @@ pub(super) struct Cut {
 /// Cuts cells of dimension 3 to polygons and cells of dimension 2 to lines; others are passed over.
 ///
 /// A vertex in the plane counts to the side of the normal, so that a face in the plane is cut out once, by the cell behind it.
-pub(super) fn cut(cells: &Cells, points: &ArrayView, plane: &Slice, cycle: u64) -> Result<Cut, ExtractError> {
+///
+/// Cells for which `counts` does not hold are passed over. `furthest_of_all` makes of the distance of the furthest vertex from
+/// the plane that of all ranks, and is called whatever happens.
+pub(super) fn cut(
+    cells: &Cells,
+    points: &ArrayView,
+    plane: &Slice,
+    cycle: u64,
+    counts: &dyn Fn(usize) -> bool,
+    furthest_of_all: &dyn Fn(f64) -> f64,
+) -> Result<Cut, ExtractError> {
     let length = plane.normal.iter().fold(0.0_f64, |sum, x| sum.hypot(*x));
     let normal = plane.normal.map(|x| x / length);
     let mut distances = Vec::with_capacity(points.len());
     let mut furthest = 0.0_f64;
+    let mut fault = None;
     for vertex in 0..points.len() {
-        let at = point(points, vertex, cycle)?;
+        let at = match point(points, vertex, cycle) {
+            Ok(at) => at,
+            Err(error) => {
+                fault = Some(error);
+                break;
+            }
+        };
         let distance: f64 = (0..3).map(|axis| (at[axis] - plane.origin[axis]) * normal[axis]).sum();
         furthest = furthest.max(distance.abs());
         distances.push(distance);
     }
     // A vertex that is in the plane but for rounding is in the plane: slivers beside it would mean nothing.
-    let slack = 1e-12 * furthest;
+    let slack = 1e-12 * furthest_of_all(furthest);
+    if let Some(error) = fault {
+        return Err(error);
+    }
     for distance in &mut distances {
         if distance.abs() <= slack {
             *distance = 0.0;
@@ -71,7 +91,7 @@ pub(super) fn cut(cells: &Cells, points: &ArrayView, plane: &Slice, cycle: u64) 
         polygon: Vec::new(),
         cut: Cut { points: Vec::new(), crossings: Vec::new(), cells: Cells::new(), owners: Vec::new() },
     };
-    for cell in 0..cells.len() {
+    for cell in (0..cells.len()).filter(|&cell| counts(cell)) {
         let vertices = cells.vertices(cell);
         let first = is_ahead(distances[vertices[0] as usize]);
         if vertices.iter().all(|&vertex| is_ahead(distances[vertex as usize]) == first) {

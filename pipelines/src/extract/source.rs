@@ -8,6 +8,8 @@ use tombolo_deform::surface::{FeatureSettings, Surface};
 
 use super::gather::{self, Owners, Points};
 use super::{Association, Channel, Extract, ExtractError, ExtractFeatures, Field, slice};
+use crate::communicator::{Communicator, agree};
+use crate::distributed::{DistributedError, Part, PartBoundary, SharedVertices};
 use crate::language::Slice;
 
 /// An extract, and what was wrong with the fields that it lacks.
@@ -19,6 +21,19 @@ pub struct Extracted {
     pub owners: Arc<[u32]>,
     /// One error for each field that was wanted and could not be taken.
     pub errors: Vec<ExtractError>,
+    /// What its points are in the solver's mesh.
+    pub(crate) origin: Origin,
+}
+
+/// What the points of an extract are in the solver's mesh.
+#[derive(Debug, Clone)]
+pub(crate) enum Origin {
+    /// Those of the boundary.
+    Boundary,
+    /// Other vertices.
+    Vertices,
+    /// On edges between these vertices.
+    Edges(Vec<[u32; 2]>),
 }
 
 impl Extracted {
@@ -43,6 +58,21 @@ pub struct Source {
     key: Key,
     cells: Arc<Cells>,
     boundary: Option<Boundary>,
+    whole: Option<Box<Whole>>,
+}
+
+/// What a rank knows of a mesh of which it has a part.
+#[derive(Debug)]
+pub(crate) struct Whole {
+    ghosts: Option<Vec<bool>>,
+    /// The cells but the ghosts.
+    own: Cells,
+    pub(crate) shared: SharedVertices,
+    /// For each vertex whether other ranks have it too.
+    pub(crate) is_shared: Vec<bool>,
+    pub(crate) boundary: PartBoundary,
+    /// The surface of the whole mesh, on rank 0.
+    pub(crate) surface: Option<Boundary>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,12 +95,12 @@ impl Key {
 }
 
 #[derive(Debug)]
-struct Boundary {
+pub(crate) struct Boundary {
     surface: Arc<Surface>,
-    cells: Arc<Cells>,
-    vertices: Arc<[u32]>,
+    pub(crate) cells: Arc<Cells>,
+    pub(crate) vertices: Arc<[u32]>,
     owners: Arc<[u32]>,
-    features: Arc<ExtractFeatures>,
+    pub(crate) features: Arc<ExtractFeatures>,
 }
 
 impl Boundary {
@@ -88,6 +118,61 @@ impl Boundary {
     }
 }
 
+impl Whole {
+    fn is_ghost(&self, cell: usize) -> bool {
+        self.ghosts.as_ref().is_some_and(|ghosts| ghosts.get(cell).is_some_and(|&ghost| ghost))
+    }
+
+    /// What this rank has of the surface.
+    fn piece_of_surface(
+        &self,
+        channel: &Channel,
+        cycle: u64,
+        wanted: &dyn Fn(&str) -> bool,
+    ) -> Result<Extracted, ExtractError> {
+        let (vertices, faces) = (self.boundary.vertices(), self.boundary.faces());
+        let points = gather::points(&channel.mesh.points, vertices, cycle)?;
+        let from = Points::Vertices(vertices);
+        let (fields, errors) = gather::fields(channel, cycle, wanted, &from, &Owners::Cells(&faces.cells));
+        let cells = Cells::new();
+        let extract =
+            Extract { points, vertices: Some(vertices.into()), cells: Arc::new(cells), features: None, fields };
+        let owners = faces.cells.as_slice().into();
+        Ok(Extracted { extract: Arc::new(extract), owners, errors, origin: Origin::Boundary })
+    }
+
+    /// What this rank has of all cells.
+    fn piece(
+        &self,
+        channel: &Channel,
+        cycle: u64,
+        wanted: &dyn Fn(&str) -> bool,
+        cells: &Arc<Cells>,
+    ) -> Result<Extracted, ExtractError> {
+        #[expect(clippy::cast_possible_truncation, reason = "vertices and cells are numbered with 32 bits")]
+        let owners: Vec<u32> = (0..cells.len()).filter(|&cell| !self.is_ghost(cell)).map(|cell| cell as u32).collect();
+        // Vertices of ghosts alone, and what no cell has, are somebody else's.
+        let mut places = vec![u32::MAX; channel.mesh.points.len()];
+        self.own.connectivity().iter().for_each(|&vertex| places[vertex as usize] = 0);
+        let vertices: Vec<u32> =
+            (0..).zip(&places).filter(|(_, place)| **place == 0).map(|(vertex, _)| vertex).collect();
+        (0..).zip(&vertices).for_each(|(place, &vertex)| places[vertex as usize] = place);
+        let renumbered = |of: &[u32]| of.iter().map(|&vertex| places[vertex as usize]).collect::<Vec<u32>>();
+        let mut own = Cells::new();
+        for (cell, (cell_type, of_cell)) in self.own.iter().enumerate() {
+            match self.own.polyhedron_faces(cell) {
+                [] => own.push(cell_type, &renumbered(of_cell))?,
+                faces => own.push_polyhedron(&faces.iter().map(|face| renumbered(face)).collect::<Vec<_>>())?,
+            }
+        }
+        let points = gather::points(&channel.mesh.points, &vertices, cycle)?;
+        let from = Points::Vertices(&vertices);
+        let (fields, errors) = gather::fields(channel, cycle, wanted, &from, &Owners::Cells(&owners));
+        let extract = Extract { points, vertices: Some(vertices.into()), cells: Arc::new(own), features: None, fields };
+        Ok(Extracted { extract: Arc::new(extract), owners: owners.into(), errors, origin: Origin::Vertices })
+    }
+}
+
 impl Source {
     /// Copies and checks the cells of a channel.
     ///
@@ -96,7 +181,38 @@ impl Source {
     pub fn new(channel: &Channel) -> Result<Self, ExtractError> {
         let cells = channel.mesh.cells.to_cells()?;
         cells.validate(channel.mesh.points.len())?;
-        Ok(Self { key: Key::of(&channel.mesh), cells: Arc::new(cells), boundary: None })
+        Ok(Self { key: Key::of(&channel.mesh), cells: Arc::new(cells), boundary: None, whole: None })
+    }
+
+    /// The same of a channel of which each rank has a part. Extracts are then of the rank's part, its ghosts left out, and make
+    /// one on rank 0 when they are merged. Collective.
+    ///
+    /// # Errors
+    /// [`ExtractError::Distributed`], the same on all ranks.
+    pub fn distributed(channel: &Channel, communicator: &dyn Communicator) -> Result<Self, ExtractError> {
+        let part = agree(communicator, Part::of(&channel.mesh)).map_err(DistributedError::from)?;
+        let own = agree(communicator, part.own_cells()).map_err(DistributedError::from)?;
+        let (shared, boundary) = PartBoundary::find(communicator, &part, &FeatureSettings::default())?;
+        let mut is_shared = vec![false; part.points.len()];
+        shared.shared().for_each(|vertex| is_shared[vertex as usize] = true);
+        let surface = boundary.surface().map(|surface| Boundary::new(Arc::clone(surface)));
+        let whole = Whole { ghosts: part.ghosts, own, shared, is_shared, boundary, surface };
+        let key = Key::of(&channel.mesh);
+        Ok(Self { key, cells: Arc::new(part.cells), boundary: None, whole: Some(Box::new(whole)) })
+    }
+
+    /// What is known of the whole mesh where this is a part of one.
+    pub(crate) fn whole_mesh(&self) -> Option<&Whole> {
+        self.whole.as_deref()
+    }
+
+    /// Whether a vertex or cell counts to this rank: each counts to one.
+    #[must_use]
+    pub fn counts(&self, association: Association, entity: usize) -> bool {
+        self.whole.as_ref().is_none_or(|whole| match association {
+            Association::Element => !whole.is_ghost(entity),
+            Association::Vertex => u32::try_from(entity).is_ok_and(|vertex| whole.shared.owns(vertex)),
+        })
     }
 
     /// Whether the channel still has the cells that this was made of. Looks at no cell.
@@ -147,6 +263,9 @@ impl Source {
         cycle: u64,
         wanted: &dyn Fn(&str) -> bool,
     ) -> Result<Extracted, ExtractError> {
+        if let Some(whole) = &self.whole {
+            return whole.piece_of_surface(channel, cycle, wanted);
+        }
         let boundary = self.boundary(channel)?;
         let points = gather::points(&channel.mesh.points, &boundary.vertices, cycle)?;
         let from = Points::Vertices(&boundary.vertices);
@@ -158,12 +277,13 @@ impl Source {
             features: Some(Arc::clone(&boundary.features)),
             fields,
         };
-        Ok(Extracted { extract: Arc::new(extract), owners: Arc::clone(&boundary.owners), errors })
+        let owners = Arc::clone(&boundary.owners);
+        Ok(Extracted { extract: Arc::new(extract), owners, errors, origin: Origin::Boundary })
     }
 
     /// The cut of the mesh with a plane: polygons that turn counter-clockwise about its normal (lines where the mesh is a
     /// surface), vertex fields interpolated linearly along the cut edges, element fields carried over. Cells that share an edge
-    /// share its point.
+    /// share its point. `furthest_of_all` makes of a number the largest that any rank has; on one process it gives it back.
     ///
     /// # Errors
     /// [`ExtractError::PointNotFinite`]; fields as in [`surface`](Self::surface).
@@ -173,13 +293,16 @@ impl Source {
         plane: &Slice,
         cycle: u64,
         wanted: &dyn Fn(&str) -> bool,
+        furthest_of_all: &dyn Fn(f64) -> f64,
     ) -> Result<Extracted, ExtractError> {
-        let cut = slice::cut(&self.cells, &channel.mesh.points, plane, cycle)?;
+        let counts = |cell: usize| self.counts(Association::Element, cell);
+        let cut = slice::cut(&self.cells, &channel.mesh.points, plane, cycle, &counts, furthest_of_all)?;
         let from = Points::Crossings(&cut.crossings);
         let (fields, errors) = gather::fields(channel, cycle, wanted, &from, &Owners::Cells(&cut.owners));
         let extract =
             Extract { points: cut.points, vertices: None, cells: Arc::new(cut.cells), features: None, fields };
-        Ok(Extracted { extract: Arc::new(extract), owners: cut.owners.into(), errors })
+        let origin = Origin::Edges(cut.crossings.iter().map(|crossing| crossing.edge).collect());
+        Ok(Extracted { extract: Arc::new(extract), owners: cut.owners.into(), errors, origin })
     }
 
     /// The whole mesh.
@@ -192,6 +315,9 @@ impl Source {
         cycle: u64,
         wanted: &dyn Fn(&str) -> bool,
     ) -> Result<Extracted, ExtractError> {
+        if let Some(whole) = &self.whole {
+            return whole.piece(channel, cycle, wanted, &self.cells);
+        }
         let view = &channel.mesh.points;
         let points: Result<Vec<_>, _> = (0..view.len()).map(|vertex| gather::point(view, vertex, cycle)).collect();
         let (fields, errors) = gather::fields(channel, cycle, wanted, &Points::All, &Owners::All);
@@ -204,13 +330,15 @@ impl Source {
             features: None,
             fields,
         };
-        Ok(Extracted { extract: Arc::new(extract), owners: numbers(self.cells.len()), errors })
+        let owners = numbers(self.cells.len());
+        Ok(Extracted { extract: Arc::new(extract), owners, errors, origin: Origin::Vertices })
     }
 
     /// The quality of the cells at the present coordinates.
     #[must_use]
     pub fn quality(&self, channel: &Channel) -> Quality {
-        quality(&self.cells, &channel.mesh.points.to_vectors())
+        let cells = self.whole.as_ref().map_or(&*self.cells, |whole| &whole.own);
+        quality(cells, &channel.mesh.points.to_vectors())
     }
 
     /// The scaled Jacobian of each cell at the present coordinates, NaN for those that have none.

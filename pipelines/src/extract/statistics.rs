@@ -34,6 +34,16 @@ pub fn statistics(
     communicator: &dyn Communicator,
 ) -> Result<FieldStatistics, ExtractError> {
     check_length(channel, field)?;
+    Ok(statistics_of(field, communicator, &|_| true))
+}
+
+/// The same over the vertices or cells for which `counts` holds. Of a field that fits its mesh: there is nothing to go wrong, so
+/// that no rank waits for another.
+pub fn statistics_of(
+    field: &FieldView,
+    communicator: &dyn Communicator,
+    counts: &dyn Fn(usize) -> bool,
+) -> FieldStatistics {
     let values = &field.values;
     let (mut least, mut largest) = (f64::INFINITY, f64::NEG_INFINITY);
     let (mut sum, mut scaled_squares, mut count, mut non_finite) = (0.0, 0.0, 0.0_f64, 0.0_f64);
@@ -44,7 +54,7 @@ pub fn statistics(
     };
     // The squares of large values would overflow: they are taken of the values over the largest.
     let mut scale = 0.0_f64;
-    for tuple in 0..values.len() {
+    for tuple in (0..values.len()).filter(|&tuple| counts(tuple)) {
         let value = measure(tuple);
         if value.is_finite() {
             scale = scale.max(value.abs());
@@ -55,7 +65,7 @@ pub fn statistics(
     let scale = if widest[0] > 0.0 { widest[0] } else { 1.0 };
     for start in (0..values.len()).step_by(CHUNK) {
         let (mut part_sum, mut part_squares) = (0.0, 0.0);
-        for tuple in start..values.len().min(start + CHUNK) {
+        for tuple in (start..values.len().min(start + CHUNK)).filter(|&tuple| counts(tuple)) {
             let value = measure(tuple);
             if !value.is_finite() {
                 non_finite += 1.0;
@@ -81,12 +91,12 @@ pub fn statistics(
     let or_nan = |value: f64| if count > 0.0 { value } else { f64::NAN };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
     let non_finite = non_finite as u64;
-    Ok(FieldStatistics {
+    FieldStatistics {
         min: or_nan(-extremes[0]),
         max: or_nan(extremes[1]),
         mean: or_nan(sum / count * scale),
         l2: or_nan((scaled_squares / count).sqrt() * scale),
         non_finite,
         first_non_finite,
-    })
+    }
 }

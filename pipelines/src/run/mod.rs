@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use tombolo_deform::surface::Surface;
 
-use crate::communicator::{Communicator, Solo};
+use crate::communicator::{Communicator, Reduction, Solo, agree};
 use crate::extract::{Channel, ExtractError, Snapshot, Source};
 use crate::language::{Config, Due, Problem, Stage, Validate, nearest};
 use pipeline::Prepared;
@@ -102,7 +102,7 @@ impl Runner {
             }
             prepared.due.take(snapshot.cycle, snapshot.time);
             let name = prepared.pipeline.channel.as_deref();
-            match source(&mut self.sources, snapshot.channels, name) {
+            match source(&mut self.sources, snapshot.channels, name, &*self.communicator) {
                 Ok((channel, source)) => {
                     prepared.run(snapshot, channel, source, &*self.communicator, &mut outputs);
                 }
@@ -118,7 +118,7 @@ impl Runner {
     /// # Errors
     /// A text that names the channel or what is wrong with its mesh.
     pub fn surface(&mut self, channels: &[Channel], name: Option<&str>) -> Result<Arc<Surface>, String> {
-        let (channel, source) = source(&mut self.sources, channels, name)?;
+        let (channel, source) = source(&mut self.sources, channels, name, &*self.communicator)?;
         source.surface_of(channel).map_err(|error| error.to_string())
     }
 
@@ -132,7 +132,7 @@ impl Runner {
         name: Option<&str>,
         surface: Arc<Surface>,
     ) -> Result<(), String> {
-        let (_, source) = source(&mut self.sources, channels, name)?;
+        let (_, source) = source(&mut self.sources, channels, name, &*self.communicator)?;
         source.set_surface(surface);
         Ok(())
     }
@@ -143,18 +143,26 @@ fn source<'a, 'c>(
     sources: &'a mut HashMap<String, Source>,
     channels: &'c [Channel<'c>],
     name: Option<&str>,
+    communicator: &dyn Communicator,
 ) -> Result<(&'c Channel<'c>, &'a mut Source), String> {
-    let found = match name {
-        None => channels.first(),
-        Some(name) => channels.iter().find(|channel| channel.name == name),
-    };
-    let channel = found.ok_or_else(|| {
-        let known: Vec<&str> = channels.iter().map(|channel| channel.name).collect();
-        let Some(name) = name.filter(|_| !known.is_empty()) else { return "the solver has no channel".to_owned() };
-        let hint =
-            nearest(name, known.iter().copied()).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-        format!("the solver has no channel `{name}`; its channels are {}{hint}", known.join(", "))
-    })?;
+    let found = channel_of(channels, name);
+    if communicator.size() > 1 {
+        let channel = agree(communicator, found).map_err(|error| error.to_string())?;
+        // Taken anew where the cells of any rank have changed.
+        let is_of = sources.get(channel.name).is_some_and(|source| source.is_of(channel));
+        let mut changed = [f64::from(u8::from(!is_of))];
+        communicator.reduce(Reduction::Maximum, &mut changed);
+        if changed[0] > 0.0 {
+            let source = Source::distributed(channel, communicator);
+            let source = source.map_err(|error| format!("channel `{}`: {error}", channel.name))?;
+            sources.insert(channel.name.to_owned(), source);
+        }
+        return match sources.get_mut(channel.name) {
+            Some(source) => Ok((channel, source)),
+            None => Err(format!("channel `{}` is not known", channel.name)),
+        };
+    }
+    let channel = found?;
     let describe = |error: ExtractError| format!("channel `{}`: {error}", channel.name);
     if !sources.get(channel.name).is_some_and(|source| source.is_of(channel)) {
         sources.remove(channel.name);
@@ -166,4 +174,18 @@ fn source<'a, 'c>(
             Ok((channel, entry.insert(source)))
         }
     }
+}
+
+fn channel_of<'c>(channels: &'c [Channel<'c>], name: Option<&str>) -> Result<&'c Channel<'c>, String> {
+    let found = match name {
+        None => channels.first(),
+        Some(name) => channels.iter().find(|channel| channel.name == name),
+    };
+    found.ok_or_else(|| {
+        let known: Vec<&str> = channels.iter().map(|channel| channel.name).collect();
+        let Some(name) = name.filter(|_| !known.is_empty()) else { return "the solver has no channel".to_owned() };
+        let hint =
+            nearest(name, known.iter().copied()).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+        format!("the solver has no channel `{name}`; its channels are {}{hint}", known.join(", "))
+    })
 }

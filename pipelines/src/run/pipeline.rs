@@ -3,13 +3,15 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use tombolo_deform::surface::Edit;
+use tombolo_deform::{mesh::ArrayView, surface::Edit};
 
 use super::due::Clock;
 use super::output::{Frame, MonitorValues, Output};
-use crate::communicator::{Communicator, Reduction};
+use crate::communicator::{Communicator, Reduction, agree};
 use crate::expression::Expression;
-use crate::extract::{Channel, Extract, Extracted, Snapshot, Source, statistics};
+use crate::extract::{
+    Association, Channel, Extract, Extracted, FieldView, Snapshot, Source, check_length, merged, statistics_of,
+};
 use crate::language::{
     Action, Change, Order, OrderStage, Pipeline, Problem, Slice, Stage, StreamStage, Write, file_pattern,
     monitor_names, nearest,
@@ -45,6 +47,13 @@ struct Progress<'a> {
     edits: Vec<Edit>,
     errors: Vec<Keyed>,
     outputs: &'a mut Vec<Output>,
+}
+
+impl Progress<'_> {
+    /// Whether this rank has nothing of a mesh of which others have parts.
+    fn is_bare(&self) -> bool {
+        self.communicator.size() > 1 && self.channel.mesh.points.is_empty()
+    }
 }
 
 impl Prepared {
@@ -141,7 +150,7 @@ impl Prepared {
                 }
             }
         }
-        let errors = std::mem::take(&mut progress.errors);
+        let errors = errors_of_all(communicator, std::mem::take(&mut progress.errors));
         self.report(snapshot.cycle, errors, outputs);
     }
 
@@ -152,6 +161,9 @@ impl Prepared {
     /// Names selected fields that the channel does not have.
     fn check_selection(&self, progress: &mut Progress) {
         let Some(selected) = &self.selected else { return };
+        if progress.is_bare() {
+            return;
+        }
         let known = || progress.channel.fields.iter().map(|field| field.name);
         let mut missing: Vec<&String> =
             selected.iter().filter(|name| *name != QUALITY_FIELD && known().all(|known| known != *name)).collect();
@@ -191,7 +203,15 @@ impl Prepared {
         let (channel, cycle) = (progress.channel, progress.snapshot.cycle);
         let wanted = |field: &str| self.wants(field);
         let taken = match slice {
-            Some(plane) => progress.source.slice(channel, plane, cycle, &wanted),
+            Some(plane) => {
+                let communicator = progress.communicator;
+                let furthest_of_all = |furthest: f64| {
+                    let mut furthest = [furthest];
+                    communicator.reduce(Reduction::Maximum, &mut furthest);
+                    furthest[0]
+                };
+                progress.source.slice(channel, plane, cycle, &wanted, &furthest_of_all)
+            }
             None => progress.source.surface(channel, cycle, &wanted),
         };
         self.keep(taken, progress);
@@ -221,12 +241,13 @@ impl Prepared {
         let [mut cells, mut inverted] = [quality.cells as f64, quality.inverted as f64];
         let (mut min, mut max, mut mean) = (quality.min, quality.max, quality.mean);
         if progress.communicator.size() > 1 {
-            let mut extremes = [-min, max];
+            let none = quality.cells == 0;
+            let mut extremes = if none { [f64::NEG_INFINITY; 2] } else { [-min, max] };
             progress.communicator.reduce(Reduction::Maximum, &mut extremes);
             let mut sums = [cells, inverted, mean * cells];
             progress.communicator.reduce(Reduction::Sum, &mut sums);
-            (min, max) = (-extremes[0], extremes[1]);
             [cells, inverted] = [sums[0], sums[1]];
+            (min, max) = if cells > 0.0 { (-extremes[0], extremes[1]) } else { (1.0, 1.0) };
             mean = if cells > 0.0 { sums[2] / cells } else { 1.0 };
         }
         progress.values.extend([min, mean, max, inverted]);
@@ -239,14 +260,28 @@ impl Prepared {
     fn statistics(field: &str, progress: &mut Progress) {
         let cycle = progress.snapshot.cycle;
         let known = || progress.channel.fields.iter().map(|field| field.name);
-        let Some(view) = progress.channel.fields.iter().find(|view| view.name == field) else {
-            let message = format!("statistics: {}", unknown_field(field, known()));
-            progress.errors.push((format!("statistics {field}"), message));
-            progress.values.extend([f64::NAN; 5]);
-            return;
+        let found = progress.channel.fields.iter().find(|view| view.name == field);
+        // A rank with nothing of the mesh need not have its fields.
+        let none = FieldView { name: field, association: Association::Vertex, values: ArrayView::scalars(&[]) };
+        let view = match found {
+            None if progress.is_bare() => Ok(&none),
+            None => Err(format!("statistics: {}", unknown_field(field, known()))),
+            Some(view) => {
+                check_length(progress.channel, view).map(|()| view).map_err(|error| format!("statistics: {error}"))
+            }
         };
-        match statistics(progress.channel, view, progress.communicator) {
-            Ok(measured) => {
+        // Where one rank has nothing to measure, none measures.
+        let may_measure = agree(progress.communicator, view.as_ref().map(|_| ()));
+        match view {
+            Err(message) => {
+                progress.errors.push((format!("statistics {field}"), message));
+                progress.values.extend([f64::NAN; 5]);
+            }
+            Ok(_) if may_measure.is_err() => progress.values.extend([f64::NAN; 5]),
+            Ok(view) => {
+                let source = &*progress.source;
+                let counts = |entity: usize| source.counts(view.association, entity);
+                let measured = statistics_of(view, progress.communicator, &counts);
                 if let Some((entity, value)) = measured.first_non_finite {
                     let message = format!(
                         "cycle {cycle}: field `{field}` is not finite in {} places, first {value} at {} {entity}",
@@ -258,25 +293,22 @@ impl Prepared {
                 let non_finite = measured.non_finite as f64;
                 progress.values.extend([measured.min, measured.max, measured.mean, measured.l2, non_finite]);
             }
-            Err(error) => {
-                progress.errors.push((format!("statistics {field}"), format!("statistics: {error}")));
-                progress.values.extend([f64::NAN; 5]);
-            }
         }
     }
 
-    /// The extract to hand out; the whole mesh where no stage has taken one.
+    /// The extract to hand out; the whole mesh where no stage has taken one. Of several ranks rank 0 alone has one.
     fn finished(&self, progress: &mut Progress) -> Option<Arc<Extract>> {
-        if progress.extracted.is_none() {
-            let has_source = matches!(self.pipeline.stages.first(), Some(Stage::Surface {} | Stage::Slice(_)));
-            if has_source {
-                return None;
-            }
+        let has_source = matches!(self.pipeline.stages.first(), Some(Stage::Surface {} | Stage::Slice(_)));
+        if progress.extracted.is_none() && !has_source {
             let taken =
                 progress.source.whole(progress.channel, progress.snapshot.cycle, &|field: &str| self.wants(field));
             self.keep(taken, progress);
         }
-        progress.extracted.as_ref().map(|extracted| Arc::clone(&extracted.extract))
+        let Some(whole) = progress.source.whole_mesh() else {
+            return progress.extracted.as_ref().map(|extracted| Arc::clone(&extracted.extract));
+        };
+        // What is wrong where it could not be taken has been said there.
+        merged(progress.communicator, whole, progress.extracted.as_ref()).ok().flatten()
     }
 
     fn stream(&self, stage: &StreamStage, progress: &mut Progress) {
@@ -323,6 +355,25 @@ impl Prepared {
     fn stop(&self, progress: &mut Progress) {
         progress.outputs.push(Output::Stop { pipeline: Arc::clone(&self.name), reason: self.reason() });
     }
+}
+
+/// The errors of all ranks, on rank 0; the others have none. Collective.
+fn errors_of_all(communicator: &dyn Communicator, mut errors: Vec<Keyed>) -> Vec<Keyed> {
+    if communicator.size() == 1 {
+        return errors;
+    }
+    let mut any = [f64::from(u8::from(!errors.is_empty()))];
+    communicator.reduce(Reduction::Maximum, &mut any);
+    if any[0] == 0.0 {
+        return errors;
+    }
+    let own = if communicator.rank() == 0 { Vec::new() } else { std::mem::take(&mut errors) };
+    let told = communicator.gather(0, &serde_json::to_vec(&own).unwrap_or_default());
+    for (rank, bytes) in told.unwrap_or_default().into_iter().enumerate() {
+        let theirs: Vec<Keyed> = serde_json::from_slice(&bytes).unwrap_or_default();
+        errors.extend(theirs.into_iter().map(|(key, message)| (key, format!("rank {rank}: {message}"))));
+    }
+    errors
 }
 
 fn unknown_field<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -> String {

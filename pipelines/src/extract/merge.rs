@@ -1,0 +1,295 @@
+//! Extracts of the ranks, merged to one on rank 0.
+
+use std::{collections::HashMap, sync::Arc};
+
+use tombolo_deform::mesh::{CellType, Cells, Vector};
+
+use super::source::{Origin, Whole};
+use super::{Association, Extract, Extracted, Field};
+use crate::communicator::{Communicator, agree};
+use crate::distributed::{DistributedError, Reader, Writer};
+
+/// What one rank brings.
+struct Piece {
+    points: Vec<Vector>,
+    /// The points that other ranks may bring too, and what all of them call them: the vertices of the edge that they lie on.
+    named: Vec<(u32, [u32; 2])>,
+    cells: Cells,
+    fields: Vec<Field>,
+}
+
+/// The extract that the pieces of the ranks make, on rank 0. Points on the borders of the parts come once; of what several ranks
+/// have there, the lowest rank's holds. Collective.
+///
+/// A field is there where every rank that has vertices (or cells) in the extract brings it.
+///
+/// # Errors
+/// Where a rank has no piece; the same on all ranks.
+pub(crate) fn merged(
+    communicator: &dyn Communicator,
+    whole: &Whole,
+    extracted: Option<&Extracted>,
+) -> Result<Option<Arc<Extract>>, DistributedError> {
+    let piece = extracted.ok_or("it has no extract");
+    let piece = agree(communicator, piece)?;
+    let result = match &piece.origin {
+        Origin::Boundary => on_boundary(communicator, whole, piece),
+        Origin::Vertices | Origin::Edges(_) => anywhere(communicator, whole, piece),
+    };
+    Ok(agree(communicator, result)?)
+}
+
+/// Of the surface all is known but where it is and what the fields are.
+fn on_boundary(
+    communicator: &dyn Communicator,
+    whole: &Whole,
+    piece: &Extracted,
+) -> Result<Option<Arc<Extract>>, DistributedError> {
+    let extract = &piece.extract;
+    let owned: Vec<usize> = whole.boundary.owned_places().collect();
+    let mut message = Writer::default();
+    owned.iter().for_each(|&place| message.f64s(&extract.points[place]));
+    write_fields(&mut message, &extract.fields, &mut owned.iter().copied());
+    let gathered = communicator.gather(0, &message.into_bytes());
+    let (Some(root), Some(surface), Some(messages)) = (whole.boundary.root(), &whole.surface, gathered) else {
+        return Ok(None);
+    };
+    let mut points = vec![[0.0; 3]; surface.vertices.len()];
+    let mut merging = Fields::default();
+    for (rank, bytes) in messages.iter().enumerate() {
+        let mut reader = Reader::new(rank, bytes);
+        let (owned, faces) = (&root.owned[rank], &root.faces[rank]);
+        for &vertex in owned {
+            points[vertex as usize] = reader.vector()?;
+        }
+        let fields = read_fields(&mut reader, owned.len(), faces.len())?;
+        merging.add(fields, owned, faces);
+    }
+    Ok(Some(Arc::new(Extract {
+        fields: merging.finish(points.len(), surface.cells.len()),
+        points,
+        vertices: Some(Arc::clone(&surface.vertices)),
+        cells: Arc::clone(&surface.cells),
+        features: Some(Arc::clone(&surface.features)),
+    })))
+}
+
+/// Of other extracts nothing is known before.
+fn anywhere(
+    communicator: &dyn Communicator,
+    whole: &Whole,
+    piece: &Extracted,
+) -> Result<Option<Arc<Extract>>, DistributedError> {
+    let message = described(whole, piece);
+    let Some(messages) = communicator.gather(0, &message) else { return Ok(None) };
+    let mut points = Vec::new();
+    let mut cells = Cells::new();
+    let mut merging = Fields::default();
+    let mut by_name: HashMap<[u32; 2], u32> = HashMap::new();
+    let mut vertices = Vec::new();
+    for (rank, bytes) in messages.iter().enumerate() {
+        let piece = Piece::read(rank, bytes)?;
+        let mut numbers = vec![u32::MAX; piece.points.len()];
+        let mut names = piece.named.into_iter().peekable();
+        for (place, point) in (0..).zip(&piece.points) {
+            #[expect(clippy::cast_possible_truncation, reason = "points are numbered with 32 bits")]
+            let next = points.len() as u32;
+            let name = names.next_if(|(named, _)| *named == place).map(|(_, name)| name);
+            let number = match name {
+                Some(name) => *by_name.entry(name).or_insert(next),
+                None => next,
+            };
+            numbers[place as usize] = number;
+            if number == next {
+                points.push(*point);
+                vertices.push(name.map_or(u32::MAX, |name| name[0]));
+            }
+        }
+        let first_cell = cells.len();
+        let mut renumbered = Vec::new();
+        for (cell, (cell_type, of_cell)) in piece.cells.iter().enumerate() {
+            let renumber = |of: &[u32]| of.iter().map(|&point| numbers[point as usize]).collect::<Vec<u32>>();
+            match piece.cells.polyhedron_faces(cell) {
+                [] => {
+                    renumbered.clear();
+                    renumbered.extend(of_cell.iter().map(|&point| numbers[point as usize]));
+                    cells.push(cell_type, &renumbered)?;
+                }
+                faces => cells.push_polyhedron(&faces.iter().map(|face| renumber(face)).collect::<Vec<_>>())?,
+            }
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "cells are numbered with 32 bits")]
+        let places: Vec<u32> = (first_cell as u32..cells.len() as u32).collect();
+        merging.add(piece.fields, &numbers, &places);
+    }
+    let fields = merging.finish(points.len(), cells.len());
+    let vertices = matches!(piece.origin, Origin::Vertices).then(|| vertices.into());
+    Ok(Some(Arc::new(Extract { points, vertices, cells: Arc::new(cells), features: None, fields })))
+}
+
+/// A rank's piece as it is sent.
+fn described(whole: &Whole, piece: &Extracted) -> Vec<u8> {
+    let extract = &piece.extract;
+    let numbers = whole.shared.numbers();
+    let number = |vertex: u32| numbers[vertex as usize];
+    // Ends of an edge that other ranks have too are shared; of a vertex extract all are named, for its own sake.
+    let name = |place: usize| match &piece.origin {
+        Origin::Edges(edges) => {
+            let edge = edges[place].map(|vertex| vertex as usize);
+            edge.iter().all(|&vertex| whole.is_shared[vertex]).then(|| {
+                let [a, b] = edge.map(|vertex| numbers[vertex]);
+                [a.min(b), a.max(b)]
+            })
+        }
+        _ => extract.vertices.as_ref().map(|vertices| [number(vertices[place]); 2]),
+    };
+    let named: Vec<(usize, [u32; 2])> =
+        (0..extract.points.len()).filter_map(|place| Some((place, name(place)?))).collect();
+    let mut message = Writer::with_capacity(32 * extract.points.len() + 4 * extract.cells.connectivity().len());
+    message.u64(extract.points.len() as u64);
+    extract.points.iter().for_each(|point| message.f64s(point));
+    message.u64(named.len() as u64);
+    for (place, [a, b]) in named {
+        #[expect(clippy::cast_possible_truncation, reason = "points are numbered with 32 bits")]
+        message.u32(place as u32);
+        message.u32(a);
+        message.u32(b);
+    }
+    message.u64(extract.cells.len() as u64);
+    for (cell, (cell_type, vertices)) in extract.cells.iter().enumerate() {
+        message.u8(cell_type.vtk());
+        match extract.cells.polyhedron_faces(cell) {
+            [] => message.u32s(vertices),
+            faces => {
+                message.u64(faces.len() as u64);
+                faces.iter().for_each(|face| message.u32s(face));
+            }
+        }
+    }
+    write_fields(&mut message, &extract.fields, &mut (0..extract.points.len()));
+    message.into_bytes()
+}
+
+impl Piece {
+    fn read(rank: usize, bytes: &[u8]) -> Result<Self, DistributedError> {
+        let garbled = || DistributedError::Garbled { rank };
+        let mut reader = Reader::new(rank, bytes);
+        let count = reader.count(24)?;
+        let points = (0..count).map(|_| reader.vector()).collect::<Result<Vec<_>, _>>()?;
+        let count = reader.count(12)?;
+        let named = (0..count).map(|_| Ok((reader.u32()?, [reader.u32()?, reader.u32()?])));
+        let named = named.collect::<Result<Vec<_>, DistributedError>>()?;
+        let mut cells = Cells::new();
+        for _ in 0..reader.count(1)? {
+            match CellType::from_vtk(reader.u8()?).ok_or_else(garbled)? {
+                CellType::Polyhedron => {
+                    let faces = reader.count(8)?;
+                    cells.push_polyhedron(&(0..faces).map(|_| reader.u32s()).collect::<Result<Vec<_>, _>>()?)?;
+                }
+                cell_type => cells.push(cell_type, &reader.u32s()?)?,
+            }
+        }
+        cells.validate(points.len())?;
+        let fields = read_fields(&mut reader, points.len(), cells.len())?;
+        Ok(Self { points, named, cells, fields })
+    }
+}
+
+/// The fields, of the points only these.
+fn write_fields(message: &mut Writer, fields: &[Field], points: &mut (dyn ExactSizeIterator<Item = usize> + '_)) {
+    let points: Vec<usize> = points.collect();
+    message.u64(fields.len() as u64);
+    for field in fields {
+        message.text(&field.name);
+        message.u8(u8::from(field.association == Association::Element));
+        message.u64(field.components as u64);
+        match field.association {
+            Association::Element => message.f64s(&field.values),
+            Association::Vertex => {
+                for &point in &points {
+                    message.f64s(&field.values[point * field.components..(point + 1) * field.components]);
+                }
+            }
+        }
+    }
+}
+
+fn read_fields(reader: &mut Reader, points: usize, cells: usize) -> Result<Vec<Field>, DistributedError> {
+    (0..reader.count(17)?)
+        .map(|_| {
+            let name = reader.text()?;
+            let association = if reader.u8()? == 0 { Association::Vertex } else { Association::Element };
+            let components = usize::try_from(reader.u64()?).unwrap_or(usize::MAX);
+            let count = if association == Association::Vertex { points } else { cells };
+            let values = reader.f64s(count.saturating_mul(components))?;
+            Ok(Field { name, association, components, values })
+        })
+        .collect()
+}
+
+/// Fields that come together.
+#[derive(Default)]
+struct Fields {
+    /// Each with how many values were set.
+    fields: Vec<(Field, usize)>,
+    points: usize,
+    cells: usize,
+}
+
+impl Fields {
+    /// Takes in what one rank brings for these points and cells of the whole. What a lower rank brought for a point stays.
+    fn add(&mut self, fields: Vec<Field>, points: &[u32], cells: &[u32]) {
+        for field in fields {
+            let (places, before) = match field.association {
+                Association::Vertex => (points, self.points),
+                Association::Element => (cells, self.cells),
+            };
+            if places.is_empty() {
+                continue;
+            }
+            let same = |(known, _): &(Field, usize)| {
+                (&known.name, known.association, known.components) == (&field.name, field.association, field.components)
+            };
+            let known = match self.fields.iter().position(same) {
+                Some(known) => known,
+                None => {
+                    let Field { ref name, association, components, .. } = field;
+                    let empty = Field { name: name.clone(), association, components, values: Vec::new() };
+                    self.fields.push((empty, 0));
+                    self.fields.len() - 1
+                }
+            };
+            let (known, set) = &mut self.fields[known];
+            // Only a field that every rank before this one has brought can be whole.
+            if *set < before {
+                continue;
+            }
+            let components = known.components;
+            for (place, values) in places.iter().zip(field.values.chunks(components.max(1))) {
+                let start = *place as usize * components;
+                if known.values.len() < start + components {
+                    known.values.resize(start + components, f64::NAN);
+                }
+                if known.values[start].is_nan() {
+                    known.values[start..start + components].copy_from_slice(values);
+                }
+            }
+            *set = before + places.len();
+        }
+        self.points += points.len();
+        self.cells += cells.len();
+    }
+
+    /// Those that all ranks have brought.
+    fn finish(self, points: usize, cells: usize) -> Vec<Field> {
+        let (all_points, all_cells) = (self.points, self.cells);
+        let whole = |(field, set): (Field, usize)| {
+            let (brought, count) = match field.association {
+                Association::Vertex => (all_points, points),
+                Association::Element => (all_cells, cells),
+            };
+            (set == brought && field.values.len() == count * field.components).then_some(field)
+        };
+        self.fields.into_iter().filter_map(whole).collect()
+    }
+}
