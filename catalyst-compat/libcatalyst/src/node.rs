@@ -1,8 +1,9 @@
 //! The node: a tree of objects and lists whose leaves are arrays, owned or borrowed.
 //!
 //! Nodes live on the heap and stay where they are until they are removed, so that the addresses which the C interface hands out
-//! hold. A node knows its parent by address; whoever moves the contents of a node calls [`Node::adopt_children`].
+//! hold. A node knows its parent by address: each way to a child first tells the children where the node is now.
 
+use std::cell::Cell;
 use std::ptr::{self, NonNull};
 use std::sync::Arc;
 
@@ -20,7 +21,7 @@ struct Child {
 
 /// One node of a tree.
 pub struct Node {
-    parent: *const Node,
+    parent: Cell<*const Node>,
     pub(crate) datatype: Datatype,
     pub(crate) memory: Memory,
     children: Vec<Child>,
@@ -36,19 +37,24 @@ impl Node {
     /// An empty node without a parent.
     #[must_use]
     pub fn new() -> Self {
-        Self { parent: ptr::null(), datatype: Datatype::EMPTY, memory: Memory::Nothing, children: Vec::new() }
+        Self {
+            parent: Cell::new(ptr::null()),
+            datatype: Datatype::EMPTY,
+            memory: Memory::Nothing,
+            children: Vec::new(),
+        }
     }
 
     /// Whether no other node owns this one.
     #[must_use]
     pub fn is_root(&self) -> bool {
-        self.parent.is_null()
+        self.parent.get().is_null()
     }
 
     /// The node that owns this one; null for a root.
     #[must_use]
     pub fn parent(&self) -> *const Node {
-        self.parent
+        self.parent.get()
     }
 
     /// Type and layout.
@@ -72,12 +78,14 @@ impl Node {
     /// The child of a number.
     #[must_use]
     pub fn child(&self, index: usize) -> Option<&Node> {
+        self.settle();
         // SAFETY: children are owned by this node and live as long as it; the borrow of `self` keeps them from being changed.
         self.children.get(index).map(|child| unsafe { child.node.as_ref() })
     }
 
     /// The child of a number, to change it.
     pub fn child_mut(&mut self, index: usize) -> Option<&mut Node> {
+        self.settle();
         // SAFETY: as in `child`; the unique borrow of `self` makes this one unique.
         self.children.get_mut(index).map(|child| unsafe { child.node.as_mut() })
     }
@@ -90,6 +98,7 @@ impl Node {
 
     /// The children with their names, which are empty in a list.
     pub fn children(&self) -> impl Iterator<Item = (&str, &Node)> {
+        self.settle();
         // SAFETY: as in `child`.
         self.children.iter().map(|child| (child.name.as_str(), unsafe { child.node.as_ref() }))
     }
@@ -131,8 +140,9 @@ impl Node {
         if self.depth() >= DEEPEST {
             return Err(Error::new(format!("'{name}' would lie deeper than {DEEPEST} levels")));
         }
-        let mut node = Node::new();
-        node.parent = ptr::from_ref(self);
+        self.settle();
+        let node = Node::new();
+        node.parent.set(ptr::from_ref(self));
         let node = NonNull::from(Box::leak(Box::new(node)));
         self.children.push(Child { name: name.to_owned(), node });
         Ok(self.children.len() - 1)
@@ -166,11 +176,11 @@ impl Node {
     #[must_use]
     pub fn depth(&self) -> usize {
         let mut depth = 0;
-        let mut above = self.parent;
+        let mut above = self.parent.get();
         // SAFETY: a parent lives as long as its children; only addresses and the field `parent` are read.
         while let Some(node) = unsafe { above.as_ref() } {
             depth += 1;
-            above = node.parent;
+            above = node.parent.get();
         }
         depth
     }
@@ -190,7 +200,7 @@ impl Node {
             if ptr::eq(node, self) {
                 return true;
             }
-            above = node.parent;
+            above = node.parent.get();
         }
         false
     }
@@ -199,7 +209,7 @@ impl Node {
     #[must_use]
     pub fn name(&self) -> String {
         // SAFETY: as in `depth`.
-        let Some(parent) = (unsafe { self.parent.as_ref() }) else {
+        let Some(parent) = (unsafe { self.parent.get().as_ref() }) else {
             return String::new();
         };
         let Some(index) = parent.children.iter().position(|child| ptr::eq(child.node.as_ptr(), self)) else {
@@ -214,7 +224,7 @@ impl Node {
         let mut names = Vec::new();
         let mut node = self;
         // SAFETY: as in `depth`.
-        while let Some(parent) = unsafe { node.parent.as_ref() } {
+        while let Some(parent) = unsafe { node.parent.get().as_ref() } {
             names.push(node.name());
             node = parent;
         }
@@ -238,7 +248,7 @@ impl Node {
             any = true;
             node = match (name, node.kind()) {
                 // SAFETY: as in `depth`.
-                ("..", _) => unsafe { node.parent.as_ref() }?,
+                ("..", _) => unsafe { node.parent.get().as_ref() }?,
                 (_, Kind::List) => node.child(list_index(name)?)?,
                 _ => node.get(name)?,
             };
@@ -289,11 +299,12 @@ impl Node {
             any = true;
             // SAFETY: `node` is `self` or a node reached from it, live, and no other borrow of it is held in this loop.
             let here = unsafe { &mut *node };
+            here.settle();
             node = if name == ".." {
-                if here.parent.is_null() {
+                if here.parent.get().is_null() {
                     return Err(Error::new(format!("'{path}' goes above the root")));
                 }
-                here.parent.cast_mut()
+                here.parent.get().cast_mut()
             } else {
                 let listed = if here.kind() == Kind::List {
                     list_index(name).filter(|index| *index < here.count())
@@ -356,7 +367,7 @@ impl Node {
         if found.holds(self) {
             return Err(Error::new(format!("'{path}' would remove the node that it starts from")));
         }
-        let (found, owner) = (ptr::from_ref(found), found.parent.cast_mut());
+        let (found, owner) = (ptr::from_ref(found), found.parent.get().cast_mut());
         // SAFETY: the owner of a node that is there lives; `found` was only borrowed to be looked up.
         let Some(owner) = (unsafe { owner.as_mut() }) else {
             return Err(Error::new(format!("'{path}' is a root")));
@@ -389,12 +400,16 @@ impl Node {
         }
     }
 
-    /// Tells the children where their parent is, after the contents of a node have been moved.
-    pub(crate) fn adopt_children(&mut self) {
-        let parent = ptr::from_ref(self);
-        for child in &mut self.children {
-            // SAFETY: as in `child_mut`.
-            unsafe { child.node.as_mut() }.parent = parent;
+    /// Tells the children where their parent is, if this node has been moved since they were told.
+    fn settle(&self) {
+        let here = ptr::from_ref(self);
+        // SAFETY: children are owned by this node and live; only their cells are written.
+        let told = |child: &Child| unsafe { child.node.as_ref() }.parent.get();
+        if self.children.first().is_some_and(|first| !ptr::eq(told(first), here)) {
+            for child in &self.children {
+                // SAFETY: as above.
+                unsafe { child.node.as_ref() }.parent.set(here);
+            }
         }
     }
 
@@ -406,8 +421,8 @@ impl Node {
         std::mem::swap(&mut self.datatype, &mut other.datatype);
         std::mem::swap(&mut self.memory, &mut other.memory);
         std::mem::swap(&mut self.children, &mut other.children);
-        self.adopt_children();
-        other.adopt_children();
+        self.settle();
+        other.settle();
     }
 
     /// Takes over the contents of a node that is given away.

@@ -233,8 +233,11 @@ impl Layout {
         if self.data.is_null() {
             node.make_room(Datatype::compact(kind, elements))?;
         } else {
-            let fits =
-                |length: i64| datatype.offset >= 0 && datatype.stride >= 0 && end.is_some_and(|end| end <= length);
+            let fits = |length: i64| {
+                datatype.offset >= 0
+                    && datatype.stride >= datatype.element_bytes
+                    && end.is_some_and(|end| end <= length)
+            };
             if let Some(length) = self.length.filter(|length| !fits(*length)) {
                 let message =
                     format!("{elements} {} at {} reach beyond {length} bytes of data", kind.name(), datatype.offset);

@@ -13,6 +13,9 @@ pub struct Element {
     pub vertices: Vec<usize>,
 }
 
+/// The name of an axis, and the coordinates of points along it.
+pub type Axis = (String, Vec<f64>);
+
 /// Points, elements and fields of a domain.
 pub struct Domain<'a> {
     /// The name of the coordinate set.
@@ -20,7 +23,7 @@ pub struct Domain<'a> {
     /// The name of the topology.
     pub topology: String,
     /// The axes, each with the coordinates of all points along it.
-    pub axes: Vec<(String, Vec<f64>)>,
+    pub axes: Vec<Axis>,
     /// The elements.
     pub elements: Vec<Element>,
     /// Numbers of elements along `i`, `j`, `k` where the topology has them.
@@ -116,9 +119,9 @@ fn dims(node: &Node) -> Result<[usize; 3]> {
 
 /// The axes of a coordinate set with all coordinates, and the numbers of points along each, 1 where there is no such direction.
 #[expect(clippy::cast_precision_loss, reason = "no grid has so many points along one axis")]
-fn points(coordset: &Node) -> Result<(Vec<(String, Vec<f64>)>, [usize; 3])> {
+fn points(coordset: &Node) -> Result<(Vec<Axis>, [usize; 3])> {
     const NAMES: [&str; 3] = ["x", "y", "z"];
-    let along: Vec<(String, Vec<f64>)> = match text(coordset, "type")?.as_str() {
+    let along: Vec<Axis> = match text(coordset, "type")?.as_str() {
         "uniform" => {
             let dims = dims(coordset.existing("dims")?)?;
             let number = |path: String, otherwise: f64| {

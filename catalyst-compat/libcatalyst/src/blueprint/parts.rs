@@ -265,15 +265,16 @@ pub fn field(node: &Node, report: &mut Report) {
     }
     if by_material {
         report.text(node, "matset");
-        if let Some(values) = report.needed(node, "matset_values") {
-            if !values.kind().is_number() && values.count() == 0 {
-                report.wrong(values, &format!("values by material are expected, not {}", described(values)));
-            }
+        if let Some(values) = report.needed(node, "matset_values")
+            && !values.kind().is_number()
+            && values.count() == 0
+        {
+            report.wrong(values, &format!("values by material are expected, not {}", described(values)));
         }
     }
-    if node.get("values").is_some() || !by_material {
-        if let Some(values) = report.needed(node, "values") {
-            mcarray::verify_values(values, report);
-        }
+    if (node.get("values").is_some() || !by_material)
+        && let Some(values) = report.needed(node, "values")
+    {
+        mcarray::verify_values(values, report);
     }
 }
