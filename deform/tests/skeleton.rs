@@ -115,6 +115,57 @@ fn an_open_tube_has_its_axis() {
 }
 
 #[test]
+fn curves_end_in_the_middle_of_caps_round_or_flat() {
+    for (squeeze, reach) in [(1.0, 0.35..0.6), (0.5, 0.2..0.65)] {
+        let (points, triangles) = cubes(&(0..12).map(|x| [x, 0, 0]).collect::<Vec<_>>(), 6);
+        // A round tube of radius 0.5, or an elliptic one, with flat caps: squares become discs.
+        let round = |[x, y, z]: Vector| {
+            let [y, z] = [y - 0.5, z - 0.5];
+            let size = if y == 0.0 && z == 0.0 { 1.0 } else { y.abs().max(z.abs()) / y.hypot(z) };
+            [x, size * y, squeeze * size * z]
+        };
+        let skeleton = extract(&surface_of(points.into_iter().map(round).collect(), &triangles)).unwrap();
+        assert_eq!(counts(&skeleton), [1, 0, 0, 2]);
+        for &[x, y, z] in skeleton.nodes() {
+            assert!(y.hypot(z) < 0.1, "{x} {y} {z}");
+        }
+        for end in skeleton.curves()[0].ends().map(|end| skeleton.nodes()[end as usize]) {
+            let away = end[0].min(12.0 - end[0]);
+            assert!(reach.contains(&away), "{end:?} is {away} from the cap");
+        }
+    }
+}
+
+#[test]
+fn numbers_of_vertices_and_triangles_do_not_matter() {
+    let tee: Vec<[i32; 3]> = (-4..=4).map(|x| [x, 0, 0]).chain((1..=4).map(|y| [0, y, 0])).collect();
+    let (points, triangles) = cubes(&tee, 3);
+    let points: Vec<Vector> =
+        points.into_iter().enumerate().map(|(vertex, point)| noisy(point, vertex, 5, 0.1)).collect();
+    let skeleton = extract(&surface_of(points.clone(), &triangles)).unwrap();
+    for stride in [7, 1001] {
+        // A number without a factor in common with the counts visits all of them.
+        let number = |place: usize, count: usize| {
+            let stride = (stride..).find(|stride| (2..=*stride).all(|by| stride % by > 0 || count % by > 0)).unwrap();
+            place * stride % count
+        };
+        let mut shuffled = vec![[0.0; 3]; points.len()];
+        (0..points.len()).for_each(|vertex| shuffled[number(vertex, points.len())] = points[vertex]);
+        let mut turned = vec![[0; 3]; triangles.len()];
+        for (place, triangle) in triangles.iter().enumerate() {
+            let mut triangle = triangle.map(|vertex| number(vertex as usize, points.len()) as u32);
+            triangle.rotate_left(place % 3);
+            turned[number(place, triangles.len())] = triangle;
+        }
+        let other = extract(&surface_of(shuffled, &turned)).unwrap();
+        assert_eq!((other.nodes(), other.curves()), (skeleton.nodes(), skeleton.curves()));
+        for (vertex, node) in skeleton.node_of_vertex().iter().enumerate() {
+            assert_eq!(other.node_of_vertex()[number(vertex, points.len())], *node);
+        }
+    }
+}
+
+#[test]
 fn holes_become_loops_and_a_crossing_becomes_a_branch_node() {
     for holes in 0..4 {
         let (points, triangles) = cubes(&ladder(holes), 4);

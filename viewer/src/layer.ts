@@ -48,6 +48,11 @@ export class Piece {
     this.data.modified();
   }
 
+  setPoints(points: Uint32Array): void {
+    this.data.setVerts(vtkCellArray.newInstance({ values: cells(points, 1) }));
+    this.data.modified();
+  }
+
   setLines(lines: Uint32Array): void {
     this.data.setLines(vtkCellArray.newInstance({ values: cells(lines, 2) }));
     this.data.modified();

@@ -274,8 +274,14 @@ selection.onChange(() => {
   preview.chosen();
   forecasts.changed(wished());
 });
-watchDrags(part("stage"), scene, selection, (by) => {
-  if (form.compose("translate", { by })) composed();
+watchDrags(part("stage"), scene, selection, (by, node) => {
+  if (node ? form.compose("skeleton", { at: node, by }) : form.compose("translate", { by })) composed();
+});
+part("skeleton").addEventListener("click", (event) => {
+  const button = event.currentTarget as HTMLButtonElement;
+  const shown = button.getAttribute("aria-pressed") !== "true";
+  button.setAttribute("aria-pressed", String(shown));
+  preview.showSkeleton(shown);
 });
 
 publish({
@@ -301,6 +307,10 @@ publish({
   get preview() { return preview.inspect(); },
   get forecast() { return forecasts.inspect(); },
   get errors() { return [...errors]; },
+  get skeleton() {
+    const bones = scene.shownBones;
+    return bones && { nodes: bones.now.length / 3, segments: bones.segments.length / 2, places: scene.nodePlaces() };
+  },
   featureBounds: (name) => scene.featureBounds(name),
   featurePlace: (name) => scene.featurePlace(name),
 });

@@ -18,6 +18,7 @@ export class PreviewPanel {
   private seen: PreviewInspection = NOTHING;
   private points: Float32Array = new Float32Array(0);
   private text = "";
+  private bones = false;
 
   /** `edits` reads the form; it throws an `InputError` as long as something is missing there. */
   constructor(private readonly scene: Scene, private readonly address: string, private readonly edits: () => Json[]) {}
@@ -28,6 +29,7 @@ export class PreviewPanel {
     this.surface = surface;
     this.stack = stack;
     this.preview?.offer(surface);
+    if (moved && this.bones) this.showSkeleton(true);
     if (moved && this.shown !== "") {
       this.shown = "";
       this.changed();
@@ -62,6 +64,13 @@ export class PreviewPanel {
     else this.cleared();
   }
 
+  /** Shows the skeleton, by which the shape can be dragged, or takes it away. */
+  showSkeleton(shown: boolean): void {
+    this.bones = shown;
+    if (shown) this.started().skeleton(this.stack);
+    else this.scene.setBones(null);
+  }
+
   inspect(): PreviewInspection {
     return { ...this.seen, bounds: this.scene.previewBounds };
   }
@@ -74,6 +83,11 @@ export class PreviewPanel {
       surface: (surface) => this.scene.setPreviewSurface(surface),
       shape: (shape) => this.take(shape),
       checked: (faults) => this.judge(faults),
+      skeleton: (bones, reason) => {
+        if (!this.bones) return;
+        this.scene.setBones(bones);
+        if (bones === null) this.say("failed", `No skeleton: ${reason}`);
+      },
       failed: (_, reason) => this.fail(reason),
       cleared: () => this.cleared(),
     });

@@ -7,6 +7,7 @@
 import type { Json, SurfaceInformation } from "./protocol";
 import type { FailureKind, ShapeFaults } from "./kernel";
 import type { PreviewAnswer, PreviewRequest } from "./preview.worker";
+import type { Bones } from "./skeleton";
 
 /** What computes: a Worker, or something that looks like one in a test. */
 export interface PreviewWorker {
@@ -26,6 +27,8 @@ export interface PreviewEvents {
   shape(shape: PreviewShape): void;
   /** What is wrong with the shape that was shown last; null where it is sound. */
   checked(faults: ShapeFaults | null): void;
+  /** The skeleton that was asked for; or why there is none. */
+  skeleton(bones: Bones | null, reason: string): void;
   /** An edit that cannot be previewed, or nothing to preview it with. */
   failed(kind: FailureKind | "surface-missing", reason: string): void;
   cleared(): void;
@@ -40,6 +43,7 @@ export class Preview {
   private known: string | null = null;
   private state: "absent" | "fetching" | "ready" = "absent";
   private waiting: Wish | null = null;
+  private wanted: Json[] | null = null;
   private computing: { number: number; at: number } | null = null;
   private number = 0;
   private resting: ReturnType<typeof setTimeout> | undefined;
@@ -58,7 +62,15 @@ export class Preview {
     if (id === this.known) return;
     this.known = id;
     this.state = "absent";
+    this.wanted = null;
     this.clear();
+  }
+
+  /** Asks for the skeleton of the shape that `stack` has made. */
+  skeleton(stack: Json[]): void {
+    if (this.known === null) return this.events.skeleton(null, "the simulation has no reference surface");
+    this.wanted = stack;
+    this.next();
   }
 
   /** Whether there is a surface to preview edits of. */
@@ -83,6 +95,13 @@ export class Preview {
   }
 
   private next(): void {
+    if (this.wanted !== null) {
+      if (this.state === "absent") return void this.fetch();
+      if (this.state === "ready" && this.known !== null) {
+        this.worker.postMessage({ skeleton: this.known, stack: this.wanted }, []);
+        this.wanted = null;
+      }
+    }
     if (this.waiting === null || this.computing !== null) return;
     if (this.state === "absent") void this.fetch();
     if (this.state !== "ready") return;
@@ -115,6 +134,8 @@ export class Preview {
   private without(kind: FailureKind | "surface-missing", reason: string): void {
     this.state = "absent";
     this.waiting = null;
+    if (this.wanted !== null) this.events.skeleton(null, reason);
+    this.wanted = null;
     this.events.failed(kind, reason);
   }
 
@@ -124,6 +145,10 @@ export class Preview {
       if ("error" in answer) return this.without(answer.kind, answer.error);
       this.state = "ready";
       this.events.surface(answer.surface);
+    } else if ("skeleton" in answer) {
+      if (answer.skeleton !== this.known) return;
+      if ("error" in answer) this.events.skeleton(null, answer.error);
+      else this.events.skeleton(answer.bones, "");
     } else if ("check" in answer) {
       this.computing = null;
       if (answer.check === this.number && this.waiting === null) this.events.checked(answer.faults);

@@ -1,7 +1,9 @@
 /** Computes previews of edits away from the thread that draws. */
 import { Kernel, KernelError } from "./kernel";
-import type { FailureKind, KernelSurface, ShapeFaults, SurfaceDescription } from "./kernel";
+import type { FailureKind, KernelSurface, ShapeFaults, SkeletonDescription, SurfaceDescription } from "./kernel";
 import type { Json } from "./protocol";
+import { segmentsOf } from "./skeleton";
+import type { Bones } from "./skeleton";
 
 export type PreviewRequest =
   /** A reference surface, as the server sends it. */
@@ -9,12 +11,16 @@ export type PreviewRequest =
   /** The edits that the shape has now, and those to be previewed with them. */
   | { number: number; stack: Json[]; edits: Json[] }
   /** Whether the shape of the last preview is sound. */
-  | { check: number };
+  | { check: number }
+  /** The skeleton of the surface that is open, and where these edits have brought it. */
+  | { skeleton: string; stack: Json[] };
 
 export type PreviewAnswer =
   | { id: string; surface: Pick<SurfaceDescription, "triangles" | "triangleFeatures" | "features"> }
   | { number: number; points: Float32Array; largest: number; milliseconds: number }
   | { check: number; faults: ShapeFaults | null }
+  | { skeleton: string; bones: Bones }
+  | { skeleton: string; kind: FailureKind; error: string }
   | { number: number; kind: FailureKind; error: string }
   | { id: string; kind: FailureKind; error: string };
 
@@ -48,6 +54,11 @@ async function answer(request: PreviewRequest): Promise<void> {
   const start = performance.now();
   const stack = JSON.stringify(request.stack);
   if (now.stack !== stack) now = { stack, displacement: surface.displacement(request.stack) };
+  if ("skeleton" in request) {
+    const bones = bonesOf(surface.skeleton(), now.displacement);
+    worker.postMessage({ skeleton: request.skeleton, bones }, []);
+    return;
+  }
   const displacement = surface.displacement([...request.stack, ...request.edits]);
   const points = new Float32Array(displacement.length);
   let largest = 0;
@@ -62,12 +73,25 @@ async function answer(request: PreviewRequest): Promise<void> {
   worker.postMessage({ number: request.number, points, largest: Math.sqrt(largest), milliseconds: performance.now() - start }, [points.buffer]);
 }
 
+/** A skeleton, each node moved by the mean of what the vertices that it carries have moved. */
+function bonesOf({ nodes, curves, nodeOfVertex }: SkeletonDescription, displacement: Float64Array): Bones {
+  const moved = new Float64Array(nodes.length);
+  const carried = new Uint32Array(nodes.length / 3);
+  nodeOfVertex.forEach((node, vertex) => {
+    carried[node]!++;
+    for (let k = 0; k < 3; k++) moved[3 * node + k]! += displacement[3 * vertex + k]!;
+  });
+  const now = Float32Array.from(nodes, (value, i) => value + moved[i]! / Math.max(1, carried[Math.floor(i / 3)]!));
+  return { reference: nodes, now, ...segmentsOf(curves, carried.length) };
+}
+
 // One after the other: an answer is there before the next question is looked at.
 let last = Promise.resolve();
 worker.onmessage = ({ data }) => {
   last = last.then(() => answer(data)).catch((error: unknown) => {
     const kind = error instanceof KernelError ? error.kind : "trap";
-    const which = "number" in data ? { number: data.number } : "check" in data ? { number: data.check } : { id: data.id };
+    const which = "number" in data ? { number: data.number } : "check" in data ? { number: data.check }
+      : "skeleton" in data ? { skeleton: data.skeleton } : { id: data.id };
     worker.postMessage({ ...which, kind, error: error instanceof Error ? error.message : String(error) }, []);
   });
 };

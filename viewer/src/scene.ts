@@ -6,6 +6,7 @@ import vtkRenderWindowInteractor from "@kitware/vtk.js/Rendering/Core/RenderWind
 import vtkInteractorStyleTrackballCamera from "@kitware/vtk.js/Interaction/Style/InteractorStyleTrackballCamera";
 import vtkColorTransferFunction from "@kitware/vtk.js/Rendering/Core/ColorTransferFunction";
 import vtkOpenGLRenderWindow from "@kitware/vtk.js/Rendering/OpenGL/RenderWindow";
+import { BonesPicture } from "./bones";
 import type { ColourMap, Colouring } from "./colour";
 import { Ghost } from "./ghost";
 import { Layer } from "./layer";
@@ -13,6 +14,8 @@ import { bounds, firstTriangle } from "./picking";
 import type { PreviewSurface } from "./preview";
 import type { DataFrame, TopologyFrame, Vector, ViewInformation } from "./protocol";
 import type { Selection } from "./selection";
+import { REACH, nearestWithin } from "./skeleton";
+import type { Bones } from "./skeleton";
 
 const BACKGROUND: Vector = [0.086, 0.094, 0.106];
 
@@ -36,6 +39,7 @@ export class Scene {
   private readonly colours = vtkColorTransferFunction.newInstance();
   private readonly pending = new Map<string, DataFrame>();
   private readonly ghost: Ghost;
+  private readonly bones: BonesPicture;
   private features: string[] = [];
   private colouring: Colouring | null = null;
   private locked: [number, number] | null = null;
@@ -64,6 +68,14 @@ export class Scene {
     new ResizeObserver(() => this.resize()).observe(container);
     selection.onChange(() => this.request());
     this.ghost = new Ghost(this.renderer);
+    // What lies in the middle of a shape would be hidden by it.
+    const above = vtkRenderer.newInstance();
+    above.setLayer(1);
+    above.setInteractive(false);
+    above.setActiveCamera(this.renderer.getActiveCamera());
+    this.window.setNumberOfLayers(2);
+    this.window.addRenderer(above);
+    this.bones = new BonesPicture(above);
     this.resize();
   }
 
@@ -77,6 +89,46 @@ export class Scene {
   setPreview(points: Float32Array | null, broken?: Uint32Array, drawn?: () => void): void {
     this.ghost.setPoints(points, broken);
     this.request(drawn);
+  }
+
+  /** Shows a skeleton; null takes it away. */
+  setBones(bones: Bones | null): void {
+    this.bones.show(bones);
+    this.request();
+  }
+
+  get shownBones(): Bones | null {
+    return this.bones.shown;
+  }
+
+  /** Marks the place that a node is dragged to; null for none. */
+  holdNode(place: Vector | null): void {
+    this.bones.hold(place);
+    this.request();
+  }
+
+  /** The node under a place of the page that can be dragged: where it is now, and where in the reference. Null when there is none. */
+  nodeAt(clientX: number, clientY: number): { now: Vector; reference: Vector } | null {
+    const free = this.bones.shown?.free;
+    if (!free) return null;
+    const places = new Float32Array(2 * free.length);
+    free.forEach((node, i) => places.set(this.onPage(this.bones.node(node)?.now ?? [NaN, NaN, NaN]), 2 * i));
+    const found = nearestWithin(places, clientX, clientY, REACH);
+    return found < 0 ? null : this.bones.node(free[found]!);
+  }
+
+  /** The place of the page at which a point is drawn. */
+  private onPage(point: Vector): [number, number] {
+    const box = this.container.getBoundingClientRect();
+    const [width, height] = this.canvas.getSize();
+    const place = this.canvas.worldToDisplay(...point, this.renderer) as Vector;
+    return [box.left + (place[0] / width) * box.width, box.top + (1 - place[1] / height) * box.height];
+  }
+
+  /** The places of the page of the nodes that can be dragged. */
+  nodePlaces(): [number, number][] {
+    const free = this.bones.shown?.free ?? new Uint32Array(0);
+    return Array.from(free, (node) => this.onPage(this.bones.node(node)?.now ?? [NaN, NaN, NaN]));
   }
 
   /** The box around the preview that is drawn; null when there is none. */
@@ -217,8 +269,6 @@ export class Scene {
   /** A place of the page at which this feature is seen and would be picked; null when nothing of it is. */
   featurePlace(name: string): [number, number] | null {
     const number = this.features.indexOf(name);
-    const box = this.container.getBoundingClientRect();
-    const [width, height] = this.canvas.getSize();
     for (const { topology, coordinates } of this.layers.values()) {
       if (!topology?.triangleFeatures || coordinates.length !== topology.points * 3) continue;
       const own = [...topology.triangleFeatures.keys()].filter((triangle) => topology.triangleFeatures?.[triangle] === number);
@@ -226,9 +276,7 @@ export class Scene {
       for (let i = Math.floor(stride / 2); i < own.length; i += stride) {
         const corner = (k: number, axis: number): number => coordinates[3 * topology.triangles[3 * own[i]! + k]! + axis]!;
         const middle = [0, 1, 2].map((axis) => (corner(0, axis) + corner(1, axis) + corner(2, axis)) / 3);
-        const place = this.canvas.worldToDisplay(middle[0]!, middle[1]!, middle[2]!, this.renderer) as Vector;
-        const x = box.left + (place[0] / width) * box.width;
-        const y = box.top + (1 - place[1] / height) * box.height;
+        const [x, y] = this.onPage(middle as Vector);
         if (this.featureAt(x, y) === name && document.elementFromPoint(x, y)?.closest("#scene")) return [x, y];
       }
     }

@@ -80,6 +80,40 @@ describe("the geometry kernel as a module", () => {
     expect(surface.displacement(move([1, 0, 0])).some((value) => value === 1)).toBe(true);
   });
 
+  it("finds the skeleton of a tube, and says that a sheet has none", () => {
+    const RINGS = 30, AROUND = 16;
+    const points: number[] = [], facePoints: number[] = [];
+    for (let ring = 0; ring < RINGS; ring++) for (let k = 0; k < AROUND; k++) {
+      const turn = (2 * Math.PI * k) / AROUND;
+      points.push(0.2 * ring, 0.5 * Math.cos(turn), 0.5 * Math.sin(turn));
+      const next = (k + 1) % AROUND;
+      if (ring > 0) facePoints.push((ring - 1) * AROUND + k, ring * AROUND + k, ring * AROUND + next, (ring - 1) * AROUND + next);
+    }
+    const faces = facePoints.length / 4;
+    const surface = kernel.createSurface({
+      points: Float64Array.from(points), vertices: Uint32Array.from({ length: points.length / 3 }, (_, i) => i),
+      faceSizes: new Uint32Array(faces).fill(4), facePoints: Uint32Array.from(facePoints),
+      faceFeatures: new Uint32Array(faces), features: ["wall"],
+    });
+    const { nodes, curves, nodeOfVertex } = surface.skeleton();
+    expect(curves.length).toBe(1);
+    expect([...curves[0]!].sort((a, b) => a - b)).toEqual(Array.from({ length: nodes.length / 3 }, (_, i) => i));
+    expect(nodeOfVertex.length).toBe(points.length / 3);
+    expect(Math.max(...nodeOfVertex)).toBeLessThan(nodes.length / 3);
+    for (let i = 0; i < nodes.length; i += 3) expect(Math.hypot(nodes[i + 1]!, nodes[i + 2]!)).toBeLessThan(0.1);
+    const middle = nodes.findIndex((x, i) => i % 3 === 0 && Math.abs(x - 2.9) < 0.3);
+    const bent = surface.displacement([{ skeleton: { at: [...nodes.subarray(middle, middle + 3)], by: [0, 0.5, 0] } }]);
+    expect(Math.max(...bent.filter((_, i) => i % 3 === 1))).toBeGreaterThan(0.45);
+    expect(surface.check()).toBeNull();
+    surface.displacement([{ skeleton: { at: [...nodes.subarray(middle, middle + 3)], by: [0, 0, 0] } }, { scale_direction: {
+      features: ["wall"], region: { sphere: { center: [2.9, 0.5, 0], radius: 0.4 } }, fixed_region: { half_space: { origin: [1, 0, 0], normal: [-1, 0, 0] } }, factors: [-1, 1, 1] } }]);
+    expect(surface.check()?.triangles.length).toBeGreaterThan(0);
+    const plate = { ...sheet(), points: sheet().points.map((value, i) => (i % 3 === 2 ? 0 : value)) };
+    const none = failure(() => kernel.createSurface(plate).skeleton());
+    expect([none.kind, none.message]).toEqual(["skeleton", expect.stringMatching(/encloses no volume/)]);
+    surface.close();
+  });
+
   it("survives its own failure", () => {
     const surface = kernel.createSurface(sheet());
     const before = surface.displacement(move([0, 0, 0.25]));

@@ -18,6 +18,7 @@ function setUp(fetchSurface = async () => new ArrayBuffer(8)) {
   }, {
     surface: () => heard.push("surface"), shape: ({ largest }) => heard.push(`shape ${largest}`),
     checked: (faults) => heard.push(`checked ${faults?.text ?? "sound"}`),
+    skeleton: (bones, reason) => heard.push(bones ? `skeleton ${bones.free.length}` : `no skeleton: ${reason}`),
     failed: (kind, reason) => heard.push(`${kind}: ${reason}`), cleared: () => heard.push("cleared"),
   });
   const answer = (data: PreviewAnswer): void => worker.onmessage?.({ data } as MessageEvent<PreviewAnswer>);
@@ -125,5 +126,25 @@ describe("the preview", () => {
     opened("a");
     work();
     expect(heard.at(-1)).toBe("shape 3");
+  });
+
+  it("asks for the skeleton once the surface is there, and says why there is none", async () => {
+    const { preview, asked, heard, answer, opened, fetched } = setUp();
+    preview.skeleton([]);
+    expect(heard).toEqual(["no skeleton: the simulation has no reference surface"]);
+    preview.offer(A);
+    preview.skeleton(edit(1));
+    preview.skeleton(edit(2));
+    await settled();
+    expect(asked.some((request) => "skeleton" in request)).toBe(false);
+    opened("a");
+    expect(asked.at(-1)).toEqual({ skeleton: "a", stack: edit(2) });
+    heard.length = 0;
+    answer({ skeleton: "b", kind: "skeleton", error: "of another surface" });
+    answer({ skeleton: "a", bones: { reference: new Float64Array(9), now: new Float32Array(9), segments: Uint32Array.of(0, 1, 1, 2), free: Uint32Array.of(1) } });
+    preview.skeleton([]);
+    answer({ skeleton: "a", kind: "skeleton", error: "it is flat" });
+    expect(heard).toEqual(["skeleton 1", "no skeleton: it is flat"]);
+    expect(fetched()).toBe(1);
   });
 });

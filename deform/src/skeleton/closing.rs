@@ -56,39 +56,131 @@ impl Frame {
 const FLAT: f64 = 1e-7;
 
 pub(super) fn closed_pieces(surface: &Surface) -> Result<Vec<Piece>, SkeletonError> {
-    let triangles: Vec<[u32; 3]> =
-        surface.triangles().iter().copied().filter(|[a, b, c]| a != b && b != c && c != a).collect();
+    let Ordered { points, vertices, mut triangles } = Ordered::new(surface);
     if triangles.is_empty() {
         return Err(SkeletonError::NoTriangles);
     }
-    let joined = join_open_edges(surface.points(), &triangles);
-    let mut triangles: Vec<[u32; 3]> =
-        triangles.iter().map(|triangle| triangle.map(|vertex| joined[vertex as usize])).collect();
-    triangles.retain(|[a, b, c]| a != b && b != c && c != a);
-    let twins = twins(surface, &triangles)?;
-    let piece_of = orient(surface, &mut triangles, &twins)?;
-    // Orientation may have turned triangles, and with them the order of their sides.
-    let twins = self::twins(surface, &triangles)?;
+    let mesh_vertex = |vertex: u32| surface.vertices()[vertices[vertex as usize] as usize];
+    let joined = join_open_edges(&points, &triangles);
+    if joined.iter().zip(0u32..).any(|(&into, vertex)| into != vertex) {
+        triangles.iter_mut().for_each(|triangle| *triangle = triangle.map(|vertex| joined[vertex as usize]));
+        triangles.retain(|[a, b, c]| a != b && b != c && c != a);
+    }
+    let mut twins = twins(&triangles, points.len(), mesh_vertex)?;
+    let piece_of = orient(&mut triangles, &mut twins, mesh_vertex)?;
     let corners = part_sheets(&triangles, &twins);
-    pieces(surface, &triangles, &twins, &piece_of, &corners, &joined)
+    let mut pieces = pieces(&points, &triangles, &twins, &piece_of, &corners, mesh_vertex)?;
+    for (vertex, &representative) in joined.iter().enumerate() {
+        let (piece, number) = pieces.stands_for[representative as usize];
+        if let Some(piece) = pieces.closed.get_mut(piece as usize) {
+            piece.vertices.push((vertices[vertex], number));
+        }
+    }
+    Ok(pieces.closed)
+}
+
+/// A surface in an order that does not depend on how it is numbered: vertices by their coordinates, triangles by their vertices.
+struct Ordered {
+    points: Vec<Vector>,
+    /// The surface's own number of each vertex.
+    vertices: Vec<u32>,
+    /// Those with three different vertices, from the lowest on.
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Ordered {
+    fn new(surface: &Surface) -> Self {
+        // Adding 0 makes one zero of the two there are.
+        let mut ordered: Vec<(Vector, u32)> =
+            surface.points().iter().map(|point| point.map(|value| value + 0.0)).zip(0..).collect();
+        ordered.sort_unstable_by(|(a, own), (b, other)| {
+            let [x, y, z] = [0, 1, 2].map(|axis| a[axis].total_cmp(&b[axis]));
+            x.then(y).then(z).then(own.cmp(other))
+        });
+        let mut ranks = vec![0u32; ordered.len()];
+        for (&(_, vertex), rank) in ordered.iter().zip(0..) {
+            ranks[vertex as usize] = rank;
+        }
+        let mut triangles: Vec<[u32; 3]> = surface
+            .triangles()
+            .iter()
+            .map(|triangle| lowest_first(triangle.map(|vertex| ranks[vertex as usize])))
+            .filter(|[a, b, c]| a != b && b != c && c != a)
+            .collect();
+        triangles.sort_unstable();
+        let (points, vertices) = ordered.into_iter().unzip();
+        Self { points, vertices, triangles }
+    }
+}
+
+/// A triangle from its lowest vertex on.
+fn lowest_first([a, b, c]: [u32; 3]) -> [u32; 3] {
+    if a <= b && a <= c {
+        [a, b, c]
+    } else if b <= c {
+        [b, c, a]
+    } else {
+        [c, a, b]
+    }
 }
 
 /// For each vertex the lowest one it is joined with: those on open edges that have the same place to the last bit.
 fn join_open_edges(points: &[Vector], triangles: &[[u32; 3]]) -> Vec<u32> {
-    let mut sides: Vec<[u32; 2]> = triangles.iter().flat_map(sides_of).map(sorted).collect();
-    sides.sort_unstable();
     let mut joined: Vec<u32> = (0..points.len() as u32).collect();
-    let mut first_at: HashMap<[u64; 3], u32> = HashMap::new();
-    let mut open: Vec<u32> =
-        sides.chunk_by(|a, b| a == b).filter(|same| same.len() == 1).flat_map(|same| same[0]).collect();
-    open.sort_unstable();
-    open.dedup();
-    for vertex in open {
-        // Adding 0 makes one zero of the two there are.
-        let key = points[vertex as usize].map(|value| (value + 0.0).to_bits());
-        joined[vertex as usize] = *first_at.entry(key).or_insert(vertex);
+    let mut is_open = vec![false; points.len()];
+    Sides::new(triangles, points.len()).for_each_edge(|ends, sides| {
+        if sides.len() == 1 {
+            ends.into_iter().for_each(|end| is_open[end as usize] = true);
+        }
+    });
+    // Vertices that lie in the same place follow each other.
+    let mut first: Option<u32> = None;
+    for vertex in (0..points.len() as u32).filter(|&vertex| is_open[vertex as usize]) {
+        match first {
+            Some(first) if points[first as usize] == points[vertex as usize] => joined[vertex as usize] = first,
+            _ => first = Some(vertex),
+        }
     }
     joined
+}
+
+/// The sides of triangles (three each) by the lower of their ends.
+struct Sides {
+    starts: Vec<u32>,
+    /// The higher end, and the number of the side.
+    sides: Vec<(u32, u32)>,
+}
+
+impl Sides {
+    fn new(triangles: &[[u32; 3]], vertices: usize) -> Self {
+        let mut starts = vec![0u32; vertices + 1];
+        for [lower, _] in triangles.iter().flat_map(sides_of).map(sorted) {
+            starts[lower as usize + 1] += 1;
+        }
+        for vertex in 0..vertices {
+            starts[vertex + 1] += starts[vertex];
+        }
+        let mut next = starts.clone();
+        let mut sides = vec![(0, 0); 3 * triangles.len()];
+        for ([lower, higher], side) in triangles.iter().flat_map(sides_of).map(sorted).zip(0u32..) {
+            let place = &mut next[lower as usize];
+            sides[*place as usize] = (higher, side);
+            *place += 1;
+        }
+        for pair in starts.windows(2) {
+            sides[pair[0] as usize..pair[1] as usize].sort_unstable();
+        }
+        Self { starts, sides }
+    }
+
+    /// Calls `work` with the ends of each edge, the lower first, and its sides.
+    fn for_each_edge(&self, mut work: impl FnMut([u32; 2], &[(u32, u32)])) {
+        for (pair, lower) in self.starts.windows(2).zip(0u32..) {
+            for same in self.sides[pair[0] as usize..pair[1] as usize].chunk_by(|a, b| a.0 == b.0) {
+                work([lower, same[0].0], same);
+            }
+        }
+    }
 }
 
 fn sides_of(triangle: &[u32; 3]) -> [[u32; 2]; 3] {
@@ -102,31 +194,30 @@ fn sorted([a, b]: [u32; 2]) -> [u32; 2] {
 
 const OPEN: u32 = u32::MAX;
 
-/// For each side (three a triangle) the side of the other triangle at its edge.
-fn twins(surface: &Surface, triangles: &[[u32; 3]]) -> Result<Vec<u32>, SkeletonError> {
-    let mut sides: Vec<([u32; 2], u32)> = triangles.iter().flat_map(sides_of).map(sorted).zip(0u32..).collect();
-    sides.sort_unstable();
-    let mut twins = vec![OPEN; sides.len()];
-    for same in sides.chunk_by(|a, b| a.0 == b.0) {
-        match same {
-            [(_, a), (_, b)] => {
-                twins[*a as usize] = *b;
-                twins[*b as usize] = *a;
-            }
-            [_] | [] => {}
-            more => {
-                return Err(SkeletonError::NonManifoldEdge {
-                    edge: more[0].0.map(|vertex| surface.vertices()[vertex as usize]),
-                    faces: more.len(),
-                });
-            }
+/// For each side (three a triangle) the side of the other triangle at its edge. `mesh_vertex` names vertices in errors.
+fn twins(triangles: &[[u32; 3]], vertices: usize, mesh_vertex: impl Fn(u32) -> u32) -> Result<Vec<u32>, SkeletonError> {
+    let mut twins = vec![OPEN; 3 * triangles.len()];
+    let mut fault = None;
+    Sides::new(triangles, vertices).for_each_edge(|ends, sides| match sides {
+        [(_, a), (_, b)] => {
+            twins[*a as usize] = *b;
+            twins[*b as usize] = *a;
         }
+        [_] | [] => {}
+        more => fault = fault.or(Some((ends, more.len()))),
+    });
+    match fault {
+        Some((edge, faces)) => Err(SkeletonError::NonManifoldEdge { edge: sorted(edge.map(mesh_vertex)), faces }),
+        None => Ok(twins),
     }
-    Ok(twins)
 }
 
-/// Turns triangles so that neighbours run alike, and gives each the number of its connected piece.
-fn orient(surface: &Surface, triangles: &mut [[u32; 3]], twins: &[u32]) -> Result<Vec<u32>, SkeletonError> {
+/// Turns triangles, and their sides with them, so that neighbours run alike, and gives each the number of its connected piece.
+fn orient(
+    triangles: &mut [[u32; 3]],
+    twins: &mut [u32],
+    mesh_vertex: impl Fn(u32) -> u32,
+) -> Result<Vec<u32>, SkeletonError> {
     let original = triangles.to_vec();
     let side = |side: u32| sides_of(&original[side as usize / 3])[side as usize % 3];
     let mut piece_of = vec![OPEN; triangles.len()];
@@ -152,15 +243,20 @@ fn orient(surface: &Surface, triangles: &mut [[u32; 3]], twins: &[u32]) -> Resul
                     turned[other as usize] = turn;
                     waiting.push(other);
                 } else if turned[other as usize] != turn {
-                    let edge = side(own).map(|vertex| surface.vertices()[vertex as usize]);
-                    return Err(SkeletonError::OneSided { edge });
+                    return Err(SkeletonError::OneSided { edge: side(own).map(mesh_vertex) });
                 }
             }
         }
         pieces += 1;
     }
-    for (triangle, turned) in triangles.iter_mut().zip(turned) {
-        if turned {
+    if turned.contains(&true) {
+        // A triangle [a, b, c] becomes [a, c, b]: its first side and its last change places.
+        let now = |side: u32| if turned[side as usize / 3] { side + 2 - 2 * (side % 3) } else { side };
+        let old = twins.to_vec();
+        for (side, twin) in (0u32..).zip(old) {
+            twins[now(side) as usize] = if twin == OPEN { OPEN } else { now(twin) };
+        }
+        for (triangle, _) in triangles.iter_mut().zip(&turned).filter(|(_, turned)| **turned) {
             triangle.swap(1, 2);
         }
     }
@@ -198,14 +294,20 @@ fn part_sheets(triangles: &[[u32; 3]], twins: &[u32]) -> Vec<u32> {
     sheets
 }
 
+struct Pieces {
+    closed: Vec<Piece>,
+    /// The piece of each vertex and its number there, by the first sheet met.
+    stands_for: Vec<(u32, u32)>,
+}
+
 fn pieces(
-    surface: &Surface,
+    all_points: &[Vector],
     triangles: &[[u32; 3]],
     twins: &[u32],
     piece_of: &[u32],
     corners: &[u32],
-    joined: &[u32],
-) -> Result<Vec<Piece>, SkeletonError> {
+    mesh_vertex: impl Fn(u32) -> u32,
+) -> Result<Pieces, SkeletonError> {
     let count = piece_of.iter().max().map_or(0, |&last| last as usize + 1);
     let mut members = vec![Vec::new(); count];
     for (triangle, &piece) in piece_of.iter().enumerate() {
@@ -213,10 +315,9 @@ fn pieces(
     }
     // The number within its piece of each sheet, by its first corner.
     let mut numbers = vec![OPEN; corners.len()];
-    // The piece and the number of each vertex, by the first sheet met.
-    let mut stands_for = vec![(OPEN, OPEN); joined.len()];
+    let mut stands_for = vec![(OPEN, OPEN); all_points.len()];
     let mut closed = Vec::with_capacity(count);
-    let largest = surface.points().iter().flatten().fold(0.0f64, |largest, value| largest.max(value.abs()));
+    let largest = all_points.iter().flatten().fold(0.0f64, |largest, value| largest.max(value.abs()));
     let unit = if largest > 0.0 { largest } else { 1.0 };
     for (piece, members) in members.iter().enumerate() {
         let mut points = Vec::new();
@@ -227,7 +328,7 @@ fn pieces(
                 let vertex = triangles[triangle][place] as usize;
                 if numbers[sheet] == OPEN {
                     numbers[sheet] = points.len() as u32;
-                    points.push(surface.points()[vertex]);
+                    points.push(all_points[vertex]);
                 }
                 if stands_for[vertex].0 == OPEN {
                     stands_for[vertex] = (piece as u32, numbers[sheet]);
@@ -248,7 +349,7 @@ fn pieces(
         }
         close_holes(&mut points, &mut own, &starts, &mut next);
         let vertex = members.first().map_or(0, |&triangle| triangles[triangle][0]);
-        let flat = SkeletonError::Flat { vertex: surface.vertices()[vertex as usize], triangles: members.len() };
+        let flat = SkeletonError::Flat { vertex: mesh_vertex(vertex), triangles: members.len() };
         let Some(frame) = Frame::new(&points, unit) else { return Err(flat) };
         points.iter_mut().for_each(|point| *point = frame.enter(*point));
         let mut mesh = Triangulation::new(points, own);
@@ -264,13 +365,7 @@ fn pieces(
         }
         closed.push(Piece { mesh, frame, vertices: Vec::new() });
     }
-    for (vertex, &representative) in joined.iter().enumerate() {
-        let (piece, number) = stands_for[representative as usize];
-        if let Some(piece) = closed.get_mut(piece as usize) {
-            piece.vertices.push((vertex as u32, number));
-        }
-    }
-    Ok(closed)
+    Ok(Pieces { closed, stands_for })
 }
 
 /// Closes every loop of open edges by triangles about its centre. At most one open edge leaves each vertex.

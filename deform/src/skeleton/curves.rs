@@ -7,10 +7,22 @@ use super::medial::NearestPoints;
 use super::thinning::Graph;
 use super::triangulation::length;
 use crate::mesh::Vector;
-use crate::vector::{add, scale, subtract};
+use crate::vector::{add, dot, scale, subtract};
 
 /// How fast the distance to the surface falls along an end that runs straight at it, as a part of the way.
 const STRAIGHT: f64 = 0.5;
+
+/// The distance of an end from its cap, in parts of the distance to the surface before it.
+const CAP: f64 = 0.82;
+
+/// How much farther that is where a tube is flat, in parts of what its mean radius is more than the least.
+const WIDE: f64 = 2.5;
+
+/// How many times the least radius the mean one is at least where a tube counts as flat.
+const FLAT: f64 = 1.3;
+
+/// How much farther than the nearest the points of a flat tube may be from its middle.
+const FLATTEST: f64 = 2.5;
 
 /// The skeleton of one piece.
 pub(super) struct Curves {
@@ -27,11 +39,17 @@ impl Curves {
         let radii = graph.points.iter().map(|&point| surface.distance(point)).collect();
         let mut pruning = Pruning { graph, radii };
         pruning.prune(settings.shortest_branch);
-        pruning.trim();
+        pruning.finish_ends(surface);
         pruning.prune(settings.shortest_branch);
         pruning.smooth();
         pruning.into_curves(originals)
     }
+}
+
+fn distance_to_segment(point: Vector, [from, to]: [Vector; 2]) -> f64 {
+    let [along, away] = [subtract(to, from), subtract(point, from)];
+    let part = (dot(along, away) / dot(along, along)).clamp(0.0, 1.0);
+    length(subtract(away, scale(along, if part.is_finite() { part } else { 0.0 })))
 }
 
 struct Pruning {
@@ -103,7 +121,7 @@ impl Pruning {
     /// Cuts off short branches, and draws branch vertices together that a short chain joins, shortest first.
     fn prune(&mut self, shortest: f64) {
         loop {
-            let mut chains = self.chains();
+            let mut chains = self.with_reach(self.chains());
             let alone = chains.len() == 1;
             chains.sort_by(|a, b| a.length.total_cmp(&b.length));
             let found = chains.into_iter().find_map(|chain| {
@@ -131,11 +149,37 @@ impl Pruning {
         }
     }
 
-    /// Cuts off what of an end runs straight at the surface, as the contracted middle of a flat cap does: there the distance to
-    /// the surface falls nearly as fast as the curve runs, where along the middle of a tube it does not.
-    fn trim(&mut self) {
+    /// Takes for the length of a chain with one free end how far it leads away from the others: one that runs back along them
+    /// leads nowhere.
+    fn with_reach(&self, mut chains: Vec<Chain>) -> Vec<Chain> {
+        let place = |vertex: u32| self.graph.points[vertex as usize];
+        let reaches: Vec<f64> = (0..chains.len())
+            .map(|own| {
+                let vertices = &chains[own].vertices;
+                let [first, last] = [vertices[0], vertices[vertices.len() - 1]];
+                if (self.degree(first) == 1) == (self.degree(last) == 1) {
+                    return chains[own].length;
+                }
+                let others = || chains.iter().enumerate().filter(|(other, _)| *other != own);
+                let away = |vertex: u32| {
+                    others()
+                        .flat_map(|(_, chain)| chain.vertices.windows(2))
+                        .map(|pair| distance_to_segment(place(vertex), [place(pair[0]), place(pair[1])]))
+                        .fold(f64::INFINITY, f64::min)
+                };
+                vertices.iter().map(|&vertex| away(vertex)).fold(0.0, f64::max).min(chains[own].length)
+            })
+            .collect();
+        chains.iter_mut().zip(reaches).for_each(|(chain, reach)| chain.length = reach);
+        chains
+    }
+
+    /// Leads every end anew. What contracts last is blurred by the spacing of the vertices and drawn to the corners of caps: it is
+    /// cut back to where the surface is about as far as before, or by one radius where the tube is flat, and the curve goes straight on
+    /// from there until it is about one radius from the cap.
+    fn finish_ends(&mut self, surface: &NearestPoints) {
         for chain in self.chains() {
-            for mut vertices in [chain.vertices.clone(), chain.vertices.into_iter().rev().collect()] {
+            for mut vertices in [chain.vertices.clone(), chain.vertices.iter().rev().copied().collect()] {
                 if self.degree(vertices[0]) != 1 {
                     continue;
                 }
@@ -143,21 +187,79 @@ impl Pruning {
                 if self.degree(vertices[vertices.len() - 1]) == 1 {
                     vertices.truncate(vertices.len().div_ceil(2));
                 }
-                let first = self.radii[vertices[0] as usize];
-                let mut run = 0.0;
-                let mut excess = vec![0.0];
-                for pair in vertices.windows(2) {
-                    let [from, to] = [pair[0] as usize, pair[1] as usize];
-                    run += length(subtract(self.graph.points[to], self.graph.points[from]));
-                    excess.push(self.radii[to] - first - STRAIGHT * run);
-                }
-                let most = excess.iter().copied().fold(0.0, f64::max);
-                // Not to the last node before the turn: where exactly it lies is blurred by the spacing of the vertices.
-                let cut = excess.iter().position(|&excess| excess >= 0.7 * most).unwrap_or(0);
-                if cut > 0 {
-                    self.merge(vertices[cut], &vertices[..=cut]);
-                }
+                self.finish_end(&vertices, surface);
             }
+        }
+    }
+
+    /// `vertices` run from the end inwards.
+    fn finish_end(&mut self, vertices: &[u32], surface: &NearestPoints) {
+        let place = |vertex: u32| self.graph.points[vertex as usize];
+        let mut runs = vec![0.0];
+        for pair in vertices.windows(2) {
+            runs.push(runs[runs.len() - 1] + length(subtract(place(pair[1]), place(pair[0]))));
+        }
+        let whole = runs[runs.len() - 1];
+        let at = |run: f64| runs.partition_point(|&own| own < run).min(vertices.len() - 1);
+        let largest = |from: usize, to: usize| {
+            vertices[from..=to].iter().map(|&vertex| self.radii[vertex as usize]).fold(0.0, f64::max)
+        };
+        // The distance to the surface where the end has become a tube, and the mean distance to it across, which is more where
+        // the tube is flat.
+        let depth = largest(0, at(2.0 * self.radii[vertices[0] as usize]));
+        let [near, far] = [at(depth), at(2.5 * depth)];
+        let width = match surface.mean_across([place(vertices[near]), place(vertices[far])], FLATTEST * depth) {
+            Some(width) if near < far => width.max(depth),
+            _ => depth,
+        };
+        let is_flat = width > FLAT * depth;
+        let whole_tube = at(width);
+        let reached = 0.93 * largest(0, whole_tube);
+        let cut = match vertices[..whole_tube].iter().position(|&vertex| self.radii[vertex as usize] >= reached) {
+            Some(cut) if !is_flat => cut,
+            _ => whole_tube,
+        };
+        let back = at(runs[cut] + width);
+        let depth = self.radii[vertices[cut] as usize];
+        let along = subtract(place(vertices[cut]), place(vertices[back]));
+        let chord = length(along);
+        if chord <= 0.0 || !depth.is_finite() || whole < 2.0 * width {
+            return self.cut_straight(vertices, &runs);
+        }
+        let along = scale(along, 1.0 / chord);
+        let start = place(vertices[cut]);
+        let ahead = |run: f64| add(start, scale(along, run));
+        let step = 0.05 * depth;
+        let steps =
+            (0..200).take_while(|&count| surface.distance(ahead(f64::from(count) * step)) >= CAP * depth).count();
+        if steps == 0 {
+            return;
+        }
+        let reach = (steps as f64 - 1.0) * step - if is_flat { WIDE * (width - FLAT * depth) } else { 0.0 };
+        // As many of its vertices as lie as close as those before them.
+        let spacing = (runs[back] - runs[cut]) / (back - cut) as f64;
+        let wanted = ((reach / spacing).round().max(0.0) as usize).min(cut);
+        self.merge(vertices[cut - wanted], &vertices[..=cut - wanted]);
+        if wanted == 0 && reach > 0.0 {
+            self.graph.points[vertices[cut] as usize] = ahead(reach);
+        }
+        for (count, &vertex) in (1..=wanted).zip(vertices[..cut].iter().rev()) {
+            let place = ahead(reach * count as f64 / wanted as f64);
+            self.graph.points[vertex as usize] = place;
+            self.radii[vertex as usize] = surface.distance(place);
+        }
+    }
+
+    /// Cuts off what of a short end runs straight at the surface: there the distance to the surface falls nearly as fast as the
+    /// curve runs. `runs` are the lengths from the end to each vertex.
+    fn cut_straight(&mut self, vertices: &[u32], runs: &[f64]) {
+        let first = self.radii[vertices[0] as usize];
+        let excess = |place: usize| self.radii[vertices[place] as usize] - first - STRAIGHT * runs[place];
+        let most = (0..vertices.len()).map(excess).fold(0.0, f64::max);
+        // Not to the last node before the turn: where exactly it lies is blurred by the spacing of the vertices.
+        let cut = (0..vertices.len()).position(|place| excess(place) >= 0.7 * most).unwrap_or(0);
+        if cut > 0 {
+            self.merge(vertices[cut], &vertices[..=cut]);
         }
     }
 

@@ -136,9 +136,11 @@ impl Skeleton {
         let mut node_of_vertex = vec![0u32; surface.points().len()];
         for mut piece in closed_pieces(surface)? {
             resolution::resample(&mut piece.mesh, settings.least_vertices, settings.most_vertices);
-            let tree = NearestPoints::of(&piece.mesh);
-            flow::contract(&mut piece.mesh, &tree, settings);
-            let found = Curves::new(thinning::thin(&piece.mesh), &piece.vertices, &tree, settings);
+            let (mut mesh, into) = piece.mesh.scattered();
+            piece.vertices.iter_mut().for_each(|(_, vertex)| *vertex = into[*vertex as usize]);
+            let tree = NearestPoints::of(&mesh);
+            flow::contract(&mut mesh, &tree, settings);
+            let found = Curves::new(thinning::thin(&mesh), &piece.vertices, &tree, settings);
             let offset = nodes.len() as u32;
             for (&(vertex, _), node) in piece.vertices.iter().zip(&found.node_of_original) {
                 node_of_vertex[vertex as usize] = node + offset;

@@ -84,6 +84,25 @@ impl NearestPoints {
         self.nearest(place, u32::MAX).map_or(f64::INFINITY, |(point, _)| length(subtract(point, place)))
     }
 
+    /// The mean distance from an axis of the points beside it that are not farther than a bound; `None` where there is none.
+    pub fn mean_across(&self, [from, to]: [Vector; 2], farthest: f64) -> Option<f64> {
+        let along = subtract(to, from);
+        let squared = dot(along, along);
+        let (mut sum, mut count) = (0.0, 0u32);
+        for (point, _) in &self.points {
+            let away = subtract(*point, from);
+            let part = dot(away, along) / squared;
+            if (0.0..=1.0).contains(&part) {
+                let across = length(subtract(away, scale(along, part)));
+                if across <= farthest {
+                    sum += across;
+                    count += 1;
+                }
+            }
+        }
+        (count > 0).then(|| sum / f64::from(count))
+    }
+
     fn new(mut points: Vec<(Vector, u32)>) -> Self {
         let mut axes = vec![0; points.len()];
         let mut ranges = vec![(0, points.len())];

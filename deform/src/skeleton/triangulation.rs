@@ -31,6 +31,23 @@ impl Triangulation {
         Self { alive: points.len(), points, triangles, triangles_at, merged_into }
     }
 
+    /// What is left of it, numbered from 0 on, and for each vertex there ever was the one it has become there. The numbers are
+    /// scattered: neighbours have no close ones, so that passes over all vertices lean towards no side.
+    pub fn scattered(self) -> (Self, Vec<u32>) {
+        let merged = self.merged();
+        let mut alive: Vec<u32> = (0..self.points.len() as u32).filter(|&vertex| self.is_alive(vertex)).collect();
+        // The golden ratio of the range spreads them evenly.
+        alive.sort_unstable_by_key(|vertex| vertex.wrapping_mul(0x9E37_79B1));
+        let mut numbers = vec![0; self.points.len()];
+        for (&vertex, number) in alive.iter().zip(0..) {
+            numbers[vertex as usize] = number;
+        }
+        let points = alive.iter().map(|&vertex| self.points[vertex as usize]).collect();
+        let triangles = self.live_triangles().map(|triangle| triangle.map(|vertex| numbers[vertex as usize])).collect();
+        let into = merged.iter().map(|&root| numbers[root as usize]).collect();
+        (Self::new(points, triangles), into)
+    }
+
     /// How many vertices there are still.
     pub fn vertex_count(&self) -> usize {
         self.alive
