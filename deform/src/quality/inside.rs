@@ -125,7 +125,7 @@ fn least(coefficients: &[Cubic], axes: usize, until: f64, cuts: usize) -> Least 
 fn halves(coefficients: &[Cubic], stride: usize) -> [Vec<Cubic>; 2] {
     let mut result = [coefficients.to_vec(), coefficients.to_vec()];
     let middle = |a: Cubic, b: Cubic| -> Cubic { std::array::from_fn(|power| 0.5 * (a[power] + b[power])) };
-    for first in (0..coefficients.len()).filter(|index| index / stride % 3 == 0) {
+    for first in (0..coefficients.len()).filter(|index| (index / stride).is_multiple_of(3)) {
         let [a, b, c] = [0, 1, 2].map(|step| coefficients[first + step * stride]);
         let (ab, bc) = (middle(a, b), middle(b, c));
         let centre = middle(ab, bc);
