@@ -2,6 +2,7 @@
 //! skeleton.
 
 use std::process::Command;
+use std::sync::{Mutex, PoisonError};
 
 use serde_json::Value;
 use tombolo_deform::mesh::Vector;
@@ -47,8 +48,9 @@ fn outlet_angle(triangles: &[[u32; 3]], points: &[Vector]) -> f64 {
     1.0f64.atan2(-slope).to_degrees()
 }
 
-#[test]
-fn one_drag_of_the_skeleton_makes_the_outlet_of_the_bypass_less_steep() {
+fn make_mesh() {
+    static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+    let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     if !project().join(MESH).exists() {
         let made = Command::new(project().join(".venv/bin/python"))
             .current_dir(project())
@@ -57,6 +59,59 @@ fn one_drag_of_the_skeleton_makes_the_outlet_of_the_bypass_less_steep() {
             .expect("gmsh is installed (scripts/setup)");
         assert!(made.success(), "scripts/meshes made no mesh");
     }
+}
+
+#[test]
+fn vtk_reads_the_skeleton_that_the_program_writes() {
+    make_mesh();
+    let directory = tempfile::tempdir().expect("a directory");
+    let out = directory.path().join("skeleton.vtp");
+    let output = tombolo(&["skeleton", "--mesh", MESH, "--out", out.to_str().expect("text"), "--json"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let report: Value = serde_json::from_slice(&output.stdout).expect("a report");
+    let count = |name: &str| report[name].as_u64().expect("a count") as usize;
+    assert_eq!(["components", "loops", "branches", "ends", "curves"].map(count), [1, 1, 2, 2, 4], "{report}");
+    if std::env::var_os("TOMBOLO_WITHOUT_VTK").is_some() {
+        eprintln!("skipped: TOMBOLO_WITHOUT_VTK is set, so VTK reads nothing");
+        return;
+    }
+    let read = Command::new("/usr/bin/python3")
+        .arg(project().join("tests/vtk/read_back.py"))
+        .arg(&out)
+        .output()
+        .expect("python3 starts");
+    assert!(read.status.success(), "VTK (apt-get install python3-vtk9): {}", String::from_utf8_lossy(&read.stderr));
+    let text = String::from_utf8(read.stdout).expect("text");
+    let values = |start: &str| -> Vec<f64> {
+        let line = text.lines().find_map(|line| line.strip_prefix(start)).unwrap_or_else(|| panic!("no {start}"));
+        let bits = |word: &str| f64::from_bits(u64::from_str_radix(word, 16).expect("a number"));
+        line.split_ascii_whitespace().map(bits).collect()
+    };
+    // Polylines are cells of VTK's kind 4.
+    let polylines: Vec<usize> = text
+        .lines()
+        .filter_map(|line| line.strip_prefix("cell 4"))
+        .map(|nodes| nodes.split_whitespace().count())
+        .collect();
+    assert_eq!(polylines.len(), count("curves"));
+    assert_eq!(
+        polylines.iter().map(|nodes| nodes - 1).sum::<usize>(),
+        count("nodes"),
+        "as many segments as nodes: one loop"
+    );
+    assert_eq!(values("points").len(), 3 * count("nodes"));
+    let degrees = values("point \"degree\" 1");
+    let of_degree = |wanted: f64| degrees.iter().filter(|&&degree| degree == wanted).count();
+    assert_eq!([of_degree(1.0), of_degree(3.0)], ["ends", "branches"].map(count));
+    assert_eq!(values("point \"node\" 1"), (0..count("nodes")).map(|node| node as f64).collect::<Vec<_>>());
+    assert_eq!(values("cell \"curve\" 1"), [0.0, 1.0, 2.0, 3.0]);
+    // The artery has a radius of 6.6 mm and less where it is narrow.
+    assert!(values("point \"radius\" 1").iter().all(|radius| (0.001..0.012).contains(radius)));
+}
+
+#[test]
+fn one_drag_of_the_skeleton_makes_the_outlet_of_the_bypass_less_steep() {
+    make_mesh();
     // The order that the demo replays.
     let orders = std::fs::read_to_string(project().join("examples/flow/orders/bypass-angle.json")).expect("the order");
     let orders: Value = serde_json::from_str(&orders).expect("JSON");

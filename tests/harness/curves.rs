@@ -62,6 +62,47 @@ impl CurveGraph {
         Some((seconds, Self { points, edges: (0..edges).map(|_| [number() as usize, number() as usize]).collect() }))
     }
 
+    /// The graph without the branches with a free end that are shorter than a part of the surface's diagonal, shortest first.
+    #[must_use]
+    pub fn without_spurs(&self, part: f64, surface: &Surface) -> Self {
+        let bound = part * diagonal(surface);
+        let mut edges = self.edges.clone();
+        loop {
+            let mut around = vec![Vec::new(); self.points.len()];
+            for &[a, b] in &edges {
+                around[a].push(b);
+                around[b].push(a);
+            }
+            let shortest = (0..self.points.len())
+                .filter(|&end| around[end].len() == 1)
+                .filter_map(|end| {
+                    let mut path = vec![end, around[end][0]];
+                    let mut length = distance(self.points[end], self.points[path[1]]);
+                    while let [a, b] = around[path[path.len() - 1]][..] {
+                        let [before, here] = [path[path.len() - 2], path[path.len() - 1]];
+                        path.push(if a == before { b } else { a });
+                        length += distance(self.points[here], self.points[path[path.len() - 1]]);
+                    }
+                    let is_branch = around[path[path.len() - 1]].len() > 2;
+                    (is_branch && length < bound).then_some((length, path))
+                })
+                .min_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((_, path)) = shortest else { break };
+            edges.retain(|&[a, b]| !path.windows(2).any(|pair| pair == [a, b] || pair == [b, a]));
+        }
+        // What is left, numbered from 0 on; points without an edge were points before or the cut ends.
+        let kept: Vec<usize> = (0..self.points.len())
+            .filter(|&point| {
+                edges.iter().any(|edge| edge.contains(&point)) || !self.edges.iter().any(|edge| edge.contains(&point))
+            })
+            .collect();
+        let number = |point: usize| kept.iter().position(|&other| other == point).expect("it has an edge");
+        Self {
+            points: kept.iter().map(|&point| self.points[point]).collect(),
+            edges: edges.iter().map(|edge| edge.map(number)).collect(),
+        }
+    }
+
     /// Pieces, loops, branch nodes and ends.
     #[must_use]
     pub fn counts(&self) -> [usize; 4] {
@@ -84,14 +125,7 @@ impl CurveGraph {
     /// graph are from the other at most, and the other's from this. The curves are sampled at a thousandth of the diagonal.
     #[must_use]
     pub fn apart(&self, other: &Self, surface: &Surface) -> [f64; 2] {
-        let [lower, upper] =
-            surface.points().iter().fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[lower, upper], point| {
-                [
-                    std::array::from_fn(|axis| lower[axis].min(point[axis])),
-                    std::array::from_fn(|axis| upper[axis].max(point[axis])),
-                ]
-            });
-        let diagonal = distance(lower, upper);
+        let diagonal = diagonal(surface);
         let [a, b] = [self, other].map(|graph| graph.samples(1e-3 * diagonal));
         [away(&a, &b) / diagonal, away(&b, &a) / diagonal]
     }
@@ -109,6 +143,18 @@ impl CurveGraph {
         }
         samples
     }
+}
+
+/// The diagonal of a surface's bounding box.
+fn diagonal(surface: &Surface) -> f64 {
+    let [lower, upper] =
+        surface.points().iter().fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[lower, upper], point| {
+            [
+                std::array::from_fn(|axis| lower[axis].min(point[axis])),
+                std::array::from_fn(|axis| upper[axis].max(point[axis])),
+            ]
+        });
+    distance(lower, upper)
 }
 
 fn distance(a: Vector, b: Vector) -> f64 {
