@@ -146,7 +146,11 @@ fn numbers_of_vertices_and_triangles_do_not_matter() {
     for stride in [7, 1001] {
         // A number without a factor in common with the counts visits all of them.
         let number = |place: usize, count: usize| {
-            let stride = (stride..).find(|stride| (2..=*stride).all(|by| stride % by > 0 || count % by > 0)).unwrap();
+            let stride = (stride..)
+                .find(|stride| {
+                    (2..=*stride).all(|by| !usize::is_multiple_of(*stride, by) || !usize::is_multiple_of(count, by))
+                })
+                .unwrap();
             place * stride % count
         };
         let mut shuffled = vec![[0.0; 3]; points.len()];

@@ -9,6 +9,9 @@ use super::places::{self, Candidate, Twins};
 use super::{DistributedError, Part, TOLERANCE};
 use crate::communicator::{Communicator, Reduction, agree};
 
+/// A neighbour's rank, and its values at vertices that are shared with it.
+type FromNeighbour = (usize, Vec<(u32, Vector)>);
+
 /// The vertices that this rank and another both have.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Neighbour {
@@ -277,7 +280,7 @@ impl SharedVertices {
         communicator: &dyn Communicator,
         values: &[Vector],
         wanted: impl Fn(usize, u32) -> bool,
-    ) -> Result<Vec<(usize, Vec<(u32, Vector)>)>, DistributedError> {
+    ) -> Result<Vec<FromNeighbour>, DistributedError> {
         let mut messages = Vec::new();
         for neighbour in &self.neighbours {
             let mut message = Writer::with_capacity(24 * neighbour.vertices.len());
@@ -346,12 +349,11 @@ fn consecutive(
     }
     let starts = communicator.exchange(starts);
     let start = starts.first().map_or(Ok(0), |(from, bytes)| Reader::new(*from, bytes).u64())?;
-    #[expect(clippy::cast_possible_truncation, reason = "fewer vertices than 2^32")]
-    let mut next = start as u32;
     let mut numbers = vec![u32::MAX; owners.len()];
-    for (number, _) in numbers.iter_mut().zip(owners).filter(|(_, owner)| **owner as usize == rank) {
+    let owned = numbers.iter_mut().zip(owners).filter(|(_, owner)| **owner as usize == rank);
+    #[expect(clippy::cast_possible_truncation, reason = "fewer vertices than 2^32")]
+    for (next, (number, _)) in (start as u32..).zip(owned) {
         *number = next;
-        next += 1;
     }
     let mut messages: BTreeMap<u32, Writer> = BTreeMap::new();
     for (vertex, twins) in twins.iter().filter(|(vertex, _)| owners[*vertex as usize] as usize == rank) {

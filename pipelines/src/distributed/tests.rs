@@ -264,8 +264,11 @@ fn content(extract: &Extract) -> (usize, BTreeSet<(Vec<Rounded>, Rounded)>) {
     (extract.points.len(), extract.cells.iter().enumerate().map(cell).collect())
 }
 
-/// What the pipelines make of a part, by their names: extracts, and the values of monitors.
-fn made(part: &Part, communicator: Arc<dyn Communicator>) -> (BTreeMap<String, Arc<Extract>>, Vec<(String, f64)>) {
+/// Extracts by the names of their pipelines, and the values of monitors.
+type Made = (BTreeMap<String, Arc<Extract>>, Vec<(String, f64)>);
+
+/// What the pipelines make of a part.
+fn made(part: &Part, communicator: Arc<dyn Communicator>) -> Made {
     let speed: Vec<f64> = part.points.iter().map(|[x, y, z]| x + y * z).collect();
     let number = |cell: usize| part.global_cells.as_ref().map_or(cell as f64, |numbers| numbers[cell] as f64);
     // What stands in ghosts is nobody's business.
