@@ -34,7 +34,7 @@ fn a_torus() {
 
 #[test]
 fn a_surface_of_genus_three() {
-    agree("genus 3", &windows(3, 5, 12), [1, 3, 4, 0]);
+    agree("genus 3", &windows(3, 8, 30), [1, 3, 4, 0]);
 }
 
 /// A flat frame of unit cubes with some windows in a row, each square cut into `fine` by `fine`, and its corners rounded by moving each

@@ -19,6 +19,9 @@ const LEAST_FOLDING: f64 = 1.0 / 128.0;
 /// Sub-steps longer than this are halved before the volume is untangled.
 const UNTANGLED_BELOW: f64 = 0.06;
 
+/// The exponent of the stiffening in sub-steps after one that did not hold with a smaller exponent.
+const STIFFER: f64 = 1.0;
+
 /// Sub-steps tried before it is given up.
 const TRIES: usize = 200;
 
@@ -101,9 +104,10 @@ pub trait BoundaryMotion {
 
 /// Takes the volume along with a motion of its boundary from the shape `start` on.
 ///
-/// One linear solve on the shape reached, with a material stiffened anew, makes a sub-step: a fifth of the way at first. One
-/// that the guard does not let through is halved, a small one is untangled (see [`Untangler`]); after one that holds, the next
-/// may be half as long again. So what is found is a function of the arguments alone.
+/// One linear solve on the shape reached, with a material stiffened anew, makes a sub-step: a fifth of the way at first. The
+/// first that the guard does not let through is tried again with a stiffening of 1, which the rest of the way keeps, unless it
+/// was that or more; others are halved, and a small one is untangled (see [`Untangler`]). After one that holds, the next may be
+/// half as long again. So what is found is a function of the arguments alone.
 ///
 /// `untangler` is of the reference mesh, which is what cells are drawn back to.
 ///
@@ -122,15 +126,15 @@ pub fn follow<M: BoundaryMotion>(
     let mut route = Route { waypoints: Vec::new(), rejected: 0, untangled: 0, iterations: 0 };
     let mut shape = Arc::clone(start);
     let (mut reached, mut step) = (0.0, FIRST);
+    let mut stiffening = settings.stiffening;
     let mut latest: Option<VolumeOperator> = None;
     while reached < 1.0 {
         let stiffened = mesh.with_points(shape.to_vec()).map_err(|_| FollowError::Volume(overflow()))?;
         let renewed = match &latest {
-            Some(operator) => operator.updated(&stiffened),
+            Some(operator) => operator.restiffened(&stiffened, stiffening),
             None => VolumeOperator::new(&stiffened, boundary, &settings),
         };
-        let operator = latest.insert(renewed.map_err(FollowError::Volume)?);
-        drop(stiffened);
+        let mut operator = latest.insert(renewed.map_err(FollowError::Volume)?);
         loop {
             // A last sub-step that would leave next to nothing takes it along.
             let next = if reached + 1.25 * step >= 1.0 { 1.0 } else { reached + step };
@@ -153,6 +157,12 @@ pub fn follow<M: BoundaryMotion>(
                 break;
             }
             route.rejected += 1;
+            if stiffening < STIFFER && !folds {
+                stiffening = STIFFER;
+                let stiffer = operator.restiffened(&stiffened, stiffening).map_err(FollowError::Volume)?;
+                operator = latest.insert(stiffer);
+                continue;
+            }
             step = 0.5 * (next - reached);
             if step < (if folds { LEAST_FOLDING } else { LEAST }) || route.rejected >= TRIES {
                 return Err(stalled(mesh, &shape, &candidate, guard, route, folds));

@@ -174,18 +174,28 @@ impl VolumeOperator {
     /// [`VolumeError::OtherCells`] where `mesh` does not have the cells that this operator was set up for;
     /// [`VolumeError::InvertedCell`].
     pub fn updated(&self, mesh: &Mesh) -> Result<Self, VolumeError> {
+        self.restiffened(mesh, self.settings.stiffening)
+    }
+
+    /// The same with another exponent of the stiffening.
+    ///
+    /// # Errors
+    /// As [`VolumeOperator::updated`], and [`VolumeError::Setting`].
+    pub fn restiffened(&self, mesh: &Mesh, stiffening: f64) -> Result<Self, VolumeError> {
+        let settings = Deform { stiffening, ..self.settings };
+        settings.validate()?;
         if *mesh.cells() != self.cells || mesh.points().len() != self.graph.vertex_count() {
             return Err(VolumeError::OtherCells);
         }
         let elements = Elements::new(mesh);
-        let stiffness = stiffness(mesh, &elements, self.settings.stiffening)?;
+        let stiffness = stiffness(mesh, &elements, stiffening)?;
         let like = Some(&self.equations);
-        let equations = equations(&self.graph, mesh, &elements, &stiffness, &self.constraints, &self.settings, like)?;
+        let equations = equations(&self.graph, mesh, &elements, &stiffness, &self.constraints, &settings, like)?;
         let places = |vertices: &[u32]| vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect();
         Ok(Self {
             graph: Arc::clone(&self.graph),
             cells: self.cells.clone(),
-            settings: self.settings,
+            settings,
             boundary: self.boundary.clone(),
             boundary_points: places(&self.boundary),
             sliding: self.sliding.clone(),
