@@ -115,7 +115,8 @@ impl Skeleton {
     /// The curve skeleton of a surface, by mean curvature flow (Tagliasacchi, Alhashim, Olson and Zhang 2012).
     ///
     /// Each connected piece gets a skeleton of its own, inside out or not. Holes are closed for the time being, so that an open
-    /// tube has its axis; open edges that lie on each other to the last bit are joined.
+    /// tube has its axis; open edges that lie on each other to the last bit are joined. A piece as long as wide, as a ball, has one
+    /// node: the centroid of its surface.
     ///
     /// # Errors
     /// [`SkeletonError`], which names the place: edges of more than two faces, surfaces of one side, flat pieces.
@@ -138,9 +139,14 @@ impl Skeleton {
             resolution::resample(&mut piece.mesh, settings.least_vertices, settings.most_vertices);
             let (mut mesh, into) = piece.mesh.scattered();
             piece.vertices.iter_mut().for_each(|(_, vertex)| *vertex = into[*vertex as usize]);
+            let centroid = mesh.centroid();
             let tree = NearestPoints::of(&mesh);
             flow::contract(&mut mesh, &tree, settings);
-            let found = Curves::new(thinning::thin(&mesh), &piece.vertices, &tree, settings);
+            let mut found = Curves::new(thinning::thin(&mesh), &piece.vertices, &tree, settings);
+            // What has no middle line is drawn together to a place that hangs on the last bit.
+            if let [only] = &mut found.nodes[..] {
+                *only = centroid;
+            }
             let offset = nodes.len() as u32;
             for (&(vertex, _), node) in piece.vertices.iter().zip(&found.node_of_original) {
                 node_of_vertex[vertex as usize] = node + offset;

@@ -97,6 +97,18 @@ impl Triangulation {
         self.live_triangles().map(|triangle| 0.5 * length(self.normal(triangle))).sum()
     }
 
+    /// The middle of the surface, by area.
+    pub fn centroid(&self) -> Vector {
+        let (mut sum, mut whole) = ([0.0; 3], 0.0);
+        for triangle in self.live_triangles() {
+            let area = length(self.normal(triangle));
+            let corners = triangle.map(|vertex| self.points[vertex as usize]);
+            (0..3).for_each(|axis| sum[axis] += area / 3.0 * corners.iter().map(|corner| corner[axis]).sum::<f64>());
+            whole += area;
+        }
+        sum.map(|value| value / whole)
+    }
+
     /// Six times the volume enclosed, about the first point.
     pub fn signed_volume(&self) -> f64 {
         let Some(&origin) = self.points.first() else { return 0.0 };
