@@ -86,8 +86,9 @@ struct Task {
 struct Computing {
     id: String,
     stack: EditStack,
-    kept: usize,
-    guard: Guard,
+    wish: Wish,
+    /// Whether the mesh stays where it is until the plan is made, because the one before started elsewhere.
+    resting: bool,
 }
 
 /// A schedule under way.
@@ -255,17 +256,16 @@ impl Steerer {
             Ok(wish) => wish,
             Err(error) => return self.log.reject(&id, moment, &error.into()),
         };
-        let (kept, guard) = (wish.kept, wish.guard);
         self.log.update(&id, |order| order.status = OrderStatus::Computing);
-        let computing = Computing { id, stack, kept, guard };
+        let computing = Computing { id, stack, wish, resting: false };
         match &self.worker {
             Some(worker) if background => {
-                worker.plan(wish);
+                worker.plan(computing.wish.clone());
                 self.computing = Some(computing);
             }
             _ => {
                 let begun = Instant::now();
-                let plan = lock(&self.planner).plan(&wish);
+                let plan = lock(&self.planner).plan(&computing.wish);
                 self.commit(computing, plan, moment, begun, step_seconds);
             }
         }
@@ -278,7 +278,17 @@ impl Steerer {
                 self.reference_quality = Some((min, mean, inverted));
             }
             Done::Planned(plan) => {
-                if let Some(computing) = self.computing.take() {
+                if let Some(mut computing) = self.computing.take() {
+                    let is_stale =
+                        plan.as_ref().as_ref().is_ok_and(|plan| !Arc::ptr_eq(plan.start(), &self.place.points));
+                    if let Some(worker) = self.worker.as_ref().filter(|_| is_stale) {
+                        // The worker may be at a forecast: the mesh waits for the way from here, not the solver.
+                        computing.wish.start = self.place.clone();
+                        computing.resting = true;
+                        worker.plan(computing.wish.clone());
+                        self.computing = Some(computing);
+                        return;
+                    }
                     self.commit(computing, *plan, moment, Instant::now(), step_seconds);
                 }
             }
@@ -294,8 +304,7 @@ impl Steerer {
         begun: Instant,
         step_seconds: Option<f64>,
     ) {
-        let Computing { id, stack, kept, guard } = computing;
-        let plan = plan.and_then(|plan| self.starting_here(plan, &guard));
+        let Computing { id, stack, wish, .. } = computing;
         let plan = match plan {
             Ok(plan) => plan,
             Err(rejection) => return self.log.reject(&id, moment, &rejection),
@@ -307,7 +316,7 @@ impl Steerer {
             });
         }
         let fraction = plan.target().fraction;
-        self.stack = if fraction < 1.0 { stack.clamped(kept, fraction) } else { stack };
+        self.stack = if fraction < 1.0 { stack.clamped(wish.kept, fraction) } else { stack };
         self.foreseen = false;
         lock(&self.present).stack.clone_from(&self.stack);
         let clamped = (fraction < 1.0).then_some(fraction);
@@ -325,14 +334,6 @@ impl Steerer {
         self.motion = Some(Motion { id, plan, begun: moment, taken: 0 });
     }
 
-    /// The plan itself if the mesh is still where it starts, else one from where the mesh is.
-    fn starting_here(&self, plan: Plan, guard: &Guard) -> Result<Plan, Rejection> {
-        if Arc::ptr_eq(plan.start(), &self.place.points) {
-            return Ok(plan);
-        }
-        lock(&self.planner).go(&self.place, &plan, guard)
-    }
-
     /// The last change of the mesh and the coordinates at its end.
     pub(crate) fn present(&self) -> (&Shape, &[Vector]) {
         (&self.shape, &self.place.points)
@@ -340,6 +341,9 @@ impl Steerer {
 
     /// Takes the next shape of the schedule under way for the coming step, if it is due; says whether it was.
     pub(crate) fn next_shape(&mut self, moment: Moment, time_step: f64) -> bool {
+        if self.computing.as_ref().is_some_and(|computing| computing.resting) {
+            return false;
+        }
         let Some(motion) = self.motion.as_mut() else { return false };
         let (cycles, time) = (moment.cycle.saturating_sub(motion.begun.cycle), moment.time - motion.begun.time);
         if !motion.plan.schedule().is_due(motion.taken, cycles, time) {

@@ -107,11 +107,6 @@ impl Planner {
         }
     }
 
-    /// From the shape `start` on to where a plan leads that was made from another.
-    pub(crate) fn go(&mut self, start: &Place, plan: &Plan, guard: &Guard) -> Result<Plan, Rejection> {
-        caught(|| self.shaper.go(start, plan.target(), plan.asked(), guard))
-    }
-
     /// Sets the operator of the volume up. One that cannot be made is reported by the order that needs it.
     pub(crate) fn prepare(&mut self, deform: &DeformStage) {
         let _ = caught(|| self.shaper.prepare(deform));
