@@ -55,6 +55,7 @@ interface Exports {
   check(surface: number): number;
   skeleton(surface: number): number;
   decode_frame(): number;
+  rehearse(): number;
   arrays(): number;
   array(index: number): number;
   array_bytes(index: number): number;
@@ -79,6 +80,11 @@ export class Kernel {
     const streamed = typeof Response !== "undefined" && source instanceof Response;
     if (streamed && !source.ok) throw new KernelError("trap", `the geometry kernel did not arrive: ${source.status} ${source.statusText}`);
     return new Kernel(await (streamed ? WebAssembly.compileStreaming(source) : WebAssembly.compile(source as BufferSource)));
+  }
+
+  /** Has the module make a small edit of its own, so that the engine has compiled it well before the first that somebody waits for. */
+  rehearse(): void {
+    this.call([], (exports) => exports.rehearse(), () => undefined);
   }
 
   /** The bytes that the module's memory takes. */

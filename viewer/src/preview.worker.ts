@@ -29,7 +29,11 @@ const worker = self as unknown as {
   postMessage(answer: PreviewAnswer, transfer: Transferable[]): void;
 };
 
-const kernel = fetch(new URL("../wasm/pkg/kernel.wasm", import.meta.url)).then((response) => Kernel.load(response));
+const kernel = fetch(new URL("../wasm/pkg/kernel.wasm", import.meta.url)).then(async (response) => {
+  const loaded = await Kernel.load(response);
+  loaded.rehearse();
+  return loaded;
+});
 let surface: KernelSurface | null = null;
 let reference: Float64Array = new Float64Array(0);
 /** The displacement that the shape has now, and the stack that it is of. */

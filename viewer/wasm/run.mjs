@@ -4,7 +4,8 @@
  *   node viewer/wasm/run.mjs MODULE.wasm SURFACE STACKS.json [DISPLACEMENTS]
  *
  * SURFACE is a frame of kind 3, STACKS a list of stacks. The displacements are written one after the other, as doubles. What it
- * took is printed as JSON, in seconds: `compile` the module, `open` the surface, and each stack.
+ * took is printed as JSON, in seconds: `compile` the module, `rehearse` as the viewer does when it loads, `open` the surface, and
+ * each stack. With REHEARSE=0 in the environment nothing is rehearsed.
  */
 import { readFileSync, writeFileSync } from "node:fs";
 
@@ -27,6 +28,10 @@ const call = (input, run) => {
   return result;
 };
 
+const rehearse = process.env["REHEARSE"] === "0" ? 0 : seconds(() => exports.rehearse())[1];
+// What the engine compiles well it compiles on threads of its own, a moment later.
+await new Promise((resolve) => setTimeout(resolve, 300));
+
 const frame = readFileSync(surfacePath);
 const [surface, open] = seconds(() => call(frame, () => exports.open_surface()));
 const displacements = [];
@@ -39,4 +44,4 @@ const stacks = JSON.parse(readFileSync(stacksPath, "utf8")).map((stack) => {
   return time;
 });
 if (outputPath) writeFileSync(outputPath, Buffer.concat(displacements));
-console.log(JSON.stringify({ compile, open, stacks, memory: exports.memory.buffer.byteLength }));
+console.log(JSON.stringify({ compile, rehearse, open, stacks, memory: exports.memory.buffer.byteLength }));
