@@ -1,21 +1,25 @@
 //! The three calls.
 
+mod commands;
+mod description;
+
 use std::{
     net::SocketAddr,
     sync::{Arc, OnceLock},
     time::Instant,
 };
 
+use commands::Intake;
+use description::features;
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Value, json};
 use tombolo_deform::{
-    mesh::{Mesh, Vector},
+    mesh::Mesh,
     surface::{FeatureSettings, Surface},
 };
 use tombolo_pipelines::{
     extract::Channel,
-    files::{UnreadFile, read_displacements},
-    language::{self, Command, Config, Due, Question, Stage, TimedCommand, Validate},
+    language::{self, Config, Due, Stage, TimedCommand, Validate},
     shape::Shaper,
 };
 
@@ -25,8 +29,8 @@ use crate::{
     report::{Durations, Report},
     settings::{ExecuteError, FinalizeError, InitializeError, MeshMotion, Settings, Steering, Step},
     stages::Pipelines,
-    steering::{Defaults, Forecaster, Log, Moment, Parameters, Queue, Received, Source, Steerer, Timed},
-    stream::{CommandSink, Hub, ReferenceSurface, Server},
+    steering::{Defaults, Forecaster, Log, Moment, Parameters, Queue, Source, Steerer, Timed},
+    stream::{Hub, ReferenceSurface, Server},
 };
 
 /// Links a solver to its viewers and to the orders that change its shape.
@@ -49,7 +53,17 @@ pub struct Adaptor {
     told: Told,
     paused: bool,
     stopped: bool,
+    meetings: Meetings,
     timing: Timing,
+}
+
+/// When the ranks come together.
+#[derive(Default)]
+struct Meetings {
+    /// Calls so far.
+    calls: u64,
+    /// What was wrong here since the last meeting.
+    fault: Option<ExecuteError>,
 }
 
 /// The mesh that orders change: that of the solver's first channel.
@@ -91,8 +105,26 @@ impl Adaptor {
     ///
     /// # Errors
     /// [`InitializeError`]: an address in use, a journal that cannot be written, a configuration, a parameter or a command that
-    /// makes no sense.
+    /// makes no sense. On several ranks all have the same error, also where they were given different configurations.
+    ///
+    /// Collective, as the other two calls are.
     pub fn initialize(settings: Settings) -> Result<Self, InitializeError> {
+        let communicator = Arc::clone(&settings.communicator);
+        let own = serde_json::to_vec(&(&settings.config, &settings.orders));
+        let adaptor = Self::set_up(settings);
+        if communicator.size() == 1 {
+            return adaptor;
+        }
+        let adaptor = comm::agree_on(&*communicator, adaptor)?;
+        let own = own.unwrap_or_default();
+        let mut first = own.clone();
+        communicator.broadcast(0, &mut first);
+        let same = if own == first { Ok(()) } else { Err("its configuration or its orders are not those of rank 0") };
+        comm::agree_on(&*communicator, same)?;
+        Ok(adaptor)
+    }
+
+    fn set_up(settings: Settings) -> Result<Self, InitializeError> {
         let Settings { config, communicator, parameters, orders, output } = settings;
         // What was built by hand is held to the same rules as what was read.
         let config: Config = checked(&config, "configuration")?;
@@ -135,6 +167,7 @@ impl Adaptor {
             told: Told { schema: language::order_schema(), ..Told::default() },
             paused: false,
             stopped: false,
+            meetings: Meetings::default(),
             timing: Timing::default(),
         };
         adaptor.describe();
@@ -161,12 +194,15 @@ impl Adaptor {
     /// the adaptor takes it for done.
     ///
     /// Where no pipeline is due, no command has arrived and no motion is under way, it costs one atomic load and a few
-    /// comparisons and allocates nothing. It waits for nobody, except while it is paused, and for the plans of orders that
-    /// take effect at a given cycle.
+    /// comparisons and allocates nothing; on several ranks also one reduction of six numbers, at every call or, where the
+    /// configuration says so (`steering.poll_steps`), at every so many. It waits for nobody, except while it is paused, and for the
+    /// plans of orders that take effect at a given cycle.
+    ///
+    /// On several ranks it is collective: all call it for the same cycle and time.
     ///
     /// # Errors
     /// [`ExecuteError`] for a mistake of the solver alone; nothing that a viewer, a file of orders or the network did ends up
-    /// here.
+    /// here. A mistake on one rank is an error on all of them.
     pub fn execute(&mut self, step: &Step, channels: &[Channel<'_>]) -> Result<Steering<'_>, ExecuteError> {
         let entered = Instant::now();
         if let Some(left) = self.timing.left.take() {
@@ -177,8 +213,11 @@ impl Adaptor {
         if let Some(hub) = &self.hub {
             hub.clock.set(moment.cycle, moment.time);
         }
-        self.check(step, channels)?;
-        let moved = if self.is_calm(moment) { false } else { self.act(step, moment, channels)? };
+        let fault = self.check(step, channels).err();
+        let moved = match self.meet(moment, fault)? {
+            Some(called) if !self.is_calm(moment, called) => self.act(step, moment, channels)?,
+            _ => false,
+        };
         let left = Instant::now();
         self.timing.execute.add(left - entered);
         self.timing.left = Some(left);
@@ -248,20 +287,35 @@ impl Adaptor {
         Ok(())
     }
 
+    /// Whether rank 0 was called to look at something; an error where any rank has one. `None` between two meetings of the ranks:
+    /// then nothing is done, and a fault waits for the next, so that all ranks have it at the same call.
+    #[inline]
+    fn meet(&mut self, moment: Moment, fault: Option<ExecuteError>) -> Result<Option<bool>, ExecuteError> {
+        let called = self.queue.has_called();
+        if self.communicator.size() == 1 {
+            return fault.map_or(Ok(Some(called)), Err);
+        }
+        let due = self.meetings.calls.is_multiple_of(u64::from(self.config.steering.poll_steps.get()));
+        self.meetings.calls += 1;
+        let fault = self.meetings.fault.take().or(fault);
+        // All ranks know alike of a motion under way; what only the step's own numbers could tell is left for the next meeting.
+        let under_way = self.paused || matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if !steerer.is_at_rest());
+        if !due && !under_way {
+            self.meetings.fault = fault;
+            return Ok(None);
+        }
+        comm::meet(&*self.communicator, moment, fault, called).map(Some)
+    }
+
     /// Whether there is nothing to do in this call.
     #[inline]
-    fn is_calm(&self, moment: Moment) -> bool {
+    fn is_calm(&self, moment: Moment, called: bool) -> bool {
         let at_rest = match &self.mesh {
             SteeredMesh::Unknown => false,
             SteeredMesh::Unsteered | SteeredMesh::Refused(_) => true,
             SteeredMesh::Steered(steerer, _) => steerer.is_at_rest(),
         };
-        at_rest
-            && !self.paused
-            && !self.queue.has_called()
-            && !self.timed.is_due(moment)
-            && !self.pipelines.is_due(moment)
-            && self.communicator.size() == 1
+        at_rest && !self.paused && !called && !self.timed.is_due(moment) && !self.pipelines.is_due(moment)
     }
 
     /// Does what there is to do; says whether the mesh moves over the coming step.
@@ -310,102 +364,6 @@ impl Adaptor {
             self.tell_conditions();
         }
         Ok(moved)
-    }
-
-    /// Takes in a command that no viewer sent.
-    fn accept(&mut self, id: Option<String>, source: Source, mut command: Command, moment: Moment) {
-        // The journal gets what a file holds and not its name, so that it replays whatever becomes of the file.
-        let read = self.read_files(&mut command);
-        match self.log.accept(id, &source, &command, moment) {
-            Ok(id) => match read {
-                Ok(()) => self.obey(id, &source, command, moment),
-                Err(reason) => self.log.reject(&id, moment, &reason.into()),
-            },
-            Err(reason) => self.complain(&format!("a command was not taken: {reason}")),
-        }
-    }
-
-    fn read_files(&self, command: &mut Command) -> Result<(), UnreadFile> {
-        match (command, &self.mesh) {
-            (Command::Order(order), SteeredMesh::Steered(_, surface)) => read_displacements(order.edits_mut(), surface),
-            // Without a surface every order is rejected.
-            _ => Ok(()),
-        }
-    }
-
-    /// Says to whom it may concern what no order's outcome can say.
-    fn complain(&self, message: &str) {
-        eprintln!("tombolo: {message}");
-        if let Some(hub) = &self.hub {
-            hub.tell(&json!({"error": {"message": message}}));
-        }
-    }
-
-    /// Carries out what viewers have asked for meanwhile, as far as it can be now.
-    fn serve(&mut self, moment: Moment) {
-        let received: Vec<Received> = self.queue.take().into();
-        if self.communicator.size() == 1 {
-            for Received { client, id, command } in received {
-                self.obey(id, &Source::Viewer(client), command, moment);
-            }
-        } else {
-            let own = received.into_iter().map(|received| (received.id, received.command)).collect();
-            for (id, command) in comm::agree(&*self.communicator, own) {
-                self.obey(id, &Source::Viewer(0), command, moment);
-            }
-        }
-        let step_seconds = self.timing.steps.median();
-        if let SteeredMesh::Steered(steerer, _) = &mut self.mesh
-            && steerer.advance(moment, step_seconds)
-        {
-            self.describe();
-            self.tell_conditions();
-        }
-    }
-
-    fn obey(&mut self, id: String, source: &Source, command: Command, moment: Moment) {
-        let outcome = match command {
-            Command::Order(order) => {
-                let background = self.config.steering.background && matches!(source, Source::Viewer(_));
-                match &mut self.mesh {
-                    SteeredMesh::Steered(steerer, _) => steerer.take(id, order, background),
-                    SteeredMesh::Refused(reason) => self.log.reject(&id, moment, &reason.into()),
-                    SteeredMesh::Unknown | SteeredMesh::Unsteered => {
-                        self.log.reject(&id, moment, &"no reference mesh was taken".into());
-                    }
-                }
-                return;
-            }
-            Command::Pause {} if self.config.stream.is_none() => {
-                Err("there is no stream, so that nobody could resume".to_owned())
-            }
-            Command::Pause {} => {
-                self.paused = true;
-                Ok(())
-            }
-            Command::Resume {} => {
-                self.paused = false;
-                Ok(())
-            }
-            Command::Stop {} => {
-                self.stopped = true;
-                Ok(())
-            }
-            Command::Parameter(change) => {
-                self.parameters.set(&change.name, change.value).map_err(|error| error.to_string())
-            }
-        };
-        if let Err(reason) = &outcome {
-            match (source, &self.hub) {
-                (Source::Viewer(client), Some(hub)) => {
-                    hub.tell_client(*client, &json!({"error": {"message": reason, "id": id}}));
-                }
-                _ => self.complain(&format!("command '{id}': {reason}")),
-            }
-        }
-        self.log.settle(&id, moment, outcome);
-        self.describe();
-        self.tell_conditions();
     }
 
     /// Copies the mesh as it is now as the reference of all shapes, if anybody could ask for one.
@@ -471,74 +429,12 @@ impl Adaptor {
         .map_err(|error| format!("a thread could not be started: {error}"))?;
         Ok((steerer, surface))
     }
-
-    /// Brings what `hello` tells up to date.
-    fn describe(&self) {
-        let Some(hub) = &self.hub else { return };
-        let stack = match &self.mesh {
-            SteeredMesh::Steered(steerer, _) => steerer.stack().edits(),
-            _ => Vec::new(),
-        };
-        let list = |value: &Value| if value.is_null() { json!([]) } else { value.clone() };
-        let Defaults { deform, guard, schedule } = &self.defaults;
-        let description = json!({
-            "protocol": 1,
-            "views": self.pipelines.views(),
-            "channel": self.told.channel,
-            "features": list(&self.told.features),
-            "surface": self.told.surface,
-            "fields": list(&self.told.fields),
-            "parameters": self.parameters.all(),
-            "schemas": {"order": self.told.schema},
-            "stack": stack,
-            "defaults": {"deform": deform, "guard": guard, "schedule": schedule},
-        });
-        if let Value::Object(description) = description {
-            hub.describe(description);
-        }
-    }
-
-    fn tell_conditions(&self) {
-        let Some(hub) = &self.hub else { return };
-        let quality = match &self.mesh {
-            SteeredMesh::Steered(steerer, _) => steerer.quality(),
-            _ => None,
-        };
-        let quality = quality.map(|(min, mean, inverted)| json!({"min": min, "mean": mean, "inverted": inverted}));
-        let conditions = json!({"paused": self.paused, "stopped": self.stopped, "quality": quality});
-        if let Value::Object(conditions) = conditions {
-            hub.conditions(conditions);
-        }
-    }
 }
 
 /// Reads what was built by hand as if it had stood in a file, so that the same rules hold.
 fn checked<T: Serialize + DeserializeOwned + Validate>(value: &T, name: &str) -> Result<T, InitializeError> {
     let text = serde_json::to_string(value).map_err(InitializeError::Unwritable)?;
     Ok(language::parse_valid(&text, name)?)
-}
-
-fn features(surface: &Surface) -> Value {
-    let features = surface.features();
-    let mut faces = vec![0_usize; features.names().len()];
-    for &feature in features.face_features() {
-        if let Some(count) = faces.get_mut(feature as usize) {
-            *count += 1;
-        }
-    }
-    let described = features.names().iter().zip(faces).zip(0..).map(|((name, faces), feature)| {
-        let vertices = features.vertices(feature);
-        let points = vertices.iter().map(|&vertex| surface.points()[vertex as usize]);
-        let empty = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-        let bounds = points.fold(empty, |[lower, upper]: [Vector; 2], point| {
-            [
-                std::array::from_fn(|axis| lower[axis].min(point[axis])),
-                std::array::from_fn(|axis| upper[axis].max(point[axis])),
-            ]
-        });
-        json!({"name": name, "faces": faces, "vertices": vertices.len(), "bounds": bounds})
-    });
-    described.collect()
 }
 
 /// The settings of orders that bring none: those of the pipeline that waits for orders, else the kernel's.
@@ -554,65 +450,4 @@ fn defaults(config: &Config) -> Defaults {
         }
     }
     defaults
-}
-
-/// Takes the commands of viewers in, on the stream's thread.
-struct Intake {
-    queue: Arc<Queue>,
-    log: Arc<Log>,
-    hub: Arc<Hub>,
-    forecaster: Arc<OnceLock<Forecaster>>,
-}
-
-impl Intake {
-    /// Has a viewer told what an order would come to.
-    fn forecast(&self, client: u64, id: Option<String>, question: &str) -> Result<(), String> {
-        let Question::Forecast(order) =
-            language::parse_valid(question, "message").map_err(|error| error.to_string())?;
-        let command = Command::Order(order);
-        check_files(&command)?;
-        let Command::Order(order) = command else { return Ok(()) };
-        let forecaster = self.forecaster.get().ok_or("there is no mesh yet whose shape could be changed")?;
-        let hub = Arc::clone(&self.hub);
-        forecaster.ask(client, &order, move |forecast| {
-            hub.tell_client(client, &json!({"forecast": {"id": id, "order": forecast}}));
-        });
-        Ok(())
-    }
-}
-
-/// What comes over the network names no files of this machine.
-fn check_files(command: &Command) -> Result<(), String> {
-    match command.file() {
-        None => Ok(()),
-        Some((edit, file)) => Err(format!(
-            "edit {edit} (displacement): file: found {file:?}; an order over the network names no files of this machine, \
-             expected `vertices` and `values`"
-        )),
-    }
-}
-
-fn is_question(message: &str) -> bool {
-    matches!(serde_json::from_str::<Value>(message), Ok(Value::Object(members)) if members.contains_key("forecast"))
-}
-
-impl CommandSink for Intake {
-    fn receive(&self, client: u64, id: Option<String>, command: &str) -> Result<(), String> {
-        if is_question(command) {
-            return self.forecast(client, id, command);
-        }
-        let command: Command = language::parse_valid(command, "message").map_err(|error| error.to_string())?;
-        check_files(&command)?;
-        if !self.queue.has_room() {
-            return Err("the solver has not come to the commands before this one yet; try again later".into());
-        }
-        let (cycle, time) = self.hub.clock.get();
-        let id = self.log.accept(id, &Source::Viewer(client), &command, Moment { cycle, time })?;
-        self.queue.push(Received { client, id, command });
-        Ok(())
-    }
-
-    fn orders(&self) -> Value {
-        self.log.told()
-    }
 }

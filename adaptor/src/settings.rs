@@ -4,7 +4,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use tombolo_deform::mesh::{MeshError, Vector};
 use tombolo_pipelines::{
-    communicator::{Communicator, Solo},
+    communicator::{Communicator, RankError, Solo},
     language::{Config, LanguageError, TimedCommand},
 };
 
@@ -104,6 +104,9 @@ pub enum InitializeError {
     /// The configuration or a command cannot be written as JSON.
     #[error("the configuration or the orders cannot be written as JSON: {0}")]
     Unwritable(serde_json::Error),
+    /// Something is wrong on one rank, or the ranks were given different configurations. All ranks have this error.
+    #[error(transparent)]
+    Rank(#[from] RankError),
     /// The pipelines cannot be run.
     #[error("{0}")]
     Pipelines(String),
@@ -138,6 +141,29 @@ pub enum ExecuteError {
         channel: String,
         /// What is wrong.
         source: MeshError,
+    },
+    /// Something is wrong on one rank. All ranks have this error, that of the lowest rank on which something is wrong.
+    #[error(transparent)]
+    Rank(#[from] RankError),
+    /// The ranks have come to different cycles.
+    #[error("the ranks call execute for cycles from {lowest} to {highest}; expected the same cycle on all of them")]
+    Cycles {
+        /// The lowest.
+        lowest: u64,
+        /// The highest.
+        highest: u64,
+    },
+    /// The ranks have come to different times.
+    #[error(
+        "cycle {cycle}: the ranks call execute for times from {earliest} to {latest}; expected the same time on all of them"
+    )]
+    Times {
+        /// The step.
+        cycle: u64,
+        /// The earliest.
+        earliest: f64,
+        /// The latest.
+        latest: f64,
     },
     /// The mesh is not the one of the first call.
     #[error(

@@ -7,12 +7,14 @@
 //! cargo run --release -p tombolo-benchmarks -- paper --json
 //! cargo run --release -p tombolo-benchmarks -- surface-wasm --json
 //! cargo run --release -p tombolo-benchmarks -- skeleton --json
+//! cargo run --release -p tombolo-benchmarks -- scaling --json
 //! ```
 
 mod measure;
 mod overhead;
 mod paper;
 mod report;
+mod scaling;
 mod skeleton;
 mod stiffening;
 mod surface;
@@ -49,6 +51,8 @@ enum Name {
     Skeleton,
     /// The quality of deformed meshes at several exponents of the stiffening.
     Stiffening,
+    /// Surfaces of meshes in parts: the time it takes, and what goes from rank to rank.
+    Scaling,
     /// Volume motion at the sizes of the paper's meshes, beside the paper and PETSc.
     Volume,
 }
@@ -64,6 +68,11 @@ fn main() -> ExitCode {
         Name::Stiffening => {
             return said(
                 stiffening::run().map(|report| if arguments.json { report.json() + "\n" } else { report.to_string() }),
+            );
+        }
+        Name::Scaling => {
+            return said(
+                scaling::run().map(|report| if arguments.json { report.json() + "\n" } else { report.to_string() }),
             );
         }
         Name::Overhead => overhead::run(),

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::net::SocketAddr;
+use std::num::NonZeroU32;
 
 use super::DeformStage;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
@@ -60,11 +61,15 @@ pub struct Steering {
     pub background: bool,
     /// Whether the solver waits before its first step until a viewer has connected. Needs `stream`.
     pub wait_for_viewer: bool,
+    /// On several ranks: at every how many calls of `execute` the ranks come together to hear what was asked for and whether one of
+    /// them has an error, by one reduction of six numbers. In between a call returns at once, and what falls due waits for the
+    /// next such call. While the mesh moves they come together at every call.
+    pub poll_steps: NonZeroU32,
 }
 
 impl Default for Steering {
     fn default() -> Self {
-        Self { background: true, wait_for_viewer: false }
+        Self { background: true, wait_for_viewer: false, poll_steps: NonZeroU32::MIN }
     }
 }
 

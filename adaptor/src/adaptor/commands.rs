@@ -1,0 +1,198 @@
+//! The intake of commands: from viewers, files and pipelines to what they change.
+
+use std::sync::{Arc, OnceLock};
+
+use serde_json::{Value, json};
+use tombolo_pipelines::{
+    files::{UnreadFile, read_displacements},
+    language::{self, Command, Question},
+};
+
+use super::{Adaptor, SteeredMesh};
+use crate::{
+    comm,
+    steering::{Forecaster, Log, Moment, Queue, Received, Source},
+    stream::{CommandSink, Hub},
+};
+
+impl Adaptor {
+    /// Takes in a command that no viewer sent. All ranks come here with the same one; rank 0 reads its files, names it and writes it
+    /// to the journal, and what it takes, all obey.
+    pub(super) fn accept(&mut self, id: Option<String>, source: Source, command: Command, moment: Moment) {
+        let taken = if self.communicator.rank() == 0 { self.take_in(id, &source, command, moment) } else { None };
+        for (id, command) in self.told_to_all(taken.into_iter().collect()) {
+            self.obey(id, &source, command, moment);
+        }
+    }
+
+    fn take_in(
+        &self,
+        id: Option<String>,
+        source: &Source,
+        mut command: Command,
+        moment: Moment,
+    ) -> Option<(String, Command)> {
+        // The journal gets what a file holds and not its name, so that it replays whatever becomes of the file.
+        let read = self.read_files(&mut command);
+        match self.log.accept(id, source, &command, moment) {
+            Ok(id) => match read {
+                Ok(()) => return Some((id, command)),
+                Err(reason) => self.log.reject(&id, moment, &reason.into()),
+            },
+            Err(reason) => self.complain(&format!("a command was not taken: {reason}")),
+        }
+        None
+    }
+
+    /// The commands of rank 0 on all ranks, so that they take effect at the same cycle everywhere. Collective; free on one process.
+    fn told_to_all(&self, commands: Vec<(String, Command)>) -> Vec<(String, Command)> {
+        comm::share(&*self.communicator, commands).unwrap_or_else(|reason| {
+            self.complain(&reason);
+            Vec::new()
+        })
+    }
+
+    fn read_files(&self, command: &mut Command) -> Result<(), UnreadFile> {
+        match (command, &self.mesh) {
+            (Command::Order(order), SteeredMesh::Steered(_, surface)) => read_displacements(order.edits_mut(), surface),
+            // Without a surface every order is rejected.
+            _ => Ok(()),
+        }
+    }
+
+    /// Says to whom it may concern what no order's outcome can say. Once: rank 0 speaks for all.
+    pub(super) fn complain(&self, message: &str) {
+        if self.communicator.rank() > 0 {
+            return;
+        }
+        eprintln!("tombolo: {message}");
+        if let Some(hub) = &self.hub {
+            hub.tell(&json!({"error": {"message": message}}));
+        }
+    }
+
+    /// Carries out what viewers have asked for meanwhile, as far as it can be now.
+    pub(super) fn serve(&mut self, moment: Moment) {
+        let received: Vec<Received> = self.queue.take().into();
+        let clients: Vec<u64> = received.iter().map(|received| received.client).collect();
+        let own = received.into_iter().map(|received| (received.id, received.command)).collect();
+        for (place, (id, command)) in self.told_to_all(own).into_iter().enumerate() {
+            // Only rank 0 has viewers to answer.
+            let client = clients.get(place).copied().unwrap_or_default();
+            self.obey(id, &Source::Viewer(client), command, moment);
+        }
+        let step_seconds = self.timing.steps.median();
+        if let SteeredMesh::Steered(steerer, _) = &mut self.mesh
+            && steerer.advance(moment, step_seconds)
+        {
+            self.describe();
+            self.tell_conditions();
+        }
+    }
+
+    fn obey(&mut self, id: String, source: &Source, command: Command, moment: Moment) {
+        let outcome = match command {
+            Command::Order(order) => {
+                let background = self.config.steering.background && matches!(source, Source::Viewer(_));
+                match &mut self.mesh {
+                    SteeredMesh::Steered(steerer, _) => steerer.take(id, order, background),
+                    SteeredMesh::Refused(reason) => self.log.reject(&id, moment, &reason.into()),
+                    SteeredMesh::Unknown | SteeredMesh::Unsteered => {
+                        self.log.reject(&id, moment, &"no reference mesh was taken".into());
+                    }
+                }
+                return;
+            }
+            Command::Pause {} if self.config.stream.is_none() => {
+                Err("there is no stream, so that nobody could resume".to_owned())
+            }
+            Command::Pause {} => {
+                self.paused = true;
+                Ok(())
+            }
+            Command::Resume {} => {
+                self.paused = false;
+                Ok(())
+            }
+            Command::Stop {} => {
+                self.stopped = true;
+                Ok(())
+            }
+            Command::Parameter(change) => {
+                self.parameters.set(&change.name, change.value).map_err(|error| error.to_string())
+            }
+        };
+        if let Err(reason) = &outcome {
+            match (source, &self.hub) {
+                (Source::Viewer(client), Some(hub)) => {
+                    hub.tell_client(*client, &json!({"error": {"message": reason, "id": id}}));
+                }
+                _ => self.complain(&format!("command '{id}': {reason}")),
+            }
+        }
+        self.log.settle(&id, moment, outcome);
+        self.describe();
+        self.tell_conditions();
+    }
+}
+
+/// Takes the commands of viewers in, on the stream's thread.
+pub(super) struct Intake {
+    pub(super) queue: Arc<Queue>,
+    pub(super) log: Arc<Log>,
+    pub(super) hub: Arc<Hub>,
+    pub(super) forecaster: Arc<OnceLock<Forecaster>>,
+}
+
+impl Intake {
+    /// Has a viewer told what an order would come to.
+    fn forecast(&self, client: u64, id: Option<String>, question: &str) -> Result<(), String> {
+        let Question::Forecast(order) =
+            language::parse_valid(question, "message").map_err(|error| error.to_string())?;
+        let command = Command::Order(order);
+        check_files(&command)?;
+        let Command::Order(order) = command else { return Ok(()) };
+        let forecaster = self.forecaster.get().ok_or("there is no mesh yet whose shape could be changed")?;
+        let hub = Arc::clone(&self.hub);
+        forecaster.ask(client, &order, move |forecast| {
+            hub.tell_client(client, &json!({"forecast": {"id": id, "order": forecast}}));
+        });
+        Ok(())
+    }
+}
+
+/// What comes over the network names no files of this machine.
+fn check_files(command: &Command) -> Result<(), String> {
+    match command.file() {
+        None => Ok(()),
+        Some((edit, file)) => Err(format!(
+            "edit {edit} (displacement): file: found {file:?}; an order over the network names no files of this machine, \
+             expected `vertices` and `values`"
+        )),
+    }
+}
+
+fn is_question(message: &str) -> bool {
+    matches!(serde_json::from_str::<Value>(message), Ok(Value::Object(members)) if members.contains_key("forecast"))
+}
+
+impl CommandSink for Intake {
+    fn receive(&self, client: u64, id: Option<String>, command: &str) -> Result<(), String> {
+        if is_question(command) {
+            return self.forecast(client, id, command);
+        }
+        let command: Command = language::parse_valid(command, "message").map_err(|error| error.to_string())?;
+        check_files(&command)?;
+        if !self.queue.has_room() {
+            return Err("the solver has not come to the commands before this one yet; try again later".into());
+        }
+        let (cycle, time) = self.hub.clock.get();
+        let id = self.log.accept(id, &Source::Viewer(client), &command, Moment { cycle, time })?;
+        self.queue.push(Received { client, id, command });
+        Ok(())
+    }
+
+    fn orders(&self) -> Value {
+        self.log.told()
+    }
+}

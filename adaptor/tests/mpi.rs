@@ -1,0 +1,135 @@
+//! The ranks of MPI: started without `mpirun`, this program runs itself under it on 1 to 4 ranks.
+#![allow(clippy::unwrap_used, reason = "a test")]
+
+use std::{
+    process::{Command, ExitCode},
+    time::{Duration, Instant},
+};
+
+use tombolo::{
+    comm::{
+        Communicator, Counted, Reduction,
+        mpi::{Mpi, MpiError, rsmpi},
+        threads,
+    },
+    deform::{
+        shapes::box_of_tets,
+        surface::{FeatureSettings, Surface},
+    },
+    pipelines::distributed::{Part, PartBoundary},
+};
+
+const PATIENCE: Duration = Duration::from_secs(60);
+
+fn main() -> ExitCode {
+    match std::env::var("OMPI_COMM_WORLD_SIZE").or_else(|_| std::env::var("PMI_SIZE")) {
+        Ok(_) => {
+            as_rank();
+            ExitCode::SUCCESS
+        }
+        Err(_) => launch(),
+    }
+}
+
+/// Runs this program on several ranks.
+fn launch() -> ExitCode {
+    let program = std::env::current_exe().unwrap();
+    let mut failed = 0;
+    for ranks in 1..=4 {
+        let mut command = Command::new("mpirun");
+        command.args(["--oversubscribe", "--allow-run-as-root", "-n", &ranks.to_string()]).arg(&program);
+        let begun = Instant::now();
+        let mut child = command.spawn().expect("mpirun: install openmpi-bin, or run scripts/setup --distributed");
+        let status = loop {
+            if let Some(status) = child.try_wait().unwrap() {
+                break Some(status);
+            }
+            if begun.elapsed() > PATIENCE {
+                let _ = child.kill();
+                break None;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        let passed = status.is_some_and(|status| status.success());
+        println!("test ranks_{ranks} ... {}", if passed { "ok" } else { "FAILED" });
+        failed += usize::from(!passed);
+    }
+    let outcome = if failed == 0 { "ok" } else { "FAILED" };
+    println!("\ntest result: {outcome}. {} passed; {failed} failed; 0 ignored", 4 - failed);
+    if failed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+fn as_rank() {
+    assert_eq!(Mpi::new(&rsmpi::topology::SimpleCommunicator::world()).err(), Some(MpiError::NotInitialized));
+    let (universe, _) = rsmpi::initialize_with_threading(rsmpi::Threading::Funneled).unwrap();
+    let world = Mpi::new(&universe.world()).unwrap();
+    everything(&world);
+    // Half of the ranks, in the other order.
+    use rsmpi::topology::{Color, Communicator as _};
+    let half =
+        universe.world().split_by_color_with_key(Color::with_value(world.rank() as i32 % 2), -(world.rank() as i32));
+    everything(&Mpi::new(&half.unwrap()).unwrap());
+    // By the handles that C and Fortran have.
+    // SAFETY: the handle of a communicator that is alive.
+    let again = unsafe { Mpi::from_raw(world.as_raw()) }.unwrap();
+    assert_eq!((again.rank(), again.size()), (world.rank(), world.size()));
+    // SAFETY: MPI is initialized, and the handle is alive.
+    let fortran = unsafe { rsmpi::ffi::RSMPI_Comm_c2f(world.as_raw()) };
+    // SAFETY: as above.
+    everything(&unsafe { Mpi::from_fortran(fortran) }.unwrap());
+    // SAFETY: the null handle.
+    let none = unsafe { Mpi::from_raw(rsmpi::ffi::RSMPI_COMM_NULL) };
+    assert_eq!(none.err(), Some(MpiError::Null));
+    partitioned(&world);
+}
+
+/// Every call, against what threads make of it.
+fn everything(ranks: &dyn Communicator) {
+    let (rank, size) = (ranks.rank(), ranks.size());
+    for root in 0..size {
+        let mut bytes = if rank == root { vec![root as u8; 100_000] } else { vec![1, 2, 3] };
+        ranks.broadcast(root, &mut bytes);
+        assert_eq!(bytes, vec![root as u8; 100_000]);
+        let gathered = ranks.gather(root, &vec![rank as u8; 1000 * rank]);
+        assert_eq!(gathered, (rank == root).then(|| (0..size).map(|rank| vec![rank as u8; 1000 * rank]).collect()));
+    }
+    let values = |rank: usize| [1.0 / (rank as f64 + 3.0), -(rank as f64), if rank == 1 { f64::NAN } else { 1e16 }];
+    for reduction in [Reduction::Sum, Reduction::Minimum, Reduction::Maximum] {
+        let mut sum = values(rank);
+        ranks.reduce(reduction, &mut sum);
+        let by_threads = threads::run(size, |ranks| {
+            let mut sum = values(ranks.rank());
+            ranks.reduce(reduction, &mut sum);
+            sum
+        });
+        assert_eq!(sum.map(f64::to_bits), by_threads[0].map(f64::to_bits));
+    }
+    for round in 0..200_u8 {
+        // To all ranks but those that `round` leaves out, twice to the next one.
+        let wanted = |from: usize, to: usize| (from + to + round as usize) % 3 != 0;
+        let mut messages: Vec<(usize, Vec<u8>)> =
+            (0..size).filter(|&to| wanted(rank, to)).map(|to| (to, vec![round; 10 * rank])).collect();
+        messages.push(((rank + 1) % size, vec![rank as u8, round]));
+        let before = (rank + size - 1) % size;
+        let mut expected: Vec<(usize, Vec<u8>)> =
+            (0..size).filter(|&from| wanted(from, rank)).map(|from| (from, vec![round; 10 * from])).collect();
+        expected.push((before, vec![before as u8, round]));
+        expected.sort_by_key(|(from, _)| *from);
+        assert_eq!(ranks.exchange(messages), expected);
+    }
+    ranks.barrier();
+}
+
+/// The surface of a mesh in parts is that of the whole.
+fn partitioned(ranks: &Mpi) {
+    let ranks = Counted::new(ranks);
+    let mesh = box_of_tets([6, 5, 4], [0.0; 3], [1.0; 3]);
+    let of_cells: Vec<usize> = (0..mesh.cells().len()).map(|cell| cell * ranks.size() / mesh.cells().len()).collect();
+    let part = Part::cut(&mesh, &of_cells, ranks.rank(), true).unwrap();
+    let (_, boundary) = PartBoundary::find(&ranks, &part, &FeatureSettings::default()).unwrap();
+    if let Some(surface) = boundary.surface() {
+        assert_eq!(**surface, Surface::extract(&mesh, &FeatureSettings::default()).unwrap());
+    }
+    assert_eq!(ranks.rank() == 0, boundary.surface().is_some());
+    assert!(ranks.size() == 1 || ranks.traffic().bytes_sent > 0);
+}

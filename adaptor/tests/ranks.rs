@@ -1,0 +1,240 @@
+//! Runs on several ranks, which are threads here: they do the same at the same cycle, whatever viewers or one of them do.
+
+mod common;
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use common::{LINK_TO_ALL, Viewer, config};
+use serde_json::json;
+use tombolo::{
+    Adaptor, Parameter, Settings, Step,
+    comm::{Communicator, Counted, threads},
+    deform::{
+        mesh::{ArrayView, CellType, Mesh},
+        shapes::box_of_tets,
+    },
+    pipelines::{
+        distributed::Part,
+        encode::{Decoded, decode},
+        extract::{Association, Channel, FieldView},
+    },
+};
+
+const RANKS: usize = 3;
+
+fn part(mesh: &Mesh, rank: usize) -> Part {
+    let cells = mesh.cells().len();
+    let of_cells: Vec<usize> = (0..cells).map(|cell| cell * RANKS / cells).collect();
+    Part::cut(mesh, &of_cells, rank, true).expect("a part")
+}
+
+fn speed(part: &Part) -> Vec<f64> {
+    part.points.iter().map(|[x, y, z]| x + y * z).collect()
+}
+
+fn step(cycle: u64) -> Step {
+    Step { cycle, time: cycle as f64 * 0.01, time_step: 0.01 }
+}
+
+#[test]
+fn what_viewers_ask_for_happens_at_the_same_cycle() {
+    let mesh = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+    let outcomes = threads::run(RANKS, |ranks| {
+        let rank = ranks.rank();
+        let part = part(&mesh, rank);
+        let inflow = Parameter { name: "inflow".into(), value: 1.0, minimum: 0.0, maximum: 10.0 };
+        let mut adaptor = Adaptor::initialize(Settings {
+            config: config(LINK_TO_ALL),
+            communicator: Arc::new(ranks),
+            parameters: vec![inflow],
+            ..Settings::default()
+        })
+        .expect("initialize");
+        assert_eq!(adaptor.link().is_some(), rank == 0);
+        let speed = speed(&part);
+        let fields =
+            [FieldView { name: "speed", association: Association::Vertex, values: ArrayView::scalars(&speed) }];
+        let channels = [Channel { name: "fluid", mesh: part.view(), fields: &fields }];
+        let (mut first, mut second) = (None::<Viewer>, None::<Viewer>);
+        let (mut cycle, mut changes) = (0, Vec::new());
+        loop {
+            let steering = adaptor.execute(&step(cycle), &channels).expect("execute");
+            changes.extend(steering.parameters.iter().map(|(name, value)| (cycle, name.clone(), *value)));
+            if steering.stop {
+                break;
+            }
+            if rank == 0 {
+                match cycle {
+                    // Sees the whole surface, says something, and is gone.
+                    0 => first = Some(Viewer::connect(&adaptor)),
+                    5 => {
+                        let viewer = first.as_mut().expect("connected");
+                        viewer.hello();
+                        let _ = viewer.look_for("nothing", Duration::from_millis(500), |_| false);
+                        let whole = viewer.frames.iter().filter_map(|frame| match decode(frame) {
+                            Ok(Decoded::Topology(topology)) => Some(topology),
+                            _ => None,
+                        });
+                        assert!(whole.count() > 0, "no frame came");
+                        viewer.send(&json!({"id": "more", "parameter": {"name": "inflow", "value": 2.0}}));
+                    }
+                    20 => drop(first.take()),
+                    25 => {
+                        let mut viewer = Viewer::connect(&adaptor);
+                        viewer.hello();
+                        viewer.send(&json!({"pause": {}}));
+                        viewer.send(&json!({"resume": {}}));
+                        viewer.send(&json!({"id": "end", "stop": {}}));
+                        second = Some(viewer);
+                    }
+                    _ => {}
+                }
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            cycle += 1;
+            assert!(cycle < 5000, "nobody stopped the run");
+        }
+        drop(second);
+        adaptor.finalize().expect("finalize");
+        (cycle, changes)
+    });
+    assert!(outcomes.iter().all(|outcome| *outcome == outcomes[0]), "{outcomes:?}");
+    assert!(outcomes[0].0 >= 25 && outcomes[0].1.iter().any(|(_, name, value)| name == "inflow" && *value == 2.0));
+}
+
+#[test]
+fn a_mistake_on_one_rank_is_the_same_error_on_all() {
+    let mesh = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+    let begun = Instant::now();
+    let outcomes = threads::run(RANKS, |ranks| {
+        let rank = ranks.rank();
+        let part = part(&mesh, rank);
+        let mut adaptor =
+            Adaptor::initialize(Settings { communicator: Arc::new(ranks), ..Settings::default() }).expect("initialize");
+        let channels = [Channel { name: "fluid", mesh: part.view(), fields: &[] }];
+        let mut said = Vec::new();
+        for cycle in 0..6 {
+            let mut step = step(cycle);
+            if rank == 2 && cycle == 2 {
+                step.time = f64::NAN;
+            }
+            if rank == 1 && cycle == 4 {
+                step.cycle = 40;
+            }
+            let shown = if rank == 1 && cycle == 3 { &channels[..0] } else { &channels[..] };
+            said.push(adaptor.execute(&step, shown).map(|_| ()).map_err(|error| error.to_string()));
+        }
+        adaptor.finalize().expect("finalize");
+        said
+    });
+    assert!(outcomes.iter().all(|outcome| *outcome == outcomes[0]), "{outcomes:?}");
+    let fault = |cycle: usize| outcomes[0][cycle].clone().expect_err("an error");
+    assert!(fault(2).starts_with("rank 2: cycle 2: time is NaN"), "{}", fault(2));
+    assert!(fault(3).starts_with("rank 1: cycle 3: no channel"), "{}", fault(3));
+    assert!(fault(4).contains("cycles from 4 to 40"), "{}", fault(4));
+    assert!([0, 1, 5].iter().all(|&cycle: &usize| outcomes[0][cycle].is_ok()), "{outcomes:?}");
+    assert!(begun.elapsed() < Duration::from_secs(20));
+}
+
+/// A fault between two meetings waits for the next, and what falls due between them too.
+#[test]
+fn ranks_come_together_as_often_as_they_are_told() {
+    let text = LINK_TO_ALL.replacen('{', r#"{"steering": {"poll_steps": 4}, "#, 1);
+    let mesh = box_of_tets([3, 3, 3], [0.0; 3], [1.0; 3]);
+    let outcomes = threads::run(RANKS, |ranks| {
+        let rank = ranks.rank();
+        let part = part(&mesh, rank);
+        let ranks = Counted::new(ranks);
+        let counted = Arc::new(ranks);
+        let communicator: Arc<dyn Communicator> = Arc::clone(&counted) as Arc<dyn Communicator>;
+        let mut adaptor = Adaptor::initialize(Settings { config: config(&text), communicator, ..Settings::default() })
+            .expect("set up");
+        let channels = [Channel { name: "fluid", mesh: part.view(), fields: &[] }];
+        let mut said = Vec::new();
+        for cycle in 0..13 {
+            let mut step = step(cycle);
+            // Between two meetings, and for one rank only: a NaN, and another cycle.
+            if rank == 2 && cycle == 5 {
+                step.time = f64::NAN;
+            }
+            if rank == 1 && cycle == 10 {
+                step.cycle = 11;
+            }
+            let before = counted.traffic();
+            let outcome = adaptor.execute(&step, &channels).map(|_| ()).map_err(|error| error.to_string());
+            said.push((outcome, counted.traffic() == before));
+        }
+        adaptor.finalize().expect("finalize");
+        said
+    });
+    for said in &outcomes {
+        for (cycle, (outcome, silent)) in said.iter().enumerate() {
+            assert_eq!(*silent, cycle % 4 != 0, "cycle {cycle}");
+            match cycle {
+                8 => assert!(
+                    outcome.clone().is_err_and(|text| text.starts_with("rank 2: cycle 5: time is NaN")),
+                    "{outcome:?}"
+                ),
+                _ => assert_eq!(*outcome, Ok(()), "cycle {cycle}"),
+            }
+        }
+    }
+}
+
+/// A rank whose mesh makes no sense takes no other with it: the error is named, with its rank, and the run goes on.
+#[test]
+fn a_bad_cell_on_one_rank_holds_nobody_up() {
+    let mesh = box_of_tets([3, 3, 3], [0.0; 3], [1.0; 3]);
+    let begun = Instant::now();
+    let faults = [
+        |part: &mut Part| part.points[3][1] = f64::NAN,
+        |part: &mut Part| {
+            let vertices = part.cells.vertices(0).to_vec();
+            // The same tetrahedron a second time and a third: its faces have three cells.
+            for _ in 0..2 {
+                part.cells.push(CellType::Tetra, &vertices).expect("a cell");
+                part.global_cells.iter_mut().for_each(|numbers| numbers.push(9999));
+                part.ghosts.iter_mut().for_each(|ghosts| ghosts.push(false));
+            }
+        },
+        |part: &mut Part| part.global_vertices.iter_mut().for_each(|numbers| numbers[1] = numbers[0]),
+    ];
+    for fault in faults {
+        let outcomes = threads::run(RANKS, |ranks| {
+            let rank = ranks.rank();
+            let mut part = part(&mesh, rank);
+            if rank == 1 {
+                fault(&mut part);
+            }
+            let settings =
+                Settings { config: config(LINK_TO_ALL), communicator: Arc::new(ranks), ..Settings::default() };
+            let mut adaptor = Adaptor::initialize(settings).expect("initialize");
+            let speed = speed(&part);
+            let fields =
+                [FieldView { name: "speed", association: Association::Vertex, values: ArrayView::scalars(&speed) }];
+            let channels = [Channel { name: "fluid", mesh: part.view(), fields: &fields }];
+            let said: Vec<_> = (0..4)
+                .map(|cycle| adaptor.execute(&step(cycle), &channels).map(|_| ()).map_err(|error| error.to_string()))
+                .collect();
+            adaptor.finalize().expect("finalize");
+            said
+        });
+        assert!(outcomes.iter().all(|outcome| *outcome == outcomes[0]), "{outcomes:?}");
+        assert!(outcomes[0].iter().flat_map(|outcome| outcome.as_ref().err()).all(|text| text.contains("rank 1")));
+    }
+    assert!(begun.elapsed() < Duration::from_secs(20));
+}
+
+#[test]
+fn a_run_does_not_begin_with_different_configurations() {
+    let outcomes = threads::run(2, |ranks| {
+        let text = if ranks.rank() == 0 { LINK_TO_ALL.to_owned() } else { LINK_TO_ALL.replace("boundary", "border") };
+        let settings = Settings { config: config(&text), communicator: Arc::new(ranks), ..Settings::default() };
+        Adaptor::initialize(settings).map(drop).map_err(|error| error.to_string())
+    });
+    let expected = Err("rank 1: its configuration or its orders are not those of rank 0".to_owned());
+    assert_eq!(outcomes, [expected.clone(), expected]);
+}
