@@ -14,16 +14,23 @@ if (NOT TARGET catalyst::catalyst)
     IMPORTED_SONAME "libcatalyst.so.3"
     INTERFACE_INCLUDE_DIRECTORIES "${_catalyst_include}"
     INTERFACE_COMPILE_FEATURES "c_std_99;cxx_std_11")
-  # Headers of ParaView's examples ask for this target.
-  add_library(catalyst::conduit_headers INTERFACE IMPORTED)
-  set_target_properties(catalyst::conduit_headers PROPERTIES
-    INTERFACE_INCLUDE_DIRECTORIES "${_catalyst_include}")
-  add_library(catalyst::catalyst_headers INTERFACE IMPORTED)
-  set_target_properties(catalyst::catalyst_headers PROPERTIES
-    INTERFACE_INCLUDE_DIRECTORIES "${_catalyst_include}")
+  # The headers by themselves, and the parts that Catalyst has as libraries of their own.
+  foreach (_catalyst_part IN ITEMS catalyst conduit blueprint)
+    add_library(catalyst::${_catalyst_part}_headers INTERFACE IMPORTED)
+    set_target_properties(catalyst::${_catalyst_part}_headers PROPERTIES
+      INTERFACE_INCLUDE_DIRECTORIES "${_catalyst_include}")
+  endforeach ()
+  foreach (_catalyst_part IN ITEMS conduit blueprint)
+    add_library(catalyst::${_catalyst_part} INTERFACE IMPORTED)
+    set_target_properties(catalyst::${_catalyst_part} PROPERTIES
+      INTERFACE_LINK_LIBRARIES catalyst::catalyst)
+  endforeach ()
 endif ()
 
 set(catalyst_VERSION "2.0.0")
+set(CATALYST_VERSION "2.0.0")
+set(CATALYST_ABI_VERSION "3")
+set(CATALYST_BUILD_SHARED_LIBS ON)
 set(CATALYST_USE_MPI OFF)
 set(CATALYST_WRAP_PYTHON OFF)
 set(CATALYST_WRAP_FORTRAN OFF)

@@ -68,6 +68,7 @@ public:
                                                                   : static_cast<Id>(number - CONDUIT_INT8_ID);
   }
 
+  conduit_index_t type_id() const { return conduit_datatype_id(this->Type); }
   std::string name() const
   {
     char* text = conduit_datatype_name(this->Type);
@@ -133,22 +134,24 @@ private:
   const conduit_datatype* Type;
 };
 
-// A node, or a place in the tree of another: what operator[], child and append give refers to the tree that it is from.
-// Copying copies the data; moving does not.
+// A node, or a place in the tree of another: what operator[], child, append and cpp_node give refers to the tree that it is from
+// and leaves that to its owner. Copying copies the data; moving does not.
 class Node
 {
 public:
   Node()
     : Handle(conduit_node_create())
+    , Owns(true)
   {
   }
   Node(const Node& other)
-    : Handle(conduit_node_create())
+    : Node()
   {
     this->set(other);
   }
   Node(Node&& other) noexcept
     : Handle(other.Handle)
+    , Owns(other.Owns)
   {
     other.Handle = nullptr;
   }
@@ -169,6 +172,7 @@ public:
     {
       this->release();
       this->Handle = other.Handle;
+      this->Owns = other.Owns;
       other.Handle = nullptr;
     }
     return *this;
@@ -258,15 +262,15 @@ public:
     conduit_node_set_path_##stem##_ptr(this->Handle, path.c_str(), const_cast<type*>(some(data)),            \
       static_cast<conduit_index_t>(data.size()));                                                            \
   }                                                                                                          \
-  void set_external_##stem##_vector(std::vector<type>& data)                                                 \
+  void set_external_##stem##_vector(const std::vector<type>& data)                                           \
   {                                                                                                          \
     conduit_node_set_external_##stem##_ptr(                                                                  \
-      this->Handle, data.data(), static_cast<conduit_index_t>(data.size()));                                 \
+      this->Handle, const_cast<type*>(data.data()), static_cast<conduit_index_t>(data.size()));              \
   }                                                                                                          \
-  void set_path_external_##stem##_vector(const std::string& path, std::vector<type>& data)                   \
+  void set_path_external_##stem##_vector(const std::string& path, const std::vector<type>& data)             \
   {                                                                                                          \
-    conduit_node_set_path_external_##stem##_ptr(                                                             \
-      this->Handle, path.c_str(), data.data(), static_cast<conduit_index_t>(data.size()));                   \
+    conduit_node_set_path_external_##stem##_ptr(this->Handle, path.c_str(), const_cast<type*>(data.data()),  \
+      static_cast<conduit_index_t>(data.size()));                                                            \
   }                                                                                                          \
   void set_##stem##_ptr(const type* data, CATALYST_CONDUIT_LAYOUT(type))                                     \
   {                                                                                                          \
@@ -277,14 +281,16 @@ public:
     conduit_node_set_path_##stem##_ptr_detailed(                                                             \
       this->Handle, path.c_str(), const_cast<type*>(data), CATALYST_CONDUIT_PASS);                           \
   }                                                                                                          \
-  void set_external_##stem##_ptr(type* data, CATALYST_CONDUIT_LAYOUT(type))                                  \
+  void set_external_##stem##_ptr(const type* data, CATALYST_CONDUIT_LAYOUT(type))                            \
   {                                                                                                          \
-    conduit_node_set_external_##stem##_ptr_detailed(this->Handle, data, CATALYST_CONDUIT_PASS);              \
+    conduit_node_set_external_##stem##_ptr_detailed(                                                         \
+      this->Handle, const_cast<type*>(data), CATALYST_CONDUIT_PASS);                                         \
   }                                                                                                          \
-  void set_path_external_##stem##_ptr(const std::string& path, type* data, CATALYST_CONDUIT_LAYOUT(type))    \
+  void set_path_external_##stem##_ptr(                                                                       \
+    const std::string& path, const type* data, CATALYST_CONDUIT_LAYOUT(type))                                \
   {                                                                                                          \
     conduit_node_set_path_external_##stem##_ptr_detailed(                                                    \
-      this->Handle, path.c_str(), data, CATALYST_CONDUIT_PASS);                                              \
+      this->Handle, path.c_str(), const_cast<type*>(data), CATALYST_CONDUIT_PASS);                           \
   }                                                                                                          \
   type as_##stem() const { CATALYST_CONDUIT_WRAP_EXCEP(return conduit_node_as_##stem(this->Handle)) }        \
   type* as_##stem##_ptr()                                                                                    \
@@ -318,16 +324,16 @@ public:
   {                                                                                                          \
     this->set_path_##stem##_ptr(path, data, CATALYST_CONDUIT_PASS);                                          \
   }                                                                                                          \
-  void set_external(std::vector<type>& data) { this->set_external_##stem##_vector(data); }                   \
-  void set_external(type* data, CATALYST_CONDUIT_LAYOUT(type))                                               \
+  void set_external(const std::vector<type>& data) { this->set_external_##stem##_vector(data); }             \
+  void set_external(const type* data, CATALYST_CONDUIT_LAYOUT(type))                                         \
   {                                                                                                          \
     this->set_external_##stem##_ptr(data, CATALYST_CONDUIT_PASS);                                            \
   }                                                                                                          \
-  void set_path_external(const std::string& path, std::vector<type>& data)                                   \
+  void set_path_external(const std::string& path, const std::vector<type>& data)                             \
   {                                                                                                          \
     this->set_path_external_##stem##_vector(path, data);                                                     \
   }                                                                                                          \
-  void set_path_external(const std::string& path, type* data, CATALYST_CONDUIT_LAYOUT(type))                 \
+  void set_path_external(const std::string& path, const type* data, CATALYST_CONDUIT_LAYOUT(type))           \
   {                                                                                                          \
     this->set_path_external_##stem##_ptr(path, data, CATALYST_CONDUIT_PASS);                                 \
   }                                                                                                          \
@@ -387,8 +393,8 @@ public:
   void set(const std::vector<char>& data) { this->set_char_vector(data); }
   void set_path(const std::string& path, const char data) { this->set_path_char(path, data); }
   void set_path(const std::string& path, const std::vector<char>& data) { this->set_path_char_vector(path, data); }
-  void set_external(std::vector<char>& data) { this->set_external_char_vector(data); }
-  void set_path_external(const std::string& path, std::vector<char>& data)
+  void set_external(const std::vector<char>& data) { this->set_external_char_vector(data); }
+  void set_path_external(const std::string& path, const std::vector<char>& data)
   {
     this->set_path_external_char_vector(path, data);
   }
@@ -438,7 +444,14 @@ public:
 
   // ---- Children.
   Node operator[](const std::string& path) { return this->fetch(path); }
-  const Node operator[](const std::string& path) const { return this->fetch_existing(path); }
+  const Node operator[](const std::string& path) const
+  {
+    if (!this->has_path(path))
+    {
+      CATALYST_CONDUIT_ERROR("'" + path + "' is not there")
+    }
+    return this->fetch_existing(path);
+  }
   Node operator[](conduit_index_t index) { return this->child(index); }
   const Node operator[](conduit_index_t index) const { return this->child(index); }
   Node fetch(const std::string& path)
@@ -542,8 +555,14 @@ public:
   }
 
   // ---- Text and files.
-  void print() const { conduit_node_print(this->Handle); }
-  void print_detailed() const { conduit_node_print_detailed(this->Handle); }
+  // To std::cout, wherever that leads.
+  void print() const { std::cout << this->to_summary_string() << std::endl; }
+  void print_detailed() const
+  {
+    Node options;
+    options.set_path("protocol", "conduit_json");
+    std::cout << taken(conduit_node_to_json_with_options(this->Handle, options.Handle)) << std::endl;
+  }
   std::string to_json() const { return taken(conduit_node_to_json(this->Handle)); }
   std::string to_yaml() const { return taken(conduit_node_to_yaml(this->Handle)); }
   std::string to_string() const { return taken(conduit_node_to_string(this->Handle)); }
@@ -564,16 +583,17 @@ public:
 private:
   explicit Node(conduit_node* handle)
     : Handle(handle)
+    , Owns(false)
   {
   }
 
   void release()
   {
-    if (this->Handle)
+    if (this->Handle && this->Owns)
     {
       conduit_node_destroy(this->Handle);
-      this->Handle = nullptr;
     }
+    this->Handle = nullptr;
   }
 
   // An address that is not null, also where there are no elements.
@@ -640,6 +660,7 @@ private:
   }
 
   conduit_node* Handle;
+  bool Owns;
 };
 
 // The node of the C interface; it stays the object's.
@@ -648,12 +669,10 @@ inline conduit_node* c_node(const Node* node)
   return node ? node->Handle : nullptr;
 }
 
-// An object over a node of the C interface: it borrows the data and leaves the node alone.
+// An object that refers to a node of the C interface, which stays its owner's.
 inline Node cpp_node(conduit_node* node)
 {
-  Node borrowed;
-  conduit_node_set_external_node(borrowed.Handle, node);
-  return borrowed;
+  return Node(node);
 }
 
 }

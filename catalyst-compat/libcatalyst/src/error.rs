@@ -1,5 +1,6 @@
-//! Errors, and how they reach the caller: through the handler that was set, else as a C++ exception where the process has a C++
-//! runtime, else as a line on standard error.
+//! Errors, and how they reach the caller: through the handler that was set for their severity, else as a C++ exception where the
+//! process has a C++ runtime, else as a line on standard error. As in Conduit, a value read as another type than it has is a
+//! warning: with a handler of warnings that returns, the read answers 0 or null.
 
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::fmt;
@@ -11,6 +12,7 @@ use std::sync::{Mutex, PoisonError};
 pub struct Error {
     message: String,
     place: &'static Location<'static>,
+    severity: Severity,
 }
 
 /// The result of anything that may go wrong.
@@ -20,7 +22,13 @@ impl Error {
     /// An error that says `message`, noticed where this is called.
     #[track_caller]
     pub fn new(message: impl Into<String>) -> Self {
-        Self { message: message.into(), place: Location::caller() }
+        Self { message: message.into(), place: Location::caller(), severity: Severity::Error }
+    }
+
+    /// What is told to the handler of warnings, noticed where this is called.
+    #[track_caller]
+    pub fn warning(message: impl Into<String>) -> Self {
+        Self { message: message.into(), place: Location::caller(), severity: Severity::Warning }
     }
 }
 
@@ -65,7 +73,7 @@ pub fn set_handler(severity: Severity, handler: Option<Handler>) {
 
 /// Tells an error to the handler, or throws it, or prints it. Whoever calls this must be ready to be unwound.
 pub fn raise(error: Error) {
-    let handler = *slot(Severity::Error).lock().unwrap_or_else(PoisonError::into_inner);
+    let handler = *slot(error.severity).lock().unwrap_or_else(PoisonError::into_inner);
     let message = text(&error.message);
     let file = text(error.place.file());
     let line = c_int::try_from(error.place.line()).unwrap_or(0);
@@ -78,21 +86,6 @@ pub fn raise(error: Error) {
             throw(&message);
             eprintln!("conduit: {}", message.to_string_lossy());
         }
-    }
-}
-
-/// Tells a warning to its handler, or prints it.
-#[track_caller]
-pub fn warn(message: &str) {
-    let place = Location::caller();
-    let handler = *slot(Severity::Warning).lock().unwrap_or_else(PoisonError::into_inner);
-    match handler {
-        Some(handler) => {
-            let (message, file) = (text(message), text(place.file()));
-            // SAFETY: as in `raise`.
-            unsafe { handler(message.as_ptr(), file.as_ptr(), c_int::try_from(place.line()).unwrap_or(0)) }
-        }
-        None => eprintln!("conduit: {message}"),
     }
 }
 

@@ -339,7 +339,7 @@ impl Node {
         if self.kind() == kind {
             return Ok(());
         }
-        Err(Error::new(format!("{} holds {}, not {}", self.place(), self.kind().name(), kind.name())))
+        Err(Error::warning(format!("{} holds {}, not {}", self.place(), self.kind().name(), kind.name())))
     }
 
     /// The first element, as what it is.

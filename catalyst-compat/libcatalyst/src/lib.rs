@@ -6,8 +6,8 @@
 //!
 //! # Guarantees
 //! - The shared library exports exactly the names in `symbols.txt`.
-//! - A null node, a wrong type, a number out of range, a path that is not there, a length that is negative: each is told to the
-//!   error handler, with the node's path, what was found and what was expected.
+//! - A null node, a number out of range, a path that is not there, a length that is negative: each is told to the error handler,
+//!   with the node's path, what was found and what was expected; a value read as another type is told to the handler of warnings.
 //! - No panic leaves a function. Where no handler is set an error is thrown as a C++ `std::runtime_error`, if the process has a
 //!   C++ runtime; else it is printed and the function returns 0 or null.
 //!
@@ -20,6 +20,7 @@ pub mod blueprint;
 mod c_api;
 pub mod compare;
 pub mod datatype;
+pub mod dump;
 pub mod error;
 pub mod files;
 pub mod information;

@@ -1,7 +1,8 @@
 //! Finding an implementation of Catalyst and loading it.
 //!
 //! The name is `catalyst_load/implementation` in the node that initializes, else the variable `CATALYST_IMPLEMENTATION_NAME`; with
-//! `CATALYST_IMPLEMENTATION_PREFER_ENV` set the variable comes first. Without a name the stub answers. Directories are those of
+//! `CATALYST_IMPLEMENTATION_PREFER_ENV` set the variable comes first. Without a name, or with the name `stub`, the stub answers.
+//! Directories are those of
 //! `catalyst_load/search_paths`, then of `CATALYST_IMPLEMENTATION_PATHS` (first, where the environment is preferred), then
 //! `catalyst` beside this library. The file is `libcatalyst-NAME.so`. `CATALYST_DEBUG` tells each step on standard error.
 
@@ -118,6 +119,10 @@ pub fn load(parameters: Option<&Node>) -> Result<Implementation, Status> {
     let implementation = match name {
         None => {
             debug(|| "no implementation is named; the stub answers".to_owned());
+            stub::IMPLEMENTATION
+        }
+        Some(name) if name == "stub" => {
+            debug(|| "the stub is asked for".to_owned());
             stub::IMPLEMENTATION
         }
         Some(name) => {

@@ -153,7 +153,7 @@ impl Node {
         if datatype.kind.is_leaf() {
             let _ = write!(
                 text,
-                ", \"number_of_elements\": {}, \"offset\": {}, \"stride\": {}, \"element_bytes\": {}, \"endianness\": \"{}\"",
+                ",\"number_of_elements\": {},\"offset\": {},\"stride\": {},\"element_bytes\": {},\"endianness\": \"{}\"",
                 datatype.elements,
                 datatype.offset,
                 datatype.stride,
@@ -192,7 +192,8 @@ impl Node {
             if index >= first && index < self.count() - last {
                 if index == first {
                     let left_out = self.count() - first - last;
-                    let _ = write!(text, "{}... ( skipped {left_out} children ){}", style.margin(depth), style.end);
+                    let children = if left_out == 1 { "child" } else { "children" };
+                    let _ = write!(text, "{}... ( skipped {left_out} {children} ){}", style.margin(depth), style.end);
                 }
                 continue;
             }

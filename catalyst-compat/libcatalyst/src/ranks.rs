@@ -25,11 +25,29 @@ pub fn rank_and_size() -> (i32, i32) {
     from_mpi().or_else(from_environment).filter(|(rank, size)| *rank >= 0 && rank < size).unwrap_or((0, 1))
 }
 
+/// The world of MPICH and its kin, which is a constant; Open MPI's is an object with a name.
+const WORLD: usize = 0x4400_0000;
+
+/// The world as Fortran numbers it, where MPI runs.
+#[must_use]
+pub fn world() -> Option<u64> {
+    from_mpi()?;
+    match (symbol(c"ompi_mpi_comm_world"), symbol(c"MPI_Comm_c2f")) {
+        (Some(world), Some(convert)) => {
+            // SAFETY: a function of this name in a process with Open MPI takes a communicator and gives a number.
+            let handle = unsafe {
+                std::mem::transmute::<*mut c_void, unsafe extern "C" fn(*mut c_void) -> c_int>(convert)(world)
+            };
+            u64::try_from(handle).ok()
+        }
+        _ => u64::try_from(WORLD).ok(),
+    }
+}
+
 fn from_mpi() -> Option<(i32, i32)> {
     let (initialized, finalized) = (symbol(c"MPI_Initialized")?, symbol(c"MPI_Finalized")?);
     let (rank_of, size_of) = (symbol(c"MPI_Comm_rank")?, symbol(c"MPI_Comm_size")?);
-    // Open MPI's world is an object with a name; that of MPICH and its kin is a constant.
-    let world = symbol(c"ompi_mpi_comm_world").unwrap_or(std::ptr::without_provenance_mut(0x4400_0000));
+    let world = symbol(c"ompi_mpi_comm_world").unwrap_or(std::ptr::without_provenance_mut(WORLD));
     let (mut started, mut ended, mut rank, mut size) = (0, 0, 0, 0);
     // SAFETY: functions of these names in a process are MPI's, whose C interface gives them these signatures; a communicator is
     // passed in one register by all of them, whether it is an address or an integer.

@@ -2,10 +2,11 @@
 //! the nodes that it gets, for `catalyst_replay`.
 
 use std::ffi::c_int;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::{env, fs};
 
+use crate::dump::{self, Stage};
 use crate::error::{Error, Result};
 use crate::loader::{Implementation, Status};
 use crate::node::Node;
@@ -23,23 +24,15 @@ pub const IMPLEMENTATION: Implementation = Implementation { initialize, execute,
 
 static EXECUTED: AtomicU64 = AtomicU64::new(0);
 
-/// The file in which a stage's node is kept.
-#[must_use]
-pub fn dump_path(directory: &Path, stage: &str, invocation: Option<u64>, size: i32, rank: i32) -> PathBuf {
-    let count = invocation.map(|count| format!("_invc{count}")).unwrap_or_default();
-    directory.join(format!("{stage}{count}_params.conduit_bin.{size}.{rank}"))
-}
-
-fn dump(stage: &str, invocation: Option<u64>, node: *const Node) -> c_int {
+fn dump(stage: Stage, node: *const Node) -> c_int {
     let Some(directory) = env::var_os("CATALYST_DATA_DUMP_DIRECTORY").filter(|path| !path.is_empty()) else {
         return Status::Ok as c_int;
     };
     let written = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| -> Result<()> {
-        let (rank, size) = ranks::rank_and_size();
         let directory = PathBuf::from(directory);
         fs::create_dir_all(&directory)
             .map_err(|error| Error::new(format!("'{}' cannot be made: {error}", directory.display())))?;
-        let path = dump_path(&directory, stage, invocation, size, rank);
+        let path = dump::path(&directory, stage, ranks::rank_and_size());
         let empty = Node::new();
         // SAFETY: the caller of a Catalyst function hands over null or a live node.
         let node = unsafe { node.as_ref() }.unwrap_or(&empty);
@@ -47,8 +40,8 @@ fn dump(stage: &str, invocation: Option<u64>, node: *const Node) -> c_int {
     }));
     match written {
         Ok(Ok(())) => {}
-        Ok(Err(error)) => eprintln!("catalyst: the node of {stage} is not written: {error}"),
-        Err(_) => eprintln!("catalyst: the node of {stage} is not written: a defect of this library"),
+        Ok(Err(error)) => eprintln!("catalyst: the node of {stage:?} is not written: {error}"),
+        Err(_) => eprintln!("catalyst: the node of {stage:?} is not written: a defect of this library"),
     }
     Status::Ok as c_int
 }
@@ -58,7 +51,7 @@ fn dump(stage: &str, invocation: Option<u64>, node: *const Node) -> c_int {
 /// # Safety
 /// The node is null or live.
 pub unsafe extern "C-unwind" fn initialize(parameters: *const Node) -> c_int {
-    dump("initialize", None, parameters)
+    dump(Stage::Initialize, parameters)
 }
 
 /// `catalyst_stub_execute`.
@@ -66,7 +59,7 @@ pub unsafe extern "C-unwind" fn initialize(parameters: *const Node) -> c_int {
 /// # Safety
 /// The node is null or live.
 pub unsafe extern "C-unwind" fn execute(parameters: *const Node) -> c_int {
-    dump("execute", Some(EXECUTED.fetch_add(1, Ordering::Relaxed)), parameters)
+    dump(Stage::Execute(EXECUTED.fetch_add(1, Ordering::Relaxed)), parameters)
 }
 
 /// `catalyst_stub_finalize`.
@@ -74,7 +67,7 @@ pub unsafe extern "C-unwind" fn execute(parameters: *const Node) -> c_int {
 /// # Safety
 /// The node is null or live.
 pub unsafe extern "C-unwind" fn finalize(parameters: *const Node) -> c_int {
-    dump("finalize", None, parameters)
+    dump(Stage::Finalize, parameters)
 }
 
 /// `catalyst_stub_about`.

@@ -144,6 +144,8 @@ fn the_loader_finds_what_is_asked_for() {
     let name = |name| ("CATALYST_IMPLEMENTATION_NAME", name);
     let prefer = ("CATALYST_IMPLEMENTATION_PREFER_ENV", "1");
     assert_eq!(with(&["0"], &[]), "stub\n");
+    assert_eq!(with(&["0"], &[name("stub")]), "stub\n");
+    assert_eq!(with(&["0", "stub", path], &[name("nothing")]), "stub\n");
     assert_eq!(with(&["0", "echo", path], &[]), "echo\n");
     assert_eq!(with(&["0", "echo"], &[paths]), "echo\n");
     assert_eq!(with(&["0"], &[paths, name("echo")]), "echo\n");
@@ -183,7 +185,32 @@ fn what_is_dumped_is_played_back() {
     let read =
         |directory: &Path| std::fs::read(directory.join("execute_invc0_params.conduit_bin.1.0")).expect("was dumped");
     assert_eq!(read(&dumped), read(&again));
-    let refused = output(replay().arg(directory.path().join("nothing")));
-    assert!(!refused.status.success());
-    assert!(String::from_utf8_lossy(&refused.stderr).contains("rank 0 of 1"), "{refused:?}");
+    let schema = std::fs::read_to_string(dumped.join("finalize_params.conduit_bin.1.0_json")).expect("was dumped");
+    let leaf = "{\"dtype\":\"char8_str\",\"number_of_elements\": 5,\"offset\": 0,\"stride\": 1,\"element_bytes\": 1,\
+                \"endianness\": \"little\"}";
+    assert!(
+        schema.starts_with("\n{\n  \"catalyst_load\": \n  {\n    \"implementation\": ") && schema.contains(leaf),
+        "{schema}"
+    );
+
+    // What is not the whole of a run on as many ranks is refused.
+    let refused = |directory: &Path, why: &str| {
+        let refused = output(replay().arg(directory));
+        assert!(!refused.status.success());
+        assert!(String::from_utf8_lossy(&refused.stderr).contains(why), "{refused:?}");
+    };
+    refused(&directory.path().join("nothing"), "cannot be read");
+    refused(directory.path(), "0 nodes of initialize");
+    for (stage, why) in [("initialize", "0 nodes of initialize"), ("execute_invc0", "0 nodes of execute")] {
+        let file = dumped.join(format!("{stage}_params.conduit_bin.1.0"));
+        let kept = std::fs::read(&file).expect("was dumped");
+        std::fs::remove_file(&file).expect("is there");
+        refused(&dumped, why);
+        std::fs::write(dumped.join("execute_invc1_params.conduit_bin.1.0"), &kept).expect("can be written");
+        refused(&dumped, "holds");
+        std::fs::remove_file(dumped.join("execute_invc1_params.conduit_bin.1.0")).expect("is there");
+        std::fs::write(&file, &kept).expect("can be written");
+    }
+    std::fs::write(dumped.join("finalize_params.conduit_bin.2.1"), "").expect("can be written");
+    refused(&dumped, "a run on 2 ranks; this one has 1");
 }

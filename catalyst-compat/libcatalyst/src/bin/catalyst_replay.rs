@@ -1,28 +1,44 @@
-//! Plays back to an implementation what the stub wrote to a directory: `catalyst_replay DIRECTORY`, on as many ranks.
+//! Plays back to an implementation what the stub wrote to a directory: `catalyst_replay DIRECTORY`, on as many ranks. A directory
+//! that does not hold all of a run is refused. A communicator among the parameters (`mpi_comm`, or `mpi_comm` below any of them) is
+//! of the run that was written: it becomes the world of this one, or is left out where there is no MPI.
 //!
 //! The library is taken from `../lib` beside this program, else from where the linker looks. Under a launcher of MPI, MPI is
 //! loaded and initialized first, as implementations that use it expect.
 
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::os::unix::ffi::OsStrExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 use std::{env, ptr};
 
+#[path = "../dump.rs"]
+mod dump;
 #[path = "../ranks.rs"]
 #[allow(dead_code, reason = "shared with the library")]
 mod ranks;
+
+use dump::Stage;
 
 type Make = unsafe extern "C-unwind" fn() -> *mut c_void;
 type Unmake = unsafe extern "C-unwind" fn(*mut c_void);
 type Load = unsafe extern "C-unwind" fn(*mut c_void, *const c_char, *const c_char);
 type Call = unsafe extern "C-unwind" fn(*const c_void) -> c_int;
+type Count = unsafe extern "C-unwind" fn(*mut c_void) -> i64;
+type Child = unsafe extern "C-unwind" fn(*mut c_void, i64) -> *mut c_void;
+type Has = unsafe extern "C-unwind" fn(*const c_void, *const c_char) -> c_int;
+type Remove = unsafe extern "C-unwind" fn(*mut c_void, *const c_char);
+type Set = unsafe extern "C-unwind" fn(*mut c_void, *const c_char, u64);
 
 /// The functions of the library that are used.
 struct Catalyst {
     make: Make,
     unmake: Unmake,
     load: Load,
+    count: Count,
+    child: Child,
+    has: Has,
+    remove: Remove,
+    set: Set,
     initialize: Call,
     execute: Call,
     finalize: Call,
@@ -54,10 +70,42 @@ impl Catalyst {
                 make: std::mem::transmute::<*mut c_void, Make>(symbol(handle, c"catalyst_conduit_node_create")?),
                 unmake: std::mem::transmute::<*mut c_void, Unmake>(symbol(handle, c"catalyst_conduit_node_destroy")?),
                 load: std::mem::transmute::<*mut c_void, Load>(symbol(handle, c"catalyst_conduit_node_load")?),
+                count: std::mem::transmute::<*mut c_void, Count>(symbol(
+                    handle,
+                    c"catalyst_conduit_node_number_of_children",
+                )?),
+                child: std::mem::transmute::<*mut c_void, Child>(symbol(handle, c"catalyst_conduit_node_child")?),
+                has: std::mem::transmute::<*mut c_void, Has>(symbol(handle, c"catalyst_conduit_node_has_path")?),
+                remove: std::mem::transmute::<*mut c_void, Remove>(symbol(
+                    handle,
+                    c"catalyst_conduit_node_remove_path",
+                )?),
+                set: std::mem::transmute::<*mut c_void, Set>(symbol(handle, c"catalyst_conduit_node_set_path_uint64")?),
                 initialize: std::mem::transmute::<*mut c_void, Call>(symbol(handle, c"catalyst_initialize")?),
                 execute: std::mem::transmute::<*mut c_void, Call>(symbol(handle, c"catalyst_execute")?),
                 finalize: std::mem::transmute::<*mut c_void, Call>(symbol(handle, c"catalyst_finalize")?),
             })
+        }
+    }
+
+    /// Puts this run's communicator in the place of the one that was written.
+    ///
+    /// # Safety
+    /// The node is live.
+    unsafe fn adopt(&self, node: *mut c_void, deepest: bool) {
+        let name = c"mpi_comm";
+        // SAFETY: the node and its children are live, the name is a C string.
+        unsafe {
+            if (self.has)(node, name.as_ptr()) != 0 {
+                match ranks::world() {
+                    Some(world) => (self.set)(node, name.as_ptr(), world),
+                    None => (self.remove)(node, name.as_ptr()),
+                }
+            } else if !deepest {
+                for index in 0..(self.count)(node) {
+                    self.adopt((self.child)(node, index), true);
+                }
+            }
         }
     }
 
@@ -67,6 +115,7 @@ impl Catalyst {
         let status = unsafe {
             let node = (self.make)();
             (self.load)(node, file.as_ptr(), c"conduit_bin".as_ptr());
+            self.adopt(node, false);
             let status = call(node);
             (self.unmake)(node);
             status
@@ -92,31 +141,15 @@ fn start_mpi() -> Option<unsafe extern "C" fn() -> c_int> {
     }
 }
 
-fn dumped(directory: &Path, stage: &str, (rank, size): (i32, i32)) -> PathBuf {
-    directory.join(format!("{stage}_params.conduit_bin.{size}.{rank}"))
-}
-
 fn replay(directory: &Path) -> Result<(), String> {
     let world = ranks::rank_and_size();
+    let executions = dump::check(directory, world.1)?;
     let catalyst = Catalyst::find()?;
-    let first = dumped(directory, "initialize", world);
-    if !first.exists() {
-        let (rank, size) = world;
-        return Err(format!(
-            "'{}' is not there; this is rank {rank} of {size}: were there as many then?",
-            first.display()
-        ));
+    catalyst.play(&dump::path(directory, Stage::Initialize, world), catalyst.initialize)?;
+    for number in 0..executions {
+        catalyst.play(&dump::path(directory, Stage::Execute(number), world), catalyst.execute)?;
     }
-    catalyst.play(&first, catalyst.initialize)?;
-    for invocation in 0_u64.. {
-        let path = dumped(directory, &format!("execute_invc{invocation}"), world);
-        if !path.exists() {
-            break;
-        }
-        catalyst.play(&path, catalyst.execute)?;
-    }
-    let last = dumped(directory, "finalize", world);
-    if last.exists() { catalyst.play(&last, catalyst.finalize) } else { Ok(()) }
+    catalyst.play(&dump::path(directory, Stage::Finalize, world), catalyst.finalize)
 }
 
 fn main() -> ExitCode {

@@ -106,6 +106,11 @@ fn styled(options: Option<&Node>, mut style: Style, protocol: &str) -> Result<(S
             None => Err(Error::new(format!("the option '{name}' is a number that is not negative"))),
         },
     };
+    // Summaries leave nothing out where a threshold is 0 or negative.
+    let threshold = |name: &str, otherwise: usize| match options.get(name).and_then(Node::integer) {
+        Some(value) if value <= 0 => Ok(usize::MAX),
+        _ => count(name, otherwise),
+    };
     let text = |name: &str, otherwise: &str| match options.get(name) {
         None => Ok(otherwise.to_owned()),
         Some(node) => node.text().ok_or_else(|| Error::new(format!("the option '{name}' is a text"))),
@@ -114,8 +119,8 @@ fn styled(options: Option<&Node>, mut style: Style, protocol: &str) -> Result<(S
     style.depth = count("depth", style.depth)?.min(1 << 10);
     style.pad = text("pad", &style.pad)?;
     style.end = text("eoe", &style.end)?;
-    style.children = count("num_children_threshold", style.children)?;
-    style.elements = count("num_elements_threshold", style.elements)?;
+    style.children = threshold("num_children_threshold", style.children)?;
+    style.elements = threshold("num_elements_threshold", style.elements)?;
     Ok((style, text("protocol", protocol)?))
 }
 

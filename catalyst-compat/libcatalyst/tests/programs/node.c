@@ -387,6 +387,84 @@ static void partition(void)
   conduit_node_destroy(whole);
 }
 
+static int warnings = 0;
+static void note_warning(const char* message, const char* file, int line)
+{
+  (void)file;
+  (void)line;
+  ++warnings;
+  CHECK(strstr(message, "'value' holds float64, not ") != NULL);
+}
+
+/* A value read as another type is told to the handler of warnings; what is not there to that of errors. */
+static void handlers(void)
+{
+  conduit_node* node = conduit_node_create();
+  conduit_node_set_path_double(node, "value", 42);
+  conduit_node* value = conduit_node_fetch(node, "value");
+  const int before = errors;
+  conduit_utils_set_warning_handler(note_warning);
+  CHECK(conduit_node_as_float32(value) == 0);
+  CHECK(conduit_node_as_int_ptr(value) == NULL);
+  CHECK(conduit_node_as_char8_str(value) == NULL);
+  CHECK(conduit_node_fetch_path_as_uint8(node, "value") == 0);
+  CHECK(warnings == 4 && errors == before);
+  CHECK(conduit_node_fetch_existing(value, "nothing") == NULL);
+  CHECK(warnings == 4 && errors == before + 1);
+  conduit_utils_set_warning_handler(note);
+  conduit_node_destroy(node);
+}
+
+/* A text of a node, written by a function that may have options. */
+#define CHECK_TEXT(call, expected)                                                                           \
+  do                                                                                                         \
+  {                                                                                                          \
+    char* text = call;                                                                                       \
+    if (strcmp(text, expected) != 0) fprintf(stderr, "the text is: %s\n", text);                             \
+    CHECK(strcmp(text, expected) == 0);                                                                      \
+    free(text);                                                                                              \
+  } while (0)
+
+static void summaries(void)
+{
+  conduit_node* node = conduit_node_create();
+  conduit_node* options = conduit_node_create();
+  conduit_node* info = conduit_node_create();
+  conduit_int64 numbers[10] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9 };
+  conduit_node_set_path_external_int64_ptr(node, "a", numbers, 10);
+  conduit_node_set_path_int(node, "b", 1);
+  for (int i = 1; i < 5; ++i) conduit_node_set_int(conduit_node_append(conduit_node_fetch(node, "c")), 10 * i);
+  conduit_node_set_path_int(options, "num_children_threshold", 2);
+  conduit_node_set_path_int(options, "num_elements_threshold", 4);
+  CHECK_TEXT(conduit_node_to_summary_string_with_options(node, options),
+    "\na: [0, 1, ..., 8, 9]\n... ( skipped 1 child )\nc: \n  - 10\n  ... ( skipped 2 children )\n  - 40\n");
+  /* A threshold that is not positive leaves nothing out. */
+  conduit_node_set_path_int(options, "num_children_threshold", -1);
+  conduit_node_set_path_int(options, "num_elements_threshold", 0);
+  CHECK_TEXT(conduit_node_to_summary_string_with_options(node, options),
+    "\na: [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]\nb: 1\nc: \n  - 10\n  - 20\n  - 30\n  - 40\n");
+  conduit_node_reset(options);
+  conduit_node_set_path_int(options, "depth", 1);
+  conduit_node_set_path_char8_str(options, "pad", "-");
+  conduit_node_set_path_char8_str(options, "eoe", ";");
+  CHECK_TEXT(conduit_node_to_json_with_options(conduit_node_fetch(node, "c"), options), ";--[;----10,;----20,;----30,;----40;--]");
+
+  /* Only what the tree owns has a size of its own. */
+  conduit_node_info(node, info);
+  conduit_node* spaces = conduit_node_fetch(info, "mem_spaces");
+  CHECK(conduit_node_number_of_children(info) == 5 && conduit_node_number_of_children(spaces) == 6);
+  for (conduit_index_t i = 0; i < 6; ++i)
+  {
+    conduit_node* space = conduit_node_child(spaces, i);
+    const int external = strcmp(conduit_node_fetch_path_as_char8_str(space, "type"), "external") == 0;
+    CHECK(external == (i == 0) && conduit_node_has_path(space, "bytes") == !external);
+  }
+  CHECK(conduit_node_fetch_path_as_int64(info, "total_bytes_allocated") == 5 * 4);
+  conduit_node_destroy(node);
+  conduit_node_destroy(options);
+  conduit_node_destroy(info);
+}
+
 static void datatypes(void)
 {
   conduit_node* node = conduit_node_create();
@@ -428,6 +506,8 @@ int main(int argc, char** argv)
   blueprint();
   partition();
   datatypes();
+  handlers();
+  summaries();
   puts("node.c: ok");
   return 0;
 }

@@ -106,6 +106,41 @@ int main()
   Node borrowed = cpp_node(c_node(&node));
   CHECK(borrowed["a"].data_ptr() == node["a"].data_ptr());
 
+  // What cpp_node gives is the node itself, also where there is nothing in it yet, and leaves it to its owner.
+  conduit_node* bare = conduit_node_create();
+  {
+    Node wrapped = cpp_node(bare);
+    CHECK(c_node(&wrapped) == bare);
+    wrapped["made/here"] = 3;
+    Node again;
+    again = cpp_node(conduit_node_fetch(bare, "made"));
+    again["there"] = 4;
+  }
+  CHECK(conduit_node_fetch_path_as_int(bare, "made/here") == 3 && conduit_node_fetch_path_as_int(bare, "made/there") == 4);
+  conduit_node_destroy(bare);
+
+  // What is lent may be constant.
+  const std::vector<double> constants = { 1, 2 };
+  node["constants"].set_external(constants);
+  node.set_path_external("constant", &constants[1], 1);
+  CHECK(node["constants"].as_double_ptr() == constants.data() && node["constant"].as_double() == 2);
+  CHECK(node["constants"].dtype().type_id() == CONDUIT_FLOAT64_ID);
+
+  // Printing goes where std::cout goes.
+  {
+    Node printed;
+    printed["a"] = 10;
+    printed["b/c"] = 30.0;
+    std::ostringstream told;
+    std::streambuf* usual = std::cout.rdbuf(told.rdbuf());
+    printed.print();
+    printed["a"].print_detailed();
+    std::cout.rdbuf(usual);
+    CHECK(told.str() == "\na: 10\nb: \n  c: 30.0\n\n"
+                        "{\"dtype\":\"int32\",\"number_of_elements\": 1,\"offset\": 0,\"stride\": 4,"
+                        "\"element_bytes\": 4,\"endianness\": \"little\", \"value\": 10}\n");
+  }
+
   Node list = node["list"];
   list.append().set(1.5);
   list.append() = 2.5f;
@@ -121,6 +156,8 @@ int main()
   CHECK_THROWS(node.remove(99), "99");
   CHECK_THROWS(node.child(99), "99");
   CHECK_THROWS(constant["nothing"], "'nothing'");
+  CHECK_THROWS(constant[""], "''");
+  CHECK_THROWS(constant["../a"], "'../a'");
   CHECK_THROWS(node.rename_child("a", "text"), "already");
   CHECK_THROWS(node.parse("{", "json"), "line 1");
   // Whoever calls the C interface from C++ gets an exception of C++.

@@ -11,6 +11,8 @@ program node
   integer(4), pointer :: integers(:)
   real(8), pointer :: reals(:)
   character(len=32) :: text
+  character(len=16) :: padded
+  character, pointer :: letters(:)
   integer(kind(catalyst_status)) :: code
   integer :: i
 
@@ -52,6 +54,13 @@ program node
   call check(x(2) == 2d0, 8)
   call catalyst_conduit_node_fetch_path_as_char8_str(mesh, "fields/f/association", text)
   call check(text == "vertex", 9)
+  padded = "blanks"
+  call catalyst_conduit_node_set_path_char8_str(tree, "padded", padded)
+  call catalyst_conduit_node_fetch_path_as_char8_str(tree, "padded", letters)
+  call check(size(letters) == 7 .and. letters(6) == "s" .and. letters(7) == C_NULL_CHAR, 20)
+  call catalyst_conduit_node_set_char8_str(catalyst_conduit_node_fetch(tree, "padded"), "more  ")
+  call catalyst_conduit_node_as_char8_str(catalyst_conduit_node_fetch(tree, "padded"), letters)
+  call check(size(letters) == 5, 21)
   call catalyst_conduit_node_path(catalyst_conduit_node_fetch(mesh, "fields/f"), text)
   call check(text == "catalyst/channels/grid/data/fiel", 10)
 
