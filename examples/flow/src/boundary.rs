@@ -7,6 +7,7 @@ use tombolo_deform::mesh::Vector;
 
 use crate::SolverError;
 use crate::geometry::{Geometry, cross, dot, minus};
+use crate::linear::Halo;
 use crate::topology::Topology;
 
 /// Where and when a [`Value`] is asked for.
@@ -121,12 +122,19 @@ pub(crate) struct Boundary {
     pub rules: Vec<Rule>,
     /// Components held by walls that lie along the axes.
     pub held: Vec<[bool; 3]>,
+    /// The outlet vertices that this rank owns.
     pub outlets: Vec<OutletVertex>,
+    /// Whether any rank has one.
+    open: bool,
+    /// For each patch how many of its triangles are counted on this rank: they are the first.
+    counted: Vec<usize>,
     slip: Vec<SlipVertex>,
 }
 
 impl Boundary {
-    pub fn new(topology: &Topology, mut patches: Vec<Patch>, geometry: &Geometry) -> Result<Self, SolverError> {
+    /// The boundary of one rank's part. Its patches hold all triangles of the whole boundary that belong to a cell of the part.
+    /// Normals and areas are not known before [`Boundary::measure`].
+    pub fn new(topology: &Topology, mut patches: Vec<Patch>, halo: &Halo) -> Result<Self, SolverError> {
         let vertex_count = topology.vertex_count();
         for patch in &mut patches {
             for vertex in patch.triangles.iter_mut().flatten() {
@@ -135,6 +143,14 @@ impl Boundary {
                     .get(*vertex as usize)
                     .ok_or_else(|| SolverError::PatchVertex { patch: patch.name.clone(), vertex: *vertex })?;
             }
+        }
+        let mut counted = Vec::with_capacity(patches.len());
+        for patch in &mut patches {
+            let triangles = std::mem::take(&mut patch.triangles).into_iter();
+            let (mut own, others): (Vec<_>, Vec<_>) = triangles.partition(|triangle| halo.counts(triangle));
+            counted.push(own.len());
+            own.extend(others);
+            patch.triangles = own;
         }
         let mut rules = vec![Rule::Free; vertex_count];
         for patch in patches.iter().filter(|patch| matches!(patch.condition, Condition::NoSlip)) {
@@ -158,20 +174,20 @@ impl Boundary {
                 *rule = Rule::Wall;
             }
         }
-        let mut boundary =
-            Self { patches, rules, held: vec![[false; 3]; vertex_count], outlets: Vec::new(), slip: Vec::new() };
-        boundary.measure(geometry);
-        Ok(boundary)
+        let held = vec![[false; 3]; vertex_count];
+        Ok(Self { patches, rules, held, outlets: Vec::new(), open: false, counted, slip: Vec::new() })
     }
 
-    /// Brings normals and areas up to date with the coordinates.
-    pub fn measure(&mut self, geometry: &Geometry) {
+    /// Brings normals and areas up to date with the coordinates. Collective.
+    pub fn measure(&mut self, geometry: &Geometry, halo: &Halo) {
         let points = geometry.points.as_slice();
         self.outlets.clear();
         self.slip.clear();
         self.held.fill([false; 3]);
         let mut areas = vec![[0.0; 3]; points.len()];
-        self.measure_rims(points, &mut areas);
+        // Area and volume of each patch's outlet vertices.
+        let mut sizes = vec![0.0; 2 * self.patches.len()];
+        self.measure_rims(points, &mut areas, halo);
         for (index, patch) in self.patches.iter().enumerate() {
             if !matches!(patch.condition, Condition::Slip | Condition::Pressure(_)) {
                 continue;
@@ -191,7 +207,8 @@ impl Boundary {
                 }
             }
             let first_outlet = self.outlets.len();
-            for &vertex in vertices.iter().filter(|&&vertex| self.rules[vertex as usize] == Rule::Free) {
+            let is_free = |vertex: u32| (vertex as usize) < halo.rows() && self.rules[vertex as usize] == Rule::Free;
+            for &vertex in vertices.iter().filter(|&&vertex| is_free(vertex)) {
                 let area = areas[vertex as usize];
                 let size = dot(area, area).sqrt();
                 if size == 0.0 {
@@ -208,21 +225,24 @@ impl Boundary {
                     self.slip.push(SlipVertex { vertex, normal });
                 }
             }
-            let (mut area, mut volume) = (0.0, 0.0);
             for outlet in &self.outlets[first_outlet..] {
-                area += dot(outlet.area, outlet.area).sqrt();
-                volume += geometry.vertex_volumes[outlet.vertex as usize];
+                sizes[2 * index] += dot(outlet.area, outlet.area).sqrt();
+                sizes[2 * index + 1] += geometry.vertex_volumes[outlet.vertex as usize];
             }
-            for outlet in &mut self.outlets[first_outlet..] {
-                outlet.yield_rate = OUTLET_STIFFNESS * area / volume;
-            }
+        }
+        halo.add(&mut sizes);
+        self.open = sizes.iter().any(|&size| size > 0.0);
+        for outlet in &mut self.outlets {
+            let patch = 2 * outlet.patch as usize;
+            outlet.yield_rate = OUTLET_STIFFNESS * sizes[patch] / sizes[patch + 1];
         }
     }
 
     /// Where a prescribed velocity meets no-slip walls, it rules, but not through the walls: what flows in then flows out,
     /// also where a wall slopes away from the inlet. `areas` is memory, zero before and after.
-    fn measure_rims(&mut self, points: &[Vector], areas: &mut [Vector]) {
-        let is_rim = |vertex: u32| matches!(self.rules[vertex as usize], Rule::Prescribed(_));
+    fn measure_rims(&mut self, points: &[Vector], areas: &mut [Vector], halo: &Halo) {
+        let is_rim =
+            |vertex: u32| (vertex as usize) < halo.rows() && matches!(self.rules[vertex as usize], Rule::Prescribed(_));
         let mut rims = Vec::new();
         for patch in self.patches.iter().filter(|patch| matches!(patch.condition, Condition::NoSlip)) {
             for triangle in patch.triangles.iter().filter(|triangle| triangle.iter().any(|&vertex| is_rim(vertex))) {
@@ -248,7 +268,7 @@ impl Boundary {
 
     /// Whether some part of the boundary lets the fluid choose how much of it passes.
     pub fn is_open(&self) -> bool {
-        !self.outlets.is_empty()
+        self.open
     }
 
     /// Writes the prescribed velocities into `velocity`, and takes the part through walls from the mesh.
@@ -296,25 +316,37 @@ impl Boundary {
         }
     }
 
-    /// The flux of a vector field out through a patch.
-    pub fn flux(&self, patch: usize, field: &[Vector], points: &[Vector]) -> f64 {
+    /// The flux of a vector field out through each patch. Collective.
+    pub fn fluxes(&self, field: &[Vector], points: &[Vector], halo: &Halo) -> Vec<f64> {
         let outward = |triangle: &[u32; 3]| {
             let area = triangle_area(points, *triangle);
             triangle.iter().map(|&vertex| dot(field[vertex as usize], area)).sum::<f64>() / 3.0
         };
-        self.patches[patch].triangles.iter().map(outward).sum()
+        let mut fluxes: Vec<f64> = self.counted_triangles().map(|patch| patch.iter().map(outward).sum()).collect();
+        halo.add(&mut fluxes);
+        fluxes
     }
 
-    /// The mean of a scalar field over a patch, and the patch's area.
-    pub fn mean(&self, patch: usize, field: &[f64], points: &[Vector]) -> (f64, f64) {
-        let (mut total, mut whole) = (0.0, 0.0);
-        for triangle in &self.patches[patch].triangles {
-            let area = triangle_area(points, *triangle);
-            let size = dot(area, area).sqrt();
-            total += size * triangle.iter().map(|&vertex| field[vertex as usize]).sum::<f64>() / 3.0;
-            whole += size;
+    /// The mean of a scalar field over each patch, and the patch's area. Collective.
+    pub fn means(&self, field: &[f64], points: &[Vector], halo: &Halo) -> Vec<(f64, f64)> {
+        let mut sums = Vec::with_capacity(2 * self.patches.len());
+        for triangles in self.counted_triangles() {
+            let (mut total, mut whole) = (0.0, 0.0);
+            for triangle in triangles {
+                let area = triangle_area(points, *triangle);
+                let size = dot(area, area).sqrt();
+                total += size * triangle.iter().map(|&vertex| field[vertex as usize]).sum::<f64>() / 3.0;
+                whole += size;
+            }
+            sums.extend([total, whole]);
         }
-        (if whole > 0.0 { total / whole } else { 0.0 }, whole)
+        halo.add(&mut sums);
+        let mean = |&[total, whole]: &[f64; 2]| (if whole > 0.0 { total / whole } else { 0.0 }, whole);
+        sums.as_chunks().0.iter().map(mean).collect()
+    }
+
+    fn counted_triangles(&self) -> impl Iterator<Item = &[[u32; 3]]> {
+        self.patches.iter().zip(&self.counted).map(|(patch, &counted)| &patch.triangles[..counted])
     }
 }
 

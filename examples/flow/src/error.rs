@@ -1,6 +1,7 @@
 //! Why the solver stopped.
 
 use tombolo_deform::mesh::{CellType, Vector};
+use tombolo_pipelines::communicator::RankError;
 
 /// Why the solver cannot start, or cannot go on.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -49,6 +50,9 @@ pub enum SolverError {
         /// Its value.
         value: f64,
     },
+    /// Something is wrong on one rank. All ranks have this error.
+    #[error(transparent)]
+    Rank(#[from] RankError),
     /// An inverted or flat element.
     #[error("cycle {cycle}: cell {cell} at ({:.6}, {:.6}, {:.6}) is inverted or flat (volume {volume:.3e})", place[0], place[1], place[2])]
     Inverted {

@@ -24,9 +24,9 @@ impl Through {
     pub fn now(solver: &Solver) -> Self {
         let mut through = Self::default();
         let (mut inlets, mut outlets) = ((0.0, 0.0), (0.0, 0.0));
-        for (index, patch) in solver.patches().iter().enumerate() {
-            let flux = solver.flux(index);
-            let (pressure, area) = solver.mean_pressure(index);
+        for ((patch, flux), (pressure, area)) in
+            solver.patches().iter().zip(solver.fluxes()).zip(solver.mean_pressures())
+        {
             match patch.condition {
                 Condition::Velocity(_) => {
                     through.mass_in -= flux;
@@ -62,10 +62,15 @@ impl History {
         Ok(Self { file: file.into(), lines })
     }
 
-    /// Adds the state as it is now.
-    pub(crate) fn add(&mut self, solver: &Solver, seconds: f64) -> Result<(), (PathBuf, std::io::Error)> {
-        let Through { mass_in, mass_out, pressure_drop } = Through::now(solver);
-        let (cycle, time) = (solver.cycle(), solver.time());
+    /// Adds what flows through at the end of a step.
+    pub(crate) fn add(
+        &mut self,
+        cycle: u64,
+        time: f64,
+        through: Through,
+        seconds: f64,
+    ) -> Result<(), (PathBuf, std::io::Error)> {
+        let Through { mass_in, mass_out, pressure_drop } = through;
         writeln!(self.lines, "{cycle},{time},{pressure_drop},{mass_in},{mass_out},{seconds:.6}")
             // A run may be watched through it, and may be ended by force.
             .and_then(|()| self.lines.flush())

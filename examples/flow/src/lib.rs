@@ -24,7 +24,8 @@
 //! - Mass: the flux of the velocity through the whole boundary is 0 to the tolerance of the pressure solve, in every step,
 //!   walls that move included. No pressure is prescribed strongly, so that the equation of continuity is tested with
 //!   every shape function, those at the outlet included. Within the domain it holds weakly.
-//! - The same bits whatever the number of threads.
+//! - The same bits whatever the number of threads. On several ranks the same bits each time; the preconditioners depend on the parts,
+//!   so that from one number of ranks to another fields agree to the tolerances of the solves.
 //! - Momentum is not conserved to rounding: the convective form is used.
 //! - No turbulence model, and no shock capturing: at cell Reynolds numbers far above one a jet's edges may overshoot.
 #![warn(missing_docs)]
@@ -37,6 +38,8 @@ mod geometry;
 pub mod history;
 pub mod linear;
 mod momentum;
+pub mod partition;
+pub mod parts;
 pub mod program;
 pub mod report;
 mod solver;

@@ -4,12 +4,17 @@ use std::io::Write;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use clap::Parser;
+use tombolo::comm::{Communicator, Solo};
+use tombolo_flow::parts::{Dealing, Ranks};
 use tombolo_flow::program::{Options, Run};
 
 /// Solves incompressible flow on a mesh of tetrahedra that can be steered: watched in a browser, and given another shape while
 /// it runs.
+///
+/// Built with the feature `distributed` it runs under mpirun too: each rank gets a part of the mesh.
 #[derive(Debug, Parser)]
 #[command(name = "flow", version)]
 struct Arguments {
@@ -40,26 +45,72 @@ struct Arguments {
     /// Where viewers connect to, in place of what the pipelines say; port 0 takes any free one
     #[arg(long, value_name = "ADDRESS:PORT", conflicts_with = "headless")]
     listen: Option<SocketAddr>,
-    /// How many threads to use; without it one for each core
+    /// How many threads each rank uses; without it the cores are shared out evenly
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
+    /// Leave this rank without any of the mesh (to test what must work on any partition)
+    #[arg(long, value_name = "RANK", hide_short_help = true)]
+    empty_rank: Option<usize>,
+    /// Number each rank's vertices and cells at random, from this seed (to test)
+    #[arg(long, value_name = "SEED", hide_short_help = true)]
+    shuffle: Option<u64>,
+    /// Do not tell the adaptor which vertices of the ranks are the same (to test)
+    #[arg(long, hide_short_help = true)]
+    without_numbers: bool,
 }
 
 fn main() -> ExitCode {
-    match run(Arguments::parse()) {
+    let arguments = Arguments::parse();
+    match on_ranks(|ranks| run(arguments, ranks)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("flow: {error}");
+            if !error.is_empty() {
+                eprintln!("flow: {error}");
+            }
             ExitCode::FAILURE
         }
     }
 }
 
-fn run(arguments: Arguments) -> Result<(), Box<dyn std::error::Error>> {
-    if let Some(threads) = arguments.threads {
+/// Whether this process was started by mpirun, together with others or alone.
+fn under_mpirun() -> bool {
+    ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK"].into_iter().any(|name| std::env::var_os(name).is_some())
+}
+
+/// Does the work on the ranks that mpirun started, or on this process. What is wrong on all ranks is said by the first alone: the
+/// others fail with an empty message.
+#[cfg(feature = "distributed")]
+fn on_ranks(work: impl FnOnce(Ranks) -> Result<(), Box<dyn std::error::Error>>) -> Result<(), String> {
+    use tombolo::comm::mpi::{Mpi, rsmpi};
+    if !under_mpirun() {
+        return work(Arc::new(Solo)).map_err(|error| error.to_string());
+    }
+    let (universe, _) = rsmpi::initialize_with_threading(rsmpi::Threading::Funneled)
+        .ok_or_else(|| "MPI could not be initialized".to_owned())?;
+    let ranks: Ranks = Arc::new(Mpi::new(&universe.world()).map_err(|error| error.to_string())?);
+    let is_first = ranks.rank() == 0;
+    work(ranks).map_err(|error| if is_first { error.to_string() } else { String::new() })
+}
+
+#[cfg(not(feature = "distributed"))]
+fn on_ranks(work: impl FnOnce(Ranks) -> Result<(), Box<dyn std::error::Error>>) -> Result<(), String> {
+    let ranks = std::env::var("OMPI_COMM_WORLD_SIZE").or_else(|_| std::env::var("PMI_SIZE"));
+    if under_mpirun() && ranks.is_ok_and(|ranks| ranks != "1") {
+        return Err(
+            "started on several ranks, but built for one process; build it with `--features distributed`".into()
+        );
+    }
+    work(Arc::new(Solo)).map_err(|error| error.to_string())
+}
+
+fn run(arguments: Arguments, ranks: Ranks) -> Result<(), Box<dyn std::error::Error>> {
+    let is_first = ranks.rank() == 0;
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = arguments.threads.or_else(|| (ranks.size() > 1).then(|| (cores() / ranks.size()).max(1)));
+    if let Some(threads) = threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
     }
-    let run = Run::new(&Options {
+    let options = Options {
         case: arguments.case,
         pipelines: arguments.pipelines,
         orders: arguments.orders,
@@ -68,14 +119,20 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn std::error::Error>> {
         listen: arguments.listen,
         out: arguments.out,
         history: arguments.history,
-    })?;
+        dealing: Dealing {
+            empty_rank: arguments.empty_rank,
+            shuffle: arguments.shuffle,
+            without_numbers: arguments.without_numbers,
+        },
+    };
+    let run = Run::on(ranks, &options)?;
     if let Some(link) = run.link() {
         let mut output = std::io::stdout();
         writeln!(output, "Open {link}")?;
         output.flush()?;
     }
     let report = run.finish()?;
-    if let Some(file) = arguments.report {
+    if let Some(file) = arguments.report.filter(|_| is_first) {
         let text = serde_json::to_string_pretty(&report)? + "\n";
         std::fs::write(&file, text).map_err(|error| format!("{}: {error}", file.display()))?;
     }

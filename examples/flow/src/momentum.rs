@@ -5,7 +5,7 @@ use tombolo_deform::mesh::Vector;
 
 use crate::Fluid;
 use crate::geometry::{Element, Geometry, dot, row_slices};
-use crate::linear::{Matrix, for_each_chunk};
+use crate::linear::{Halo, Matrix, for_each_chunk};
 use crate::topology::Topology;
 
 /// What one element contributes beside its shape.
@@ -152,17 +152,19 @@ pub(crate) fn gradient(topology: &Topology, geometry: &Geometry, field: &[f64], 
 }
 
 /// Subtracts the pressure's stabilisation from the continuity equation: the integral of each shape function's gradient times the
-/// part of the pressure gradient that is orthogonal to linear fields, scaled by the intrinsic time (Codina 2000).
+/// part of the pressure gradient that is orthogonal to linear fields, scaled by the intrinsic time (Codina 2000). Collective.
+#[expect(clippy::too_many_arguments, reason = "the parts of one equation")]
 pub(crate) fn subtract_pressure_stabilisation(
     topology: &Topology,
     geometry: &Geometry,
     states: &[ElementState],
     density: f64,
+    halo: &Halo,
     projected: &mut Vec<Vector>,
     result: &mut [f64],
 ) {
     projected.resize(topology.vertex_count(), [0.0; 3]);
-    for_each_chunk(projected, |start, chunk| {
+    for_each_chunk(&mut projected[..topology.rows()], |start, chunk| {
         for (offset, value) in chunk.iter_mut().enumerate() {
             let mut total = [0.0; 3];
             for incidence in topology.around(start + offset) {
@@ -175,6 +177,7 @@ pub(crate) fn subtract_pressure_stabilisation(
             *value = total.map(|value| if volume > 0.0 { value / volume } else { 0.0 });
         }
     });
+    halo.update(projected);
     let projected = &*projected;
     for_each_chunk(result, |start, chunk| {
         for (offset, value) in chunk.iter_mut().enumerate() {

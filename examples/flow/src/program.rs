@@ -2,21 +2,24 @@
 
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
+use tombolo::comm::{Communicator, RankError, Solo, agree_on};
 use tombolo::{Adaptor, ExecuteError, FinalizeError, InitializeError, JournalError, Settings, Step};
-use tombolo_deform::mesh::{ArrayView, CellsView, Mesh, MeshError, MeshView, Vector};
-use tombolo_deform::quality::quality;
+use tombolo_deform::mesh::{ArrayView, Mesh, MeshError, Vector};
 use tombolo_deform::surface::{FeatureSettings, Surface, SurfaceError};
+use tombolo_pipelines::distributed::DistributedError;
 use tombolo_pipelines::extract::{Association, Channel, Field, FieldView};
 use tombolo_pipelines::files::{self, Compression, FileError};
 use tombolo_pipelines::language::{self, Config, LanguageError, StreamServer, TimedCommand};
 
-use crate::SolverError;
 use crate::case::{Case, CaseError};
-use crate::history::History;
+use crate::history::{History, Through};
+use crate::parts::{Dealing, Share};
 use crate::report::{FlowReport, MeshReport, Report};
 use crate::solver::{Motion, Settings as SolverSettings, Solver};
+use crate::{Patch, SolverError};
 
 /// What a run is asked to do.
 #[derive(Debug, Clone, Default)]
@@ -37,6 +40,8 @@ pub struct Options {
     pub out: Option<PathBuf>,
     /// Where the flow is written step by step, as comma-separated values.
     pub history: Option<PathBuf>,
+    /// How the mesh is dealt out, where there are several ranks.
+    pub dealing: Dealing,
 }
 
 /// Why a run could not be done, or ended early.
@@ -81,21 +86,57 @@ pub enum ProgramError {
     /// A mesh that is none.
     #[error(transparent)]
     Points(#[from] MeshError),
+    /// The mesh cannot be dealt out to the ranks.
+    #[error(transparent)]
+    Distributed(#[from] DistributedError),
+    /// Something is wrong on one rank. All ranks have this error.
+    #[error(transparent)]
+    Rank(#[from] RankError),
 }
 
 /// A run that has been set up.
 pub struct Run {
     case: Case,
+    communicator: Arc<dyn Communicator>,
     out: Option<PathBuf>,
     steps: Option<u64>,
     adaptor: Adaptor,
     solver: Solver,
-    mesh: Mesh,
+    share: Share,
+    /// The mesh as it was read, on the rank that writes it.
+    whole: Option<Mesh>,
     points: Vec<Vector>,
     parameters: Vec<f64>,
     worst: MeshReport,
     flow: FlowReport,
+    /// Whether the flow is written step by step: by the first rank, and measured by all.
+    has_history: bool,
     history: Option<History>,
+}
+
+/// What every rank reads from files.
+struct Read {
+    case: Case,
+    config: Config,
+    orders: Vec<TimedCommand>,
+    mesh: Mesh,
+    surface: Surface,
+    patches: Vec<Patch>,
+    history: Option<History>,
+}
+
+impl Read {
+    fn new(options: &Options, is_first: bool) -> Result<Self, ProgramError> {
+        let case = Case::read(&options.case)?;
+        let config = config(options, &case)?;
+        let orders = orders(options, &case)?;
+        let mesh = files::read_mesh(&case.mesh)?.mesh;
+        let surface = Surface::extract(&mesh, &FeatureSettings::default())?;
+        let patches = case.patches(&options.case, &surface)?;
+        let history = options.history.as_deref().filter(|_| is_first);
+        let history = history.map(History::create).transpose().map_err(unwritten)?;
+        Ok(Self { case, config, orders, mesh, surface, patches, history })
+    }
 }
 
 impl Run {
@@ -104,44 +145,57 @@ impl Run {
     /// # Errors
     /// [`ProgramError`] naming the file and the place in it.
     pub fn new(options: &Options) -> Result<Self, ProgramError> {
-        let case = Case::read(&options.case)?;
-        let config = config(options, &case)?;
-        let orders = orders(options, &case)?;
-        let mesh = files::read_mesh(&case.mesh)?.mesh;
-        let surface = Surface::extract(&mesh, &FeatureSettings::default())?;
-        let patches = case.patches(&options.case, &surface)?;
+        Self::on(Arc::new(Solo), options)
+    }
+
+    /// The same on several ranks, each of which gets a part of the mesh. Collective, as everything is that a run does; the first
+    /// rank has the server and writes the files.
+    ///
+    /// Every rank reads the mesh file and keeps its part.
+    ///
+    /// # Errors
+    /// [`ProgramError`], on several ranks the same on all of them.
+    pub fn on(communicator: Arc<dyn Communicator>, options: &Options) -> Result<Self, ProgramError> {
+        let is_first = communicator.rank() == 0;
+        let read = agreed(&*communicator, Read::new(options, is_first))?;
+        let Read { case, config, orders, mesh, surface, patches, history } = read;
+        let (share, patches) = Share::of(&*communicator, &mesh, &surface, patches, options.dealing)?;
+        let whole = (is_first && options.out.is_some()).then_some(mesh);
         let declared = case.declared_parameters();
         let parameters: Vec<f64> = declared.iter().map(|parameter| parameter.value).collect();
-        let mut solver = Solver::new(&mesh, patches, case.fluid(&parameters), SolverSettings::default())?;
+        let (fluid, settings) = (case.fluid(&parameters), SolverSettings::default());
+        let mut solver = if communicator.size() == 1 {
+            Solver::new(&share.mesh, patches, fluid, settings)?
+        } else {
+            Solver::of_part(&communicator, &share.shared, &share.mesh, patches, fluid, settings)?
+        };
         solver.set_parameters(&parameters);
         let (velocity, pressure) = case.initial_values();
         solver.initialise(&velocity, &pressure);
         let adaptor = Adaptor::initialize(Settings {
             config,
+            communicator: Arc::clone(&communicator),
             parameters: declared,
             orders,
             output: options.out.clone().unwrap_or_else(|| PathBuf::from(".")),
-            ..Settings::default()
         })?;
-        let start = quality(mesh.cells(), mesh.points());
+        let points = share.mesh.points().to_vec();
         // With viewers a run goes on until somebody stops it, unless it was told when to end.
         let steps = options.steps.or_else(|| options.headless.then_some(case.steps));
         Ok(Self {
-            worst: MeshReport {
-                vertices: mesh.points().len(),
-                cells: mesh.cells().len(),
-                inverted: start.inverted,
-                min_scaled_jacobian: start.min,
-            },
-            points: mesh.points().to_vec(),
+            worst: share.measure(&*communicator, &points),
+            points,
             flow: FlowReport::default(),
-            history: options.history.as_deref().map(History::create).transpose().map_err(unwritten)?,
+            has_history: options.history.is_some(),
+            history,
             out: options.out.clone(),
             steps,
             case,
+            communicator,
             adaptor,
             solver,
-            mesh,
+            share,
+            whole,
             parameters,
         })
     }
@@ -168,7 +222,8 @@ impl Run {
         self.flow.seconds = begun.elapsed().as_secs_f64();
         self.flow.measure(&self.solver, self.case.time_step);
         if let Some(folder) = &self.out {
-            self.write(&folder.join("final.vtu"))?;
+            let written = self.write(&folder.join("final.vtu"));
+            agreed(&*self.communicator, written)?;
         }
         let adaptor = match self.adaptor.finalize() {
             Ok(report) => report,
@@ -200,8 +255,7 @@ impl Run {
                 FieldView { name: "velocity", association: Association::Vertex, values: ArrayView::vectors(&velocity) },
                 FieldView { name: "pressure", association: Association::Vertex, values: ArrayView::scalars(&pressure) },
             ];
-            let mesh = MeshView::new(ArrayView::vectors(&self.points), CellsView::Owned(self.mesh.cells()))
-                .with_features(self.mesh.features());
+            let mesh = self.share.view(&self.points);
             let steering = self.adaptor.execute(&step, &[Channel { name: "fluid", mesh, fields: &fields }])?;
             if steering.stop {
                 break;
@@ -225,15 +279,19 @@ impl Run {
                 None => false,
             };
             if moved {
-                let shape = quality(self.mesh.cells(), &self.points);
+                let shape = self.share.measure(&*self.communicator, &self.points);
                 self.worst.inverted = self.worst.inverted.max(shape.inverted);
-                self.worst.min_scaled_jacobian = self.worst.min_scaled_jacobian.min(shape.min);
+                self.worst.min_scaled_jacobian = self.worst.min_scaled_jacobian.min(shape.min_scaled_jacobian);
             }
             let motion = moved.then_some(Motion { points: &self.points });
             let outcome = self.solver.step(time_step, motion)?;
             self.flow.count(&outcome, &self.solver);
-            if let Some(history) = &mut self.history {
-                history.add(&self.solver, begun.elapsed().as_secs_f64()).map_err(unwritten)?;
+            if self.has_history {
+                let (cycle, time, through) = (self.solver.cycle(), self.solver.time(), Through::now(&self.solver));
+                let seconds = begun.elapsed().as_secs_f64();
+                let add = |history: &mut History| history.add(cycle, time, through, seconds).map_err(unwritten);
+                let added = self.history.as_mut().map_or(Ok(()), add);
+                agreed(&*self.communicator, added)?;
             }
             self.solver.velocity_into(&mut velocity);
             self.solver.pressure_into(&mut pressure);
@@ -241,23 +299,41 @@ impl Run {
         Ok(())
     }
 
-    /// Writes the mesh as it is, its features, the velocity and the pressure.
+    /// Writes the mesh as it is, its features, the velocity and the pressure, in the numbers of the file it was read from. Collective;
+    /// the first rank writes.
     fn write(&self, file: &Path) -> Result<(), ProgramError> {
+        let communicator = &*self.communicator;
+        let before = || self.whole.as_ref().map_or(Vec::new(), |mesh| mesh.points().to_vec());
+        let none = || vec![[0.0; 3]; self.whole.as_ref().map_or(0, |mesh| mesh.points().len())];
+        let pressure: Vec<Vector> = self.solver.pressure().into_iter().map(|value| [value, 0.0, 0.0]).collect();
+        let gathered = [
+            self.share.gather(communicator, &self.points, before()),
+            self.share.gather(communicator, &self.solver.velocity(), none()),
+            self.share.gather(communicator, &pressure, none()),
+        ];
+        let (Some(whole), [Some(points), Some(velocity), Some(pressure)]) = (&self.whole, gathered) else {
+            return Ok(());
+        };
         let velocity = Field {
             name: "velocity".into(),
             association: Association::Vertex,
             components: 3,
-            values: self.solver.velocity().into_flattened(),
+            values: velocity.into_flattened(),
         };
         let pressure = Field {
             name: "pressure".into(),
             association: Association::Vertex,
             components: 1,
-            values: self.solver.pressure(),
+            values: pressure.into_iter().map(|[value, ..]| value).collect(),
         };
-        let mesh = self.mesh.with_points(self.points.clone())?;
+        let mesh = whole.with_points(points)?;
         Ok(files::write_mesh(file, &mesh, &[velocity, pressure], Compression::default())?)
     }
+}
+
+/// On one process the outcome as it is; on several, where it failed on one, an error on all.
+fn agreed<T>(communicator: &dyn Communicator, mine: Result<T, ProgramError>) -> Result<T, ProgramError> {
+    if communicator.size() == 1 { mine } else { Ok(agree_on(communicator, mine)?) }
 }
 
 fn unwritten((file, source): (PathBuf, std::io::Error)) -> ProgramError {

@@ -80,7 +80,7 @@ pub struct FlowReport {
 impl FlowReport {
     /// Counts one step.
     pub(crate) fn count(&mut self, outcome: &StepOutcome, solver: &Solver) {
-        let through: f64 = 0.5 * (0..solver.patches().len()).map(|patch| solver.flux(patch).abs()).sum::<f64>();
+        let through: f64 = 0.5 * solver.fluxes().into_iter().map(f64::abs).sum::<f64>();
         if through > 0.0 {
             self.worst_imbalance = self.worst_imbalance.max(outcome.imbalance.abs() / through);
         }
@@ -95,9 +95,10 @@ impl FlowReport {
         let steps = self.steps.max(1) as f64;
         self.momentum_iterations /= steps;
         self.pressure_iterations /= steps;
-        for (index, patch) in solver.patches().iter().enumerate() {
-            self.fluxes.insert(patch.name.clone(), solver.flux(index));
-            self.mean_pressures.insert(patch.name.clone(), solver.mean_pressure(index).0);
+        for ((patch, flux), (pressure, _)) in solver.patches().iter().zip(solver.fluxes()).zip(solver.mean_pressures())
+        {
+            self.fluxes.insert(patch.name.clone(), flux);
+            self.mean_pressures.insert(patch.name.clone(), pressure);
         }
         Through { mass_in: self.mass_in, mass_out: self.mass_out, pressure_drop: self.pressure_drop } =
             Through::now(solver);

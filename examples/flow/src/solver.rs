@@ -1,12 +1,16 @@
 //! One time step after the other.
 
+use std::sync::Arc;
+
 use tombolo_deform::mesh::{Mesh, Vector};
+use tombolo_pipelines::communicator::Communicator;
+use tombolo_pipelines::distributed::SharedVertices;
 
 use crate::SolverError;
 use crate::boundary::{Boundary, Patch, Place, Rule, Value};
 use crate::geometry::{Geometry, dot};
 use crate::linear::{
-    BiCgStab, BlockIncompleteLu, ConjugateGradients, Matrix, Multigrid, Outcome, Pattern, for_each_chunk, norm, sum,
+    BiCgStab, BlockIncompleteLu, ConjugateGradients, Halo, Matrix, Outcome, Pattern, Schwarz, for_each_chunk, sum,
 };
 use crate::momentum::{self, ElementState, Known};
 use crate::topology::Topology;
@@ -64,6 +68,9 @@ pub struct StepOutcome {
 /// The flow on one mesh.
 ///
 /// Arrays go in and come out in the mesh's numbering; within, the solver has its own.
+///
+/// On several ranks each has a part of the mesh ([`Solver::of_part`]); then [`Solver::new`] and all that steps, changes or measures
+/// the whole is collective, and errors are the same on all ranks.
 #[derive(Debug)]
 pub struct Solver {
     settings: Settings,
@@ -71,6 +78,7 @@ pub struct Solver {
     topology: Topology,
     geometry: Geometry,
     boundary: Boundary,
+    halo: Halo,
     cycle: u64,
     time: f64,
     parameters: Vec<f64>,
@@ -103,10 +111,10 @@ pub struct Solver {
 struct Projection {
     matrix: Matrix,
     diagonal: Vec<usize>,
-    multigrid: Multigrid,
-    /// Whether the multigrid was set up for another shape than the matrix.
+    preconditioner: Schwarz,
+    /// Whether the preconditioner was set up for another shape than the matrix.
     stale: bool,
-    /// How many iterations a full solve took with a fresh multigrid.
+    /// How many iterations a full solve took with a fresh preconditioner.
     usual_iterations: usize,
     solver: ConjugateGradients,
     right: Vec<f64>,
@@ -120,15 +128,56 @@ impl Solver {
     pub fn new(mesh: &Mesh, patches: Vec<Patch>, fluid: Fluid, settings: Settings) -> Result<Self, SolverError> {
         check_fluid(fluid)?;
         let topology = Topology::new(mesh)?;
-        let geometry = Geometry::new(&topology, topology.to_solver(mesh.points()));
-        check_elements(&topology, &geometry, 0)?;
-        let boundary = Boundary::new(&topology, patches, &geometry)?;
-        let vertices = topology.vertex_count();
-        let momentum = Matrix::zeros(std::sync::Arc::clone(&topology.pattern));
-        let (momentum_diagonal, momentum_preconditioner) = diagonal_of(&topology.pattern)
-            .zip(BlockIncompleteLu::new(&topology.pattern))
-            .ok_or(SolverError::NoCells)?;
-        let projection = Projection::new(&topology, &geometry, &boundary, momentum_diagonal.clone());
+        let halo = Halo::alone(topology.vertex_count());
+        Self::set_up(mesh, Ok(topology), halo, patches, fluid, settings)
+    }
+
+    /// A fluid at rest on a mesh of tetrahedra of which each rank has a part. Collective.
+    ///
+    /// `mesh` is this rank's part: its own cells and those of other ranks that touch one of them by a vertex. It may be empty. The
+    /// patches are the same on all ranks, with those of their triangles here that belong to a cell of the part. What is wrong is
+    /// told by the part's own numbers.
+    ///
+    /// # Errors
+    /// [`SolverError::Rank`], the same on all ranks; see [`Solver::new`].
+    pub fn of_part(
+        communicator: &Arc<dyn Communicator>,
+        shared: &SharedVertices,
+        mesh: &Mesh,
+        patches: Vec<Patch>,
+        fluid: Fluid,
+        settings: Settings,
+    ) -> Result<Self, SolverError> {
+        check_fluid(fluid)?;
+        let topology = Topology::of_part(mesh, |vertex| shared.owns(vertex));
+        let order = topology.as_ref().map_or(&[][..], |topology| &topology.vertex_order);
+        let halo = Halo::new(Arc::clone(communicator), shared, order);
+        Self::set_up(mesh, topology, halo, patches, fluid, settings)
+    }
+
+    fn set_up(
+        mesh: &Mesh,
+        topology: Result<Topology, SolverError>,
+        halo: Halo,
+        patches: Vec<Patch>,
+        fluid: Fluid,
+        settings: Settings,
+    ) -> Result<Self, SolverError> {
+        // What can fail on one rank alone, before anything that all do together.
+        let own = topology.and_then(|topology| {
+            let geometry = Geometry::new(&topology, topology.to_solver(mesh.points()));
+            check_elements(&topology, &geometry, 0)?;
+            let boundary = Boundary::new(&topology, patches, &halo)?;
+            let momentum = diagonal_of(&topology.pattern)
+                .zip(BlockIncompleteLu::new(&topology.pattern))
+                .ok_or(SolverError::NoCells)?;
+            Ok((topology, geometry, boundary, momentum))
+        });
+        let (topology, geometry, mut boundary, (momentum_diagonal, momentum_preconditioner)) = halo.agree(own)?;
+        boundary.measure(&geometry, &halo);
+        let (vertices, rows) = (topology.vertex_count(), topology.rows());
+        let momentum = Matrix::zeros(Arc::clone(&topology.pattern));
+        let projection = Projection::new(&topology, &geometry, &boundary, &halo, momentum_diagonal.clone());
         Ok(Self {
             settings,
             fluid,
@@ -151,11 +200,12 @@ impl Solver {
             states: Vec::new(),
             convecting: vec![[0.0; 3]; vertices],
             history: vec![[0.0; 3]; vertices],
-            right: vec![[0.0; 3]; vertices],
+            right: vec![[0.0; 3]; rows],
             scratch: Vec::new(),
             topology,
             geometry,
             boundary,
+            halo,
         })
     }
 
@@ -206,6 +256,7 @@ impl Solver {
         let mut pressure_outcome = None;
         if impulse {
             self.boundary.impose(&mut self.velocity, &self.mesh_velocity, &self.geometry.points, end, &self.parameters);
+            self.halo.update(&mut self.velocity);
             pressure_outcome = Some(self.apply_impulse());
         }
         let second_order = !impulse && !moves && self.history_length >= 2;
@@ -217,6 +268,7 @@ impl Solver {
         std::mem::swap(&mut self.velocity, &mut self.scratch);
         let momentum = self.solve_momentum();
         self.boundary.impose_slip(&mut self.velocity, &self.mesh_velocity);
+        self.halo.update(&mut self.velocity);
 
         let mut pressure = self.project(Some(self.fluid.density));
         let scale = self.fluid.density * rate;
@@ -264,13 +316,7 @@ impl Solver {
             }
             return Ok(false);
         };
-        let vertices = self.topology.vertex_count();
-        if motion.points.len() != vertices {
-            return Err(SolverError::Length { what: "coordinates", found: motion.points.len(), expected: vertices });
-        }
-        let points = self.topology.to_solver(motion.points);
-        let geometry = Geometry::new(&self.topology, points);
-        check_elements(&self.topology, &geometry, self.cycle)?;
+        let geometry = self.halo.agree(self.moved(motion))?;
         let mut moves = false;
         for (velocity, (new, old)) in
             self.mesh_velocity.iter_mut().zip(geometry.points.iter().zip(&self.geometry.points))
@@ -279,9 +325,20 @@ impl Solver {
             moves |= *velocity != [0.0; 3];
         }
         self.geometry = geometry;
-        self.boundary.measure(&self.geometry);
+        self.boundary.measure(&self.geometry, &self.halo);
         self.projection.reassemble(&self.topology, &self.geometry, &self.boundary);
-        Ok(moves)
+        Ok(self.halo.maximum(f64::from(u8::from(moves))) > 0.0)
+    }
+
+    /// The shape of the mesh at the end of a motion.
+    fn moved(&self, motion: Motion) -> Result<Geometry, SolverError> {
+        let vertices = self.topology.vertex_count();
+        if motion.points.len() != vertices {
+            return Err(SolverError::Length { what: "coordinates", found: motion.points.len(), expected: vertices });
+        }
+        let geometry = Geometry::new(&self.topology, self.topology.to_solver(motion.points));
+        check_elements(&self.topology, &geometry, self.cycle)?;
+        Ok(geometry)
     }
 
     /// Prepares the known part of the time derivative, the convecting velocity and the first guess (in `scratch`); the rate.
@@ -334,7 +391,7 @@ impl Solver {
             self.momentum.values[self.momentum_diagonal[vertex]] -= BACKFLOW * self.fluid.density * outward.min(0.0);
         }
         self.boundary.impose(&mut self.scratch, &self.mesh_velocity, &self.geometry.points, end, &self.parameters);
-        for (vertex, rule) in self.boundary.rules.iter().enumerate() {
+        for (vertex, rule) in self.boundary.rules.iter().enumerate().take(self.topology.rows()) {
             if *rule != Rule::Free {
                 self.momentum.values[self.topology.pattern.row(vertex)].fill(0.0);
                 self.momentum.values[self.momentum_diagonal[vertex]] = 1.0;
@@ -357,10 +414,12 @@ impl Solver {
             }
             total
         });
+        let squares = self.halo.sum(squares);
         let tolerance = self.settings.momentum_tolerance * squares[0].sqrt().max(f64::MIN_POSITIVE);
         self.momentum_solver.solve(
             &self.momentum,
             &self.momentum_preconditioner,
+            &self.halo,
             &self.boundary.held,
             &self.right,
             &mut self.velocity,
@@ -380,22 +439,23 @@ impl Solver {
                 &self.geometry,
                 &self.states,
                 density,
+                &self.halo,
                 &mut self.scratch,
                 &mut self.projection.right,
             );
         }
-        let through: f64 = (0..self.boundary.patches.len())
-            .map(|patch| self.boundary.flux(patch, &self.velocity, &self.geometry.points).abs())
-            .sum();
+        let through: f64 = self.fluxes().into_iter().map(f64::abs).sum();
         let outcome = self.projection.solve(
             &self.topology,
+            &self.halo,
             &mut self.potential,
             &self.settings,
             through,
             self.boundary.is_open(),
         );
         self.scratch.resize(self.velocity.len(), [0.0; 3]);
-        momentum::gradient(&self.topology, &self.geometry, &self.potential, &mut self.scratch);
+        let rows = self.topology.rows();
+        momentum::gradient(&self.topology, &self.geometry, &self.potential, &mut self.scratch[..rows]);
         // At an outlet, the part normal to it is that which the pressure equation took into its balance.
         for outlet in &self.boundary.outlets {
             let vertex = outlet.vertex as usize;
@@ -409,7 +469,7 @@ impl Solver {
             }
         }
         let (gradient, geometry, boundary) = (&self.scratch, &self.geometry, &self.boundary);
-        for_each_chunk(&mut self.velocity, |start, chunk| {
+        for_each_chunk(&mut self.velocity[..rows], |start, chunk| {
             for (offset, value) in chunk.iter_mut().enumerate() {
                 let vertex = start + offset;
                 if boundary.rules[vertex] == Rule::Free {
@@ -420,12 +480,13 @@ impl Solver {
             }
         });
         self.boundary.impose_slip(&mut self.velocity, &self.mesh_velocity);
+        self.halo.update(&mut self.velocity);
         outcome
     }
 
     fn centre_pressure(&mut self) {
         let (pressure, volumes) = (&self.pressure, &self.geometry.vertex_volumes);
-        let [total, whole] = sum(pressure.len(), |range| {
+        let sums = sum(self.topology.rows(), |range| {
             let mut parts = [0.0; 2];
             for vertex in range {
                 parts[0] += volumes[vertex] * pressure[vertex];
@@ -433,17 +494,22 @@ impl Solver {
             }
             parts
         });
+        let [total, whole] = self.halo.sum(sums);
         self.pressure.iter_mut().for_each(|value| *value -= total / whole);
     }
 
     fn check_finite(&self) -> Result<(), SolverError> {
         let (velocity, pressure) = (&self.velocity, &self.pressure);
-        let [total] = sum(pressure.len(), |range| {
+        let total = sum(pressure.len(), |range| {
             [range.map(|v| (velocity[v][0] + velocity[v][1] + velocity[v][2] + pressure[v]) * 0.0).sum()]
         });
-        if total == 0.0 {
+        if self.halo.sum(total) == [0.0] {
             return Ok(());
         }
+        self.halo.agree(self.first_non_finite())
+    }
+
+    fn first_non_finite(&self) -> Result<(), SolverError> {
         for (rank, &vertex) in self.topology.vertex_order.iter().enumerate() {
             let values = [self.velocity[rank][0], self.velocity[rank][1], self.velocity[rank][2], self.pressure[rank]];
             if let Some(component) = values.iter().position(|value| !value.is_finite()) {
@@ -461,7 +527,7 @@ impl Solver {
     }
 
     fn imbalance(&self) -> f64 {
-        (0..self.boundary.patches.len()).map(|patch| self.flux(patch)).sum()
+        self.fluxes().into_iter().sum()
     }
 
     /// How many steps have been done.
@@ -518,28 +584,22 @@ impl Solver {
         &self.boundary.patches
     }
 
-    /// The flux of the velocity out through a patch (volume per time).
-    ///
-    /// # Panics
-    /// Where there is no such patch.
+    /// The flux of the velocity out through each patch (volume per time).
     #[must_use]
-    pub fn flux(&self, patch: usize) -> f64 {
-        self.boundary.flux(patch, &self.velocity, &self.geometry.points)
+    pub fn fluxes(&self) -> Vec<f64> {
+        self.boundary.fluxes(&self.velocity, &self.geometry.points, &self.halo)
     }
 
-    /// The mean pressure over a patch, and the patch's area.
-    ///
-    /// # Panics
-    /// Where there is no such patch.
+    /// The mean pressure over each patch, and the patch's area.
     #[must_use]
-    pub fn mean_pressure(&self, patch: usize) -> (f64, f64) {
-        self.boundary.mean(patch, &self.pressure, &self.geometry.points)
+    pub fn mean_pressures(&self) -> Vec<(f64, f64)> {
+        self.boundary.means(&self.pressure, &self.geometry.points, &self.halo)
     }
 
     /// The greatest velocity of any vertex.
     #[must_use]
     pub fn max_velocity(&self) -> f64 {
-        self.velocity.iter().map(|&velocity| dot(velocity, velocity)).fold(0.0, f64::max).sqrt()
+        self.halo.maximum(self.velocity.iter().map(|&velocity| dot(velocity, velocity)).fold(0.0, f64::max).sqrt())
     }
 
     /// The largest Courant number of any element for a time step: how many elements the fluid crosses in it.
@@ -551,16 +611,17 @@ impl Solver {
             });
             0.5 * time_step * element.gradients.iter().map(|&gradient| dot(mean, gradient).abs()).sum::<f64>()
         };
-        self.topology.elements.iter().zip(&self.geometry.elements).map(across).fold(0.0, f64::max)
+        let elements = self.topology.elements.iter().zip(&self.geometry.elements);
+        self.halo.maximum(elements.map(across).fold(0.0, f64::max))
     }
 }
 
 impl Projection {
-    fn new(topology: &Topology, geometry: &Geometry, boundary: &Boundary, diagonal: Vec<usize>) -> Self {
+    fn new(topology: &Topology, geometry: &Geometry, boundary: &Boundary, halo: &Halo, diagonal: Vec<usize>) -> Self {
         let matrix = pressure_matrix(topology, geometry, boundary, &diagonal);
         Self {
-            multigrid: Multigrid::new(&matrix),
-            right: vec![0.0; topology.vertex_count()],
+            preconditioner: Schwarz::new(&matrix, halo),
+            right: vec![0.0; topology.rows()],
             matrix,
             diagonal,
             stale: false,
@@ -578,6 +639,7 @@ impl Projection {
     fn solve(
         &mut self,
         topology: &Topology,
+        halo: &Halo,
         potential: &mut [f64],
         settings: &Settings,
         through: f64,
@@ -589,26 +651,30 @@ impl Projection {
             let used = (0..rows).filter(|&row| !topology.around(row).is_empty()).count();
             let [total] = sum(rows, |range| [self.right[range].iter().sum()]);
             #[expect(clippy::cast_precision_loss, reason = "a count of vertices")]
-            let mean = total / used.max(1) as f64;
+            let [total, used] = halo.sum([total, used as f64]);
+            let mean = total / used.max(1.0);
             self.right.iter_mut().for_each(|value| *value -= mean);
         }
         for row in (0..rows).filter(|&row| topology.around(row).is_empty()) {
             self.right[row] = 0.0;
         }
+        let [square] = sum(rows, |range| [self.right[range].iter().map(|value| value * value).sum()]);
         #[expect(clippy::cast_precision_loss, reason = "a count of vertices")]
-        let small = 1e-9 * through / (rows as f64).sqrt();
-        let tolerance = (settings.pressure_tolerance * norm(&self.right)).max(small);
+        let [square, vertices] = halo.sum([square, rows as f64]);
+        let small = 1e-9 * through / vertices.sqrt();
+        let tolerance = (settings.pressure_tolerance * square.sqrt()).max(small);
         let solve = |this: &mut Self, potential: &mut [f64], limit| {
-            this.solver.solve(&this.matrix, &mut this.multigrid, &this.right, potential, tolerance, limit)
+            let (matrix, preconditioner) = (&this.matrix, &mut this.preconditioner);
+            this.solver.solve(matrix, preconditioner, halo, &this.right, potential, tolerance, limit)
         };
-        // An old multigrid still serves a mesh that has moved a little; conjugate gradients have the true matrix.
+        // An old preconditioner still serves a mesh that has moved a little; conjugate gradients have the true matrix.
         if self.stale {
             let limit = self.usual_iterations + self.usual_iterations / 2 + 2;
             let first = solve(self, potential, limit);
             if first.converged {
                 return first;
             }
-            self.multigrid = Multigrid::new(&self.matrix);
+            self.preconditioner = Schwarz::new(&self.matrix, halo);
             self.stale = false;
             self.usual_iterations = 0;
             let mut second = solve(self, potential, settings.iteration_limit);
@@ -633,7 +699,7 @@ fn pressure_matrix(topology: &Topology, geometry: &Geometry, boundary: &Boundary
         let vertex = outlet.vertex as usize;
         matrix.values[diagonal[vertex]] += outlet.yield_rate * dot(outlet.area, outlet.area).sqrt();
     }
-    for vertex in (0..topology.vertex_count()).filter(|&vertex| topology.around(vertex).is_empty()) {
+    for vertex in (0..topology.rows()).filter(|&vertex| topology.around(vertex).is_empty()) {
         matrix.values[diagonal[vertex]] = 1.0;
     }
     matrix

@@ -12,7 +12,7 @@ use crate::linear::Pattern;
 /// The tetrahedra of a mesh in the solver's own numbering, and the sparsity of every matrix on them.
 ///
 /// Vertices are numbered anew by reverse Cuthill-McKee (Cuthill and McKee 1969), tetrahedra by their lowest vertex, so that
-/// what is near in space is near in memory.
+/// what is near in space is near in memory. On several ranks the vertices that this one owns come first; they alone have rows.
 #[derive(Debug)]
 pub struct Topology {
     /// The mesh's number of each of the solver's vertices.
@@ -23,7 +23,7 @@ pub struct Topology {
     pub element_order: Vec<u32>,
     /// The vertices of each element, in the solver's numbers.
     pub elements: Vec<[u32; 4]>,
-    /// Where two vertices share an element.
+    /// Where two vertices share an element, in the rows of the vertices that this rank owns.
     pub pattern: Arc<Pattern>,
     /// Row starts into `incidences`.
     pub incidence_starts: Vec<usize>,
@@ -38,7 +38,7 @@ pub struct Incidence {
     pub element: u32,
     /// Which of the element's vertices it is seen from.
     pub local: u8,
-    /// For each of the element's vertices, the position of its column within the row.
+    /// For each of the element's vertices, the position of its column within the row, where there is one.
     pub slots: [u16; 4],
 }
 
@@ -48,6 +48,15 @@ impl Topology {
     /// # Errors
     /// [`SolverError::CellType`] for a volume cell that is not a tetrahedron, [`SolverError::NoCells`] where there is none.
     pub fn new(mesh: &Mesh) -> Result<Self, SolverError> {
+        let topology = Self::of_part(mesh, |_| true)?;
+        if topology.elements.is_empty() { Err(SolverError::NoCells) } else { Ok(topology) }
+    }
+
+    /// The same of a rank's part of a mesh, of which it owns some vertices; it may be empty.
+    ///
+    /// # Errors
+    /// [`SolverError::CellType`].
+    pub fn of_part(mesh: &Mesh, owns: impl Fn(u32) -> bool) -> Result<Self, SolverError> {
         let mut cells: Vec<([u32; 4], u32)> = Vec::new();
         for (cell, (cell_type, vertices)) in mesh.cells().iter().enumerate() {
             match (cell_type, vertices) {
@@ -56,12 +65,12 @@ impl Topology {
                 _ => return Err(SolverError::CellType { cell, found: cell_type }),
             }
         }
-        if cells.is_empty() {
-            return Err(SolverError::NoCells);
-        }
         let vertex_count = mesh.points().len();
-        let natural = adjacency(vertex_count, cells.iter().map(|(vertices, _)| vertices));
-        let vertex_order = reverse_cuthill_mckee(&natural);
+        let natural = adjacency(vertex_count, vertex_count, cells.iter().map(|(vertices, _)| vertices));
+        let (mut vertex_order, others): (Vec<u32>, Vec<u32>) =
+            reverse_cuthill_mckee(&natural).into_iter().partition(|&vertex| owns(vertex));
+        let rows = vertex_order.len();
+        vertex_order.extend(others);
         let mut vertex_rank = vec![0u32; vertex_count];
         for (rank, &vertex) in vertex_order.iter().enumerate() {
             vertex_rank[vertex as usize] = number(rank);
@@ -71,7 +80,7 @@ impl Topology {
         }
         cells.sort_by_key(|&(vertices, cell)| (vertices.into_iter().min(), cell));
         let elements: Vec<[u32; 4]> = cells.iter().map(|&(vertices, _)| vertices).collect();
-        let pattern = adjacency(vertex_count, elements.iter());
+        let pattern = adjacency(vertex_count, rows, elements.iter());
 
         let mut incidence_starts = vec![0usize; vertex_count + 1];
         for &vertex in elements.iter().flatten() {
@@ -84,7 +93,8 @@ impl Topology {
         let mut incidences = vec![Incidence { element: 0, local: 0, slots: [0; 4] }; elements.len() * 4];
         for (element, vertices) in elements.iter().enumerate() {
             for (local, &vertex) in vertices.iter().enumerate() {
-                let row = &pattern.columns[pattern.row(vertex as usize)];
+                let row = if (vertex as usize) < rows { pattern.row(vertex as usize) } else { 0..0 };
+                let row = &pattern.columns[row];
                 let slots = vertices.map(|column| {
                     let slot = row.partition_point(|&entry| entry < column);
                     u16::try_from(slot).unwrap_or(u16::MAX)
@@ -105,6 +115,12 @@ impl Topology {
             incidence_starts,
             incidences,
         })
+    }
+
+    /// How many vertices this rank owns: they are the first.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.pattern.rows()
     }
 
     /// How many vertices there are.
@@ -137,8 +153,12 @@ fn number(index: usize) -> u32 {
     index as u32
 }
 
-/// Which vertices share an element, each with itself.
-fn adjacency<'a>(vertex_count: usize, elements: impl Iterator<Item = &'a [u32; 4]> + Clone) -> Pattern {
+/// Which vertices share an element, each with itself, in the first `row_count` rows.
+fn adjacency<'a>(
+    vertex_count: usize,
+    row_count: usize,
+    elements: impl Iterator<Item = &'a [u32; 4]> + Clone,
+) -> Pattern {
     let mut starts = vec![0usize; vertex_count + 1];
     for &vertex in elements.clone().flatten() {
         starts[vertex as usize + 1] += 4;
@@ -155,7 +175,7 @@ fn adjacency<'a>(vertex_count: usize, elements: impl Iterator<Item = &'a [u32; 4
             next[row as usize] += 4;
         }
     }
-    let rows: Vec<Vec<u32>> = (0..vertex_count)
+    let rows: Vec<Vec<u32>> = (0..row_count)
         .into_par_iter()
         .map(|row| {
             let mut columns = all[starts[row]..starts[row + 1]].to_vec();
@@ -167,7 +187,7 @@ fn adjacency<'a>(vertex_count: usize, elements: impl Iterator<Item = &'a [u32; 4
             columns
         })
         .collect();
-    let mut offsets = Vec::with_capacity(vertex_count + 1);
+    let mut offsets = Vec::with_capacity(row_count + 1);
     offsets.push(0);
     for row in &rows {
         offsets.push(offsets[offsets.len() - 1] + row.len());

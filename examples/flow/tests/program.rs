@@ -1,12 +1,15 @@
 //! Cases, orders and reports, on a mesh small enough for a test.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use tombolo_deform::mesh::FeatureSource;
 use tombolo_deform::shapes::{BOX_FEATURES, box_of_tets};
 use tombolo_flow::case::{Case, CaseError};
+use tombolo_flow::parts::Dealing;
 use tombolo_flow::program::{Options, Run};
 use tombolo_flow::report::Report;
+use tombolo_pipelines::communicator::threads;
 use tombolo_pipelines::files::{self, Compression};
 
 const CASE: &str = r#"{
@@ -243,4 +246,79 @@ fn a_uniform_stream_stays_uniform_through_any_schedule() {
             "{table}"
         );
     }
+}
+
+/// The same run on several ranks, which are threads here; the report of the first.
+fn run_on(ranks: usize, options: &Options) -> Report {
+    let reports =
+        threads::run(ranks, |communicator| Run::on(Arc::new(communicator), options).unwrap().finish().unwrap());
+    reports.into_iter().next().unwrap()
+}
+
+/// How far the fields and coordinates of two files are apart, relative to the largest value of each.
+fn difference(a: &Path, b: &Path) -> Vec<(String, f64)> {
+    let [a, b] = [a, b].map(|file| files::read_mesh(file).unwrap());
+    assert_eq!(a.mesh.cells(), b.mesh.cells());
+    let apart = |a: &[f64], b: &[f64]| {
+        let largest = a.iter().map(|value| value.abs()).fold(0.0, f64::max);
+        a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / largest.max(f64::MIN_POSITIVE)
+    };
+    let mut apart_by =
+        vec![("coordinates".to_owned(), apart(a.mesh.points().as_flattened(), b.mesh.points().as_flattened()))];
+    for field in &a.fields {
+        let other = b.fields.iter().find(|other| other.name == field.name).unwrap();
+        apart_by.push((field.name.clone(), apart(&field.values, &other.values)));
+    }
+    apart_by
+}
+
+#[test]
+fn ranks_solve_what_one_process_solves() {
+    let (folder, case) = folder(CASE);
+    let alone = Options { out: Some(folder.path().join("alone")), ..headless(&case) };
+    let expected = run(&alone);
+    let dealings = [
+        Dealing::default(),
+        Dealing { empty_rank: Some(0), ..Dealing::default() },
+        Dealing { empty_rank: Some(1), shuffle: Some(7), without_numbers: true },
+    ];
+    for (ranks, dealing) in [(2, dealings[0]), (3, dealings[1]), (4, dealings[2])] {
+        let options = Options { out: Some(folder.path().join("ranks")), dealing, ..alone.clone() };
+        let report = run_on(ranks, &options);
+        assert_eq!((report.cycles, report.error.as_deref()), (12, None));
+        assert_eq!((report.mesh.vertices, report.mesh.cells), (expected.mesh.vertices, expected.mesh.cells));
+        assert_eq!((report.mesh.inverted, report.mesh.min_scaled_jacobian), (0, expected.mesh.min_scaled_jacobian));
+        assert_eq!(report.flow.unconverged, 0);
+        for (name, apart) in difference(&folder.path().join("alone/final.vtu"), &folder.path().join("ranks/final.vtu"))
+        {
+            // The solves stop at residuals of 1e-6 and 1e-7; `ranks_solve_the_same_equations` asks for more.
+            let tolerance = if name == "coordinates" { 1e-8 } else { 5e-5 };
+            assert!(apart <= tolerance, "{ranks} ranks, {dealing:?}: {name} is {apart:e} apart");
+        }
+        for (name, flux) in &expected.flow.fluxes {
+            assert!((flux - report.flow.fluxes[name]).abs() < 1e-6, "{name}: {flux} {}", report.flow.fluxes[name]);
+        }
+        // Preconditioners that are worse, but not by much.
+        let [few, many] = [&expected, &report].map(|report| report.flow.pressure_iterations);
+        assert!(many < 3.0 * few + 10.0, "{few} iterations, on {ranks} ranks {many}");
+    }
+}
+
+#[test]
+fn ranks_fail_together() {
+    let diverging = CASE.replace("\"y * (1 - y)\"", "\"1 / max(0, 0.22 - t)\"");
+    let (_folder, case) = folder(&diverging);
+    let reports = threads::run(3, |communicator| {
+        Run::on(Arc::new(communicator), &headless(&case)).unwrap().finish().map(|report| report.error)
+    });
+    let errors: Vec<String> = reports.into_iter().map(|report| report.unwrap().unwrap()).collect();
+    assert!(errors.iter().all(|error| *error == errors[0]), "{errors:?}");
+    assert!(errors[0].starts_with("rank ") && errors[0].contains("cycle 5, time 0.25"), "{}", errors[0]);
+    let refused = threads::run(3, |communicator| {
+        let dealing = Dealing { empty_rank: Some(3), ..Dealing::default() };
+        Run::on(Arc::new(communicator), &Options { dealing, ..headless(&case) }).err().map(|error| error.to_string())
+    });
+    assert!(
+        refused.iter().all(|error| error.as_ref().is_some_and(|text| text.contains("rank 3 cannot be left empty")))
+    );
 }

@@ -1,6 +1,6 @@
 //! The stabilised bi-conjugate gradient method, for three right-hand sides of one matrix at once.
 
-use super::{BlockIncompleteLu, Matrix, Outcome, for_each_chunk, sum};
+use super::{BlockIncompleteLu, Halo, Matrix, Outcome, for_each_chunk, sum};
 
 /// One value of three components for each row.
 pub type Tuples = Vec<[f64; 3]>;
@@ -8,7 +8,8 @@ pub type Tuples = Vec<[f64; 3]>;
 /// BiCGStab (van der Vorst 1992), preconditioned from the right, for three systems that share a matrix.
 ///
 /// Each component has its own scalars and rests once it has converged. `held` marks components of rows that are prescribed
-/// although the matrix does not say so: the operator is the identity there.
+/// although the matrix does not say so: the operator is the identity there. On several ranks each has its rows of the matrix;
+/// `right` holds the values of its rows, `solution` those of all its vertices.
 #[derive(Debug, Default)]
 pub struct BiCgStab {
     residual: Tuples,
@@ -24,12 +25,13 @@ impl BiCgStab {
     /// Improves `solution` until each component's residual is below its `tolerance` (absolute, Euclidean norm).
     ///
     /// Gives up after `limit` iterations; a breakdown restarts from the residual reached. NaN in, NaN out: the outcome then is
-    /// not converged.
+    /// not converged. Collective.
     #[expect(clippy::too_many_arguments, reason = "the parts of one linear system")]
     pub fn solve(
         &mut self,
         matrix: &Matrix,
         preconditioner: &BlockIncompleteLu,
+        halo: &Halo,
         held: &[[bool; 3]],
         right: &[[f64; 3]],
         solution: &mut [[f64; 3]],
@@ -37,17 +39,17 @@ impl BiCgStab {
         limit: usize,
     ) -> Outcome {
         let rows = right.len();
-        for buffer in [
-            &mut self.residual,
-            &mut self.shadow,
-            &mut self.direction,
-            &mut self.preconditioned,
-            &mut self.image,
-            &mut self.second,
-            &mut self.second_image,
-        ] {
+        for buffer in
+            [&mut self.residual, &mut self.shadow, &mut self.direction, &mut self.image, &mut self.second_image]
+        {
             buffer.resize(rows, [0.0; 3]);
         }
+        // What the matrix is applied to has values at the other ranks' vertices too.
+        for buffer in [&mut self.preconditioned, &mut self.second] {
+            buffer.resize(solution.len(), [0.0; 3]);
+        }
+        halo.update(solution);
+        let dot = |a: &[[f64; 3]], b: &[[f64; 3]]| halo.sum(dot(a, b));
         let mut iterations = 0;
         let mut norms = [f64::INFINITY; 3];
         while iterations < limit {
@@ -57,7 +59,7 @@ impl BiCgStab {
             if !open.contains(&true) {
                 break;
             }
-            let done = self.run(matrix, preconditioner, held, solution, tolerance, open, limit - iterations);
+            let done = self.run(matrix, preconditioner, halo, held, solution, tolerance, open, limit - iterations);
             iterations += done.max(1);
             if norms.iter().any(|norm| !norm.is_finite()) {
                 break;
@@ -73,12 +75,15 @@ impl BiCgStab {
         &mut self,
         matrix: &Matrix,
         preconditioner: &BlockIncompleteLu,
+        halo: &Halo,
         held: &[[bool; 3]],
         solution: &mut [[f64; 3]],
         tolerance: [f64; 3],
         mut open: [bool; 3],
         limit: usize,
     ) -> usize {
+        let rows = self.residual.len();
+        let dot = |a: &[[f64; 3]], b: &[[f64; 3]]| halo.sum(dot(a, b));
         self.shadow.copy_from_slice(&self.residual);
         self.direction.fill([0.0; 3]);
         self.image.fill([0.0; 3]);
@@ -96,14 +101,16 @@ impl BiCgStab {
                     }
                 }
             });
-            preconditioner.apply(&self.direction, &mut self.preconditioned);
+            preconditioner.apply(&self.direction, &mut self.preconditioned[..rows]);
+            halo.update(&mut self.preconditioned);
             multiply(matrix, held, &self.preconditioned, &mut self.image);
             let against = dot(&self.shadow, &self.image);
             alpha = quotient(open, |c| rho[c], |c| against[c]);
             update(solution, alpha, &self.preconditioned);
             update(&mut self.residual, alpha.map(|value| -value), &self.image);
 
-            preconditioner.apply(&self.residual, &mut self.second);
+            preconditioner.apply(&self.residual, &mut self.second[..rows]);
+            halo.update(&mut self.second);
             multiply(matrix, held, &self.second, &mut self.second_image);
             let (top, bottom) = (dot(&self.second_image, &self.residual), dot(&self.second_image, &self.second_image));
             omega = quotient(open, |c| top[c], |c| bottom[c]);

@@ -61,6 +61,21 @@ impl Matrix {
         Self { pattern, values, columns }
     }
 
+    /// The first `rows` rows and columns.
+    #[must_use]
+    pub fn leading_block(&self, rows: usize) -> Self {
+        let mut starts = vec![0];
+        let (mut columns, mut values) = (Vec::new(), Vec::new());
+        for row in 0..rows {
+            let range = self.pattern.row(row);
+            let inside = self.pattern.columns[range.clone()].partition_point(|&column| (column as usize) < rows);
+            columns.extend_from_slice(&self.pattern.columns[range.start..range.start + inside]);
+            values.extend_from_slice(&self.values[range.start..range.start + inside]);
+            starts.push(columns.len());
+        }
+        Self { pattern: Arc::new(Pattern { starts, columns }), values, columns: rows }
+    }
+
     /// `result = self * vector`.
     pub fn multiply(&self, vector: &[f64], result: &mut [f64]) {
         for_each_chunk(result, |start, chunk| {

@@ -269,8 +269,9 @@ fn smoothed(matrix: &Matrix, inverse_diagonal: &[f64], eigenvalue: f64, tentativ
     smoother.times(tentative)
 }
 
+/// A small symmetric matrix, factored; where it is not definite, its diagonal is lifted slightly.
 #[derive(Debug)]
-struct DenseCholesky {
+pub(super) struct DenseCholesky {
     size: usize,
     factor: Vec<f64>,
     inverse_diagonal: Vec<f64>,
@@ -289,6 +290,15 @@ impl DenseCholesky {
                 factor[row * size + matrix.pattern.columns[entry] as usize] = matrix.values[entry];
             }
         }
+        Self::factored(factor, size, inverse_diagonal)
+    }
+
+    /// The same of a dense matrix, row by row.
+    pub(super) fn of_dense(values: Vec<f64>, size: usize) -> Self {
+        Self::factored(values, size, Vec::new())
+    }
+
+    fn factored(mut factor: Vec<f64>, size: usize, inverse_diagonal: Vec<f64>) -> Self {
         let largest = (0..size).map(|row| factor[row * size + row]).fold(0.0, f64::max);
         for row in 0..size {
             factor[row * size + row] += 1e-10 * largest;
@@ -309,7 +319,7 @@ impl DenseCholesky {
         Self { size, factor, inverse_diagonal }
     }
 
-    fn solve(&self, values: &mut [f64]) {
+    pub(super) fn solve(&self, values: &mut [f64]) {
         let size = self.size;
         if self.factor.is_empty() {
             values.iter_mut().zip(&self.inverse_diagonal).for_each(|(value, inverse)| *value *= inverse);
