@@ -1,4 +1,4 @@
-//! The surfaces of the meshes that `scripts/meshes` makes.
+//! The meshes that `scripts/meshes` makes, and their surfaces.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -31,4 +31,24 @@ pub fn generated_surfaces(names: &[&str]) -> Vec<PathBuf> {
         assert!(output.status.success(), "run scripts/setup\n{}", String::from_utf8_lossy(&output.stderr));
     }
     names.iter().map(|name| path(name)).collect()
+}
+
+/// A mesh of `scripts/meshes`, in `meshes/`, where the cases of the examples look for it; made where it is not there yet.
+///
+/// # Panics
+/// Where the script fails: it needs what `scripts/setup` installs.
+#[must_use]
+pub fn generated_mesh(name: &str) -> PathBuf {
+    static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+    let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let path = project().join(format!("meshes/{name}.msh"));
+    if !path.exists() {
+        let made = Command::new(project().join(".venv/bin/python"))
+            .current_dir(project())
+            .args(["scripts/meshes", name])
+            .status()
+            .unwrap_or_else(|error| panic!("Python does not start ({error}): run scripts/setup"));
+        assert!(made.success(), "scripts/meshes made no mesh: run scripts/setup");
+    }
+    path
 }

@@ -11,7 +11,7 @@ mod viewer;
 
 pub use cgal::{cgal, cgal_program, off};
 pub use curves::CurveGraph;
-pub use generated::generated_surfaces;
+pub use generated::{generated_mesh, generated_surfaces};
 pub use mesh::{NOZZLE_FEATURES, write_nozzle};
 pub use run::{Run, program, programs, tombolo};
 pub use small::Small;

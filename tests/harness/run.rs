@@ -23,6 +23,7 @@ pub fn programs() -> &'static Path {
         let output = Command::new(cargo)
             .current_dir(project())
             .args(["build", "--quiet", "--workspace", "--bins", "--test", "browser"])
+            .args(cfg!(feature = "distributed").then_some("--features=tombolo-tests/distributed"))
             .output()
             .expect("cargo runs");
         assert!(output.status.success(), "the programs do not build:\n{}", String::from_utf8_lossy(&output.stderr));
@@ -61,13 +62,23 @@ impl Run {
     /// # Panics
     /// Where it cannot be started.
     pub fn flow<S: AsRef<OsStr>>(arguments: &[S]) -> Run {
-        let mut child = program("flow")
-            .args(arguments)
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("flow starts");
+        Self::start(program("flow").args(arguments))
+    }
+
+    /// Starts `flow` with these arguments on several ranks of MPI.
+    ///
+    /// # Panics
+    /// Where it cannot be started.
+    pub fn flow_on<S: AsRef<OsStr>>(ranks: usize, arguments: &[S]) -> Run {
+        let mut command = Command::new("mpirun");
+        // More ranks than cores, and as whoever runs the tests.
+        command.args(["--oversubscribe", "--allow-run-as-root", "-n", &ranks.to_string()]);
+        Self::start(command.current_dir(project()).arg(programs().join("flow")).args(arguments))
+    }
+
+    fn start(command: &mut Command) -> Run {
+        let mut child =
+            command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("flow starts");
         let (sender, lines) = channel();
         let text = Arc::new(Mutex::new(String::new()));
         let pipes: [Option<Box<dyn Read + Send>>; 2] = [

@@ -153,7 +153,6 @@ pub(crate) fn gradient(topology: &Topology, geometry: &Geometry, field: &[f64], 
 
 /// Subtracts the pressure's stabilisation from the continuity equation: the integral of each shape function's gradient times the
 /// part of the pressure gradient that is orthogonal to linear fields, scaled by the intrinsic time (Codina 2000). Collective.
-#[expect(clippy::too_many_arguments, reason = "the parts of one equation")]
 pub(crate) fn subtract_pressure_stabilisation(
     topology: &Topology,
     geometry: &Geometry,
