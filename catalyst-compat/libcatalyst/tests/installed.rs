@@ -90,6 +90,7 @@ fn nodes_work_from_c_cpp_and_fortran() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let told = succeed(built.program("node_c").arg(directory.path()));
     assert!(told.contains("node.c: ok") && told.contains("conduit: the conduit node is null"), "{told}");
+    assert!(succeed(&mut built.program("blueprint")).contains("blueprint.c: ok"));
     let implementations = built.implementations();
     let told = succeed(built.program("node_cpp").env("CATALYST_IMPLEMENTATION_PATHS", &implementations));
     assert!(told.contains("node.cpp: ok"), "{told}");

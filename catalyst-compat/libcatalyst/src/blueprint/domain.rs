@@ -1,5 +1,7 @@
 //! One domain of a mesh as points and elements, whatever its coordinate set and topology.
 
+use std::collections::HashSet;
+
 use crate::blueprint::parts::vertices_of;
 use crate::error::{Error, Result};
 use crate::node::Node;
@@ -9,8 +11,22 @@ use crate::node::Node;
 pub struct Element {
     /// The shape, as Blueprint names it.
     pub shape: String,
-    /// The vertices, in the order of the shape.
+    /// The vertices, in the order of the shape; of a polyhedron each once, in the order its faces bring them.
     pub vertices: Vec<usize>,
+    /// The faces of a polyhedron by their vertices; none for other shapes.
+    pub faces: Vec<Vec<usize>>,
+}
+
+impl Element {
+    fn new(shape: impl Into<String>, vertices: Vec<usize>) -> Self {
+        Self { shape: shape.into(), vertices, faces: Vec::new() }
+    }
+
+    fn polyhedron(faces: Vec<Vec<usize>>) -> Self {
+        let mut seen = HashSet::new();
+        let vertices = faces.iter().flatten().copied().filter(|vertex| seen.insert(*vertex)).collect();
+        Self { shape: "polyhedral".into(), vertices, faces }
+    }
 }
 
 /// The name of an axis, and the coordinates of points along it.
@@ -39,7 +55,7 @@ impl<'a> Domain<'a> {
     /// Reads a domain; without a name its first topology.
     ///
     /// # Errors
-    /// Something is missing, refers to what is not there, or is polyhedral.
+    /// Something is missing or refers to what is not there.
     pub fn read(mesh: &'a Node, topology: Option<&str>) -> Result<Self> {
         let topologies = mesh.existing("topologies")?;
         let name = topology.map_or_else(|| topologies.name_of(0).to_owned(), str::to_owned);
@@ -63,9 +79,9 @@ impl<'a> Domain<'a> {
             )));
         }
         let elements = match (kind.as_str(), cells) {
-            ("points", _) => (0..count).map(|index| Element { shape: "point".into(), vertices: vec![index] }).collect(),
+            ("points", _) => (0..count).map(|index| Element::new("point", vec![index])).collect(),
             (_, Some(cells)) => grid(cells),
-            _ => unstructured(found.existing("elements")?)?,
+            _ => unstructured(found)?,
         };
         if let Some(wrong) = elements.iter().flat_map(|element| &element.vertices).find(|vertex| **vertex >= count) {
             return Err(Error::new(format!("{}: vertex {wrong} of {count} points", found.place())));
@@ -183,14 +199,30 @@ fn grid(cells: [usize; 3]) -> Vec<Element> {
             for i in 0..many[0] {
                 let first = i + j * row + k * layer;
                 let vertices = corners.iter().take(1 << dimension).map(|corner| first + corner).collect();
-                elements.push(Element { shape: shape.to_owned(), vertices });
+                elements.push(Element::new(shape, vertices));
             }
         }
     }
     elements
 }
 
-fn unstructured(elements: &Node) -> Result<Vec<Element>> {
+/// The elements of an unstructured topology: one group of them, or several by name.
+fn unstructured(topology: &Node) -> Result<Vec<Element>> {
+    let elements = topology.existing("elements")?;
+    let faces = topology.get("subelements");
+    if elements.get("shape").is_some() || elements.get("connectivity").is_some() {
+        return group(elements, faces);
+    }
+    let mut all = Vec::new();
+    for (index, (name, member)) in elements.children().enumerate() {
+        let of_member = faces.and_then(|faces| if name.is_empty() { faces.child(index) } else { faces.get(name) });
+        all.extend(group(member, of_member)?);
+    }
+    Ok(all)
+}
+
+/// The elements of a group; polyhedra name their faces, which are a group too.
+fn group(elements: &Node, faces: Option<&Node>) -> Result<Vec<Element>> {
     let integers = |name: &str| -> Result<Vec<i64>> {
         let node = elements.existing(name)?;
         let all: Option<Vec<i64>> = node.numbers().map(|number| number.as_i64()).collect();
@@ -198,28 +230,29 @@ fn unstructured(elements: &Node) -> Result<Vec<Element>> {
     };
     let shape = text(elements, "shape")?;
     let connectivity = integers("connectivity")?;
-    let vertices = |from: i64, count: i64| -> Result<Vec<usize>> {
+    let entries = |from: i64, count: i64| -> Result<Vec<usize>> {
         let end = from.checked_add(count);
         let range = usize::try_from(from).ok().zip(end.and_then(|end| usize::try_from(end).ok()));
         let found = range.and_then(|(from, end)| connectivity.get(from..end));
         let found = found
             .ok_or_else(|| Error::new(format!("{}: an element reaches beyond the connectivity", elements.place())))?;
-        let all: Option<Vec<usize>> = found.iter().map(|vertex| usize::try_from(*vertex).ok()).collect();
-        all.ok_or_else(|| Error::new(format!("{}: a vertex is negative", elements.place())))
+        let all: Option<Vec<usize>> = found.iter().map(|entry| usize::try_from(*entry).ok()).collect();
+        all.ok_or_else(|| Error::new(format!("{}: the connectivity has a negative entry", elements.place())))
     };
     if let Some(size) = vertices_of(&shape) {
-        let count = i64::try_from(connectivity.len()).unwrap_or(i64::MAX) / size;
-        return (0..count)
-            .map(|index| Ok(Element { shape: shape.clone(), vertices: vertices(index * size, size)? }))
-            .collect();
-    }
-    if shape == "polyhedral" {
-        return Err(Error::new(format!("{}: polyhedra cannot be taken apart into vertices", elements.place())));
+        let count = i64::try_from(connectivity.len()).unwrap_or(i64::MAX);
+        if count % size != 0 {
+            return Err(Error::new(format!(
+                "{}: {count} vertices are no whole number of '{shape}', which has {size}",
+                elements.place()
+            )));
+        }
+        return (0..count / size).map(|index| Ok(Element::new(shape.clone(), entries(index * size, size)?))).collect();
     }
     let sizes = integers("sizes")?;
     let offsets = match elements.get("offsets") {
         Some(_) => integers("offsets")?,
-        None => sizes.iter().scan(0, |sum, size| Some(std::mem::replace(sum, *sum + size))).collect(),
+        None => sizes.iter().scan(0_i64, |sum, size| Some(std::mem::replace(sum, sum.saturating_add(*size)))).collect(),
     };
     let shapes: Vec<String> = if shape == "mixed" {
         let map: Vec<_> = elements.existing("shape_map")?.children().collect();
@@ -234,8 +267,25 @@ fn unstructured(elements: &Node) -> Result<Vec<Element>> {
     if shapes.len() != sizes.len() || offsets.len() != sizes.len() {
         return Err(Error::new(format!("{}: sizes, offsets and shapes of different lengths", elements.place())));
     }
+    let known = match faces.filter(|_| shapes.iter().any(|shape| shape == "polyhedral")) {
+        Some(faces) => group(faces, None)?,
+        None => Vec::new(),
+    };
+    let face = |index: usize| {
+        let found = known.get(index).map(|face| face.vertices.clone());
+        found.ok_or_else(|| {
+            Error::new(format!("{}: face {index} of {} in 'subelements'", elements.place(), known.len()))
+        })
+    };
     let each = shapes.into_iter().zip(offsets.iter().zip(&sizes));
-    each.map(|(shape, (offset, size))| Ok(Element { shape, vertices: vertices(*offset, *size)? })).collect()
+    each.map(|(shape, (offset, size))| {
+        let entries = entries(*offset, *size)?;
+        if shape == "polyhedral" {
+            return Ok(Element::polyhedron(entries.into_iter().map(face).collect::<Result<_>>()?));
+        }
+        Ok(Element::new(shape, entries))
+    })
+    .collect()
 }
 
 /// Gathers rows of leaves of one type into a new leaf.

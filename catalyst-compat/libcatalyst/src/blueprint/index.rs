@@ -1,8 +1,9 @@
 //! The index of a mesh: what is in it, without its arrays.
 
-use crate::blueprint::mesh::domains;
-use crate::blueprint::parts::{ASSOCIATIONS, AXES, COORDSETS, TOPOLOGIES};
-use crate::blueprint::report::{Report, described};
+use crate::blueprint::mesh::{domains, refer_all};
+use crate::blueprint::parts::{ASSOCIATIONS, AXES, COORDSETS, TOPOLOGIES, whereabouts};
+use crate::blueprint::report::Report;
+use crate::blueprint::sets::material_map;
 use crate::error::{Error, Result};
 use crate::node::Node;
 
@@ -50,7 +51,8 @@ pub fn generate(mesh: &Node, path: &str, count: i64) -> Result<Node> {
         }
         for (name, field) in mesh.get("fields").into_iter().flat_map(Node::children) {
             let entry = index.at("fields")?.child_named(name)?;
-            let components = field.get("values").map_or(1, |values| values.count().max(1));
+            let by_material = || field.get("matset_values").and_then(|values| values.child(0));
+            let components = field.get("values").or_else(by_material).map_or(1, |values| values.count().max(1));
             entry.at("number_of_components")?.set_number(i64::try_from(components).unwrap_or(1))?;
             for text in ["association", "basis", "topology", "matset", "volume_dependent"] {
                 copy_text(field, text, entry)?;
@@ -65,6 +67,16 @@ pub fn generate(mesh: &Node, path: &str, count: i64) -> Result<Node> {
                 }
                 if let Some(map) = set.get("material_map") {
                     entry.at("material_map")?.take(map.copy()?)?;
+                } else if let Some(fractions) = set.get("volume_fractions") {
+                    // Without a map the order of the materials is their numbering.
+                    for (number, (material, _)) in (0_i64..).zip(fractions.children()) {
+                        entry.at("material_map")?.child_named(material)?.set_number(number)?;
+                    }
+                }
+                if let Some(species) = set.get("matset_values").and_then(|values| values.child(0)) {
+                    for (name, _) in species.children() {
+                        entry.at("species")?.child_named(name)?;
+                    }
                 }
                 entry.at("path")?.set_text(under(group, name))?;
             }
@@ -101,14 +113,24 @@ fn system(axes: &[&str]) -> &'static str {
 /// Verifies an index.
 pub fn verify(node: &Node, report: &mut Report) {
     type Check = fn(&Node, &mut Report);
-    let groups: [(&str, bool, Check); 3] =
-        [("coordsets", true, coordset), ("topologies", true, topology), ("fields", false, field)];
+    let groups: [(&str, bool, Check); 7] = [
+        ("coordsets", true, coordset),
+        ("topologies", true, topology),
+        ("matsets", false, matset),
+        ("specsets", false, specset),
+        ("fields", false, field),
+        ("adjsets", false, neighbours),
+        ("nestsets", false, neighbours),
+    ];
     for (group, needed, check) in groups {
-        let found = if needed { report.object(node, group) } else { node.get(group) };
-        for (name, entry) in found.into_iter().flat_map(Node::children) {
+        if !needed && node.get(group).is_none() {
+            continue;
+        }
+        for (name, entry) in report.object(node, group).into_iter().flat_map(Node::children) {
             check(entry, report.below(group, "mesh/index").below(name, "mesh/index"));
         }
     }
+    refer_all(node, report);
 }
 
 /// Verifies the entry of a coordinate set.
@@ -120,13 +142,18 @@ pub fn coordset(node: &Node, report: &mut Report) {
     }
 }
 
-/// Verifies a coordinate system.
+/// Verifies a coordinate system: its type and the axes of that type.
 pub fn coord_system(node: &Node, report: &mut Report) {
-    report.one_of(node, "type", &["cartesian", "cylindrical", "spherical", "logical"]);
+    let kind = report.one_of(node, "type", &["cartesian", "cylindrical", "spherical"]);
+    let allowed: &[&str] = match kind.as_deref() {
+        Some("cartesian") => &["x", "y", "z"],
+        Some("cylindrical") => &["r", "z"],
+        Some("spherical") => &["r", "theta", "phi"],
+        _ => &AXES,
+    };
     if let Some(axes) = report.object(node, "axes") {
-        for (name, axis) in axes.children().filter(|(name, _)| !AXES.contains(name) && !["i", "j", "k"].contains(name))
-        {
-            report.wrong(axis, &format!("'{name}' is no axis; axes are {}", AXES.join(", ")));
+        for (name, axis) in axes.children().filter(|(name, _)| !allowed.contains(name)) {
+            report.wrong(axis, &format!("'{name}' is no axis here; axes are {}", allowed.join(", ")));
         }
     }
 }
@@ -134,25 +161,45 @@ pub fn coord_system(node: &Node, report: &mut Report) {
 /// Verifies the entry of a topology.
 pub fn topology(node: &Node, report: &mut Report) {
     report.one_of(node, "type", &TOPOLOGIES);
-    report.text(node, "coordset");
-    report.text(node, "path");
+    for name in ["coordset", "path"] {
+        report.text(node, name);
+    }
+    if node.get("grid_function").is_some() {
+        report.text(node, "grid_function");
+    }
 }
 
 /// Verifies the entry of a field.
 pub fn field(node: &Node, report: &mut Report) {
+    whereabouts(node, report);
+    for name in ["topology", "matset"].into_iter().filter(|name| node.get(name).is_some()) {
+        report.text(node, name);
+    }
     report.integers(node, "number_of_components");
-    if node.get("topology").is_some() || node.get("matset").is_none() {
-        report.text(node, "topology");
-    }
     report.text(node, "path");
-    match (node.get("association"), node.get("basis")) {
-        (Some(_), _) => {
-            report.one_of(node, "association", &ASSOCIATIONS);
-        }
-        (None, Some(basis)) if basis.text().is_none() => {
-            report.wrong(basis, &format!("a text is expected, not {}", described(basis)));
-        }
-        (None, Some(_)) => {}
-        (None, None) => report.wrong(node, "neither 'association' nor 'basis' is there"),
+}
+
+/// Verifies the entry of volume fractions.
+pub fn matset(node: &Node, report: &mut Report) {
+    report.text(node, "topology");
+    report.text(node, "path");
+    if node.get("material_map").is_none() {
+        report.object(node, "materials");
+    } else if let Some(map) = report.object(node, "material_map") {
+        material_map(map, report);
     }
+}
+
+/// Verifies the entry of mass fractions.
+pub fn specset(node: &Node, report: &mut Report) {
+    report.text(node, "matset");
+    report.text(node, "path");
+    report.object(node, "species");
+}
+
+/// Verifies the entry of what domains share, or of how they refine each other.
+pub fn neighbours(node: &Node, report: &mut Report) {
+    report.text(node, "topology");
+    report.text(node, "path");
+    report.one_of(node, "association", &ASSOCIATIONS);
 }

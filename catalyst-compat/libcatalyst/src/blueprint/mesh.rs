@@ -6,13 +6,11 @@ use crate::blueprint::{index, sets};
 use crate::datatype::Kind;
 use crate::node::Node;
 
-/// Whether a tree holds several domains rather than one mesh.
+/// Whether a tree holds domains rather than being one; what is empty holds none.
 #[must_use]
 pub fn is_multi_domain(node: &Node) -> bool {
-    node.get("coordsets").is_none() && node.get("topologies").is_none() && {
-        let holds = |child: &Node| child.get("coordsets").is_some() || child.get("topologies").is_some();
-        matches!(node.kind(), Kind::Object | Kind::List) && node.children().any(|(_, child)| holds(child))
-    }
+    let holds = |part: &str| node.get(part).is_some();
+    matches!(node.kind(), Kind::Empty | Kind::Object | Kind::List) && !holds("coordsets") && !holds("topologies")
 }
 
 /// The domains of a mesh: itself, or its children.
@@ -21,10 +19,13 @@ pub fn domains(node: &Node) -> Vec<&Node> {
     if is_multi_domain(node) { node.children().map(|(_, domain)| domain).collect() } else { vec![node] }
 }
 
-/// Verifies a mesh of one domain or several.
+/// Verifies a mesh of one domain, several, or none: a rank may have nothing.
 pub fn verify(node: &Node, report: &mut Report) {
     if !is_multi_domain(node) {
         return verify_domain(node, report);
+    }
+    if node.count() == 0 {
+        report.remark("a mesh without domains");
     }
     for (number, (name, domain)) in node.children().enumerate() {
         let name = if name.is_empty() { format!("[{number}]") } else { name.to_owned() };
@@ -52,17 +53,19 @@ fn verify_domain(mesh: &Node, report: &mut Report) {
         ("adjsets", "adjset", sets::adjset),
         ("nestsets", "nestset", sets::nestset),
     ];
-    for (group, protocol, check) in optional {
-        match mesh.get(group) {
-            Some(children) if children.kind() == Kind::Object => each(children, group, protocol, check, report),
-            Some(other) if other.kind() != Kind::Empty => {
-                report.wrong(other, &format!("an object is expected, not {}", described(other)));
-            }
-            _ => {}
+    for (group, protocol, check) in optional.into_iter().filter(|(group, ..)| mesh.get(group).is_some()) {
+        if let Some(children) = report.object(mesh, group) {
+            each(children, group, protocol, check, report);
         }
     }
+    refer_all(mesh, report);
+}
+
+/// Checks what the parts of a mesh, or of an index, name of each other.
+pub fn refer_all(mesh: &Node, report: &mut Report) {
     for (group, reference, target) in [
         ("topologies", "coordset", "coordsets"),
+        ("topologies", "grid_function", "fields"),
         ("fields", "topology", "topologies"),
         ("matsets", "topology", "topologies"),
         ("adjsets", "topology", "topologies"),
@@ -106,7 +109,8 @@ pub fn verify_part(protocol: &str, node: &Node, report: &mut Report) {
         "coordset/uniform" => parts::uniform_coordset,
         "coordset/rectilinear" => parts::rectilinear_coordset,
         "coordset/explicit" => parts::explicit_coordset,
-        "coordset/uniform/origin" | "coordset/uniform/spacing" => parts::axes_values,
+        "coordset/uniform/origin" => parts::origin,
+        "coordset/uniform/spacing" => parts::spacing,
         "coordset/type" => |node, report| parts::word(node, &parts::COORDSETS, report),
         "coordset/coord_system" => index::coord_system,
         "topology" => parts::topology,
@@ -131,9 +135,12 @@ pub fn verify_part(protocol: &str, node: &Node, report: &mut Report) {
         "adjset" => sets::adjset,
         "nestset" => sets::nestset,
         "index" => index::verify,
-        "index/coordset" => index::coordset,
-        "index/topology" => index::topology,
-        "index/field" => index::field,
+        "coordset/index" | "index/coordset" => index::coordset,
+        "topology/index" | "index/topology" => index::topology,
+        "field/index" | "index/field" => index::field,
+        "matset/index" | "index/matset" => index::matset,
+        "specset/index" | "index/specset" => index::specset,
+        "adjset/index" | "nestset/index" | "index/adjset" | "index/nestset" => index::neighbours,
         _ => return report.wrong(node, &format!("a mesh has no part '{protocol}'")),
     };
     check(node, report);

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::node::Node;
 
 /// The numbers that VTK gives to shapes, for maps of shapes.
-const NUMBERS: [(&str, i32); 9] = [
+const NUMBERS: [(&str, i32); 10] = [
     ("point", 1),
     ("line", 3),
     ("tri", 5),
@@ -18,6 +18,7 @@ const NUMBERS: [(&str, i32); 9] = [
     ("hex", 12),
     ("wedge", 13),
     ("pyramid", 14),
+    ("polyhedral", 42),
 ];
 
 /// Elements of one domain.
@@ -134,38 +135,109 @@ fn select(selection: &Node, domains: &[Domain<'_>], pieces: &mut Vec<Piece>) -> 
     Ok(())
 }
 
+/// Numbers the vertices of a new domain in the order in which its elements bring them.
+#[derive(Default)]
+struct Vertices {
+    /// Whether vertices of different domains at one place become one.
+    joined: bool,
+    /// The domain and the vertex there.
+    origins: Vec<(usize, usize)>,
+    by_vertex: HashMap<(usize, usize), i64>,
+    by_place: HashMap<Vec<u64>, i64>,
+}
+
+impl Vertices {
+    fn number(&mut self, number: usize, vertex: usize, domain: &Domain<'_>) -> i64 {
+        let next = length(&self.origins);
+        let Self { joined, by_place, .. } = self;
+        let new = *self.by_vertex.entry((number, vertex)).or_insert_with(|| {
+            // Zero has two signs but is one place.
+            let place = || domain.axes.iter().map(|(_, values)| (values[vertex] + 0.0).to_bits()).collect();
+            if *joined { *by_place.entry(place()).or_insert(next) } else { next }
+        });
+        if new == next {
+            self.origins.push((number, vertex));
+        }
+        new
+    }
+}
+
+/// Entries of different lengths one after the other, as Blueprint writes polygons and what is mixed.
+#[derive(Default)]
+struct Runs {
+    connectivity: Vec<i64>,
+    sizes: Vec<i64>,
+    offsets: Vec<i64>,
+}
+
+impl Runs {
+    fn push(&mut self, entries: &[i64]) {
+        self.offsets.push(length(&self.connectivity));
+        self.sizes.push(length(entries));
+        self.connectivity.extend(entries);
+    }
+
+    fn write(&self, shapes: &[&str], mixed: bool, output: &mut Node) -> Result<()> {
+        let first = shapes.first().copied().unwrap_or_default();
+        output.at("shape")?.set_text(if mixed { "mixed" } else { first })?;
+        output.at("connectivity")?.set_numbers(&self.connectivity)?;
+        if mixed {
+            let mut numbers = Vec::new();
+            for shape in shapes {
+                let number = NUMBERS.iter().find(|(name, _)| name == shape).map_or(0, |(_, number)| *number);
+                output.at("shape_map")?.child_named(shape)?.set_number(number)?;
+                numbers.push(number);
+            }
+            output.at("shapes")?.set_numbers(&numbers)?;
+        }
+        if mixed || first == "polygonal" || first == "polyhedral" {
+            output.at("sizes")?.set_numbers(&self.sizes)?;
+            output.at("offsets")?.set_numbers(&self.offsets)?;
+        }
+        Ok(())
+    }
+}
+
+fn length<T>(values: &[T]) -> i64 {
+    i64::try_from(values.len()).unwrap_or(i64::MAX)
+}
+
 fn write(group: &[Piece], domains: &[Domain<'_>], output: &mut Node) -> Result<()> {
     let Some(first) = group.first().map(|(number, _)| &domains[*number]) else {
         return Ok(());
     };
     let joined = group.iter().any(|(number, _)| *number != group[0].0);
-    let mut vertices: Vec<(usize, usize)> = Vec::new();
-    let mut by_vertex: HashMap<(usize, usize), i64> = HashMap::new();
-    let mut by_place: HashMap<Vec<u64>, i64> = HashMap::new();
-    let (mut connectivity, mut sizes, mut offsets, mut shapes) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    let mut elements = Vec::new();
+    let mut vertices = Vertices { joined, ..Vertices::default() };
+    let (mut runs, mut faces) = (Runs::default(), Runs::default());
+    let mut by_face: HashMap<Vec<i64>, i64> = HashMap::new();
+    let (mut shapes, mut elements) = (Vec::new(), Vec::new());
     for (number, chosen) in group {
         let domain = &domains[*number];
         for index in chosen {
             let element = &domain.elements[*index];
             elements.push((*number, *index));
             shapes.push(element.shape.as_str());
-            offsets.push(i64::try_from(connectivity.len()).unwrap_or(i64::MAX));
-            sizes.push(i64::try_from(element.vertices.len()).unwrap_or(i64::MAX));
-            for vertex in &element.vertices {
-                let next = i64::try_from(vertices.len()).unwrap_or(i64::MAX);
-                let new = *by_vertex.entry((*number, *vertex)).or_insert_with(|| {
-                    // Zero has two signs but is one place.
-                    let place = || domain.axes.iter().map(|(_, values)| (values[*vertex] + 0.0).to_bits()).collect();
-                    if joined { *by_place.entry(place()).or_insert(next) } else { next }
-                });
-                if new == next {
-                    vertices.push((*number, *vertex));
-                }
-                connectivity.push(new);
+            let mut renumbered = |old: &[usize]| -> Vec<i64> {
+                old.iter().map(|vertex| vertices.number(*number, *vertex, domain)).collect()
+            };
+            if element.faces.is_empty() {
+                runs.push(&renumbered(&element.vertices));
+                continue;
             }
+            let of_element = element.faces.iter().map(|face| {
+                let face = renumbered(face);
+                // Two polyhedra turn the face between them in opposite ways.
+                let mut key = face.clone();
+                key.sort_unstable();
+                *by_face.entry(key).or_insert_with(|| {
+                    faces.push(&face);
+                    length(&faces.sizes) - 1
+                })
+            });
+            runs.push(&of_element.collect::<Vec<_>>());
         }
     }
+    let vertices = vertices.origins;
     let coordset = output.at("coordsets")?.child_named(&first.coordset)?;
     coordset.at("type")?.set_text("explicit")?;
     for (axis, (name, _)) in first.axes.iter().enumerate() {
@@ -178,20 +250,9 @@ fn write(group: &[Piece], domains: &[Domain<'_>], output: &mut Node) -> Result<(
     topology.at("type")?.set_text("unstructured")?;
     topology.at("coordset")?.set_text(&first.coordset)?;
     let mixed = shapes.iter().any(|shape| *shape != shapes[0]);
-    topology.at("elements/shape")?.set_text(if mixed { "mixed" } else { shapes[0] })?;
-    topology.at("elements/connectivity")?.set_numbers(&connectivity)?;
-    if mixed {
-        let mut numbers = Vec::new();
-        for shape in &shapes {
-            let number = NUMBERS.iter().find(|(name, _)| name == shape).map_or(0, |(_, number)| *number);
-            topology.at("elements/shape_map")?.child_named(shape)?.set_number(number)?;
-            numbers.push(number);
-        }
-        topology.at("elements/shapes")?.set_numbers(&numbers)?;
-    }
-    if mixed || shapes[0] == "polygonal" {
-        topology.at("elements/sizes")?.set_numbers(&sizes)?;
-        topology.at("elements/offsets")?.set_numbers(&offsets)?;
+    runs.write(&shapes, mixed, topology.at("elements")?)?;
+    if !faces.sizes.is_empty() {
+        faces.write(&vec!["polygonal"; faces.sizes.len()], mixed, topology.at("subelements")?)?;
     }
     for (name, at_vertices, field) in &first.fields {
         let rows = if *at_vertices { &vertices } else { &elements };

@@ -41,22 +41,30 @@ pub fn uniform_coordset(node: &Node, report: &mut Report) {
     if let Some(dims) = report.object(node, "dims") {
         logical_dims(dims, report);
     }
-    for name in ["origin", "spacing"] {
+    for (name, check) in [("origin", origin as fn(&Node, &mut Report)), ("spacing", spacing)] {
         if let Some(values) = node.get(name) {
-            axes_values(values, report);
+            check(values, report);
         }
     }
 }
 
-/// Verifies one number for each axis.
-pub fn axes_values(node: &Node, report: &mut Report) {
-    if node.kind() != Kind::Object || node.count() == 0 {
+/// Verifies where a uniform coordinate set begins: a number for each axis.
+pub fn origin(node: &Node, report: &mut Report) {
+    along_axes(node, "", report);
+}
+
+/// Verifies the steps of a uniform coordinate set: a number `d` and the axis, such as `dx`, for each axis.
+pub fn spacing(node: &Node, report: &mut Report) {
+    along_axes(node, "d", report);
+}
+
+fn along_axes(node: &Node, before: &str, report: &mut Report) {
+    if !matches!(node.kind(), Kind::Object | Kind::Empty) {
         return report.wrong(node, &format!("an object of numbers is expected, not {}", described(node)));
     }
     for (name, value) in node.children() {
-        let axis = name.strip_prefix('d').unwrap_or(name);
-        if !AXES.contains(&axis) {
-            report.wrong(value, &format!("'{name}' is no axis; axes are {}", AXES.join(", ")));
+        if !name.strip_prefix(before).is_some_and(|axis| AXES.contains(&axis)) {
+            report.remark(&format!("'{name}' is not read; axes are {}, after '{before}'", AXES.join(", ")));
         } else if !value.kind().is_number() {
             report.wrong(value, &format!("a number is expected, not {}", described(value)));
         }
@@ -82,15 +90,20 @@ pub fn logical_dims(node: &Node, report: &mut Report) {
 
 /// Verifies a rectilinear coordinate set: an array for each axis.
 pub fn rectilinear_coordset(node: &Node, report: &mut Report) {
-    if let Some(values) = report.object(node, "values") {
-        axes_values(values, report);
+    let Some(values) = report.needed(node, "values") else {
+        return;
+    };
+    if !matches!(values.kind(), Kind::Object | Kind::List) || values.count() == 0 {
+        return report.wrong(values, &format!("an array for each axis is expected, not {}", described(values)));
+    }
+    for (_, value) in values.children().filter(|(_, value)| !value.kind().is_number()) {
+        report.wrong(value, &format!("numbers are expected, not {}", described(value)));
     }
 }
 
 /// Verifies an explicit coordinate set: arrays of one length.
 pub fn explicit_coordset(node: &Node, report: &mut Report) {
-    if let Some(values) = report.object(node, "values") {
-        axes_values(values, report);
+    if let Some(values) = report.needed(node, "values") {
         mcarray::verify(values, report);
     }
 }
@@ -149,19 +162,35 @@ fn structured(node: &Node, report: &mut Report) {
 }
 
 fn unstructured(node: &Node, report: &mut Report) {
-    let Some(elements) = report.object(node, "elements") else {
+    let Some(elements) = report.needed(node, "elements") else {
         return;
     };
-    if elements.get("shape").is_some() || elements.get("connectivity").is_some() {
-        elements_of(elements, report);
-        if elements.get("shape").and_then(Node::text).as_deref() == Some("polyhedral") {
-            faces_of(node, report);
-        }
-        return;
+    if !matches!(elements.kind(), Kind::Object | Kind::List) || elements.count() == 0 {
+        return report.wrong(elements, &format!("elements are expected, not {}", described(elements)));
     }
-    // Several groups of elements, by name.
-    for (name, group) in elements.children() {
-        elements_of(group, report.below(name, "mesh/topology"));
+    let faces = node.get("subelements");
+    if elements.get("shape").is_some() || elements.get("connectivity").is_some() {
+        return group(elements, faces, report);
+    }
+    // Several groups of elements, by name or in a list.
+    for (index, (name, member)) in elements.children().enumerate() {
+        let (name, of_member) = if name.is_empty() {
+            (format!("[{index}]"), faces.and_then(|faces| faces.child(index)))
+        } else {
+            (name.to_owned(), faces.and_then(|faces| faces.get(name)))
+        };
+        group(member, of_member, report.below(&name, "mesh/topology"));
+    }
+}
+
+fn group(elements: &Node, faces: Option<&Node>, report: &mut Report) {
+    elements_of(elements, report);
+    let polyhedral = elements.get("shape").and_then(Node::text).as_deref() == Some("polyhedral")
+        || elements.get("shape_map").is_some_and(|map| map.get("polyhedral").is_some());
+    match faces.filter(|_| polyhedral) {
+        Some(faces) => faces_of(faces, report.below("subelements", "mesh/topology")),
+        None if polyhedral => report.wrong(elements, "polyhedra need their faces in 'subelements'"),
+        None => {}
     }
 }
 
@@ -177,7 +206,18 @@ fn elements_of(elements: &Node, report: &mut Report) {
             if let Some(map) = report.object(elements, "shape_map") {
                 shape_map(map, report);
             }
-            let shapes = report.integers(elements, "shapes").map(|shapes| shapes.datatype().elements);
+            let shapes = report.integers(elements, "shapes");
+            let mapped = |number: i64| {
+                let mut numbers = elements.get("shape_map").into_iter().flat_map(Node::children);
+                numbers.any(|(_, value)| value.integer() == Some(number))
+            };
+            if let Some(shapes) = shapes {
+                let mut numbers = shapes.numbers().filter_map(|number| number.as_i64());
+                if let Some(unknown) = numbers.find(|number| !mapped(*number)) {
+                    report.wrong(shapes, &format!("{unknown} is not in the shape map"));
+                }
+            }
+            let shapes = shapes.map(|shapes| shapes.datatype().elements);
             for name in ["sizes", "offsets"] {
                 let found = report.integers(elements, name).filter(|found| shapes != Some(found.datatype().elements));
                 if let (Some(found), Some(shapes)) = (found, shapes) {
@@ -188,11 +228,8 @@ fn elements_of(elements: &Node, report: &mut Report) {
         Some(shape) => {
             let size = vertices_of(shape).unwrap_or(1);
             let count = connectivity.map_or(0, |connectivity| connectivity.datatype().elements);
-            if let Some(connectivity) = connectivity.filter(|_| count % size != 0) {
-                report.wrong(
-                    connectivity,
-                    &format!("{count} vertices are no whole number of '{shape}', which has {size}"),
-                );
+            if count % size != 0 {
+                report.remark(&format!("{count} vertices are no whole number of '{shape}', which has {size}"));
             }
             optional_integers(elements, "offsets", report);
         }
@@ -200,15 +237,13 @@ fn elements_of(elements: &Node, report: &mut Report) {
     }
 }
 
-fn faces_of(topology: &Node, report: &mut Report) {
-    if let Some(faces) = report.object(topology, "subelements") {
-        // The faces are polygons of any size, or all of one shape.
-        report.one_of(faces, "shape", &["polygonal", "tri", "quad", "mixed"]);
-        report.integers(faces, "connectivity");
-        if faces.get("shape").and_then(Node::text).as_deref() == Some("polygonal") {
-            report.integers(faces, "sizes");
-        }
-        optional_integers(faces, "offsets", report);
+/// The faces of polyhedra: polygons of any size, or all of one shape.
+fn faces_of(faces: &Node, report: &mut Report) {
+    if faces.kind() != Kind::Object {
+        return report.wrong(faces, &format!("an object is expected, not {}", described(faces)));
+    }
+    if report.one_of(faces, "shape", &["polygonal", "tri", "quad", "mixed"]).is_some() {
+        elements_of(faces, report);
     }
 }
 
@@ -249,32 +284,53 @@ pub fn vertices_of(shape: &str) -> Option<i64> {
 
 /// Verifies a field.
 pub fn field(node: &Node, report: &mut Report) {
-    if node.get("association").is_some() {
-        report.one_of(node, "association", &ASSOCIATIONS);
-    } else if node.get("basis").is_some() {
-        report.text(node, "basis");
-    } else {
-        report.wrong(node, "neither 'association' nor 'basis' is there");
+    whereabouts(node, report);
+    if node.get("volume_dependent").is_some_and(|flag| !matches!(flag.text().as_deref(), Some("true" | "false"))) {
+        report.remark("'volume_dependent' is neither 'true' nor 'false'");
     }
-    if let Some(flag) = node.get("volume_dependent") {
-        word(flag, &["true", "false"], report);
-    }
-    let by_material = node.get("matset").is_some();
-    if node.get("topology").is_some() || !by_material {
-        report.text(node, "topology");
-    }
-    if by_material {
-        report.text(node, "matset");
-        if let Some(values) = report.needed(node, "matset_values")
-            && !values.kind().is_number()
-            && values.count() == 0
-        {
-            report.wrong(values, &format!("values by material are expected, not {}", described(values)));
+    for (reference, values) in [("topology", "values"), ("matset", "matset_values")] {
+        match (node.get(reference), node.get(values)) {
+            (None, None) => {}
+            (Some(_), None) | (None, Some(_)) => {
+                report.wrong(node, &format!("'{reference}' and '{values}' go together, but one is missing"));
+            }
+            (Some(_), Some(found)) if values == "values" => {
+                report.text(node, reference);
+                mcarray::verify_values(found, report);
+            }
+            (Some(_), Some(found)) => {
+                report.text(node, reference);
+                by_material(found, 2, report);
+            }
         }
     }
-    if (node.get("values").is_some() || !by_material)
-        && let Some(values) = report.needed(node, "values")
-    {
-        mcarray::verify_values(values, report);
+}
+
+/// Checks what a field, or its entry in an index, says of where its values are.
+pub fn whereabouts(node: &Node, report: &mut Report) {
+    if node.get("association").is_none() && node.get("basis").is_none() {
+        report.wrong(node, "neither 'association' nor 'basis' is there");
+    }
+    if node.get("association").is_some() {
+        report.one_of(node, "association", &ASSOCIATIONS);
+    }
+    if node.get("basis").is_some() {
+        report.text(node, "basis");
+    }
+    if node.get("topology").is_none() && node.get("matset").is_none() {
+        report.wrong(node, "neither 'topology' nor 'matset' is there");
+    }
+}
+
+/// Values for each material, which may have components.
+fn by_material(node: &Node, depth: usize, report: &mut Report) {
+    if node.kind().is_number() {
+        return;
+    }
+    if depth == 0 || !matches!(node.kind(), Kind::Object | Kind::List) || node.count() == 0 {
+        return report.wrong(node, &format!("values by material are expected, not {}", described(node)));
+    }
+    for (_, child) in node.children() {
+        by_material(child, depth - 1, report);
     }
 }

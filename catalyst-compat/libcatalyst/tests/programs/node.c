@@ -287,106 +287,6 @@ static void texts(const char* directory)
   conduit_node_destroy(options);
 }
 
-static int fails(const char* protocol, const char* yaml, const char* path, const char* told)
-{
-  conduit_node *node = conduit_node_create(), *info = conduit_node_create();
-  conduit_node_parse(node, yaml, "yaml");
-  int valid = conduit_blueprint_verify(protocol, node, info);
-  CHECK(strcmp(conduit_node_fetch_path_as_char8_str(info, "valid"), valid ? "true" : "false") == 0);
-  int found = !valid && strstr(conduit_node_fetch_path_as_char8_str(info, path), told) != NULL;
-  if (!found) conduit_node_print(info);
-  conduit_node_destroy(node);
-  conduit_node_destroy(info);
-  return found;
-}
-
-static void blueprint(void)
-{
-  const char* mesh = "coordsets: {c: {type: explicit, values: {x: [0.0, 1.0, 0.0, 0.0], y: [0.0, 0.0, 1.0, 0.0], z: [0.0, 0.0, 0.0, 1.0]}}}\n"
-                     "topologies: {t: {type: unstructured, coordset: c, elements: {shape: tet, connectivity: [0, 1, 2, 3]}}}\n"
-                     "fields: {f: {association: vertex, topology: t, values: [1.0, 2.0, 3.0, 4.0]}}\n";
-  conduit_node *node = conduit_node_create(), *info = conduit_node_create(), *index = conduit_node_create();
-  CHECK(!conduit_blueprint_mesh_verify(node, info));
-  conduit_node_parse(node, mesh, "yaml");
-  CHECK(conduit_blueprint_mesh_verify(node, info) && conduit_blueprint_verify("mesh", node, info));
-  CHECK(conduit_blueprint_mesh_verify_sub_protocol("topology", conduit_node_fetch(node, "topologies/t"), info));
-  CHECK(!conduit_blueprint_mesh_verify_sub_protocol("coordset", conduit_node_fetch(node, "topologies/t"), info));
-  CHECK(!conduit_blueprint_mesh_verify_sub_protocol("nonsense", node, info));
-  CHECK(conduit_blueprint_mcarray_verify(conduit_node_fetch(node, "coordsets/c/values"), info));
-  CHECK(!conduit_blueprint_mcarray_verify_sub_protocol("sub", node, info));
-  conduit_blueprint_mesh_generate_index(node, "", 1, index);
-  CHECK(conduit_blueprint_mesh_verify_sub_protocol("index", index, info));
-  CHECK(conduit_node_fetch_path_as_int64(index, "fields/f/number_of_components") == 1);
-  conduit_node_set_node(conduit_node_fetch(index, "domains/one"), node);
-  CHECK(conduit_blueprint_mesh_verify(conduit_node_fetch(index, "domains"), info));
-  CHECK(fails("mesh", "coordsets: {c: {type: wrong}}\ntopologies: {t: {type: points, coordset: c}}", "coordsets/c/errors/[0]",
-    "'coordsets/c/type': 'wrong' is none of uniform, rectilinear, explicit"));
-  CHECK(fails("mesh", "coordsets: {c: {type: uniform, dims: {i: 3}}}\ntopologies: {t: {type: uniform, coordset: d}}",
-    "topologies/t/errors/[0]", "there is no 'd' in 'coordsets'; there are [c]"));
-  CHECK(fails("mesh/topology", "{type: unstructured, coordset: c, elements: {shape: hex, connectivity: [0, 1, 2]}}", "errors/[0]",
-    "3 vertices are no whole number of 'hex'"));
-  CHECK(fails("mesh/coordset", "{type: explicit, values: {x: [0.0, 1.0], y: [0.0]}}", "errors/[0]", "1 elements"));
-  CHECK(fails("mesh/field", "{association: face, topology: t, values: [1]}", "errors/[0]", "'face' is none of vertex, element"));
-  CHECK(fails("table", "{values: {a: [1, 2], b: [1, 2, 3]}}", "values/b/errors/[0]", "3 rows"));
-  CHECK(fails("mash", "{}", "errors/[0]", "there are mesh, mcarray"));
-  CHECK(!conduit_blueprint_table_verify(info, index) && !conduit_blueprint_table_verify_sub_protocol("sub", node, index));
-  conduit_blueprint_about(info);
-  CHECK(conduit_node_has_path(info, "protocols/mesh"));
-  conduit_about(info);
-  CHECK(conduit_node_has_path(info, "version"));
-  conduit_node_destroy(node);
-  conduit_node_destroy(info);
-  conduit_node_destroy(index);
-}
-
-/* A grid of 3 by 2 elements, cut, joined and made a table. */
-static void partition(void)
-{
-  const char* grid = "coordsets: {c: {type: uniform, dims: {i: 4, j: 3}, spacing: {dx: 0.5, dy: 2.0}}}\n"
-                     "topologies: {t: {type: uniform, coordset: c}}\n"
-                     "fields: {e: {association: element, topology: t, values: [0, 1, 2, 3, 4, 5]},\n"
-                     "  v: {association: vertex, topology: t, values: {a: [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11],\n"
-                     "                                                b: [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]}}}\n";
-  conduit_node *mesh = conduit_node_create(), *options = conduit_node_create(), *info = conduit_node_create();
-  conduit_node *parts = conduit_node_create(), *whole = conduit_node_create();
-  conduit_node_parse(mesh, grid, "yaml");
-  conduit_blueprint_mesh_flatten(mesh, NULL, whole);
-  CHECK(conduit_blueprint_table_verify(whole, info));
-  CHECK(conduit_node_fetch_path_as_float64_ptr(whole, "element_data/values/y")[5] == 3.0);
-  CHECK(conduit_node_fetch_path_as_int64_ptr(whole, "vertex_data/values/v/b")[11] == 11);
-  conduit_node_set_path_int(options, "target", 4);
-  conduit_blueprint_mesh_partition(mesh, options, parts);
-  CHECK(conduit_node_number_of_children(parts) == 4 && conduit_blueprint_mesh_verify(parts, info));
-  conduit_int64 sum = 0;
-  for (int i = 0; i < 4; ++i)
-  {
-    conduit_node* values = conduit_node_fetch_existing(conduit_node_child(parts, i), "fields/e/values");
-    for (int j = 0; j < conduit_node_number_of_elements(values); ++j) sum += conduit_node_as_int64_ptr(values)[j];
-  }
-  CHECK(sum == 15);
-  conduit_node_set_path_int(options, "target", 1);
-  conduit_blueprint_mesh_partition(parts, options, whole);
-  CHECK(conduit_blueprint_mesh_verify(whole, info));
-  /* Each point is there once again, and each value where its point is. */
-  CHECK(conduit_node_number_of_elements(conduit_node_fetch(whole, "coordsets/c/values/x")) == 12);
-  CHECK(conduit_node_number_of_elements(conduit_node_fetch(whole, "topologies/t/elements/connectivity")) == 24);
-  for (int i = 0; i < 12; ++i)
-    CHECK(conduit_node_fetch_path_as_int64_ptr(whole, "fields/v/values/a")[i] ==
-      (int)(conduit_node_fetch_path_as_float64_ptr(whole, "coordsets/c/values/x")[i] / 0.5) +
-        4 * (int)(conduit_node_fetch_path_as_float64_ptr(whole, "coordsets/c/values/y")[i] / 2.0));
-  conduit_node_parse(options, "{selections: [{type: logical, start: [1, 0], end: [2, 1]}, {type: explicit, elements: [0]}]}", "yaml");
-  conduit_blueprint_mesh_partition(mesh, options, parts);
-  CHECK(conduit_node_fetch_path_as_int64_ptr(parts, "domain_00000/fields/original_element_ids/values/ids")[2] == 4);
-  CHECK(conduit_node_fetch_path_as_int64(parts, "domain_00001/fields/e/values") == 0);
-  conduit_node_parse(options, "{selections: [{type: explicit, elements: [7]}]}", "yaml");
-  CHECK_ERROR(conduit_blueprint_mesh_partition(mesh, options, parts), "element 7 of 6");
-  conduit_node_destroy(mesh);
-  conduit_node_destroy(options);
-  conduit_node_destroy(info);
-  conduit_node_destroy(parts);
-  conduit_node_destroy(whole);
-}
-
 static int warnings = 0;
 static void note_warning(const char* message, const char* file, int line)
 {
@@ -503,8 +403,6 @@ int main(int argc, char** argv)
   memory();
   comparisons();
   texts(argv[1]);
-  blueprint();
-  partition();
   datatypes();
   handlers();
   summaries();
