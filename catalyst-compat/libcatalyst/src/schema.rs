@@ -121,6 +121,14 @@ pub fn to_base64_json(node: &Node) -> Result<String> {
     Ok(format!("{{\n\"schema\": {schema},\n\"data\": {{\"base64\": \"{}\"}}\n}}\n", base64::encode(&data)))
 }
 
+/// The child of a name, which a text brings once.
+fn new_child<'a>(node: &'a mut Node, name: &str) -> Result<&'a mut Node> {
+    if node.get(name).is_some() {
+        return Err(Error::new(format!("{}: the name '{name}' is there twice", node.place())));
+    }
+    node.child_named(name)
+}
+
 /// Fills a node with a plain value: numbers become leaves, lists of numbers arrays.
 fn plain(value: &Value, node: &mut Node) -> Result<()> {
     match value {
@@ -135,7 +143,7 @@ fn plain(value: &Value, node: &mut Node) -> Result<()> {
         Value::Text(text) => node.set_text(text),
         Value::Object(entries) => {
             node.become_tree(Kind::Object);
-            entries.iter().try_for_each(|(name, value)| plain(value, node.child_named(name)?))
+            entries.iter().try_for_each(|(name, value)| plain(value, new_child(node, name)?))
         }
         Value::List(values) => {
             let numbers = |value: &Value| matches!(value, Value::Integer(_) | Value::Unsigned(_) | Value::Real(_));
@@ -184,7 +192,7 @@ impl Layout {
                         return Err(Error::new("a schema nested too deeply"));
                     }
                     node.become_tree(Kind::Object);
-                    entries.iter().try_for_each(|(name, entry)| self.read(entry, node.child_named(name)?, used))
+                    entries.iter().try_for_each(|(name, entry)| self.read(entry, new_child(node, name)?, used))
                 }
             },
             other => Err(Error::new(format!("a schema holds types, not {other:?}"))),

@@ -92,7 +92,7 @@ proptest! {
     }
 
     #[test]
-    fn no_text_brings_the_readers_down(text in any::<String>(), brackets in "[\\[\\]{}:,\"'a0-9 \n#|>&.-]{0,60}") {
+    fn no_text_brings_the_readers_down(text in any::<String>(), brackets in "[\\[\\]{}:,\"'a0-9 \n#|>&*!?%+.\\\\-]{0,60}") {
         for protocol in [Protocol::Json, Protocol::Yaml, Protocol::Schema, Protocol::Base64] {
             for text in [&text, &brackets] {
                 let _ = schema::parse(text, protocol);
@@ -147,4 +147,68 @@ fn deep_texts_are_refused_and_deep_trees_let_go() {
         deep.at("b/b/b").and_then(|place| place.take(node)).is_err(),
         "900 levels and three are more than a thousand"
     );
+}
+
+/// The same tree as YAML in other words and as JSON.
+#[test]
+fn yaml_is_read_as_it_is_meant() {
+    let same = [
+        ("a: 1\nb: two words", r#"{"a": 1, "b": "two words"}"#),
+        ("%YAML 1.2\n--- # begins\na: 1\n...\nb: 2", r#"{"a": 1}"#),
+        ("a: 1\n---\na: 2", r#"{"a": 1}"#),
+        ("--- {a: 1}", r#"{"a": 1}"#),
+        ("base: &b {x: 1, y: [1, 2]}\ncopy: *b\n", r#"{"base": {"x": 1, "y": [1, 2]}, "copy": {"x": 1, "y": [1, 2]}}"#),
+        ("a: &list\n  - 1\n  - 2\nb: [*list, *list]", r#"{"a": [1, 2], "b": [[1, 2], [1, 2]]}"#),
+        ("- &one\n  k: v\n- *one", r#"[{"k": "v"}, {"k": "v"}]"#),
+        ("a: !!str 12\nb: !thing {c: 1}\nd: ! text", r#"{"a": "12", "b": {"c": 1}, "d": "text"}"#),
+        (
+            "a: {b: two words, c: http://here:80/x, 'd e': \"f\\tg\", h}",
+            r#"{"a": {"b": "two words", "c": "http://here:80/x", "d e": "f\tg", "h": null}}"#,
+        ),
+        ("a: [one: 1, 'C:\\new', it's]", r#"{"a": [{"one": 1}, "C:\\new", "it's"]}"#),
+        ("a: [1, # one\n  2,\n\n  3]\nb: 4", r#"{"a": [1, 2, 3], "b": 4}"#),
+        (
+            "a: goes\n  on and\n\n  on\nb: \"so\n  does # this\\\n   one\"",
+            r#"{"a": "goes on and\non", "b": "so does # thisone"}"#,
+        ),
+        (
+            "a: |\n  one\n    two\n\nb: |-\n  three\nc: >\n  four\n  five\n\n  six\nd: |+\n  seven\n\n",
+            r#"{"a": "one\n  two\n", "b": "three", "c": "four five\nsix\n", "d": "seven\n\n"}"#,
+        ),
+        ("a: |1\n  one", r#"{"a": " one\n"}"#),
+        ("- - 1\n  - x\n- y", r#"[[1, "x"], "y"]"#),
+        ("\"a: b\": 1\n'it''s': 2\n\"\\x41\\u00e9\": 3", r#"{"a: b": 1, "it's": 2, "A\u00e9": 3}"#),
+        ("a: true\nb: {c: true}\nd: +3\ne: 1e3", r#"{"a": "true", "b": {"c": "true"}, "d": 3, "e": 1000.0}"#),
+        ("{a: [1, 2],\n b: {c: text}}", r#"{"a": [1, 2], "b": {"c": "text"}}"#),
+    ];
+    for (yaml, json) in same {
+        let read = schema::parse(yaml, Protocol::Yaml).unwrap_or_else(|error| panic!("{yaml}\n{error}"));
+        let wanted = schema::parse(json, Protocol::Json).expect("JSON");
+        assert_eq!(differences(&wanted, &read), None, "{yaml}");
+    }
+    for (yaml, told) in [
+        ("a: 1\n  b: 2", "line 2: a name is not expected here"),
+        ("a: *b", "there is no anchor 'b'"),
+        ("a: &a [*a]", "there is no anchor 'a'"),
+        ("? a\n: b", "no scalars"),
+        ("a: 'open\nb: 1", "the end of the quoted text"),
+        ("a: [1, 2\nb: 1", "line 2: ',' or ']' is expected"),
+        ("a: {b: 1} c", "the end of the line is expected"),
+        ("a: \"\\q\"", "'\\q' is no escape"),
+        ("a: 1\nb: 2\na: 3", "the name 'a' is there twice"),
+        ("  a: 1\nb: 2", "less indentation"),
+    ] {
+        let error = schema::parse(yaml, Protocol::Yaml).map(|_| ()).expect_err(yaml);
+        assert!(error.to_string().contains(told), "{yaml}: {error}");
+    }
+    assert!(schema::parse(r#"{"a": 1, "a": 2}"#, Protocol::Json).is_err());
+    assert!(schema::parse("{a: int32, a: int64}", Protocol::Schema).is_err());
+    // A few lines that would stand for 10 to the power of 12 values, and anchors that would nest without end.
+    let lines: Vec<String> =
+        (1..13).map(|i| format!("a{i}: &a{i} [{}]", vec![format!("*a{}", i - 1); 10].join(", "))).collect();
+    let error =
+        schema::parse(&format!("a0: &a0 [x]\n{}", lines.join("\n")), Protocol::Yaml).map(|_| ()).expect_err("too much");
+    assert!(error.to_string().contains("stand for too much"), "{error}");
+    let lines: Vec<String> = (1..5000).map(|i| format!("a{i}: &a{i} [*a{}]", i - 1)).collect();
+    assert!(schema::parse(&format!("a0: &a0 [x]\n{}", lines.join("\n")), Protocol::Yaml).is_err());
 }
