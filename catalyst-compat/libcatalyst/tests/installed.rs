@@ -106,6 +106,10 @@ fn valgrind_finds_nothing() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let options = ["-q", "--error-exitcode=9", "--leak-check=full", "--errors-for-leak-kinds=definite"];
     succeed(Command::new("valgrind").args(options).arg(built.build.join("node_c")).arg(directory.path()));
+    for seed in ["1", "2"] {
+        succeed(Command::new("valgrind").args(options).arg(built.build.join("rubbish")).args([seed, "3000"]));
+        succeed(built.program("rubbish").args([seed, "50000"]));
+    }
     let mut session = Command::new("valgrind");
     session.args(options).arg(built.build.join("session")).args(["0", "echo"]).arg(built.implementations());
     assert!(succeed(&mut session).contains("echo"));
