@@ -11,7 +11,9 @@
 #include <string>
 #include <vector>
 
+#include "catalyst_conduit_datatype.hpp"
 #include "catalyst_conduit_error.hpp"
+#include "catalyst_conduit_families.hpp"
 #include "conduit.h"
 
 #define CATALYST_CONDUIT_ERROR(message) throw ::conduit_cpp::Error((message), std::string(__FILE__), __LINE__);
@@ -37,102 +39,6 @@
 
 namespace conduit_cpp
 {
-
-class Node;
-
-// Type and layout of what a node holds; good for as long as the node is there and keeps it.
-class DataType
-{
-public:
-  enum class Id
-  {
-    int8,
-    int16,
-    int32,
-    int64,
-    uint8,
-    uint16,
-    uint32,
-    uint64,
-    float32,
-    float64,
-    unknown
-  };
-
-  bool is_valid() const { return this->Type != nullptr; }
-
-  Id id() const
-  {
-    const conduit_index_t number = this->is_valid() ? conduit_datatype_id(this->Type) : CONDUIT_EMPTY_ID;
-    return number < CONDUIT_INT8_ID || number > CONDUIT_FLOAT64_ID ? Id::unknown
-                                                                  : static_cast<Id>(number - CONDUIT_INT8_ID);
-  }
-
-  conduit_index_t type_id() const { return conduit_datatype_id(this->Type); }
-  std::string name() const
-  {
-    char* text = conduit_datatype_name(this->Type);
-    std::string name(text ? text : "");
-    conduit_datatype_name_destroy(text);
-    return name;
-  }
-
-  conduit_index_t number_of_elements() const { return conduit_datatype_number_of_elements(this->Type); }
-  conduit_index_t offset() const { return conduit_datatype_offset(this->Type); }
-  conduit_index_t stride() const { return conduit_datatype_stride(this->Type); }
-  conduit_index_t element_bytes() const { return conduit_datatype_element_bytes(this->Type); }
-  conduit_index_t endianness() const { return conduit_datatype_endianness(this->Type); }
-  conduit_index_t element_index(conduit_index_t index) const
-  {
-    return conduit_datatype_element_index(this->Type, index);
-  }
-
-#define CATALYST_CONDUIT_ANSWER(what)                                                                        \
-  bool what() const { return conduit_datatype_##what(this->Type) != 0; }
-  CATALYST_CONDUIT_ANSWER(is_empty)
-  CATALYST_CONDUIT_ANSWER(is_object)
-  CATALYST_CONDUIT_ANSWER(is_list)
-  CATALYST_CONDUIT_ANSWER(is_number)
-  CATALYST_CONDUIT_ANSWER(is_floating_point)
-  CATALYST_CONDUIT_ANSWER(is_integer)
-  CATALYST_CONDUIT_ANSWER(is_signed_integer)
-  CATALYST_CONDUIT_ANSWER(is_unsigned_integer)
-  CATALYST_CONDUIT_ANSWER(is_int8)
-  CATALYST_CONDUIT_ANSWER(is_int16)
-  CATALYST_CONDUIT_ANSWER(is_int32)
-  CATALYST_CONDUIT_ANSWER(is_int64)
-  CATALYST_CONDUIT_ANSWER(is_uint8)
-  CATALYST_CONDUIT_ANSWER(is_uint16)
-  CATALYST_CONDUIT_ANSWER(is_uint32)
-  CATALYST_CONDUIT_ANSWER(is_uint64)
-  CATALYST_CONDUIT_ANSWER(is_float32)
-  CATALYST_CONDUIT_ANSWER(is_float64)
-  CATALYST_CONDUIT_ANSWER(is_char)
-  CATALYST_CONDUIT_ANSWER(is_short)
-  CATALYST_CONDUIT_ANSWER(is_int)
-  CATALYST_CONDUIT_ANSWER(is_long)
-  CATALYST_CONDUIT_ANSWER(is_unsigned_char)
-  CATALYST_CONDUIT_ANSWER(is_unsigned_short)
-  CATALYST_CONDUIT_ANSWER(is_unsigned_int)
-  CATALYST_CONDUIT_ANSWER(is_unsigned_long)
-  CATALYST_CONDUIT_ANSWER(is_float)
-  CATALYST_CONDUIT_ANSWER(is_double)
-  CATALYST_CONDUIT_ANSWER(is_string)
-  CATALYST_CONDUIT_ANSWER(is_char8_str)
-  CATALYST_CONDUIT_ANSWER(is_little_endian)
-  CATALYST_CONDUIT_ANSWER(is_big_endian)
-  CATALYST_CONDUIT_ANSWER(endianness_matches_machine)
-#undef CATALYST_CONDUIT_ANSWER
-
-private:
-  friend class Node;
-  explicit DataType(const conduit_datatype* type)
-    : Type(type)
-  {
-  }
-
-  const conduit_datatype* Type;
-};
 
 // A node, or a place in the tree of another: what operator[], child, append and cpp_node give refers to the tree that it is from
 // and leaves that to its owner. Copying copies the data; moving does not.
@@ -240,114 +146,6 @@ public:
   }
 
   // ---- Setting to numbers and arrays of them, copied or borrowed.
-#define CATALYST_CONDUIT_LAYOUT(type)                                                                        \
-  conduit_index_t count = 1, conduit_index_t offset = 0, conduit_index_t stride = sizeof(type),              \
-                  conduit_index_t element_bytes = sizeof(type), conduit_index_t endianness = 0
-#define CATALYST_CONDUIT_PASS count, offset, stride, element_bytes, endianness
-
-  // What has the name of the type in it.
-#define CATALYST_CONDUIT_NAMED(stem, type)                                                                   \
-  void set_##stem(const type data) { conduit_node_set_##stem(this->Handle, data); }                          \
-  void set_path_##stem(const std::string& path, const type data)                                             \
-  {                                                                                                          \
-    conduit_node_set_path_##stem(this->Handle, path.c_str(), data);                                          \
-  }                                                                                                          \
-  void set_##stem##_vector(const std::vector<type>& data)                                                    \
-  {                                                                                                          \
-    conduit_node_set_##stem##_ptr(                                                                           \
-      this->Handle, const_cast<type*>(some(data)), static_cast<conduit_index_t>(data.size()));               \
-  }                                                                                                          \
-  void set_path_##stem##_vector(const std::string& path, const std::vector<type>& data)                      \
-  {                                                                                                          \
-    conduit_node_set_path_##stem##_ptr(this->Handle, path.c_str(), const_cast<type*>(some(data)),            \
-      static_cast<conduit_index_t>(data.size()));                                                            \
-  }                                                                                                          \
-  void set_external_##stem##_vector(const std::vector<type>& data)                                           \
-  {                                                                                                          \
-    conduit_node_set_external_##stem##_ptr(                                                                  \
-      this->Handle, const_cast<type*>(data.data()), static_cast<conduit_index_t>(data.size()));              \
-  }                                                                                                          \
-  void set_path_external_##stem##_vector(const std::string& path, const std::vector<type>& data)             \
-  {                                                                                                          \
-    conduit_node_set_path_external_##stem##_ptr(this->Handle, path.c_str(), const_cast<type*>(data.data()),  \
-      static_cast<conduit_index_t>(data.size()));                                                            \
-  }                                                                                                          \
-  void set_##stem##_ptr(const type* data, CATALYST_CONDUIT_LAYOUT(type))                                     \
-  {                                                                                                          \
-    conduit_node_set_##stem##_ptr_detailed(this->Handle, const_cast<type*>(data), CATALYST_CONDUIT_PASS);    \
-  }                                                                                                          \
-  void set_path_##stem##_ptr(const std::string& path, const type* data, CATALYST_CONDUIT_LAYOUT(type))       \
-  {                                                                                                          \
-    conduit_node_set_path_##stem##_ptr_detailed(                                                             \
-      this->Handle, path.c_str(), const_cast<type*>(data), CATALYST_CONDUIT_PASS);                           \
-  }                                                                                                          \
-  void set_external_##stem##_ptr(const type* data, CATALYST_CONDUIT_LAYOUT(type))                            \
-  {                                                                                                          \
-    conduit_node_set_external_##stem##_ptr_detailed(                                                         \
-      this->Handle, const_cast<type*>(data), CATALYST_CONDUIT_PASS);                                         \
-  }                                                                                                          \
-  void set_path_external_##stem##_ptr(                                                                       \
-    const std::string& path, const type* data, CATALYST_CONDUIT_LAYOUT(type))                                \
-  {                                                                                                          \
-    conduit_node_set_path_external_##stem##_ptr_detailed(                                                    \
-      this->Handle, path.c_str(), const_cast<type*>(data), CATALYST_CONDUIT_PASS);                           \
-  }                                                                                                          \
-  type as_##stem() const { CATALYST_CONDUIT_WRAP_EXCEP(return conduit_node_as_##stem(this->Handle)) }        \
-  type* as_##stem##_ptr()                                                                                    \
-  {                                                                                                          \
-    CATALYST_CONDUIT_WRAP_EXCEP(return conduit_node_as_##stem##_ptr(this->Handle))                           \
-  }                                                                                                          \
-  const type* as_##stem##_ptr() const                                                                        \
-  {                                                                                                          \
-    CATALYST_CONDUIT_WRAP_EXCEP(return conduit_node_as_##stem##_ptr(this->Handle))                           \
-  }                                                                                                          \
-  type fetch_path_as_##stem(const std::string& path) const                                                   \
-  {                                                                                                          \
-    CATALYST_CONDUIT_WRAP_EXCEP(return conduit_node_fetch_path_as_##stem(this->Handle, path.c_str()))        \
-  }                                                                                                          \
-  type to_##stem() const { return this->converted<type>(); }
-
-  // What is found by the type alone.
-#define CATALYST_CONDUIT_TYPED(stem, type)                                                                   \
-  void set(const type data) { this->set_##stem(data); }                                                      \
-  void set(const std::vector<type>& data) { this->set_##stem##_vector(data); }                               \
-  void set(const type* data, CATALYST_CONDUIT_LAYOUT(type))                                                  \
-  {                                                                                                          \
-    this->set_##stem##_ptr(data, CATALYST_CONDUIT_PASS);                                                     \
-  }                                                                                                          \
-  void set_path(const std::string& path, const type data) { this->set_path_##stem(path, data); }             \
-  void set_path(const std::string& path, const std::vector<type>& data)                                      \
-  {                                                                                                          \
-    this->set_path_##stem##_vector(path, data);                                                              \
-  }                                                                                                          \
-  void set_path(const std::string& path, const type* data, CATALYST_CONDUIT_LAYOUT(type))                    \
-  {                                                                                                          \
-    this->set_path_##stem##_ptr(path, data, CATALYST_CONDUIT_PASS);                                          \
-  }                                                                                                          \
-  void set_external(const std::vector<type>& data) { this->set_external_##stem##_vector(data); }             \
-  void set_external(const type* data, CATALYST_CONDUIT_LAYOUT(type))                                         \
-  {                                                                                                          \
-    this->set_external_##stem##_ptr(data, CATALYST_CONDUIT_PASS);                                            \
-  }                                                                                                          \
-  void set_path_external(const std::string& path, const std::vector<type>& data)                             \
-  {                                                                                                          \
-    this->set_path_external_##stem##_vector(path, data);                                                     \
-  }                                                                                                          \
-  void set_path_external(const std::string& path, const type* data, CATALYST_CONDUIT_LAYOUT(type))           \
-  {                                                                                                          \
-    this->set_path_external_##stem##_ptr(path, data, CATALYST_CONDUIT_PASS);                                 \
-  }                                                                                                          \
-  Node& operator=(const type data)                                                                           \
-  {                                                                                                          \
-    this->set(data);                                                                                         \
-    return *this;                                                                                            \
-  }                                                                                                          \
-  Node& operator=(const std::vector<type>& data)                                                             \
-  {                                                                                                          \
-    this->set(data);                                                                                         \
-    return *this;                                                                                            \
-  }
-
   CATALYST_CONDUIT_NAMED(int8, conduit_int8)
   CATALYST_CONDUIT_NAMED(int16, conduit_int16)
   CATALYST_CONDUIT_NAMED(int32, conduit_int32)

@@ -10,7 +10,6 @@ mod catalyst;
 mod datatype;
 mod node;
 mod text;
-
 mod tree;
 mod values;
 
@@ -20,6 +19,18 @@ use std::ptr;
 
 use crate::error::{Error, Result, raise};
 use crate::node::Node;
+
+/// Functions of the C interface: the name that is linked to, the function, and its body.
+macro_rules! exported {
+    ($($name:expr => $function:ident($($argument:ident: $type:ty),* $(,)?) $(-> $answer:ty)? { $($body:tt)* })*) => { $(
+        #[unsafe(export_name = $name)]
+        unsafe extern "C-unwind" fn $function($($argument: $type),*) $(-> $answer)? {
+            // SAFETY: the caller keeps to the rules of this module.
+            unsafe { $($body)* }
+        }
+    )* };
+}
+pub(crate) use exported;
 
 /// Runs the body of a function; an error is raised after everything in it has been dropped.
 pub(crate) fn run<T>(otherwise: T, body: impl FnOnce() -> Result<T>) -> T {

@@ -4,7 +4,7 @@ use std::ffi::{c_char, c_void};
 use std::io::Write;
 use std::ptr;
 
-use super::{hand_out, node, node_mut, run, string};
+use super::{exported, hand_out, node, node_mut, run, string};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::node::Node;
@@ -20,78 +20,45 @@ unsafe fn optional(text: *const c_char) -> Result<String> {
     if text.is_null() { Ok(String::new()) } else { unsafe { string(text, "the text") } }
 }
 
-#[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_parse(
-    target: *mut Node,
-    text: *const c_char,
-    protocol: *const c_char,
-) {
+/// Fills a node with what a text or a file holds. The tree is made before the node is borrowed.
+///
+/// # Safety
+/// As the functions of [`super`].
+unsafe fn fill(target: *mut Node, made: impl FnOnce() -> Result<Node>) {
     run((), || {
-        // SAFETY: the caller keeps to `c_api`'s rules.
-        unsafe {
-            let parsed = schema::parse(&string(text, "the text")?, Protocol::from_name(&optional(protocol)?)?)?;
-            node_mut(target)?.take(parsed)
-        }
+        let made = made()?;
+        // SAFETY: as the caller promises.
+        unsafe { node_mut(target)?.take(made) }
     });
 }
 
-#[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_generate(
-    target: *mut Node,
-    text: *const c_char,
-    protocol: *const c_char,
-    data: *mut c_void,
-) {
-    run((), || {
-        // SAFETY: the caller keeps to `c_api`'s rules: the data are what the schema describes.
-        unsafe {
-            let protocol = Protocol::from_name(&optional(protocol)?)?;
-            let copy = schema::over(&string(text, "the schema")?, protocol, data.cast())?.copy()?;
-            node_mut(target)?.take(copy)
-        }
-    });
+/// A tree over data that a schema describes.
+///
+/// # Safety
+/// As the functions of [`super`]; the data are what the schema describes, for as long as the tree refers to them.
+unsafe fn laid_over(schema: *const c_char, protocol: *const c_char, data: *mut c_void) -> Result<Node> {
+    // SAFETY: as the caller promises.
+    unsafe { schema::over(&string(schema, "the schema")?, Protocol::from_name(&optional(protocol)?)?, data.cast()) }
 }
 
-#[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_generate_external(
-    target: *mut Node,
-    text: *const c_char,
-    protocol: *const c_char,
-    data: *mut c_void,
-) {
-    run((), || {
-        // SAFETY: the caller keeps to `c_api`'s rules: the data are what the schema describes, for as long as the node lives.
-        unsafe {
-            let protocol = Protocol::from_name(&optional(protocol)?)?;
-            let tree = schema::over(&string(text, "the schema")?, protocol, data.cast())?;
-            node_mut(target)?.take(tree)
+exported! {
+    "catalyst_conduit_node_parse" => parse(target: *mut Node, text: *const c_char, protocol: *const c_char) {
+        fill(target, || schema::parse(&string(text, "the text")?, Protocol::from_name(&optional(protocol)?)?))
+    }
+    "catalyst_conduit_node_generate" =>
+        generate(target: *mut Node, schema: *const c_char, protocol: *const c_char, data: *mut c_void) {
+            fill(target, || laid_over(schema, protocol, data)?.copy())
         }
-    });
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_save(
-    source: *mut Node,
-    path: *const c_char,
-    protocol: *const c_char,
-) {
-    // SAFETY: the caller keeps to `c_api`'s rules.
-    run((), || unsafe { files::save(node(source)?, &string(path, "the path")?, &optional(protocol)?) });
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_load(
-    target: *mut Node,
-    path: *const c_char,
-    protocol: *const c_char,
-) {
-    run((), || {
-        // SAFETY: the caller keeps to `c_api`'s rules.
-        unsafe {
-            let loaded = files::load(&string(path, "the path")?, &optional(protocol)?)?;
-            node_mut(target)?.take(loaded)
+    "catalyst_conduit_node_generate_external" =>
+        generate_external(target: *mut Node, schema: *const c_char, protocol: *const c_char, data: *mut c_void) {
+            fill(target, || laid_over(schema, protocol, data))
         }
-    });
+    "catalyst_conduit_node_load" => load(target: *mut Node, path: *const c_char, protocol: *const c_char) {
+        fill(target, || files::load(&string(path, "the path")?, &optional(protocol)?))
+    }
+    "catalyst_conduit_node_save" => save(source: *mut Node, path: *const c_char, protocol: *const c_char) {
+        run((), || files::save(node(source)?, &string(path, "the path")?, &optional(protocol)?))
+    }
 }
 
 /// The options of a call over a style.
@@ -172,20 +139,17 @@ fn show(text: &str) {
     let _ = output.write_all(text.as_bytes()).and_then(|()| output.flush());
 }
 
-#[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_print(source: *mut Node) {
-    run((), || {
-        // SAFETY: the caller keeps to `c_api`'s rules.
-        show(&format!("{}\n", unsafe { node(source)? }.to_yaml(&Style::summary())));
-        Ok(())
-    });
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_print_detailed(source: *mut Node) {
-    run((), || {
-        // SAFETY: the caller keeps to `c_api`'s rules.
-        show(&format!("{}\n", unsafe { node(source)? }.to_json(&Style::default(), Detail::Everything)));
-        Ok(())
-    });
+exported! {
+    "catalyst_conduit_node_print" => print(source: *mut Node) {
+        run((), || {
+            show(&format!("{}\n", node(source)?.to_yaml(&Style::summary())));
+            Ok(())
+        })
+    }
+    "catalyst_conduit_node_print_detailed" => print_detailed(source: *mut Node) {
+        run((), || {
+            show(&format!("{}\n", node(source)?.to_json(&Style::default(), Detail::Everything)));
+            Ok(())
+        })
+    }
 }

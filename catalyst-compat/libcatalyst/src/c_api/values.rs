@@ -4,7 +4,7 @@
 use std::ffi::{c_char, c_double, c_float, c_int, c_long, c_schar, c_short, c_uchar, c_uint, c_ulong, c_ushort};
 use std::ptr;
 
-use super::{node, node_mut, run, string};
+use super::{exported, node, node_mut, run, string};
 use crate::datatype::Datatype;
 use crate::error::Result;
 use crate::leaf::Element;
@@ -12,11 +12,6 @@ use crate::node::Node;
 
 /// `char` counts as signed, as in Conduit.
 type Char = c_schar;
-
-/// A layout as the C functions take it.
-fn layout<T: Element>(elements: i64, offset: i64, stride: i64, element_bytes: i64, endianness: i64) -> Datatype {
-    Datatype { kind: T::KIND, elements, offset, stride, element_bytes, endianness }
-}
 
 /// # Safety
 /// As the functions of [`super`]; `data` is as long as `layout` says.
@@ -93,135 +88,58 @@ macro_rules! family {
         mod $module {
             use super::*;
 
-            #[unsafe(export_name = concat!("catalyst_conduit_node_set_", $stem))]
-            unsafe extern "C-unwind" fn set_value(target: *mut Node, value: $type) {
-                // SAFETY: the caller keeps to `c_api`'s rules; the value is one element.
-                unsafe { set(target, None, &value, Datatype::compact(<$type>::KIND, 1)) }
+            type Nodes = *mut Node;
+            type Path = *const c_char;
+            type Values = *mut $type;
+
+            fn compact(elements: i64) -> Datatype {
+                Datatype::compact(<$type>::KIND, elements)
             }
 
-            #[unsafe(export_name = concat!("catalyst_conduit_node_set_path_", $stem))]
-            unsafe extern "C-unwind" fn set_path_value(target: *mut Node, path: *const c_char, value: $type) {
-                // SAFETY: as `set_value`.
-                unsafe { set(target, Some(path), &value, Datatype::compact(<$type>::KIND, 1)) }
+            fn laid_out(elements: i64, offset: i64, stride: i64, element_bytes: i64, endianness: i64) -> Datatype {
+                Datatype { kind: <$type>::KIND, elements, offset, stride, element_bytes, endianness }
             }
 
-            #[unsafe(export_name = concat!("catalyst_conduit_node_set_", $stem, "_ptr"))]
-            unsafe extern "C-unwind" fn set_array(target: *mut Node, data: *mut $type, elements: i64) {
-                // SAFETY: the caller keeps to `c_api`'s rules.
-                unsafe { set(target, None, data, Datatype::compact(<$type>::KIND, elements)) }
-            }
-
-            #[unsafe(export_name = concat!("catalyst_conduit_node_set_path_", $stem, "_ptr"))]
-            unsafe extern "C-unwind" fn set_path_array(
-                target: *mut Node,
-                path: *const c_char,
-                data: *mut $type,
-                elements: i64,
-            ) {
-                // SAFETY: the caller keeps to `c_api`'s rules.
-                unsafe { set(target, Some(path), data, Datatype::compact(<$type>::KIND, elements)) }
-            }
-
-            #[unsafe(export_name = concat!("catalyst_conduit_node_set_", $stem, "_ptr_detailed"))]
-            unsafe extern "C-unwind" fn set_strided(
-                target: *mut Node,
-                data: *mut $type,
-                elements: i64,
-                offset: i64,
-                stride: i64,
-                element_bytes: i64,
-                endianness: i64,
-            ) {
-                // SAFETY: the caller keeps to `c_api`'s rules.
-                unsafe { set(target, None, data, layout::<$type>(elements, offset, stride, element_bytes, endianness)) }
-            }
-
-            #[unsafe(export_name = concat!("catalyst_conduit_node_set_path_", $stem, "_ptr_detailed"))]
-            unsafe extern "C-unwind" fn set_path_strided(
-                target: *mut Node,
-                path: *const c_char,
-                data: *mut $type,
-                elements: i64,
-                offset: i64,
-                stride: i64,
-                element_bytes: i64,
-                endianness: i64,
-            ) {
-                let layout = layout::<$type>(elements, offset, stride, element_bytes, endianness);
-                // SAFETY: the caller keeps to `c_api`'s rules.
-                unsafe { set(target, Some(path), data, layout) }
-            }
-
-            #[unsafe(export_name = concat!("catalyst_conduit_node_set_external_", $stem, "_ptr"))]
-            unsafe extern "C-unwind" fn borrow_array(target: *mut Node, data: *mut $type, elements: i64) {
-                // SAFETY: the caller keeps to `c_api`'s rules.
-                unsafe { borrow(target, None, data, Datatype::compact(<$type>::KIND, elements)) }
-            }
-
-            #[unsafe(export_name = concat!("catalyst_conduit_node_set_path_external_", $stem, "_ptr"))]
-            unsafe extern "C-unwind" fn borrow_path_array(
-                target: *mut Node,
-                path: *const c_char,
-                data: *mut $type,
-                elements: i64,
-            ) {
-                // SAFETY: the caller keeps to `c_api`'s rules.
-                unsafe { borrow(target, Some(path), data, Datatype::compact(<$type>::KIND, elements)) }
-            }
-
-            #[unsafe(export_name = concat!("catalyst_conduit_node_set_external_", $stem, "_ptr_detailed"))]
-            unsafe extern "C-unwind" fn borrow_strided(
-                target: *mut Node,
-                data: *mut $type,
-                elements: i64,
-                offset: i64,
-                stride: i64,
-                element_bytes: i64,
-                endianness: i64,
-            ) {
-                let layout = layout::<$type>(elements, offset, stride, element_bytes, endianness);
-                // SAFETY: the caller keeps to `c_api`'s rules.
-                unsafe { borrow(target, None, data, layout) }
-            }
-
-            #[unsafe(export_name = concat!("catalyst_conduit_node_set_path_external_", $stem, "_ptr_detailed"))]
-            unsafe extern "C-unwind" fn borrow_path_strided(
-                target: *mut Node,
-                path: *const c_char,
-                data: *mut $type,
-                elements: i64,
-                offset: i64,
-                stride: i64,
-                element_bytes: i64,
-                endianness: i64,
-            ) {
-                let layout = layout::<$type>(elements, offset, stride, element_bytes, endianness);
-                // SAFETY: the caller keeps to `c_api`'s rules.
-                unsafe { borrow(target, Some(path), data, layout) }
-            }
-
-            #[unsafe(export_name = concat!("catalyst_conduit_node_as_", $stem))]
-            unsafe extern "C-unwind" fn get_value(source: *mut Node) -> $type {
-                // SAFETY: the caller keeps to `c_api`'s rules.
-                unsafe { get(source, None) }
-            }
-
-            #[unsafe(export_name = concat!("catalyst_conduit_node_fetch_path_as_", $stem))]
-            unsafe extern "C-unwind" fn get_path_value(source: *mut Node, path: *const c_char) -> $type {
-                // SAFETY: the caller keeps to `c_api`'s rules.
-                unsafe { get(source, Some(path)) }
-            }
-
-            #[unsafe(export_name = concat!("catalyst_conduit_node_as_", $stem, "_ptr"))]
-            unsafe extern "C-unwind" fn get_address(source: *mut Node) -> *mut $type {
-                // SAFETY: the caller keeps to `c_api`'s rules.
-                unsafe { address(source, None) }
-            }
-
-            #[unsafe(export_name = concat!("catalyst_conduit_node_fetch_path_as_", $stem, "_ptr"))]
-            unsafe extern "C-unwind" fn get_path_address(source: *mut Node, path: *const c_char) -> *mut $type {
-                // SAFETY: the caller keeps to `c_api`'s rules.
-                unsafe { address(source, Some(path)) }
+            exported! {
+                concat!("catalyst_conduit_node_set_", $stem) =>
+                    set_value(node: Nodes, value: $type) { set(node, None, &value, compact(1)) }
+                concat!("catalyst_conduit_node_set_path_", $stem) =>
+                    set_path_value(node: Nodes, path: Path, value: $type) { set(node, Some(path), &value, compact(1)) }
+                concat!("catalyst_conduit_node_set_", $stem, "_ptr") =>
+                    set_array(node: Nodes, data: Values, count: i64) { set(node, None, data, compact(count)) }
+                concat!("catalyst_conduit_node_set_path_", $stem, "_ptr") =>
+                    set_path_array(node: Nodes, path: Path, data: Values, count: i64) {
+                        set(node, Some(path), data, compact(count))
+                    }
+                concat!("catalyst_conduit_node_set_external_", $stem, "_ptr") =>
+                    borrow_array(node: Nodes, data: Values, count: i64) { borrow(node, None, data, compact(count)) }
+                concat!("catalyst_conduit_node_set_path_external_", $stem, "_ptr") =>
+                    borrow_path_array(node: Nodes, path: Path, data: Values, count: i64) {
+                        borrow(node, Some(path), data, compact(count))
+                    }
+                concat!("catalyst_conduit_node_set_", $stem, "_ptr_detailed") =>
+                    set_strided(node: Nodes, data: Values, count: i64, offset: i64, stride: i64, bytes: i64, order: i64) {
+                        set(node, None, data, laid_out(count, offset, stride, bytes, order))
+                    }
+                concat!("catalyst_conduit_node_set_path_", $stem, "_ptr_detailed") =>
+                    set_path_strided(
+                        node: Nodes, path: Path, data: Values, count: i64, offset: i64, stride: i64, bytes: i64, order: i64
+                    ) { set(node, Some(path), data, laid_out(count, offset, stride, bytes, order)) }
+                concat!("catalyst_conduit_node_set_external_", $stem, "_ptr_detailed") =>
+                    borrow_strided(node: Nodes, data: Values, count: i64, offset: i64, stride: i64, bytes: i64, order: i64) {
+                        borrow(node, None, data, laid_out(count, offset, stride, bytes, order))
+                    }
+                concat!("catalyst_conduit_node_set_path_external_", $stem, "_ptr_detailed") =>
+                    borrow_path_strided(
+                        node: Nodes, path: Path, data: Values, count: i64, offset: i64, stride: i64, bytes: i64, order: i64
+                    ) { borrow(node, Some(path), data, laid_out(count, offset, stride, bytes, order)) }
+                concat!("catalyst_conduit_node_as_", $stem) => get_value(node: Nodes) -> $type { get(node, None) }
+                concat!("catalyst_conduit_node_fetch_path_as_", $stem) =>
+                    get_path_value(node: Nodes, path: Path) -> $type { get(node, Some(path)) }
+                concat!("catalyst_conduit_node_as_", $stem, "_ptr") =>
+                    get_address(node: Nodes) -> Values { address(node, None) }
+                concat!("catalyst_conduit_node_fetch_path_as_", $stem, "_ptr") =>
+                    get_path_address(node: Nodes, path: Path) -> Values { address(node, Some(path)) }
             }
         }
     };
