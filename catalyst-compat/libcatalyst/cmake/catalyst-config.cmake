@@ -50,6 +50,15 @@ if (EXISTS "${_catalyst_library_directory}/libcatalyst_fortran.so")
   endif ()
 endif ()
 
+# Where Python finds the packages `catalyst` and `catalyst_conduit`.
+set(catalyst_PYTHON_FOUND 0)
+file(GLOB CATALYST_PYTHON_MODULE_DIRECTORY "${_catalyst_library_directory}/python3*/site-packages")
+if (CATALYST_PYTHON_MODULE_DIRECTORY)
+  set(CATALYST_WRAP_PYTHON ON)
+  set(catalyst_PYTHON_FOUND 1)
+endif ()
+set(catalyst_Python_FOUND ${catalyst_PYTHON_FOUND})
+
 if ("SDK" IN_LIST catalyst_FIND_COMPONENTS)
   include("${CMAKE_CURRENT_LIST_DIR}/catalyst-macros.cmake")
 endif ()

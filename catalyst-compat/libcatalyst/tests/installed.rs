@@ -101,6 +101,27 @@ fn nodes_work_from_c_cpp_and_fortran() {
 }
 
 #[test]
+fn python_sees_the_same_node() {
+    let built = Built::get();
+    let packages = std::fs::read_dir(built.prefix.join("lib")).expect("the prefix can be read").flatten();
+    let packages = packages.map(|entry| entry.path().join("site-packages")).find(|path| path.is_dir());
+    let packages = packages.expect("the Python packages are installed");
+    let has_numpy = |python: &&str| {
+        Command::new(python).args(["-c", "import numpy"]).output().is_ok_and(|output| output.status.success())
+    };
+    let python = ["python3", "/usr/bin/python3"].into_iter().find(has_numpy).expect("scripts/setup installs NumPy");
+    for (name, paths) in [("stub", PathBuf::new()), ("echo", built.implementations())] {
+        let mut run = Command::new(python);
+        run.arg(package().join("tests/programs/node.py"))
+            .arg(name)
+            .env("PYTHONPATH", &packages)
+            .env("PYTHONDONTWRITEBYTECODE", "1");
+        let told = succeed(run.env_remove("CATALYST_IMPLEMENTATION_NAME").env("CATALYST_IMPLEMENTATION_PATHS", paths));
+        assert!(told.contains(&format!("node.py: ok with {name}")), "{told}");
+    }
+}
+
+#[test]
 fn valgrind_finds_nothing() {
     let built = Built::get();
     let directory = tempfile::tempdir().expect("a temporary directory");

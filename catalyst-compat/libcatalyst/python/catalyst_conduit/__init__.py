@@ -1,0 +1,311 @@
+"""Conduit's node from Python, over the functions of libcatalyst.
+
+    node = Node()
+    node["catalyst/state/timestep"] = 3
+    mesh = node["catalyst/channels/grid/data"]
+    mesh["fields/p/values"].set_external(pressure)   # a NumPy array, read where it is
+
+A place that holds nothing, an object or a list is a `Node` itself; one that holds a text is a `str`, one number a NumPy scalar,
+several an array that shows the node's memory. `fetch` gives the `Node` in each case.
+"""
+
+import ctypes
+import numbers
+
+import numpy
+
+from ._library import Error, called, taken, text_of
+
+__all__ = ["Error", "Node", "about", "blueprint"]
+
+_LIST, _TEXT = 2, 13
+_TYPES = "int8 int16 int32 int64 uint8 uint16 uint32 uint64 float32 float64".split()
+_ORDERS = {0: "=", 1: ">", 2: "<"}
+
+
+class _Memory:
+    """Memory of a node for NumPy; the array that is made of it keeps the node."""
+
+    def __init__(self, owner, interface):
+        self.owner = owner
+        self.__array_interface__ = interface
+
+
+def _array(value):
+    """An array of one direction, of a type that a node can hold."""
+    array = numpy.asarray(value)
+    if array.dtype == bool:
+        array = array.astype(numpy.uint8)
+    if array.dtype.name not in _TYPES:
+        raise TypeError(f"a node holds {', '.join(_TYPES)} and texts, not {array.dtype.name}")
+    return array.reshape(1) if array.ndim == 0 else array
+
+
+class Node:
+    """A tree, or a place in one, which keeps the tree alive."""
+
+    def __init__(self, value=None):
+        self._handle = called("catalyst_conduit_node_create")
+        self._root = self
+        self._lent = {}
+        if value is not None:
+            self.set(value)
+
+    @classmethod
+    def _at(cls, handle, root):
+        place = cls.__new__(cls)
+        place._handle = handle
+        place._root = root
+        return place
+
+    def __del__(self):
+        if getattr(self, "_root", None) is self and called is not None:
+            called("catalyst_conduit_node_destroy", self.handle)
+
+    @property
+    def handle(self):
+        """The node of the C interface."""
+        return ctypes.c_void_p(self._handle)
+
+    def _call(self, name, *arguments):
+        return called("catalyst_conduit_node_" + name, self.handle, *arguments)
+
+    def _node(self, name, *arguments):
+        return Node._at(self._call(name, *arguments), self._root)
+
+    # ---- Setting.
+    def set(self, value):
+        """Copies a number, a text, an array, another node, or a `dict` or a list of such; numbers in a list are an array."""
+        if isinstance(value, Node):
+            self._call("set_node", value.handle)
+        elif isinstance(value, dict):
+            self.reset()
+            for name, entry in value.items():
+                self.fetch(name).set(entry)
+        elif isinstance(value, (str, bytes)):
+            self._call("set_char8_str", value)
+        elif isinstance(value, (list, tuple)) and not all(isinstance(entry, numbers.Number) for entry in value):
+            self.reset()
+            for entry in value:
+                self.append().set(entry)
+        else:
+            array = _array(value)
+            # The array may show what this node holds, so that is let go last.
+            copy = Node()
+            copy._lay(numpy.ascontiguousarray(array, array.dtype.newbyteorder("=")).reshape(-1), "set_")
+            self._call("move", copy.handle)
+
+    def set_external(self, value):
+        """Refers to an array where it is; the tree keeps it alive until something else is set here."""
+        if isinstance(value, Node):
+            self._call("set_external_node", value.handle)
+            self._root._lent[self.path()] = value
+            return
+        array = _array(value) if isinstance(value, numpy.ndarray) else None
+        if array is None:
+            raise TypeError(f"set_external takes a NumPy array or a Node, not {type(value).__name__}")
+        if array.ndim > 1 and array.flags.c_contiguous:
+            array = array.reshape(-1)
+        if array.ndim != 1 or array.strides[0] < array.itemsize or not array.dtype.isnative or array.dtype != value.dtype:
+            raise TypeError("set_external takes an array that runs forward in one direction, of numbers as the machine has them")
+        self._lay(array, "set_external_")
+        self._root._lent[self.path()] = array
+
+    def _lay(self, array, how):
+        stride = array.strides[0] if array.size > 1 else array.itemsize
+        layout = (array.size, 0, stride, array.itemsize, 0)
+        self._call(f"{how}{array.dtype.name}_ptr_detailed", ctypes.c_void_p(array.ctypes.data), *layout)
+
+    def set_path(self, path, value):
+        """`set` at a path."""
+        self.fetch(path).set(value)
+
+    def set_path_external(self, path, value):
+        """`set_external` at a path."""
+        self.fetch(path).set_external(value)
+
+    def __setitem__(self, path, value):
+        (self.child(path) if isinstance(path, int) else self.fetch(path)).set(value)
+
+    def reset(self):
+        """Empties the node."""
+        self._call("reset")
+        if self._root is self:
+            self._lent.clear()
+
+    # ---- Places.
+    def fetch(self, path):
+        """The node at a path, which is made where it is not there."""
+        return self._node("fetch", path)
+
+    def fetch_existing(self, path):
+        """The node at a path, which must be there."""
+        return self._node("fetch_existing", path)
+
+    def child(self, which):
+        """A child by its number or its name."""
+        return self._node("child_by_name" if isinstance(which, str) else "child", which)
+
+    def append(self):
+        """A new entry at the end of a list."""
+        return self._node("append")
+
+    def parent(self):
+        """The node above, or `None`."""
+        handle = self._call("parent")
+        return Node._at(handle, self._root) if handle else None
+
+    def __getitem__(self, path):
+        return (self.child(path) if isinstance(path, int) else self.fetch(path)).value()
+
+    def children(self):
+        """The children in order."""
+        return (self.child(index) for index in range(self.number_of_children()))
+
+    __iter__ = children
+
+    def child_names(self):
+        """The names of the children in order."""
+        return [child.name() for child in self.children()]
+
+    def number_of_children(self):
+        """How many children there are."""
+        return self._call("number_of_children")
+
+    def number_of_elements(self):
+        """How many elements a leaf has."""
+        return self._call("number_of_elements")
+
+    def has_child(self, name):
+        """Whether there is a child of a name."""
+        return bool(self._call("has_child", name))
+
+    def has_path(self, path):
+        """Whether there is something at a path."""
+        return bool(self._call("has_path", path))
+
+    __contains__ = has_path
+
+    def remove(self, path=None, index=None):
+        """Removes what is at a path, or a child by its number."""
+        if path is None:
+            self._call("remove_child", index)
+        else:
+            self._call("remove_path", path)
+
+    def rename_child(self, old, new):
+        """Gives a child another name."""
+        self._call("rename_child", old, new)
+
+    def name(self):
+        """The name below the parent."""
+        return taken(self._call("name"))
+
+    def path(self):
+        """The path from the root."""
+        return taken(self._call("path"))
+
+    # ---- What is held.
+    def _type(self):
+        return ctypes.c_void_p(self._call("dtype"))
+
+    def dtype(self):
+        """The NumPy type of what a leaf holds, `str` of a text, `None` of others."""
+        kind = called("catalyst_conduit_datatype_id", self._type())
+        if kind == _TEXT:
+            return str
+        if not _LIST < kind < _TEXT:
+            return None
+        order = called("catalyst_conduit_datatype_endianness", self._type())
+        return numpy.dtype(_TYPES[kind - 3]).newbyteorder(_ORDERS[order])
+
+    def value(self):
+        """A text, a number or an array; the node itself where it holds none of these."""
+        held = self.dtype()
+        if held is None:
+            return self
+        if held is str:
+            return text_of(self._call("as_char8_str"))
+        count = self._call("number_of_elements")
+        if count == 0:
+            return numpy.empty(0, held)
+        stride = called("catalyst_conduit_datatype_stride", self._type())
+        address = self._call("element_ptr", 0)
+        interface = {"version": 3, "shape": (count,), "strides": (stride,), "typestr": held.str, "data": (address, False)}
+        array = numpy.asarray(_Memory(self._root, interface))
+        return array[0] if count == 1 else array
+
+    def update(self, other):
+        """Takes over what another tree has, and keeps the rest."""
+        self._call("update", other.handle)
+
+    def compatible(self, other):
+        """Whether everything of this tree is there in another with the same types."""
+        return bool(self._call("compatible", other.handle))
+
+    def diff(self, other, info, epsilon=1e-12):
+        """Whether two trees differ; how, is in `info`."""
+        return bool(self._call("diff", other.handle, info.handle, float(epsilon)))
+
+    def info(self):
+        """What the tree takes of memory."""
+        info = Node()
+        self._call("info", info.handle)
+        return info
+
+    def is_root(self):
+        """Whether there is nothing above."""
+        return bool(self._call("is_root"))
+
+    def is_data_external(self):
+        """Whether the data are somebody else's."""
+        return bool(self._call("is_data_external"))
+
+    def is_contiguous(self):
+        """Whether the data of the tree follow each other."""
+        return bool(self._call("is_contiguous"))
+
+    # ---- Texts and files.
+    def to_json(self):
+        """The tree as JSON."""
+        return taken(self._call("to_json"))
+
+    def to_yaml(self):
+        """The tree as YAML."""
+        return taken(self._call("to_yaml"))
+
+    def to_string(self):
+        """The tree as YAML."""
+        return taken(self._call("to_string"))
+
+    def to_summary_string(self):
+        """The tree as YAML, long arrays shortened."""
+        return taken(self._call("to_summary_string"))
+
+    __str__ = __repr__ = to_summary_string
+
+    def print_detailed(self):
+        """Prints the tree with its types."""
+        self._call("print_detailed")
+
+    def parse(self, text, protocol="yaml"):
+        """Fills the node with what a text holds."""
+        self._call("parse", text, protocol)
+
+    def load(self, path, protocol=""):
+        """Fills the node with what a file holds."""
+        self._call("load", str(path), protocol)
+
+    def save(self, path, protocol=""):
+        """Writes the tree to a file."""
+        self._call("save", str(path), protocol)
+
+
+def about():
+    """What the library says of its Conduit."""
+    node = Node()
+    called("catalyst_conduit_about", node.handle)
+    return node
+
+
+from . import blueprint  # noqa: E402 - it needs the Node
