@@ -237,6 +237,20 @@ impl Adaptor {
         Ok(Steering { motion, parameters: self.parameters.take_changed(), stop: self.stopped })
     }
 
+    /// Whether `execute` will look at the mesh and the fields of this step, which a solver that would have to copy them first can
+    /// ask. Where it will not, it needs the number of the mesh's vertices all the same. The same on all ranks.
+    #[must_use]
+    pub fn looks_at(&self, step: &Step) -> bool {
+        matches!(self.mesh, SteeredMesh::Unknown) || self.pipelines.is_due(Moment { cycle: step.cycle, time: step.time })
+    }
+
+    /// The orders so far and what became of each, in the order in which they came in; of more than
+    /// [`ORDERS_KEPT`](crate::ORDERS_KEPT) only the newest. On rank 0.
+    #[must_use]
+    pub fn orders(&self) -> Vec<crate::OrderReport> {
+        self.log.reports()
+    }
+
     /// Ends the run: viewers are disconnected, and every thread has ended when it returns.
     ///
     /// # Errors

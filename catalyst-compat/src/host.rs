@@ -7,7 +7,7 @@
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::sync::OnceLock;
 
-use crate::CatalystError;
+use crate::error::CatalystError;
 
 /// A node of the host's Conduit; only ever behind a pointer.
 #[repr(C)]
@@ -29,11 +29,11 @@ macro_rules! host_functions {
         }
 
         impl Host {
-            fn look_up() -> Result<Host, CatalystError> {
+            fn look_up() -> Result<Host, &'static str> {
                 Ok(Host {
                     $($field: {
                         let address = symbol(concat!("catalyst_conduit_", $symbol, "\0"))
-                            .ok_or(CatalystError::MissingSymbol { symbol: concat!("catalyst_conduit_", $symbol) })?;
+                            .ok_or(concat!("catalyst_conduit_", $symbol))?;
                         // SAFETY: a function of this name in a process that speaks Catalyst 2 is Conduit's, whose C interface
                         // gives it this signature; the address is not null (`symbol`), and function and data pointers have
                         // one size on every platform that has `dlsym`.
@@ -46,19 +46,27 @@ macro_rules! host_functions {
 }
 
 host_functions! {
-    has_path: "node_has_path" => unsafe extern "C" fn(*const RawNode, *const c_char) -> c_int,
-    fetch_existing: "node_fetch_existing" => unsafe extern "C" fn(*mut RawNode, *const c_char) -> *mut RawNode,
+    number_of_children: "node_number_of_children" => unsafe extern "C" fn(*mut RawNode) -> i64,
+    child: "node_child" => unsafe extern "C" fn(*mut RawNode, i64) -> *mut RawNode,
+    has_child: "node_has_child" => unsafe extern "C" fn(*const RawNode, *const c_char) -> c_int,
+    child_by_name: "node_child_by_name" => unsafe extern "C" fn(*mut RawNode, *const c_char) -> *mut RawNode,
+    name: "node_name" => unsafe extern "C" fn(*const RawNode) -> *mut c_char,
     dtype: "node_dtype" => unsafe extern "C" fn(*const RawNode) -> *const RawDatatype,
-    datatype_id: "datatype_id" => unsafe extern "C" fn(*const RawDatatype) -> i64,
-    number_of_elements: "datatype_number_of_elements" => unsafe extern "C" fn(*const RawDatatype) -> i64,
-    as_int32: "node_as_int32" => unsafe extern "C" fn(*const RawNode) -> i32,
-    as_int64: "node_as_int64" => unsafe extern "C" fn(*const RawNode) -> i64,
-    as_uint32: "node_as_uint32" => unsafe extern "C" fn(*const RawNode) -> u32,
-    as_uint64: "node_as_uint64" => unsafe extern "C" fn(*const RawNode) -> u64,
-    as_float32: "node_as_float32" => unsafe extern "C" fn(*const RawNode) -> f32,
-    as_float64: "node_as_float64" => unsafe extern "C" fn(*const RawNode) -> f64,
-    set_path_text: "node_set_path_char8_str" => unsafe extern "C" fn(*mut RawNode, *const c_char, *const c_char),
-    set_path_int32: "node_set_path_int32" => unsafe extern "C" fn(*mut RawNode, *const c_char, i32),
+    element: "node_element_ptr" => unsafe extern "C" fn(*mut RawNode, i64) -> *mut c_void,
+    type_number: "datatype_id" => unsafe extern "C" fn(*const RawDatatype) -> i64,
+    count: "datatype_number_of_elements" => unsafe extern "C" fn(*const RawDatatype) -> i64,
+    stride: "datatype_stride" => unsafe extern "C" fn(*const RawDatatype) -> i64,
+    endianness: "datatype_endianness" => unsafe extern "C" fn(*const RawDatatype) -> i64,
+    fetch: "node_fetch" => unsafe extern "C" fn(*mut RawNode, *const c_char) -> *mut RawNode,
+    has_path: "node_has_path" => unsafe extern "C" fn(*const RawNode, *const c_char) -> c_int,
+    remove_path: "node_remove_path" => unsafe extern "C" fn(*mut RawNode, *const c_char),
+    set_text: "node_set_path_char8_str" => unsafe extern "C" fn(*mut RawNode, *const c_char, *const c_char),
+    set_int32: "node_set_path_int32" => unsafe extern "C" fn(*mut RawNode, *const c_char, i32),
+    set_int64s: "node_set_path_int64_ptr" => unsafe extern "C" fn(*mut RawNode, *const c_char, *mut i64, i64),
+    set_float64: "node_set_path_float64" => unsafe extern "C" fn(*mut RawNode, *const c_char, f64),
+    set_float64s: "node_set_path_float64_ptr_detailed" =>
+        unsafe extern "C" fn(*mut RawNode, *const c_char, *mut f64, i64, i64, i64, i64, i64),
+    set_external: "node_set_path_external_node" => unsafe extern "C" fn(*mut RawNode, *const c_char, *mut RawNode),
 }
 
 impl Host {
@@ -67,8 +75,8 @@ impl Host {
     /// # Errors
     /// [`CatalystError::MissingSymbol`] with the first function that the process does not export.
     pub(crate) fn get() -> Result<&'static Host, CatalystError> {
-        static HOST: OnceLock<Result<Host, CatalystError>> = OnceLock::new();
-        HOST.get_or_init(Host::look_up).as_ref().map_err(Clone::clone)
+        static HOST: OnceLock<Result<Host, &'static str>> = OnceLock::new();
+        HOST.get_or_init(Host::look_up).as_ref().map_err(|symbol| CatalystError::MissingSymbol { symbol })
     }
 }
 

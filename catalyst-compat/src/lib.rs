@@ -7,108 +7,54 @@
 //! CATALYST_IMPLEMENTATION_NAME=tombolo CATALYST_IMPLEMENTATION_PATHS=/where/it/lies ./solver
 //! ```
 //!
-//! # What works
-//! - `about` fills `catalyst/version`, `catalyst/abi_version`, `catalyst/implementation`, `catalyst/use_mpi` and
-//!   `tombolo/version`.
-//! - `initialize`, `execute` and `finalize` keep the order of calls that Catalyst asks for, and `execute` reads
-//!   `catalyst/state/timestep` (or `cycle`) and `catalyst/state/time`.
+//! It exports the small C interface of `tombolo.h` as well, for solvers that want no conduit node.
 //!
-//! # What does not
-//! Meshes are not read yet: an `execute` that hands over `catalyst/channels` returns [`Status::ChannelsNotRead`] (103) and says
-//! so once on standard error. There is nothing to steer, so `results` writes nothing.
+//! # What is read
+//! - `catalyst_initialize`: `catalyst/scripts` and `catalyst/pipelines` (files of pipelines that end in `.json`; the type `io`
+//!   writes files), `catalyst/parameters/<name>/{value, minimum, maximum}`, `catalyst/mpi_comm`. Where the node names no pipelines
+//!   the variable `TOMBOLO_PIPELINES` may; else the surface of the first channel is streamed. `TOMBOLO_ORDERS` names a file of
+//!   orders, `TOMBOLO_OUTPUT` the directory of what is written, `TOMBOLO_REPORT` the file of the report at the end.
+//! - `catalyst_execute`: `catalyst/state/{timestep | cycle, time, time_step}`, and each of `catalyst/channels`: `mesh`, `multimesh`,
+//!   `amrmesh`, all topologies and shapes of the Blueprint. Arrays are lent to the adaptor as they lie in memory wherever it reads
+//!   their type. The first channel's mesh is the one that orders change. The cells are those of the topology of the highest
+//!   dimension; an integer element field `features`, `boundary_attribute` or `<topology>_attribute` on a topology of its faces says
+//!   which feature each belongs to, and `state/features/<name>` of the channel names them. An integer vertex field `features` does
+//!   so for vertices.
+//!
+//! # What is handed back
+//! By `catalyst_results` after each `catalyst_execute`: `catalyst/<channel>` where the mesh is to move over the coming step (its new
+//! coordinates, with the fields `displacement` and `velocity`), and `catalyst/steering` with the parameters; both with
+//! `coordsets`, `topologies`, `fields` side by side, and below `data` once more.
 //!
 //! # Guarantees
 //! No call panics across the border, no null pointer is followed, and a node that lacks what is needed is answered with a
-//! status and a line on standard error that names the path. The host's Conduit is reached only through its own C functions
-//! ([`host`]), looked up at run time, so that the library needs no Catalyst to be built.
+//! status and a line on standard error that names the path, what was found and what was expected. Before values are read it is asked
+//! whether their memory can be. On several ranks an error of one is that of all, so that none waits for another. The host's Conduit
+//! is reached only through its own C functions ([`host`]), looked up at run time, so that the library needs no Catalyst to be built.
+//!
+//! A length that a solver states wrongly, within memory that it has, cannot be known.
 
+mod array;
+mod c_api;
+mod configuration;
+mod error;
 pub mod host;
+mod memory;
+mod mesh;
+mod motion;
 mod node;
+mod ranks;
+mod results;
+mod run;
 mod session;
 
 use std::ffi::c_int;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+pub use error::{CatalystError, Status};
 use host::{Host, RawNode};
 use node::{Node, NodeMut};
 use session::Session;
-
-/// What a call answers: Catalyst's own statuses, and above 99 those of this implementation (100 to 102 as ParaView uses them).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(i32)]
-#[non_exhaustive]
-pub enum Status {
-    /// Done.
-    Ok = 0,
-    /// The call came before `initialize` or after `finalize`.
-    NoImplementation = 1,
-    /// The process exports no `catalyst_conduit_*` functions that could read or fill its nodes.
-    ConduitMismatch = 7,
-    /// The node is null, or lacks something that is needed.
-    InvalidNode = 100,
-    /// The call met a defect of this library; the solver may go on.
-    Failed = 102,
-    /// The state was read, but the mesh channels that came with it were not: reading them is not implemented.
-    ChannelsNotRead = 103,
-}
-
-/// Why a call did not answer [`Status::Ok`].
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum CatalystError {
-    /// The node pointer is null.
-    #[error("the conduit node is null")]
-    NullNode,
-    /// The call came before `initialize` or after `finalize`.
-    #[error("called outside of catalyst_initialize ... catalyst_finalize")]
-    NotInitialized,
-    /// The host exports no usable Conduit.
-    #[error("this process does not export '{symbol}'; the solver must be linked with libcatalyst (2.0 or newer)")]
-    MissingSymbol {
-        /// The first function that was not found.
-        symbol: &'static str,
-    },
-    /// A path that is needed is not there.
-    #[error("'{path}' is missing")]
-    Missing {
-        /// The path, or the paths of which one is needed.
-        path: &'static str,
-    },
-    /// A path holds something else than one number.
-    #[error("'{path}' must hold one {expected}, but holds a value of conduit type {found}")]
-    NotANumber {
-        /// The path.
-        path: String,
-        /// What is needed.
-        expected: &'static str,
-        /// Conduit's type number.
-        found: i64,
-    },
-    /// The time is NaN or infinite.
-    #[error("'{path}' is {value}; it must be finite")]
-    NotFinite {
-        /// The path.
-        path: &'static str,
-        /// The value.
-        value: f64,
-    },
-    /// The channels were not read.
-    #[error("mesh channels are not read yet: 'catalyst/channels' is ignored")]
-    ChannelsNotRead,
-}
-
-impl CatalystError {
-    /// The status that says this to the host.
-    #[must_use]
-    pub fn status(&self) -> Status {
-        match self {
-            CatalystError::NotInitialized => Status::NoImplementation,
-            CatalystError::MissingSymbol { .. } => Status::ConduitMismatch,
-            CatalystError::ChannelsNotRead => Status::ChannelsNotRead,
-            _ => Status::InvalidNode,
-        }
-    }
-}
 
 /// One function of the table.
 type Call = unsafe extern "C" fn(*const RawNode) -> c_int;
@@ -142,7 +88,7 @@ pub static catalyst_api_impl: Implementation =
 static SESSION: Mutex<Option<Session>> = Mutex::new(None);
 
 fn session() -> MutexGuard<'static, Option<Session>> {
-    // A session is replaced whole, never half written, so one that a panic left behind is still sound.
+    // A session is replaced whole, and its calls bring it from one sound state to another or leave it.
     SESSION.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -151,8 +97,14 @@ unsafe extern "C" fn initialize(params: *const RawNode) -> c_int {
     answer("catalyst_initialize", || {
         let host = Host::get()?;
         // SAFETY: the caller of a Catalyst function hands over null or a live node of the host's Conduit.
-        unsafe { Node::new(host, params) }?;
-        *session() = Some(Session::default());
+        let node = unsafe { Node::root(host, params) }?;
+        // The one before ends first, with its server.
+        let before = session().take();
+        if let Some(before) = before {
+            before.finalize()?;
+        }
+        let new = Session::new(&node)?;
+        *session() = Some(new);
         Ok(())
     })
 }
@@ -162,7 +114,7 @@ unsafe extern "C" fn execute(params: *const RawNode) -> c_int {
     answer("catalyst_execute", || {
         let host = Host::get()?;
         // SAFETY: as in `initialize`.
-        let node = unsafe { Node::new(host, params) }?;
+        let node = unsafe { Node::root(host, params) }?;
         session().as_mut().ok_or(CatalystError::NotInitialized)?.execute(&node)
     })
 }
@@ -172,8 +124,9 @@ unsafe extern "C" fn finalize(params: *const RawNode) -> c_int {
     answer("catalyst_finalize", || {
         let host = Host::get()?;
         // SAFETY: as in `initialize`.
-        unsafe { Node::new(host, params) }?;
-        session().take().map(drop).ok_or(CatalystError::NotInitialized)
+        unsafe { Node::root(host, params) }?;
+        let ended = session().take().ok_or(CatalystError::NotInitialized)?;
+        ended.finalize()
     })
 }
 
@@ -183,39 +136,32 @@ unsafe extern "C" fn about(params: *mut RawNode) -> c_int {
         let host = Host::get()?;
         // SAFETY: as in `initialize`; `about` hands over a node to be filled, so the caller holds it for us alone.
         let mut node = unsafe { NodeMut::new(host, params) }?;
-        node.set_text(c"catalyst/version", c"2.0.0");
-        node.set_text(c"catalyst/abi_version", c"3");
-        node.set_text(c"catalyst/implementation", c"tombolo");
-        node.set_integer(c"catalyst/use_mpi", 0);
-        node.set_text(c"tombolo/version", VERSION);
+        node.set_text("catalyst/version", "2.0.0");
+        node.set_text("catalyst/abi_version", "3");
+        node.set_text("catalyst/implementation", "tombolo");
+        node.set_integer("catalyst/use_mpi", i32::from(cfg!(feature = "distributed")));
+        node.set_text("tombolo/version", env!("CARGO_PKG_VERSION"));
         Ok(())
     })
 }
 
-/// Hands nothing back: there is nothing to steer yet.
+/// Hands back what is to be done in the step that follows.
 unsafe extern "C" fn results(params: *mut RawNode) -> c_int {
     answer("catalyst_results", || {
         let host = Host::get()?;
         // SAFETY: as in `about`.
-        unsafe { NodeMut::new(host, params) }?;
-        session().as_ref().map(|_| ()).ok_or(CatalystError::NotInitialized)
+        let mut node = unsafe { NodeMut::new(host, params) }?;
+        session().as_ref().ok_or(CatalystError::NotInitialized)?.results(&mut node);
+        Ok(())
     })
 }
-
-const VERSION: &std::ffi::CStr =
-    match std::ffi::CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
-        Ok(text) => text,
-        Err(_) => c"",
-    };
 
 /// Runs a call so that neither an error nor a panic crosses the border, and says on standard error what went wrong.
 fn answer(call: &str, run: impl FnOnce() -> Result<(), CatalystError>) -> c_int {
     let status = match std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)) {
         Ok(Ok(())) => Status::Ok,
         Ok(Err(error)) => {
-            if session::is_news(&error) {
-                eprintln!("tombolo: {call}: {error}");
-            }
+            eprintln!("tombolo: {call}: {error}");
             error.status()
         }
         Err(_) => {

@@ -1,17 +1,268 @@
-//! Safe access to the host's nodes: every read asks first whether the path is there and what it holds, because Conduit answers a
-//! wrong guess with a C++ exception, which must not run through Rust frames.
+//! Safe access to the host's nodes: every read asks first what is there, because Conduit answers a wrong guess with a C++
+//! exception, which must not run through Rust frames.
 
-use std::ffi::CStr;
+use std::ffi::{CStr, CString, c_char};
 use std::marker::PhantomData;
+use std::ptr;
 
-use crate::CatalystError;
+use crate::array::{Array, Number};
+use crate::error::CatalystError;
 use crate::host::{Host, RawNode};
 
-/// A node that can be read for the length of one call.
-pub(crate) struct Node<'call> {
+/// Conduit's numbers of types.
+mod type_number {
+    pub(super) const EMPTY: i64 = 0;
+    pub(super) const OBJECT: i64 = 1;
+    pub(super) const LIST: i64 = 2;
+    pub(super) const TEXT: i64 = 13;
+}
+
+const BIG_ENDIAN: i64 = 1;
+
+/// What a node is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Empty,
+    Object,
+    List,
+    Text,
+    Numbers,
+    Unknown(i64),
+}
+
+/// A node that can be read for the length of one call (`'call`). It knows the way to itself, so that an error can name it; the
+/// way is written out only then.
+#[derive(Clone, Copy)]
+pub(crate) struct Node<'up, 'call> {
     host: &'static Host,
-    pointer: *const RawNode,
+    pointer: *mut RawNode,
+    name: &'up CStr,
+    parent: Option<&'up Node<'up, 'call>>,
     call: PhantomData<&'call RawNode>,
+}
+
+impl<'call> Node<'_, 'call> {
+    /// # Safety
+    /// `pointer` is null or a node of the host's Conduit that lives, with all that it borrows, unchanged by others until the call
+    /// returns.
+    pub(crate) unsafe fn root(host: &'static Host, pointer: *const RawNode) -> Result<Self, CatalystError> {
+        if pointer.is_null() {
+            return Err(CatalystError::NullNode);
+        }
+        Ok(Self { host, pointer: pointer.cast_mut(), name: c"", parent: None, call: PhantomData })
+    }
+
+    /// The way from the root: names joined by `/`.
+    pub(crate) fn path(&self) -> String {
+        match self.parent.map(Node::path) {
+            None => String::new(),
+            Some(path) if path.is_empty() => self.name().into_owned(),
+            Some(path) => format!("{path}/{}", self.name()),
+        }
+    }
+
+    /// The name under which it was reached.
+    pub(crate) fn name(&self) -> std::borrow::Cow<'_, str> {
+        self.name.to_string_lossy()
+    }
+
+    fn type_number(&self) -> i64 {
+        // SAFETY: the node is live and not null (`root`, `child`); its data type is part of it.
+        unsafe { (self.host.type_number)((self.host.dtype)(self.pointer)) }
+    }
+
+    pub(crate) fn kind(&self) -> Kind {
+        match self.type_number() {
+            type_number::EMPTY => Kind::Empty,
+            type_number::OBJECT => Kind::Object,
+            type_number::LIST => Kind::List,
+            type_number::TEXT => Kind::Text,
+            3..=12 => Kind::Numbers,
+            other => Kind::Unknown(other),
+        }
+    }
+
+    /// The child of this name; `None` where this is no object or has none.
+    pub(crate) fn child<'next>(&'next self, name: &'next CStr) -> Option<Node<'next, 'call>> {
+        if self.kind() != Kind::Object {
+            return None;
+        }
+        // SAFETY: the node is a live object and the name a C string; the child is asked for only where it is there.
+        let pointer = unsafe {
+            if (self.host.has_child)(self.pointer, name.as_ptr()) == 0 {
+                return None;
+            }
+            (self.host.child_by_name)(self.pointer, name.as_ptr())
+        };
+        (!pointer.is_null()).then_some(Node { host: self.host, pointer, name, parent: Some(self), call: PhantomData })
+    }
+
+    /// The child of this name.
+    pub(crate) fn need<'next>(
+        &'next self,
+        name: &'next CStr,
+        expected: &'static str,
+    ) -> Result<Node<'next, 'call>, CatalystError> {
+        self.child(name).ok_or_else(|| match self.kind() {
+            Kind::Object | Kind::Empty => {
+                let missing = Node { host: self.host, pointer: self.pointer, name, parent: Some(self), call: PhantomData };
+                CatalystError::Missing { path: missing.path(), expected }
+            }
+            _ => self.wrong(format!("an object with '{}'", name.to_string_lossy())),
+        })
+    }
+
+    /// How many children an object or a list has.
+    pub(crate) fn len(&self) -> usize {
+        if !matches!(self.kind(), Kind::Object | Kind::List) {
+            return 0;
+        }
+        // SAFETY: the node is live and has children.
+        usize::try_from(unsafe { (self.host.number_of_children)(self.pointer) }).unwrap_or(0)
+    }
+
+    /// The names of the children, by which [`Node::at`] reaches them; in a list their numbers in brackets.
+    pub(crate) fn names(&self) -> Vec<CString> {
+        let is_list = self.kind() == Kind::List;
+        (0..self.len())
+            .map(|index| {
+                if is_list {
+                    return CString::new(format!("[{index}]")).unwrap_or_default();
+                }
+                // SAFETY: the index is below the number of children; Conduit hands out a copy of the name, made by malloc, which
+                // is freed here once it has been copied.
+                unsafe {
+                    let child = (self.host.child)(self.pointer, index as i64);
+                    let name: *mut c_char = if child.is_null() { ptr::null_mut() } else { (self.host.name)(child) };
+                    if name.is_null() {
+                        return CString::default();
+                    }
+                    let copy = CStr::from_ptr(name).to_owned();
+                    libc::free(name.cast());
+                    copy
+                }
+            })
+            .collect()
+    }
+
+    /// The child number `index`, which `name` names in errors.
+    pub(crate) fn at<'next>(&'next self, index: usize, name: &'next CStr) -> Option<Node<'next, 'call>> {
+        if index >= self.len() {
+            return None;
+        }
+        // SAFETY: the index is below the number of children.
+        let pointer = unsafe { (self.host.child)(self.pointer, i64::try_from(index).ok()?) };
+        (!pointer.is_null()).then_some(Node { host: self.host, pointer, name, parent: Some(self), call: PhantomData })
+    }
+
+    /// The text that it holds.
+    pub(crate) fn text(&self) -> Result<String, CatalystError> {
+        if self.kind() != Kind::Text {
+            return Err(self.wrong("a text".into()));
+        }
+        let (first, count, stride) = self.layout()?;
+        let mut bytes = Vec::new();
+        for index in 0..count {
+            // SAFETY: Conduit says that the node holds `count` bytes, `stride` apart.
+            let byte = unsafe { first.offset((index * stride) as isize).read() };
+            if byte == 0 {
+                break;
+            }
+            bytes.push(byte);
+        }
+        String::from_utf8(bytes).map_err(|_| self.wrong("a text in UTF-8".into()))
+    }
+
+    /// Address of the first element, number of elements, and bytes from one to the next.
+    fn layout(&self) -> Result<(*const u8, i64, i64), CatalystError> {
+        // SAFETY: the node is live; its data type is part of it.
+        let (count, stride) = unsafe {
+            let dtype = (self.host.dtype)(self.pointer);
+            ((self.host.count)(dtype), (self.host.stride)(dtype))
+        };
+        if count <= 0 {
+            return Ok((ptr::NonNull::<u64>::dangling().as_ptr().cast(), 0, stride.max(1)));
+        }
+        // SAFETY: the node has a first element.
+        let first: *const u8 = unsafe { (self.host.element)(self.pointer, 0) }.cast::<u8>();
+        if first.is_null() {
+            return Err(self.wrong_found("a null pointer".into(), format!("the address of {count} values")));
+        }
+        if stride < 0 || count.checked_mul(stride.max(1)).is_none_or(|bytes| bytes > isize::MAX as i64) {
+            return Err(self.wrong_found(format!("{count} values {stride} bytes apart"), "a length that memory can have".into()));
+        }
+        Ok((first, count, stride))
+    }
+
+    /// The numbers that it holds, borrowed for the length of the call.
+    pub(crate) fn array(&self) -> Result<Array<'call>, CatalystError> {
+        let number = match self.type_number() {
+            3 => Number::I8,
+            4 => Number::I16,
+            5 => Number::I32,
+            6 => Number::I64,
+            7 => Number::U8,
+            8 => Number::U16,
+            9 => Number::U32,
+            10 => Number::U64,
+            11 => Number::F32,
+            12 => Number::F64,
+            _ => return Err(self.wrong("an array of numbers".into())),
+        };
+        let (first, count, stride) = self.layout()?;
+        // SAFETY: the node is live; its data type is part of it.
+        let endianness = unsafe { (self.host.endianness)((self.host.dtype)(self.pointer)) };
+        // SAFETY: Conduit says that the node holds `count` numbers of this type, `stride` bytes apart, and by the contract of
+        // `root` they live until the call returns.
+        Ok(unsafe { Array::new(first, count as usize, stride as usize, number, endianness == BIG_ENDIAN) })
+    }
+
+    /// The one number that it holds.
+    pub(crate) fn number(&self) -> Result<f64, CatalystError> {
+        let array = self.array().map_err(|_| self.wrong("a number".into()))?;
+        if array.len() == 1 { Ok(array.get(0)) } else { Err(self.wrong("one number".into())) }
+    }
+
+    /// The one whole number that it holds, from 0 on.
+    pub(crate) fn count(&self) -> Result<u64, CatalystError> {
+        let array = self.array().map_err(|_| self.wrong("a whole number from 0 on".into()))?;
+        let value = (array.len() == 1).then(|| array.whole(0)).flatten();
+        value.ok_or_else(|| {
+            let found = if array.len() == 1 { format!("{}", array.get(0)) } else { self.found() };
+            self.wrong_found(found, "a whole number from 0 on".into())
+        })
+    }
+
+    /// What it holds, in words.
+    pub(crate) fn found(&self) -> String {
+        match self.kind() {
+            Kind::Empty => "nothing".into(),
+            Kind::Object => {
+                let names: Vec<String> =
+                    self.names().iter().take(8).map(|name| name.to_string_lossy().into_owned()).collect();
+                if names.is_empty() { "an empty object".into() } else { format!("an object of {}", names.join(", ")) }
+            }
+            Kind::List => format!("a list of {}", self.len()),
+            Kind::Text => match self.text() {
+                Ok(text) => format!("the text '{text}'"),
+                Err(_) => "a text".into(),
+            },
+            Kind::Numbers => match self.array() {
+                Ok(array) => format!("{} value(s) of type {}", array.len(), array.number().name()),
+                Err(_) => "numbers".into(),
+            },
+            Kind::Unknown(number) => format!("a value of unknown type {number}"),
+        }
+    }
+
+    /// The error that this holds something else.
+    pub(crate) fn wrong(&self, expected: String) -> CatalystError {
+        self.wrong_found(self.found(), expected)
+    }
+
+    pub(crate) fn wrong_found(&self, found: String, expected: String) -> CatalystError {
+        CatalystError::Wrong { path: self.path(), found, expected }
+    }
 }
 
 /// A node that can be filled for the length of one call.
@@ -21,80 +272,71 @@ pub(crate) struct NodeMut<'call> {
     call: PhantomData<&'call mut RawNode>,
 }
 
-/// One number, as the host stored it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Number {
-    Integer(i128),
-    Real(f64),
-}
-
-impl Node<'_> {
-    /// # Safety
-    /// `pointer` is null or a node of the host's Conduit that lives, unchanged by others, until the call returns.
-    pub(crate) unsafe fn new(host: &'static Host, pointer: *const RawNode) -> Result<Self, CatalystError> {
-        if pointer.is_null() { Err(CatalystError::NullNode) } else { Ok(Self { host, pointer, call: PhantomData }) }
-    }
-
-    pub(crate) fn has(&self, path: &CStr) -> bool {
-        // SAFETY: the node is live and not null (`Node::new`), the path is a C string; `has_path` reads only and does not throw.
-        unsafe { (self.host.has_path)(self.pointer, path.as_ptr()) != 0 }
-    }
-
-    /// The number at `path`; `None` where the path is not there.
-    pub(crate) fn number(&self, path: &CStr) -> Result<Option<Number>, CatalystError> {
-        if !self.has(path) {
-            return Ok(None);
-        }
-        // SAFETY: the path exists, so `fetch_existing` returns a live child and does not throw. It takes a mutable pointer by
-        // its C signature but writes nothing.
-        let child: *const RawNode = unsafe { (self.host.fetch_existing)(self.pointer.cast_mut(), path.as_ptr()) };
-        if child.is_null() {
-            return Ok(None);
-        }
-        // SAFETY: `child` is a live node; its data type lives as long as it does and is only read.
-        let (kind, count) = unsafe {
-            let datatype = (self.host.dtype)(child);
-            ((self.host.datatype_id)(datatype), (self.host.number_of_elements)(datatype))
-        };
-        let wrong = || CatalystError::NotANumber {
-            path: path.to_string_lossy().into_owned(),
-            expected: "32- or 64-bit number",
-            found: kind,
-        };
-        if count < 1 {
-            return Err(wrong());
-        }
-        // SAFETY: each function reads the first element of a node that holds at least one value of exactly its type, which is
-        // the case Conduit defines without an error.
-        let number = unsafe {
-            match kind {
-                5 => Number::Integer((self.host.as_int32)(child).into()),
-                6 => Number::Integer((self.host.as_int64)(child).into()),
-                9 => Number::Integer((self.host.as_uint32)(child).into()),
-                10 => Number::Integer((self.host.as_uint64)(child).into()),
-                11 => Number::Real((self.host.as_float32)(child).into()),
-                12 => Number::Real((self.host.as_float64)(child)),
-                _ => return Err(wrong()),
-            }
-        };
-        Ok(Some(number))
-    }
-}
-
 impl NodeMut<'_> {
     /// # Safety
-    /// `pointer` is null or a node of the host's Conduit that lives, touched by nobody else, until the call returns.
+    /// `pointer` is null or a node of the host's Conduit that lives, and is used by nobody else, until the call returns.
     pub(crate) unsafe fn new(host: &'static Host, pointer: *mut RawNode) -> Result<Self, CatalystError> {
         if pointer.is_null() { Err(CatalystError::NullNode) } else { Ok(Self { host, pointer, call: PhantomData }) }
     }
 
-    pub(crate) fn set_text(&mut self, path: &CStr, value: &CStr) {
-        // SAFETY: the node is live and ours for the call (`NodeMut::new`); both arguments are C strings, which Conduit copies.
-        unsafe { (self.host.set_path_text)(self.pointer, path.as_ptr(), value.as_ptr()) }
+    pub(crate) fn set_text(&mut self, path: &str, value: &str) {
+        let (path, value) = (c_string(path), c_string(value));
+        // SAFETY: the node is live and ours alone (`new`), path and value are C strings, which Conduit copies.
+        unsafe { (self.host.set_text)(self.pointer, path.as_ptr(), value.as_ptr()) }
     }
 
-    pub(crate) fn set_integer(&mut self, path: &CStr, value: i32) {
+    pub(crate) fn set_integer(&mut self, path: &str, value: i32) {
         // SAFETY: as in `set_text`.
-        unsafe { (self.host.set_path_int32)(self.pointer, path.as_ptr(), value) }
+        unsafe { (self.host.set_int32)(self.pointer, c_string(path).as_ptr(), value) }
     }
+
+    pub(crate) fn set_integers(&mut self, path: &str, values: &[i64]) {
+        // SAFETY: as in `set_text`; the values are copied, not written to.
+        unsafe {
+            let data = values.as_ptr().cast_mut();
+            (self.host.set_int64s)(self.pointer, c_string(path).as_ptr(), data, values.len() as i64);
+        }
+    }
+
+    pub(crate) fn set_number(&mut self, path: &str, value: f64) {
+        // SAFETY: as in `set_text`.
+        unsafe { (self.host.set_float64)(self.pointer, c_string(path).as_ptr(), value) }
+    }
+
+    /// Copies one axis of vectors.
+    pub(crate) fn set_axis(&mut self, path: &str, vectors: &[[f64; 3]], axis: usize) {
+        // SAFETY: as in `set_text`; of the values, from the `axis`-th on, every third is copied, none is written to.
+        unsafe {
+            let data = vectors.as_ptr().cast::<f64>().cast_mut();
+            let (count, offset) = (vectors.len() as i64, 8 * axis.min(2) as i64);
+            (self.host.set_float64s)(self.pointer, c_string(path).as_ptr(), data, count, offset, 24, 8, 0);
+        }
+    }
+
+    /// Shows at `path` what stands at `from`, without a copy.
+    pub(crate) fn set_same(&mut self, path: &str, from: &str) {
+        // SAFETY: as in `set_text`; both places are in one tree, so that what is borrowed lives as long as what borrows it.
+        unsafe {
+            let shown = (self.host.fetch)(self.pointer, c_string(from).as_ptr());
+            if !shown.is_null() {
+                (self.host.set_external)(self.pointer, c_string(path).as_ptr(), shown);
+            }
+        }
+    }
+
+    /// Takes away what an earlier call left.
+    pub(crate) fn remove(&mut self, path: &str) {
+        let path = c_string(path);
+        // SAFETY: as in `set_text`; only what is there is removed.
+        unsafe {
+            if (self.host.has_path)(self.pointer, path.as_ptr()) != 0 {
+                (self.host.remove_path)(self.pointer, path.as_ptr());
+            }
+        }
+    }
+}
+
+/// A C string; what follows a nul is left out.
+fn c_string(text: &str) -> CString {
+    CString::new(text.split('\0').next().unwrap_or_default()).unwrap_or_default()
 }

@@ -1,58 +1,112 @@
-//! What is kept between `initialize` and `finalize`.
+//! From `catalyst_initialize` to `catalyst_finalize`: what the nodes say.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Arc;
 
-use crate::CatalystError;
-use crate::node::{Node, Number};
+use tombolo::{InitializeError, Settings, Step};
 
-/// One run of a solver.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+use crate::configuration::{self, Configuration};
+use crate::error::CatalystError;
+use crate::mesh::Channel;
+use crate::node::{Kind, Node, NodeMut};
+use crate::ranks;
+use crate::results::{self, STEERING};
+use crate::run::Run;
+
+/// A run that is described by nodes.
 pub(crate) struct Session {
-    /// The last step that was read, as (cycle, time).
-    last: Option<(u64, f64)>,
+    run: Run,
+    is_first: bool,
 }
 
 impl Session {
-    /// Reads the state of one step.
-    pub(crate) fn execute(&mut self, node: &Node<'_>) -> Result<(), CatalystError> {
-        if !node.has(c"catalyst") {
-            return Err(CatalystError::Missing { path: "catalyst" });
+    /// Sets a run up. Collective.
+    pub(crate) fn new(node: &Node<'_, '_>) -> Result<Self, CatalystError> {
+        let configuration = Configuration::read(node);
+        let handle = configuration.as_ref().ok().and_then(|configuration| configuration.communicator);
+        let communicator = ranks::communicator(handle)?;
+        let Configuration { config, is_default, parameters, orders, output, notes, .. } =
+            ranks::agree(&*communicator, configuration)?;
+        let is_first = communicator.rank() == 0;
+        if is_first {
+            notes.iter().for_each(|note| eprintln!("tombolo: {note}"));
         }
-        self.last = Some((cycle(node)?, time(node)?));
-        if node.has(c"catalyst/channels") { Err(CatalystError::ChannelsNotRead) } else { Ok(()) }
-    }
-}
-
-fn cycle(node: &Node<'_>) -> Result<u64, CatalystError> {
-    // ParaView's blueprint says `timestep`, Conduit's `cycle`; the first wins where both are there.
-    for path in [c"catalyst/state/timestep", c"catalyst/state/cycle"] {
-        let wrong = |found| CatalystError::NotANumber {
-            path: path.to_string_lossy().into_owned(),
-            expected: "integer that is not negative",
-            found,
+        let mut settings = Settings { config, communicator: Arc::clone(&communicator), parameters, orders, output };
+        let run = match Run::new(settings.clone()) {
+            // Nobody asked for that very port.
+            Err(CatalystError::Initialize(InitializeError::Stream(_))) if is_default && communicator.size() == 1 => {
+                if let Some(stream) = &mut settings.config.stream {
+                    stream.listen.set_port(0);
+                }
+                Run::new(settings)?
+            }
+            run => run?,
         };
-        match node.number(path)? {
-            Some(Number::Integer(value)) => return u64::try_from(value).map_err(|_| wrong(6)),
-            Some(Number::Real(_)) => return Err(wrong(12)),
-            None => {}
+        if let Some(link) = run.link().filter(|_| is_first) {
+            eprintln!("tombolo: open {link}");
         }
+        Ok(Self { run, is_first })
     }
-    Err(CatalystError::Missing { path: "catalyst/state/timestep (or catalyst/state/cycle)" })
-}
 
-fn time(node: &Node<'_>) -> Result<f64, CatalystError> {
-    const PATH: &str = "catalyst/state/time";
-    let value = match node.number(c"catalyst/state/time")? {
-        Some(Number::Real(value)) => value,
-        #[expect(clippy::cast_precision_loss, reason = "a time written as an integer is small")]
-        Some(Number::Integer(value)) => value as f64,
-        None => return Err(CatalystError::Missing { path: PATH }),
-    };
-    if value.is_finite() { Ok(value) } else { Err(CatalystError::NotFinite { path: PATH, value }) }
-}
+    /// Shows a step to the adaptor. Collective.
+    pub(crate) fn execute(&mut self, node: &Node<'_, '_>) -> Result<(), CatalystError> {
+        let given = self.read(node);
+        self.run.execute(given)
+    }
 
-/// Whether an error has yet to be told: that channels are not read is said once in a process, everything else each time.
-pub(crate) fn is_news(error: &CatalystError) -> bool {
-    static TOLD: AtomicBool = AtomicBool::new(false);
-    *error != CatalystError::ChannelsNotRead || !TOLD.swap(true, Ordering::Relaxed)
+    fn read<'call>(&self, node: &Node<'_, 'call>) -> Result<(Step, Vec<Channel<'call>>), CatalystError> {
+        let catalyst = node.need(c"catalyst", "an object with 'state' and 'channels'")?;
+        let state = catalyst.need(c"state", "an object with 'timestep' (or 'cycle') and 'time'")?;
+        let cycle = match state.child(c"timestep") {
+            Some(timestep) => timestep.count()?,
+            None => state.need(c"cycle", "the step's number, here or as 'timestep'")?.count()?,
+        };
+        let finite = |node: &Node<'_, '_>| match node.number()? {
+            value if value.is_finite() => Ok(value),
+            value => Err(node.wrong_found(format!("{value}"), "a finite number".into())),
+        };
+        let time = finite(&state.need(c"time", "the simulated time")?)?;
+        let time_step = match state.child(c"time_step") {
+            Some(length) => match finite(&length)? {
+                value if value >= 0.0 => value,
+                value => return Err(length.wrong_found(format!("{value}"), "a number from 0 on".into())),
+            },
+            None => self.run.likely_time_step(time),
+        };
+        let mut channels = Vec::new();
+        if let Some(all) = catalyst.child(c"channels") {
+            if !matches!(all.kind(), Kind::Object | Kind::Empty) {
+                return Err(all.wrong("an object of channels by their names".into()));
+            }
+            for (index, name) in all.names().iter().enumerate() {
+                let Some(channel) = all.at(index, name) else { continue };
+                if channel.name() == STEERING {
+                    let expected = format!("another name: the results bring a mesh called '{STEERING}'");
+                    return Err(channel.wrong_found(format!("a channel called '{STEERING}'"), expected));
+                }
+                channels.push(Channel::read(&channel)?);
+            }
+        }
+        if channels.is_empty() && self.run.ranks() == 1 {
+            return Err(catalyst
+                .need(c"channels", "an object with at least one channel")
+                .map_or_else(|error| error, |all| all.wrong("at least one channel".into())));
+        }
+        Ok((Step { cycle, time, time_step }, channels))
+    }
+
+    /// Fills in what the adaptor asks for the step that follows.
+    pub(crate) fn results(&self, node: &mut NodeMut<'_>) {
+        let (steered, blocks) = self.run.steered();
+        results::fill(node, self.run.asked(), steered, blocks);
+    }
+
+    /// Ends the run. Collective.
+    pub(crate) fn finalize(self) -> Result<(), CatalystError> {
+        let (report, ended) = self.run.finalize();
+        if let (Some(report), Some(file)) = (report.filter(|_| self.is_first), configuration::report_file()) {
+            let text = serde_json::to_string_pretty(&report).unwrap_or_default();
+            std::fs::write(&file, text).map_err(|error| CatalystError::Configuration(format!("{file}: {error}")))?;
+        }
+        ended
+    }
 }

@@ -1,120 +1,57 @@
-/* A host that speaks Catalyst 2: a small Conduit of its own under the names libcatalyst exports, and the calls a solver makes.
+/* A host that speaks Catalyst 2 over a Conduit of its own, and gets everything wrong that can be got wrong.
  *
- *   cc -rdynamic host.c -o host -ldl && ./host libtombolo_catalyst.so
+ *   cc -rdynamic host.c -o host -ldl -lm && ./host libtombolo_catalyst.so
  *
  * Exits with 0 when every answer is the one expected; else prints the first that is not and exits with 1. */
 #include <dlfcn.h>
 #include <math.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#include <sys/mman.h>
 
-typedef struct conduit_node {
-  const char* path[16];
-  int64_t type[16];
-  double number[16];
-  const char* text[16];
-  int count;
-  int child; /* of a fetched child: the entry it stands for */
-  struct conduit_node* parent;
-} conduit_node;
-typedef struct { int64_t id; } conduit_datatype;
-
-static int find(const conduit_node* node, const char* path)
-{
-  for (int i = 0; i < node->count; ++i)
-    if (strcmp(node->path[i], path) == 0) return i;
-  return -1;
-}
-
-int catalyst_conduit_node_has_path(const conduit_node* node, const char* path)
-{
-  size_t length = strlen(path);
-  for (int i = 0; i < node->count; ++i)
-    if (strncmp(node->path[i], path, length) == 0 && (node->path[i][length] == 0 || node->path[i][length] == '/')) return 1;
-  return 0;
-}
-
-conduit_node* catalyst_conduit_node_fetch_existing(conduit_node* node, const char* path)
-{
-  static conduit_node children[64];
-  static int next = 0;
-  conduit_node* child = &children[next++ % 64];
-  child->parent = node;
-  child->child = find(node, path);
-  return child;
-}
-
-const conduit_datatype* catalyst_conduit_node_dtype(const conduit_node* node)
-{
-  static conduit_datatype types[64];
-  static int next = 0;
-  conduit_datatype* type = &types[next++ % 64];
-  type->id = node->child < 0 ? 1 : node->parent->type[node->child];
-  return type;
-}
-
-int64_t catalyst_conduit_datatype_id(const conduit_datatype* type) { return type->id; }
-int64_t catalyst_conduit_datatype_number_of_elements(const conduit_datatype* type) { return type->id > 2; }
-
-/* Real Conduit throws when a value is read as what it is not: here that ends the test. */
-static double read_as(const conduit_node* node, int64_t type)
-{
-  if (node->child < 0 || node->parent->type[node->child] != type) {
-    fprintf(stderr, "a value was read as a type it does not have\n");
-    exit(1);
-  }
-  return node->parent->number[node->child];
-}
-int32_t catalyst_conduit_node_as_int32(const conduit_node* node) { return (int32_t)read_as(node, 5); }
-int64_t catalyst_conduit_node_as_int64(const conduit_node* node) { return (int64_t)read_as(node, 6); }
-uint32_t catalyst_conduit_node_as_uint32(const conduit_node* node) { return (uint32_t)read_as(node, 9); }
-uint64_t catalyst_conduit_node_as_uint64(const conduit_node* node) { return (uint64_t)read_as(node, 10); }
-float catalyst_conduit_node_as_float32(const conduit_node* node) { return (float)read_as(node, 11); }
-double catalyst_conduit_node_as_float64(const conduit_node* node) { return read_as(node, 12); }
-
-static void put(conduit_node* node, const char* path, int64_t type, double number, const char* text)
-{
-  int i = node->count++;
-  node->path[i] = strdup(path);
-  node->type[i] = type;
-  node->number[i] = number;
-  node->text[i] = text ? strdup(text) : NULL;
-}
-void catalyst_conduit_node_set_path_char8_str(conduit_node* node, const char* path, const char* text)
-{
-  put(node, path, 13, 0, text);
-}
-void catalyst_conduit_node_set_path_int32(conduit_node* node, const char* path, int32_t value)
-{
-  put(node, path, 5, value, NULL);
-}
-
-struct catalyst_impl {
-  int version;
-  int (*initialize)(const conduit_node*);
-  int (*execute)(const conduit_node*);
-  int (*finalize)(const conduit_node*);
-  int (*about)(conduit_node*);
-  int (*results)(conduit_node*);
-};
+#include "foreign.h"
 
 static void expect(const char* what, int found, int wanted)
 {
+  fprintf(stderr, "-- %s\n", what);
   if (found != wanted) {
     fprintf(stderr, "%s: %d where %d is expected\n", what, found, wanted);
     exit(1);
   }
 }
 
-static void expect_text(const conduit_node* node, const char* path, const char* wanted)
+static void expect_text(conduit_node* node, const char* path, const char* wanted)
 {
-  int i = find(node, path);
-  if (i < 0 || node->text[i] == NULL || strcmp(node->text[i], wanted) != 0) {
-    fprintf(stderr, "%s: '%s' where '%s' is expected\n", path, i < 0 ? "nothing" : node->text[i], wanted);
+  conduit_node* found = walk(node, path, 0);
+  if (!found || found->type.id != TEXT || strcmp(found->data, wanted) != 0) {
+    fprintf(stderr, "%s: not '%s'\n", path, wanted);
     exit(1);
   }
+}
+
+static double xyz[12] = { 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1 };
+static int32_t tet[4] = { 0, 1, 2, 3 };
+static double temperature[4] = { 1, 2, 3, 4 };
+
+/* A whole step of one tetrahedron, and the way to what a case spoils. */
+static conduit_node* step(conduit_node* node)
+{
+  static int64_t cycle = 0;
+  clear(node);
+  integer(node, "catalyst/state/timestep", ++cycle);
+  number(node, "catalyst/state/time", 0.1 * (double)cycle);
+  text(node, "catalyst/channels/grid/type", "mesh");
+  conduit_node* mesh = at(node, "catalyst/channels/grid/data");
+  text(mesh, "coordsets/coords/type", "explicit");
+  array(mesh, "coordsets/coords/values/x", FLOAT64, xyz, 4, 0, 24);
+  array(mesh, "coordsets/coords/values/y", FLOAT64, xyz, 4, 8, 24);
+  array(mesh, "coordsets/coords/values/z", FLOAT64, xyz, 4, 16, 24);
+  text(mesh, "topologies/mesh/type", "unstructured");
+  text(mesh, "topologies/mesh/coordset", "coords");
+  text(mesh, "topologies/mesh/elements/shape", "tet");
+  array(mesh, "topologies/mesh/elements/connectivity", INT32, tet, 4, 0, 0);
+  text(mesh, "fields/temperature/association", "vertex");
+  text(mesh, "fields/temperature/topology", "mesh");
+  array(mesh, "fields/temperature/values", FLOAT64, temperature, 4, 0, 0);
+  return mesh;
 }
 
 int main(int argc, char** argv)
@@ -130,70 +67,133 @@ int main(int argc, char** argv)
     return 1;
   }
   expect("version", impl->version, 1);
-
-  conduit_node about = { 0 };
+  static conduit_node about, empty, node;
   expect("about before initialize", impl->about(&about), 0);
   expect_text(&about, "catalyst/version", "2.0.0");
   expect_text(&about, "catalyst/abi_version", "3");
   expect_text(&about, "catalyst/implementation", "tombolo");
-  expect("catalyst/use_mpi", find(&about, "catalyst/use_mpi") >= 0, 1);
+  expect("catalyst/use_mpi", catalyst_conduit_node_has_path(&about, "catalyst/use_mpi"), 1);
   expect("about(NULL)", impl->about(NULL), 100);
 
-  conduit_node empty = { 0 };
   expect("execute before initialize", impl->execute(&empty), 1);
   expect("results before initialize", impl->results(&empty), 1);
   expect("finalize before initialize", impl->finalize(&empty), 1);
   expect("initialize(NULL)", impl->initialize(NULL), 100);
-  expect("a null node does not initialize", impl->execute(&empty), 1);
+  static conduit_node setup;
+  text(&setup, "catalyst/scripts/script/filename", "no-such-file.json");
+  expect("a configuration that is not there", impl->initialize(&setup), 100);
+  clear(&setup);
+  text(&setup, "catalyst/pipelines/0/type", "oi");
+  text(&setup, "catalyst/pipelines/0/filename", "x.vtu");
+  expect("a pipeline of an unknown type", impl->initialize(&setup), 100);
+  clear(&setup);
+  text(&setup, "catalyst/mpi_comm", "world");
+  expect("a communicator in words", impl->initialize(&setup), 100);
+  expect("what failed did not initialize", impl->execute(&empty), 1);
   expect("initialize", impl->initialize(&empty), 0);
   expect("a second initialize", impl->initialize(&empty), 0);
 
   expect("execute(NULL)", impl->execute(NULL), 100);
   expect("execute without catalyst", impl->execute(&empty), 100);
+  step(&node);
+  expect("a step", impl->execute(&node), 0);
 
-  conduit_node timestep = { 0 };
-  put(&timestep, "catalyst/state/timestep", 6, 7, NULL);
-  expect("no time", impl->execute(&timestep), 100);
-  put(&timestep, "catalyst/state/time", 12, 0.7, NULL);
-  expect("timestep as int64", impl->execute(&timestep), 0);
-
-  int64_t integers[] = { 5, 6, 9, 10 };
-  for (int i = 0; i < 4; ++i) {
-    conduit_node cycle = { 0 };
-    put(&cycle, "catalyst/state/cycle", integers[i], 7, NULL);
-    put(&cycle, "catalyst/state/time", 11, 0.5, NULL);
-    expect("cycle of each integer type", impl->execute(&cycle), 0);
+  const int64_t integers[] = { INT32, INT64, UINT32, UINT64, FLOAT64 };
+  const union { int32_t a; int64_t b; } seven = { .b = 700 };
+  const double real_seven = 700.0;
+  for (int i = 0; i < 5; ++i) {
+    step(&node);
+    array(&node, "catalyst/state/timestep", integers[i], i == 4 ? (const void*)&real_seven : &seven, 1, 0, 0);
+    expect("a timestep of each type", impl->execute(&node), 0);
   }
 
-  conduit_node negative = { 0 };
-  put(&negative, "catalyst/state/cycle", 5, -1, NULL);
-  put(&negative, "catalyst/state/time", 12, 0, NULL);
-  expect("a negative cycle", impl->execute(&negative), 100);
+  step(&node);
+  catalyst_conduit_node_remove_path(&node, "catalyst/state/time");
+  expect("no time", impl->execute(&node), 100);
+  step(&node);
+  integer(&node, "catalyst/state/timestep", -1);
+  expect("a negative cycle", impl->execute(&node), 100);
+  step(&node);
+  text(&node, "catalyst/state/timestep", "seven");
+  expect("a cycle in words", impl->execute(&node), 100);
+  step(&node);
+  number(&node, "catalyst/state/time", NAN);
+  expect("a time that is NaN", impl->execute(&node), 100);
+  step(&node);
+  integer(&node, "catalyst/state/timestep/deeper", 1);
+  expect("a cycle that is an object", impl->execute(&node), 100);
+  step(&node);
+  catalyst_conduit_node_remove_path(&node, "catalyst/channels");
+  expect("no channels", impl->execute(&node), 100);
 
-  conduit_node text = { 0 };
-  put(&text, "catalyst/state/cycle", 13, 0, "seven");
-  put(&text, "catalyst/state/time", 12, 0, NULL);
-  expect("a cycle in words", impl->execute(&text), 100);
+  step(&node);
+  text(&node, "catalyst/channels/grid/type", "msh");
+  expect("a channel of an unknown type", impl->execute(&node), 100);
+  step(&node);
+  text(&node, "catalyst/channels/grid/memoryspace", "cuda");
+  expect("a graphics card's memory, as a flag", impl->execute(&node), 100);
+  conduit_node* mesh = step(&node);
+  text(mesh, "coordsets/coords/type", "explicid");
+  expect("a coordset of an unknown type", impl->execute(&node), 100);
+  mesh = step(&node);
+  array(mesh, "coordsets/coords/values/y", FLOAT64, xyz, 3, 8, 24);
+  expect("coordinates of different lengths", impl->execute(&node), 100);
+  mesh = step(&node);
+  text(mesh, "topologies/mesh/coordset", "points");
+  expect("a coordset that is not there", impl->execute(&node), 100);
+  mesh = step(&node);
+  text(mesh, "topologies/mesh/elements/shape", "tetrahedron");
+  expect("a shape of an unknown name", impl->execute(&node), 100);
+  mesh = step(&node);
+  array(mesh, "topologies/mesh/elements/connectivity", INT32, tet, 3, 0, 0);
+  expect("three quarters of a tetrahedron", impl->execute(&node), 100);
+  mesh = step(&node);
+  const int32_t beyond[4] = { 0, 1, 2, 4 }, below[4] = { 0, 1, 2, -3 };
+  array(mesh, "topologies/mesh/elements/connectivity", INT32, beyond, 4, 0, 0);
+  expect("a vertex that does not exist", impl->execute(&node), 100);
+  mesh = step(&node);
+  array(mesh, "topologies/mesh/elements/connectivity", INT32, below, 4, 0, 0);
+  expect("a vertex below 0", impl->execute(&node), 100);
+  mesh = step(&node);
+  array(mesh, "fields/temperature/values", FLOAT64, temperature, 3, 0, 0);
+  expect("a field that is too short", impl->execute(&node), 100);
+  mesh = step(&node);
+  text(mesh, "fields/temperature/association", "point");
+  expect("an unknown association", impl->execute(&node), 100);
+  mesh = step(&node);
+  catalyst_conduit_node_remove_path(mesh, "fields/temperature/values");
+  expect("a field without values", impl->execute(&node), 100);
+  mesh = step(&node);
+  text(mesh, "fields/temperature/values", "warm");
+  expect("a field in words", impl->execute(&node), 100);
+  mesh = step(&node);
+  array(mesh, "coordsets/coords/values/x", FLOAT64, NULL, 4, 0, 24);
+  expect("a null pointer", impl->execute(&node), 100);
+  mesh = step(&node);
+  array(mesh, "fields/temperature/values", FLOAT64, temperature, INT64_MAX, 0, 0);
+  expect("a length that no memory has", impl->execute(&node), 100);
+  mesh = step(&node);
+  void* page = mmap(NULL, 4096, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  array(mesh, "fields/temperature/values", FLOAT64, page, 4, 0, 0);
+  expect("memory that cannot be read, as a graphics card's", impl->execute(&node), 100);
+  munmap(page, 4096);
+  expect("memory that was unmapped", impl->execute(&node), 100);
 
-  conduit_node nan_time = { 0 };
-  put(&nan_time, "catalyst/state/cycle", 5, 1, NULL);
-  put(&nan_time, "catalyst/state/time", 12, NAN, NULL);
-  expect("a time that is NaN", impl->execute(&nan_time), 100);
-
-  conduit_node object = { 0 };
-  put(&object, "catalyst/state/cycle/deeper", 5, 1, NULL);
-  put(&object, "catalyst/state/time", 12, 0, NULL);
-  expect("a cycle that is an object", impl->execute(&object), 100);
-
-  put(&timestep, "catalyst/channels/grid/type", 13, 0, "mesh");
-  expect("channels", impl->execute(&timestep), 103);
-  expect("channels again", impl->execute(&timestep), 103);
-
+  step(&node);
+  expect("a sound step after all that", impl->execute(&node), 0);
   expect("results", impl->results(&empty), 0);
+  expect("results say that nothing moves",
+    catalyst_conduit_node_has_path(&empty, "catalyst/steering/fields/moving/values") &&
+      !catalyst_conduit_node_has_path(&empty, "catalyst/grid"), 1);
   expect("results(NULL)", impl->results(NULL), 100);
   expect("finalize(NULL)", impl->finalize(NULL), 100);
   expect("finalize", impl->finalize(&empty), 0);
-  expect("execute after finalize", impl->execute(&timestep), 1);
+  expect("execute after finalize", impl->execute(&node), 1);
+  clear(&empty);
   expect("initialize after finalize", impl->initialize(&empty), 0);
+  expect("finalize again", impl->finalize(&empty), 0);
+  clear(&about);
+  clear(&setup);
+  clear(&node);
   return 0;
 }

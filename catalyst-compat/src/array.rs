@@ -1,0 +1,237 @@
+//! Arrays as the host's nodes describe them, and how they are lent to the adaptor.
+
+use std::marker::PhantomData;
+
+use tombolo::deform::mesh::{Indices, Values};
+
+/// A type of number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Number {
+    I8,
+    I16,
+    I32,
+    I64,
+    U8,
+    U16,
+    U32,
+    U64,
+    F32,
+    F64,
+}
+
+impl Number {
+    pub(crate) fn bytes(self) -> usize {
+        match self {
+            Number::I8 | Number::U8 => 1,
+            Number::I16 | Number::U16 => 2,
+            Number::I32 | Number::U32 | Number::F32 => 4,
+            Number::I64 | Number::U64 | Number::F64 => 8,
+        }
+    }
+
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Number::I8 => "int8",
+            Number::I16 => "int16",
+            Number::I32 => "int32",
+            Number::I64 => "int64",
+            Number::U8 => "uint8",
+            Number::U16 => "uint16",
+            Number::U32 => "uint32",
+            Number::U64 => "uint64",
+            Number::F32 => "float32",
+            Number::F64 => "float64",
+        }
+    }
+
+    fn is_real(self) -> bool {
+        matches!(self, Number::F32 | Number::F64)
+    }
+}
+
+/// Numbers of any type at any distance from each other, borrowed from the solver for the length of one call.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Array<'call> {
+    first: *const u8,
+    count: usize,
+    stride: usize,
+    number: Number,
+    swapped: bool,
+    call: PhantomData<&'call [u8]>,
+}
+
+impl<'call> Array<'call> {
+    /// # Safety
+    /// From `first` on there are `count` numbers of this type, `stride` bytes apart (not aligned, it may be), that live and do
+    /// not change during `'call`; `count * stride` is at most `isize::MAX`.
+    pub(crate) unsafe fn new(first: *const u8, count: usize, stride: usize, number: Number, big_endian: bool) -> Self {
+        let swapped = big_endian && cfg!(target_endian = "little");
+        Self { first, count, stride, number, swapped, call: PhantomData }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.count
+    }
+
+    pub(crate) fn number(&self) -> Number {
+        self.number
+    }
+
+    fn read<const N: usize>(&self, index: usize) -> [u8; N] {
+        assert!(index < self.count && N == self.number.bytes(), "element {index}");
+        // SAFETY: the element is there (`new`), and bytes need no alignment.
+        let mut bytes: [u8; N] = unsafe { self.first.add(index * self.stride).cast::<[u8; N]>().read_unaligned() };
+        if self.swapped {
+            bytes.reverse();
+        }
+        bytes
+    }
+
+    /// A value as double precision.
+    ///
+    /// # Panics
+    /// Where `index` is out of range.
+    #[expect(clippy::cast_precision_loss, reason = "fields of large integers are shown, not computed with")]
+    pub(crate) fn get(&self, index: usize) -> f64 {
+        match self.number {
+            Number::I8 => f64::from(i8::from_ne_bytes(self.read(index))),
+            Number::I16 => f64::from(i16::from_ne_bytes(self.read(index))),
+            Number::I32 => f64::from(i32::from_ne_bytes(self.read(index))),
+            Number::I64 => i64::from_ne_bytes(self.read(index)) as f64,
+            Number::U8 => f64::from(u8::from_ne_bytes(self.read(index))),
+            Number::U16 => f64::from(u16::from_ne_bytes(self.read(index))),
+            Number::U32 => f64::from(u32::from_ne_bytes(self.read(index))),
+            Number::U64 => u64::from_ne_bytes(self.read(index)) as f64,
+            Number::F32 => f64::from(f32::from_ne_bytes(self.read(index))),
+            Number::F64 => f64::from_ne_bytes(self.read(index)),
+        }
+    }
+
+    /// A value as an integer; `None` for a real number that is none.
+    ///
+    /// # Panics
+    /// Where `index` is out of range.
+    pub(crate) fn integer(&self, index: usize) -> Option<i64> {
+        match self.number {
+            Number::I64 => Some(i64::from_ne_bytes(self.read(index))),
+            Number::U64 => i64::try_from(u64::from_ne_bytes(self.read(index))).ok(),
+            _ => {
+                let value = self.get(index);
+                #[expect(clippy::cast_possible_truncation, reason = "a whole number below 2^53")]
+                (value.fract() == 0.0 && value.abs() < 9.0e15).then_some(value as i64)
+            }
+        }
+    }
+
+    /// A value as a whole number from 0 on.
+    ///
+    /// # Panics
+    /// Where `index` is out of range.
+    pub(crate) fn whole(&self, index: usize) -> Option<u64> {
+        self.integer(index).and_then(|value| u64::try_from(value).ok())
+    }
+
+    /// The values in memory as a slice, where they can be seen as one: every `stride`-th of it is one of them.
+    fn slice<T>(&self) -> Option<(&'call [T], usize)> {
+        let size = size_of::<T>();
+        if size != self.number.bytes() || self.swapped {
+            return None;
+        }
+        if self.count == 0 {
+            return Some((&[], 1));
+        }
+        let stride = if self.count == 1 { size } else { self.stride };
+        if !stride.is_multiple_of(size) || stride == 0 || !self.first.addr().is_multiple_of(align_of::<T>()) {
+            return None;
+        }
+        let length = (self.count - 1) * (stride / size) + 1;
+        // SAFETY: aligned; the last of the values is the last element of the slice, and what lies between two of them lies between
+        // two addresses of the solver's array (`new`), live and unchanged during the call. Every pattern of bits is a number.
+        Some((unsafe { std::slice::from_raw_parts(self.first.cast::<T>(), length) }, stride / size))
+    }
+
+    /// The values as the adaptor borrows them, with the distance between two; `None` where they have to be copied.
+    pub(crate) fn values(&self) -> Option<(Values<'call>, usize)> {
+        match self.number {
+            Number::F32 => self.slice().map(|(values, stride)| (Values::F32(values), stride)),
+            Number::F64 => self.slice().map(|(values, stride)| (Values::F64(values), stride)),
+            Number::I32 => self.slice().map(|(values, stride)| (Values::I32(values), stride)),
+            Number::I64 => self.slice().map(|(values, stride)| (Values::I64(values), stride)),
+            Number::U8 => self.slice().map(|(values, stride)| (Values::U8(values), stride)),
+            Number::I8 | Number::I16 | Number::U16 | Number::U32 | Number::U64 => None,
+        }
+    }
+
+    /// The values as vertex numbers, one beside the other; `None` where they have to be copied.
+    pub(crate) fn indices(&self) -> Option<Indices<'call>> {
+        if self.count > 1 && self.stride != self.number.bytes() {
+            return None;
+        }
+        match self.number {
+            Number::I32 => self.slice().map(|(values, _)| Indices::I32(values)),
+            Number::I64 => self.slice().map(|(values, _)| Indices::I64(values)),
+            Number::U32 => self.slice().map(|(values, _)| Indices::U32(values)),
+            Number::U64 => self.slice().map(|(values, _)| Indices::U64(values)),
+            _ => None,
+        }
+    }
+
+    /// Where the first and the last value lie: the bounds of the memory that is lent.
+    pub(crate) fn ends(&self) -> Option<[(*const u8, usize); 2]> {
+        let last = self.first.wrapping_add(self.count.checked_sub(1)? * self.stride);
+        Some([(self.first, self.number.bytes()), (last, self.number.bytes())])
+    }
+
+    /// The address of the first value.
+    pub(crate) fn address(&self) -> usize {
+        self.first.addr()
+    }
+
+    /// Whether its values are whole numbers by their type.
+    pub(crate) fn is_integer(&self) -> bool {
+        !self.number.is_real()
+    }
+
+    /// Takes the values into a fingerprint.
+    pub(crate) fn fingerprint(&self, into: &mut Fingerprint) {
+        into.add(self.count as u64);
+        if self.stride == self.number.bytes() && self.count > 0 {
+            // SAFETY: the values lie one beside the other (`new`), and any bytes are bytes.
+            into.bytes(unsafe { std::slice::from_raw_parts(self.first, self.count * self.stride) });
+        } else {
+            (0..self.count).for_each(|index| into.add(self.get(index).to_bits()));
+        }
+    }
+}
+
+/// Tells arrays apart that differ: of arrays that solvers hand over, not of ones made to deceive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Fingerprint([u64; 4]);
+
+impl Default for Fingerprint {
+    fn default() -> Self {
+        Self([0x9e37_79b9_7f4a_7c15, 0xbf58_476d_1ce4_e5b9, 0x94d0_49bb_1331_11eb, 0x2545_f491_4f6c_dd1d])
+    }
+}
+
+impl Fingerprint {
+    fn mix(state: u64, word: u64) -> u64 {
+        (state ^ word).wrapping_mul(0x9fb2_1c65_1e98_df25).rotate_left(29)
+    }
+
+    pub(crate) fn add(&mut self, word: u64) {
+        self.0[0] = Self::mix(self.0[0], word);
+        self.0.rotate_left(1);
+    }
+
+    fn bytes(&mut self, bytes: &[u8]) {
+        let (blocks, rest) = bytes.as_chunks::<32>();
+        for block in blocks {
+            let (words, _) = block.as_chunks::<8>();
+            for (state, word) in self.0.iter_mut().zip(words) {
+                *state = Self::mix(*state, u64::from_ne_bytes(*word));
+            }
+        }
+        rest.iter().for_each(|byte| self.add(u64::from(*byte)));
+    }
+}

@@ -1,0 +1,268 @@
+//! What `catalyst_initialize` says: pipelines, parameters, orders, the ranks.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+use tombolo::Parameter;
+use tombolo::pipelines::language::{self, Config, TimedCommand};
+
+use crate::error::CatalystError;
+use crate::node::{Kind, Node};
+use crate::results::RESERVED;
+
+/// The variable that names a configuration, for a solver whose own input names none.
+const PIPELINES: &str = "TOMBOLO_PIPELINES";
+/// The variable that names a file of orders.
+const ORDERS: &str = "TOMBOLO_ORDERS";
+/// The variable that names the directory of what is written.
+const OUTPUT: &str = "TOMBOLO_OUTPUT";
+
+/// The variable that names the file of the report at the end.
+const REPORT: &str = "TOMBOLO_REPORT";
+
+/// What a run is set up with.
+#[derive(Debug)]
+pub(crate) struct Configuration {
+    pub(crate) config: Config,
+    /// Whether nobody asked for this configuration.
+    pub(crate) is_default: bool,
+    pub(crate) parameters: Vec<Parameter>,
+    pub(crate) orders: Vec<TimedCommand>,
+    pub(crate) output: PathBuf,
+    /// The Fortran handle of the communicator.
+    pub(crate) communicator: Option<i32>,
+    /// What is not done, for the log.
+    pub(crate) notes: Vec<String>,
+}
+
+/// What is found on the way through the node.
+#[derive(Default)]
+struct Found {
+    files: Vec<String>,
+    pipelines: Vec<serde_json::Value>,
+    notes: Vec<String>,
+}
+
+impl Configuration {
+    /// Reads `catalyst` of the node of `catalyst_initialize`; without one everything is the default.
+    pub(crate) fn read(root: &Node<'_, '_>) -> Result<Self, CatalystError> {
+        let mut found = Found::default();
+        let (mut parameters, mut communicator, mut orders) = (Vec::new(), None, Vec::new());
+        if let Some(catalyst) = root.child(c"catalyst") {
+            if let Some(scripts) = catalyst.child(c"scripts") {
+                each(&scripts, |child| script(child, &mut found))?;
+            }
+            if let Some(pipelines) = catalyst.child(c"pipelines") {
+                each(&pipelines, |child| pipeline(child, &mut found))?;
+            }
+            if let Some(node) = catalyst.child(c"parameters") {
+                each(&node, |child| parameter(child, &mut parameters))?;
+            }
+            if let Some(handle) = catalyst.child(c"mpi_comm") {
+                let value = handle.array().ok().filter(|array| array.len() == 1).and_then(|array| array.integer(0));
+                let value = value.and_then(|value| i32::try_from(value).ok());
+                communicator = Some(value.ok_or_else(|| handle.wrong("the Fortran handle of a communicator".into()))?);
+            }
+        }
+        if found.files.is_empty() && found.pipelines.is_empty() {
+            found.files.extend(variable(PIPELINES));
+        }
+        if let Some(file) = variable(ORDERS) {
+            orders = language::parse_orders(&text(&file)?, &file).map_err(unreadable)?;
+        }
+        let is_default = found.files.is_empty() && found.pipelines.is_empty();
+        Ok(Self {
+            config: if is_default { default_config()? } else { merged(&found)? },
+            is_default,
+            parameters,
+            orders,
+            output: variable(OUTPUT).map_or_else(|| PathBuf::from("."), PathBuf::from),
+            communicator,
+            notes: found.notes,
+        })
+    }
+}
+
+fn variable(name: &str) -> Option<String> {
+    std::env::var(name).ok().filter(|value| !value.is_empty())
+}
+
+/// Where the report of the run goes.
+pub(crate) fn report_file() -> Option<String> {
+    variable(REPORT)
+}
+
+fn text(file: &str) -> Result<String, CatalystError> {
+    let bytes = std::fs::read(file).map_err(|error| CatalystError::Configuration(format!("{file}: {error}")))?;
+    Ok(language::text(&bytes, file).map_err(unreadable)?.to_owned())
+}
+
+fn unreadable(error: impl ToString) -> CatalystError {
+    CatalystError::Configuration(error.to_string())
+}
+
+/// The surface of the first channel, for whoever opens the link.
+fn default_config() -> Result<Config, CatalystError> {
+    let config = json!({
+        "version": 1,
+        "stream": {},
+        "pipelines": [{"name": "surface", "every": {"steps": 1}, "stages": [{"surface": {}}, {"stream": {}}]}]
+    });
+    language::parse(&config.to_string(), "the default configuration").map_err(unreadable)
+}
+
+/// The configurations of all files as one, and what the node itself asks for.
+fn merged(found: &Found) -> Result<Config, CatalystError> {
+    let own = json!({"version": 1, "pipelines": found.pipelines});
+    let mut config: Option<Config> = None;
+    for file in &found.files {
+        let next = language::parse(&text(file)?, file).map_err(unreadable)?;
+        match &mut config {
+            None => config = Some(next),
+            Some(config) => {
+                config.stream = config.stream.take().or(next.stream);
+                config.journal = config.journal.take().or(next.journal);
+                config.pipelines.extend(next.pipelines);
+            }
+        }
+    }
+    let own = language::parse(&own.to_string(), "catalyst/pipelines").map_err(unreadable)?;
+    Ok(match config {
+        None => own,
+        Some(mut config) => {
+            config.pipelines.extend(own.pipelines);
+            config
+        }
+    })
+}
+
+fn each(
+    node: &Node<'_, '_>,
+    mut visit: impl FnMut(&Node<'_, '_>) -> Result<(), CatalystError>,
+) -> Result<(), CatalystError> {
+    if !matches!(node.kind(), Kind::Object | Kind::List | Kind::Empty) {
+        return Err(node.wrong("an object or a list".into()));
+    }
+    for (index, name) in node.names().iter().enumerate() {
+        if let Some(child) = node.at(index, name) {
+            visit(&child)?;
+        }
+    }
+    Ok(())
+}
+
+fn is_json(file: &str) -> bool {
+    Path::new(file).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"))
+}
+
+/// A script is a file, or an object with `filename`; ours are JSON.
+fn script(node: &Node<'_, '_>, found: &mut Found) -> Result<(), CatalystError> {
+    let file = match node.kind() {
+        Kind::Text => node.text()?,
+        _ => node.need(c"filename", "the script's file")?.text()?,
+    };
+    if is_json(&file) {
+        found.files.push(file);
+    } else {
+        let path = node.path();
+        found.notes.push(format!("'{path}': {file} is not run: a configuration is a file that ends in .json"));
+    }
+    Ok(())
+}
+
+/// A pipeline of Catalyst: `io` writes files; a text, or an object with `filename` and no other type, names a configuration.
+fn pipeline(node: &Node<'_, '_>, found: &mut Found) -> Result<(), CatalystError> {
+    if node.kind() == Kind::Text {
+        return script(node, found);
+    }
+    let kind = node.child(c"type").map_or(Ok(String::new()), |kind| kind.text())?;
+    let file_node = node.need(c"filename", "the file to write, or the configuration to read")?;
+    let file = file_node.text()?;
+    match kind.as_str() {
+        "io" => {
+            let channel = node.need(c"channel", "the name of the channel to write")?.text()?;
+            let (file, note) = written_file(&file);
+            if let Some(note) = note {
+                found.notes.push(format!("'{}': {note}", file_node.path()));
+            }
+            found.pipelines.push(json!({
+                "name": node.name(), "channel": channel, "every": {"steps": 1}, "stages": [{"write": {"file": file}}]
+            }));
+            Ok(())
+        }
+        _ if is_json(&file) => script(node, found),
+        "" => Err(file_node.wrong_found(format!("'{file}'"), "a file that ends in .json, or the type 'io' beside it".into())),
+        other => {
+            let kind = node.need(c"type", "'io'")?;
+            Err(kind.wrong_found(format!("'{other}'"), "'io', or a filename that ends in .json".into()))
+        }
+    }
+}
+
+/// ParaView's pattern as ours. Files of VTK's other kinds are written as .vtu, which holds the same mesh.
+fn written_file(file: &str) -> (String, Option<String>) {
+    let mut pattern = String::new();
+    let mut rest = file;
+    while let Some((before, after)) = rest.split_once('{') {
+        pattern.push_str(before);
+        let Some((name, behind)) = after.split_once('}') else {
+            rest = after;
+            pattern.push('{');
+            break;
+        };
+        // A format may follow the name: `{timestep:06d}`.
+        let name = match name.split(':').next().unwrap_or_default() {
+            "timestep" | "cycle" => "cycle",
+            other => other,
+        };
+        pattern.push_str(&format!("{{{name}}}"));
+        rest = behind;
+    }
+    pattern.push_str(rest);
+    let extension = Path::new(&pattern).extension().map(|extension| extension.to_string_lossy().into_owned());
+    match extension.as_deref() {
+        Some("vtu" | "vtp") => (pattern, None),
+        Some(other) if other.starts_with("vt") || other.starts_with("pvt") => {
+            let stem = pattern.trim_end_matches(other);
+            let written = format!("{stem}vtu");
+            let note = format!("a .{other} file is written as {written}");
+            (written, Some(note))
+        }
+        _ => (pattern, None),
+    }
+}
+
+/// A number that can be steered: `{value, minimum, maximum}`, or a number without bounds. Texts are those of others.
+fn parameter(node: &Node<'_, '_>, parameters: &mut Vec<Parameter>) -> Result<(), CatalystError> {
+    let name = node.name().into_owned();
+    if RESERVED.contains(&name.as_str()) {
+        return Err(node.wrong_found(format!("the name '{name}'"), format!("a name that is none of {}", RESERVED.join(", "))));
+    }
+    let bound = |child: &std::ffi::CStr, default: f64| node.child(child).map_or(Ok(default), |child| child.number());
+    let (value, minimum, maximum) = match node.kind() {
+        Kind::Numbers => (node.number()?, -f64::MAX, f64::MAX),
+        Kind::Object => (
+            node.need(c"value", "the parameter's value")?.number()?,
+            bound(c"minimum", -f64::MAX)?,
+            bound(c"maximum", f64::MAX)?,
+        ),
+        _ => return Ok(()),
+    };
+    parameters.push(Parameter { name, value, minimum, maximum });
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patterns_of_paraview_become_ours() {
+        assert_eq!(written_file("out-{timestep}.vtu"), ("out-{cycle}.vtu".into(), None));
+        assert_eq!(written_file("out-{timestep:06d}-{time}.vtp"), ("out-{cycle}-{time}.vtp".into(), None));
+        let (file, note) = written_file("out-{timestep}.vtpd");
+        assert_eq!(file, "out-{cycle}.vtu");
+        assert!(note.is_some_and(|note| note.contains(".vtpd")));
+        assert_eq!(written_file("plain.vtu"), ("plain.vtu".into(), None));
+    }
+}

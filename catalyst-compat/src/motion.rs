@@ -1,0 +1,57 @@
+//! What the adaptor asks of the solver, kept until the solver has read it.
+
+use std::collections::BTreeMap;
+
+use tombolo::Steering;
+use tombolo::deform::mesh::Vector;
+
+/// A motion of the mesh over one step.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Motion {
+    pub(crate) coordinates: Vec<Vector>,
+    pub(crate) displacement: Vec<Vector>,
+    pub(crate) velocity: Vec<Vector>,
+    pub(crate) shape: (u32, u32),
+    pub(crate) order: String,
+}
+
+/// What the adaptor asks for the step that follows.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Asked {
+    /// Where the mesh goes, if it moves.
+    pub(crate) motion: Option<Motion>,
+    /// The parameters and their values now.
+    pub(crate) parameters: BTreeMap<String, f64>,
+    /// Names of those that changed with the last call.
+    pub(crate) changed: Vec<String>,
+    /// Whether the run is to end.
+    pub(crate) stop: bool,
+}
+
+impl Asked {
+    /// Takes over what the last call gave back.
+    pub(crate) fn take(&mut self, steering: &Steering<'_>) {
+        self.stop = steering.stop;
+        self.changed.clear();
+        for (name, value) in steering.parameters {
+            self.changed.push(name.clone());
+            self.parameters.insert(name.clone(), *value);
+        }
+        let Some(motion) = &steering.motion else {
+            self.motion = None;
+            return;
+        };
+        let kept = self.motion.get_or_insert_default();
+        for (kept, given) in [
+            (&mut kept.coordinates, motion.coordinates),
+            (&mut kept.displacement, motion.displacement),
+            (&mut kept.velocity, motion.velocity),
+        ] {
+            kept.clear();
+            kept.extend_from_slice(given);
+        }
+        kept.shape = motion.shape;
+        kept.order.clear();
+        kept.order.push_str(motion.order);
+    }
+}

@@ -1,0 +1,99 @@
+//! The processes that run together, and how they agree about what each was given.
+
+use std::sync::Arc;
+
+use tombolo::comm::Communicator;
+use tombolo::pipelines::communicator::Reduction;
+
+use crate::error::{CatalystError, Status};
+
+/// The communicator of this Fortran handle; without one, MPI's world where MPI runs, else this process by itself.
+#[cfg(feature = "distributed")]
+pub(crate) fn communicator(handle: Option<i32>) -> Result<Arc<dyn Communicator>, CatalystError> {
+    use tombolo::comm::{Solo, mpi};
+    let unusable = |error: mpi::MpiError| CatalystError::Configuration(format!("'catalyst/mpi_comm': {error}"));
+    match handle {
+        // SAFETY: Catalyst's blueprint says that `catalyst/mpi_comm` is the handle of a live communicator; a null one is told.
+        Some(handle) => Ok(Arc::new(unsafe { mpi::Mpi::from_fortran(handle) }.map_err(unusable)?)),
+        None => {
+            use mpi::rsmpi::environment::{is_finalized, is_initialized};
+            if !is_initialized() || is_finalized() {
+                return Ok(Arc::new(Solo));
+            }
+            // SAFETY: the world is alive between MPI's initialization and its end.
+            let world = unsafe { mpi::Mpi::from_raw(mpi::rsmpi::ffi::RSMPI_COMM_WORLD) };
+            Ok(Arc::new(world.map_err(unusable)?))
+        }
+    }
+}
+
+/// This process by itself: built without the feature `distributed`.
+#[cfg(not(feature = "distributed"))]
+pub(crate) fn communicator(_: Option<i32>) -> Result<Arc<dyn Communicator>, CatalystError> {
+    let size = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MV2_COMM_WORLD_SIZE"]
+        .into_iter()
+        .find_map(|name| std::env::var(name).ok()?.parse::<usize>().ok());
+    match size {
+        Some(size) if size > 1 => Err(CatalystError::Configuration(format!(
+            "{size} ranks run, but this library was built without MPI; expected a build with the feature 'distributed'"
+        ))),
+        _ => Ok(Arc::new(tombolo::comm::Solo)),
+    }
+}
+
+/// Goes on where all ranks can; where one cannot, all get its error with its status. Collective.
+pub(crate) fn agree<T>(ranks: &dyn Communicator, mine: Result<T, CatalystError>) -> Result<T, CatalystError> {
+    if ranks.size() == 1 {
+        return mine;
+    }
+    #[expect(clippy::cast_precision_loss, reason = "ranks below 2^53")]
+    let (own, none) = (ranks.rank() as f64, ranks.size() as f64);
+    let mut first = [if mine.is_err() { own } else { none }];
+    ranks.reduce(Reduction::Minimum, &mut first);
+    if first[0] >= none {
+        return mine;
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a rank")]
+    let rank = first[0] as usize;
+    let mut bytes = match &mine {
+        Err(error) => format!("{} {error}", error.status() as i32).into_bytes(),
+        Ok(_) => Vec::new(),
+    };
+    ranks.broadcast(rank, &mut bytes);
+    // On the rank itself its own error says it all.
+    match mine {
+        Err(error) if rank == ranks.rank() => Err(error),
+        _ => {
+            let told = String::from_utf8_lossy(&bytes).into_owned();
+            let (status, message) = told.split_once(' ').unwrap_or(("100", told.as_str()));
+            let status = if status == "102" { Status::Failed } else { Status::InvalidNode };
+            Err(CatalystError::Rank { rank, message: message.into(), status })
+        }
+    }
+}
+
+/// The names of all ranks' channels, in the order of their ranks and there in their own. Collective.
+pub(crate) fn union(ranks: &dyn Communicator, own: &[&str]) -> Vec<String> {
+    let mut bytes = own.join("\n").into_bytes();
+    // Most often all have the same.
+    let hash = bytes.iter().fold(bytes.len() as u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3));
+    let mut spread = [f64::from((hash >> 32) as u32 ^ hash as u32), 0.0];
+    spread[1] = -spread[0];
+    ranks.reduce(Reduction::Minimum, &mut spread);
+    if spread[0] == -spread[1] {
+        return own.iter().map(|name| (*name).to_owned()).collect();
+    }
+    if let Some(all) = ranks.gather(0, &bytes) {
+        let mut names: Vec<String> = Vec::new();
+        for part in &all {
+            for name in String::from_utf8_lossy(part).lines() {
+                if !names.iter().any(|known| known == name) {
+                    names.push(name.to_owned());
+                }
+            }
+        }
+        bytes = names.join("\n").into_bytes();
+    }
+    ranks.broadcast(0, &mut bytes);
+    String::from_utf8_lossy(&bytes).lines().map(str::to_owned).collect()
+}

@@ -1,0 +1,163 @@
+//! One run: the adaptor, what is kept for it of each channel, and what it asks of the solver.
+
+use std::sync::Arc;
+
+use tombolo::comm::Communicator;
+use tombolo::deform::mesh::MeshView;
+use tombolo::pipelines::extract::{self, FieldView};
+use tombolo::{Adaptor, FinalizeError, OrderReport, Report, Settings, Step};
+
+use crate::error::CatalystError;
+use crate::mesh::{Block, Channel, Kept};
+use crate::motion::Asked;
+use crate::ranks;
+
+/// A run under way.
+pub(crate) struct Run {
+    adaptor: Adaptor,
+    communicator: Arc<dyn Communicator>,
+    kept: Vec<(String, Kept)>,
+    /// The channel that orders change.
+    steered: String,
+    /// Its meshes and how many vertices each has.
+    blocks: Vec<(String, usize)>,
+    last_time: Option<f64>,
+    time_step: f64,
+    asked: Asked,
+}
+
+impl Run {
+    /// Begins. Collective.
+    pub(crate) fn new(settings: Settings) -> Result<Self, CatalystError> {
+        let mut asked = Asked::default();
+        let parameters = settings.parameters.iter();
+        asked.parameters.extend(parameters.map(|parameter| (parameter.name.clone(), parameter.value)));
+        let communicator = Arc::clone(&settings.communicator);
+        let adaptor = Adaptor::initialize(settings)?;
+        Ok(Self {
+            adaptor,
+            communicator,
+            kept: Vec::new(),
+            steered: String::new(),
+            blocks: Vec::new(),
+            last_time: None,
+            time_step: 0.0,
+            asked,
+        })
+    }
+
+    /// The link that a viewer opens.
+    pub(crate) fn link(&self) -> Option<String> {
+        self.adaptor.link()
+    }
+
+    /// How many processes run together.
+    pub(crate) fn ranks(&self) -> usize {
+        self.communicator.size()
+    }
+
+    /// What is asked for the step that follows.
+    pub(crate) fn asked(&self) -> &Asked {
+        &self.asked
+    }
+
+    /// The channel that orders change, its meshes and how many vertices each has.
+    pub(crate) fn steered(&self) -> (&str, &[(String, usize)]) {
+        (&self.steered, &self.blocks)
+    }
+
+    /// The orders so far and what became of each.
+    pub(crate) fn orders(&self) -> Vec<OrderReport> {
+        self.adaptor.orders()
+    }
+
+    /// The length of the step to come, where the solver does not say: that of the step that has been.
+    pub(crate) fn likely_time_step(&self, time: f64) -> f64 {
+        match self.last_time {
+            Some(last) if time > last => time - last,
+            Some(last) if time < last => 0.0,
+            _ => self.time_step,
+        }
+    }
+
+    /// Shows a step to the adaptor. Collective.
+    ///
+    /// `given` is what the solver shows, or why it cannot be shown; then nothing was done, on any rank.
+    pub(crate) fn execute<'call>(
+        &mut self,
+        given: Result<(Step, Vec<Channel<'call>>), CatalystError>,
+    ) -> Result<(), CatalystError> {
+        // What can be wrong here alone is agreed upon before anything that all do together.
+        let prepared = given.and_then(|(step, channels)| {
+            let looked_at = self.adaptor.looks_at(&step);
+            channels.iter().try_for_each(|channel| self.update(channel, looked_at))?;
+            Ok((step, channels))
+        });
+        let (step, mut channels) = ranks::agree(&*self.communicator, prepared)?;
+        self.time_step = step.time_step;
+        self.last_time = Some(step.time);
+        self.complete(&mut channels)?;
+        if let Some(steered) = channels.first() {
+            self.steered.clone_from(&steered.name);
+            self.blocks.clear();
+            self.blocks.extend(steered.blocks.iter().map(|block: &Block| (block.name.clone(), block.vertex_count())));
+        }
+        let Self { adaptor, kept, asked, .. } = self;
+        let mut fields: Vec<Vec<FieldView<'_>>> = channels.iter().map(|_| Vec::new()).collect();
+        let mut meshes: Vec<MeshView<'_>> = Vec::with_capacity(channels.len());
+        for (channel, fields) in channels.iter().zip(&mut fields) {
+            let kept = kept.iter().find(|(name, _)| *name == channel.name);
+            if let Some((_, kept)) = kept {
+                meshes.push(kept.views(channel, fields));
+            }
+        }
+        let parts = channels.iter().zip(meshes).zip(&fields);
+        let views: Vec<extract::Channel<'_>> =
+            parts.map(|((channel, mesh), fields)| extract::Channel { name: &channel.name, mesh, fields }).collect();
+        asked.take(&adaptor.execute(&step, &views)?);
+        Ok(())
+    }
+
+    fn update(&mut self, channel: &Channel<'_>, looked_at: bool) -> Result<(), CatalystError> {
+        if !self.kept.iter().any(|(name, _)| *name == channel.name) {
+            self.kept.push((channel.name.clone(), Kept::default()));
+        }
+        let kept = self.kept.iter_mut().find(|(name, _)| *name == channel.name);
+        kept.map_or(Ok(()), |(_, kept)| kept.update(channel, looked_at))
+    }
+
+    /// Gives every rank the channels of all, empty where it has none, in one order. Collective.
+    fn complete(&mut self, channels: &mut Vec<Channel<'_>>) -> Result<(), CatalystError> {
+        if self.communicator.size() == 1 {
+            return Ok(());
+        }
+        let own: Vec<&str> = channels.iter().map(|channel| channel.name.as_str()).collect();
+        let names = ranks::union(&*self.communicator, &own);
+        let mut given = std::mem::take(channels);
+        for name in names {
+            channels.push(match given.iter().position(|channel| channel.name == name) {
+                Some(place) => given.swap_remove(place),
+                None => {
+                    let nothing = Channel { name, ..Channel::default() };
+                    self.update(&nothing, true)?;
+                    nothing
+                }
+            });
+        }
+        Ok(())
+    }
+
+    /// Ends the run. Collective. The report is there even where a file could not be written.
+    pub(crate) fn finalize(self) -> (Option<Report>, Result<(), CatalystError>) {
+        match self.adaptor.finalize() {
+            Ok(report) => (Some(report), Ok(())),
+            Err(error) => {
+                let report = match &error {
+                    FinalizeError::Files { report, .. } => Some((**report).clone()),
+                    _ => None,
+                };
+                (report, Err(error.into()))
+            }
+        }
+    }
+}
