@@ -22,25 +22,21 @@ pub(crate) struct Asked {
     pub(crate) motion: Option<Motion>,
     /// The parameters and their values now.
     pub(crate) parameters: BTreeMap<String, f64>,
-    /// Names of those that changed with the last call.
-    pub(crate) changed: Vec<String>,
     /// Whether the run is to end.
     pub(crate) stop: bool,
 }
 
 impl Asked {
+    /// The mesh stays where it is.
+    pub(crate) fn rest(&mut self) {
+        self.motion = None;
+    }
+
     /// Takes over what the last call gave back.
     pub(crate) fn take(&mut self, steering: &Steering<'_>) {
         self.stop = steering.stop;
-        self.changed.clear();
-        for (name, value) in steering.parameters {
-            self.changed.push(name.clone());
-            self.parameters.insert(name.clone(), *value);
-        }
-        let Some(motion) = &steering.motion else {
-            self.motion = None;
-            return;
-        };
+        self.parameters.extend(steering.parameters.iter().cloned());
+        let Some(motion) = &steering.motion else { return };
         let kept = self.motion.get_or_insert_default();
         for (kept, given) in [
             (&mut kept.coordinates, motion.coordinates),

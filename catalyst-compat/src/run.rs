@@ -97,11 +97,14 @@ impl Run {
         self.time_step = step.time_step;
         self.last_time = Some(step.time);
         self.complete(&mut channels)?;
-        if let Some(steered) = channels.first() {
-            self.steered.clone_from(&steered.name);
-            self.blocks.clear();
-            self.blocks.extend(steered.blocks.iter().map(|block: &Block| (block.name.clone(), block.vertex_count())));
-        }
+        // A solver that shows nothing yet is asked for nothing.
+        let Some(steered) = channels.first() else {
+            self.asked.rest();
+            return Ok(());
+        };
+        self.steered.clone_from(&steered.name);
+        self.blocks.clear();
+        self.blocks.extend(steered.blocks.iter().map(|block: &Block| (block.name.clone(), block.vertex_count())));
         let Self { adaptor, kept, asked, .. } = self;
         let mut fields: Vec<Vec<FieldView<'_>>> = channels.iter().map(|_| Vec::new()).collect();
         let mut meshes: Vec<MeshView<'_>> = Vec::with_capacity(channels.len());
@@ -114,6 +117,8 @@ impl Run {
         let parts = channels.iter().zip(meshes).zip(&fields);
         let views: Vec<extract::Channel<'_>> =
             parts.map(|((channel, mesh), fields)| extract::Channel { name: &channel.name, mesh, fields }).collect();
+        // What an earlier step asked for is not asked again.
+        asked.rest();
         asked.take(&adaptor.execute(&step, &views)?);
         Ok(())
     }

@@ -86,11 +86,6 @@ impl Session {
                 channels.push(Channel::read(&channel)?);
             }
         }
-        if channels.is_empty() && self.run.ranks() == 1 {
-            return Err(catalyst
-                .need(c"channels", "an object with at least one channel")
-                .map_or_else(|error| error, |all| all.wrong("at least one channel".into())));
-        }
         Ok((Step { cycle, time, time_step }, channels))
     }
 

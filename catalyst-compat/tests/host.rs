@@ -59,7 +59,6 @@ fn whatever_is_wrong_is_told_with_its_path() {
         "no-such-file.json",
         "'catalyst/pipelines/0/type': found 'oi'; expected 'io'",
         "'catalyst/mpi_comm': found the text 'world'; expected the Fortran handle of a communicator",
-        "'catalyst/channels' is missing",
         "'catalyst/channels/grid/type': found 'msh'; expected 'mesh', 'multimesh' or 'amrmesh'",
         "'catalyst/channels/grid/memoryspace': found 'cuda'; expected 'host'",
         "'catalyst/channels/grid/data/coordsets/coords/type': found 'explicid'",
