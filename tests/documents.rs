@@ -109,6 +109,35 @@ fn edits_of_the_book_are_carried_out() {
     assert_eq!(kinds.len(), 7, "{kinds:?}");
 }
 
+/// Lines without their indentation, empty ones left out.
+fn dense(text: &str) -> Vec<&str> {
+    text.lines().map(str::trim).filter(|line| !line.is_empty()).collect()
+}
+
+/// What the book shows of other languages is cut out of programs that are built and run.
+#[test]
+fn snippets_of_other_languages_are_of_the_examples() {
+    let read = |folder: &str| -> Vec<String> {
+        let files = fs::read_dir(project().join("examples").join(folder)).expect("the examples are there");
+        files.map(|file| fs::read_to_string(file.expect("a file").path()).expect("a text")).collect()
+    };
+    let mut checked = 0;
+    for (language, folder) in [("c", "c"), ("cpp", "cxx"), ("fortran", "fortran")] {
+        let programs = read(folder);
+        for page in pages() {
+            let text = fs::read_to_string(&page).expect("a page can be read");
+            for (line, block) in blocks(&text, language) {
+                let wanted = dense(&block);
+                let found =
+                    programs.iter().any(|program| dense(program).windows(wanted.len()).any(|lines| lines == wanted));
+                assert!(found, "{}:{line}: no example in {folder} has these lines:\n{block}", page.display());
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked >= 10, "{checked} snippets");
+}
+
 #[test]
 fn what_is_wrong_in_a_snippet_is_found() {
     for wrong in

@@ -8,8 +8,10 @@
 //! cargo run --release -p tombolo-benchmarks -- surface-wasm --json
 //! cargo run --release -p tombolo-benchmarks -- skeleton --json
 //! cargo run --release -p tombolo-benchmarks -- scaling --json
+//! cargo run --release -p tombolo-benchmarks -- catalyst --json
 //! ```
 
+mod catalyst;
 mod measure;
 mod overhead;
 mod paper;
@@ -53,6 +55,8 @@ enum Name {
     Stiffening,
     /// Surfaces of meshes in parts: the time it takes, and what goes from rank to rank.
     Scaling,
+    /// What an attached Catalyst implementation costs when nothing is due, and the memory that it adds.
+    Catalyst,
     /// Volume motion at the sizes of the paper's meshes, beside the paper and PETSc.
     Volume,
 }
@@ -73,6 +77,11 @@ fn main() -> ExitCode {
         Name::Scaling => {
             return said(
                 scaling::run().map(|report| if arguments.json { report.json() + "\n" } else { report.to_string() }),
+            );
+        }
+        Name::Catalyst => {
+            return said(
+                catalyst::run().map(|report| if arguments.json { report.json() + "\n" } else { report.to_string() }),
             );
         }
         Name::Overhead => overhead::run(),

@@ -38,6 +38,7 @@ pub(crate) struct Node<'up, 'call> {
     pointer: *mut RawNode,
     name: &'up CStr,
     parent: Option<&'up Node<'up, 'call>>,
+    type_number: i64,
     call: PhantomData<&'call RawNode>,
 }
 
@@ -49,7 +50,21 @@ impl<'call> Node<'_, 'call> {
         if pointer.is_null() {
             return Err(CatalystError::NullNode);
         }
-        Ok(Self { host, pointer: pointer.cast_mut(), name: c"", parent: None, call: PhantomData })
+        // SAFETY: the node is live, by the caller's promise.
+        Ok(unsafe { Self::reached(host, pointer.cast_mut(), c"", None) })
+    }
+
+    /// # Safety
+    /// `pointer` is a live node of the host's Conduit.
+    unsafe fn reached<'next>(
+        host: &'static Host,
+        pointer: *mut RawNode,
+        name: &'next CStr,
+        parent: Option<&'next Node<'next, 'call>>,
+    ) -> Node<'next, 'call> {
+        // SAFETY: the node is live; its data type is part of it.
+        let type_number = unsafe { (host.type_number)((host.dtype)(pointer)) };
+        Node { host, pointer, name, parent, type_number, call: PhantomData }
     }
 
     /// The way from the root: names joined by `/`.
@@ -66,13 +81,8 @@ impl<'call> Node<'_, 'call> {
         self.name.to_string_lossy()
     }
 
-    fn type_number(&self) -> i64 {
-        // SAFETY: the node is live and not null (`root`, `child`); its data type is part of it.
-        unsafe { (self.host.type_number)((self.host.dtype)(self.pointer)) }
-    }
-
     pub(crate) fn kind(&self) -> Kind {
-        match self.type_number() {
+        match self.type_number {
             type_number::EMPTY => Kind::Empty,
             type_number::OBJECT => Kind::Object,
             type_number::LIST => Kind::List,
@@ -94,7 +104,8 @@ impl<'call> Node<'_, 'call> {
             }
             (self.host.child_by_name)(self.pointer, name.as_ptr())
         };
-        (!pointer.is_null()).then_some(Node { host: self.host, pointer, name, parent: Some(self), call: PhantomData })
+        // SAFETY: what Conduit hands out as a child is a live node of the tree.
+        (!pointer.is_null()).then(|| unsafe { Self::reached(self.host, pointer, name, Some(self)) })
     }
 
     /// The child of this name.
@@ -105,8 +116,7 @@ impl<'call> Node<'_, 'call> {
     ) -> Result<Node<'next, 'call>, CatalystError> {
         self.child(name).ok_or_else(|| match self.kind() {
             Kind::Object | Kind::Empty => {
-                let missing = Node { host: self.host, pointer: self.pointer, name, parent: Some(self), call: PhantomData };
-                CatalystError::Missing { path: missing.path(), expected }
+                CatalystError::Missing { path: Node { name, parent: Some(self), ..*self }.path(), expected }
             }
             _ => self.wrong(format!("an object with '{}'", name.to_string_lossy())),
         })
@@ -152,7 +162,8 @@ impl<'call> Node<'_, 'call> {
         }
         // SAFETY: the index is below the number of children.
         let pointer = unsafe { (self.host.child)(self.pointer, i64::try_from(index).ok()?) };
-        (!pointer.is_null()).then_some(Node { host: self.host, pointer, name, parent: Some(self), call: PhantomData })
+        // SAFETY: what Conduit hands out as a child is a live node of the tree.
+        (!pointer.is_null()).then(|| unsafe { Self::reached(self.host, pointer, name, Some(self)) })
     }
 
     /// The text that it holds.
@@ -196,7 +207,7 @@ impl<'call> Node<'_, 'call> {
 
     /// The numbers that it holds, borrowed for the length of the call.
     pub(crate) fn array(&self) -> Result<Array<'call>, CatalystError> {
-        let number = match self.type_number() {
+        let number = match self.type_number {
             3 => Number::I8,
             4 => Number::I16,
             5 => Number::I32,

@@ -197,3 +197,18 @@ fn every_mesh_of_the_blueprint_arrives() {
     assert_eq!(Written::read(&written, "mixed", 0).field("each"), [1.0, 2.0, 3.0, 4.0]);
     assert_eq!(Written::read(&written, "blocks", 0).field("which"), [1.0, 2.0]);
 }
+
+#[test]
+fn valgrind_finds_nothing() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let pipelines = directory.path().join("pipelines.json");
+    std::fs::write(&pipelines, QUALITY).expect("a file");
+    for name in ["host", "meshes"] {
+        let program = compile(directory.path(), name, true);
+        let mut command = Command::new("valgrind");
+        command.args(["-q", "--error-exitcode=9", "--leak-check=full", "--errors-for-leak-kinds=definite"]);
+        command.arg(&program).arg(library()).arg(&pipelines).env("TOMBOLO_PIPELINES", &pipelines);
+        let output = command.env("TOMBOLO_OUTPUT", directory.path()).output().expect("valgrind is installed (scripts/setup)");
+        assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+}

@@ -76,7 +76,11 @@ impl Run {
         Self::start(command.current_dir(project()).arg(programs().join("flow")).args(arguments))
     }
 
-    fn start(command: &mut Command) -> Run {
+    /// Starts any program.
+    ///
+    /// # Panics
+    /// Where it cannot be started.
+    pub fn start(command: &mut Command) -> Run {
         let mut child =
             command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("flow starts");
         let (sender, lines) = channel();

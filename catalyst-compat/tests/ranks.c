@@ -1,0 +1,98 @@
+/* Ranks that go wrong by themselves, and ranks without data: no rank waits for another, all get the same answer. On three ranks. */
+#include <catalyst.h>
+#include <mpi.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+static int rank;
+
+/* All ranks have this answer. */
+static void expect(const char* what, int status, int wanted)
+{
+  int least, most;
+  MPI_Allreduce(&status, &least, 1, MPI_INT, MPI_MIN, MPI_COMM_WORLD);
+  MPI_Allreduce(&status, &most, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
+  if (rank == 0) fprintf(stderr, "-- %s\n", what);
+  if (least != wanted || most != wanted) {
+    fprintf(stderr, "%s: %d to %d where %d is expected\n", what, least, most, wanted);
+    MPI_Abort(MPI_COMM_WORLD, 1);
+  }
+}
+
+static double points[24];
+static const int32_t hex[8] = { 0, 1, 3, 2, 4, 5, 7, 6 };
+static double heat[8];
+
+/* Rank 2 has no cells, and does not even name the channel. */
+static conduit_node* step(int cycle)
+{
+  conduit_node* node = conduit_node_create();
+  conduit_node_set_path_int32(node, "catalyst/state/timestep", cycle);
+  conduit_node_set_path_float64(node, "catalyst/state/time", cycle);
+  if (rank == 2) return node;
+  conduit_node* channel = conduit_node_fetch(node, "catalyst/channels/solid");
+  conduit_node_set_path_char8_str(channel, "type", "mesh");
+  conduit_node* mesh = conduit_node_fetch(channel, "data");
+  conduit_node_set_path_char8_str(mesh, "coordsets/coords/type", "explicit");
+  const char* axes[] = { "x", "y", "z" };
+  for (int axis = 0; axis < 3; ++axis) {
+    char path[64];
+    snprintf(path, sizeof path, "coordsets/coords/values/%s", axes[axis]);
+    conduit_node_set_path_external_float64_ptr_detailed(mesh, path, points, 8, 8 * axis, 24, 8, 0);
+  }
+  conduit_node_set_path_char8_str(mesh, "topologies/mesh/type", "unstructured");
+  conduit_node_set_path_char8_str(mesh, "topologies/mesh/coordset", "coords");
+  conduit_node_set_path_char8_str(mesh, "topologies/mesh/elements/shape", "hex");
+  conduit_node_set_path_external_int32_ptr(mesh, "topologies/mesh/elements/connectivity", (int32_t*)hex, 8);
+  conduit_node_set_path_char8_str(mesh, "fields/heat/association", "vertex");
+  conduit_node_set_path_char8_str(mesh, "fields/heat/topology", "mesh");
+  conduit_node_set_path_external_float64_ptr(mesh, "fields/heat/values", heat, 8);
+  return node;
+}
+
+static int run(conduit_node* node)
+{
+  const int status = (int)catalyst_execute(node);
+  conduit_node_destroy(node);
+  return status;
+}
+
+int main(int argc, char** argv)
+{
+  MPI_Init(&argc, &argv);
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  for (int v = 0; v < 8; ++v) {
+    points[3 * v] = rank + (v & 1);
+    points[3 * v + 1] = v >> 1 & 1;
+    points[3 * v + 2] = v >> 2;
+    heat[v] = points[3 * v];
+  }
+  conduit_node* setup = conduit_node_create();
+  conduit_node_set_path_int32(setup, "catalyst/mpi_comm", MPI_Comm_c2f(MPI_COMM_WORLD));
+  conduit_node* wrong = conduit_node_create();
+  conduit_node_set_node(wrong, setup);
+  if (rank == 1) conduit_node_set_path_char8_str(wrong, "catalyst/scripts/a/filename", "no-such-file.json");
+  expect("a configuration that rank 1 cannot read", (int)catalyst_initialize(wrong), 100);
+  expect("initialize", (int)catalyst_initialize(setup), 0);
+
+  expect("a rank without data", run(step(0)), 0);
+  conduit_node* node = step(1);
+  if (rank == 1) conduit_node_set_path_char8_str(node, "catalyst/channels/solid/data/topologies/mesh/elements/shape", "cube");
+  expect("a shape that rank 1 alone gets wrong", run(node), 100);
+  node = step(1);
+  if (rank == 0) conduit_node_set_path_float64_ptr(node, "catalyst/channels/solid/data/fields/heat/values", heat, 7);
+  expect("a field that is too short on rank 0", run(node), 100);
+  node = step(1);
+  if (rank == 2) conduit_node_remove_path(node, "catalyst/state/time");
+  expect("no time on rank 2", run(node), 100);
+  expect("a sound step after that", run(step(1)), 0);
+  expect("and another", run(step(2)), 0);
+  conduit_node* results = conduit_node_create();
+  expect("results", (int)catalyst_results(results), 0);
+  expect("finalize", (int)catalyst_finalize(setup), 0);
+  conduit_node_destroy(results);
+  conduit_node_destroy(setup);
+  conduit_node_destroy(wrong);
+  MPI_Finalize();
+  return 0;
+}
