@@ -51,11 +51,6 @@ impl Run {
         self.adaptor.link()
     }
 
-    /// How many processes run together.
-    pub(crate) fn ranks(&self) -> usize {
-        self.communicator.size()
-    }
-
     /// What is asked for the step that follows.
     pub(crate) fn asked(&self) -> &Asked {
         &self.asked
