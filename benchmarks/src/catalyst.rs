@@ -122,7 +122,10 @@ impl fmt::Display for Catalyst {
         for Row { case, measured } in &self.rows {
             let Measured { tets, seconds, p95, allocated, added_bytes, mesh_bytes } = measured;
             let (added, own) = (mega(*added_bytes as f64), mega(*mesh_bytes as f64));
-            writeln!(f, "{case:<24} {tets:>10} {seconds:>12.3e} {p95:>12.3e} {allocated:>12} {added:>14.1} {own:>14.1}")?;
+            writeln!(
+                f,
+                "{case:<24} {tets:>10} {seconds:>12.3e} {p95:>12.3e} {allocated:>12} {added:>14.1} {own:>14.1}"
+            )?;
         }
         writeln!(f, "\n{:<44} {:>12} {:>14}", "target", "value", "at most")?;
         for target in &self.targets {

@@ -191,7 +191,10 @@ fn pipeline(node: &Node<'_, '_>, found: &mut Found) -> Result<(), CatalystError>
             Ok(())
         }
         _ if is_json(&file) => script(node, found),
-        "" => Err(file_node.wrong_found(format!("'{file}'"), "a file that ends in .json, or the type 'io' beside it".into())),
+        "" => {
+            Err(file_node
+                .wrong_found(format!("'{file}'"), "a file that ends in .json, or the type 'io' beside it".into()))
+        }
         other => {
             let kind = node.need(c"type", "'io'")?;
             Err(kind.wrong_found(format!("'{other}'"), "'io', or a filename that ends in .json".into()))
@@ -236,7 +239,9 @@ fn written_file(file: &str) -> (String, Option<String>) {
 fn parameter(node: &Node<'_, '_>, parameters: &mut Vec<Parameter>) -> Result<(), CatalystError> {
     let name = node.name().into_owned();
     if RESERVED.contains(&name.as_str()) {
-        return Err(node.wrong_found(format!("the name '{name}'"), format!("a name that is none of {}", RESERVED.join(", "))));
+        return Err(
+            node.wrong_found(format!("the name '{name}'"), format!("a name that is none of {}", RESERVED.join(", ")))
+        );
     }
     let bound = |child: &std::ffi::CStr, default: f64| node.child(child).map_or(Ok(default), |child| child.number());
     let (value, minimum, maximum) = match node.kind() {

@@ -200,7 +200,8 @@ impl<'call> Node<'_, 'call> {
             return Err(self.wrong_found("a null pointer".into(), format!("the address of {count} values")));
         }
         if stride < 0 || count.checked_mul(stride.max(1)).is_none_or(|bytes| bytes > isize::MAX as i64) {
-            return Err(self.wrong_found(format!("{count} values {stride} bytes apart"), "a length that memory can have".into()));
+            return Err(self
+                .wrong_found(format!("{count} values {stride} bytes apart"), "a length that memory can have".into()));
         }
         Ok((first, count, stride))
     }

@@ -76,7 +76,8 @@ pub(crate) fn agree<T>(ranks: &dyn Communicator, mine: Result<T, CatalystError>)
 pub(crate) fn union(ranks: &dyn Communicator, own: &[&str]) -> Vec<String> {
     let mut bytes = own.join("\n").into_bytes();
     // Most often all have the same.
-    let hash = bytes.iter().fold(bytes.len() as u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3));
+    let hash =
+        bytes.iter().fold(bytes.len() as u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3));
     let mut spread = [f64::from((hash >> 32) as u32 ^ hash as u32), 0.0];
     spread[1] = -spread[0];
     ranks.reduce(Reduction::Minimum, &mut spread);

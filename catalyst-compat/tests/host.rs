@@ -120,7 +120,8 @@ impl Written {
                     let [a, rest @ ..] = face else { return };
                     for pair in rest.windows(2) {
                         let [a, b, c] = [*a, pair[0], pair[1]].map(|vertex| points[vertex as usize]);
-                        sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2])
+                        sum += a[0] * (b[1] * c[2] - b[2] * c[1])
+                            + a[1] * (b[2] * c[0] - b[0] * c[2])
                             + a[2] * (b[0] * c[1] - b[1] * c[0]);
                     }
                 });
@@ -208,7 +209,8 @@ fn valgrind_finds_nothing() {
         let mut command = Command::new("valgrind");
         command.args(["-q", "--error-exitcode=9", "--leak-check=full", "--errors-for-leak-kinds=definite"]);
         command.arg(&program).arg(library()).arg(&pipelines).env("TOMBOLO_PIPELINES", &pipelines);
-        let output = command.env("TOMBOLO_OUTPUT", directory.path()).output().expect("valgrind is installed (scripts/setup)");
+        let output =
+            command.env("TOMBOLO_OUTPUT", directory.path()).output().expect("valgrind is installed (scripts/setup)");
         assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
     }
 }

@@ -112,7 +112,10 @@ fn every_language_obeys_the_same_orders_alike() {
         // conductivity changes.
         assert!(moved[1] < rest[1] && moved[1] > 0.7 * rest[1], "{name}: {moved:?}, at rest {rest:?}");
         let first = *first.get_or_insert(moved);
-        assert!(first.iter().zip(moved).all(|(one, other)| (one - other).abs() < 1e-9), "{name}: {moved:?}, not {first:?}");
+        assert!(
+            first.iter().zip(moved).all(|(one, other)| (one - other).abs() < 1e-9),
+            "{name}: {moved:?}, not {first:?}"
+        );
     }
 }
 
@@ -130,7 +133,10 @@ fn three_ranks_and_ranks_without_cells_compute_what_one_does() {
             numbers(&succeed(program.env("TOMBOLO_PIPELINES", &pipelines).env("TOMBOLO_ORDERS", &change)))
         };
         let (one, three) = (run(1, "4"), run(3, "4"));
-        assert!(one[2] == 0.125 && one.iter().zip(three).all(|(a, b)| (a - b).abs() < 1e-12), "{name}: {one:?}, {three:?}");
+        assert!(
+            one[2] == 0.125 && one.iter().zip(three).all(|(a, b)| (a - b).abs() < 1e-12),
+            "{name}: {one:?}, {three:?}"
+        );
         if name == PROGRAMS[0] {
             // Two slabs of cells on three ranks.
             assert!((run(3, "2")[0] - 1.0).abs() < 1e-12);
@@ -149,7 +155,8 @@ fn steer(name: &str, ranks: usize, shape: bool) {
     let link = run.link();
     let mut viewer = Viewer::connect(&link).expect("the run lets in");
     let hello = viewer.wait_for("hello", |hello| hello["channel"] == "solid");
-    let features: Vec<&str> = hello["features"].as_array().into_iter().flatten().filter_map(|it| it["name"].as_str()).collect();
+    let features: Vec<&str> =
+        hello["features"].as_array().into_iter().flatten().filter_map(|it| it["name"].as_str()).collect();
     assert!(viewer.frame().starts_with(b"TMBL"), "{name}");
     if shape {
         for side in ["x-min", "x-max", "y-min", "y-max", "z-min", "z-max"] {
@@ -227,11 +234,17 @@ fn no_rank_waits_for_one_that_goes_wrong() {
     succeed(compile.args(flags.split_whitespace()));
     let mut run = Command::new("timeout");
     run.args(["60", "mpirun", "--oversubscribe", "--allow-run-as-root", "-n", "3"]).arg(&program);
-    run.current_dir(directory.path()).env("CATALYST_IMPLEMENTATION_NAME", "tombolo").env("TOMBOLO_PIPELINES", &pipelines);
+    run.current_dir(directory.path())
+        .env("CATALYST_IMPLEMENTATION_NAME", "tombolo")
+        .env("TOMBOLO_PIPELINES", &pipelines);
     let told = succeed(&mut run);
-    assert!(told.contains("rank 1: 'catalyst/channels/solid/data/topologies/mesh/elements/shape': found 'cube'"), "{told}");
+    assert!(
+        told.contains("rank 1: 'catalyst/channels/solid/data/topologies/mesh/elements/shape': found 'cube'"),
+        "{told}"
+    );
     assert!(told.contains("rank 2: 'catalyst/state/time' is missing"), "{told}");
-    let surface = tombolo::pipelines::files::read_mesh(directory.path().join("surface-000002.vtp")).expect("was written");
+    let surface =
+        tombolo::pipelines::files::read_mesh(directory.path().join("surface-000002.vtp")).expect("was written");
     // Two cubes side by side, without the face between them.
     assert_eq!(surface.mesh.cells().len(), 10);
 }

@@ -37,7 +37,11 @@ impl Address {
         }
         let bytes = count.checked_mul(stride).and_then(|values| values.checked_mul(number.bytes()));
         if bytes.is_none_or(|bytes| isize::try_from(bytes).is_err()) {
-            return Err(Fault::invalid(what, format!("{count} values, {stride} apart"), "a length that memory can have"));
+            return Err(Fault::invalid(
+                what,
+                format!("{count} values, {stride} apart"),
+                "a length that memory can have",
+            ));
         }
         Ok(Self { first, count, stride, number })
     }
@@ -115,9 +119,14 @@ impl Named {
             fields: self
                 .fields
                 .iter()
-                .map(|(name, association, components)| (name.clone(), *association, components.iter().map(array).collect()))
+                .map(|(name, association, components)| {
+                    (name.clone(), *association, components.iter().map(array).collect())
+                })
                 .collect(),
-            ghosts: self.ghosts.and_then(|first| Address::new("ghosts", 7, first.cast(), cells, 1).ok()).map(|it| array(&it)),
+            ghosts: self
+                .ghosts
+                .and_then(|first| Address::new("ghosts", 7, first.cast(), cells, 1).ok())
+                .map(|it| array(&it)),
             global_vertices: numbers(self.global_vertices, vertices),
             global_cells: numbers(self.global_cells, cells),
         };
@@ -182,8 +191,13 @@ pub unsafe extern "C" fn tombolo_mesh(
 ) -> c_int {
     let change = |named: &mut Named| {
         let dimension = usize::try_from(dimension).ok().filter(|it| (1..=3).contains(it) && *it <= stride);
-        let dimension = dimension
-            .ok_or_else(|| Fault::invalid("coordinates", format!("a stride of {stride}"), "2 or 3 values, and a stride of as many or more"))?;
+        let dimension = dimension.ok_or_else(|| {
+            Fault::invalid(
+                "coordinates",
+                format!("a stride of {stride}"),
+                "2 or 3 values, and a stride of as many or more",
+            )
+        })?;
         let all = Address::new("coordinates", kind, coordinates, vertices, stride)?;
         named.axes = (0..dimension).map(|axis| all.part(axis)).collect();
         Ok(())
@@ -352,11 +366,18 @@ pub unsafe extern "C" fn tombolo_field(
         let association = match association {
             0 => Association::Vertex,
             1 => Association::Element,
-            other => return Err(Fault::invalid(&what, format!("the association {other}"), "TOMBOLO_VERTEX or TOMBOLO_ELEMENT")),
+            other => {
+                return Err(Fault::invalid(
+                    &what,
+                    format!("the association {other}"),
+                    "TOMBOLO_VERTEX or TOMBOLO_ELEMENT",
+                ));
+            }
         };
         let components = usize::try_from(components).ok().filter(|it| (1..=9).contains(it) && *it <= stride);
-        let components = components
-            .ok_or_else(|| Fault::invalid(&what, format!("a stride of {stride}"), "1 to 9 components, and a stride of as many or more"))?;
+        let components = components.ok_or_else(|| {
+            Fault::invalid(&what, format!("a stride of {stride}"), "1 to 9 components, and a stride of as many or more")
+        })?;
         let count = match (association, &named.cells) {
             (Association::Element, Some(Cells::Mixed { sizes, .. })) => sizes.count,
             (Association::Element, Some(Cells::Uniform(_, connectivity))) => connectivity.count / named.corners(),

@@ -50,7 +50,11 @@ impl From<CatalystError> for Fault {
 
 impl Fault {
     fn invalid(what: &str, found: impl ToString, expected: impl ToString) -> Self {
-        Fault::Error(CatalystError::Wrong { path: what.into(), found: found.to_string(), expected: expected.to_string() })
+        Fault::Error(CatalystError::Wrong {
+            path: what.into(),
+            found: found.to_string(),
+            expected: expected.to_string(),
+        })
     }
 }
 

@@ -33,7 +33,8 @@ impl Mask {
                     continue;
                 }
                 let (counts, _) = counts(&window.need(c"dims", "the cells that the child covers")?)?;
-                let corner = whole_numbers(&window.need(c"origin", "the first cell that the child covers")?, ["i", "j", "k"])?;
+                let corner =
+                    whole_numbers(&window.need(c"origin", "the first cell that the child covers")?, ["i", "j", "k"])?;
                 let origin = std::array::from_fn(|axis| corner[axis] - origin[axis]);
                 mask.covered.push(Covered { origin, counts: counts.map(|count| count.max(1)) });
             }

@@ -86,9 +86,7 @@ impl<'call> Coordset<'call> {
     pub(super) fn grid(&self) -> Option<[usize; 3]> {
         match self {
             Coordset::Uniform { points, .. } => Some(*points),
-            Coordset::Rectilinear { axes } => {
-                Some(std::array::from_fn(|axis| axes.get(axis).map_or(1, Array::len)))
-            }
+            Coordset::Rectilinear { axes } => Some(std::array::from_fn(|axis| axes.get(axis).map_or(1, Array::len))),
             Coordset::Explicit { .. } => None,
         }
     }

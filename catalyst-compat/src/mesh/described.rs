@@ -39,7 +39,8 @@ pub(crate) enum DescribedCells<'call> {
 impl<'call> Description<'call> {
     /// The channel that the arrays describe.
     pub(crate) fn channel(self) -> Result<Channel<'call>, CatalystError> {
-        let Description { name, axes, cells, faces, feature_names, fields, ghosts, global_vertices, global_cells } = self;
+        let Description { name, axes, cells, faces, feature_names, fields, ghosts, global_vertices, global_cells } =
+            self;
         let wrong = |what: &str, found: String, expected: String| CatalystError::Wrong {
             path: format!("channel '{name}', {what}"),
             found,

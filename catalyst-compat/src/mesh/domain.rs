@@ -99,7 +99,12 @@ impl<'call> Domain<'call> {
         Self { coordset, topology, fields, faces, roles, path }
     }
 
-    fn read_fields(&mut self, node: &Node<'_, 'call>, main: &Named, others: &[Named<'call>]) -> Result<(), CatalystError> {
+    fn read_fields(
+        &mut self,
+        node: &Node<'_, 'call>,
+        main: &Named,
+        others: &[Named<'call>],
+    ) -> Result<(), CatalystError> {
         let Some(fields) = node.child(c"fields") else { return Ok(()) };
         if fields.kind() == Kind::Empty {
             return Ok(());
@@ -167,7 +172,8 @@ impl<'call> Domain<'call> {
             field.components.iter().map(move |array| (array, format_args!("fields/{}/values", field.name).to_string()))
         });
         let coordsets = self.coordset.arrays().iter().map(|array| (array, "coordsets".to_owned()));
-        let topologies = self.topology.arrays().into_iter().chain(of_faces).map(|array| (array, "topologies".to_owned()));
+        let topologies =
+            self.topology.arrays().into_iter().chain(of_faces).map(|array| (array, "topologies".to_owned()));
         for (array, place) in coordsets.chain(topologies).chain(of_fields) {
             if let Some(found) = memory::fault(array) {
                 return Err(CatalystError::Wrong {

@@ -69,7 +69,10 @@ impl<'call> Field<'call> {
             if node.child(c"basis").is_some() || node.child(c"matset").is_some() {
                 return Ok(None);
             }
-            return Err(node.need(c"association", "'vertex' or 'element'").err().unwrap_or_else(|| node.wrong("a field".into())));
+            return Err(node
+                .need(c"association", "'vertex' or 'element'")
+                .err()
+                .unwrap_or_else(|| node.wrong("a field".into())));
         };
         let (association, expected) = match association_node.text()?.as_str() {
             "vertex" => (Association::Vertex, vertices),

@@ -1,6 +1,8 @@
 //! What is kept of a channel from step to step: whatever cannot be lent as it lies in the solver's memory.
 
-use tombolo::deform::mesh::{ArrayView, Cells, CellsView, FeatureSource, Indices, MeshView, TaggedFaces, Values, Vector};
+use tombolo::deform::mesh::{
+    ArrayView, Cells, CellsView, FeatureSource, Indices, MeshView, TaggedFaces, Values, Vector,
+};
 use tombolo::pipelines::extract::{Association, FieldView};
 
 use super::channel::Channel;
@@ -137,11 +139,7 @@ impl Kept {
     }
 
     /// What the adaptor is lent: the mesh and its fields.
-    pub(crate) fn views<'a>(
-        &'a self,
-        channel: &'a Channel<'a>,
-        fields: &mut Vec<FieldView<'a>>,
-    ) -> MeshView<'a> {
+    pub(crate) fn views<'a>(&'a self, channel: &'a Channel<'a>, fields: &mut Vec<FieldView<'a>>) -> MeshView<'a> {
         let single = channel.single();
         let points = single.and_then(|domain| domain.coordset.lent());
         let points = points.unwrap_or_else(|| ArrayView::vectors(&self.points));

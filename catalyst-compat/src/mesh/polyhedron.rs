@@ -61,7 +61,9 @@ fn volume<'a>(faces: impl Iterator<Item = &'a [u32]>, place: &impl Fn(u32) -> Ve
         let a = from_origin(first);
         for pair in rest.windows(2) {
             let (b, c) = (from_origin(pair[0]), from_origin(pair[1]));
-            sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+            sum += a[0] * (b[1] * c[2] - b[2] * c[1])
+                + a[1] * (b[2] * c[0] - b[0] * c[2])
+                + a[2] * (b[0] * c[1] - b[1] * c[0]);
         }
     }
     sum

@@ -60,7 +60,10 @@ impl<'call> Rows<'call> {
             let Some(end) = end else {
                 return Err(CatalystError::Wrong {
                     path: format!("{}/connectivity", self.path),
-                    found: format!("{} entries, but row {index} begins at {start} and has {size}", self.connectivity.len()),
+                    found: format!(
+                        "{} entries, but row {index} begins at {start} and has {size}",
+                        self.connectivity.len()
+                    ),
                     expected: "rows that end within it".into(),
                 });
             };

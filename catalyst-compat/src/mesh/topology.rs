@@ -23,7 +23,13 @@ pub(super) enum Topology<'call> {
     /// Polyhedra by their faces.
     Polyhedral { cells: Rows<'call>, faces: Rows<'call> },
     /// Each of its own type.
-    Mixed { cells: Rows<'call>, shapes: Array<'call>, map: Vec<(i64, CellType)>, faces: Option<Rows<'call>>, path: String },
+    Mixed {
+        cells: Rows<'call>,
+        shapes: Array<'call>,
+        map: Vec<(i64, CellType)>,
+        faces: Option<Rows<'call>>,
+        path: String,
+    },
 }
 
 const SHAPES: [(&str, CellType); 11] = [
@@ -44,7 +50,8 @@ fn shape(name: &str) -> Option<CellType> {
     SHAPES.into_iter().find(|(shape, _)| *shape == name).map(|(_, cell_type)| cell_type)
 }
 
-const KNOWN_SHAPES: &str = "'point', 'line', 'tri', 'quad', 'tet', 'hex', 'wedge', 'pyramid', 'polygonal', 'polyhedral' or 'mixed'";
+const KNOWN_SHAPES: &str =
+    "'point', 'line', 'tri', 'quad', 'tet', 'hex', 'wedge', 'pyramid', 'polygonal', 'polyhedral' or 'mixed'";
 const KNOWN_TYPES: &str = "'points', 'uniform', 'rectilinear', 'structured' or 'unstructured'";
 
 impl<'call> Topology<'call> {
@@ -63,7 +70,8 @@ impl<'call> Topology<'call> {
                 let elements = node.need(c"elements", "an object with 'dims'")?;
                 let dims = elements.need(c"dims", "the number of cells along i, j, k")?;
                 let (cells, dimension) = counts(&dims)?;
-                let points = cells.iter().try_fold(1_usize, |product, count| product.checked_mul(count.checked_add(1)?));
+                let points =
+                    cells.iter().try_fold(1_usize, |product, count| product.checked_mul(count.checked_add(1)?));
                 if points != Some(coordset.len()) {
                     return Err(dims.wrong_found(
                         format!("{:?} cells", &cells[..dimension]),
@@ -98,7 +106,9 @@ impl<'call> Topology<'call> {
                 }
                 let size = cell_type.vertex_count().unwrap_or(1);
                 if !connectivity.len().is_multiple_of(size) {
-                    return Err(connectivity_node.wrong(format!("a multiple of {size} values, for cells of shape '{name}'")));
+                    return Err(
+                        connectivity_node.wrong(format!("a multiple of {size} values, for cells of shape '{name}'"))
+                    );
                 }
                 Ok(Topology::Uniform { cell_type, connectivity, path: connectivity_node.path() })
             }
@@ -141,9 +151,9 @@ impl<'call> Topology<'call> {
             Topology::Uniform { cell_type, connectivity, .. } => {
                 connectivity.len() / cell_type.vertex_count().unwrap_or(1)
             }
-            Topology::Polygonal(rows) | Topology::Polyhedral { cells: rows, .. } | Topology::Mixed { cells: rows, .. } => {
-                rows.len()
-            }
+            Topology::Polygonal(rows)
+            | Topology::Polyhedral { cells: rows, .. }
+            | Topology::Mixed { cells: rows, .. } => rows.len(),
         }
     }
 
@@ -196,7 +206,9 @@ impl<'call> Topology<'call> {
             Topology::Points(count) => {
                 for cell in (0..*count).filter(|cell| keep(*cell)) {
                     #[expect(clippy::cast_possible_truncation, reason = "as above")]
-                    cells.push(CellType::Vertex, &[shift + cell as u32]).map_err(|error| unfit("points", cell, &error))?;
+                    cells
+                        .push(CellType::Vertex, &[shift + cell as u32])
+                        .map_err(|error| unfit("points", cell, &error))?;
                 }
             }
             Topology::Grid { cells: counts } => {
@@ -341,7 +353,8 @@ fn grid_cell(counts: [usize; 3], cell: usize) -> (CellType, Vec<u32>) {
     let at = [cell % along(0), cell / along(0) % along(1), cell / (along(0) * along(1))];
     let strides = [1, counts[0] + 1, (counts[0] + 1) * (counts[1] + 1)];
     let first: usize = at.iter().zip(strides).map(|(at, stride)| at * stride).sum();
-    let steps: Vec<usize> = strides.into_iter().zip(counts).filter(|(_, count)| *count > 0).map(|(step, _)| step).collect();
+    let steps: Vec<usize> =
+        strides.into_iter().zip(counts).filter(|(_, count)| *count > 0).map(|(step, _)| step).collect();
     let (cell_type, corners) = match steps[..] {
         [] => (CellType::Vertex, vec![0]),
         [a] => (CellType::Line, vec![0, a]),
