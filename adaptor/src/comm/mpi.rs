@@ -41,8 +41,8 @@ const ROUNDS: c_int = 1024;
 /// Ranks of MPI, of any communicator: what is said here goes through a copy of it, and so can never be taken for what the solver
 /// says.
 ///
-/// MPI may have been initialized with any level of thread support but `MPI_THREAD_SINGLE` where the solver itself has no
-/// thread: the adaptor calls MPI inside `initialize`, `execute` and `finalize` alone, and from the thread that calls these.
+/// `MPI_THREAD_FUNNELED` is enough: the adaptor calls MPI inside `initialize`, `execute` and `finalize` alone, and from the thread that
+/// calls these.
 ///
 /// The copy is freed when this is dropped, which is to be done on all ranks, and before MPI is finalized (after that, nothing is
 /// freed).

@@ -77,8 +77,7 @@ fn under_mpirun() -> bool {
     ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK"].into_iter().any(|name| std::env::var_os(name).is_some())
 }
 
-/// Does the work on the ranks that mpirun started, or on this process. What is wrong on all ranks is said by the first alone: the
-/// others fail with an empty message.
+/// Does the work on the ranks that mpirun started, or on this process. The message is empty where the first rank has said what is wrong.
 #[cfg(feature = "distributed")]
 fn on_ranks(work: impl FnOnce(Ranks) -> Result<(), Box<dyn std::error::Error>>) -> Result<(), String> {
     use tombolo::comm::mpi::{Mpi, rsmpi};
@@ -89,7 +88,13 @@ fn on_ranks(work: impl FnOnce(Ranks) -> Result<(), Box<dyn std::error::Error>>) 
         .ok_or_else(|| "MPI could not be initialized".to_owned())?;
     let ranks: Ranks = Arc::new(Mpi::new(&universe.world()).map_err(|error| error.to_string())?);
     let is_first = ranks.rank() == 0;
-    work(ranks).map_err(|error| if is_first { error.to_string() } else { String::new() })
+    work(ranks).map_err(|error| {
+        // Before MPI is finalized: once a rank has failed and gone, mpirun ends the others.
+        if is_first {
+            eprintln!("flow: {error}");
+        }
+        String::new()
+    })
 }
 
 #[cfg(not(feature = "distributed"))]
