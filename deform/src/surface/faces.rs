@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::SurfaceError;
+use super::{SurfaceError, tetra_faces};
 use crate::mesh::{CellType, Cells};
 
 /// A boundary face: its cell and its place among the faces of that cell.
@@ -18,6 +18,20 @@ pub(super) struct CellFace {
 /// A face of a collapsed cell (one that names a vertex twice) counts with its distinct vertices, and not at all where fewer than
 /// three are left.
 pub(super) fn boundary_faces(
+    cells: &Cells,
+    vertex_count: usize,
+    dimension: usize,
+    left_out: Option<&[bool]>,
+) -> Result<Vec<CellFace>, SurfaceError> {
+    let of_tetrahedra = || tetra_faces::boundary_faces(cells, vertex_count, left_out);
+    match (dimension == 3).then(of_tetrahedra).flatten() {
+        Some(found) => Ok(found),
+        None => boundary_faces_of_any(cells, vertex_count, dimension, left_out),
+    }
+}
+
+/// The same for cells of any type, and with what is wrong.
+pub(super) fn boundary_faces_of_any(
     cells: &Cells,
     vertex_count: usize,
     dimension: usize,

@@ -109,6 +109,7 @@ mod part;
 mod polyharmonic;
 mod region;
 mod sharp_edges;
+mod tetra_faces;
 mod triangle_pair;
 
 pub use advance::Advance;
