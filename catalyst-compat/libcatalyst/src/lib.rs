@@ -18,6 +18,7 @@
 pub mod base64;
 pub mod blueprint;
 mod c_api;
+mod children;
 pub mod compare;
 pub mod datatype;
 pub mod dump;

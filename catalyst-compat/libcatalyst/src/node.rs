@@ -7,6 +7,7 @@ use std::cell::Cell;
 use std::ptr::{self, NonNull};
 use std::sync::Arc;
 
+use crate::children::{Child, Children};
 use crate::datatype::{Datatype, Kind};
 use crate::error::{Error, Result};
 use crate::memory::{Block, Memory};
@@ -14,17 +15,12 @@ use crate::memory::{Block, Memory};
 /// How deep a tree may be; deeper ones are refused, so that walking a tree cannot overflow the stack.
 pub const DEEPEST: usize = 1000;
 
-struct Child {
-    name: String,
-    node: NonNull<Node>,
-}
-
 /// One node of a tree.
 pub struct Node {
     parent: Cell<*const Node>,
     pub(crate) datatype: Datatype,
     pub(crate) memory: Memory,
-    children: Vec<Child>,
+    children: Children,
 }
 
 impl Default for Node {
@@ -41,7 +37,7 @@ impl Node {
             parent: Cell::new(ptr::null()),
             datatype: Datatype::EMPTY,
             memory: Memory::Nothing,
-            children: Vec::new(),
+            children: Children::default(),
         }
     }
 
@@ -72,7 +68,7 @@ impl Node {
     /// How many children there are; 0 for a leaf.
     #[must_use]
     pub fn count(&self) -> usize {
-        self.children.len()
+        self.children.list().len()
     }
 
     /// The child of a number.
@@ -80,31 +76,31 @@ impl Node {
     pub fn child(&self, index: usize) -> Option<&Node> {
         self.settle();
         // SAFETY: children are owned by this node and live as long as it; the borrow of `self` keeps them from being changed.
-        self.children.get(index).map(|child| unsafe { child.node.as_ref() })
+        self.children.list().get(index).map(|child| unsafe { child.node.as_ref() })
     }
 
     /// The child of a number, to change it.
     pub fn child_mut(&mut self, index: usize) -> Option<&mut Node> {
         self.settle();
         // SAFETY: as in `child`; the unique borrow of `self` makes this one unique.
-        self.children.get_mut(index).map(|child| unsafe { child.node.as_mut() })
+        self.children.list().get(index).map(|child| unsafe { &mut *child.node.as_ptr() })
     }
 
     /// The name of the child of a number; empty in a list.
     #[must_use]
     pub fn name_of(&self, index: usize) -> &str {
-        self.children.get(index).map_or("", |child| &child.name)
+        self.children.list().get(index).map_or("", |child| &child.name)
     }
 
     /// The children with their names, which are empty in a list.
     pub fn children(&self) -> impl Iterator<Item = (&str, &Node)> {
         self.settle();
         // SAFETY: as in `child`.
-        self.children.iter().map(|child| (child.name.as_str(), unsafe { child.node.as_ref() }))
+        self.children.list().iter().map(|child| (child.name.as_str(), unsafe { child.node.as_ref() }))
     }
 
     fn position(&self, name: &str) -> Option<usize> {
-        if self.kind() == Kind::Object { self.children.iter().position(|child| child.name == name) } else { None }
+        if self.kind() == Kind::Object { self.children.position(name) } else { None }
     }
 
     /// The child of a name, which may hold slashes.
@@ -145,7 +141,7 @@ impl Node {
         node.parent.set(ptr::from_ref(self));
         let node = NonNull::from(Box::leak(Box::new(node)));
         self.children.push(Child { name: name.to_owned(), node });
-        Ok(self.children.len() - 1)
+        Ok(self.count() - 1)
     }
 
     /// Makes this an object or a list; what it held is let go unless it is one already.
@@ -164,11 +160,11 @@ impl Node {
     }
 
     fn release_children(&mut self) {
-        let mut left = std::mem::take(&mut self.children);
+        let mut left = std::mem::take(&mut self.children).into_list();
         while let Some(child) = left.pop() {
             // SAFETY: the pointer came from `Box::leak` in `push` and was taken out of the only list that holds it.
             let mut node = unsafe { Box::from_raw(child.node.as_ptr()) };
-            left.append(&mut node.children);
+            left.append(&mut std::mem::take(&mut node.children).into_list());
         }
     }
 
@@ -212,7 +208,7 @@ impl Node {
         let Some(parent) = (unsafe { self.parent.get().as_ref() }) else {
             return String::new();
         };
-        let Some(index) = parent.children.iter().position(|child| ptr::eq(child.node.as_ptr(), self)) else {
+        let Some(index) = parent.children.list().iter().position(|child| ptr::eq(child.node.as_ptr(), self)) else {
             return String::new();
         };
         if parent.kind() == Kind::List { format!("[{index}]") } else { parent.name_of(index).to_owned() }
@@ -311,7 +307,7 @@ impl Node {
                 } else {
                     None
                 };
-                match listed.and_then(|index| here.children.get(index)) {
+                match listed.and_then(|index| here.children.list().get(index)) {
                     Some(child) => child.node.as_ptr(),
                     None => here.child_named(name)?,
                 }
@@ -338,10 +334,9 @@ impl Node {
     /// # Errors
     /// There is no such child.
     pub fn remove(&mut self, index: usize) -> Result<()> {
-        if index >= self.children.len() {
+        let Some(child) = self.children.remove(index) else {
             return Err(Error::new(format!("{} has {} children, none of number {index}", self.place(), self.count())));
-        }
-        let child = self.children.remove(index);
+        };
         // SAFETY: as in `release_children`.
         drop(unsafe { Box::from_raw(child.node.as_ptr()) });
         Ok(())
@@ -372,7 +367,7 @@ impl Node {
         let Some(owner) = (unsafe { owner.as_mut() }) else {
             return Err(Error::new(format!("'{path}' is a root")));
         };
-        match owner.children.iter().position(|child| ptr::eq(child.node.as_ptr(), found)) {
+        match owner.children.list().iter().position(|child| ptr::eq(child.node.as_ptr(), found)) {
             Some(index) => owner.remove(index),
             None => Err(Error::new(format!("'{path}' is not there"))),
         }
@@ -391,9 +386,9 @@ impl Node {
         if self.position(new).is_some() {
             return Err(Error::new(format!("{} has a child '{new}' already", self.place())));
         }
-        match self.position(old).and_then(|index| self.children.get_mut(index)) {
-            Some(child) => {
-                new.clone_into(&mut child.name);
+        match self.position(old) {
+            Some(index) => {
+                self.children.rename(index, new);
                 Ok(())
             }
             None => Err(Error::new(self.why_not(old))),
@@ -405,8 +400,8 @@ impl Node {
         let here = ptr::from_ref(self);
         // SAFETY: children are owned by this node and live; only their cells are written.
         let told = |child: &Child| unsafe { child.node.as_ref() }.parent.get();
-        if self.children.first().is_some_and(|first| !ptr::eq(told(first), here)) {
-            for child in &self.children {
+        if self.children.list().first().is_some_and(|first| !ptr::eq(told(first), here)) {
+            for child in self.children.list() {
                 // SAFETY: as above.
                 unsafe { child.node.as_ref() }.parent.set(here);
             }

@@ -212,3 +212,45 @@ fn yaml_is_read_as_it_is_meant() {
     let lines: Vec<String> = (1..5000).map(|i| format!("a{i}: &a{i} [*a{}]", i - 1)).collect();
     assert!(schema::parse(&format!("a0: &a0 [x]\n{}", lines.join("\n")), Protocol::Yaml).is_err());
 }
+
+/// Children are found by name whether few or many, after any of them has gone, come or changed its name.
+#[test]
+fn many_children_are_found_by_name() {
+    let mut node = Node::new();
+    let mut names: Vec<String> = Vec::new();
+    let check = |node: &Node, names: &[String]| {
+        assert_eq!(node.children().map(|(name, _)| name).collect::<Vec<_>>(), names);
+        for (index, name) in names.iter().enumerate() {
+            let found = node.get(name).expect("it is there");
+            assert!(std::ptr::eq(found, node.child(index).expect("it is there")), "{name}");
+            assert_eq!(found.name(), *name);
+        }
+        assert!(node.get("nothing").is_none());
+    };
+    for step in 0..200_usize {
+        match step % 5 {
+            3 => {
+                let index = step * 7 % names.len();
+                node.remove_named(&names.remove(index)).expect("it is there");
+            }
+            4 => {
+                let (index, new) = (step * 3 % names.len(), format!("new/{step}"));
+                node.rename(&names[index], &new).expect("it is there and the name is free");
+                names[index] = new;
+            }
+            _ => {
+                names.push(format!("name {step}"));
+                node.child_named(&format!("name {step}")).expect("shallow");
+            }
+        }
+        assert!(node.rename(&names[0], &names[names.len() - 1]).is_err() || names.len() == 1);
+        check(&node, &names);
+    }
+    let copy = node.copy().expect("memory");
+    check(&copy, &names);
+    while names.len() > 1 {
+        node.remove(0).expect("it is there");
+        names.remove(0);
+        check(&node, &names);
+    }
+}
