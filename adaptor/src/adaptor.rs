@@ -244,6 +244,19 @@ impl Adaptor {
         matches!(self.mesh, SteeredMesh::Unknown) || self.pipelines.is_due(Moment { cycle: step.cycle, time: step.time })
     }
 
+    /// Stops changing the shape of the mesh, because the solver has made another one of it: views go on, orders are rejected with
+    /// this reason from now on. To be called on all ranks.
+    pub fn release_shape(&mut self, reason: &str) {
+        if matches!(self.mesh, SteeredMesh::Steered(..)) {
+            if self.communicator.rank() == 0 {
+                self.complain(reason);
+            }
+            self.mesh = SteeredMesh::Refused(reason.to_owned());
+            self.describe();
+            self.tell_conditions();
+        }
+    }
+
     /// The orders so far and what became of each, in the order in which they came in; of more than
     /// [`ORDERS_KEPT`](crate::ORDERS_KEPT) only the newest. On rank 0.
     #[must_use]

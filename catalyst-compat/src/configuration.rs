@@ -158,8 +158,8 @@ fn is_json(file: &str) -> bool {
 /// A script is a file, or an object with `filename`; ours are JSON.
 fn script(node: &Node<'_, '_>, found: &mut Found) -> Result<(), CatalystError> {
     let file = match node.kind() {
-        Kind::Text => node.text()?,
-        _ => node.need(c"filename", "the script's file")?.text()?,
+        Kind::Text => node.text()?.into_owned(),
+        _ => node.need(c"filename", "the script's file")?.text()?.into_owned(),
     };
     if is_json(&file) {
         found.files.push(file);
@@ -175,10 +175,10 @@ fn pipeline(node: &Node<'_, '_>, found: &mut Found) -> Result<(), CatalystError>
     if node.kind() == Kind::Text {
         return script(node, found);
     }
-    let kind = node.child(c"type").map_or(Ok(String::new()), |kind| kind.text())?;
+    let kind = node.child(c"type").map_or(Ok("".into()), |kind| kind.text())?;
     let file_node = node.need(c"filename", "the file to write, or the configuration to read")?;
-    let file = file_node.text()?;
-    match kind.as_str() {
+    let file = file_node.text()?.into_owned();
+    match &*kind {
         "io" => {
             let channel = node.need(c"channel", "the name of the channel to write")?.text()?;
             let (file, note) = written_file(&file);

@@ -1,6 +1,7 @@
 //! Safe access to the host's nodes: every read asks first what is there, because Conduit answers a wrong guess with a C++
 //! exception, which must not run through Rust frames.
 
+use std::borrow::Cow;
 use std::ffi::{CStr, CString, c_char};
 use std::marker::PhantomData;
 use std::ptr;
@@ -69,15 +70,22 @@ impl<'call> Node<'_, 'call> {
 
     /// The way from the root: names joined by `/`.
     pub(crate) fn path(&self) -> String {
-        match self.parent.map(Node::path) {
-            None => String::new(),
-            Some(path) if path.is_empty() => self.name().into_owned(),
-            Some(path) => format!("{path}/{}", self.name()),
+        let mut path = String::with_capacity(96);
+        self.write_path(&mut path);
+        path
+    }
+
+    fn write_path(&self, path: &mut String) {
+        let Some(parent) = self.parent else { return };
+        parent.write_path(path);
+        if !path.is_empty() {
+            path.push('/');
         }
+        path.push_str(&self.name());
     }
 
     /// The name under which it was reached.
-    pub(crate) fn name(&self) -> std::borrow::Cow<'_, str> {
+    pub(crate) fn name(&self) -> Cow<'_, str> {
         self.name.to_string_lossy()
     }
 
@@ -166,22 +174,22 @@ impl<'call> Node<'_, 'call> {
         (!pointer.is_null()).then(|| unsafe { Self::reached(self.host, pointer, name, Some(self)) })
     }
 
-    /// The text that it holds.
-    pub(crate) fn text(&self) -> Result<String, CatalystError> {
+    /// The text that it holds, up to its first nul; borrowed for the length of the call wherever its letters lie side by side.
+    pub(crate) fn text(&self) -> Result<Cow<'call, str>, CatalystError> {
         if self.kind() != Kind::Text {
             return Err(self.wrong("a text".into()));
         }
         let (first, count, stride) = self.layout()?;
-        let mut bytes = Vec::new();
-        for index in 0..count {
-            // SAFETY: Conduit says that the node holds `count` bytes, `stride` apart.
-            let byte = unsafe { first.offset((index * stride) as isize).read() };
-            if byte == 0 {
-                break;
-            }
-            bytes.push(byte);
+        let no_text = || self.wrong_found("bytes that are none".into(), "a text in UTF-8".into());
+        if stride == 1 || count == 1 {
+            // SAFETY: Conduit says that the node holds `count` bytes, which live until the call returns (`root`).
+            let bytes: &'call [u8] = unsafe { std::slice::from_raw_parts(first, count as usize) };
+            let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+            return std::str::from_utf8(&bytes[..end]).map(Cow::Borrowed).map_err(|_| no_text());
         }
-        String::from_utf8(bytes).map_err(|_| self.wrong("a text in UTF-8".into()))
+        // SAFETY: Conduit says that the node holds `count` bytes, `stride` apart.
+        let bytes = (0..count).map(|index| unsafe { first.offset((index * stride) as isize).read() });
+        String::from_utf8(bytes.take_while(|byte| *byte != 0).collect()).map(Cow::Owned).map_err(|_| no_text())
     }
 
     /// Address of the first element, number of elements, and bytes from one to the next.

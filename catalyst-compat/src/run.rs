@@ -12,6 +12,9 @@ use crate::mesh::{Block, Channel, Kept};
 use crate::motion::Asked;
 use crate::ranks;
 
+/// Why orders are rejected from then on.
+const OTHER_MESH: &str = "the solver has made another mesh: shapes are measured from the mesh of the first step, so its cells must stay the same";
+
 /// A run under way.
 pub(crate) struct Run {
     adaptor: Adaptor,
@@ -44,6 +47,11 @@ impl Run {
             time_step: 0.0,
             asked,
         })
+    }
+
+    /// Whether anything is due that looks at the mesh and its fields.
+    pub(crate) fn looks_at(&self, step: &Step) -> bool {
+        self.adaptor.looks_at(step)
     }
 
     /// The link that a viewer opens.
@@ -83,12 +91,19 @@ impl Run {
         given: Result<(Step, Vec<Channel<'call>>), CatalystError>,
     ) -> Result<(), CatalystError> {
         // What can be wrong here alone is agreed upon before anything that all do together.
+        let mut is_other = false;
         let prepared = given.and_then(|(step, channels)| {
             let looked_at = self.adaptor.looks_at(&step);
-            channels.iter().try_for_each(|channel| self.update(channel, looked_at))?;
+            for channel in &channels {
+                let changed = self.update(channel, looked_at)?;
+                is_other |= changed && channel.name == self.steered;
+            }
             Ok((step, channels))
         });
-        let (step, mut channels) = ranks::agree(&*self.communicator, prepared)?;
+        let ((step, mut channels), is_other) = ranks::agree_and_ask(&*self.communicator, prepared, is_other)?;
+        if is_other {
+            self.adaptor.release_shape(OTHER_MESH);
+        }
         self.time_step = step.time_step;
         self.last_time = Some(step.time);
         self.complete(&mut channels)?;
@@ -118,12 +133,12 @@ impl Run {
         Ok(())
     }
 
-    fn update(&mut self, channel: &Channel<'_>, looked_at: bool) -> Result<(), CatalystError> {
+    fn update(&mut self, channel: &Channel<'_>, looked_at: bool) -> Result<bool, CatalystError> {
         if !self.kept.iter().any(|(name, _)| *name == channel.name) {
             self.kept.push((channel.name.clone(), Kept::default()));
         }
         let kept = self.kept.iter_mut().find(|(name, _)| *name == channel.name);
-        kept.map_or(Ok(()), |(_, kept)| kept.update(channel, looked_at))
+        kept.map_or(Ok(false), |(_, kept)| kept.update(channel, looked_at))
     }
 
     /// Gives every rank the channels of all, empty where it has none, in one order. Collective.

@@ -72,6 +72,8 @@ impl Session {
             },
             None => self.run.likely_time_step(time),
         };
+        let step = Step { cycle, time, time_step };
+        let looked_at = self.run.looks_at(&step);
         let mut channels = Vec::new();
         if let Some(all) = catalyst.child(c"channels") {
             if !matches!(all.kind(), Kind::Object | Kind::Empty) {
@@ -83,10 +85,10 @@ impl Session {
                     let expected = format!("another name: the results bring a mesh called '{STEERING}'");
                     return Err(channel.wrong_found(format!("a channel called '{STEERING}'"), expected));
                 }
-                channels.push(Channel::read(&channel)?);
+                channels.push(Channel::read(&channel, looked_at)?);
             }
         }
-        Ok((Step { cycle, time, time_step }, channels))
+        Ok((step, channels))
     }
 
     /// Fills in what the adaptor asks for the step that follows.

@@ -192,6 +192,26 @@ int main(int argc, char** argv)
   clear(&empty);
   expect("initialize after finalize", impl->initialize(&empty), 0);
   expect("finalize again", impl->finalize(&empty), 0);
+
+  /* Somebody could steer now; then the solver makes another mesh of it, with another number of vertices in the end. */
+  clear(&setup);
+  text(&setup, "catalyst/scripts/script/filename", argc > 2 ? argv[2] : "");
+  expect("initialize with a server", impl->initialize(&setup), 0);
+  step(&node);
+  expect("the mesh that shapes are measured from", impl->execute(&node), 0);
+  const int32_t other[8] = { 0, 1, 2, 3, 1, 0, 2, 3 };
+  mesh = step(&node);
+  array(mesh, "topologies/mesh/elements/connectivity", INT32, other, 8, 0, 0);
+  expect("another mesh", impl->execute(&node), 0);
+  mesh = step(&node);
+  double more[15] = { 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1 };
+  double warm[5] = { 0 };
+  array(mesh, "coordsets/coords/values/x", FLOAT64, more, 5, 0, 24);
+  array(mesh, "coordsets/coords/values/y", FLOAT64, more, 5, 8, 24);
+  array(mesh, "coordsets/coords/values/z", FLOAT64, more, 5, 16, 24);
+  array(mesh, "fields/temperature/values", FLOAT64, warm, 5, 0, 0);
+  expect("and one more vertex", impl->execute(&node), 0);
+  expect("finalize the last", impl->finalize(&setup), 0);
   clear(&about);
   clear(&setup);
   clear(&node);

@@ -27,18 +27,27 @@ fn compile(directory: &Path, name: &str, exporting: bool) -> PathBuf {
     program
 }
 
-fn run(program: &Path, environment: &[(&str, &str)]) -> (Output, String) {
+fn run(program: &Path, script: Option<&Path>, environment: &[(&str, &str)]) -> (Output, String) {
     let mut command = Command::new(program);
     for name in ["PIPELINES", "ORDERS", "OUTPUT", "REPORT"] {
         command.env_remove(format!("TOMBOLO_{name}"));
     }
-    let output = command.arg(library()).envs(environment.iter().copied()).output().expect("the host was just compiled");
+    let output = command
+        .arg(library())
+        .args(script)
+        .envs(environment.iter().copied())
+        .output()
+        .expect("the host was just compiled");
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     (output, errors)
 }
 
 /// A configuration that looks at everything, and is watched by nobody.
 const QUALITY: &str = r#"{"version": 1, "pipelines": [{"name": "health", "stages": [{"quality": {}}]}]}"#;
+
+/// A configuration with a server.
+const STREAM: &str = r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"}, "pipelines": [
+    {"name": "surface", "stages": [{"surface": {}}, {"stream": {}}]}]}"#;
 
 #[test]
 fn whatever_is_wrong_is_told_with_its_path() {
@@ -47,7 +56,9 @@ fn whatever_is_wrong_is_told_with_its_path() {
     std::fs::write(&pipelines, QUALITY).expect("a file");
     let pipelines = pipelines.to_string_lossy();
     let host = compile(directory.path(), "host", true);
-    let (output, errors) = run(&host, &[("TOMBOLO_PIPELINES", &pipelines)]);
+    let stream = directory.path().join("stream.json");
+    std::fs::write(&stream, STREAM).expect("a file");
+    let (output, errors) = run(&host, Some(&stream), &[("TOMBOLO_PIPELINES", &pipelines)]);
     assert!(output.status.success(), "{errors}");
     for told in [
         "catalyst_execute: 'catalyst' is missing; expected an object with 'state' and 'channels'",
@@ -75,6 +86,8 @@ fn whatever_is_wrong_is_told_with_its_path() {
         "'catalyst/channels/grid/data/coordsets/coords/values/x': found a null pointer",
         "expected a length that memory can have",
         "cannot be read; expected values in the main memory of this process",
+        "tombolo: open http://127.0.0.1:",
+        "tombolo: the solver has made another mesh",
     ] {
         assert!(errors.contains(told), "'{told}' is not in:\n{errors}");
     }
@@ -84,7 +97,7 @@ fn whatever_is_wrong_is_told_with_its_path() {
 #[test]
 fn a_host_without_conduit_is_told_so() {
     let directory = tempfile::tempdir().expect("a temporary directory");
-    let (output, errors) = run(&compile(directory.path(), "host", false), &[]);
+    let (output, errors) = run(&compile(directory.path(), "host", false), None, &[]);
     assert!(!output.status.success());
     assert!(errors.contains("does not export 'catalyst_conduit_node_number_of_children'"), "{errors}");
     assert!(errors.contains("about before initialize: 7 where 0 is expected"), "{errors}");
@@ -203,7 +216,7 @@ fn every_mesh_of_the_blueprint_arrives() {
 fn valgrind_finds_nothing() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let pipelines = directory.path().join("pipelines.json");
-    std::fs::write(&pipelines, QUALITY).expect("a file");
+    std::fs::write(&pipelines, STREAM).expect("a file");
     for name in ["host", "meshes"] {
         let program = compile(directory.path(), name, true);
         let mut command = Command::new("valgrind");

@@ -55,8 +55,8 @@ int main(int argc, char** argv)
 
   for (long step = 0; step < steps; ++step) {
     check(tombolo_execute(run, (uint64_t)step, time_step * (double)step, time_step));
-    if (tombolo_stopped(run)) break;
     check(tombolo_parameter_value(run, "conductivity", &conductivity));
+    if (tombolo_stopped(run)) break;
     const size_t bytes = 3 * sizeof(double) * (size_t)solver.vertices;
     const double* coordinates = tombolo_coordinates(run);
     if (coordinates) memcpy(solver.velocity, tombolo_velocity(run), bytes);

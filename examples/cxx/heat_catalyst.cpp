@@ -91,11 +91,11 @@ int main(int argc, char** argv)
 
       conduit_cpp::Node results;
       check(catalyst_results(conduit_cpp::c_node(&results)), "catalyst_results");
+      if (results.has_path("catalyst/steering/fields/conductivity/values"))
+        conductivity = results["catalyst/steering/fields/conductivity/values"].to_float64();
       if (results.has_path("catalyst/steering/fields/stop/values") &&
         results["catalyst/steering/fields/stop/values"].to_float64() != 0.0)
         break;
-      if (results.has_path("catalyst/steering/fields/conductivity/values"))
-        conductivity = results["catalyst/steering/fields/conductivity/values"].to_float64();
 
       std::vector<double> moved = solver.coordinates;
       solver.velocity.assign(solver.velocity.size(), 0.0);

@@ -45,8 +45,8 @@ program heat_catalyst
     call check(c_catalyst_execute(node), "catalyst_execute")
     results = catalyst_conduit_node_create()
     call check(c_catalyst_results(results), "catalyst_results")
-    if (number(results, "catalyst/steering/fields/stop/values", 0d0) /= 0d0) exit
     conductivity = number(results, "catalyst/steering/fields/conductivity/values", conductivity)
+    if (number(results, "catalyst/steering/fields/stop/values", 0d0) /= 0d0) exit
     moves = logical(catalyst_conduit_node_has_path(results, "catalyst/solid/coordsets/coords")) .and. solver%vertices > 0
     solver%velocity = 0
     if (moves) then

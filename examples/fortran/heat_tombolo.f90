@@ -58,8 +58,8 @@ program heat_tombolo
 
   do step = 0, steps - 1
     call check(tombolo_execute(run, int(step, c_int64_t), time_step * step, time_step))
-    if (tombolo_stopped(run) /= 0) exit
     call check(tombolo_parameter_value(run, "conductivity", conductivity))
+    if (tombolo_stopped(run) /= 0) exit
     moved => tombolo_coordinates(run, solver%vertices)
     velocity => tombolo_velocity(run, solver%vertices)
     solver%velocity = 0

@@ -39,8 +39,8 @@ pub(crate) struct Channel<'call> {
 const KINDS: &str = "'mesh', 'multimesh' or 'amrmesh'";
 
 impl<'call> Channel<'call> {
-    /// Reads a channel. No value of an array is looked at.
-    pub(crate) fn read(node: &Node<'_, 'call>) -> Result<Self, CatalystError> {
+    /// Reads a channel. No value of an array is looked at; where nobody will look at any (`looked_at`), fields are passed over.
+    pub(crate) fn read(node: &Node<'_, 'call>, looked_at: bool) -> Result<Self, CatalystError> {
         let mut channel = Self { name: node.name().into_owned(), ..Self::default() };
         // A rank without data may leave its channel empty.
         if node.kind() == Kind::Empty {
@@ -49,7 +49,7 @@ impl<'call> Channel<'call> {
         let kind = node.need(c"type", KINDS)?;
         refuse_devices(node)?;
         let kind_name = kind.text()?;
-        if !matches!(kind_name.as_str(), "mesh" | "multimesh" | "amrmesh") {
+        if !matches!(&*kind_name, "mesh" | "multimesh" | "amrmesh") {
             return Err(kind.wrong_found(format!("'{kind_name}'"), KINDS.into()));
         }
         let Some(data) = node.child(c"data") else {
@@ -61,19 +61,30 @@ impl<'call> Channel<'call> {
         channel.feature_names = feature_names(node)?;
         if kind_name == "mesh" {
             channel.feature_names.extend(feature_names(&data)?);
-            channel.push(String::new(), &data, false)?;
+        }
+        // A mesh may come in domains, as those of several blocks do.
+        let has_domains = data.child(c"coordsets").is_none()
+            && data.names().first().and_then(|name| data.at(0, name)?.child(c"coordsets").map(drop)).is_some();
+        if kind_name == "mesh" && !has_domains {
+            channel.push(String::new(), &data, false, looked_at)?;
         } else {
             for (index, name) in data.names().iter().enumerate() {
                 let Some(block) = data.at(index, name) else { continue };
-                channel.push(name.to_string_lossy().into_owned(), &block, kind_name == "amrmesh")?;
+                channel.push(name.to_string_lossy().into_owned(), &block, kind_name == "amrmesh", looked_at)?;
             }
         }
         channel.refuse_too_many()?;
         Ok(channel)
     }
 
-    fn push(&mut self, name: String, node: &Node<'_, 'call>, nested: bool) -> Result<(), CatalystError> {
-        let Some(domain) = Domain::read(node)? else { return Ok(()) };
+    fn push(
+        &mut self,
+        name: String,
+        node: &Node<'_, 'call>,
+        nested: bool,
+        looked_at: bool,
+    ) -> Result<(), CatalystError> {
+        let Some(domain) = Domain::read(node, looked_at)? else { return Ok(()) };
         let mask = match &domain.topology {
             Topology::Grid { cells } if nested => Mask::read(node, *cells)?,
             _ => Mask::default(),

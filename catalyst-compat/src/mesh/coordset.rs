@@ -36,7 +36,7 @@ pub(super) fn counts(node: &Node<'_, '_>) -> Result<([usize; 3], usize), Catalys
 impl<'call> Coordset<'call> {
     pub(super) fn read(node: &Node<'_, 'call>) -> Result<Self, CatalystError> {
         let kind = node.need(c"type", "'uniform', 'rectilinear' or 'explicit'")?;
-        match kind.text()?.as_str() {
+        match &*kind.text()? {
             "uniform" => Self::uniform(node),
             "rectilinear" => Ok(Coordset::Rectilinear { axes: axes(node)? }),
             "explicit" => {

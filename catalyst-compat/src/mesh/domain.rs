@@ -48,7 +48,7 @@ struct Named<'call> {
 
 impl<'call> Domain<'call> {
     /// Reads a mesh; `None` for one that says nothing, as that of a rank without cells may.
-    pub(super) fn read(node: &Node<'_, 'call>) -> Result<Option<Self>, CatalystError> {
+    pub(super) fn read(node: &Node<'_, 'call>, with_fields: bool) -> Result<Option<Self>, CatalystError> {
         if node.kind() == Kind::Empty || (node.kind() == Kind::Object && node.len() == 0) {
             return Ok(None);
         }
@@ -58,7 +58,7 @@ impl<'call> Domain<'call> {
         for (index, name) in topologies.names().into_iter().enumerate() {
             let Some(topology) = topologies.at(index, &name) else { continue };
             let coordset_name = topology.need(c"coordset", "the name of its coordset")?;
-            let text = CString::new(coordset_name.text()?).unwrap_or_default();
+            let text = CString::new(&*coordset_name.text()?).unwrap_or_default();
             let Some(coordset_node) = coordsets.child(&text) else {
                 let known: Vec<String> =
                     coordsets.names().iter().map(|name| name.to_string_lossy().into_owned()).collect();
@@ -83,7 +83,9 @@ impl<'call> Domain<'call> {
             roles: Roles::default(),
             path: node.path(),
         };
-        domain.read_fields(node, &main, &others)?;
+        if with_fields {
+            domain.read_fields(node, &main, &others)?;
+        }
         Ok(Some(domain))
     }
 
@@ -124,7 +126,7 @@ impl<'call> Domain<'call> {
             let Some(field) = Field::read(&field_node, &main.name, vertices, elements)? else { continue };
             let role = told.as_ref().and_then(|told| told.child(name));
             let role = match role.as_ref().and_then(|role| role.child(c"attribute_type")) {
-                Some(role) => role.text()?,
+                Some(role) => role.text()?.into_owned(),
                 None if field.name == "vtkGhostType" => "Ghosts".into(),
                 None => String::new(),
             };

@@ -74,7 +74,7 @@ impl<'call> Field<'call> {
                 .err()
                 .unwrap_or_else(|| node.wrong("a field".into())));
         };
-        let (association, expected) = match association_node.text()?.as_str() {
+        let (association, expected) = match &*association_node.text()? {
             "vertex" => (Association::Vertex, vertices),
             "element" => (Association::Element, elements),
             other => {

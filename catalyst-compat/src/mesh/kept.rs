@@ -47,17 +47,18 @@ pub(crate) struct Kept {
 
 impl Kept {
     /// Brings what is kept up to date with what the solver shows. Where nobody will look at the values of this step
-    /// (`looked_at`), nothing is copied or compared unless the mesh has another size.
-    pub(crate) fn update(&mut self, channel: &Channel<'_>, looked_at: bool) -> Result<(), CatalystError> {
+    /// (`looked_at`), nothing is copied or compared unless the mesh has another size. Says whether the cells are others than before.
+    pub(crate) fn update(&mut self, channel: &Channel<'_>, looked_at: bool) -> Result<bool, CatalystError> {
         let counts = (channel.vertex_count(), channel.blocks.iter().map(|block| block.domain.topology.len()).sum());
         if !looked_at && self.fingerprint.is_some() && counts == self.counts {
-            return Ok(());
+            return Ok(false);
         }
         channel.check_memory()?;
         let single = channel.single();
         let lent_cells = single.and_then(|domain| domain.topology.lent().map(|_| address(domain)));
         let fingerprint = channel.fingerprint();
         let is_same = self.fingerprint == Some(fingerprint);
+        let is_other = self.fingerprint.is_some() && !is_same;
         self.counts = counts;
         let lent_points = single.is_some_and(|domain| domain.coordset.lent().is_some());
         if !lent_points || (!is_same && lent_cells.is_none()) {
@@ -88,7 +89,7 @@ impl Kept {
             self.points = Vec::new();
         }
         self.copy_fields(channel);
-        Ok(())
+        Ok(is_other)
     }
 
     fn points_of(&self, channel: &Channel<'_>) -> Vec<Vector> {

@@ -57,7 +57,7 @@ const KNOWN_TYPES: &str = "'points', 'uniform', 'rectilinear', 'structured' or '
 impl<'call> Topology<'call> {
     pub(super) fn read(node: &Node<'_, 'call>, coordset: &Coordset<'call>) -> Result<Self, CatalystError> {
         let kind = node.need(c"type", KNOWN_TYPES)?;
-        match kind.text()?.as_str() {
+        match &*kind.text()? {
             "points" => Ok(Topology::Points(coordset.len())),
             "uniform" | "rectilinear" => {
                 let points = coordset.grid().ok_or_else(|| {
