@@ -2,7 +2,7 @@
 //! Blueprint's checks, in Rust and with no library behind it but the C library.
 //!
 //! Solvers that were written for Catalyst 2 link to it unchanged; `scripts/install-catalyst PREFIX` puts the library, its headers
-//! (C, C++, Fortran), its CMake package and its pkg-config file into a prefix.
+//! (C, C++, Fortran), its Python packages, its CMake package and its pkg-config files into a prefix.
 //!
 //! # Guarantees
 //! - The shared library exports exactly the names in `symbols.txt`.
@@ -14,6 +14,13 @@
 //! # What it does not
 //! An address that is not a node, an array that is shorter than it is said to be, and two threads that use one tree at once are
 //! not noticed.
+//!
+//! # Where it differs
+//! - Messages are in other words than Conduit's, and name the place. Blueprint's reports have the same `valid`, `errors` and `info`.
+//! - In YAML a quoted number is a text, `null` holds nothing, and `!!str` makes a text.
+//! - Blueprint wants `sizes` for polygons, and for elements of mixed shapes also `offsets`; components of a field have one length.
+//! - Names that release candidates of Catalyst 2 had (`catalyst_error`, `catalyst_library` of CMake) are not there, nor is the C++
+//!   interface of Conduit itself (`conduit::Node`): `conduit_cpp::Node` is.
 
 pub mod base64;
 pub mod blueprint;
