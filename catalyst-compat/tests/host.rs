@@ -227,3 +227,24 @@ fn valgrind_finds_nothing() {
         assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
     }
 }
+
+/// Of what lies at z = 1, towards z = 0, in two shapes.
+const ORDERS: &str = r#"[
+    {"id": "press", "at": {"cycle": 2}, "order": {
+        "edits": [{"translate": {"region": {"half_space": {"origin": [0, 0, 0.99], "normal": [0, 0, 1]}},
+            "fixed_region": {"half_space": {"origin": [0, 0, 0.01], "normal": [0, 0, -1]}}, "by": [0, 0, -0.2]}}],
+        "schedule": {"steps": 2, "every": {"steps": 2}}}},
+    {"at": {"cycle": 3}, "parameter": {"name": "heating", "value": 2.5}},
+    {"at": {"cycle": 6}, "stop": {}}]"#;
+
+#[test]
+fn results_hold_the_motion_while_there_is_one() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let (pipelines, orders) = (directory.path().join("pipelines.json"), directory.path().join("orders.json"));
+    std::fs::write(&pipelines, r#"{"version": 1}"#).expect("a file");
+    std::fs::write(&orders, ORDERS).expect("a file");
+    let program = compile(directory.path(), "motion", true);
+    let (output, errors) = run(&program, Some(&pipelines), &[("TOMBOLO_ORDERS", &orders.to_string_lossy())]);
+    assert!(output.status.success(), "{errors}");
+    assert_eq!(errors, "");
+}
