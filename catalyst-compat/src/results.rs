@@ -16,7 +16,9 @@ pub(crate) const RESERVED: [&str; 4] = ["stop", "moving", "shape", "shapes"];
 pub(crate) fn fill(node: &mut NodeMut<'_>, asked: &Asked, channel: &str, blocks: &[(String, usize)]) {
     // What an earlier call left would be taken for new.
     node.remove(&format!("catalyst/{STEERING}"));
-    node.remove(&format!("catalyst/{channel}"));
+    if !channel.is_empty() {
+        node.remove(&format!("catalyst/{channel}"));
+    }
     settings(node, asked);
     let Some(motion) = &asked.motion else { return };
     let root = format!("catalyst/{channel}");

@@ -213,6 +213,19 @@ fn every_mesh_of_the_blueprint_arrives() {
 }
 
 #[test]
+fn rubbish_is_answered() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let stream = directory.path().join("stream.json");
+    std::fs::write(&stream, STREAM).expect("a file");
+    let (output, errors) = run(&compile(directory.path(), "rubbish", true), Some(&stream), &[]);
+    assert!(output.status.success(), "{errors}");
+    let told = String::from_utf8_lossy(&output.stdout);
+    let refused: u32 = told.split(' ').next().and_then(|count| count.parse().ok()).expect("a count");
+    assert!((1000..3000).contains(&refused), "{told}");
+    assert!(!errors.contains("defect"), "{errors}");
+}
+
+#[test]
 fn valgrind_finds_nothing() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let pipelines = directory.path().join("pipelines.json");

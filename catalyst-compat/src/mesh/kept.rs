@@ -63,6 +63,13 @@ impl Kept {
         let lent_points = single.is_some_and(|domain| domain.coordset.lent().is_some());
         if !lent_points || (!is_same && lent_cells.is_none()) {
             self.points.clear();
+            if self.points.try_reserve(counts.0).is_err() {
+                return Err(CatalystError::Wrong {
+                    path: format!("catalyst/channels/{}/data", channel.name),
+                    found: format!("{} vertices", counts.0),
+                    expected: "as many as there is memory for".into(),
+                });
+            }
             for block in &channel.blocks {
                 block.domain.coordset.append(&mut self.points);
             }
