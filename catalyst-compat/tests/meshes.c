@@ -176,7 +176,7 @@ int main(int argc, char** argv)
   /* A hexahedron; the other cube as two wedges, one of them as a pyramid and a tetrahedron. */
   mesh = channel("mixed", "mesh");
   explicit_points(mesh, two_cubes, 12);
-  const int32_t mixed[] = { 0, 1, 4, 3, 6, 7, 10, 9, 1, 4, 2, 7, 10, 8, 4, 10, 11, 5, 8, 4, 5, 2, 8 };
+  const int32_t mixed[] = { 0, 1, 4, 3, 6, 7, 10, 9, 1, 4, 2, 7, 10, 8, 4, 5, 11, 10, 8, 5, 4, 2, 8 };
   const int32_t sizes[] = { 8, 6, 5, 4 }, offsets[] = { 0, 8, 14, 19 };
   const uint8_t shapes[] = { 12, 13, 14, 10 };
   conduit_node* cells = shape(mesh, "mixed");
