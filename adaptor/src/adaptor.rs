@@ -18,6 +18,7 @@ use tombolo_deform::{
     surface::{FeatureSettings, Surface},
 };
 use tombolo_pipelines::{
+    distributed::{Part, Ranks},
     extract::Channel,
     language::{self, Config, Due, Stage, TimedCommand, Validate},
     shape::Shaper,
@@ -27,7 +28,7 @@ use crate::{
     comm,
     journal::Journal,
     report::{Durations, Report},
-    settings::{ExecuteError, FinalizeError, InitializeError, MeshMotion, Settings, Steering, Step},
+    settings::{ExecuteError, FinalizeError, InitializeError, MeshMotion, Settings, Solvers, Steering, Step},
     stages::Pipelines,
     steering::{Defaults, Forecaster, Log, Moment, Parameters, Queue, Source, Steerer, Timed},
     stream::{Hub, ReferenceSurface, Server},
@@ -39,6 +40,7 @@ use crate::{
 pub struct Adaptor {
     config: Config,
     communicator: Arc<dyn comm::Communicator>,
+    solvers: Option<Solvers>,
     parameters: Parameters,
     defaults: Defaults,
     pipelines: Pipelines,
@@ -74,7 +76,8 @@ enum SteeredMesh {
     Unsteered,
     /// Orders cannot be carried out, for this reason.
     Refused(String),
-    Steered(Box<Steerer>, Arc<Surface>),
+    /// With its surface, which on several ranks rank 0 has.
+    Steered(Box<Steerer>, Option<Arc<Surface>>),
 }
 
 /// What `hello` tells and what does not change from order to order.
@@ -125,7 +128,7 @@ impl Adaptor {
     }
 
     fn set_up(settings: Settings) -> Result<Self, InitializeError> {
-        let Settings { config, communicator, parameters, orders, output } = settings;
+        let Settings { config, communicator, solvers, parameters, orders, output } = settings;
         // What was built by hand is held to the same rules as what was read.
         let config: Config = checked(&config, "configuration")?;
         let orders: Vec<TimedCommand> = checked(&orders, "orders")?;
@@ -146,6 +149,7 @@ impl Adaptor {
                     log: Arc::clone(&log),
                     hub: Arc::clone(hub),
                     forecaster: Arc::clone(&forecaster),
+                    is_in_parts: communicator.size() > 1,
                 };
                 Some(Server::start(stream, Arc::clone(hub), Arc::new(intake))?)
             }
@@ -156,6 +160,7 @@ impl Adaptor {
             pipelines: Pipelines::new(&config, Arc::clone(&communicator), &output)?,
             config,
             communicator,
+            solvers,
             parameters,
             timed: Timed::new(orders),
             queue,
@@ -241,7 +246,8 @@ impl Adaptor {
     /// ask. Where it will not, it needs the number of the mesh's vertices all the same. The same on all ranks.
     #[must_use]
     pub fn looks_at(&self, step: &Step) -> bool {
-        matches!(self.mesh, SteeredMesh::Unknown) || self.pipelines.is_due(Moment { cycle: step.cycle, time: step.time })
+        matches!(self.mesh, SteeredMesh::Unknown)
+            || self.pipelines.is_due(Moment { cycle: step.cycle, time: step.time })
     }
 
     /// Stops changing the shape of the mesh, because the solver has made another one of it: views go on, orders are rejected with
@@ -399,17 +405,20 @@ impl Adaptor {
         let channel = channels.first().ok_or(ExecuteError::NoChannel { cycle })?;
         self.mesh = if self.config.stream.is_none() && self.timed.is_empty() && !self.pipelines.can_order() {
             SteeredMesh::Unsteered
-        } else if self.communicator.size() > 1 {
-            SteeredMesh::Refused("the shape of a mesh on more than one process cannot be changed yet".into())
         } else {
-            let mesh = channel.mesh.to_mesh().map_err(|source| ExecuteError::Mesh {
-                cycle,
-                channel: channel.name.into(),
-                source,
-            })?;
-            match self.take_over(mesh) {
-                Ok((steerer, surface)) => {
-                    self.pipelines.share_surface(channels, Arc::clone(&surface));
+            let of_channel = |source| ExecuteError::Mesh { cycle, channel: channel.name.into(), source };
+            let taken = if self.communicator.size() > 1 {
+                let part = comm::agree_on(&*self.communicator, Part::of(&channel.mesh).map_err(of_channel))?;
+                self.take_over_part(&part)
+            } else {
+                self.take_over(channel.mesh.to_mesh().map_err(of_channel)?)
+            };
+            match taken {
+                Ok(steerer) => {
+                    let surface = steerer.surface();
+                    if let Some(surface) = surface.as_ref().filter(|_| self.communicator.size() == 1) {
+                        self.pipelines.share_surface(channels, Arc::clone(surface));
+                    }
                     SteeredMesh::Steered(Box::new(steerer), surface)
                 }
                 Err(reason) => {
@@ -424,7 +433,7 @@ impl Adaptor {
         );
         self.told.channel = channel.name.to_owned();
         self.told.fields = fields.collect();
-        if let SteeredMesh::Steered(steerer, surface) = &self.mesh {
+        if let SteeredMesh::Steered(steerer, Some(surface)) = &self.mesh {
             self.told.features = features(surface);
             if let Some(hub) = &self.hub {
                 if let Some(forecaster) = steerer.forecaster() {
@@ -440,11 +449,10 @@ impl Adaptor {
         Ok(())
     }
 
-    fn take_over(&self, mesh: Mesh) -> Result<(Steerer, Arc<Surface>), String> {
+    fn take_over(&self, mesh: Mesh) -> Result<Steerer, String> {
         let mesh = Arc::new(mesh);
         let surface = Surface::extract(&mesh, &FeatureSettings::default()).map_err(|error| error.to_string())?;
-        let surface = Arc::new(surface);
-        let shaper = Shaper::new(mesh, Arc::clone(&surface)).map_err(|error| error.to_string())?;
+        let shaper = Shaper::new(mesh, Arc::new(surface)).map_err(|error| error.to_string())?;
         let steerer = Steerer::new(
             shaper,
             self.defaults.clone(),
@@ -452,9 +460,19 @@ impl Adaptor {
             Arc::clone(&self.queue),
             // Whoever drives can drag it at any time.
             self.config.stream.is_some() || self.timed.drags_skeleton() || self.pipelines.drags_skeleton(),
-        )
-        .map_err(|error| format!("a thread could not be started: {error}"))?;
-        Ok((steerer, surface))
+        );
+        steerer.map_err(|error| format!("a thread could not be started: {error}"))
+    }
+
+    /// The same of this rank's part of a mesh. Collective.
+    fn take_over_part(&self, part: &Part) -> Result<Steerer, String> {
+        let partition = |ranks: Ranks| match &self.solvers {
+            Some(solvers) => solvers(ranks, &part.points),
+            None => Arc::new(ranks),
+        };
+        let shaper = Shaper::of_part(Arc::clone(&self.communicator), part, &FeatureSettings::default(), partition)
+            .map_err(|error| error.to_string())?;
+        Ok(Steerer::of_part(shaper, self.defaults.clone(), Arc::clone(&self.log)))
     }
 }
 

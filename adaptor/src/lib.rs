@@ -34,6 +34,8 @@
 
 mod adaptor;
 pub mod comm;
+#[cfg(feature = "distributed")]
+pub mod distributed;
 mod journal;
 mod report;
 mod settings;
@@ -45,7 +47,7 @@ mod writer;
 pub use adaptor::Adaptor;
 pub use journal::JournalError;
 pub use report::{ORDERS_KEPT, OrderReport, OrderStatus, Report, Spread};
-pub use settings::{ExecuteError, FinalizeError, InitializeError, MeshMotion, Settings, Steering, Step};
+pub use settings::{ExecuteError, FinalizeError, InitializeError, MeshMotion, Settings, Solvers, Steering, Step};
 pub use steering::{Parameter, ParameterError};
 pub use tombolo_deform as deform;
 pub use tombolo_pipelines as pipelines;

@@ -2,9 +2,13 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use tombolo_deform::mesh::{MeshError, Vector};
+use tombolo_deform::{
+    mesh::{MeshError, Vector},
+    partition::Partition,
+};
 use tombolo_pipelines::{
     communicator::{Communicator, RankError, Solo},
+    distributed::Ranks,
     language::{Config, LanguageError, TimedCommand},
 };
 
@@ -14,6 +18,10 @@ use crate::{
     stream::StreamError,
 };
 
+/// Makes of the ranks that have the parts of a mesh, and of where the vertices of this rank's part lie, a partition with solvers of
+/// its own.
+pub type Solvers = Arc<dyn Fn(Ranks, &[Vector]) -> Arc<dyn Partition> + Send + Sync>;
+
 /// Everything that a run is set up with.
 #[derive(Clone)]
 pub struct Settings {
@@ -22,6 +30,8 @@ pub struct Settings {
     pub config: Config,
     /// The processes that the mesh is distributed over.
     pub communicator: Arc<dyn Communicator>,
+    /// What puts solvers of linear systems in place of the ones that the ranks have otherwise, such as PETSc's; `None`: these.
+    pub solvers: Option<Solvers>,
     /// The numbers of the solver that can be steered.
     pub parameters: Vec<Parameter>,
     /// Commands known beforehand; read a file of them, or a journal, with
@@ -40,6 +50,7 @@ impl Default for Settings {
         Self {
             config,
             communicator: Arc::new(Solo),
+            solvers: None,
             parameters: Vec::new(),
             orders: Vec::new(),
             output: PathBuf::from("."),

@@ -2,7 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "a test")]
 
 use std::{
+    os::raw::c_int,
     process::{Command, ExitCode},
+    sync::Arc,
     time::{Duration, Instant},
 };
 
@@ -13,11 +15,20 @@ use tombolo::{
         threads,
     },
     deform::{
+        mesh::{FeatureSource, Mesh, Vector},
         shapes::box_of_tets,
         surface::{FeatureSettings, Surface},
+        volume::{Deform, Method, VolumeOperator},
     },
-    pipelines::distributed::{Part, PartBoundary},
+    distributed::{Petsc, Preconditioning},
+    pipelines::distributed::{Part, PartBoundary, Ranks},
 };
+
+unsafe extern "C" {
+    fn PetscInitializeNoArguments() -> c_int;
+    fn PetscFinalized(is: *mut c_int) -> c_int;
+    fn PetscFinalize() -> c_int;
+}
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -68,7 +79,25 @@ fn as_rank() {
     use rsmpi::topology::{Color, Communicator as _};
     let half =
         universe.world().split_by_color_with_key(Color::with_value(world.rank() as i32 % 2), -(world.rank() as i32));
-    everything(&Mpi::new(&half.unwrap()).unwrap());
+    let half = half.unwrap();
+    everything(&Mpi::new(&half).unwrap());
+    // PETSc on these ranks alone: one half is at it while the other has not begun, or is through.
+    for preconditioning in PRECONDITIONINGS {
+        solved(&half, preconditioning, [5, 4, 4]);
+    }
+    // Once more, on all of them: PETSc has come and gone.
+    for preconditioning in PRECONDITIONINGS {
+        solved(&universe.world(), preconditioning, [7, 6, 5]);
+    }
+    // A solver that has PETSc itself keeps it.
+    let mut finalized = 1;
+    // SAFETY: MPI is there; PETSc was finalized with the last of the above, and is initialized and finalized once more here.
+    unsafe {
+        assert_eq!(PetscInitializeNoArguments(), 0);
+        solved(&half, Preconditioning::Schwarz, [4, 4, 4]);
+        assert_eq!((PetscFinalized(&raw mut finalized), finalized), (0, 0));
+        assert_eq!(PetscFinalize(), 0);
+    }
     // By the handles that C and Fortran have.
     // SAFETY: the handle of a communicator that is alive.
     let again = unsafe { Mpi::from_raw(world.as_raw()) }.unwrap();
@@ -118,6 +147,51 @@ fn everything(ranks: &dyn Communicator) {
         assert_eq!(ranks.exchange(messages), expected);
     }
     ranks.barrier();
+}
+
+const PRECONDITIONINGS: [Preconditioning; 4] =
+    [Preconditioning::Schwarz, Preconditioning::IncompleteCholesky, Preconditioning::Gamg, Preconditioning::Jacobi];
+
+/// PETSc moves the volume as one process does, again on cells that have moved, and says why it cannot.
+fn solved(world: &rsmpi::topology::SimpleCommunicator, preconditioning: Preconditioning, cells: [usize; 3]) {
+    let ranks: Arc<dyn Communicator> = Arc::new(Mpi::new(world).unwrap());
+    let solvers = Petsc::solvers(world, preconditioning).unwrap();
+    let mesh = box_of_tets(cells, [0.0; 3], [1.0; 3]);
+    // The last rank has no cells.
+    let (count, parts) = (mesh.cells().len(), (ranks.size() - 1).max(1));
+    let of_cells: Vec<usize> = (0..count).map(|cell| cell * parts / count).collect();
+    let part = Part::cut(&mesh, &of_cells, ranks.rank(), false).unwrap();
+    let (shared, boundary) = PartBoundary::find(&*ranks, &part, &FeatureSettings::default()).unwrap();
+    let partition = solvers(Ranks::new(ranks, Arc::new(shared), &boundary, Vec::new()), &part.points);
+    drop(solvers);
+    let own = Mesh::new(part.points.clone(), part.cells.clone(), FeatureSource::SharpEdges).unwrap();
+    let numbers: Vec<usize> = part.global_vertices.iter().flatten().map(|&number| number as usize).collect();
+    let wave = |[x, y, z]: Vector| [0.1 * (3.0 * y).sin(), 0.2 * x * z, -0.1 * (4.0 * x).cos()];
+    let on = |mesh: &Mesh, vertices: &[u32]| -> Vec<Vector> {
+        vertices.iter().map(|&vertex| wave(mesh.points()[vertex as usize])).collect()
+    };
+    let surface = Surface::extract(&mesh, &FeatureSettings::default()).unwrap();
+    for method in [Method::Elasticity, Method::Harmonic] {
+        let settings = Deform { method, tolerance: 1e-10, ..Deform::default() };
+        let serial = VolumeOperator::new(&mesh, surface.vertices(), &settings).unwrap();
+        let expected = serial.solve(&on(&mesh, surface.vertices())).unwrap().displacement;
+        let operator = VolumeOperator::of_part(&own, boundary.vertices(), &[], &settings, &partition).unwrap();
+        let again = operator.updated(&own).unwrap();
+        for operator in [&operator, &again] {
+            let found = operator.solve(&on(&own, boundary.vertices())).unwrap();
+            for (value, &number) in found.displacement.iter().zip(&numbers) {
+                let off = (0..3).map(|axis| (value[axis] - expected[number][axis]).abs()).fold(0.0, f64::max);
+                assert!(off < 1e-8, "{preconditioning:?} {method:?}: {off:e} in {} iterations", found.iterations);
+            }
+        }
+        let still = operator.solve(&vec![[0.0; 3]; boundary.vertices().len()]).unwrap();
+        assert!(still.displacement.iter().all(|value| *value == [0.0; 3]));
+        let mut bad = on(&own, boundary.vertices());
+        if let Some(first) = bad.first_mut() {
+            first[1] = f64::NAN;
+        }
+        assert!(operator.solve(&bad).is_err(), "on all ranks");
+    }
 }
 
 /// The surface of a mesh in parts is that of the whole.

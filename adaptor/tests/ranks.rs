@@ -7,7 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::{LINK_TO_ALL, Viewer, config};
+use common::{LINK_TO_ALL, Viewer, config, squeeze};
 use serde_json::json;
 use tombolo::{
     Adaptor, Parameter, Settings, Step,
@@ -60,8 +60,13 @@ fn what_viewers_ask_for_happens_at_the_same_cycle() {
         let channels = [Channel { name: "fluid", mesh: part.view(), fields: &fields }];
         let (mut first, mut second) = (None::<Viewer>, None::<Viewer>);
         let (mut cycle, mut changes) = (0, Vec::new());
+        let mut moved = None;
         loop {
             let steering = adaptor.execute(&step(cycle), &channels).expect("execute");
+            if let Some(motion) = steering.motion {
+                moved.get_or_insert(cycle);
+                assert_eq!(motion.coordinates.len(), part.points.len());
+            }
             changes.extend(steering.parameters.iter().map(|(name, value)| (cycle, name.clone(), *value)));
             if steering.stop {
                 break;
@@ -85,10 +90,19 @@ fn what_viewers_ask_for_happens_at_the_same_cycle() {
                     25 => {
                         let mut viewer = Viewer::connect(&adaptor);
                         viewer.hello();
+                        viewer.send(&json!({"id": "what", "forecast": squeeze(0.2)}));
+                        viewer.send(&json!({"id": "far", "forecast": squeeze(2.0)}));
+                        viewer.send(&json!({"id": "press", "order": squeeze(0.1)}));
+                        second = Some(viewer);
+                    }
+                    40 => {
+                        let viewer = second.as_mut().expect("connected");
+                        // The newest question of a client is the one that is answered.
+                        let told = viewer.wait_for("forecast", |forecast| forecast["id"] == "far");
+                        assert_eq!(told["order"]["outcome"], "rejected", "{told}");
                         viewer.send(&json!({"pause": {}}));
                         viewer.send(&json!({"resume": {}}));
                         viewer.send(&json!({"id": "end", "stop": {}}));
-                        second = Some(viewer);
                     }
                     _ => {}
                 }
@@ -99,10 +113,11 @@ fn what_viewers_ask_for_happens_at_the_same_cycle() {
         }
         drop(second);
         adaptor.finalize().expect("finalize");
-        (cycle, changes)
+        (cycle, changes, moved)
     });
     assert!(outcomes.iter().all(|outcome| *outcome == outcomes[0]), "{outcomes:?}");
-    assert!(outcomes[0].0 >= 25 && outcomes[0].1.iter().any(|(_, name, value)| name == "inflow" && *value == 2.0));
+    assert!(outcomes[0].2.is_some(), "the order was not carried out");
+    assert!(outcomes[0].0 >= 40 && outcomes[0].1.iter().any(|(_, name, value)| name == "inflow" && *value == 2.0));
 }
 
 #[test]
@@ -237,4 +252,60 @@ fn a_run_does_not_begin_with_different_configurations() {
     });
     let expected = Err("rank 1: its configuration or its orders are not those of rank 0".to_owned());
     assert_eq!(outcomes, [expected.clone(), expected]);
+}
+
+/// Orders take effect at the same cycle on all ranks, and give what they give on one; undone, every rank has its own coordinates
+/// back bit for bit. The second order comes in the middle of the first one's schedule, the third makes no sense.
+#[test]
+fn orders_move_all_parts_at_the_same_cycle() {
+    let mesh = box_of_tets([5, 5, 5], [0.0; 3], [1.0; 3]);
+    let orders = r#"[
+        {"at": {"cycle": 2}, "order": {"edits": [
+            {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.1, -0.2]}}], "schedule": {"steps": 6}}},
+        {"at": {"cycle": 4}, "order": {"edits": [
+            {"translate": {"features": ["x-max"], "fixed": ["x-min"], "by": [0.1, 0.0, 0.0]}}], "schedule": {"steps": 3}}},
+        {"at": {"cycle": 9}, "order": {"edits": [
+            {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -5.0]}}]}},
+        {"at": {"cycle": 10}, "order": {"undo": 2}}]"#;
+    let run = |communicator: Arc<dyn Communicator>, part: &Part| {
+        let numbers: Vec<usize> = part.global_vertices.iter().flatten().map(|&number| number as usize).collect();
+        let mut points = part.points.clone();
+        let orders = tombolo::pipelines::language::parse_orders(orders, "orders").expect("orders");
+        let mut adaptor =
+            Adaptor::initialize(Settings { communicator, orders, ..Settings::default() }).expect("initialize");
+        let mut shapes = Vec::new();
+        for cycle in 0..14 {
+            let moving = Part { points: points.clone(), ..part.clone() };
+            let channels = [Channel { name: "fluid", mesh: moving.view(), fields: &[] }];
+            if let Some(motion) = adaptor.execute(&step(cycle), &channels).expect("execute").motion {
+                points.copy_from_slice(motion.coordinates);
+                shapes.push((cycle, motion.shape, points.clone()));
+            }
+        }
+        assert_eq!(points, part.points);
+        (numbers, shapes, adaptor.finalize().expect("finalize").orders)
+    };
+    let whole = Part::cut(&mesh, &vec![0; mesh.cells().len()], 0, false).expect("a part");
+    let (_, serial, told) = run(Arc::new(tombolo::comm::Solo), &whole);
+    assert_eq!(serial.len(), 2 + 3 + 1, "two shapes of the first order, three of the second, the way back");
+    let outcomes = threads::run(RANKS, |ranks| {
+        let part = part(&mesh, ranks.rank());
+        run(Arc::new(ranks), &part)
+    });
+    for (rank, (numbers, shapes, orders)) in outcomes.iter().enumerate() {
+        assert_eq!(shapes.len(), serial.len());
+        for ((cycle, shape, points), (expected_cycle, expected_shape, expected)) in shapes.iter().zip(&serial) {
+            assert_eq!((cycle, shape), (expected_cycle, expected_shape));
+            for (point, &number) in points.iter().zip(numbers) {
+                let off = (0..3).map(|axis| (point[axis] - expected[number][axis]).abs()).fold(0.0, f64::max);
+                assert!(off < 1e-7, "cycle {cycle}: vertex {number} is {off:e} off");
+            }
+        }
+        if rank == 0 {
+            for (order, expected) in orders.iter().zip(&told) {
+                assert_eq!((order.status, order.cycle_applied), (expected.status, expected.cycle_applied));
+                assert_eq!(order.reason.is_some(), expected.reason.is_some());
+            }
+        }
+    }
 }

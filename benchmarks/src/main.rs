@@ -9,6 +9,7 @@
 //! cargo run --release -p tombolo-benchmarks -- skeleton --json
 //! cargo run --release -p tombolo-benchmarks -- scaling --json
 //! cargo run --release -p tombolo-benchmarks -- catalyst --json
+//! cargo run --release -p tombolo-benchmarks --features distributed -- volume --json
 //! ```
 
 mod catalyst;
@@ -22,6 +23,8 @@ mod stiffening;
 mod surface;
 mod surface_wasm;
 mod volume;
+#[cfg(feature = "distributed")]
+mod volume_ranks;
 
 use std::process::ExitCode;
 
@@ -37,6 +40,14 @@ struct Arguments {
     /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
+    /// Be one of the ranks that `volume` starts for this mesh.
+    #[cfg(feature = "distributed")]
+    #[arg(long, hide = true, requires = "displacement")]
+    part_of: Option<usize>,
+    /// The displacement on one process.
+    #[cfg(feature = "distributed")]
+    #[arg(long, hide = true)]
+    displacement: Option<std::path::PathBuf>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -63,6 +74,10 @@ enum Name {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
+    #[cfg(feature = "distributed")]
+    if let (Some(number), Some(displacement)) = (arguments.part_of, &arguments.displacement) {
+        return said(volume_ranks::run(number, displacement).map(|()| String::new()));
+    }
     let result: Result<Report, Box<dyn std::error::Error>> = match arguments.name {
         Name::Paper => {
             return said(

@@ -21,7 +21,7 @@ use crate::report::{Report, Row, Target};
 /// Runs of each of our own measurements.
 const RUNS: usize = 5;
 
-const TOLERANCE: f64 = 1e-6;
+pub const TOLERANCE: f64 = 1e-6;
 
 /// The paper's table: elements, processes, milliseconds to allocate and assemble the matrix and to solve.
 const PAPER: [(&str, usize, f64, f64); 5] = [
@@ -33,7 +33,7 @@ const PAPER: [(&str, usize, f64, f64); 5] = [
 ];
 
 /// The threads of everything measured, as many as PETSc has ranks.
-const THREADS: usize = 2;
+pub const THREADS: usize = 2;
 
 /// Runs the benchmark: some minutes.
 ///
@@ -88,6 +88,8 @@ fn measured() -> Result<Report, Box<dyn Error>> {
         report.targets.push(Target::at_most(&case("difference from PETSc"), worst, 1e-5));
         let ratio = (ours.set_up + ours.solve) / quickest;
         report.targets.push(Target::at_most(&case("set-up and solve by PETSc's quickest"), ratio, 1.0));
+        #[cfg(feature = "distributed")]
+        on_ranks(number, &case, folder.path(), &mut report)?;
         if number + 1 == PAPER.len() {
             let cold = ours.assembly + ours.set_up + ours.solve;
             report.targets.push(Target::at_most(&case("elasticity, cold [s]"), cold, 2.0));
@@ -113,6 +115,44 @@ fn measured() -> Result<Report, Box<dyn Error>> {
         }
     }
     Ok(report)
+}
+
+/// PETSc on the ranks of MPI, with a part of the mesh each, beside the shared-memory solver.
+#[cfg(feature = "distributed")]
+fn on_ranks(
+    number: usize,
+    case: &dyn Fn(&str) -> String,
+    folder: &Path,
+    report: &mut Report,
+) -> Result<(), Box<dyn Error>> {
+    use crate::volume_ranks::{OnRanks, started, write_displacement};
+
+    let file = folder.join("displacement");
+    write_displacement(&file, number)?;
+    for ranks in [1, 2] {
+        let found = started(number, ranks, &file)?;
+        for OnRanks { solver, set_up, first, later, iterations, .. } in &found {
+            let on = format!("{solver}, parts on {ranks} rank(s)");
+            let stages = [
+                ("assembly and set-up".to_owned(), set_up),
+                (format!("first order, {iterations} iterations"), first),
+                ("later order".to_owned(), later),
+            ];
+            for (what, &seconds) in stages {
+                report.rows.push(Row { case: case(&format!("{on}, {what}")), seconds, steps: None });
+            }
+        }
+        let worst = found.iter().map(|solver| solver.difference).fold(0.0, f64::max);
+        let on = case(&format!("{ranks} rank(s), difference from the shared-memory solver"));
+        report.targets.push(Target::at_most(&on, worst, 1e-6));
+        let cold = |solver: &OnRanks| solver.set_up + solver.first;
+        let petsc = || found.iter().filter(|solver| solver.solver.starts_with("PETSc"));
+        let quickest = petsc().map(cold).fold(f64::INFINITY, f64::min);
+        let default = petsc().find(|solver| solver.is_default).map_or(f64::INFINITY, cold);
+        let on = case(&format!("{ranks} rank(s), PETSc as it is by default by its quickest"));
+        report.targets.push(Target::at_most(&on, default / quickest, 1.0));
+    }
+    Ok(())
 }
 
 /// What elasticity took, and its equations.
@@ -283,7 +323,7 @@ fn sliding_sides(report: &mut Report) -> Result<(), Box<dyn Error>> {
 
 /// The paper's bypass where `scripts/meshes` has made it already (the largest takes it a quarter of an hour); else a box with as
 /// many tetrahedra, made in a moment.
-fn mesh(number: usize) -> Result<(String, Mesh), Box<dyn Error>> {
+pub fn mesh(number: usize) -> Result<(String, Mesh), Box<dyn Error>> {
     let name = format!("bypass-{number}");
     let directory = std::env::var_os("TOMBOLO_MESHES")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../meshes"), PathBuf::from);
@@ -311,7 +351,7 @@ fn jiggled_box(count: usize) -> Result<Mesh, Box<dyn Error>> {
 }
 
 /// A smooth motion by up to a tenth of the domain.
-fn motion(mesh: &Mesh, boundary: &[u32]) -> Vec<Vector> {
+pub fn motion(mesh: &Mesh, boundary: &[u32]) -> Vec<Vector> {
     let points = || boundary.iter().map(|&vertex| mesh.points()[vertex as usize]);
     let bound = |start: f64, pick: fn(f64, f64) -> f64| {
         points().fold([start; 3], |a, b| std::array::from_fn(|axis| pick(a[axis], b[axis])))

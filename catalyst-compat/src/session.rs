@@ -30,7 +30,8 @@ impl Session {
         if is_first {
             notes.iter().for_each(|note| eprintln!("tombolo: {note}"));
         }
-        let mut settings = Settings { config, communicator: Arc::clone(&communicator), parameters, orders, output };
+        let mut settings =
+            Settings { config, communicator: Arc::clone(&communicator), solvers: None, parameters, orders, output };
         let run = match Run::new(settings.clone()) {
             // Nobody asked for that very port.
             Err(CatalystError::Initialize(InitializeError::Stream(_))) if is_default && communicator.size() == 1 => {

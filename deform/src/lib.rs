@@ -6,6 +6,7 @@
 
 pub mod linear;
 pub mod mesh;
+pub mod partition;
 pub mod quality;
 pub mod schedule;
 pub mod shapes;

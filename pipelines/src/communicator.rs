@@ -9,29 +9,7 @@ pub mod threads;
 pub use counted::{Counted, Traffic};
 pub use threads::Threads;
 
-/// How [`Communicator::reduce`] combines the values of the ranks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Reduction {
-    /// The smallest; NaN is passed over.
-    Minimum,
-    /// The largest; NaN is passed over.
-    Maximum,
-    /// The sum, added in a fixed order, that of [`combine`], so that the bits do not depend on chance.
-    Sum,
-}
-
-impl Reduction {
-    /// Takes `more` into `values`.
-    pub fn take_in(self, values: &mut [f64], more: &[f64]) {
-        for (value, more) in values.iter_mut().zip(more) {
-            *value = match self {
-                Reduction::Minimum => value.min(*more),
-                Reduction::Maximum => value.max(*more),
-                Reduction::Sum => *value + more,
-            };
-        }
-    }
-}
+pub use tombolo_deform::partition::Reduction;
 
 /// The processes that run together: one ([`Solo`]) or the ranks of an MPI communicator.
 ///

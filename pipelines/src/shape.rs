@@ -1,22 +1,32 @@
 //! From a stack of edits to the shapes that a solver is handed.
 
+mod boundary;
 mod carry;
 mod forecast;
 mod mend;
 mod plan;
+#[cfg(test)]
+mod tests;
 
 use std::sync::Arc;
 
 use serde::Serialize;
 use tombolo_deform::{
-    mesh::{Mesh, Vector},
-    quality::{Guard, Refusal, SurfaceRule, keeps},
+    mesh::{Cells, FeatureSource, Mesh, Vector},
+    partition::Partition,
+    quality::{Guard, Refusal, SurfaceRule, keeps_in_parts},
     schedule::Schedule,
-    surface::{BrokenSurface, Edit, EditError, Editor, Surface, SurfaceError, UnknownFeature, require_sound},
+    surface::{
+        BrokenSurface, Edit, EditError, Editor, FeatureSettings, Surface, SurfaceError, UnknownFeature, require_sound,
+    },
     volume::{Improver, Untangler, VolumeError},
 };
 
+use crate::communicator::{Communicator, agree};
+use crate::distributed::{DistributedError, Part, PartBoundary, Ranks};
 use crate::language::DeformStage;
+pub use boundary::Elsewhere;
+use boundary::{Boundary, Parts};
 use carry::Carrier;
 pub use forecast::{Forecast, Outcome};
 use mend::Mended;
@@ -78,9 +88,25 @@ pub enum Refused {
         /// What is wrong with going further.
         refusal: Refusal,
     },
+    /// What ranks said to each other was not understood.
+    #[error(transparent)]
+    Distributed(#[from] DistributedError),
+    /// Another rank has the reason, in its own words.
+    #[error("{0}")]
+    Elsewhere(Elsewhere),
 }
 
 impl Refused {
+    /// Whether it is the surface that is broken.
+    fn is_surface(&self) -> bool {
+        matches!(self, Refused::Surface(_) | Refused::Elsewhere(Elsewhere { is_surface: true, .. }))
+    }
+
+    /// Whether a mesh on a straight way would be broken.
+    fn is_quality(&self) -> bool {
+        matches!(self, Refused::Guard(Refusal::Quality(_)) | Refused::Elsewhere(Elsewhere { is_quality: true, .. }))
+    }
+
     /// The least scaled Jacobian on the way, where that is what was wrong.
     #[must_use]
     pub fn min_scaled_jacobian(&self) -> Option<f64> {
@@ -88,6 +114,7 @@ impl Refused {
             Refused::Guard(Refusal::Quality(path)) | Refused::Stalled { refusal: Refusal::Quality(path), .. } => {
                 Some(path.min_scaled_jacobian)
             }
+            Refused::Elsewhere(elsewhere) => elsewhere.min_scaled_jacobian,
             _ => None,
         }
     }
@@ -99,6 +126,7 @@ impl Refused {
             Refused::Guard(Refusal::Quality(path)) => Some(path.feasible_fraction),
             Refused::Stalled { fraction, .. } => Some(*fraction),
             Refused::Surface(broken) => Some(broken.sound_fraction),
+            Refused::Elsewhere(elsewhere) => elsewhere.feasible_fraction,
             _ => None,
         }
     }
@@ -162,10 +190,16 @@ impl Target {
 /// assert_eq!(&**back.end(), mesh.points());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+///
+/// # On several ranks
+/// Of a mesh in parts ([`Shaper::of_part`]) each rank has a shaper of its own part; rank 0 has the surface and evaluates the edits.
+/// Everything that makes or judges shapes is then collective: all ranks ask for the same, on the thread from which the communicator
+/// may be used, and get the same outcome, the same refusal, and the shape of their own vertices, ghosts among them.
 pub struct Shaper {
     mesh: Arc<Mesh>,
-    surface: Arc<Surface>,
-    editor: Editor,
+    boundary: Arc<Boundary>,
+    /// Where the surface is.
+    editor: Option<Editor>,
     operators: Vec<(DeformStage, Arc<Carrier>)>,
     reference: Arc<[Vector]>,
     untangler: Option<Arc<Untangler>>,
@@ -182,19 +216,68 @@ impl Shaper {
     /// As [`Editor::new`].
     pub fn new(mesh: Arc<Mesh>, surface: Arc<Surface>) -> Result<Self, SurfaceError> {
         let editor = Editor::new(Arc::clone(&surface))?;
+        Ok(Self::with_boundary(mesh, Boundary::of_surface(surface), Some(editor)))
+    }
+
+    /// A shaper of the part that this rank has of the reference mesh. `partition` may put another partition in place of the one
+    /// that the ranks make, such as one with solvers of its own. Collective.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use tombolo_deform::{shapes::box_of_tets, surface::{Edit, FeatureSettings}};
+    /// use tombolo_pipelines::{communicator::{Communicator, threads}, distributed::Part, shape::Shaper};
+    ///
+    /// let mesh = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+    /// let half = |cell: usize| usize::from(2 * cell >= mesh.cells().len());
+    /// let of_cells: Vec<usize> = (0..mesh.cells().len()).map(half).collect();
+    /// let edits: Vec<Edit> = serde_json::from_value(serde_json::json!([
+    ///     {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -0.1]}}
+    /// ]))?;
+    /// let least = threads::run(2, |ranks| {
+    ///     let part = Part::cut(&mesh, &of_cells, ranks.rank(), false).map_err(|error| error.to_string())?;
+    ///     let mut shaper = Shaper::of_part(Arc::new(ranks), &part, &FeatureSettings::default(), |ranks| Arc::new(ranks))
+    ///         .map_err(|error| error.to_string())?;
+    ///     let start = Arc::clone(shaper.reference());
+    ///     let plan = shaper.plan(&edits, start, &Default::default(), &Default::default(), &Default::default());
+    ///     plan.map(|plan| plan.quality().min_scaled_jacobian).map_err(|error| error.to_string())
+    /// });
+    /// assert!(least[0].as_ref().is_ok_and(|least| *least > 0.02));
+    /// assert_eq!(least[0], least[1]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`DistributedError`], the same on all ranks.
+    pub fn of_part(
+        communicator: Arc<dyn Communicator>,
+        part: &Part,
+        settings: &FeatureSettings,
+        partition: impl FnOnce(Ranks) -> Arc<dyn Partition>,
+    ) -> Result<Self, DistributedError> {
+        let (shared, boundary) = PartBoundary::find(&*communicator, part, settings)?;
+        let shared = Arc::new(shared);
+        let editor = boundary.surface().map(|surface| Editor::new(Arc::clone(surface))).transpose();
+        let editor = agree(&*communicator, editor)?;
+        let own = agree(&*communicator, own_mesh(part))?;
+        let numbers = cell_numbers(&*communicator, part, &own.1);
+        let partition = partition(Ranks::new(Arc::clone(&communicator), Arc::clone(&shared), &boundary, numbers));
+        let parts = Parts { communicator, shared, boundary };
+        Ok(Self::with_boundary(Arc::new(own.0), Boundary::of_parts(parts, partition), editor))
+    }
+
+    fn with_boundary(mesh: Arc<Mesh>, boundary: Boundary, editor: Option<Editor>) -> Self {
         let reference = mesh.points().into();
-        let spent = ShapeSeconds::default();
-        Ok(Self {
+        Self {
             mesh,
-            surface,
+            boundary: Arc::new(boundary),
             editor,
             operators: Vec::new(),
             reference,
             untangler: None,
             improver: None,
             mended: Vec::new(),
-            spent,
-        })
+            spent: ShapeSeconds::default(),
+        }
     }
 
     /// The reference mesh.
@@ -215,20 +298,32 @@ impl Shaper {
         self.spent
     }
 
-    /// Its surface.
+    /// Its surface; on several ranks that of the whole mesh, on rank 0 alone.
     #[must_use]
-    pub fn surface(&self) -> &Arc<Surface> {
-        &self.surface
+    pub fn surface(&self) -> Option<&Arc<Surface>> {
+        self.boundary.surface()
     }
 
-    /// The editor of its surface.
-    pub fn editor(&mut self) -> &mut Editor {
-        &mut self.editor
+    /// The vertices of the mesh on its surface.
+    #[must_use]
+    pub fn boundary_vertices(&self) -> &[u32] {
+        self.boundary.vertices()
+    }
+
+    /// The parts that the mesh is in.
+    #[must_use]
+    pub fn partition(&self) -> &Arc<dyn Partition> {
+        self.boundary.partition()
+    }
+
+    /// The editor of its surface, where that is.
+    pub fn editor(&mut self) -> Option<&mut Editor> {
+        self.editor.as_mut()
     }
 
     /// Extracts the skeleton of the surface when it is called, on whatever thread that is, so that the first order need not.
-    pub fn skeleton_in_advance(&self) -> impl FnOnce() + Send + 'static + use<> {
-        self.editor.skeleton_in_advance()
+    pub fn skeleton_in_advance(&self) -> Option<impl FnOnce() + Send + 'static + use<>> {
+        self.editor.as_ref().map(Editor::skeleton_in_advance)
     }
 
     /// Sets up the operator of the volume, so that the first order need not.
@@ -239,12 +334,13 @@ impl Shaper {
         self.operator(deform).map(drop)
     }
 
-    /// Holds a shape of the surface (coordinates of each of its vertices) to `rule`.
+    /// Holds a shape of the surface (coordinates of each of its vertices, on the rank that has it) to `rule`.
     fn require_sound(&self, shape: &[Vector], rule: SurfaceRule) -> Result<(), Refused> {
-        match rule {
-            SurfaceRule::Allow => Ok(()),
-            _ => Ok(require_sound(&self.surface, self.surface.points(), shape)?),
-        }
+        let sound = match (rule, self.boundary.surface()) {
+            (SurfaceRule::Allow, _) | (_, None) => Ok(()),
+            (_, Some(surface)) => require_sound(surface, surface.points(), shape).map_err(Refused::from),
+        };
+        self.boundary.agree(sound)
     }
 
     fn operator(&mut self, deform: &DeformStage) -> Result<Arc<Carrier>, Refused> {
@@ -258,7 +354,7 @@ impl Shaper {
         if self.operators.len() >= OPERATORS {
             self.operators.remove(0);
         }
-        let operator = Arc::new(Carrier::new(&self.mesh, &self.surface, deform)?);
+        let operator = Arc::new(Carrier::new(&self.mesh, &self.boundary, deform)?);
         self.operators.push((deform.clone(), Arc::clone(&operator)));
         Ok(operator)
     }
@@ -272,39 +368,40 @@ impl Shaper {
         deform.equation.validate()?;
         let mut seconds = ShapeSeconds::default();
         let watch = Stopwatch::start();
-        let surface = self.editor.displacement(stack).map_err(Refused::from).and_then(|surface| {
-            let reference = self.surface.points();
+        let boundary = Arc::clone(&self.boundary);
+        let displaced = displaced(self.editor.as_mut(), stack).and_then(|displacement| {
             // Where a part of the surface is let go, it is looked at where it ends.
-            if !deform.lets_go() {
-                let shape: Vec<Vector> = reference.iter().zip(&surface).map(|(&point, &by)| moved(point, by)).collect();
-                self.require_sound(&shape, rule)?;
+            if let (Some(surface), false, SurfaceRule::Reject) = (boundary.surface(), deform.lets_go(), rule) {
+                let moved = surface.points().iter().zip(&displacement).map(|(&point, &by)| moved(point, by));
+                require_sound(surface, surface.points(), &moved.collect::<Vec<Vector>>())?;
             }
-            Ok(surface)
+            Ok(displacement)
         });
+        let surface = boundary.scatter(displaced);
         seconds.surface = watch.seconds();
         self.spent.surface += seconds.surface;
         let surface = surface?;
         let reference = Arc::clone(&self.reference);
-        let still = surface.iter().all(|displacement| *displacement == [0.0; 3]);
+        let still = boundary.all(surface.iter().all(|displacement| *displacement == [0.0; 3]));
         if still {
             let points = Arc::clone(&reference);
             let (way, fraction, iterations, sub_steps) = (Vec::new(), 1.0, 0, 0);
             return Ok(Target { points, reference, way, fraction, seconds, iterations, sub_steps });
         }
         let watch = Stopwatch::start();
-        let solution = self.operator(deform)?.solve(&surface).map(|solution| {
+        let solution = self.operator(deform)?.solve(&surface).and_then(|solution| {
             let moved = reference.iter().zip(&solution.displacement).map(|(&point, &by)| moved(point, by));
-            let points: Arc<[Vector]> = moved.collect();
-            let improved = self.improved(&points, deform).filter(|improved| self.straight(improved));
-            (improved.unwrap_or(points), solution.iterations)
+            let mut points: Vec<Vector> = moved.collect();
+            boundary.take_from_owners(&mut points)?;
+            let improved = self.improved(&points, deform)?.filter(|improved| self.straight(improved));
+            Ok((improved.unwrap_or_else(|| points.into()), solution.iterations))
         });
         seconds.volume = watch.seconds();
         self.spent.volume += seconds.volume;
         let (points, iterations) = solution?;
         if deform.lets_go() {
             let watch = Stopwatch::start();
-            let shape: Vec<Vector> = self.surface.vertices().iter().map(|&vertex| points[vertex as usize]).collect();
-            let sound = self.require_sound(&shape, rule);
+            let sound = boundary.gather(&points).and_then(|shape| self.require_sound(&shape, rule));
             seconds.surface += watch.seconds();
             self.spent.surface += watch.seconds();
             sound?;
@@ -314,19 +411,30 @@ impl Shaper {
     }
 
     /// The shape with its worst cells lifted, where that could be done.
-    fn improved(&mut self, points: &[Vector], deform: &DeformStage) -> Option<Arc<[Vector]>> {
+    fn improved(&mut self, points: &[Vector], deform: &DeformStage) -> Result<Option<Arc<[Vector]>>, Refused> {
         if deform.equation.improve == 0 {
-            return None;
+            return Ok(None);
         }
-        let improver =
-            self.improver.get_or_insert_with(|| Arc::new(Improver::new(&self.mesh, self.surface.vertices())));
+        let (mesh, boundary) = (&self.mesh, &self.boundary);
+        let improver = self
+            .improver
+            .get_or_insert_with(|| Arc::new(Improver::of_part(mesh, boundary.vertices(), boundary.partition())));
         let mut points = points.to_vec();
-        improver.improve(&mut points, deform.equation.improve).then(|| points.into())
+        if !improver.improve(&mut points, deform.equation.improve) {
+            return Ok(None);
+        }
+        boundary.take_from_owners(&mut points)?;
+        Ok(Some(points.into()))
     }
 
     /// Whether every cell stays valid on the straight way from the reference.
     fn straight(&self, points: &[Vector]) -> bool {
-        keeps(&self.mesh, &self.reference, points, &Guard { min_scaled_jacobian: 0.0, ..Guard::default() })
+        let guard = Guard { min_scaled_jacobian: 0.0, ..Guard::default() };
+        self.keeps(&self.reference, points, &guard)
+    }
+
+    fn keeps(&self, start: &[Vector], end: &[Vector], guard: &Guard) -> bool {
+        keeps_in_parts(&self.mesh, start, end, guard, &**self.boundary.partition())
     }
 
     /// The way from the shape `start` (coordinates of every vertex) to that of a stack: [`Shaper::reach`] where no way back is
@@ -344,6 +452,39 @@ impl Shaper {
     ) -> Result<Plan, Refused> {
         self.reach(stack, 0, &start.into(), deform, schedule, guard)
     }
+}
+
+/// The displacement of the surface that a stack makes, where the surface is.
+fn displaced(editor: Option<&mut Editor>, stack: &[Edit]) -> Result<Vec<Vector>, Refused> {
+    editor.map_or_else(|| Ok(Vec::new()), |editor| Ok(editor.displacement(stack)?))
+}
+
+/// The cells of a part that are its own and of volume, with all its vertices, and where they stand among the part's cells.
+fn own_mesh(part: &Part) -> Result<(Mesh, Vec<usize>), tombolo_deform::mesh::MeshError> {
+    let is_own = |cell: &usize| !part.is_ghost(*cell) && part.cells.cell_type(*cell).dimension() == 3;
+    let own: Vec<usize> = (0..part.cells.len()).filter(is_own).collect();
+    let mut cells = Cells::new();
+    for &cell in &own {
+        match part.cells.polyhedron_faces(cell) {
+            [] => cells.push(part.cells.cell_type(cell), part.cells.vertices(cell))?,
+            faces => cells.push_polyhedron(faces)?,
+        }
+    }
+    Ok((Mesh::new(part.points.clone(), cells, FeatureSource::SharpEdges)?, own))
+}
+
+/// The numbers in the whole mesh of a part's own cells: the solver's, else they count through the ranks. Collective.
+fn cell_numbers(communicator: &dyn Communicator, part: &Part, own: &[usize]) -> Vec<u64> {
+    let counts = communicator.gather(0, &(part.cells.len() as u64).to_le_bytes());
+    let mut all = counts.unwrap_or_default().concat();
+    communicator.broadcast(0, &mut all);
+    let counts = all.as_chunks().0.iter().map(|count| u64::from_le_bytes(*count));
+    let first: u64 = counts.take(communicator.rank()).sum();
+    let number = |&cell: &usize| match &part.global_cells {
+        Some(numbers) => numbers.get(cell).copied().unwrap_or(u64::MAX),
+        None => first + cell as u64,
+    };
+    own.iter().map(number).collect()
 }
 
 /// Adding 0 would turn a coordinate of -0 into 0: what does not move keeps its bits.

@@ -71,9 +71,9 @@ fn free_features_follow_and_are_judged_as_any_other() {
     let plan = plan(&mut shaper, &turned, free, &guard).unwrap();
     let after = quality(shaper.mesh().cells(), plan.end());
     assert!(after.inverted == 0 && after.min >= guard.min_scaled_jacobian, "{after:?}");
-    let surface = Arc::clone(shaper.surface());
+    let surface = Arc::clone(shaper.surface().unwrap());
     let top = surface.features().index("z-max").unwrap();
-    let told = shaper.editor().displacement(&turned).unwrap();
+    let told = shaper.editor().unwrap().displacement(&turned).unwrap();
     let off = |vertex: u32| {
         let at = surface.vertices()[vertex as usize] as usize;
         let (end, start) = (plan.end()[at], surface.points()[vertex as usize]);

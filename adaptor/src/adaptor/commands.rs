@@ -11,7 +11,7 @@ use tombolo_pipelines::{
 use super::{Adaptor, SteeredMesh};
 use crate::{
     comm,
-    steering::{Forecaster, Log, Moment, Queue, Received, Source},
+    steering::{Asked, Forecaster, Log, Moment, Queue, Received, Source},
     stream::{CommandSink, Hub},
 };
 
@@ -54,7 +54,9 @@ impl Adaptor {
 
     fn read_files(&self, command: &mut Command) -> Result<(), UnreadFile> {
         match (command, &self.mesh) {
-            (Command::Order(order), SteeredMesh::Steered(_, surface)) => read_displacements(order.edits_mut(), surface),
+            (Command::Order(order), SteeredMesh::Steered(_, Some(surface))) => {
+                read_displacements(order.edits_mut(), surface)
+            }
             // Without a surface every order is rejected.
             _ => Ok(()),
         }
@@ -81,12 +83,29 @@ impl Adaptor {
             let client = clients.get(place).copied().unwrap_or_default();
             self.obey(id, &Source::Viewer(client), command, moment);
         }
+        self.foretell();
         let step_seconds = self.timing.steps.median();
         if let SteeredMesh::Steered(steerer, _) = &mut self.mesh
             && steerer.advance(moment, step_seconds)
         {
             self.describe();
             self.tell_conditions();
+        }
+    }
+
+    /// Answers what viewers want to know of a mesh in parts: only the ranks together can, here. On one process another thread does.
+    fn foretell(&self) {
+        if self.communicator.size() == 1 {
+            return;
+        }
+        let questions = self.queue.take_questions();
+        let asked = questions.iter().map(|asked| (String::new(), Command::Order((*asked.order).clone()))).collect();
+        for (place, (_, command)) in self.told_to_all(asked).into_iter().enumerate() {
+            let (Command::Order(order), SteeredMesh::Steered(steerer, _)) = (command, &self.mesh) else { continue };
+            let forecast = steerer.forecast(&order);
+            if let (Some(Asked { client, id, .. }), Some(hub)) = (questions.get(place), &self.hub) {
+                hub.tell_client(*client, &json!({"forecast": {"id": id, "order": forecast}}));
+            }
         }
     }
 
@@ -142,6 +161,8 @@ pub(super) struct Intake {
     pub(super) log: Arc<Log>,
     pub(super) hub: Arc<Hub>,
     pub(super) forecaster: Arc<OnceLock<Forecaster>>,
+    /// Whether the mesh is on several ranks.
+    pub(super) is_in_parts: bool,
 }
 
 impl Intake {
@@ -152,6 +173,10 @@ impl Intake {
         let command = Command::Order(order);
         check_files(&command)?;
         let Command::Order(order) = command else { return Ok(()) };
+        if self.is_in_parts {
+            self.queue.ask(Asked { client, id, order: Box::new(order) });
+            return Ok(());
+        }
         let forecaster = self.forecaster.get().ok_or("there is no mesh yet whose shape could be changed")?;
         let hub = Arc::clone(&self.hub);
         forecaster.ask(client, &order, move |forecast| {

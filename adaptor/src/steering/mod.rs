@@ -27,19 +27,20 @@ use std::{
 
 use tombolo_deform::{
     mesh::Vector,
-    quality::{Guard, Quality},
+    quality::{Guard, Quality, quality_in_parts},
     schedule::Schedule,
+    surface::Surface,
 };
 use tombolo_pipelines::{
     language::{DeformStage, Order},
-    shape::{Place, Plan, Shaper},
+    shape::{Forecast, Place, Plan, Shaper},
 };
 
 pub(crate) use forecaster::Forecaster;
 pub(crate) use log::{Log, Moment, Source};
 pub(crate) use parameters::Parameters;
 pub use parameters::{Parameter, ParameterError};
-pub(crate) use queue::{Queue, Received};
+pub(crate) use queue::{Asked, Queue, Received};
 pub(crate) use stack::EditStack;
 use stack::{ShapeSettings, StackError};
 pub(crate) use timed::Timed;
@@ -139,21 +140,38 @@ impl Steerer {
         queue: Arc<Queue>,
         skeleton: bool,
     ) -> std::io::Result<Self> {
-        let place: Place = Arc::clone(shaper.reference()).into();
-        let in_advance = skeleton.then(|| shaper.skeleton_in_advance());
-        let planner = Arc::new(Mutex::new(Planner::new(shaper)));
-        let mut worker = Worker::start(Arc::clone(&planner), queue)?;
-        worker.prepare(defaults.deform.clone());
+        let in_advance = shaper.skeleton_in_advance().filter(|_| skeleton);
+        let mut steerer = Self::of_shaper(shaper, defaults, log);
+        let mut worker = Worker::start(Arc::clone(&steerer.planner), queue)?;
+        worker.prepare(steerer.defaults.deform.clone());
         if let Some(in_advance) = in_advance {
             worker.beside(in_advance)?;
         }
+        steerer.worker = Some(worker);
+        Ok(steerer)
+    }
+
+    /// Takes over this rank's part of a mesh, and makes ready at once what no order changes: there is no other thread that could
+    /// speak with the ranks, so that orders are planned when their turn comes, on all ranks in the same call. Collective, as are
+    /// [`Steerer::advance`] and whatever else makes plans.
+    pub(crate) fn of_part(shaper: Shaper, defaults: Defaults, log: Arc<Log>) -> Self {
+        let quality = quality_in_parts(shaper.mesh().cells(), shaper.reference(), &**shaper.partition());
+        let mut steerer = Self::of_shaper(shaper, defaults, log);
+        lock(&steerer.planner).prepare(&steerer.defaults.deform);
+        steerer.reference_quality = Some((quality.min, quality.mean, quality.inverted));
+        steerer
+    }
+
+    fn of_shaper(shaper: Shaper, defaults: Defaults, log: Arc<Log>) -> Self {
+        let place: Place = Arc::clone(shaper.reference()).into();
+        let planner = Arc::new(Mutex::new(Planner::new(shaper)));
         let stack = EditStack::default();
         let present = Arc::new(Mutex::new(Present { stack: stack.clone(), place: place.clone() }));
-        Ok(Self {
+        Self {
             log,
             defaults,
             planner,
-            worker: Some(worker),
+            worker: None,
             present,
             foreseen: false,
             stack,
@@ -164,13 +182,29 @@ impl Steerer {
             shape: Shape::default(),
             quality: None,
             reference_quality: None,
-        })
+        }
+    }
+
+    /// The surface of the mesh, where this process has it.
+    pub(crate) fn surface(&self) -> Option<Arc<Surface>> {
+        lock(&self.planner).shaper().surface().cloned()
     }
 
     /// What answers forecasts; `None` where the worker has ended.
     pub(crate) fn forecaster(&self) -> Option<Forecaster> {
         let jobs = Arc::clone(self.worker.as_ref()?.jobs());
         Some(Forecaster { defaults: self.defaults.clone(), present: Arc::clone(&self.present), jobs })
+    }
+
+    /// What an order would come to, found out at once. Collective, where the mesh is in parts.
+    pub(crate) fn forecast(&self, order: &Order) -> Forecast {
+        match self.defaults.wish(&self.stack, self.place.clone(), order) {
+            Ok((_, wish)) => lock(&self.planner).forecast(&wish),
+            Err(error) => {
+                let Rejection { reason, seconds, .. } = Rejection::from(error);
+                Forecast::rejected(reason, None, None, seconds)
+            }
+        }
     }
 
     /// Has the plan of an order that will come made ahead, as far as it can be known now; once for each shape.

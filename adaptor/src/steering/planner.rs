@@ -169,8 +169,9 @@ mod tests {
         let from_there = Wish { start: aside.place(1, Arc::clone(aside.end())), ..wish(-0.2) };
         let again = planner.plan(&from_there).unwrap();
         assert!(Arc::ptr_eq(again.end(), plan.end()) && Arc::ptr_eq(again.start(), aside.end()));
-        let mut fresh =
-            Planner::new(Shaper::new(Arc::clone(planner.shaper.mesh()), Arc::clone(planner.shaper.surface())).unwrap());
+        let mut fresh = Planner::new(
+            Shaper::new(Arc::clone(planner.shaper.mesh()), Arc::clone(planner.shaper.surface().unwrap())).unwrap(),
+        );
         assert_eq!(*fresh.plan(&from_there).unwrap().way(), *again.way());
         assert!(planner.plan(&wish(-3.0)).is_err());
         assert_eq!(planner.known.len(), REMEMBERED);

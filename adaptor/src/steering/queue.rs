@@ -8,7 +8,7 @@ use std::{
     },
 };
 
-use tombolo_pipelines::language::Command;
+use tombolo_pipelines::language::{Command, Order};
 
 /// Commands that may wait for the solver; the next one is refused.
 const WAITING: usize = 256;
@@ -21,11 +21,20 @@ pub(crate) struct Received {
     pub(crate) command: Command,
 }
 
+/// A forecast that a viewer asks for where only all ranks together can answer.
+#[derive(Debug)]
+pub(crate) struct Asked {
+    pub(crate) client: u64,
+    pub(crate) id: Option<String>,
+    pub(crate) order: Box<Order>,
+}
+
 /// The queue. To look whether anything happened costs the solver one atomic load.
 #[derive(Debug, Default)]
 pub(crate) struct Queue {
     attention: AtomicBool,
     waiting: Mutex<VecDeque<Received>>,
+    questions: Mutex<Vec<Asked>>,
     arrived: Condvar,
 }
 
@@ -42,6 +51,20 @@ impl Queue {
     pub(crate) fn push(&self, received: Received) {
         self.lock().push_back(received);
         self.call();
+    }
+
+    /// Asks in place of what the same client asked before and was not told yet.
+    pub(crate) fn ask(&self, asked: Asked) {
+        let mut questions = self.questions.lock().unwrap_or_else(PoisonError::into_inner);
+        questions.retain(|waiting| waiting.client != asked.client);
+        questions.push(asked);
+        drop(questions);
+        self.call();
+    }
+
+    /// All that is asked.
+    pub(crate) fn take_questions(&self) -> Vec<Asked> {
+        std::mem::take(&mut *self.questions.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// Tells the solver's thread that there is something to look at.

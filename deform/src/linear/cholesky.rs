@@ -50,7 +50,7 @@ impl<const B: usize> LinearSolver<B> for Cholesky<B> {
         let apply = |vector: &[[[f64; B]; 1]], result: &mut [[[f64; B]; 1]]| self.factor.solve(vector, result);
         let (right_side, solution) = (single_column(right_side), single_column_mut(solution));
         let [mut convergence] =
-            conjugate_gradients(&self.matrix, apply, right_side, solution, [tolerance], REFINEMENTS)?;
+            conjugate_gradients(&*self.matrix, apply, right_side, solution, [tolerance], REFINEMENTS)?;
         convergence.iterations = 0;
         Ok(convergence)
     }

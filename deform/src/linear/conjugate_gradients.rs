@@ -40,6 +40,16 @@ impl<const B: usize> ConjugateGradients<B> {
         &self.matrix
     }
 
+    /// The preconditioner, applied to each column by itself.
+    pub(super) fn precondition<const K: usize>(&self, vector: &[Columns<B, K>], result: &mut [Columns<B, K>]) {
+        for column in 0..K {
+            let one: Vec<[f64; B]> = vector.iter().map(|value| value[column]).collect();
+            let mut found = vec![[0.0; B]; one.len()];
+            self.preconditioner.apply(&one, &mut found);
+            result.iter_mut().zip(found).for_each(|(value, found)| value[column] = found);
+        }
+    }
+
     fn iterate(
         &self,
         preconditioner: &BlockPreconditioner<B>,
@@ -52,7 +62,7 @@ impl<const B: usize> ConjugateGradients<B> {
         };
         let (right_side, solution) = (single_column(right_side), single_column_mut(solution));
         let [convergence] =
-            conjugate_gradients(&self.matrix, apply, right_side, solution, [tolerance], self.max_iterations)?;
+            conjugate_gradients(&*self.matrix, apply, right_side, solution, [tolerance], self.max_iterations)?;
         Ok(convergence)
     }
 }

@@ -16,6 +16,36 @@ pub(super) fn single_column_mut<const B: usize>(vector: &mut [[f64; B]]) -> &mut
     vector.as_chunks_mut().0
 }
 
+/// What the iteration asks of a matrix and of the vectors that it acts on.
+pub(super) trait Operator<const B: usize> {
+    /// How many values a vector has here.
+    fn rows(&self) -> usize;
+    /// `result = self * vector`.
+    fn multiply<const K: usize>(&self, vector: &[Columns<B, K>], result: &mut [Columns<B, K>]);
+    /// The inner product of each column.
+    fn dot<const K: usize>(&self, a: &[Columns<B, K>], b: &[Columns<B, K>]) -> [f64; K];
+    /// The largest value of each column.
+    fn largest<const K: usize>(&self, vector: &[Columns<B, K>]) -> [f64; K];
+}
+
+impl<const B: usize> Operator<B> for SparseMatrix<B> {
+    fn rows(&self) -> usize {
+        SparseMatrix::rows(self)
+    }
+
+    fn multiply<const K: usize>(&self, vector: &[Columns<B, K>], result: &mut [Columns<B, K>]) {
+        self.multiply_columns(vector, result);
+    }
+
+    fn dot<const K: usize>(&self, a: &[Columns<B, K>], b: &[Columns<B, K>]) -> [f64; K] {
+        dot(a, b)
+    }
+
+    fn largest<const K: usize>(&self, vector: &[Columns<B, K>]) -> [f64; K] {
+        largest(vector)
+    }
+}
+
 /// How much larger than the tolerance the last correction may be, each by the largest value of its vector.
 const CORRECTION: f64 = 10.0;
 
@@ -30,7 +60,7 @@ const CORRECTION: f64 = 10.0;
 /// The first failure of any column. `solution` then holds the last iterate, which is finite unless the error is
 /// [`LinearError::NotFinite`].
 pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
-    matrix: &SparseMatrix<B>,
+    matrix: &impl Operator<B>,
     mut precondition: impl FnMut(&[Columns<B, K>], &mut [Columns<B, K>]),
     right_side: &[Columns<B, K>],
     solution: &mut [Columns<B, K>],
@@ -41,7 +71,7 @@ pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
         right_side.len() == matrix.rows() && solution.len() == matrix.rows(),
         "one value for each row of the matrix"
     );
-    let whole = dot(right_side, right_side).map(f64::sqrt);
+    let whole = matrix.dot(right_side, right_side).map(f64::sqrt);
     if !whole.iter().all(|norm| norm.is_finite()) {
         return Err(LinearError::NotFinite { iteration: 0 });
     }
@@ -51,11 +81,11 @@ pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
 
     let mut residual = right_side.to_vec();
     let mut image = vec![[[0.0; B]; K]; residual.len()];
-    if solution.as_flattened().as_flattened().iter().any(|&value| value != 0.0) {
-        matrix.multiply_columns(solution, &mut image);
+    if matrix.largest(solution).iter().any(|&value| value != 0.0) {
+        matrix.multiply(solution, &mut image);
         add_multiple(&mut residual, [-1.0; K], &image);
     }
-    let mut reached = dot(&residual, &residual).map(f64::sqrt);
+    let mut reached = matrix.dot(&residual, &residual).map(f64::sqrt);
     for column in 0..K {
         if whole[column] <= target[column] && reached[column] > target[column] {
             // Nothing to solve for: zero answers it, whatever the iteration was to start from.
@@ -75,15 +105,15 @@ pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
     }
     let mut preconditioned = vec![[[0.0; B]; K]; residual.len()];
     precondition(&residual, &mut preconditioned);
-    let mut active = unfinished(tolerances, target, reached, solution, &preconditioned);
+    let mut active = unfinished(matrix, tolerances, target, reached, solution, &preconditioned);
     if !active.contains(&true) {
         return Ok(result);
     }
     let mut direction = preconditioned.clone();
-    let mut energy = dot(&residual, &preconditioned);
+    let mut energy = matrix.dot(&residual, &preconditioned);
     for iteration in 1..=max_iterations {
-        matrix.multiply_columns(&direction, &mut image);
-        let curvature = dot(&direction, &image);
+        matrix.multiply(&direction, &mut image);
+        let curvature = matrix.dot(&direction, &image);
         let mut step = [0.0; K];
         for column in (0..K).filter(|&column| active[column]) {
             let (curvature, energy) = (curvature[column], energy[column]);
@@ -95,7 +125,9 @@ pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
             }
             step[column] = energy / curvature;
         }
-        let square = advance(solution, &mut residual, step, &direction, &image);
+        add_multiple(solution, step, &direction);
+        add_multiple(&mut residual, step.map(|step| -step), &image);
+        let square = matrix.dot(&residual, &residual);
         for column in (0..K).filter(|&column| active[column]) {
             reached[column] = square[column].sqrt();
             result[column] = Convergence { iterations: iteration, residual: relative(column, reached[column]) };
@@ -106,12 +138,12 @@ pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
             return Ok(result);
         }
         precondition(&residual, &mut preconditioned);
-        let still = unfinished(tolerances, target, reached, solution, &preconditioned);
+        let still = unfinished(matrix, tolerances, target, reached, solution, &preconditioned);
         active = std::array::from_fn(|column| active[column] && still[column]);
         if !active.contains(&true) {
             return Ok(result);
         }
-        let before = std::mem::replace(&mut energy, dot(&residual, &preconditioned));
+        let before = std::mem::replace(&mut energy, matrix.dot(&residual, &preconditioned));
         let factor: [f64; K] =
             std::array::from_fn(|column| if active[column] { energy[column] / before[column] } else { 0.0 });
         parallel::for_each_chunk(&mut direction, ROW_CHUNK, |chunk, part| {
@@ -132,6 +164,7 @@ pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
 
 /// Which columns are not solved yet; `correction` is what the preconditioner makes of their residuals.
 fn unfinished<const B: usize, const K: usize>(
+    matrix: &impl Operator<B>,
     tolerances: [Tolerance; K],
     target: [f64; K],
     reached: [f64; K],
@@ -142,7 +175,7 @@ fn unfinished<const B: usize, const K: usize>(
     if !met.contains(&true) {
         return [true; K];
     }
-    let (size, change) = (largest(solution), largest(correction));
+    let (size, change) = (matrix.largest(solution), matrix.largest(correction));
     std::array::from_fn(|column| {
         let small = change[column] <= CORRECTION * tolerances[column].relative * size[column];
         !(met[column] && (small || reached[column] <= tolerances[column].absolute))
@@ -150,7 +183,7 @@ fn unfinished<const B: usize, const K: usize>(
 }
 
 /// The largest value of each column.
-fn largest<const B: usize, const K: usize>(vector: &[Columns<B, K>]) -> [f64; K] {
+pub(super) fn largest<const B: usize, const K: usize>(vector: &[Columns<B, K>]) -> [f64; K] {
     let parts = parallel::map_chunks(vector.len(), ROW_CHUNK, |range| {
         vector[range].iter().fold([0.0; K], |most: [f64; K], value| {
             std::array::from_fn(|column| value[column].iter().fold(most[column], |most, entry| most.max(entry.abs())))
@@ -159,19 +192,6 @@ fn largest<const B: usize, const K: usize>(vector: &[Columns<B, K>]) -> [f64; K]
     parts
         .into_iter()
         .fold([0.0; K], |most: [f64; K], part| std::array::from_fn(|column| most[column].max(part[column])))
-}
-
-/// `solution += step direction`, `residual -= step image`; the squares of the new residual's norms.
-fn advance<const B: usize, const K: usize>(
-    solution: &mut [Columns<B, K>],
-    residual: &mut [Columns<B, K>],
-    step: [f64; K],
-    direction: &[Columns<B, K>],
-    image: &[Columns<B, K>],
-) -> [f64; K] {
-    add_multiple(solution, step, direction);
-    add_multiple(residual, step.map(|step| -step), image);
-    dot(residual, residual)
 }
 
 /// The inner product of each column, summed chunk by chunk.
@@ -208,12 +228,6 @@ fn add_multiple<const B: usize, const K: usize>(
             }
         }
     });
-}
-
-/// The 2-norm.
-pub(crate) fn norm<const B: usize>(vector: &[[f64; B]]) -> f64 {
-    let [norm] = norms(single_column(vector));
-    norm
 }
 
 /// The 2-norm of each column.

@@ -19,18 +19,20 @@ mod ordering;
 mod preconditioner;
 mod real;
 mod rows;
+mod schwarz;
 #[cfg(test)]
 mod tests;
 mod transfer;
 
 pub use cholesky::Cholesky;
 pub use conjugate_gradients::ConjugateGradients;
-pub(crate) use iteration::{norm, norms};
+pub(crate) use iteration::norms;
 pub use matrix::{Block, SparseMatrix};
 pub(crate) use matrix::{ROW_CHUNK, invert_positive};
 pub use multigrid::{Multigrid, MultigridSettings, Precision};
 pub use ordering::reverse_cuthill_mckee;
 pub use preconditioner::{BlockPreconditioner, Factorization};
+pub use schwarz::Schwarz;
 
 /// Systems of at most this many equations are solved directly.
 const DIRECT: usize = 1500;
@@ -178,6 +180,17 @@ pub enum LinearError {
         /// How large the blocks are.
         block: usize,
     },
+    /// A library that solves for us says no.
+    #[error("{name} could not solve the linear system (its error {code})")]
+    Library {
+        /// The library.
+        name: &'static str,
+        /// Its error code.
+        code: i32,
+    },
+    /// Another of the ranks that solve together could not go on.
+    #[error("the linear system could not be set up on another rank")]
+    OtherRank,
     /// A matrix could not be factored.
     #[error("the linear system has no Cholesky factor: it is not positive definite, or too large for memory")]
     Factor,

@@ -94,6 +94,21 @@ impl<const B: usize> Multigrid<B> {
         Self::with_levels(matrix, settings, levels.map(|levels| Levels::Bodies(Box::new(levels), places)))
     }
 
+    /// The same for another matrix; the aggregates are used again where that has its blocks at the same places.
+    pub(super) fn of_like_matrix(&self, matrix: Arc<SparseMatrix<B>>) -> Result<Self, LinearError> {
+        let same = self.matrix.has_pattern_of(&matrix);
+        let levels = match &self.levels {
+            Levels::Single(like) => Hierarchy::new(&matrix, same.then_some(like), None).map(Levels::Single),
+            Levels::Double(like) => Hierarchy::new(&matrix, same.then_some(like), None).map(Levels::Double),
+            Levels::Bodies(like, places) => (places.len() == matrix.rows())
+                .then(|| Hierarchy::new(&matrix, same.then_some(&**like), Some(places)))
+                .flatten()
+                .map(|levels| Levels::Bodies(Box::new(levels), Arc::clone(places))),
+            Levels::None => return Self::new(matrix, self.settings),
+        };
+        Self::with_levels(matrix, self.settings, levels)
+    }
+
     /// The matrix.
     #[must_use]
     pub fn matrix(&self) -> &SparseMatrix<B> {
@@ -116,6 +131,32 @@ impl<const B: usize> Multigrid<B> {
         self.fallback.get_or_init(|| ConjugateGradients::new(Arc::clone(&self.matrix))).as_ref().map_err(|error| *error)
     }
 
+    /// Calls `work` with one V-cycle, an approximate inverse of the matrix that is symmetric and positive definite; where there are
+    /// no levels, with the fallback's preconditioner. `scale` brings each column of what it is given to the order of 1.
+    pub(super) fn with_cycle<const K: usize, R>(
+        &self,
+        scale: [f64; K],
+        work: impl FnOnce(&mut dyn FnMut(&[Columns<B, K>], &mut [Columns<B, K>])) -> R,
+    ) -> R {
+        fn cycle<T: Real, const B: usize, const C: usize, const K: usize, R>(
+            hierarchy: &Hierarchy<T, B, C>,
+            scale: [f64; K],
+            work: impl FnOnce(&mut dyn FnMut(&[Columns<B, K>], &mut [Columns<B, K>])) -> R,
+        ) -> R {
+            let mut workspace = hierarchy.workspace();
+            work(&mut |vector, result| hierarchy.apply(&mut workspace, scale, vector, result))
+        }
+        match &self.levels {
+            Levels::Single(hierarchy) => cycle(hierarchy, scale, work),
+            Levels::Double(hierarchy) => cycle(hierarchy, scale, work),
+            Levels::Bodies(hierarchy, _) => cycle(&**hierarchy, scale, work),
+            Levels::None => work(&mut |vector, result| match self.fallback() {
+                Ok(fallback) => fallback.precondition(vector, result),
+                Err(_) => result.copy_from_slice(vector),
+            }),
+        }
+    }
+
     fn iterate<T: Real, const C: usize, const K: usize>(
         &self,
         hierarchy: &Hierarchy<T, B, C>,
@@ -132,7 +173,7 @@ impl<const B: usize> Multigrid<B> {
             hierarchy.apply(&mut workspace, scale, vector, result);
         };
         let limit = self.settings.max_iterations;
-        conjugate_gradients(&self.matrix, precondition, right_side, solution, tolerances, limit)
+        conjugate_gradients(&*self.matrix, precondition, right_side, solution, tolerances, limit)
     }
 
     fn solve_columns<const K: usize>(
@@ -199,16 +240,6 @@ impl<const B: usize> LinearSolver<B> for Multigrid<B> {
     }
 
     fn renewed(&self, matrix: Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
-        let same = self.matrix.has_pattern_of(&matrix);
-        let levels = match &self.levels {
-            Levels::Single(like) => Hierarchy::new(&matrix, same.then_some(like), None).map(Levels::Single),
-            Levels::Double(like) => Hierarchy::new(&matrix, same.then_some(like), None).map(Levels::Double),
-            Levels::Bodies(like, places) => (places.len() == matrix.rows())
-                .then(|| Hierarchy::new(&matrix, same.then_some(&**like), Some(places)))
-                .flatten()
-                .map(|levels| Levels::Bodies(Box::new(levels), Arc::clone(places))),
-            Levels::None => return Ok(Box::new(Self::new(matrix, self.settings)?)),
-        };
-        Ok(Box::new(Self::with_levels(matrix, self.settings, levels)?))
+        Ok(Box::new(self.of_like_matrix(matrix)?))
     }
 }

@@ -78,6 +78,7 @@ fn residual<const B: usize>(matrix: &SparseMatrix<B>, right_side: &[[f64; B]], s
     matrix.multiply(solution, &mut image);
     let rest: Vec<[f64; B]> =
         image.iter().zip(right_side).map(|(a, b)| std::array::from_fn(|axis| a[axis] - b[axis])).collect();
+    let norm = |vector: &[[f64; B]]| norms::<B, 1>(vector.as_chunks().0)[0];
     norm(&rest) / norm(right_side)
 }
 

@@ -7,6 +7,7 @@ use super::cell::Scratch;
 use super::{CHUNK, Measure, normalized_scaled_jacobians, tet_determinant};
 use crate::mesh::{CellType, Cells, Vector};
 use crate::parallel;
+use crate::partition::{Partition, Reduction, Whole};
 use crate::vector::{add, cross, dot, mean, scale, subtract};
 
 /// How the cells of a mesh have changed since its reference.
@@ -33,6 +34,12 @@ impl Spread {
     /// The spread of values; those that are NaN are passed over.
     #[must_use]
     pub fn of(values: &[f64]) -> Self {
+        Self::in_parts(values, &Whole)
+    }
+
+    /// The same of what the ranks have between them. Collective.
+    #[must_use]
+    pub fn in_parts(values: &[f64], partition: &dyn Partition) -> Self {
         let (mut min, mut max, mut sum, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0u32);
         for &value in values.iter().filter(|value| !value.is_nan()) {
             min = min.min(value);
@@ -40,10 +47,13 @@ impl Spread {
             sum += value;
             count += 1;
         }
-        if count == 0 {
+        let (mut ends, mut sums) = ([min, -max], [sum, f64::from(count)]);
+        partition.reduce(Reduction::Minimum, &mut ends);
+        partition.reduce(Reduction::Sum, &mut sums);
+        if sums[1] == 0.0 {
             Self { min: 1.0, mean: 1.0, max: 1.0 }
         } else {
-            Self { min, mean: sum / f64::from(count), max }
+            Self { min: ends[0], mean: sums[0] / sums[1], max: -ends[1] }
         }
     }
 }
@@ -54,11 +64,20 @@ impl Spread {
 /// Where a cell names a vertex beyond `reference` or `points`.
 #[must_use]
 pub fn change(cells: &Cells, reference: &[Vector], points: &[Vector]) -> Change {
+    change_in_parts(cells, reference, points, &Whole)
+}
+
+/// The same of a mesh that is in parts: `cells` are those of this rank alone. Collective; all ranks get the whole mesh's.
+///
+/// # Panics
+/// As [`change`].
+#[must_use]
+pub fn change_in_parts(cells: &Cells, reference: &[Vector], points: &[Vector], partition: &dyn Partition) -> Change {
     let (before, after) = (volumes(cells, reference), volumes(cells, points));
     let ratios: Vec<f64> = before.iter().zip(after).map(|(&a, b)| if a == 0.0 { f64::NAN } else { b / a }).collect();
     Change {
-        normalized_scaled_jacobian: Spread::of(&normalized_scaled_jacobians(cells, reference, points)),
-        volume_ratio: Spread::of(&ratios),
+        normalized_scaled_jacobian: Spread::in_parts(&normalized_scaled_jacobians(cells, reference, points), partition),
+        volume_ratio: Spread::in_parts(&ratios, partition),
     }
 }
 

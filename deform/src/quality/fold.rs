@@ -1,6 +1,7 @@
 //! Whether a prescribed surface folds.
 
 use crate::mesh::{Cells, Vector};
+use crate::partition::Partition;
 use crate::vector::{dot, mean};
 
 use super::cell::vector_area;
@@ -14,8 +15,13 @@ pub fn turns_over(before: &[Vector], after: &[Vector]) -> bool {
 }
 
 /// The boundary faces whose normal at `end` points against that at `start`: how many, and the place (at `start`) of the first.
-/// For a mesh of polygons, the polygons themselves.
-pub(super) fn folded_faces(cells: &Cells, start: &[Vector], end: &[Vector]) -> (usize, Option<Vector>) {
+/// For a mesh of polygons, the polygons themselves. Of a mesh in parts, all ranks' together.
+pub(super) fn folded_faces(
+    cells: &Cells,
+    start: &[Vector],
+    end: &[Vector],
+    partition: &dyn Partition,
+) -> (usize, Option<Vector>) {
     let mut count = 0;
     let mut place = None;
     let (mut before, mut after) = (Vec::new(), Vec::new());
@@ -29,14 +35,21 @@ pub(super) fn folded_faces(cells: &Cells, start: &[Vector], end: &[Vector]) -> (
             place.get_or_insert_with(|| mean(before.iter().copied()));
         }
     };
-    if cells.dimension() == 2 {
+    if let Some(faces) = partition.boundary_faces() {
+        faces.iter().for_each(|(_, face)| look(face));
+    } else if cells.dimension() == 2 {
         (0..cells.len())
             .filter(|&cell| cells.cell_type(cell).dimension() == 2)
             .for_each(|cell| look(cells.vertices(cell)));
     } else {
         for_each_boundary_face(cells, look);
     }
-    (count, place)
+    if partition.ranks() == 1 {
+        return (count, place);
+    }
+    let total = crate::partition::count(partition, count);
+    let found = partition.gather(&place.map_or([f64::NAN; 3], |place| place));
+    (total, found.as_chunks().0.iter().copied().find(|place| !place[0].is_nan()))
 }
 
 /// Calls `visit` with each face that only one volume cell has, in the order of the cells.

@@ -9,6 +9,7 @@ use super::path::least_on_path;
 use super::{CHUNK, Measure, WORST, centroid};
 use crate::mesh::{Mesh, Vector};
 use crate::parallel;
+use crate::partition::{Partition, Reduction, Whole, all, any};
 
 /// What a mesh must keep to on its way to a new shape, and what is done when it would not.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -159,6 +160,9 @@ pub enum Refusal {
         /// What it is.
         value: f64,
     },
+    /// What another rank was given makes no sense.
+    #[error("the shapes given on another rank make no sense")]
+    OtherRank,
     /// A floor out of range.
     #[error("guard.min_scaled_jacobian is {value}; it must be from 0 to 1")]
     Floor {
@@ -225,12 +229,35 @@ pub fn judge(
     fractions: &[f64],
     guard: &Guard,
 ) -> Result<PathQuality, Refusal> {
-    check_arguments(mesh, start, end, fractions, guard)?;
-    let (path, floor) = Path::new(mesh, start, end, guard);
+    judge_in_parts(mesh, start, end, fractions, guard, &Whole)
+}
+
+/// The same of a mesh that is in parts, of which `mesh` is this rank's: its cells are no other rank's. Collective; all ranks get the
+/// verdict on the whole mesh.
+///
+/// # Errors
+/// As [`judge`]; [`Refusal::OtherRank`] where the arguments of another rank make no sense.
+pub fn judge_in_parts(
+    mesh: &Mesh,
+    start: &[Vector],
+    end: &[Vector],
+    fractions: &[f64],
+    guard: &Guard,
+    partition: &dyn Partition,
+) -> Result<PathQuality, Refusal> {
+    let arguments = check_arguments(mesh, start, end, fractions, guard);
+    if !all(partition, arguments.is_ok()) {
+        arguments?;
+        return Err(Refusal::OtherRank);
+    }
+    let (path, floor) = Path::new(mesh, start, end, guard, partition);
     let parts = parallel::map_chunks(mesh.cells().len(), CHUNK, |range| path.look(range, fractions));
     let mut total = Part::new(fractions.len());
     for part in parts {
         total.merge(part);
+    }
+    if partition.ranks() > 1 {
+        total = total.added_up(partition);
     }
     if total.failing > 0 {
         return Err(Refusal::Quality(Box::new(path.broken(total, floor))));
@@ -250,10 +277,16 @@ pub fn judge(
 /// Whether [`judge`] would let a straight step through, without saying why not.
 #[must_use]
 pub fn keeps(mesh: &Mesh, start: &[Vector], end: &[Vector], guard: &Guard) -> bool {
-    if check_arguments(mesh, start, end, &[1.0], guard).is_err() {
+    keeps_in_parts(mesh, start, end, guard, &Whole)
+}
+
+/// Whether [`judge_in_parts`] would let a straight step through. Collective.
+#[must_use]
+pub fn keeps_in_parts(mesh: &Mesh, start: &[Vector], end: &[Vector], guard: &Guard, partition: &dyn Partition) -> bool {
+    if !all(partition, check_arguments(mesh, start, end, &[1.0], guard).is_ok()) {
         return false;
     }
-    let path = Path::new(mesh, start, end, guard).0;
+    let path = Path::new(mesh, start, end, guard, partition).0;
     !path.fails(1.0)
 }
 
@@ -305,6 +338,7 @@ struct Path<'a> {
     end: &'a [Vector],
     /// With the slack taken off.
     floor: f64,
+    partition: &'a dyn Partition,
 }
 
 /// What was found in some of the cells.
@@ -336,6 +370,47 @@ impl Part {
         self.worst.truncate(WORST);
     }
 
+    /// What the ranks have found.
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "counts below 2^53"
+    )]
+    fn added_up(mut self, partition: &dyn Partition) -> Self {
+        self.keep_worst();
+        let shapes = self.shapes.len();
+        let mut mine = vec![self.cells as f64, self.failing as f64, self.inverted as f64, self.worst.len() as f64];
+        mine.extend(self.shapes.iter().flat_map(|&(least, sum)| [least, sum]));
+        mine.extend(self.worst.iter().flat_map(|worst| {
+            let [x, y, z] = worst.centroid;
+            let kind = [worst.cell as f64, f64::from(worst.cell_type)];
+            let measures = [worst.scaled_jacobian, worst.fraction, f64::from(u8::from(worst.inverts))];
+            kind.into_iter().chain([x, y, z]).chain(measures)
+        }));
+        let mut values = partition.gather(&mine).into_iter();
+        let mut next = || values.next().unwrap_or(f64::NAN);
+        let mut total = Self::new(shapes);
+        for _ in 0..partition.ranks() {
+            let mut part = Self::new(shapes);
+            (part.cells, part.failing, part.inverted) = (next() as usize, next() as usize, next() as usize);
+            let worst = next() as usize;
+            part.shapes.iter_mut().for_each(|shape| *shape = (next(), next()));
+            part.worst = (0..worst.min(WORST))
+                .map(|_| FailingCell {
+                    cell: next() as usize,
+                    cell_type: next() as u8,
+                    centroid: [next(), next(), next()],
+                    scaled_jacobian: next(),
+                    fraction: next(),
+                    inverts: next() > 0.0,
+                })
+                .collect();
+            total.merge(part);
+        }
+        total
+    }
+
     fn merge(&mut self, other: Self) {
         self.cells += other.cells;
         self.failing += other.failing;
@@ -357,10 +432,18 @@ struct Memory {
 
 impl<'a> Path<'a> {
     /// The path, and the floor that holds on it.
-    fn new(mesh: &'a Mesh, start: &'a [Vector], end: &'a [Vector], guard: &Guard) -> (Self, f64) {
+    fn new(
+        mesh: &'a Mesh,
+        start: &'a [Vector],
+        end: &'a [Vector],
+        guard: &Guard,
+        partition: &'a dyn Partition,
+    ) -> (Self, f64) {
         let measure = Measure::new(mesh.cells(), mesh.points());
-        let floor = guard.min_scaled_jacobian.min(least_scaled_jacobian(&measure, mesh.points()));
-        (Self { measure, start, end, floor: floor - 1e-9 * floor.abs() }, floor)
+        let mut least = [least_scaled_jacobian(&measure, mesh.points())];
+        partition.reduce(Reduction::Minimum, &mut least);
+        let floor = guard.min_scaled_jacobian.min(least[0]);
+        (Self { measure, start, end, floor: floor - 1e-9 * floor.abs(), partition }, floor)
     }
 
     fn look(&self, range: std::ops::Range<usize>, fractions: &[f64]) -> Part {
@@ -388,7 +471,7 @@ impl<'a> Path<'a> {
             if inverts || value < self.floor {
                 let cells = self.measure.cells;
                 part.fail(FailingCell {
-                    cell,
+                    cell: self.partition.cell_number(cell),
                     cell_type: cells.cell_type(cell).vtk(),
                     centroid: centroid(cells, cell, self.start),
                     scaled_jacobian: value,
@@ -406,7 +489,7 @@ impl<'a> Path<'a> {
     }
 
     fn broken(&self, total: Part, floor: f64) -> BrokenPath {
-        let (folded_faces, folded_at) = folded_faces(self.measure.cells, self.start, self.end);
+        let (folded_faces, folded_at) = folded_faces(self.measure.cells, self.start, self.end, self.partition);
         BrokenPath {
             floor,
             min_scaled_jacobian: total.worst.first().map_or(floor, |worst| worst.scaled_jacobian),
@@ -434,7 +517,7 @@ impl<'a> Path<'a> {
     }
 
     fn fails(&self, fraction: f64) -> bool {
-        parallel::any_chunk(self.measure.cells.len(), CHUNK, |mut range| {
+        let fails = parallel::any_chunk(self.measure.cells.len(), CHUNK, |mut range| {
             let mut memory = Memory::default();
             range.any(|cell| {
                 self.measure.is_measured(cell) && {
@@ -445,6 +528,7 @@ impl<'a> Path<'a> {
                             .positive
                 }
             })
-        })
+        });
+        any(self.partition, fails)
     }
 }

@@ -17,14 +17,16 @@ use serde::Serialize;
 
 pub use cell::scaled_jacobian;
 pub(crate) use cell::{HEXAHEDRON_CORNERS, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, corner_tets};
-pub use change::{Change, Spread, change, swept_volume, volumes};
+pub use change::{Change, Spread, change, change_in_parts, swept_volume, volumes};
 pub use fold::turns_over;
 pub use judge::{
-    BrokenPath, FailingCell, Guard, Otherwise, PathQuality, Refusal, ShapeQuality, SurfaceRule, judge, keeps, shape_at,
+    BrokenPath, FailingCell, Guard, Otherwise, PathQuality, Refusal, ShapeQuality, SurfaceRule, judge, judge_in_parts,
+    keeps, keeps_in_parts, shape_at,
 };
 
 use crate::mesh::{CellType, Cells, Vector};
 use crate::parallel;
+use crate::partition::{Partition, Whole};
 use crate::vector::{determinant, mean, subtract};
 use cell::{Scratch, scaled_jacobian_of};
 use inside::least_inside;
@@ -81,6 +83,15 @@ pub struct WorstCell {
 /// Where a cell names a vertex beyond `points`; a [`Mesh`](crate::mesh::Mesh) never does.
 #[must_use]
 pub fn quality(cells: &Cells, points: &[Vector]) -> Quality {
+    quality_in_parts(cells, points, &Whole)
+}
+
+/// The same of a mesh that is in parts: `cells` are those of this rank alone. Collective; all ranks get the whole mesh's.
+///
+/// # Panics
+/// As [`quality`].
+#[must_use]
+pub fn quality_in_parts(cells: &Cells, points: &[Vector], partition: &dyn Partition) -> Quality {
     let measure = Measure::new(cells, points);
     let mut parts = parallel::map_chunks(cells.len(), CHUNK, |range| {
         let mut part = Quality::empty();
@@ -95,14 +106,18 @@ pub fn quality(cells: &Cells, points: &[Vector]) -> Quality {
     .into_iter();
     let mut total = parts.next().unwrap_or_else(Quality::empty);
     parts.for_each(|part| total.merge(part));
+    for worst in &mut total.worst {
+        worst.centroid = centroid(cells, worst.cell, points);
+        worst.cell = partition.cell_number(worst.cell);
+    }
+    if partition.ranks() > 1 {
+        total = total.added_up(partition);
+    }
     #[expect(clippy::cast_precision_loss, reason = "fewer cells than 2^53")]
     if total.cells == 0 {
         (total.min, total.mean, total.max) = (1.0, 1.0, 1.0);
     } else {
         total.mean /= total.cells as f64;
-    }
-    for worst in &mut total.worst {
-        worst.centroid = centroid(cells, worst.cell, points);
     }
     total
 }
@@ -169,6 +184,43 @@ impl Quality {
             self.worst.insert(place, WorstCell { cell, scaled_jacobian: value, centroid: [0.0; 3] });
             self.worst.truncate(WORST);
         }
+    }
+
+    /// What the ranks have measured.
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "counts below 2^53"
+    )]
+    fn added_up(&self, partition: &dyn Partition) -> Self {
+        let worst = self.worst.iter().flat_map(|worst| {
+            let [x, y, z] = worst.centroid;
+            [worst.cell as f64, worst.scaled_jacobian, x, y, z]
+        });
+        let mut mine = vec![self.cells as f64, self.min, self.mean, self.max, self.inverted as f64];
+        mine.extend(self.histogram.iter().map(|&count| count as f64));
+        mine.push(self.worst.len() as f64);
+        mine.extend(worst);
+        let all = partition.gather(&mine);
+        let mut values = all.into_iter();
+        let mut total = Self::empty();
+        let mut next = || values.next().unwrap_or(f64::NAN);
+        for _ in 0..partition.ranks() {
+            let mut part = Self { cells: next() as usize, min: next(), mean: next(), max: next(), ..Self::empty() };
+            part.inverted = next() as usize;
+            part.histogram = std::array::from_fn(|_| next() as u64);
+            let count = next() as usize;
+            part.worst = (0..count.min(WORST))
+                .map(|_| WorstCell {
+                    cell: next() as usize,
+                    scaled_jacobian: next(),
+                    centroid: [next(), next(), next()],
+                })
+                .collect();
+            total.merge(part);
+        }
+        total
     }
 
     fn merge(&mut self, other: Self) {

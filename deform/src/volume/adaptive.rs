@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use super::{Deform, Untangler, VolumeError, VolumeOperator};
+use super::{Deform, Untangler, VolumeError, VolumeOperator, agreed};
 use crate::linear::LinearError;
 use crate::mesh::{Mesh, Vector};
-use crate::quality::{Guard, Refusal, judge, keeps};
+use crate::partition::{Partition, any};
+use crate::quality::{Guard, Refusal, judge_in_parts, keeps_in_parts};
 use crate::vector::{add, subtract};
 
 /// The first sub-step, what a sub-step that holds lets the next one grow by, and the least one tried.
@@ -102,6 +103,17 @@ pub trait BoundaryMotion {
     }
 }
 
+/// What is taken along with its boundary.
+#[derive(Debug, Clone, Copy)]
+pub struct Domain<'a> {
+    /// The reference mesh, or this rank's part of it, whose cells no other rank has.
+    pub mesh: &'a Mesh,
+    /// Its vertices on the boundary of the whole mesh.
+    pub boundary: &'a [u32],
+    /// The parts that the mesh is in.
+    pub partition: &'a Arc<dyn Partition>,
+}
+
 /// Takes the volume along with a motion of its boundary from the shape `start` on.
 ///
 /// One linear solve on the shape reached, with a material stiffened anew, makes a sub-step: a fifth of the way at first. The
@@ -109,19 +121,20 @@ pub trait BoundaryMotion {
 /// was that or more; others are halved, and a small one is untangled (see [`Untangler`]). After one that holds, the next may be
 /// half as long again. So what is found is a function of the arguments alone.
 ///
-/// `untangler` is of the reference mesh, which is what cells are drawn back to.
+/// `untangler` is of the reference mesh, which is what cells are drawn back to. Collective, where the mesh is in parts: the motion
+/// then must fail on all ranks or on none.
 ///
 /// # Errors
 /// [`FollowError`]; [`FollowError::Stalled`] with how far it came.
 pub fn follow<M: BoundaryMotion>(
-    mesh: &Mesh,
-    boundary: &[u32],
+    domain: Domain<'_>,
     start: &Arc<[Vector]>,
     motion: &mut M,
     settings: &Deform,
     guard: &Guard,
     untangler: Option<&Untangler>,
 ) -> Result<Route, FollowError<M::Error>> {
+    let Domain { mesh, boundary, partition } = domain;
     let settings = Deform { tolerance: settings.tolerance.max(TOLERANCE), ..*settings };
     let mut route = Route { waypoints: Vec::new(), rejected: 0, untangled: 0, iterations: 0 };
     let mut shape = Arc::clone(start);
@@ -129,10 +142,12 @@ pub fn follow<M: BoundaryMotion>(
     let mut stiffening = settings.stiffening;
     let mut latest: Option<VolumeOperator> = None;
     while reached < 1.0 {
-        let stiffened = mesh.with_points(shape.to_vec()).map_err(|_| FollowError::Volume(overflow()))?;
+        // Both that it started from and what was solved for are finite.
+        let stiffened = mesh.with_points(shape.to_vec()).map_err(|_| overflow());
+        let stiffened = agreed(&**partition, stiffened).map_err(FollowError::Volume)?;
         let renewed = match &latest {
             Some(operator) => operator.restiffened(&stiffened, stiffening),
-            None => VolumeOperator::new(&stiffened, boundary, &settings),
+            None => VolumeOperator::of_part(&stiffened, boundary, &[], &settings, partition),
         };
         let mut operator = latest.insert(renewed.map_err(FollowError::Volume)?);
         loop {
@@ -140,14 +155,14 @@ pub fn follow<M: BoundaryMotion>(
             let next = if reached + 1.25 * step >= 1.0 { 1.0 } else { reached + step };
             let places = motion.at(reached, next, &shape).map_err(FollowError::Boundary)?;
             let mut candidate = moved(operator, &shape, &places, &mut route.iterations).map_err(FollowError::Volume)?;
-            let mut holds = keeps(mesh, &shape, &candidate, guard);
-            let folds = !holds && motion.folds(&shape, &places);
+            let mut holds = keeps_in_parts(mesh, &shape, &candidate, guard, &**partition);
+            let folds = !holds && any(&**partition, motion.folds(&shape, &places));
             if let Some(untangler) = untangler
                 && !(holds || folds)
                 && next - reached <= UNTANGLED_BELOW
                 && untangler.untangle(mesh, &mut candidate, guard.min_scaled_jacobian)
             {
-                holds = keeps(mesh, &shape, &candidate, guard);
+                holds = keeps_in_parts(mesh, &shape, &candidate, guard, &**partition);
                 route.untangled += usize::from(holds);
             }
             if holds {
@@ -165,7 +180,7 @@ pub fn follow<M: BoundaryMotion>(
             }
             step = 0.5 * (next - reached);
             if step < (if folds { LEAST_FOLDING } else { LEAST }) || route.rejected >= TRIES {
-                return Err(stalled(mesh, &shape, &candidate, guard, route, folds));
+                return Err(stalled(domain, &shape, &candidate, guard, route, folds));
             }
         }
     }
@@ -199,14 +214,14 @@ fn overflow() -> VolumeError {
 }
 
 fn stalled<E>(
-    mesh: &Mesh,
+    Domain { mesh, partition, .. }: Domain<'_>,
     shape: &[Vector],
     candidate: &[Vector],
     guard: &Guard,
     route: Route,
     folds: bool,
 ) -> FollowError<E> {
-    match judge(mesh, shape, candidate, &[1.0], guard) {
+    match judge_in_parts(mesh, shape, candidate, &[1.0], guard, &**partition) {
         Err(refusal) => FollowError::Stalled(Box::new(Stalled { route, refusal, folds })),
         // `keeps` and `judge` are one test.
         Ok(_) => FollowError::Volume(overflow()),
@@ -218,7 +233,8 @@ mod tests {
     use std::convert::Infallible;
 
     use super::*;
-    use crate::quality::quality;
+    use crate::partition::whole;
+    use crate::quality::{keeps, quality};
     use crate::shapes;
 
     struct Places<F>(F);
@@ -264,9 +280,10 @@ mod tests {
             assert!(!keeps(&mesh, mesh.points(), &single(&mesh, &boundary, &end), &guard));
             let start: Arc<[Vector]> = mesh.points().into();
             let untangler = Untangler::new(&mesh, &boundary);
+            let partition = whole();
+            let domain = Domain { mesh: &mesh, boundary: &boundary, partition: &partition };
             let mut motion = Places(|to| twisted(&mesh, &boundary, 180.0 * to));
-            let route =
-                follow(&mesh, &boundary, &start, &mut motion, &Deform::default(), &guard, Some(&untangler)).unwrap();
+            let route = follow(domain, &start, &mut motion, &Deform::default(), &guard, Some(&untangler)).unwrap();
             let mut before = &start;
             for point in &route.waypoints {
                 assert!(keeps(&mesh, before, &point.points, &guard));
@@ -277,8 +294,7 @@ mod tests {
             for (&vertex, place) in boundary.iter().zip(&end) {
                 assert_eq!(before[vertex as usize], *place);
             }
-            let again =
-                follow(&mesh, &boundary, &start, &mut motion, &Deform::default(), &guard, Some(&untangler)).unwrap();
+            let again = follow(domain, &start, &mut motion, &Deform::default(), &guard, Some(&untangler)).unwrap();
             assert_eq!(route, again);
         }
     }
@@ -298,8 +314,9 @@ mod tests {
         };
         let untangler = Untangler::new(&mesh, &boundary);
         let guard = Guard { min_scaled_jacobian: 0.05, ..Guard::default() };
-        let result =
-            follow(&mesh, &boundary, &start, &mut Places(pressed), &Deform::default(), &guard, Some(&untangler));
+        let partition = whole();
+        let domain = Domain { mesh: &mesh, boundary: &boundary, partition: &partition };
+        let result = follow(domain, &start, &mut Places(pressed), &Deform::default(), &guard, Some(&untangler));
         let Err(FollowError::Stalled(stalled)) = result else { panic!("{result:?}") };
         assert!((0.6..0.8).contains(&stalled.fraction()), "{}", stalled.fraction());
         assert!(matches!(stalled.refusal, Refusal::Quality(_)));

@@ -1,10 +1,11 @@
 //! From a mesh to the equations of its free vertices.
 
-use super::VolumeError;
 use super::element::{Elements, Scratch};
+use super::{VolumeError, agreed};
 use crate::linear::{Block, SparseMatrix, reverse_cuthill_mckee};
 use crate::mesh::{Mesh, Vector};
 use crate::parallel;
+use crate::partition::{Partition, Reduction, Shares, all, any};
 use crate::quality::centroid;
 use crate::vector::dot;
 
@@ -157,16 +158,11 @@ impl Incidence {
 impl Graph {
     /// # Errors
     /// [`VolumeError::BoundaryVertex`], [`VolumeError::BoundaryTwice`], [`VolumeError::Unattached`].
-    pub(super) fn new(mesh: &Mesh, boundary: &[u32]) -> Result<Self, VolumeError> {
+    pub(super) fn new(mesh: &Mesh, boundary: &[u32], partition: &dyn Partition) -> Result<Self, VolumeError> {
+        agreed(partition, check_boundary(mesh, boundary))?;
         let vertex_count = mesh.points().len();
         let mut on_boundary = vec![false; vertex_count];
-        for &vertex in boundary {
-            match on_boundary.get_mut(vertex as usize) {
-                None => return Err(VolumeError::BoundaryVertex { vertex, vertex_count }),
-                Some(true) => return Err(VolumeError::BoundaryTwice { vertex }),
-                Some(seen) => *seen = true,
-            }
-        }
+        boundary.iter().for_each(|&vertex| on_boundary[vertex as usize] = true);
         let incidence = Incidence::new(mesh);
         #[expect(clippy::cast_possible_truncation, reason = "vertex numbers are 32-bit")]
         let free: Vec<u32> = (0..vertex_count as u32)
@@ -207,8 +203,8 @@ impl Graph {
         });
         let (inner, outer): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
         let (matrix, coupling) = (compressed(inner), compressed(outer));
-        check_attached(&order, &free, (&matrix.0, &matrix.1), &coupling.0)?;
         let vertices: Vec<u32> = order.iter().map(|&old| free[old as usize]).collect();
+        agreed(partition, check_attached(&vertices, (&matrix.0, &matrix.1), &coupling.0, partition))?;
         for (slot, &vertex) in (0..).zip(&vertices) {
             slots[vertex as usize] = slot;
         }
@@ -334,17 +330,31 @@ fn compressed(parts: Vec<(Vec<usize>, Vec<u32>)>) -> (Vec<usize>, Vec<u32>) {
     (offsets, all)
 }
 
-/// Every free vertex must be connected to the boundary. `order` is that of Cuthill and McKee, reversed: every vertex but the last
-/// of its component has a neighbour after it.
+/// Each of the boundary vertices exists, and is named once.
+fn check_boundary(mesh: &Mesh, boundary: &[u32]) -> Result<(), VolumeError> {
+    let vertex_count = mesh.points().len();
+    let mut named = vec![false; vertex_count];
+    for &vertex in boundary {
+        match named.get_mut(vertex as usize) {
+            None => return Err(VolumeError::BoundaryVertex { vertex, vertex_count }),
+            Some(true) => return Err(VolumeError::BoundaryTwice { vertex }),
+            Some(seen) => *seen = true,
+        }
+    }
+    Ok(())
+}
+
+/// Every free vertex must be connected to the boundary, be it on other ranks. `vertices` are in the order of Cuthill and McKee,
+/// reversed: every vertex but the last of its component has a neighbour after it.
 fn check_attached(
-    order: &[u32],
-    free: &[u32],
+    vertices: &[u32],
     (offsets, columns): (&[usize], &[u32]),
     outer_offsets: &[usize],
+    partition: &dyn Partition,
 ) -> Result<(), VolumeError> {
-    let mut component = vec![0usize; order.len()];
+    let mut component = vec![0usize; vertices.len()];
     let mut attached: Vec<bool> = Vec::new();
-    for row in (0..order.len()).rev() {
+    for row in (0..vertices.len()).rev() {
         component[row] = match columns[offsets[row]..offsets[row + 1]].last() {
             Some(&last) if last as usize > row => component[last as usize],
             _ => {
@@ -354,7 +364,25 @@ fn check_attached(
         };
         attached[component[row]] |= outer_offsets[row] < outer_offsets[row + 1];
     }
-    let loose = || (0..order.len()).filter(|&row| !attached[component[row]]).map(|row| free[order[row] as usize]);
+    if partition.ranks() > 1 {
+        // What is held on one rank holds what other ranks have of it.
+        let shares = Shares::new(partition, vertices);
+        loop {
+            let mut held: Vec<f64> =
+                component.iter().map(|&component| f64::from(u8::from(attached[component]))).collect();
+            shares.sum(partition, 1, &mut held);
+            let mut news = false;
+            for &place in shares.places() {
+                let attached = &mut attached[component[place as usize]];
+                news |= !*attached && held[place as usize] > 0.0;
+                *attached |= held[place as usize] > 0.0;
+            }
+            if !any(partition, news) {
+                break;
+            }
+        }
+    }
+    let loose = || (0..vertices.len()).filter(|&row| !attached[component[row]]).map(|row| vertices[row]);
     match loose().min() {
         None => Ok(()),
         Some(vertex) => Err(VolumeError::Unattached { vertex: vertex as usize, count: loose().count() }),
@@ -366,7 +394,12 @@ fn check_attached(
 ///
 /// # Errors
 /// [`VolumeError::InvertedCell`].
-pub(super) fn stiffness(mesh: &Mesh, elements: &Elements<'_>, stiffening: f64) -> Result<Vec<f64>, VolumeError> {
+pub(super) fn stiffness(
+    mesh: &Mesh,
+    elements: &Elements<'_>,
+    stiffening: f64,
+    partition: &dyn Partition,
+) -> Result<Vec<f64>, VolumeError> {
     let cells = mesh.cells();
     let mut volumes = vec![0.0; cells.len()];
     parallel::for_each_chunk(&mut volumes, CELL_CHUNK, |chunk, part| {
@@ -385,7 +418,10 @@ pub(super) fn stiffness(mesh: &Mesh, elements: &Elements<'_>, stiffening: f64) -
     });
     let (sum, count) = sums.into_iter().fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
     #[expect(clippy::cast_precision_loss, reason = "fewer cells than 2^53")]
-    let mean = sum / count.max(1) as f64;
+    let mut sums = [sum, count as f64];
+    partition.reduce(Reduction::Sum, &mut sums);
+    let [sum, count] = sums;
+    let mean = sum / count.max(1.0);
     let size = mean.cbrt();
     parallel::for_each_chunk(&mut volumes, CELL_CHUNK, |_, part| {
         for value in part.iter_mut().filter(|value| **value != 0.0) {
@@ -394,16 +430,17 @@ pub(super) fn stiffness(mesh: &Mesh, elements: &Elements<'_>, stiffening: f64) -
         }
     });
     let inverted = |&cell: &usize| !volumes[cell].is_finite() || volumes[cell] < 0.0;
-    if sum.is_finite() && (0..cells.len()).all(|cell| !inverted(&cell)) {
+    if all(partition, sum.is_finite() && (0..cells.len()).all(|cell| !inverted(&cell))) {
         return Ok(volumes);
     }
     // A NaN sum makes all of them NaN: the cells are looked at again to tell which are to blame.
     let mut scratch = Scratch::default();
     let mut broken = (0..cells.len())
         .filter(|&cell| cells.cell_type(cell).dimension() == 3 && elements.volume(cell, &mut scratch).is_none());
-    let cell = broken.next().unwrap_or(0);
+    // With cells of another rank to blame there may be none here.
+    let Some(cell) = broken.next() else { return Err(VolumeError::OtherRank) };
     Err(VolumeError::InvertedCell {
-        cell,
+        cell: partition.cell_number(cell),
         cell_type: cells.cell_type(cell),
         centroid: centroid(cells, cell, mesh.points()),
         count: 1 + broken.count(),

@@ -1,7 +1,11 @@
 //! Raising the quality of the cells of a valid mesh beyond the guard's floor.
 
+use std::sync::Arc;
+
+use super::colours::{Held, colours};
 use crate::mesh::{CellType, Mesh, Vector};
 use crate::parallel;
+use crate::partition::{Partition, Reduction, Shares, all, most, whole};
 use crate::quality::{
     HEXAHEDRON_CORNERS, Measure, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, scaled_jacobians, tet_determinant,
 };
@@ -49,7 +53,8 @@ const FIRST: [[usize; 4]; 4] = [[0, 1, 2, 3], [1, 0, 3, 2], [2, 0, 1, 3], [3, 0,
 /// - Vertices that are not free do not move, nor does any where no cell has lost a twentieth of its quality: rigid motions come
 ///   back bit for bit.
 /// - The least quality is not lower afterwards, and no cell that was valid is turned inside out.
-/// - The same bits whatever the number of threads.
+/// - The same bits whatever the number of threads; the same places, to rounding, however the vertices are numbered and whatever
+///   parts the mesh is in.
 #[derive(Debug)]
 pub struct Improver {
     pieces: Vec<Piece>,
@@ -60,6 +65,16 @@ pub struct Improver {
     offsets: Vec<usize>,
     /// The pieces that have a free vertex.
     movable: Vec<u32>,
+    parts: Option<Parts>,
+}
+
+/// What is known of the other ranks.
+#[derive(Debug)]
+struct Parts {
+    partition: Arc<dyn Partition>,
+    held: Held,
+    /// For each colour which of its vertices are shared; these are in no list of `Improver::colours`.
+    colours: Vec<Shares>,
 }
 
 /// A tetrahedron at a corner of a cell, or a cell that is one.
@@ -88,6 +103,13 @@ impl Improver {
     /// An improver of the cells of the reference mesh `mesh`; the vertices of `boundary` are not free.
     #[must_use]
     pub fn new(mesh: &Mesh, boundary: &[u32]) -> Self {
+        Self::of_part(mesh, boundary, &whole())
+    }
+
+    /// The same where `mesh` is the part of this rank, whose cells no other rank has, and `boundary` its vertices on the boundary
+    /// of the whole mesh. Collective, as is its use.
+    #[must_use]
+    pub fn of_part(mesh: &Mesh, boundary: &[u32], partition: &Arc<dyn Partition>) -> Self {
         let mut free = vec![true; mesh.points().len()];
         for &vertex in boundary {
             if let Some(free) = free.get_mut(vertex as usize) {
@@ -95,6 +117,10 @@ impl Improver {
             }
         }
         let pieces = pieces(mesh, &mut free);
+        let held = (partition.ranks() > 1).then(|| Held::new(mesh, &**partition));
+        if let Some(held) = &held {
+            held.all(&**partition, &mut free);
+        }
         let mut offsets = vec![0usize; free.len() + 1];
         for piece in &pieces {
             for &vertex in &piece.vertices {
@@ -118,14 +144,40 @@ impl Improver {
                 movable.push(number);
             }
         }
-        let colours = colours(&pieces, &offsets, &incident);
-        Self { pieces, colours, incident, offsets, movable }
+        let mut improver = Self { pieces, colours: Vec::new(), incident, offsets, movable, parts: None };
+        let around = |vertex: u32, visit: &mut dyn FnMut(u32)| {
+            for &code in improver.incident(vertex) {
+                improver.pieces[(code / 4) as usize].vertices.iter().for_each(|&other| visit(other));
+            }
+        };
+        let free: Vec<u32> = (0..).zip(&free).filter(|(_, free)| **free).map(|(vertex, _)| vertex).collect();
+        let colour_of = colours(mesh.points(), &free, around, held.as_ref().map(|held| (&**partition, held)));
+        let mut colours: Vec<Vec<u32>> = Vec::new();
+        for &vertex in &free {
+            let shared = held.as_ref().is_some_and(|held| held.is_shared(vertex));
+            if !shared && let Some(colour) = colour_of[vertex as usize].map(usize::from) {
+                colours.resize_with(colours.len().max(colour + 1), Vec::new);
+                colours[colour].push(vertex);
+            }
+        }
+        improver.parts = held.map(|held| {
+            let of_place = |place: u32| colour_of[held.vertex(place) as usize].map(usize::from);
+            let shared = held.shares().places().iter().filter_map(|&place| of_place(place));
+            let own = shared.fold(colours.len(), |count, colour| count.max(colour + 1));
+            colours.resize_with(most(&**partition, own), Vec::new);
+            let of_colour = |colour: usize| held.shares().only(|place| of_place(place) == Some(colour));
+            let shares = (0..colours.len()).map(of_colour).collect();
+            Parts { partition: Arc::clone(partition), held, colours: shares }
+        });
+        improver.colours = colours;
+        improver
     }
 
     /// Improves `points` (coordinates of each vertex) in at most `sweeps` sweeps. Says whether anything has moved; nothing does
     /// where a cell is turned inside out.
     pub fn improve(&self, points: &mut [Vector], sweeps: u32) -> bool {
-        if points.len() + 1 != self.offsets.len() {
+        let fits = points.len() + 1 == self.offsets.len();
+        if !self.parts.as_ref().map_or(fits, |parts| all(&*parts.partition, fits)) {
             return false;
         }
         let before = self.least(points);
@@ -147,7 +199,7 @@ impl Improver {
 
     /// The least quality of what can be moved.
     fn least(&self, points: &[Vector]) -> f64 {
-        parallel::map_chunks(self.movable.len(), CHUNK, |range| {
+        let least = parallel::map_chunks(self.movable.len(), CHUNK, |range| {
             self.movable[range]
                 .iter()
                 .map(|&piece| {
@@ -157,13 +209,22 @@ impl Improver {
                 .fold(f64::INFINITY, |least, value| if value < least || value.is_nan() { value } else { least })
         })
         .into_iter()
-        .fold(f64::INFINITY, |least, value| if value < least || value.is_nan() { value } else { least })
+        .fold(f64::INFINITY, |least, value| if value < least || value.is_nan() { value } else { least });
+        match &self.parts {
+            None => least,
+            Some(Parts { partition, .. }) => {
+                // The reduction passes over NaN.
+                let mut least = [if least.is_nan() { f64::NEG_INFINITY } else { least }];
+                partition.reduce(Reduction::Minimum, &mut least);
+                least[0]
+            }
+        }
     }
 
     fn sweep(&self, points: &mut [Vector], least: f64) {
         let gap = GAP * least * (1.0 - least).max(LOST);
         let barrier = Barrier { floor: least - gap, gap };
-        for colour in &self.colours {
+        for (number, colour) in self.colours.iter().enumerate() {
             let moved = parallel::map_chunks(colour.len(), VERTICES, |range| {
                 let mut star = Vec::new();
                 colour[range]
@@ -177,13 +238,63 @@ impl Improver {
             for (&vertex, place) in colour.iter().zip(moved.into_iter().flatten()) {
                 points[vertex as usize] = place;
             }
+            if let Some(parts) = &self.parts {
+                self.sweep_shared(points, &barrier, parts, &parts.colours[number]);
+            }
         }
+    }
+
+    /// The same for the vertices of one colour that other ranks have too: what the cells of all of them say is added up, so that
+    /// all move them to the same place.
+    fn sweep_shared(&self, points: &mut [Vector], barrier: &Barrier, parts: &Parts, shares: &Shares) {
+        let Parts { partition, held, .. } = parts;
+        let vertices: Vec<(u32, u32)> = shares.places().iter().map(|&place| (place, held.vertex(place))).collect();
+        let mut star = Vec::new();
+        // Whether any cell is not good, the gradient and the Hessian.
+        let mut slopes = vec![[0.0; 13]; held.len()];
+        for &(place, vertex) in &vertices {
+            let point = points[vertex as usize];
+            self.gather(vertex, points, &mut star);
+            let (gradient, hessian) = barrier.derivatives(point, &star);
+            let slope = &mut slopes[place as usize];
+            slope[0] = f64::from(u8::from(!star.iter().all(|seen| seen.least(point) >= GOOD)));
+            slope[1..4].copy_from_slice(&gradient);
+            slope[4..].copy_from_slice(hessian.as_flattened());
+        }
+        shares.sum(&**partition, 13, slopes.as_flattened_mut());
+        let direction = |place: u32| {
+            let [bad, a, b, c, hessian @ ..] = slopes[place as usize];
+            let gradient = [a, b, c];
+            let direction =
+                newton(&gradient, &std::array::from_fn(|row| std::array::from_fn(|k| hessian[3 * row + k])))?;
+            (bad > 0.0).then(|| (direction, dot(direction, gradient)))
+        };
+        let mut energies = vec![[0.0; LENGTHS + 1]; held.len()];
+        for &(place, vertex) in &vertices {
+            let Some((direction, _)) = direction(place) else { continue };
+            let point = points[vertex as usize];
+            self.gather(vertex, points, &mut star);
+            for (index, energy) in energies[place as usize].iter_mut().enumerate() {
+                *energy = barrier.energy(add(point, scale(direction, length(index))), &star);
+            }
+        }
+        shares.sum(&**partition, LENGTHS + 1, energies.as_flattened_mut());
+        for &(place, vertex) in &vertices {
+            let Some((direction, slope)) = direction(place) else { continue };
+            let energies = &energies[place as usize];
+            let along = |wanted: f64| energies[(0..=LENGTHS).find(|&index| length(index) == wanted).unwrap_or(0)];
+            points[vertex as usize] = searched(points[vertex as usize], direction, slope, along);
+        }
+    }
+
+    /// The pieces of a free vertex.
+    fn incident(&self, vertex: u32) -> &[u32] {
+        &self.incident[self.offsets[vertex as usize]..self.offsets[vertex as usize + 1]]
     }
 
     fn gather(&self, vertex: u32, points: &[Vector], star: &mut Vec<Seen>) {
         star.clear();
-        let range = self.offsets[vertex as usize]..self.offsets[vertex as usize + 1];
-        star.extend(self.incident[range].iter().map(|&code| {
+        star.extend(self.incident(vertex).iter().map(|&code| {
             let piece = &self.pieces[(code / 4) as usize];
             piece.seen((code % 4) as usize, points)
         }));
@@ -271,33 +382,8 @@ impl Barrier {
         }
         let (gradient, hessian) = self.derivatives(point, star);
         let Some(direction) = newton(&gradient, &hessian) else { return point };
-        let slope = dot(direction, gradient);
-        let before = self.energy(point, star);
-        let mut length = 1.0;
-        for _ in 0..SHORTER {
-            let place = add(point, scale(direction, length));
-            let energy = self.energy(place, star);
-            if energy <= before + 1e-4 * length * slope {
-                return if length == 1.0 { self.further(point, direction, energy, star) } else { place };
-            }
-            length *= 0.5;
-        }
-        point
-    }
-
-    /// Where Newton's step fell short, as it does near the barrier, it is doubled while that helps.
-    fn further(&self, point: Vector, direction: Vector, energy: f64, star: &[Seen]) -> Vector {
-        let (mut best, mut least, mut length) = (add(point, direction), energy, 1.0);
-        for _ in 0..LONGER {
-            length *= 2.0;
-            let place = add(point, scale(direction, length));
-            let energy = self.energy(place, star);
-            if energy.is_nan() || energy >= least {
-                break;
-            }
-            (best, least) = (place, energy);
-        }
-        best
+        let energy = |length: f64| self.energy(add(point, scale(direction, length)), star);
+        searched(point, direction, dot(direction, gradient), energy)
     }
 
     /// The energy's gradient and Hessian by the place of the vertex.
@@ -335,6 +421,41 @@ impl Barrier {
         }
         (gradient, hessian)
     }
+}
+
+/// All steps that [`searched`] may try, and none.
+const LENGTHS: usize = LONGER + SHORTER;
+
+fn length(index: usize) -> f64 {
+    let power = |power: usize| f64::from(i32::try_from(power).unwrap_or(0));
+    if index == 0 { 0.0 } else { (power(index) - power(SHORTER)).exp2() }
+}
+
+/// The place along a direction where the energy, a function of the length, has fallen enough: where the direction itself is not too
+/// long but falls short, as it does near the barrier, it is doubled while that helps.
+fn searched(point: Vector, direction: Vector, slope: f64, mut energy: impl FnMut(f64) -> f64) -> Vector {
+    let before = energy(0.0);
+    let at = |length: f64| add(point, scale(direction, length));
+    let mut length = 1.0;
+    for _ in 0..SHORTER {
+        let reached = energy(length);
+        if reached <= before + 1e-4 * length * slope {
+            if length < 1.0 {
+                return at(length);
+            }
+            let mut least = reached;
+            for _ in 0..LONGER {
+                let longer = energy(2.0 * length);
+                if longer.is_nan() || longer >= least {
+                    break;
+                }
+                (least, length) = (longer, 2.0 * length);
+            }
+            return at(length);
+        }
+        length *= 0.5;
+    }
+    point
 }
 
 /// The direction of Newton's method, with as much of the identity added to the Hessian as makes it positive definite.
@@ -402,35 +523,6 @@ fn pieces(mesh: &Mesh, free: &mut [bool]) -> Vec<Piece> {
         }
     }
     pieces
-}
-
-/// The free vertices by colours: each gets the first that none of its neighbours has.
-fn colours(pieces: &[Piece], offsets: &[usize], incident: &[u32]) -> Vec<Vec<u32>> {
-    const NONE: u32 = u32::MAX;
-    let mut colour_of = vec![NONE; offsets.len() - 1];
-    let mut colours: Vec<Vec<u32>> = Vec::new();
-    // The vertex that found each colour taken last.
-    let mut taken: Vec<u32> = Vec::new();
-    for (vertex, ends) in (0u32..).zip(offsets.windows(2)) {
-        if ends[0] == ends[1] {
-            continue;
-        }
-        for &code in &incident[ends[0]..ends[1]] {
-            for &other in &pieces[(code / 4) as usize].vertices {
-                if let Some(taken) = taken.get_mut(colour_of[other as usize] as usize) {
-                    *taken = vertex;
-                }
-            }
-        }
-        let colour = taken.iter().position(|&by| by != vertex).unwrap_or_else(|| {
-            taken.push(NONE);
-            colours.push(Vec::new());
-            taken.len() - 1
-        });
-        colour_of[vertex as usize] = u32::try_from(colour).unwrap_or(NONE);
-        colours[colour].push(vertex);
-    }
-    colours
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 
 mod adaptive;
 mod assembly;
+mod colours;
 mod element;
 mod foldover;
 mod improve;
@@ -17,7 +18,7 @@ mod sliding;
 mod tests;
 mod untangle;
 
-pub use adaptive::{BoundaryMotion, FollowError, Route, Stalled, Waypoint, follow};
+pub use adaptive::{BoundaryMotion, Domain, FollowError, Route, Stalled, Waypoint, follow};
 pub use improve::Improver;
 pub use operator::{VolumeOperator, VolumeSolution};
 pub use settings::{Deform, Method};
@@ -25,6 +26,24 @@ pub use sliding::Sliding;
 pub use untangle::Untangler;
 
 use crate::mesh::{CellType, Vector};
+use crate::partition::{Partition, all};
+
+impl VolumeError {
+    /// Whether the reason lies with another rank, which has an error of its own.
+    #[must_use]
+    pub fn is_of_other_rank(&self) -> bool {
+        matches!(self, Self::OtherRank | Self::Linear(crate::linear::LinearError::OtherRank))
+    }
+}
+
+/// What all ranks can go on with; an error on all of them where one cannot.
+fn agreed<T>(partition: &dyn Partition, mine: Result<T, VolumeError>) -> Result<T, VolumeError> {
+    match (all(partition, mine.is_ok()), mine) {
+        (true, mine) => mine,
+        (false, Err(error)) => Err(error),
+        (false, Ok(_)) => Err(VolumeError::OtherRank),
+    }
+}
 
 /// Why a volume could not be deformed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -127,6 +146,9 @@ pub enum VolumeError {
         /// Its displacement.
         value: Vector,
     },
+    /// Another of the ranks that each have a part of the mesh could not go on.
+    #[error("another rank could not go on")]
+    OtherRank,
     /// The linear solve failed.
     #[error(transparent)]
     Linear(#[from] crate::linear::LinearError),

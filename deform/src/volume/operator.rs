@@ -6,9 +6,10 @@ use super::assembly::{Elastic, Graph, Laplace, VectorLaplace, stiffness};
 use super::element::Elements;
 use super::rigid::RigidMotion;
 use super::sliding::{Constraint, Sliding, constrain, constraints};
-use super::{Deform, Method, VolumeError};
-use crate::linear::{Convergence, LinearError, LinearSolver, SparseMatrix, Tolerance, solver};
+use super::{Deform, Method, VolumeError, agreed};
+use crate::linear::{Convergence, LinearError, LinearSolver, SparseMatrix, Tolerance};
 use crate::mesh::{Cells, Mesh, Vector};
+use crate::partition::{Partition, Reduction, Shares, all, any, scalar_solver, vector_solver, whole};
 use crate::vector::{add, subtract};
 
 /// A residual this small against the right side is rounding.
@@ -55,6 +56,11 @@ pub struct VolumeOperator {
     /// Where the vertex of each unknown lies.
     unknown_points: Vec<Vector>,
     equations: Equations,
+    partition: Arc<dyn Partition>,
+    /// Which unknowns other ranks have too.
+    shares: Arc<Shares>,
+    /// The places in `boundary` of the vertices that this rank speaks for.
+    own_boundary: Arc<[u32]>,
 }
 
 #[derive(Debug)]
@@ -77,21 +83,16 @@ struct System<const B: usize> {
 }
 
 impl<const B: usize> System<B> {
-    /// `slide` brings sliding vertices into the matrix; `like` is a system of the same graph, and `fresh` makes a solver where
-    /// there is none.
+    /// `slide` brings sliding vertices into the matrix, `set_up` makes its solver.
     fn new(
         (matrix, coupling): (SparseMatrix<B>, SparseMatrix<B>),
         slide: impl FnOnce(&mut SparseMatrix<B>) -> SparseMatrix<B>,
-        like: Option<&Self>,
-        fresh: impl FnOnce(Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError>,
+        set_up: impl FnOnce(Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError>,
     ) -> Result<Self, LinearError> {
         let mut matrix = matrix;
         let sliding = slide(&mut matrix);
         let matrix = Arc::new(matrix);
-        let solver = match like {
-            Some(like) => like.solver.renewed(Arc::clone(&matrix))?,
-            None => fresh(Arc::clone(&matrix))?,
-        };
+        let solver = set_up(Arc::clone(&matrix))?;
         Ok(Self { matrix, coupling, sliding, solver })
     }
 }
@@ -135,25 +136,34 @@ impl VolumeOperator {
         sliding: &[Sliding],
         settings: &Deform,
     ) -> Result<Self, VolumeError> {
+        Self::of_part(mesh, boundary, sliding, settings, &whole())
+    }
+
+    /// The same where `mesh` is the part of this rank, whose cells no other rank has. `boundary` and `sliding` are those vertices
+    /// of the part that are so in the whole mesh, be it that no cell of this rank has a face on its boundary. Collective, as is all
+    /// that is done with the operator: every rank calls it with its own part, and its part of the displacement of the boundary.
+    ///
+    /// # Errors
+    /// Also [`VolumeError::OtherRank`], where another rank has an error of its own.
+    pub fn of_part(
+        mesh: &Mesh,
+        boundary: &[u32],
+        sliding: &[Sliding],
+        settings: &Deform,
+        partition: &Arc<dyn Partition>,
+    ) -> Result<Self, VolumeError> {
         settings.validate()?;
-        if u32::try_from(mesh.cells().len()).is_err() {
-            return Err(VolumeError::TooLarge { cells: mesh.cells().len() });
-        }
+        let cells = mesh.cells().len();
+        let countable = if u32::try_from(cells).is_ok() { Ok(()) } else { Err(VolumeError::TooLarge { cells }) };
+        agreed(&**partition, countable)?;
         let elements = Elements::new(mesh);
-        let stiffness = stiffness(mesh, &elements, settings.stiffening)?;
-        let graph = Arc::new(Graph::new(mesh, boundary)?);
-        for &Sliding { vertex, .. } in sliding {
-            let vertex_count = mesh.points().len();
-            if vertex as usize >= vertex_count {
-                return Err(VolumeError::BoundaryVertex { vertex, vertex_count });
-            }
-            if graph.is_boundary(vertex) {
-                return Err(VolumeError::BoundaryTwice { vertex });
-            }
-        }
-        let constraints = constraints(sliding, |vertex| graph.unknown(vertex))?;
-        let equations = equations(&graph, mesh, &elements, &stiffness, &constraints, settings, None)?;
+        let stiffness = stiffness(mesh, &elements, settings.stiffening, &**partition)?;
+        let graph = Arc::new(Graph::new(mesh, boundary, &**partition)?);
+        let constraints = agreed(&**partition, checked_constraints(mesh, &graph, sliding))?;
+        let equations =
+            equations(&graph, mesh, &elements, &stiffness, &constraints, settings, Start::Fresh(partition))?;
         let places = |vertices: &[u32]| vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect();
+        let owned = (0..).zip(boundary).filter(|(_, vertex)| partition.owns(**vertex));
         Ok(Self {
             cells: mesh.cells().clone(),
             settings: *settings,
@@ -162,6 +172,9 @@ impl VolumeOperator {
             sliding: sliding.to_vec(),
             constraints,
             unknown_points: places(&graph.vertices),
+            shares: Arc::new(Shares::new(&**partition, &graph.vertices)),
+            own_boundary: owned.map(|(place, _)| place).collect(),
+            partition: Arc::clone(partition),
             graph,
             equations,
         })
@@ -184,12 +197,11 @@ impl VolumeOperator {
     pub fn restiffened(&self, mesh: &Mesh, stiffening: f64) -> Result<Self, VolumeError> {
         let settings = Deform { stiffening, ..self.settings };
         settings.validate()?;
-        if *mesh.cells() != self.cells || mesh.points().len() != self.graph.vertex_count() {
-            return Err(VolumeError::OtherCells);
-        }
+        let same = *mesh.cells() == self.cells && mesh.points().len() == self.graph.vertex_count();
+        agreed(&*self.partition, if same { Ok(()) } else { Err(VolumeError::OtherCells) })?;
         let elements = Elements::new(mesh);
-        let stiffness = stiffness(mesh, &elements, stiffening)?;
-        let like = Some(&self.equations);
+        let stiffness = stiffness(mesh, &elements, stiffening, &*self.partition)?;
+        let like = Start::Like(&self.equations);
         let equations = equations(&self.graph, mesh, &elements, &stiffness, &self.constraints, &settings, like)?;
         let places = |vertices: &[u32]| vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect();
         Ok(Self {
@@ -201,6 +213,9 @@ impl VolumeOperator {
             sliding: self.sliding.clone(),
             constraints: self.constraints.clone(),
             unknown_points: places(&self.graph.vertices),
+            shares: Arc::clone(&self.shares),
+            own_boundary: Arc::clone(&self.own_boundary),
+            partition: Arc::clone(&self.partition),
             equations,
         })
     }
@@ -259,13 +274,6 @@ impl VolumeOperator {
         boundary_displacement: &[Vector],
         start: &[Vector],
     ) -> Result<VolumeSolution, VolumeError> {
-        if start.len() != self.graph.vertex_count() {
-            return Err(VolumeError::StartCount { found: start.len(), expected: self.graph.vertex_count() });
-        }
-        let bad = start.iter().zip(0..).find(|(value, _)| !value.iter().all(|entry| entry.is_finite()));
-        if let Some((&value, vertex)) = bad {
-            return Err(VolumeError::NotFinite { vertex, value });
-        }
         self.solve_all(boundary_displacement, &vec![[0.0; 3]; self.sliding.len()], Some(start))
     }
 
@@ -289,25 +297,9 @@ impl VolumeOperator {
         sliding_displacement: &[Vector],
         start: Option<&[Vector]>,
     ) -> Result<VolumeSolution, VolumeError> {
-        if sliding_displacement.len() != self.sliding.len() {
-            return Err(VolumeError::SlidingCount { found: sliding_displacement.len(), expected: self.sliding.len() });
-        }
-        for (sliding, &value) in self.sliding.iter().zip(sliding_displacement) {
-            if !value.iter().all(|component| component.is_finite()) {
-                return Err(VolumeError::NotFinite { vertex: sliding.vertex, value });
-            }
-        }
-        if boundary_displacement.len() != self.boundary.len() {
-            return Err(VolumeError::BoundaryCount {
-                found: boundary_displacement.len(),
-                expected: self.boundary.len(),
-            });
-        }
+        agreed(&*self.partition, self.check_displacements(boundary_displacement, sliding_displacement, start))?;
         let mut displacement = vec![[0.0; 3]; self.graph.vertex_count()];
         for (&vertex, &value) in self.boundary.iter().zip(boundary_displacement) {
-            if !value.iter().all(|component| component.is_finite()) {
-                return Err(VolumeError::NotFinite { vertex, value });
-            }
             displacement[vertex as usize] = value;
         }
         let convergence = match &self.equations {
@@ -318,15 +310,63 @@ impl VolumeOperator {
                 self.solve_separate(system, boundary_displacement, start, &mut displacement)?
             }
         };
-        if !displacement.as_flattened().iter().all(|value| value.is_finite()) {
+        if !all(&*self.partition, displacement.as_flattened().iter().all(|value| value.is_finite())) {
             return Err(LinearError::NotFinite { iteration: convergence.iterations }.into());
         }
         Ok(VolumeSolution { displacement, iterations: convergence.iterations, residual: convergence.residual })
     }
 
+    fn check_displacements(
+        &self,
+        boundary: &[Vector],
+        sliding: &[Vector],
+        start: Option<&[Vector]>,
+    ) -> Result<(), VolumeError> {
+        if sliding.len() != self.sliding.len() {
+            return Err(VolumeError::SlidingCount { found: sliding.len(), expected: self.sliding.len() });
+        }
+        if boundary.len() != self.boundary.len() {
+            return Err(VolumeError::BoundaryCount { found: boundary.len(), expected: self.boundary.len() });
+        }
+        let given = self.sliding.iter().map(|sliding| sliding.vertex).zip(sliding);
+        let given = given.chain(self.boundary.iter().copied().zip(boundary));
+        if let Some(found) = start.map(<[Vector]>::len).filter(|&found| found != self.graph.vertex_count()) {
+            return Err(VolumeError::StartCount { found, expected: self.graph.vertex_count() });
+        }
+        let start = start.unwrap_or_default();
+        if let Some((vertex, &value)) =
+            given.chain((0..).zip(start)).find(|(_, value)| !value.iter().all(|component| component.is_finite()))
+        {
+            return Err(VolumeError::NotFinite { vertex, value });
+        }
+        Ok(())
+    }
+
+    /// The 2-norm of what the ranks' values of the unknowns add up to.
+    fn norms<const B: usize, const K: usize>(&self, values: &[[[f64; B]; K]]) -> [f64; K] {
+        if self.partition.ranks() == 1 {
+            return crate::linear::norms(values);
+        }
+        let mut values = values.to_vec();
+        self.shares.sum(&*self.partition, B * K, values.as_flattened_mut().as_flattened_mut());
+        for &place in self.shares.places() {
+            if !self.shares.owns(place as usize) {
+                values[place as usize] = [[0.0; B]; K];
+            }
+        }
+        let mut squares = crate::linear::norms(&values).map(|norm| norm * norm);
+        self.partition.reduce(Reduction::Sum, &mut squares);
+        squares.map(f64::sqrt)
+    }
+
+    /// The values of the boundary vertices that this rank speaks for.
+    fn own<T: Copy>(&self, boundary: &[T]) -> Vec<T> {
+        self.own_boundary.iter().map(|&place| boundary[place as usize]).collect()
+    }
+
     /// The rigid motion nearest to the boundary's, and that motion less the boundary's.
     fn less_rigid(&self, boundary: &[Vector]) -> (RigidMotion, Vec<Vector>) {
-        let mut rigid = RigidMotion::nearest(&self.boundary_points, boundary);
+        let mut rigid = RigidMotion::nearest(&self.own(&self.boundary_points), &self.own(boundary), &*self.partition);
         if self.settings.method == Method::Harmonic {
             // A rotation is no solution where the boundary is free.
             rigid = rigid.translation();
@@ -347,7 +387,7 @@ impl VolumeOperator {
         start: Option<&[Vector]>,
         displacement: &mut [Vector],
     ) -> Result<Convergence, LinearError> {
-        if boundary.iter().chain(sliding).all(|value| *value == [0.0; 3]) {
+        if all(&*self.partition, boundary.iter().chain(sliding).all(|value| *value == [0.0; 3])) {
             return Ok(Convergence::default());
         }
         let (rigid, rest) = self.less_rigid(boundary);
@@ -357,7 +397,9 @@ impl VolumeOperator {
         let whole_sliding = across(&|constraint| sliding[constraint.first]);
         let rest_sliding =
             across(&|constraint| subtract(rigid.at(self.unknown_points[constraint.row]), sliding[constraint.first]));
-        let absolute = ROUNDING * crate::linear::norm(&self.coupled_right_side(system, boundary, &whole_sliding));
+        let whole = self.coupled_right_side(system, boundary, &whole_sliding);
+        let [norm] = self.norms::<3, 1>(whole.as_chunks().0);
+        let absolute = ROUNDING * norm;
         let right_side = self.coupled_right_side(system, &rest, &rest_sliding);
         let tolerance = Tolerance { relative: self.settings.tolerance, absolute };
         let mut solution = vec![[0.0; 3]; right_side.len()];
@@ -406,17 +448,23 @@ impl VolumeOperator {
         displacement: &mut [Vector],
     ) -> Result<Convergence, LinearError> {
         let from = |vertex: u32, axis: usize, mean: f64| start.map_or(0.0, |start| start[vertex as usize][axis] - mean);
-        let moving: [bool; 3] = std::array::from_fn(|axis| boundary.iter().any(|value| value[axis] != 0.0));
+        let mut moves: Vector =
+            std::array::from_fn(|axis| f64::from(u8::from(boundary.iter().any(|value| value[axis] != 0.0))));
+        self.partition.reduce(Reduction::Maximum, &mut moves);
+        let moving = moves.map(|moves| moves > 0.0);
+        let own = self.own(boundary);
+        let sum = |axis: usize| own.iter().map(|value| value[axis]).sum::<f64>();
         #[expect(clippy::cast_precision_loss, reason = "fewer vertices than 2^53")]
-        let mean: Vector = std::array::from_fn(|axis| {
-            boundary.iter().map(|value| value[axis]).sum::<f64>() / boundary.len().max(1) as f64
-        });
+        let mut sums = [sum(0), sum(1), sum(2), own.len() as f64];
+        self.partition.reduce(Reduction::Sum, &mut sums);
+        let mean: Vector = std::array::from_fn(|axis| sums[axis] / sums[3].max(1.0));
         if let [axis] = (0..3).filter(|&axis| moving[axis]).collect::<Vec<_>>()[..] {
             let values: Vec<[f64; 1]> = boundary.iter().map(|value| [value[axis]]).collect();
             let rest: Vec<[f64; 1]> = values.iter().map(|[value]| [mean[axis] - value]).collect();
             let mut right_side = vec![[0.0]; self.graph.vertices.len()];
             system.coupling.multiply(&values, &mut right_side);
-            let absolute = ROUNDING * crate::linear::norm(&right_side);
+            let [norm] = self.norms::<1, 1>(right_side.as_chunks().0);
+            let absolute = ROUNDING * norm;
             system.coupling.multiply(&rest, &mut right_side);
             let mut solution: Vec<[f64; 1]> =
                 self.graph.vertices.iter().map(|&vertex| [from(vertex, axis, mean[axis])]).collect();
@@ -436,7 +484,7 @@ impl VolumeOperator {
         let rest: Vec<[[f64; 1]; 3]> = columns(rest);
         let mut right_side = vec![[[0.0]; 3]; self.graph.vertices.len()];
         system.coupling.multiply_columns(&values, &mut right_side);
-        let absolute = crate::linear::norms(&right_side).map(|norm| ROUNDING * norm);
+        let absolute = self.norms(&right_side).map(|norm| ROUNDING * norm);
         system.coupling.multiply_columns(&rest, &mut right_side);
         let tolerances = absolute.map(|absolute| Tolerance { relative: self.settings.tolerance, absolute });
         let at = |&vertex: &u32| {
@@ -456,7 +504,38 @@ impl VolumeOperator {
     }
 }
 
-/// Assembles the equations and sets up their solver. `like` are those of the same graph.
+/// What equations are set up from besides the mesh.
+#[derive(Clone, Copy)]
+enum Start<'a> {
+    Fresh(&'a Arc<dyn Partition>),
+    /// Equations of the same graph.
+    Like(&'a Equations),
+}
+
+impl Start<'_> {
+    /// Whether the components of a harmonic displacement are solved for together: where any rank has sliding vertices.
+    fn is_coupled(self, constraints: &[Constraint]) -> bool {
+        match self {
+            Start::Fresh(partition) => any(&**partition, !constraints.is_empty()),
+            Start::Like(equations) => matches!(equations, Equations::Coupled(_)),
+        }
+    }
+}
+
+fn checked_constraints(mesh: &Mesh, graph: &Graph, sliding: &[Sliding]) -> Result<Vec<Constraint>, VolumeError> {
+    for &Sliding { vertex, .. } in sliding {
+        let vertex_count = mesh.points().len();
+        if vertex as usize >= vertex_count {
+            return Err(VolumeError::BoundaryVertex { vertex, vertex_count });
+        }
+        if graph.is_boundary(vertex) {
+            return Err(VolumeError::BoundaryTwice { vertex });
+        }
+    }
+    constraints(sliding, |vertex| graph.unknown(vertex))
+}
+
+/// Assembles the equations and sets up their solver.
 fn equations(
     graph: &Graph,
     mesh: &Mesh,
@@ -464,25 +543,35 @@ fn equations(
     stiffness: &[f64],
     constraints: &[Constraint],
     settings: &Deform,
-    like: Option<&Equations>,
+    start: Start<'_>,
 ) -> Result<Equations, LinearError> {
     let coupled = |system| {
-        let like = like.and_then(|like| if let Equations::Coupled(like) = like { Some(like) } else { None });
-        System::new(system, |matrix| constrain(matrix, constraints), like, solver).map(Equations::Coupled)
+        let slide = |matrix: &mut SparseMatrix<3>| constrain(matrix, constraints);
+        let set_up = |matrix: Arc<SparseMatrix<3>>| match start {
+            Start::Like(Equations::Coupled(like)) => like.solver.renewed(matrix),
+            Start::Like(Equations::Separate(_)) => crate::linear::solver(matrix),
+            Start::Fresh(partition) => vector_solver(partition, matrix, &graph.vertices),
+        };
+        System::new(system, slide, set_up).map(Equations::Coupled)
     };
     match settings.method {
         Method::Elasticity => {
             let form = Elastic::new(settings.poisson_ratio);
             coupled(graph.assemble(mesh, elements, &form, stiffness))
         }
-        Method::Harmonic if !constraints.is_empty() => {
+        // On one rank that has sliding vertices all ranks must solve for the components together.
+        Method::Harmonic if start.is_coupled(constraints) => {
             coupled(graph.assemble(mesh, elements, &VectorLaplace, stiffness))
         }
         Method::Harmonic => {
-            let like = like.and_then(|like| if let Equations::Separate(like) = like { Some(like) } else { None });
             let system = graph.assemble(mesh, elements, &Laplace, stiffness);
             let none = |matrix: &mut SparseMatrix<1>| SparseMatrix::zeros(vec![0; matrix.rows() + 1], Vec::new());
-            System::new(system, none, like, solver).map(Equations::Separate)
+            let set_up = |matrix: Arc<SparseMatrix<1>>| match start {
+                Start::Like(Equations::Separate(like)) => like.solver.renewed(matrix),
+                Start::Like(Equations::Coupled(_)) => crate::linear::solver(matrix),
+                Start::Fresh(partition) => scalar_solver(partition, matrix, &graph.vertices),
+            };
+            System::new(system, none, set_up).map(Equations::Separate)
         }
     }
 }

@@ -1,11 +1,14 @@
 //! Moving the inside of a mesh so that no cell is turned inside out.
 
+use std::sync::Arc;
+
 use super::foldover;
-use crate::linear::{ConjugateGradients, LinearSolver, SparseMatrix, Tolerance, reverse_cuthill_mckee};
+use crate::linear::{ConjugateGradients, Schwarz, SparseMatrix, Tolerance, reverse_cuthill_mckee};
 use crate::mesh::{CellType, Mesh, Vector};
 use crate::parallel;
+use crate::partition::{Partition, Reduction, Shares, Solver, all, any, whole};
 use crate::quality::{
-    HEXAHEDRON_CORNERS, Measure, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, quality, tet_determinant,
+    HEXAHEDRON_CORNERS, Measure, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, quality_in_parts, tet_determinant,
 };
 use crate::vector::{add, cross, dot, scale, subtract};
 
@@ -47,6 +50,8 @@ pub struct Untangler {
     slots: Vec<u32>,
     offsets: Vec<usize>,
     columns: Vec<u32>,
+    partition: Arc<dyn Partition>,
+    shares: Shares,
 }
 
 /// A tetrahedron at a corner of a cell.
@@ -69,6 +74,13 @@ impl Untangler {
     /// An untangler of the cells of the reference mesh `mesh`; the vertices of `boundary` are not free.
     #[must_use]
     pub fn new(mesh: &Mesh, boundary: &[u32]) -> Self {
+        Self::of_part(mesh, boundary, &whole())
+    }
+
+    /// The same where `mesh` is the part of this rank, whose cells no other rank has, and `boundary` its vertices on the boundary
+    /// of the whole mesh. Collective, as is its use.
+    #[must_use]
+    pub fn of_part(mesh: &Mesh, boundary: &[u32], partition: &Arc<dyn Partition>) -> Self {
         let corners = corners(mesh);
         let mut free = vec![true; mesh.points().len()];
         for &vertex in boundary {
@@ -125,7 +137,8 @@ impl Untangler {
         for (slot, &vertex) in (0..).zip(&unknowns) {
             slots[vertex as usize] = slot;
         }
-        Self { corners, unknowns, slots, offsets, columns }
+        let shares = Shares::new(&**partition, &unknowns);
+        Self { corners, unknowns, slots, offsets, columns, partition: Arc::clone(partition), shares }
     }
 
     /// Moves the free vertices of `points` until every corner's determinant is positive and every scaled Jacobian at least
@@ -133,7 +146,8 @@ impl Untangler {
     ///
     /// `mesh` is the reference mesh.
     pub fn untangle(&self, mesh: &Mesh, points: &mut [Vector], floor: f64) -> bool {
-        if self.unknowns.is_empty() || points.len() != self.slots.len() {
+        let partition = &*self.partition;
+        if all(partition, self.unknowns.is_empty()) || any(partition, points.len() != self.slots.len()) {
             return false;
         }
         let mut epsilon = 1.0;
@@ -144,10 +158,11 @@ impl Untangler {
             epsilon = if least > 0.0 { (0.01 * least).min(epsilon) } else { (1e-12 + 0.04 * least * least).sqrt() };
             let before = self.state(points, epsilon).energy;
             let (matrix, right_side) = self.assemble(points, epsilon);
-            let slope = match ConjugateGradients::new(matrix).and_then(|solver| {
+            let slope = match self.solver(matrix).and_then(|solver| {
                 solver.solve(&right_side, &mut direction, Tolerance { relative: 1e-2, absolute: 0.0 })
             }) {
-                Ok(_) => -inner(&right_side, &direction),
+                // The right side is the sum of the ranks', the direction the same on all.
+                Ok(_) => -sum(partition, inner(&right_side, &direction)),
                 Err(_) => return false,
             };
             let Some(after) = self.descend(points, &direction, epsilon, before, slope) else { break };
@@ -156,8 +171,16 @@ impl Untangler {
                 break;
             }
         }
-        let sum = quality(mesh.cells(), points);
+        let sum = quality_in_parts(mesh.cells(), points, partition);
         sum.inverted == 0 && sum.min >= floor
+    }
+
+    fn solver(&self, matrix: SparseMatrix<3>) -> Solver<3> {
+        if self.partition.ranks() == 1 {
+            return Ok(Box::new(ConjugateGradients::new(matrix)?));
+        }
+        let shares = self.shares.clone();
+        Ok(Box::new(Schwarz::with_shares(Arc::clone(&self.partition), shares, Arc::new(matrix), None)?))
     }
 
     /// Goes along `direction` as far as the energy falls enough (Armijo); the energy there.
@@ -188,7 +211,7 @@ impl Untangler {
     }
 
     fn state(&self, points: &[Vector], epsilon: f64) -> State {
-        parallel::map_chunks(self.corners.len(), CHUNK, |range| {
+        let mut state = parallel::map_chunks(self.corners.len(), CHUNK, |range| {
             let mut state = State { energy: 0.0, least: f64::INFINITY };
             for corner in &self.corners[range] {
                 let j = corner.jacobian(points);
@@ -201,7 +224,12 @@ impl Untangler {
         .fold(State { energy: 0.0, least: f64::INFINITY }, |sum, part| State {
             energy: sum.energy + part.energy,
             least: sum.least.min(part.least),
-        })
+        });
+        state.energy = sum(&*self.partition, state.energy);
+        let mut least = [state.least];
+        self.partition.reduce(Reduction::Minimum, &mut least);
+        state.least = least[0];
+        state
     }
 
     /// The Hessian, and the energy's gradient with its sign turned.
@@ -255,6 +283,12 @@ impl Corner {
     }
 }
 
+fn sum(partition: &dyn Partition, mine: f64) -> f64 {
+    let mut sum = [mine];
+    partition.reduce(Reduction::Sum, &mut sum);
+    sum[0]
+}
+
 fn inner(a: &[Vector], b: &[Vector]) -> f64 {
     a.iter().zip(b).map(|(a, b)| dot(*a, *b)).sum()
 }
@@ -298,6 +332,7 @@ fn corners(mesh: &Mesh) -> Vec<Corner> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::quality::quality;
     use crate::shapes;
 
     fn boundary(mesh: &Mesh) -> Vec<u32> {

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Parser;
+use tombolo::Solvers;
 use tombolo::comm::{Communicator, Solo};
 use tombolo_flow::parts::{Dealing, Ranks};
 use tombolo_flow::program::{Options, Run};
@@ -61,7 +62,7 @@ struct Arguments {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    match on_ranks(|ranks| run(arguments, ranks)) {
+    match on_ranks(|ranks, solvers| run(arguments, ranks, solvers)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             if !error.is_empty() {
@@ -79,16 +80,20 @@ fn under_mpirun() -> bool {
 
 /// Does the work on the ranks that mpirun started, or on this process. The message is empty where the first rank has said what is wrong.
 #[cfg(feature = "distributed")]
-fn on_ranks(work: impl FnOnce(Ranks) -> Result<(), Box<dyn std::error::Error>>) -> Result<(), String> {
-    use tombolo::comm::mpi::{Mpi, rsmpi};
+fn on_ranks(work: impl FnOnce(Ranks, Option<Solvers>) -> Result<(), Box<dyn std::error::Error>>) -> Result<(), String> {
+    use tombolo::{
+        comm::mpi::{Mpi, rsmpi},
+        distributed::{Petsc, Preconditioning},
+    };
     if !under_mpirun() {
-        return work(Arc::new(Solo)).map_err(|error| error.to_string());
+        return work(Arc::new(Solo), None).map_err(|error| error.to_string());
     }
     let (universe, _) = rsmpi::initialize_with_threading(rsmpi::Threading::Funneled)
         .ok_or_else(|| "MPI could not be initialized".to_owned())?;
     let ranks: Ranks = Arc::new(Mpi::new(&universe.world()).map_err(|error| error.to_string())?);
     let is_first = ranks.rank() == 0;
-    work(ranks).map_err(|error| {
+    let solvers = Petsc::solvers(&universe.world(), Preconditioning::default()).map_err(|error| error.to_string())?;
+    work(ranks, Some(solvers)).map_err(|error| {
         // Before MPI is finalized: once a rank has failed and gone, mpirun ends the others.
         if is_first {
             eprintln!("flow: {error}");
@@ -98,17 +103,17 @@ fn on_ranks(work: impl FnOnce(Ranks) -> Result<(), Box<dyn std::error::Error>>) 
 }
 
 #[cfg(not(feature = "distributed"))]
-fn on_ranks(work: impl FnOnce(Ranks) -> Result<(), Box<dyn std::error::Error>>) -> Result<(), String> {
+fn on_ranks(work: impl FnOnce(Ranks, Option<Solvers>) -> Result<(), Box<dyn std::error::Error>>) -> Result<(), String> {
     let ranks = std::env::var("OMPI_COMM_WORLD_SIZE").or_else(|_| std::env::var("PMI_SIZE"));
     if under_mpirun() && ranks.is_ok_and(|ranks| ranks != "1") {
         return Err(
             "started on several ranks, but built for one process; build it with `--features distributed`".into()
         );
     }
-    work(Arc::new(Solo)).map_err(|error| error.to_string())
+    work(Arc::new(Solo), None).map_err(|error| error.to_string())
 }
 
-fn run(arguments: Arguments, ranks: Ranks) -> Result<(), Box<dyn std::error::Error>> {
+fn run(arguments: Arguments, ranks: Ranks, solvers: Option<Solvers>) -> Result<(), Box<dyn std::error::Error>> {
     let is_first = ranks.rank() == 0;
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = arguments.threads.or_else(|| (ranks.size() > 1).then(|| (cores() / ranks.size()).max(1)));
@@ -130,7 +135,7 @@ fn run(arguments: Arguments, ranks: Ranks) -> Result<(), Box<dyn std::error::Err
             without_numbers: arguments.without_numbers,
         },
     };
-    let run = Run::on(ranks, &options)?;
+    let run = Run::solved_by(ranks, solvers, &options)?;
     if let Some(link) = run.link() {
         let mut output = std::io::stdout();
         writeln!(output, "Open {link}")?;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use tombolo::comm::{Communicator, RankError, Solo, agree_on};
-use tombolo::{Adaptor, ExecuteError, FinalizeError, InitializeError, JournalError, Settings, Step};
+use tombolo::{Adaptor, ExecuteError, FinalizeError, InitializeError, JournalError, Settings, Solvers, Step};
 use tombolo_deform::mesh::{ArrayView, Mesh, MeshError, Vector};
 use tombolo_deform::surface::{FeatureSettings, Surface, SurfaceError};
 use tombolo_pipelines::distributed::DistributedError;
@@ -156,6 +156,18 @@ impl Run {
     /// # Errors
     /// [`ProgramError`], on several ranks the same on all of them.
     pub fn on(communicator: Arc<dyn Communicator>, options: &Options) -> Result<Self, ProgramError> {
+        Self::solved_by(communicator, None, options)
+    }
+
+    /// The same with other solvers for the motion of the mesh, such as PETSc's.
+    ///
+    /// # Errors
+    /// As [`Run::on`].
+    pub fn solved_by(
+        communicator: Arc<dyn Communicator>,
+        solvers: Option<Solvers>,
+        options: &Options,
+    ) -> Result<Self, ProgramError> {
         let is_first = communicator.rank() == 0;
         let read = agreed(&*communicator, Read::new(options, is_first))?;
         let Read { case, config, orders, mesh, surface, patches, history } = read;
@@ -175,6 +187,7 @@ impl Run {
         let adaptor = Adaptor::initialize(Settings {
             config,
             communicator: Arc::clone(&communicator),
+            solvers,
             parameters: declared,
             orders,
             output: options.out.clone().unwrap_or_else(|| PathBuf::from(".")),

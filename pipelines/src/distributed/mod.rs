@@ -16,9 +16,10 @@ mod boundary;
 mod cut;
 mod message;
 mod places;
+mod ranks;
 mod shared;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use tombolo_deform::{
     mesh::{Cells, FeatureSource, MeshError, MeshView, Vector},
@@ -27,7 +28,9 @@ use tombolo_deform::{
 
 pub use boundary::PartBoundary;
 pub(crate) use message::{Reader, Writer};
-pub use shared::{Neighbour, SharedVertices};
+pub use ranks::Ranks;
+pub use shared::SharedVertices;
+pub use tombolo_deform::partition::Neighbour;
 
 use crate::communicator::RankError;
 

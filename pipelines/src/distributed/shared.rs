@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use tombolo_deform::{mesh::Vector, surface::BoundaryFaces};
+use tombolo_deform::{mesh::Vector, partition::Neighbour, surface::BoundaryFaces};
 
 use super::message::{Reader, Writer};
 use super::places::{self, Candidate, Twins};
@@ -11,15 +11,6 @@ use crate::communicator::{Communicator, Reduction, agree};
 
 /// A neighbour's rank, and its values at vertices that are shared with it.
 type FromNeighbour = (usize, Vec<(u32, Vector)>);
-
-/// The vertices that this rank and another both have.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Neighbour {
-    /// The other rank.
-    pub rank: usize,
-    /// The vertices, in the same order on both ranks: that of their numbers in the whole mesh.
-    pub vertices: Vec<u32>,
-}
 
 /// Which vertices of a part other ranks have too, who owns each vertex, and its number in the whole mesh.
 ///

@@ -28,7 +28,7 @@ fn shuffled(count: usize, seed: u64) -> Vec<usize> {
 }
 
 /// The same part with its vertices and cells in another order.
-fn renumbered(part: &Part, seed: u64) -> Part {
+pub(crate) fn renumbered(part: &Part, seed: u64) -> Part {
     let vertices = shuffled(part.points.len(), seed);
     let cells = shuffled(part.cells.len(), seed + 1);
     let mut new = vec![0; vertices.len()];
@@ -61,7 +61,7 @@ fn renumbered(part: &Part, seed: u64) -> Part {
 }
 
 /// Cells dealt out by where they lie, in slanted slabs; `empty` gets none.
-fn dealt(mesh: &Mesh, ranks: usize, empty: Option<usize>) -> Vec<usize> {
+pub(crate) fn dealt(mesh: &Mesh, ranks: usize, empty: Option<usize>) -> Vec<usize> {
     let ranks: Vec<usize> = (0..ranks).filter(|&rank| Some(rank) != empty).collect();
     let places: Vec<f64> = mesh
         .cells()

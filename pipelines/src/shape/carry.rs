@@ -5,65 +5,107 @@ use std::sync::Arc;
 use tombolo_deform::{
     mesh::{Mesh, Vector},
     surface::Surface,
-    volume::{Sliding, VolumeError, VolumeOperator, VolumeSolution},
+    volume::{Sliding, VolumeOperator, VolumeSolution},
 };
 
-use super::Refused;
+use super::{Refused, boundary::Boundary};
 use crate::language::DeformStage;
 
 /// Faces around a vertex whose normals lie within this of each other (as a cosine: 30 degrees) are one surface to slide along.
 const ONE_SURFACE: f64 = 0.866;
 
-/// The operator of a volume, and what it takes of each vertex of the surface.
+/// The operator of a volume, and what it takes of each vertex of its boundary.
 #[derive(Debug)]
 pub(super) struct Carrier {
     operator: VolumeOperator,
-    surface: Arc<Surface>,
-    /// The surface vertices whose displacement is prescribed, in the order in which the operator takes them; `None` for all.
+    boundary: Arc<Boundary>,
+    /// The places among the boundary's vertices whose displacement is prescribed, in the order in which the operator takes them;
+    /// `None` for all.
     held: Option<Vec<u32>>,
-    /// The surface vertex of each of the operator's sliding vertices.
+    /// The place of each of the operator's sliding vertices.
     sliding: Vec<u32>,
 }
 
 impl Carrier {
-    /// Sets up the operator of the reference mesh `mesh`, whose surface is `surface`.
-    pub(super) fn new(mesh: &Mesh, surface: &Arc<Surface>, deform: &DeformStage) -> Result<Self, Refused> {
-        let (held, sliding) = if deform.lets_go() { split(surface, deform)? } else { (None, Vec::new()) };
-        let boundary: Option<Vec<u32>> =
-            held.as_ref().map(|held| held.iter().map(|&vertex| surface.vertices()[vertex as usize]).collect());
-        let slides: Vec<Sliding> = sliding
-            .iter()
-            .map(|&(vertex, normal)| Sliding { vertex: surface.vertices()[vertex as usize], normal })
-            .collect();
-        let boundary = boundary.as_deref().unwrap_or(surface.vertices());
-        let operator = VolumeOperator::with_sliding(mesh, boundary, &slides, &deform.equation)?;
-        let sliding = sliding.into_iter().map(|(vertex, _)| vertex).collect();
-        Ok(Self { operator, surface: Arc::clone(surface), held, sliding })
+    /// Sets up the operator of the reference mesh `mesh` with this boundary. Collective.
+    pub(super) fn new(mesh: &Mesh, boundary: &Arc<Boundary>, deform: &DeformStage) -> Result<Self, Refused> {
+        let (held, sliding) = if deform.lets_go() { roles(boundary, deform)? } else { (None, Vec::new()) };
+        let vertices = boundary.vertices();
+        let prescribed: Option<Vec<u32>> =
+            held.as_ref().map(|held| held.iter().map(|&place| vertices[place as usize]).collect());
+        let slides: Vec<Sliding> =
+            sliding.iter().map(|&(place, normal)| Sliding { vertex: vertices[place as usize], normal }).collect();
+        let prescribed = prescribed.as_deref().unwrap_or(vertices);
+        let operator = VolumeOperator::of_part(mesh, prescribed, &slides, &deform.equation, boundary.partition());
+        let operator = boundary.agree(operator.map_err(Refused::from))?;
+        let sliding = sliding.into_iter().map(|(place, _)| place).collect();
+        Ok(Self { operator, boundary: Arc::clone(boundary), held, sliding })
     }
 
-    /// Whether the surface may end elsewhere than where it was told to.
+    /// Whether the boundary may end elsewhere than where it was told to.
     pub(super) fn lets_go(&self) -> bool {
         self.held.is_some()
     }
 
-    /// The displacement of the volume for one of the surface.
-    pub(super) fn solve(&self, surface: &[Vector]) -> Result<VolumeSolution, VolumeError> {
-        let of =
-            |vertices: &[u32]| -> Vec<Vector> { vertices.iter().map(|&vertex| surface[vertex as usize]).collect() };
-        match &self.held {
-            None => self.operator.solve(surface),
+    /// The displacement of the volume for one of its boundary's vertices. Collective.
+    pub(super) fn solve(&self, displacement: &[Vector]) -> Result<VolumeSolution, Refused> {
+        let of = |places: &[u32]| -> Vec<Vector> { places.iter().map(|&place| displacement[place as usize]).collect() };
+        let solution = match &self.held {
+            None => self.operator.solve(displacement),
             Some(held) => self.operator.solve_sliding(&of(held), &of(&self.sliding)),
-        }
+        };
+        self.boundary.agree(solution.map_err(Refused::from))
     }
 
-    /// Where the surface comes to lie when it is told to move like this: as it was told, but for what slides or is free.
-    pub(super) fn settle(&self, surface: Vec<Vector>) -> Result<Vec<Vector>, VolumeError> {
-        if !self.lets_go() || surface.iter().all(|displacement| *displacement == [0.0; 3]) {
-            return Ok(surface);
+    /// Where the boundary comes to lie when it is told to move like this: as it was told, but for what slides or is free.
+    /// Collective.
+    pub(super) fn settle(&self, displacement: Vec<Vector>) -> Result<Vec<Vector>, Refused> {
+        if !self.lets_go() || self.boundary.all(displacement.iter().all(|displacement| *displacement == [0.0; 3])) {
+            return Ok(displacement);
         }
-        let volume = self.solve(&surface)?.displacement;
-        Ok(self.surface.vertices().iter().map(|&vertex| volume[vertex as usize]).collect())
+        let mut volume = self.solve(&displacement)?.displacement;
+        self.boundary.take_from_owners(&mut volume)?;
+        Ok(self.boundary.places(&volume))
     }
+}
+
+/// The places among a boundary's vertices that are held, and those that slide. Collective.
+fn roles(boundary: &Boundary, deform: &DeformStage) -> Result<Split, Refused> {
+    let Some(surface) = boundary.surface() else { return spread(boundary, Ok((None, Vec::new()))) };
+    let split = split(surface, deform);
+    if boundary.partition().ranks() == 1 { split } else { spread(boundary, split) }
+}
+
+/// What rank 0 says of the surface's vertices, of the boundary's vertices on this process: first whether each is held, then the
+/// directions across which it is, one after the other.
+fn spread(boundary: &Boundary, split: Result<Split, Refused>) -> Result<Split, Refused> {
+    let (kept, normals) = boundary.agree(split)?;
+    let count = boundary.surface().map_or(0, |surface| surface.points().len());
+    let mut layers: Vec<Vec<Vector>> = vec![vec![[0.0; 3]; count]];
+    kept.iter().flatten().for_each(|&vertex| layers[0][vertex as usize] = [1.0, 0.0, 0.0]);
+    for around in normals.chunk_by(|a, b| a.0 == b.0) {
+        for (layer, &(vertex, normal)) in (1..).zip(around) {
+            if layers.len() <= layer {
+                layers.push(vec![[0.0; 3]; count]);
+            }
+            layers[layer][vertex as usize] = normal;
+        }
+    }
+    #[expect(clippy::cast_precision_loss, reason = "the faces around a vertex")]
+    let layer_count = boundary.of_root(layers.len() as f64);
+    let held = boundary.scatter(Ok(std::mem::take(&mut layers[0])))?;
+    let mut sliding: Vec<(u32, Vector)> = Vec::new();
+    let mut layer = 1;
+    #[expect(clippy::cast_precision_loss, reason = "the faces around a vertex")]
+    while (layer as f64) < layer_count {
+        let normals = boundary.scatter(Ok(layers.get_mut(layer).map(std::mem::take).unwrap_or_default()))?;
+        sliding.extend((0..).zip(normals).filter(|(_, normal)| *normal != [0.0; 3]));
+        layer += 1;
+    }
+    // The directions of one vertex in the order in which rank 0 has them.
+    sliding.sort_by_key(|(place, _)| *place);
+    let held = (0..).zip(held).filter(|(_, mark)| mark[0] > 0.0).map(|(place, _)| place).collect();
+    Ok((Some(held), sliding))
 }
 
 /// The surface vertices that are held, and those that slide, once for each direction across which they are held.

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use tombolo_deform::{
-    quality::{Change, Guard, Quality, change, quality},
+    quality::{Change, Guard, Quality, change_in_parts, quality_in_parts},
     schedule::Schedule,
     surface::Edit,
 };
@@ -89,10 +89,11 @@ impl Shaper {
         }
     }
 
-    /// What a plan comes to.
+    /// What a plan comes to. Collective, as the plan was.
     #[must_use]
     pub fn outlook(&self, plan: &Plan) -> Forecast {
         let target = plan.target();
+        let (cells, partition) = (self.mesh.cells(), &**self.partition());
         Forecast {
             outcome: if target.fraction < 1.0 { Outcome::Clamped } else { Outcome::Applied },
             reason: None,
@@ -101,8 +102,8 @@ impl Shaper {
             largest_displacement: Some(plan.largest_displacement()),
             shapes: plan.shapes(),
             sub_steps: target.sub_steps,
-            quality: Some(quality(self.mesh.cells(), plan.end())),
-            change: Some(change(self.mesh.cells(), self.mesh.points(), plan.end())),
+            quality: Some(quality_in_parts(cells, plan.end(), partition)),
+            change: Some(change_in_parts(cells, self.mesh.points(), plan.end(), partition)),
             seconds: plan.seconds(),
         }
     }

@@ -4,17 +4,18 @@ use std::sync::Arc;
 
 use tombolo_deform::{
     mesh::Vector,
-    quality::{Guard, Otherwise, Refusal, keeps, turns_over},
+    quality::{Guard, Otherwise, turns_over},
     schedule::Schedule,
-    surface::{Advance, Edit, Editor, Surface},
-    volume::{BoundaryMotion, FollowError, Route, Untangler, follow},
+    surface::{Advance, Edit, Editor},
+    volume::{BoundaryMotion, Domain, FollowError, Route, Untangler, follow},
 };
 
 use crate::language::DeformStage;
 
+use super::boundary::Boundary;
 use super::carry::Carrier;
-use super::plan::{Place, Plan, travel};
-use super::{Refused, ShapeSeconds, Shaper, Stopwatch, Target, moved};
+use super::plan::{Body, Place, Plan, travel};
+use super::{Refused, ShapeSeconds, Shaper, Stopwatch, Target, displaced, moved};
 
 /// Mended shapes that are kept: the newest ones.
 const KEPT: usize = 4;
@@ -31,15 +32,18 @@ pub(super) struct Mended {
     target: Target,
 }
 
-/// An edit evaluated on the reference surface, as it is for a shape of one solve.
+/// An edit evaluated on the reference surface, as it is for a shape of one solve. Places and displacements are those of the
+/// boundary's vertices.
 struct OnReference<'a> {
-    editor: &'a mut Editor,
+    editor: Option<&'a mut Editor>,
     /// Where a part of the surface is let go: what says where it ends.
     carrier: Option<Arc<Carrier>>,
-    surface: Arc<Surface>,
+    boundary: Arc<Boundary>,
+    /// Where the boundary lies in the reference.
+    places: Vec<Vector>,
     stack: Vec<Edit>,
     edit: Edit,
-    /// Where the surface lies before the edit and its displacement there, where that is not what the stack says.
+    /// Where the boundary lies before the edit and its displacement there, where that is not what the stack says.
     ground: Option<(Vec<Vector>, Vec<Vector>)>,
 }
 
@@ -50,9 +54,10 @@ impl BoundaryMotion for OnReference<'_> {
         if let Some(last) = self.stack.last_mut() {
             *last = self.edit.scaled(to);
         }
-        let displacement = displacement(self.editor, &self.stack, self.carrier.as_deref())?;
+        let editor = self.editor.as_deref_mut();
+        let displacement = displacement(editor, &self.boundary, &self.stack, self.carrier.as_deref())?;
         Ok(match &self.ground {
-            None => self.surface.points().iter().zip(&displacement).map(|(&point, &by)| moved(point, by)).collect(),
+            None => self.places.iter().zip(&displacement).map(|(&point, &by)| moved(point, by)).collect(),
             Some((places, ground)) => places
                 .iter()
                 .zip(ground.iter().zip(&displacement))
@@ -62,7 +67,7 @@ impl BoundaryMotion for OnReference<'_> {
     }
 
     fn folds(&self, shape: &[Vector], places: &[Vector]) -> bool {
-        folds(&self.surface, shape, places)
+        folds(&self.boundary, shape, places)
     }
 }
 
@@ -70,18 +75,23 @@ impl BoundaryMotion for OnReference<'_> {
 /// then. A surface that follows in this way does not fold as long as no sub-step folds it.
 struct OnShape<'a> {
     on_reference: OnReference<'a>,
-    advance: Advance,
+    /// Where the surface is.
+    advance: Option<Advance>,
 }
 
 impl BoundaryMotion for OnShape<'_> {
     type Error = Refused;
 
     fn at(&mut self, from: f64, to: f64, shape: &[Vector]) -> Result<Vec<Vector>, Refused> {
-        let mut places = self.on_reference.at(from, to, shape)?;
-        let vertices = self.on_reference.surface.vertices();
-        let now: Vec<Vector> = vertices.iter().map(|&vertex| shape[vertex as usize]).collect();
-        self.advance.carry(&now, &mut places)?;
-        Ok(places)
+        let places = self.on_reference.at(from, to, shape)?;
+        let boundary = &self.on_reference.boundary;
+        let now = boundary.gather(shape)?;
+        let mut wanted = boundary.gather(&with_boundary(boundary, shape, &places))?;
+        let carried = match &self.advance {
+            Some(advance) => advance.carry(&now, &mut wanted).map(|()| wanted).map_err(Refused::from),
+            None => Ok(Vec::new()),
+        };
+        boundary.scatter(carried)
     }
 
     fn folds(&self, shape: &[Vector], places: &[Vector]) -> bool {
@@ -89,21 +99,39 @@ impl BoundaryMotion for OnShape<'_> {
     }
 }
 
-/// The displacement of the surface that a stack makes, with what is let go of it where it ends.
-fn displacement(editor: &mut Editor, stack: &[Edit], carrier: Option<&Carrier>) -> Result<Vec<Vector>, Refused> {
-    let surface = editor.displacement(stack)?;
+/// The displacement of the boundary that a stack makes, with what is let go of it where it ends.
+fn displacement(
+    editor: Option<&mut Editor>,
+    boundary: &Boundary,
+    stack: &[Edit],
+    carrier: Option<&Carrier>,
+) -> Result<Vec<Vector>, Refused> {
+    let displacement = boundary.scatter(displaced(editor, stack))?;
     match carrier {
-        Some(carrier) => Ok(carrier.settle(surface)?),
-        None => Ok(surface),
+        Some(carrier) => carrier.settle(displacement),
+        None => Ok(displacement),
     }
 }
 
-/// Whether a triangle of the surface turns over.
-fn folds(surface: &Surface, shape: &[Vector], places: &[Vector]) -> bool {
-    let vertices = surface.vertices();
+/// A shape of the mesh with its boundary at `places`.
+fn with_boundary(boundary: &Boundary, shape: &[Vector], places: &[Vector]) -> Vec<Vector> {
+    let mut shape = shape.to_vec();
+    for (&vertex, &place) in boundary.vertices().iter().zip(places) {
+        shape[vertex as usize] = place;
+    }
+    shape
+}
+
+/// Whether a triangle of the surface turns over, as far as this process can say.
+fn folds(boundary: &Boundary, shape: &[Vector], places: &[Vector]) -> bool {
+    let gathered = boundary.gather(shape).and_then(|before| {
+        let after = boundary.gather(&with_boundary(boundary, shape, places))?;
+        Ok((before, after))
+    });
+    let (Ok((before, after)), Some(surface)) = (gathered, boundary.surface()) else { return false };
     surface.triangles().iter().any(|triangle| {
-        let before = triangle.map(|vertex| shape[vertices[vertex as usize] as usize]);
-        turns_over(&before, &triangle.map(|vertex| places[vertex as usize]))
+        let at = |shape: &[Vector]| triangle.map(|vertex| shape[vertex as usize]);
+        turns_over(&at(&before), &at(&after))
     })
 }
 
@@ -129,8 +157,7 @@ impl Shaper {
         match guard.otherwise {
             Otherwise::Untangle => {
                 let target = self.settled(stack, deform, guard)?;
-                let shape: Vec<Vector> =
-                    self.surface.vertices().iter().map(|&vertex| target.points[vertex as usize]).collect();
+                let shape = self.boundary.gather(&target.points)?;
                 self.require_sound(&shape, guard.surface)?;
                 self.go(start, &target, schedule, guard)
             }
@@ -148,11 +175,13 @@ impl Shaper {
     /// [`Refused::Guard`].
     pub fn go(&mut self, start: &Place, target: &Target, schedule: &Schedule, guard: &Guard) -> Result<Plan, Refused> {
         let watch = Stopwatch::start();
-        let plan = travel(&self.mesh, start, target, schedule, guard);
+        let body = Body { mesh: &self.mesh, boundary: &self.boundary };
+        // Of several ranks all say the same, each with its own cells' numbers in it.
+        let plan = self.boundary.agree(travel(body, start, target, schedule, guard));
         let spent = watch.seconds();
         self.spent.guard += spent;
         let seconds = ShapeSeconds { guard: target.seconds.guard + spent, ..target.seconds };
-        Ok(plan?.finished(self.surface.vertices(), seconds))
+        Ok(plan?.finished(&self.boundary, seconds))
     }
 
     /// The shape of a stack: of one linear solve from the reference where the guard lets that through, else the shape of the
@@ -167,14 +196,14 @@ impl Shaper {
             }
             let mut linear = match self.target(&stack[..lower], deform, guard.surface) {
                 // Followed in sub-steps, the surface may come out sound.
-                Err(Refused::Surface(_)) if lower > 0 => {
+                Err(refused) if refused.is_surface() && lower > 0 => {
                     lower -= 1;
                     continue;
                 }
                 linear => linear?,
             };
             let watch = Stopwatch::start();
-            let holds = lower == 0 || keeps(self.mesh(), &self.reference, &linear.points, guard);
+            let holds = lower == 0 || self.keeps(&self.reference, &linear.points, guard);
             linear.seconds.guard += watch.seconds();
             self.spent.guard += linear.seconds.guard;
             if holds {
@@ -204,52 +233,49 @@ impl Shaper {
     ) -> Result<Target, Refused> {
         let Some((edit, below)) = stack.split_last().filter(|(edit, _)| !edit.muted()) else { return Ok(base) };
         let watch = Stopwatch::start();
-        let untangler = Arc::clone(
-            self.untangler.get_or_insert_with(|| Arc::new(Untangler::new(&self.mesh, self.surface.vertices()))),
-        );
-        let places: Vec<Vector> = self.surface.vertices().iter().map(|&vertex| base.points[vertex as usize]).collect();
+        let boundary = Arc::clone(&self.boundary);
+        let untangler = Arc::clone(self.untangler.get_or_insert_with(|| {
+            Arc::new(Untangler::of_part(&self.mesh, boundary.vertices(), boundary.partition()))
+        }));
+        let places = boundary.places(&base.points);
         let carrier = if deform.lets_go() { Some(self.operator(deform)?) } else { None };
-        let ground = displacement(&mut self.editor, below, carrier.as_deref())?;
-        let as_stated = self
-            .surface
-            .points()
-            .iter()
-            .zip(&ground)
-            .zip(&places)
-            .all(|((&point, &by), place)| moved(point, by) == *place);
+        let ground = displacement(self.editor.as_mut(), &boundary, below, carrier.as_deref())?;
+        let reference = boundary.places(&self.reference);
+        let as_stated = boundary
+            .all(reference.iter().zip(&ground).zip(&places).all(|((&point, &by), place)| moved(point, by) == *place));
         let mut motion = OnReference {
-            editor: &mut self.editor,
+            editor: self.editor.as_mut(),
             carrier,
-            surface: Arc::clone(&self.surface),
+            boundary: Arc::clone(&boundary),
+            places: reference,
             stack: stack.to_vec(),
             edit: edit.clone(),
             ground: (!as_stated).then_some((places, ground)),
         };
-        let vertices = self.surface.vertices();
-        let mut route =
-            follow(&self.mesh, vertices, &base.points, &mut motion, &deform.equation, guard, Some(&untangler));
+        let domain = Domain { mesh: &self.mesh, boundary: boundary.vertices(), partition: boundary.partition() };
+        let mut route = follow(domain, &base.points, &mut motion, &deform.equation, guard, Some(&untangler));
         // No volume can follow a surface that folds or shrinks to nothing: it is asked for in another way.
-        if matches!(route, Err(FollowError::Stalled(_)))
-            && !deform.lets_go()
-            && let Some(advance) = Advance::new(&motion.surface, edit, stack.len() - 1)?
-        {
-            let mut motion = OnShape { on_reference: motion, advance };
-            let second =
-                follow(&self.mesh, vertices, &base.points, &mut motion, &deform.equation, guard, Some(&untangler));
-            if further(&second) > further(&route) {
-                route = second;
+        if matches!(route, Err(FollowError::Stalled(_))) && !deform.lets_go() {
+            let advance = boundary.surface().map(|surface| Advance::new(surface, edit, stack.len() - 1)).transpose();
+            let advance = boundary.agree(advance.map_err(Refused::from))?.flatten();
+            if boundary.of_root(f64::from(u8::from(advance.is_some()))) > 0.0 {
+                let mut motion = OnShape { on_reference: motion, advance };
+                let second = follow(domain, &base.points, &mut motion, &deform.equation, guard, Some(&untangler));
+                if further(&second) > further(&route) {
+                    route = second;
+                }
             }
         }
         let place = stack.len() - 1;
         let mut target = match route {
-            Ok(route) => extended(base, route),
+            Ok(route) => extended(base, with_ghosts(&boundary, route)?),
             Err(error) => {
                 self.spent.volume += watch.seconds();
-                return Err(refused(error, place, edit));
+                return boundary.agree(Err(refused(error, place, edit)));
             }
         };
-        if let Some(improved) = self.improved(&target.points, deform)
-            && keeps(&self.mesh, &target.points, &improved, guard)
+        if let Some(improved) = self.improved(&target.points, deform)?
+            && self.keeps(&target.points, &improved, guard)
         {
             target.points = Arc::clone(&improved);
             target.way.push(improved);
@@ -272,7 +298,7 @@ impl Shaper {
     ) -> Result<Plan, Refused> {
         let whole = self.target(stack, deform, guard.surface);
         let refused = match whole.and_then(|whole| self.go(start, &whole, schedule, guard)) {
-            Err(refused @ (Refused::Guard(Refusal::Quality(_)) | Refused::Surface(_))) if kept < stack.len() => refused,
+            Err(refused) if (refused.is_quality() || refused.is_surface()) && kept < stack.len() => refused,
             other => return other,
         };
         let mut part = |fraction: f64| -> Result<Option<Plan>, Refused> {
@@ -284,7 +310,7 @@ impl Shaper {
             let target = self.target(&scaled, deform, guard.surface);
             match target.and_then(|target| self.go(start, &Target { fraction, ..target }, schedule, guard)) {
                 Ok(plan) => Ok(Some(plan)),
-                Err(Refused::Guard(Refusal::Quality(_)) | Refused::Surface(_)) => Ok(None),
+                Err(refused) if refused.is_quality() || refused.is_surface() => Ok(None),
                 Err(other) => Err(other),
             }
         };
@@ -334,6 +360,18 @@ fn refused(error: FollowError<Refused>, edit: usize, what: &Edit) -> Refused {
             refusal: stalled.refusal,
         },
     }
+}
+
+/// The route with the vertices of ghost cells, which did not come along, where their owners have them.
+fn with_ghosts(boundary: &Boundary, mut route: Route) -> Result<Route, Refused> {
+    if boundary.partition().ranks() > 1 {
+        for waypoint in &mut route.waypoints {
+            let mut points = waypoint.points.to_vec();
+            boundary.take_from_owners(&mut points)?;
+            waypoint.points = points.into();
+        }
+    }
+    Ok(route)
 }
 
 /// The target that a route from `base` leads to.

@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use tombolo_deform::{
     mesh::{Mesh, Vector},
-    quality::{Guard, PathQuality, Refusal, judge, keeps, shape_at},
+    partition::Reduction,
+    quality::{Guard, PathQuality, Refusal, judge_in_parts, keeps_in_parts, shape_at},
     schedule::Schedule,
 };
 
-use super::{Refused, ShapeSeconds, Target};
+use super::{Refused, ShapeSeconds, Target, boundary::Boundary};
 
 /// Straight steps between two ways that are tried before a way is gone back to the reference.
 const SHORTCUTS: usize = 24;
@@ -135,12 +136,13 @@ impl Plan {
         self.largest_displacement
     }
 
-    /// With the seconds it took; `surface` are the vertices of the surface.
-    pub(super) fn finished(self, surface: &[u32], seconds: ShapeSeconds) -> Self {
-        let largest_displacement = surface.iter().fold(0.0_f64, |largest, &vertex| {
+    /// With the seconds it took, and how far the surface goes.
+    pub(super) fn finished(self, boundary: &Boundary, seconds: ShapeSeconds) -> Self {
+        let largest = boundary.vertices().iter().fold(0.0_f64, |largest, &vertex| {
             let [from, to] = [self.start(), self.end()].map(|points| points[vertex as usize]);
             largest.max((to[0] - from[0]).hypot(to[1] - from[1]).hypot(to[2] - from[2]))
         });
+        let largest_displacement = boundary.reduced(Reduction::Maximum, largest);
         Self { seconds, largest_displacement, ..self }
     }
 
@@ -171,20 +173,37 @@ fn write(start: &[Vector], end: &[Vector], fraction: f64, points: &mut [Vector])
     }
 }
 
+/// What goes along a way.
+#[derive(Clone, Copy)]
+pub(super) struct Body<'a> {
+    pub(super) mesh: &'a Mesh,
+    pub(super) boundary: &'a Boundary,
+}
+
+impl Body<'_> {
+    fn judge(self, start: &[Vector], end: &[Vector], fractions: &[f64], guard: &Guard) -> Result<PathQuality, Refusal> {
+        judge_in_parts(self.mesh, start, end, fractions, guard, &**self.boundary.partition())
+    }
+
+    fn keeps(self, start: &[Vector], end: &[Vector], guard: &Guard) -> bool {
+        keeps_in_parts(self.mesh, start, end, guard, &**self.boundary.partition())
+    }
+}
+
 /// The way from `start` to a target in the steps of `schedule`: straight where the guard lets it through, else over shapes that
 /// lie on the known ways from and to the reference.
 ///
 /// # Errors
 /// [`Refused::Guard`] of the straight way, where no other is known.
 pub(super) fn travel(
-    mesh: &Mesh,
+    body: Body<'_>,
     start: &Place,
     target: &Target,
     schedule: &Schedule,
     guard: &Guard,
 ) -> Result<Plan, Refused> {
     let fractions = schedule.fractions();
-    match judge(mesh, &start.points, &target.points, &fractions, guard) {
+    match body.judge(&start.points, &target.points, &fractions, guard) {
         Ok(quality) => Ok(Plan {
             way: vec![Arc::clone(&start.points), Arc::clone(&target.points)],
             shapes: fractions.iter().map(|&fraction| Shape { piece: 0, fraction }).collect(),
@@ -196,8 +215,8 @@ pub(super) fn travel(
             largest_displacement: 0.0,
             seconds: target.seconds,
         }),
-        Err(refusal @ Refusal::Quality(_)) => match around(mesh, start, target, guard) {
-            Some(way) => along(mesh, way, start, target, schedule, guard),
+        Err(refusal @ Refusal::Quality(_)) => match around(body, start, target, guard) {
+            Some(way) => along(body, way, start, target, schedule, guard),
             None => Err(refusal.into()),
         },
         Err(refusal) => Err(refusal.into()),
@@ -205,9 +224,9 @@ pub(super) fn travel(
 }
 
 /// A way over known shapes.
-fn around(mesh: &Mesh, start: &Place, target: &Target, guard: &Guard) -> Option<Vec<Arc<[Vector]>>> {
+fn around(body: Body<'_>, start: &Place, target: &Target, guard: &Guard) -> Option<Vec<Arc<[Vector]>>> {
     let reference = &target.reference;
-    let at_reference = Arc::ptr_eq(&start.points, reference) || *start.points == **reference;
+    let at_reference = body.boundary.all(Arc::ptr_eq(&start.points, reference) || *start.points == **reference);
     let leaving: Vec<&Arc<[Vector]>> =
         if at_reference { vec![reference] } else { std::iter::once(&start.points).chain(&start.back).collect() };
     let arriving: Vec<&Arc<[Vector]>> =
@@ -230,14 +249,13 @@ fn around(mesh: &Mesh, start: &Place, target: &Target, guard: &Guard) -> Option<
         .filter(|&(from, to)| from + to > 0 && from + to < limit)
         .collect();
     pairs.sort_by_key(|&(from, to)| (from + to, from));
-    let straight =
-        pairs.into_iter().take(SHORTCUTS).find(|&(from, to)| keeps(mesh, leaving[from], arriving[to], guard));
+    let straight = pairs.into_iter().take(SHORTCUTS).find(|&(from, to)| body.keeps(leaving[from], arriving[to], guard));
     straight.or(common).map(|(from, to)| join(from, to)).filter(|way| way.len() > 1)
 }
 
 /// The plan along a way of several pieces, each of which was judged.
 fn along(
-    mesh: &Mesh,
+    body: Body<'_>,
     way: Vec<Arc<[Vector]>>,
     start: &Place,
     target: &Target,
@@ -248,9 +266,13 @@ fn along(
     let mut corners = vec![0.0];
     let mut length = 0.0;
     for pair in way.windows(2) {
-        let square: f64 =
-            pair[0].as_flattened().iter().zip(pair[1].as_flattened()).map(|(a, b)| (b - a) * (b - a)).sum();
-        length += square.sqrt();
+        let partition = body.boundary.partition();
+        let square: f64 = (0_u32..)
+            .zip(pair[0].iter().zip(&*pair[1]))
+            .filter(|(vertex, _)| partition.owns(*vertex))
+            .flat_map(|(_, (a, b))| (0..3).map(|axis| (b[axis] - a[axis]) * (b[axis] - a[axis])))
+            .sum();
+        length += body.boundary.reduced(Reduction::Sum, square).sqrt();
         corners.push(length);
     }
     let last = corners.len() - 1;
@@ -264,14 +286,14 @@ fn along(
     };
     let asked: Vec<f64> = schedule.fractions();
     let places: Vec<Shape> = asked.iter().map(|&fraction| locate(fraction)).collect();
-    let (shapes, fractions, quality) = match hop(mesh, &way, &places, &asked, guard) {
+    let (shapes, fractions, quality) = match hop(body, &way, &places, &asked, guard) {
         Some(quality) => (places, asked, quality),
         None => {
             let mut fractions: Vec<f64> = asked.iter().chain(&corners[1..]).copied().collect();
             fractions.sort_by(f64::total_cmp);
             fractions.dedup();
             let shapes: Vec<Shape> = fractions.iter().map(|&fraction| locate(fraction)).collect();
-            let quality = follow(mesh, &way, &shapes, &fractions, guard)?;
+            let quality = follow(body, &way, &shapes, &fractions, guard)?;
             (shapes, fractions, quality)
         }
     };
@@ -291,16 +313,22 @@ fn along(
 
 /// The quality of shapes that the mesh goes straight between, whatever corners of the way lie between them; `None` where it
 /// cannot.
-fn hop(mesh: &Mesh, way: &[Arc<[Vector]>], shapes: &[Shape], fractions: &[f64], guard: &Guard) -> Option<PathQuality> {
+fn hop(
+    body: Body<'_>,
+    way: &[Arc<[Vector]>],
+    shapes: &[Shape],
+    fractions: &[f64],
+    guard: &Guard,
+) -> Option<PathQuality> {
     let mut before: Vec<Vector> = way.first()?.to_vec();
     let mut next = before.clone();
     let mut sum: Option<PathQuality> = None;
     for (shape, &fraction) in shapes.iter().zip(fractions) {
         write(&way[shape.piece], &way[shape.piece + 1], shape.fraction, &mut next);
-        if !keeps(mesh, &before, &next, guard) {
+        if !body.keeps(&before, &next, guard) {
             return None;
         }
-        let mut quality = judge(mesh, &before, &next, &[1.0], guard).ok()?;
+        let mut quality = body.judge(&before, &next, &[1.0], guard).ok()?;
         quality.shapes.iter_mut().for_each(|shape| shape.fraction = fraction);
         sum = Some(merged(sum, quality));
         std::mem::swap(&mut before, &mut next);
@@ -310,7 +338,7 @@ fn hop(mesh: &Mesh, way: &[Arc<[Vector]>], shapes: &[Shape], fractions: &[f64], 
 
 /// The quality of shapes that hold every corner of the way.
 fn follow(
-    mesh: &Mesh,
+    body: Body<'_>,
     way: &[Arc<[Vector]>],
     shapes: &[Shape],
     fractions: &[f64],
@@ -321,7 +349,7 @@ fn follow(
         let on = |index: &usize| shapes[*index].piece == piece;
         let places: Vec<usize> = (0..shapes.len()).filter(on).collect();
         let within: Vec<f64> = places.iter().map(|&index| shapes[index].fraction).collect();
-        let mut quality = judge(mesh, &ends[0], &ends[1], &within, guard)?;
+        let mut quality = body.judge(&ends[0], &ends[1], &within, guard)?;
         for (shape, &index) in quality.shapes.iter_mut().zip(&places) {
             shape.fraction = fractions[index];
         }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use tombolo::{
     deform::{
         quality::{Quality, quality},
-        surface::{BrokenSurface, Edit, Layer},
+        surface::{BrokenSurface, Edit, Layer, SurfaceError},
         volume::Method,
     },
     pipelines::{
@@ -98,12 +98,12 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
     let mut seconds = Seconds::default();
     let mesh_file = timed(&mut seconds.read, || read_mesh(&options.mesh))?;
     let mesh = Arc::new(mesh_file.mesh);
-    let shaper = timed(&mut seconds.features, || {
+    let made = timed(&mut seconds.features, || {
         let surface = Arc::new(surface(&mesh, options.angle)?);
-        Shaper::new(Arc::clone(&mesh), surface)
+        Ok::<_, SurfaceError>((Shaper::new(Arc::clone(&mesh), Arc::clone(&surface))?, surface))
     });
-    let mut shaper = shaper?;
-    read_displacements(&mut edits, shaper.surface())?;
+    let (mut shaper, surface) = made?;
+    read_displacements(&mut edits, &surface)?;
 
     let mut outcome = Outcome {
         status: "applied",
@@ -142,7 +142,7 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
     let spent = shaper.spent();
     (outcome.seconds.surface, outcome.seconds.volume, outcome.seconds.guard) =
         (spent.surface, spent.volume, spent.guard);
-    outcome.layers = shaper.editor().layers(&edits).unwrap_or_default();
+    outcome.layers = shaper.editor().and_then(|editor| editor.layers(&edits).ok()).unwrap_or_default();
     let plan = match plan {
         Ok(plan) => plan,
         Err(refused) => {
@@ -169,17 +169,18 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
         timed(&mut outcome.seconds.write, || write_mesh(out, &shaped, &mesh_file.fields, Compression::None))?;
     }
     if let Some(file) = &options.displacement {
-        let displacement = if target.fraction < 1.0 {
+        let whole = shaper.editor().filter(|_| target.fraction == 1.0);
+        let displacement = if let Some(editor) = whole {
+            editor.displacement(&edits)?
+        } else {
             // Clamped: what was reached, and not what was asked for.
             let reached = |&vertex: &u32| {
                 let [reference, end] = [mesh.points(), plan.end()].map(|points| points[vertex as usize]);
                 [0, 1, 2].map(|axis| end[axis] - reference[axis])
             };
-            shaper.surface().vertices().iter().map(reached).collect()
-        } else {
-            shaper.editor().displacement(&edits)?
+            surface.vertices().iter().map(reached).collect()
         };
-        write_displacement(file, shaper.surface(), &displacement)?;
+        write_displacement(file, &surface, &displacement)?;
     }
     if options.json { json(&outcome) } else { tell(&outcome, options) }
 }

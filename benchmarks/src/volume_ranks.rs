@@ -1,0 +1,175 @@
+//! Volume motion on the ranks of MPI: by PETSc with each of its preconditioners, and by the kernel's own solver on as many ranks.
+//!
+//! The benchmark starts itself again under `mpirun` for each number of ranks; every rank reads or makes the mesh and keeps its part.
+
+use std::{error::Error, path::Path, process::Command, sync::Arc, time::Instant};
+
+use serde::{Deserialize, Serialize};
+use tombolo::{
+    Solvers,
+    comm::{
+        Communicator, Reduction, agree_on,
+        mpi::{Mpi, rsmpi},
+    },
+    deform::{
+        mesh::{FeatureSource, Mesh, Vector},
+        surface::FeatureSettings,
+        volume::{Deform, VolumeOperator},
+    },
+    distributed::{Petsc, Preconditioning},
+    pipelines::distributed::{Part, PartBoundary, Ranks},
+};
+
+use crate::volume::{THREADS, TOLERANCE, mesh, motion};
+
+const RUNS: usize = 3;
+
+/// What one solver took on a number of ranks.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OnRanks {
+    pub solver: String,
+    pub is_default: bool,
+    /// Assembly and set-up.
+    pub set_up: f64,
+    pub first: f64,
+    pub later: f64,
+    pub iterations: usize,
+    /// The largest difference from the displacement on one process by the largest displacement, both solved to the kernel's default
+    /// tolerance.
+    pub difference: f64,
+}
+
+/// The displacement on one process, for ranks to compare theirs with, in a file.
+pub fn write_displacement(file: &Path, number: usize) -> Result<(), Box<dyn Error>> {
+    let (_, mesh) = mesh(number)?;
+    let surface = tombolo::deform::surface::Surface::extract(&mesh, &FeatureSettings::default())?;
+    let operator = VolumeOperator::new(&mesh, surface.vertices(), &Deform::default())?;
+    let displacement = operator.solve(&motion(&mesh, surface.vertices()))?.displacement;
+    let bytes: Vec<u8> = displacement.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect();
+    Ok(std::fs::write(file, bytes)?)
+}
+
+/// Runs the solvers on `ranks` ranks of MPI.
+pub fn started(number: usize, ranks: usize, displacement: &Path) -> Result<Vec<OnRanks>, Box<dyn Error>> {
+    let output = Command::new("mpirun")
+        .args(["--allow-run-as-root", "--oversubscribe", "-n", &ranks.to_string()])
+        .arg(std::env::current_exe()?)
+        .args(["volume", "--part-of", &number.to_string(), "--displacement"])
+        .arg(displacement)
+        .output()
+        .map_err(|error| format!("mpirun: {error}; `scripts/setup --distributed` installs it"))?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    let line = text.lines().find_map(|line| line.strip_prefix("tombolo ")).ok_or_else(|| {
+        let message = String::from_utf8_lossy(&output.stderr);
+        format!("the ranks failed: {text}{message}")
+    })?;
+    Ok(serde_json::from_str(line)?)
+}
+
+/// What each rank does.
+pub fn run(number: usize, displacement: &Path) -> Result<(), Box<dyn Error>> {
+    let universe = rsmpi::initialize().ok_or("MPI was initialized before")?;
+    let world = universe.world();
+    let communicator: Arc<dyn Communicator> = Arc::new(Mpi::new(&world)?);
+    let (rank, ranks) = (communicator.rank(), communicator.size());
+    let threads = rayon::ThreadPoolBuilder::new().num_threads((THREADS / ranks).max(1)).build()?;
+    let read = prepared(number, rank, ranks, displacement).map_err(|error| error.to_string());
+    let (part, motion, expected) = agree_on(&*communicator, read)?;
+    let (shared, boundary) = PartBoundary::find(&*communicator, &part, &FeatureSettings::default())?;
+    let shared = Arc::new(shared);
+    let own = Mesh::new(part.points.clone(), part.cells.clone(), FeatureSource::SharpEdges)?;
+    let motion: Vec<Vector> = boundary.vertices().iter().map(|&vertex| motion[vertex as usize]).collect();
+    let solvers = [
+        ("kernel", None),
+        ("PETSc, Schwarz", Some(Preconditioning::Schwarz)),
+        ("PETSc, incomplete Cholesky", Some(Preconditioning::IncompleteCholesky)),
+        ("PETSc, GAMG", Some(Preconditioning::Gamg)),
+        ("PETSc, Jacobi", Some(Preconditioning::Jacobi)),
+    ];
+    let mut found = Vec::new();
+    for (solver, preconditioning) in solvers {
+        let petsc: Option<Solvers> =
+            preconditioning.map(|preconditioning| Petsc::solvers(&world, preconditioning)).transpose()?;
+        let ranks = Ranks::new(Arc::clone(&communicator), Arc::clone(&shared), &boundary, Vec::new());
+        let partition = match &petsc {
+            Some(petsc) => petsc(ranks, &part.points),
+            None => Arc::new(ranks),
+        };
+        let mut measure = || -> Result<OnRanks, Box<dyn Error + Send + Sync>> {
+            let (mut set_up, mut first, mut later, mut iterations) = (vec![], vec![], vec![], 0);
+            let settings = Deform { tolerance: TOLERANCE, ..Deform::default() };
+            for _ in 0..RUNS {
+                communicator.barrier();
+                let start = Instant::now();
+                let operator = VolumeOperator::of_part(&own, boundary.vertices(), &[], &settings, &partition)?;
+                communicator.barrier();
+                set_up.push(start.elapsed().as_secs_f64());
+                for times in [&mut first, &mut later] {
+                    let start = Instant::now();
+                    iterations = operator.solve(&motion)?.iterations;
+                    communicator.barrier();
+                    times.push(start.elapsed().as_secs_f64());
+                }
+            }
+            let operator = VolumeOperator::of_part(&own, boundary.vertices(), &[], &Deform::default(), &partition)?;
+            let solution = operator.solve(&motion)?.displacement;
+            let largest =
+                |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, |most: f64, value| most.max(value.abs()));
+            let mut sizes = [
+                largest(&mut solution.as_flattened().iter().zip(expected.as_flattened()).map(|(a, b)| a - b)),
+                largest(&mut expected.as_flattened().iter().copied()),
+            ];
+            communicator.reduce(Reduction::Maximum, &mut sizes);
+            let middle = |times: &mut Vec<f64>| crate::measure::middle(times);
+            Ok(OnRanks {
+                solver: solver.into(),
+                is_default: preconditioning == Some(Preconditioning::default()),
+                set_up: middle(&mut set_up),
+                first: middle(&mut first),
+                later: middle(&mut later),
+                iterations,
+                difference: sizes[0] / sizes[1],
+            })
+        };
+        found.push(threads.install(&mut measure).map_err(|error| error.to_string())?);
+    }
+    if rank == 0 {
+        println!("tombolo {}", serde_json::to_string(&found)?);
+    }
+    Ok(())
+}
+
+/// This rank's part of a mesh, and for each of its vertices the motion that is prescribed on the boundary and the displacement on one
+/// process.
+type Prepared = (Part, Vec<Vector>, Vec<Vector>);
+
+fn prepared(number: usize, rank: usize, ranks: usize, displacement: &Path) -> Result<Prepared, Box<dyn Error>> {
+    let (_, mesh) = mesh(number)?;
+    let all: Vec<u32> = (0..).take(mesh.points().len()).collect();
+    let motion = motion(&mesh, &all);
+    // Slabs of as many cells each, across the longest axis.
+    let spread = |axis: usize| {
+        let places = mesh.points().iter().map(|point| point[axis]);
+        places.clone().fold(f64::MIN, f64::max) - places.fold(f64::MAX, f64::min)
+    };
+    let axis = (0..3).max_by(|&a, &b| spread(a).total_cmp(&spread(b))).unwrap_or(0);
+    let place = |cell: usize| -> f64 {
+        mesh.cells().vertices(cell).iter().map(|&vertex| mesh.points()[vertex as usize][axis]).sum()
+    };
+    let mut order: Vec<usize> = (0..mesh.cells().len()).collect();
+    order.sort_by(|&a, &b| place(a).total_cmp(&place(b)));
+    let mut of_cells = vec![0; order.len()];
+    for (index, &cell) in order.iter().enumerate() {
+        of_cells[cell] = index * ranks / order.len();
+    }
+    let part = Part::cut(&mesh, &of_cells, rank, false)?;
+    let bytes = std::fs::read(displacement)?;
+    let values: Vec<f64> = bytes.as_chunks().0.iter().map(|value| f64::from_le_bytes(*value)).collect();
+    let values = values.as_chunks::<3>().0;
+    if values.len() != mesh.points().len() {
+        return Err("the displacement is not that of this mesh".into());
+    }
+    let numbers = || part.global_vertices.iter().flatten().map(|&number| number as usize);
+    let (motion, expected) = (numbers().map(|number| motion[number]).collect(), numbers().map(|n| values[n]).collect());
+    Ok((part, motion, expected))
+}
