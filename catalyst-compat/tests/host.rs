@@ -229,7 +229,7 @@ fn rubbish_is_answered() {
 fn valgrind_finds_nothing() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let pipelines = directory.path().join("pipelines.json");
-    std::fs::write(&pipelines, STREAM).expect("a file");
+    std::fs::write(&pipelines, QUALITY).expect("a file");
     for name in ["host", "meshes"] {
         let program = compile(directory.path(), name, true);
         let mut command = Command::new("valgrind");
