@@ -13,13 +13,14 @@ use tombolo::{
     Adaptor, Parameter, Settings, Step,
     comm::{Communicator, Counted, threads},
     deform::{
-        mesh::{ArrayView, CellType, Mesh},
-        shapes::box_of_tets,
+        mesh::{ArrayView, CellType, FeatureSource, Mesh},
+        shapes::{BOX_FEATURES, box_of_tets},
     },
     pipelines::{
         distributed::Part,
         encode::{Decoded, decode},
         extract::{Association, Channel, FieldView},
+        language::parse_orders,
     },
 };
 
@@ -241,6 +242,87 @@ fn a_bad_cell_on_one_rank_holds_nobody_up() {
         assert!(outcomes[0].iter().flat_map(|outcome| outcome.as_ref().err()).all(|text| text.contains("rank 1")));
     }
     assert!(begun.elapsed() < Duration::from_secs(20));
+}
+
+/// An order falls into the schedule of another, and one cannot be done: at each cycle all ranks are handed the same shape, and vertices
+/// that several of them have, ghosts too, go to the same place. The same as on one process.
+#[test]
+fn orders_take_effect_on_all_ranks_at_the_same_cycle() {
+    const ORDERS: &str = r#"[
+        {"at": {"cycle": 1}, "id": "first", "order": {"edits": [
+            {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.1, 0, 0.2]}}],
+            "schedule": {"steps": 5, "every": {"steps": 2}}}},
+        {"at": {"cycle": 4}, "id": "amid", "order": {"edits": [
+            {"translate": {"features": ["x-max"], "fixed": ["x-min"], "by": [0.3, 0, 0]}}], "schedule": {"steps": 3}}},
+        {"at": {"cycle": 6}, "id": "none", "order": {"edits": [
+            {"translate": {"features": ["z-mxa"], "fixed": ["z-min"], "by": [0, 0, 0.1]}}]}},
+        {"at": {"cycle": 9}, "id": "broken", "order": {"edits": [
+            {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -3]}}]}},
+        {"at": {"cycle": 10}, "id": "back", "order": {"undo": 2}}]"#;
+    let mesh = named_box();
+    let run = |ranks: usize| {
+        threads::run(ranks, |communicator| {
+            let rank = communicator.rank();
+            let part = if ranks == 1 {
+                Part { global_vertices: Some((0..mesh.points().len() as u64).collect()), ..whole(&mesh) }
+            } else {
+                part(&mesh, rank)
+            };
+            let orders = parse_orders(ORDERS, "orders.json").expect("orders");
+            let settings = Settings { orders, communicator: Arc::new(communicator), ..Settings::default() };
+            let mut adaptor = Adaptor::initialize(settings).expect("initialize");
+            let mut present = part.clone();
+            let mut shapes = Vec::new();
+            for cycle in 0..13 {
+                let moved = {
+                    let channels = [Channel { name: "fluid", mesh: present.view(), fields: &[] }];
+                    let steering = adaptor.execute(&step(cycle), &channels).expect("execute");
+                    steering.motion.map(|motion| (motion.coordinates.to_vec(), motion.order.to_owned(), motion.shape))
+                };
+                if let Some((coordinates, order, shape)) = moved {
+                    let placed = part.global_vertices.iter().flatten().copied().zip(coordinates.iter().copied());
+                    shapes.push((cycle, order, shape, placed.collect::<Vec<_>>()));
+                    present.points = coordinates;
+                }
+            }
+            (shapes, adaptor.finalize().expect("finalize"))
+        })
+    };
+    let alone = run(1).remove(0);
+    let statuses: Vec<_> =
+        alone.1.orders.iter().map(|order| (order.id.clone(), order.status, order.cycle_applied)).collect();
+    assert!(alone.0.len() >= 6, "{statuses:?}");
+    let many = run(RANKS);
+    let told: Vec<_> =
+        many[0].1.orders.iter().map(|order| (order.id.clone(), order.status, order.cycle_applied)).collect();
+    assert_eq!(told, statuses);
+    for (rank, (shapes, _)) in many.iter().enumerate() {
+        assert_eq!(shapes.len(), alone.0.len());
+        for (found, expected) in shapes.iter().zip(&alone.0) {
+            assert_eq!((found.0, &found.1, found.2), (expected.0, &expected.1, expected.2), "rank {rank}");
+            for (number, place) in &found.3 {
+                let there = expected.3[*number as usize].1;
+                let apart = (0..3).map(|axis| (place[axis] - there[axis]).abs()).fold(0.0, f64::max);
+                assert!(apart < 1e-8, "rank {rank}, cycle {}, vertex {number}: {place:?} and {there:?}", found.0);
+            }
+        }
+        // Back to the bits of the beginning.
+        let last = &shapes.last().expect("shapes").3;
+        assert!(last.iter().all(|(number, place)| *place == mesh.points()[*number as usize]), "rank {rank}");
+    }
+}
+
+/// A box whose sides have names.
+fn named_box() -> Mesh {
+    let mesh = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+    let FeatureSource::Faces(tagged) = mesh.features() else { panic!("a box has tagged faces") };
+    let mut tagged = tagged.clone();
+    tagged.names = (1..).zip(BOX_FEATURES.map(str::to_owned)).collect();
+    Mesh::new(mesh.points().to_vec(), mesh.cells().clone(), FeatureSource::Faces(tagged)).expect("a mesh")
+}
+
+fn whole(mesh: &Mesh) -> Part {
+    Part::of(&mesh.into()).expect("a part")
 }
 
 #[test]
