@@ -135,7 +135,7 @@ fn everything(ranks: &dyn Communicator) {
     }
     for round in 0..200_u8 {
         // To all ranks but those that `round` leaves out, twice to the next one.
-        let wanted = |from: usize, to: usize| (from + to + round as usize) % 3 != 0;
+        let wanted = |from: usize, to: usize| !(from + to + round as usize).is_multiple_of(3);
         let mut messages: Vec<(usize, Vec<u8>)> =
             (0..size).filter(|&to| wanted(rank, to)).map(|to| (to, vec![round; 10 * rank])).collect();
         messages.push(((rank + 1) % size, vec![rank as u8, round]));
