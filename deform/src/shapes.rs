@@ -74,6 +74,63 @@ pub fn box_of_hexahedra(counts: [usize; 3], lower: Vector, upper: Vector) -> Mes
     valid(Mesh::new(grid.points(lower, upper), cells, box_features(faces, tags)))
 }
 
+/// A box of hexahedra, wedges, pyramids and tetrahedra, its first vertices and its features as those of [`box_of_tets`].
+///
+/// The kind of a column of cubes along z repeats every three steps, by `(i + 2 j) mod 3`: hexahedra; six pyramids in each cube;
+/// two wedges in each cube of an even layer, four pyramids and four tetrahedra in each of an odd one. The cubes cut to pyramids
+/// have a vertex of their own in the middle; these are the last vertices. So there is every kind from 3 by 1 by 2 cubes on.
+#[must_use]
+pub fn box_of_mixed_cells(counts: [usize; 3], lower: Vector, upper: Vector) -> Mesh {
+    // The squares of a cube, their normals inward: at z-min, z-max, and around.
+    const SQUARES: [[usize; 4]; 6] =
+        [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
+    // Those at z-min and z-max along the diagonal that the wedges have.
+    const HALVES: [[usize; 3]; 4] = [[0, 1, 3], [0, 3, 2], [4, 7, 5], [4, 6, 7]];
+    let grid = Grid::new(counts);
+    let kind = |i: usize, j: usize| (i + 2 * j) % 3;
+    let mut points = grid.points(lower, upper);
+    let mut cells = Cells::new();
+    let [columns, rows, layers] = grid.counts;
+    for (k, j, i) in (0..layers).flat_map(|k| (0..rows).flat_map(move |j| (0..columns).map(move |i| (k, j, i)))) {
+        let corner = |corner: usize| grid.vertex([i + (corner & 1), j + (corner >> 1 & 1), k + (corner >> 2 & 1)]);
+        let mut push = |cell_type: CellType, vertices: &[u32]| valid(cells.push(cell_type, vertices));
+        match (kind(i, j), k % 2) {
+            (0, _) => push(CellType::Hexahedron, &[0, 1, 3, 2, 4, 5, 7, 6].map(corner)),
+            (2, 0) => {
+                push(CellType::Wedge, &[0, 3, 1, 4, 7, 5].map(corner));
+                push(CellType::Wedge, &[0, 2, 3, 4, 6, 7].map(corner));
+            }
+            (kind, _) => {
+                let middle = number(points.len());
+                let [low, high] = [0, 7].map(|end| points[corner(end) as usize]);
+                points.push(scale(add(low, high), 0.5));
+                let squares = if kind == 1 { &SQUARES[..] } else { &SQUARES[2..] };
+                for [a, b, c, d] in squares.iter().map(|square| square.map(corner)) {
+                    push(CellType::Pyramid, &[a, b, c, d, middle]);
+                }
+                for [a, b, c] in HALVES.iter().filter(|_| kind == 2).map(|half| half.map(corner)) {
+                    push(CellType::Tetra, &[a, b, c, middle]);
+                }
+            }
+        }
+    }
+    let mut faces = Cells::new();
+    let mut tags = Vec::new();
+    grid.for_each_boundary_quad(|tag, [a, b, c, d]| {
+        let lowest = a as usize;
+        if tag >= 5 && kind(lowest % (columns + 1), lowest / (columns + 1) % (rows + 1)) == 2 {
+            for triangle in [[a, b, c], [a, c, d]] {
+                valid(faces.push(CellType::Triangle, &triangle));
+                tags.push(tag);
+            }
+        } else {
+            valid(faces.push(CellType::Quad, &[a, b, c, d]));
+            tags.push(tag);
+        }
+    });
+    valid(Mesh::new(points, cells, box_features(faces, tags)))
+}
+
 /// A closed torus of triangles about the z axis: a mesh of dimension 2, its triangles counter-clockwise seen from outside.
 ///
 /// `counts` vertices lie around the axis and around the tube (at least 3 of each). Vertex `j + counts[1] * i` lies at the angle
@@ -316,6 +373,7 @@ fn valid<T>(built: Result<T, MeshError>) -> T {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::surface::{FeatureSettings, Surface};
 
     /// Six times the volume enclosed by the faces of a cell, by the divergence theorem.
     fn six_volumes(mesh: &Mesh, cell: usize) -> f64 {
@@ -339,6 +397,22 @@ mod tests {
         assert!((volumes.iter().sum::<f64>() - 6.0).abs() < 1e-12);
         let FeatureSource::Faces(tagged) = mesh.features() else { panic!("tagged faces") };
         assert_eq!(tagged.faces.len(), 2 * 2 * (3 * 2 + 2 + 3));
+    }
+
+    #[test]
+    fn a_box_of_mixed_cells_fills_the_box_with_right_handed_cells_that_fit() {
+        let mesh = box_of_mixed_cells([4, 3, 3], [-1.0, 0.0, 2.0], [2.0, 1.0, 4.0]);
+        let volumes: Vec<f64> = (0..mesh.cells().len()).map(|cell| six_volumes(&mesh, cell) / 6.0).collect();
+        assert!(volumes.iter().all(|&volume| volume > 0.0));
+        assert!((volumes.iter().sum::<f64>() - 6.0).abs() < 1e-12);
+        for cell_type in [CellType::Tetra, CellType::Hexahedron, CellType::Wedge, CellType::Pyramid] {
+            assert!(mesh.cells().iter().any(|(found, _)| found == cell_type), "{cell_type}");
+        }
+        // Faces that do not fit would be boundary faces without a tag.
+        let surface = Surface::extract(&mesh, &FeatureSettings::default()).unwrap();
+        let FeatureSource::Faces(tagged) = mesh.features() else { panic!("tagged faces") };
+        assert_eq!(surface.faces().len(), tagged.faces.len());
+        assert_eq!(surface.features().names(), BOX_FEATURES);
     }
 
     #[test]

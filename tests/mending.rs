@@ -1,20 +1,22 @@
 //! Orders that one linear solve cannot carry out: followed in sub-steps, untangled, clamped or refused.
 
-use std::sync::Arc;
+use std::{cell::RefCell, process::Command, sync::Arc};
 
-use proptest::prelude::*;
+use proptest::{prelude::*, test_runner::TestRunner};
 use serde_json::{Value, json};
 use tombolo_deform::{
-    mesh::{Mesh, Vector},
-    quality::{Guard, Otherwise, Refusal, keeps, quality},
+    mesh::{CellType, Mesh, Vector},
+    quality::{Guard, Otherwise, Refusal, keeps, quality, scaled_jacobians},
     schedule::Schedule,
     shapes,
     surface::{Edit, FeatureSettings, Surface},
 };
 use tombolo_pipelines::{
+    files::{Compression, write_mesh},
     language::DeformStage,
     shape::{Outcome, Place, Plan, Refused, Shaper},
 };
+use tombolo_tests::project;
 
 fn shaper(mesh: Mesh) -> Shaper {
     let mesh = Arc::new(mesh);
@@ -234,28 +236,37 @@ fn any_edit() -> impl Strategy<Value = Value> {
     )
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 40, max_shrink_iters: 20, ..ProptestConfig::default() })]
+/// One of three meshes, two orders one after the other, what is to be done where they go too far, and in how many steps.
+fn any_run() -> impl Strategy<Value = (usize, [Vec<Value>; 2], Otherwise, u32)> {
+    let order = || prop::collection::vec(any_edit(), 1..3);
+    let otherwise = prop::sample::select(vec![Otherwise::Reject, Otherwise::Untangle, Otherwise::Clamp]);
+    (0..MESHES, [order(), order()], otherwise, 1..4u32)
+}
 
-    /// Whatever is asked for: every shape on the way is valid, or it is refused with a reason and the mesh has not moved.
-    #[test]
-    fn nothing_broken_is_ever_handed_out(
-        first in prop::collection::vec(any_edit(), 1..3),
-        second in prop::collection::vec(any_edit(), 1..3),
-        tets in any::<bool>(),
-        otherwise in prop::sample::select(vec![Otherwise::Reject, Otherwise::Untangle, Otherwise::Clamp]),
-        steps in 1..4u32,
-    ) {
-        let mut shaper = shaper(if tets {
-            shapes::box_of_tets([2, 3, 3], [0.0; 3], [1.0, 1.0, 2.0])
-        } else {
-            shapes::box_of_hexahedra([3, 2, 3], [0.0; 3], [1.0, 1.0, 2.0])
-        });
+const MESHES: usize = 3;
+
+fn mesh(kind: usize) -> Mesh {
+    let upper = [1.0, 1.0, 2.0];
+    match kind {
+        0 => shapes::box_of_tets([2, 3, 3], [0.0; 3], upper),
+        1 => shapes::box_of_hexahedra([3, 2, 3], [0.0; 3], upper),
+        _ => shapes::box_of_mixed_cells([3, 2, 3], [0.0; 3], upper),
+    }
+}
+
+/// Whatever is asked for: every shape on the way is valid, also to VTK, or it is refused with a reason and the mesh has not
+/// moved.
+#[test]
+fn nothing_broken_is_ever_handed_out() {
+    let seen: RefCell<[Vec<Vec<Vector>>; MESHES]> = RefCell::default();
+    let mut runner = TestRunner::new(ProptestConfig { cases: 48, max_shrink_iters: 20, ..ProptestConfig::default() });
+    let outcome = runner.run(&any_run(), |(kind, orders, otherwise, steps)| {
+        let mut shaper = shaper(mesh(kind));
         let mesh = Arc::clone(shaper.mesh());
         let guard = guard(otherwise);
         let mut place = here(&shaper);
         let mut stack: Vec<Edit> = Vec::new();
-        for order in [first, second] {
+        for order in orders {
             let kept = stack.len();
             let mut wanted = stack.clone();
             wanted.extend(edits(Value::Array(order)));
@@ -263,6 +274,11 @@ proptest! {
                 Ok(plan) => {
                     prop_assert_eq!(&plan.start()[..], &place.points[..]);
                     place = walk(&mesh, &plan, &guard);
+                    for shape in 1..=plan.shapes() {
+                        let mut points = vec![[0.0; 3]; mesh.points().len()];
+                        plan.write_shape(shape, &mut points);
+                        seen.borrow_mut()[kind].push(points);
+                    }
                     let fraction = plan.target().fraction;
                     prop_assert!(fraction > 0.0 && fraction <= 1.0);
                     for edit in &mut wanted[kept..] {
@@ -280,5 +296,45 @@ proptest! {
         } else {
             prop_assert!(otherwise != Otherwise::Untangle, "a shape that was mended has a way back");
         }
+        Ok(())
+    });
+    outcome.unwrap_or_else(|failure| panic!("{failure}"));
+    for (kind, shapes) in seen.into_inner().into_iter().enumerate() {
+        assert!(shapes.len() > 5, "{} shapes of mesh {kind}", shapes.len());
+        valid_to_vtk(&mesh(kind), &shapes);
+    }
+}
+
+/// Has VTK look at shapes of a mesh.
+fn valid_to_vtk(mesh: &Mesh, shapes: &[Vec<Vector>]) {
+    if std::env::var_os("TOMBOLO_WITHOUT_VTK").is_some() {
+        eprintln!("skipped: TOMBOLO_WITHOUT_VTK is set, so VTK looks at nothing");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, points: &[Vector]| {
+        let shape = mesh.with_points(points.to_vec()).unwrap();
+        write_mesh(folder.path().join(name), &shape, &[], Compression::None).unwrap();
+    };
+    write("reference.vtu", mesh.points());
+    for (number, points) in shapes.iter().enumerate() {
+        write(&format!("shape-{number:04}.vtu"), points);
+    }
+    let read = Command::new("/usr/bin/python3").arg(project().join("tests/vtk/path.py")).arg(folder.path()).output();
+    let read = read.expect("python3 starts");
+    assert!(read.status.success(), "VTK (apt-get install python3-vtk9): {}", String::from_utf8_lossy(&read.stderr));
+    let text = String::from_utf8(read.stdout).unwrap();
+    assert_eq!(text.lines().count(), shapes.len());
+    for (line, points) in text.lines().zip(shapes) {
+        let mut words = line.split_whitespace().skip(1);
+        let least = f64::from_bits(u64::from_str_radix(words.next().unwrap(), 16).unwrap());
+        assert_eq!(words.next(), Some("0"), "{line}: cells that VTK has inside out");
+        let ours = scaled_jacobians(mesh.cells(), points)
+            .into_iter()
+            .zip(mesh.cells().iter())
+            .filter(|(_, (cell_type, _))| matches!(cell_type, CellType::Tetra | CellType::Hexahedron))
+            .map(|(quality, _)| quality)
+            .fold(2.0, f64::min);
+        assert!((least - ours).abs() < 1e-10, "{line}: {least} to VTK, {ours} to us");
     }
 }
