@@ -14,5 +14,6 @@ pub mod skeleton;
 pub mod surface;
 pub mod volume;
 
+mod lanes;
 mod parallel;
 mod vector;

@@ -7,7 +7,7 @@ use crate::linear::LinearError;
 use crate::mesh::{Mesh, Vector};
 use crate::partition::{Partition, any};
 use crate::quality::{Guard, Refusal, judge_in_parts, keeps_in_parts};
-use crate::vector::{add, subtract};
+use crate::vector::{add, scale, subtract};
 
 /// The first sub-step, what a sub-step that holds lets the next one grow by, and the least one tried.
 const FIRST: f64 = 0.2;
@@ -26,8 +26,8 @@ const STIFFER: f64 = 1.0;
 /// Sub-steps tried before it is given up.
 const TRIES: usize = 200;
 
-/// Sub-steps are solved no finer than this: what a solve leaves out is small against a sub-step.
-const TOLERANCE: f64 = 1e-6;
+/// Sub-steps are solved no finer than this: what a solve leaves out is small against a sub-step, and the boundary is set exactly.
+const TOLERANCE: f64 = 1e-5;
 
 /// A shape on the way of [`follow`].
 #[derive(Debug, Clone, PartialEq)]
@@ -112,6 +112,8 @@ pub struct Domain<'a> {
     pub boundary: &'a [u32],
     /// The parts that the mesh is in.
     pub partition: &'a Arc<dyn Partition>,
+    /// An operator of this boundary, set up on the mesh where it starts, if there is one already.
+    pub operator: Option<&'a Arc<VolumeOperator>>,
 }
 
 /// Takes the volume along with a motion of its boundary from the shape `start` on.
@@ -119,9 +121,10 @@ pub struct Domain<'a> {
 /// One linear solve on the shape reached, with a material stiffened anew, makes a sub-step: a fifth of the way at first. The
 /// first that the guard does not let through is tried again with a stiffening of 1, which the rest of the way keeps, unless it
 /// was that or more; others are halved, and a small one is untangled (see [`Untangler`]). After one that holds, the next may be
-/// half as long again. So what is found is a function of the arguments alone.
+/// half as long again. Each solve starts from what the last one found, made as long as the sub-step. So what is found is a function
+/// of the arguments alone.
 ///
-/// `untangler` is of the reference mesh, which is what cells are drawn back to. Collective, where the mesh is in parts: the motion
+/// `untangler`, called where it is needed, is of the reference mesh, which is what cells are drawn back to. Collective, where the mesh is in parts: the motion
 /// then must fail on all ranks or on none.
 ///
 /// # Errors
@@ -132,35 +135,43 @@ pub fn follow<M: BoundaryMotion>(
     motion: &mut M,
     settings: &Deform,
     guard: &Guard,
-    untangler: Option<&Untangler>,
+    untangler: Option<&dyn Fn() -> Arc<Untangler>>,
 ) -> Result<Route, FollowError<M::Error>> {
-    let Domain { mesh, boundary, partition } = domain;
+    let Domain { mesh, boundary, partition, operator } = domain;
     let settings = Deform { tolerance: settings.tolerance.max(TOLERANCE), ..*settings };
     let mut route = Route { waypoints: Vec::new(), rejected: 0, untangled: 0, iterations: 0 };
     let mut shape = Arc::clone(start);
     let (mut reached, mut step) = (0.0, FIRST);
     let mut stiffening = settings.stiffening;
-    let mut latest: Option<VolumeOperator> = None;
+    let mut operator = operator.map(Arc::clone);
+    // What the last sub-step was solved to, and how long it was.
+    let mut latest: Option<(Vec<Vector>, f64)> = None;
     while reached < 1.0 {
         // Both that it started from and what was solved for are finite.
         let stiffened = mesh.with_points(shape.to_vec()).map_err(|_| overflow());
         let stiffened = agreed(&**partition, stiffened).map_err(FollowError::Volume)?;
-        let renewed = match &latest {
-            Some(operator) => operator.restiffened(&stiffened, stiffening),
-            None => VolumeOperator::of_part(&stiffened, boundary, &[], &settings, partition),
+        let mut current = match operator.take() {
+            Some(first) if route.waypoints.is_empty() => first,
+            Some(before) => restiffened(&before, &stiffened, stiffening, &settings).map_err(FollowError::Volume)?,
+            None => Arc::new(
+                VolumeOperator::of_part(&stiffened, boundary, &[], &settings, partition)
+                    .map_err(FollowError::Volume)?,
+            ),
         };
-        let mut operator = latest.insert(renewed.map_err(FollowError::Volume)?);
         loop {
             // A last sub-step that would leave next to nothing takes it along.
             let next = if reached + 1.25 * step >= 1.0 { 1.0 } else { reached + step };
             let places = motion.at(reached, next, &shape).map_err(FollowError::Boundary)?;
-            let mut candidate = moved(operator, &shape, &places, &mut route.iterations).map_err(FollowError::Volume)?;
+            let guess = latest.as_ref().map(|(displacement, length)| scaled(displacement, (next - reached) / length));
+            let (displacement, mut candidate) =
+                moved(&current, &shape, &places, guess, &mut route.iterations).map_err(FollowError::Volume)?;
+            latest = Some((displacement, next - reached));
             let mut holds = keeps_in_parts(mesh, &shape, &candidate, guard, &**partition);
             let folds = !holds && any(&**partition, motion.folds(&shape, &places));
             if let Some(untangler) = untangler
                 && !(holds || folds)
                 && next - reached <= UNTANGLED_BELOW
-                && untangler.untangle(mesh, &mut candidate, guard.min_scaled_jacobian)
+                && untangler().untangle(mesh, &mut candidate, guard.min_scaled_jacobian)
             {
                 holds = keeps_in_parts(mesh, &shape, &candidate, guard, &**partition);
                 route.untangled += usize::from(holds);
@@ -174,8 +185,7 @@ pub fn follow<M: BoundaryMotion>(
             route.rejected += 1;
             if stiffening < STIFFER && !folds {
                 stiffening = STIFFER;
-                let stiffer = operator.restiffened(&stiffened, stiffening).map_err(FollowError::Volume)?;
-                operator = latest.insert(stiffer);
+                current = restiffened(&current, &stiffened, stiffening, &settings).map_err(FollowError::Volume)?;
                 continue;
             }
             step = 0.5 * (next - reached);
@@ -183,30 +193,48 @@ pub fn follow<M: BoundaryMotion>(
                 return Err(stalled(domain, &shape, &candidate, guard, route, folds));
             }
         }
+        operator = Some(current);
     }
     Ok(route)
 }
 
-/// The shape after a sub-step that takes the boundary to `places`.
+fn restiffened(
+    operator: &VolumeOperator,
+    mesh: &Mesh,
+    stiffening: f64,
+    settings: &Deform,
+) -> Result<Arc<VolumeOperator>, VolumeError> {
+    Ok(Arc::new(operator.restiffened(mesh, stiffening)?.with_tolerance(settings.tolerance)))
+}
+
+fn scaled(displacement: &[Vector], factor: f64) -> Vec<Vector> {
+    displacement.iter().map(|&by| scale(by, factor)).collect()
+}
+
+/// The displacement that takes the boundary to `places`, solved for from a guess, and the shape after it.
 fn moved(
     operator: &VolumeOperator,
     shape: &[Vector],
     places: &[Vector],
+    guess: Option<Vec<Vector>>,
     iterations: &mut usize,
-) -> Result<Vec<Vector>, VolumeError> {
+) -> Result<(Vec<Vector>, Vec<Vector>), VolumeError> {
     let displacement: Vec<Vector> = operator
         .boundary()
         .iter()
         .zip(places)
         .map(|(&vertex, place)| subtract(*place, shape[vertex as usize]))
         .collect();
-    let solution = operator.solve(&displacement)?;
+    let solution = match guess {
+        Some(guess) => operator.solve_from(&displacement, &guess)?,
+        None => operator.solve(&displacement)?,
+    };
     *iterations += solution.iterations;
     let mut candidate: Vec<Vector> = shape.iter().zip(&solution.displacement).map(|(&a, &b)| add(a, b)).collect();
     for (&vertex, &place) in operator.boundary().iter().zip(places) {
         candidate[vertex as usize] = place;
     }
-    Ok(candidate)
+    Ok((solution.displacement, candidate))
 }
 
 fn overflow() -> VolumeError {
@@ -264,7 +292,7 @@ mod tests {
 
     fn single(mesh: &Mesh, boundary: &[u32], places: &[Vector]) -> Vec<Vector> {
         let operator = VolumeOperator::new(mesh, boundary, &Deform::default()).unwrap();
-        moved(&operator, mesh.points(), places, &mut 0).unwrap()
+        moved(&operator, mesh.points(), places, None, &mut 0).unwrap().1
     }
 
     /// A turn that a single solve cannot follow, on tetrahedra and on hexahedra; every piece of the way holds.
@@ -279,9 +307,10 @@ mod tests {
             let end = twisted(&mesh, &boundary, 180.0);
             assert!(!keeps(&mesh, mesh.points(), &single(&mesh, &boundary, &end), &guard));
             let start: Arc<[Vector]> = mesh.points().into();
-            let untangler = Untangler::new(&mesh, &boundary);
+            let untangler = Arc::new(Untangler::new(&mesh, &boundary));
+            let untangler = || Arc::clone(&untangler);
             let partition = whole();
-            let domain = Domain { mesh: &mesh, boundary: &boundary, partition: &partition };
+            let domain = Domain { mesh: &mesh, boundary: &boundary, partition: &partition, operator: None };
             let mut motion = Places(|to| twisted(&mesh, &boundary, 180.0 * to));
             let route = follow(domain, &start, &mut motion, &Deform::default(), &guard, Some(&untangler)).unwrap();
             let mut before = &start;
@@ -312,10 +341,11 @@ mod tests {
             };
             boundary.iter().map(place).collect::<Vec<_>>()
         };
-        let untangler = Untangler::new(&mesh, &boundary);
+        let untangler = Arc::new(Untangler::new(&mesh, &boundary));
+        let untangler = || Arc::clone(&untangler);
         let guard = Guard { min_scaled_jacobian: 0.05, ..Guard::default() };
         let partition = whole();
-        let domain = Domain { mesh: &mesh, boundary: &boundary, partition: &partition };
+        let domain = Domain { mesh: &mesh, boundary: &boundary, partition: &partition, operator: None };
         let result = follow(domain, &start, &mut Places(pressed), &Deform::default(), &guard, Some(&untangler));
         let Err(FollowError::Stalled(stalled)) = result else { panic!("{result:?}") };
         assert!((0.6..0.8).contains(&stalled.fraction()), "{}", stalled.fraction());

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::barrier::{Barrier, LENGTHS, Piece, Star, length, newton, searched};
 use super::colours::{Held, colours};
 use crate::mesh::{CellType, Mesh, Vector};
 use crate::parallel;
@@ -9,7 +10,7 @@ use crate::partition::{Partition, Reduction, Shares, all, most, whole};
 use crate::quality::{
     HEXAHEDRON_CORNERS, Measure, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, scaled_jacobians, tet_determinant,
 };
-use crate::vector::{add, cross, dot, scale, subtract};
+use crate::vector::{add, dot, scale};
 
 /// How many vertices or corners are worked on at a time.
 const VERTICES: usize = 64;
@@ -21,16 +22,6 @@ const GOOD: f64 = 0.95;
 /// How far below the least quality the barrier stands, as a part of what that has lost (of this much at least).
 const GAP: f64 = 0.05;
 const LOST: f64 = 0.05;
-
-/// The weight of the mean against the barrier.
-const MEAN: f64 = 0.01;
-
-/// Longest and shortest step tried along a direction, as powers of 2.
-const LONGER: usize = 30;
-const SHORTER: usize = 12;
-
-/// Where a vertex comes first, the others of a tetrahedron follow so that its orientation stays.
-const FIRST: [[usize; 4]; 4] = [[0, 1, 2, 3], [1, 0, 3, 2], [2, 0, 1, 3], [3, 0, 2, 1]];
 
 /// Moves the free vertices of a mesh so that its worst cells get better, without making a new one as bad.
 ///
@@ -75,28 +66,6 @@ struct Parts {
     held: Held,
     /// For each colour which of its vertices are shared; these are in no list of `Improver::colours`.
     colours: Vec<Shares>,
-}
-
-/// A tetrahedron at a corner of a cell, or a cell that is one.
-#[derive(Debug, Clone, Copy)]
-struct Piece {
-    vertices: [u32; 4],
-    /// Makes a corner's determinant by the product of its edges the quality.
-    factor: f64,
-    /// Whether all four corners count, or the first alone.
-    whole: bool,
-}
-
-/// A piece as one of its vertices sees it.
-#[derive(Debug, Clone, Copy)]
-struct Seen {
-    others: [Vector; 3],
-    /// The gradient of the determinant by the vertex.
-    normal: Vector,
-    factor: f64,
-    /// What does not depend on the vertex of the product of the squared edges at each corner, the vertex's own first; infinite
-    /// for corners that do not count.
-    products: [f64; 4],
 }
 
 impl Improver {
@@ -202,10 +171,7 @@ impl Improver {
         let least = parallel::map_chunks(self.movable.len(), CHUNK, |range| {
             self.movable[range]
                 .iter()
-                .map(|&piece| {
-                    let piece = &self.pieces[piece as usize];
-                    piece.seen(0, points).least(points[piece.vertices[0] as usize])
-                })
+                .map(|&piece| self.pieces[piece as usize].least(points))
                 .fold(f64::INFINITY, |least, value| if value < least || value.is_nan() { value } else { least })
         })
         .into_iter()
@@ -226,12 +192,12 @@ impl Improver {
         let barrier = Barrier { floor: least - gap, gap };
         for (number, colour) in self.colours.iter().enumerate() {
             let moved = parallel::map_chunks(colour.len(), VERTICES, |range| {
-                let mut star = Vec::new();
+                let mut star = Star::default();
                 colour[range]
                     .iter()
                     .map(|&vertex| {
                         self.gather(vertex, points, &mut star);
-                        barrier.improved(points[vertex as usize], &star)
+                        barrier.improved(points[vertex as usize], &star, GOOD)
                     })
                     .collect::<Vec<Vector>>()
             });
@@ -249,7 +215,7 @@ impl Improver {
     fn sweep_shared(&self, points: &mut [Vector], barrier: &Barrier, parts: &Parts, shares: &Shares) {
         let Parts { partition, held, .. } = parts;
         let vertices: Vec<(u32, u32)> = shares.places().iter().map(|&place| (place, held.vertex(place))).collect();
-        let mut star = Vec::new();
+        let mut star = Star::default();
         // Whether any cell is not good, the gradient and the Hessian.
         let mut slopes = vec![[0.0; 13]; held.len()];
         for &(place, vertex) in &vertices {
@@ -257,7 +223,7 @@ impl Improver {
             self.gather(vertex, points, &mut star);
             let (gradient, hessian) = barrier.derivatives(point, &star);
             let slope = &mut slopes[place as usize];
-            slope[0] = f64::from(u8::from(!star.iter().all(|seen| seen.least(point) >= GOOD)));
+            slope[0] = f64::from(u8::from(!star.is_above(point, GOOD)));
             slope[1..4].copy_from_slice(&gradient);
             slope[4..].copy_from_slice(hessian.as_flattened());
         }
@@ -292,203 +258,12 @@ impl Improver {
         &self.incident[self.offsets[vertex as usize]..self.offsets[vertex as usize + 1]]
     }
 
-    fn gather(&self, vertex: u32, points: &[Vector], star: &mut Vec<Seen>) {
+    fn gather(&self, vertex: u32, points: &[Vector], star: &mut Star) {
         star.clear();
-        star.extend(self.incident(vertex).iter().map(|&code| {
-            let piece = &self.pieces[(code / 4) as usize];
-            piece.seen((code % 4) as usize, points)
-        }));
-    }
-}
-
-impl Piece {
-    fn seen(&self, place: usize, points: &[Vector]) -> Seen {
-        let order = FIRST[place];
-        let others = [order[1], order[2], order[3]].map(|local| points[self.vertices[local] as usize]);
-        let [a, b, c] = others;
-        let square = |p: Vector, q: Vector| {
-            let edge = subtract(p, q);
-            dot(edge, edge)
-        };
-        let (ab, ac, bc) = (square(a, b), square(a, c), square(b, c));
-        let mut products = [1.0, ab * ac, ab * bc, ac * bc];
-        if !self.whole {
-            for (product, local) in products.iter_mut().zip(order) {
-                if local != 0 {
-                    *product = f64::INFINITY;
-                }
-            }
-        }
-        Seen { others, normal: cross(subtract(c, a), subtract(b, a)), factor: self.factor, products }
-    }
-}
-
-impl Seen {
-    /// Calls `visit` with the quality at each corner that counts where the vertex is at `point`, and the corner.
-    #[inline]
-    fn for_each_corner(&self, point: Vector, mut visit: impl FnMut(f64, usize)) {
-        let squares = self.others.map(|other| {
-            let edge = subtract(point, other);
-            dot(edge, edge)
-        });
-        let determinant = self.factor * dot(self.normal, subtract(point, self.others[0]));
-        for (corner, &product) in self.products.iter().enumerate() {
-            if product < f64::INFINITY {
-                let own = if corner == 0 { squares[0] * squares[1] * squares[2] } else { squares[corner - 1] };
-                visit(determinant / (own * product).sqrt(), corner);
-            }
+        for &code in self.incident(vertex) {
+            star.push(&self.pieces[(code / 4) as usize], (code % 4) as usize, points);
         }
     }
-
-    fn least(&self, point: Vector) -> f64 {
-        let mut least = f64::INFINITY;
-        self.for_each_corner(point, |quality, _| {
-            if quality < least || quality.is_nan() {
-                least = quality;
-            }
-        });
-        least
-    }
-}
-
-/// What one sweep brings down.
-#[derive(Debug, Clone, Copy)]
-struct Barrier {
-    floor: f64,
-    gap: f64,
-}
-
-impl Barrier {
-    fn energy(&self, point: Vector, star: &[Seen]) -> f64 {
-        let mut energy = 0.0;
-        for seen in star {
-            seen.for_each_corner(point, |quality, _| {
-                let above = quality - self.floor;
-                // Also where it is no number.
-                energy += if above > 0.0 { (self.gap / above).powi(2) - MEAN * quality.ln() } else { f64::INFINITY };
-            });
-            if energy == f64::INFINITY {
-                break;
-            }
-        }
-        energy
-    }
-
-    /// A better place of a vertex, or its own.
-    fn improved(&self, point: Vector, star: &[Seen]) -> Vector {
-        let good = star.iter().all(|seen| seen.least(point) >= GOOD);
-        if good {
-            return point;
-        }
-        let (gradient, hessian) = self.derivatives(point, star);
-        let Some(direction) = newton(&gradient, &hessian) else { return point };
-        let energy = |length: f64| self.energy(add(point, scale(direction, length)), star);
-        searched(point, direction, dot(direction, gradient), energy)
-    }
-
-    /// The energy's gradient and Hessian by the place of the vertex.
-    fn derivatives(&self, point: Vector, star: &[Seen]) -> (Vector, [Vector; 3]) {
-        let (mut gradient, mut hessian) = ([0.0; 3], [[0.0; 3]; 3]);
-        for seen in star {
-            let determinant = dot(seen.normal, subtract(point, seen.others[0]));
-            let normal = scale(seen.normal, 1.0 / determinant);
-            let edges = seen.others.map(|other| subtract(point, other));
-            let inverse = edges.map(|edge| 1.0 / dot(edge, edge));
-            seen.for_each_corner(point, |quality, corner| {
-                // The derivatives of -ln q.
-                let mut slope = scale(normal, -1.0);
-                let mut bend: [Vector; 3] = std::array::from_fn(|row| scale(normal, normal[row]));
-                let own = if corner == 0 { 0..3 } else { corner - 1..corner };
-                for edge in own {
-                    let unit = scale(edges[edge], inverse[edge]);
-                    slope = add(slope, unit);
-                    for row in 0..3 {
-                        bend[row][row] += inverse[edge];
-                        bend[row] = subtract(bend[row], scale(unit, 2.0 * unit[row]));
-                    }
-                }
-                let above = quality - self.floor;
-                let barrier = (self.gap / above).powi(2);
-                let first = -2.0 * barrier / above - MEAN / quality;
-                let second = 6.0 * barrier / (above * above) + MEAN / (quality * quality);
-                let (linear, square) = (first * quality, second * quality * quality);
-                gradient = subtract(gradient, scale(slope, linear));
-                for row in 0..3 {
-                    let outer = scale(slope, (square + linear) * slope[row]);
-                    hessian[row] = add(hessian[row], subtract(outer, scale(bend[row], linear)));
-                }
-            });
-        }
-        (gradient, hessian)
-    }
-}
-
-/// All steps that [`searched`] may try, and none.
-const LENGTHS: usize = LONGER + SHORTER;
-
-fn length(index: usize) -> f64 {
-    let power = |power: usize| f64::from(i32::try_from(power).unwrap_or(0));
-    if index == 0 { 0.0 } else { (power(index) - power(SHORTER)).exp2() }
-}
-
-/// The place along a direction where the energy, a function of the length, has fallen enough: where the direction itself is not too
-/// long but falls short, as it does near the barrier, it is doubled while that helps.
-fn searched(point: Vector, direction: Vector, slope: f64, mut energy: impl FnMut(f64) -> f64) -> Vector {
-    let before = energy(0.0);
-    let at = |length: f64| add(point, scale(direction, length));
-    let mut length = 1.0;
-    for _ in 0..SHORTER {
-        let reached = energy(length);
-        if reached <= before + 1e-4 * length * slope {
-            if length < 1.0 {
-                return at(length);
-            }
-            let mut least = reached;
-            for _ in 0..LONGER {
-                let longer = energy(2.0 * length);
-                if longer.is_nan() || longer >= least {
-                    break;
-                }
-                (least, length) = (longer, 2.0 * length);
-            }
-            return at(length);
-        }
-        length *= 0.5;
-    }
-    point
-}
-
-/// The direction of Newton's method, with as much of the identity added to the Hessian as makes it positive definite.
-fn newton(gradient: &Vector, hessian: &[Vector; 3]) -> Option<Vector> {
-    let size = (hessian[0][0] + hessian[1][1] + hessian[2][2]).abs();
-    let least = 1e-9 * size;
-    let mut shift = 0.0;
-    for _ in 0..20 {
-        let added = shift;
-        let h = |row: usize, column: usize| hessian[row][column] + if row == column { added } else { 0.0 };
-        shift = if shift == 0.0 { 1e-3 * size } else { 4.0 * shift };
-        let first = h(0, 0);
-        if first.is_nan() || first <= least {
-            continue;
-        }
-        let (l10, l20) = (h(1, 0) / first, h(2, 0) / first);
-        let second = h(1, 1) - l10 * h(1, 0);
-        if second <= least {
-            continue;
-        }
-        let l21 = (h(2, 1) - l20 * h(1, 0)) / second;
-        let third = h(2, 2) - l20 * h(2, 0) - l21 * l21 * second;
-        if third <= least {
-            continue;
-        }
-        let y = [-gradient[0], -gradient[1] + l10 * gradient[0]];
-        let y = [y[0], y[1], -gradient[2] - l20 * y[0] - l21 * y[1]];
-        let z = y[2] / third;
-        let middle = y[1] / second - l21 * z;
-        let direction = [y[0] / first - l10 * middle - l20 * z, middle, z];
-        return direction.iter().all(|value| value.is_finite()).then_some(direction);
-    }
-    None
 }
 
 /// The corners whose least is the quality of their cell. Vertices of cells that have none are taken out of `free`.
@@ -594,35 +369,6 @@ mod tests {
             }
             assert!(!improver.improve(&mut shaken(&mesh, &boundary), 0));
             assert!(!improver.improve(&mut shaken(&mesh, &boundary)[1..], 5));
-        }
-    }
-
-    /// The derivatives against central differences.
-    #[test]
-    fn derivatives_are_those_of_the_energy() {
-        let mesh = &meshes()[0];
-        let boundary = boundary(mesh);
-        let points = shaken(mesh, &boundary);
-        let improver = Improver::new(mesh, &boundary);
-        let barrier = Barrier { floor: 0.2, gap: 0.1 };
-        let vertex = improver.colours[0][3];
-        let mut star = Vec::new();
-        improver.gather(vertex, &points, &mut star);
-        let point = points[vertex as usize];
-        let (gradient, hessian) = barrier.derivatives(point, &star);
-        for axis in 0..3 {
-            let at = |step: f64| {
-                let mut moved = point;
-                moved[axis] += step;
-                moved
-            };
-            let slope = (barrier.energy(at(1e-6), &star) - barrier.energy(at(-1e-6), &star)) / 2e-6;
-            assert!((slope - gradient[axis]).abs() < 1e-5 * (1.0 + slope.abs()), "{slope} {}", gradient[axis]);
-            let [after, before] = [1e-6, -1e-6].map(|step| barrier.derivatives(at(step), &star).0);
-            for row in 0..3 {
-                let bend = (after[row] - before[row]) / 2e-6;
-                assert!((bend - hessian[row][axis]).abs() < 1e-4 * (1.0 + bend.abs()), "{bend} {}", hessian[row][axis]);
-            }
         }
     }
 

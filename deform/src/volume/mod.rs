@@ -6,6 +6,7 @@
 
 mod adaptive;
 mod assembly;
+mod barrier;
 mod colours;
 mod element;
 mod foldover;

@@ -220,6 +220,13 @@ impl VolumeOperator {
         })
     }
 
+    /// The same operator, whose solves are to leave another part of the right side.
+    #[must_use]
+    pub fn with_tolerance(mut self, tolerance: f64) -> Self {
+        self.settings.tolerance = tolerance;
+        self
+    }
+
     /// The vertices whose displacement is prescribed, in the order in which [`VolumeOperator::solve`] takes them.
     #[must_use]
     pub fn boundary(&self) -> &[u32] {

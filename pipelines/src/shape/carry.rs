@@ -17,7 +17,7 @@ const ONE_SURFACE: f64 = 0.866;
 /// The operator of a volume, and what it takes of each vertex of its boundary.
 #[derive(Debug)]
 pub(super) struct Carrier {
-    operator: VolumeOperator,
+    operator: Arc<VolumeOperator>,
     boundary: Arc<Boundary>,
     /// The places among the boundary's vertices whose displacement is prescribed, in the order in which the operator takes them;
     /// `None` for all.
@@ -37,9 +37,13 @@ impl Carrier {
             sliding.iter().map(|&(place, normal)| Sliding { vertex: vertices[place as usize], normal }).collect();
         let prescribed = prescribed.as_deref().unwrap_or(vertices);
         let operator = VolumeOperator::of_part(mesh, prescribed, &slides, &deform.equation, boundary.partition());
-        let operator = boundary.agree(operator.map_err(Refused::from))?;
+        let operator = Arc::new(boundary.agree(operator.map_err(Refused::from))?);
         let sliding = sliding.into_iter().map(|(place, _)| place).collect();
         Ok(Self { operator, boundary: Arc::clone(boundary), held, sliding })
+    }
+
+    pub(super) fn operator(&self) -> &Arc<VolumeOperator> {
+        &self.operator
     }
 
     /// Whether the boundary may end elsewhere than where it was told to.

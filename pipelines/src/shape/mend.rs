@@ -1,6 +1,6 @@
 //! Shapes that one linear solve from the reference does not reach.
 
-use std::sync::Arc;
+use std::{cell::OnceCell, sync::Arc};
 
 use tombolo_deform::{
     mesh::Vector,
@@ -234,11 +234,17 @@ impl Shaper {
         let Some((edit, below)) = stack.split_last().filter(|(edit, _)| !edit.muted()) else { return Ok(base) };
         let watch = Stopwatch::start();
         let boundary = Arc::clone(&self.boundary);
-        let untangler = Arc::clone(self.untangler.get_or_insert_with(|| {
-            Arc::new(Untangler::of_part(&self.mesh, boundary.vertices(), boundary.partition()))
-        }));
         let places = boundary.places(&base.points);
-        let carrier = if deform.lets_go() { Some(self.operator(deform)?) } else { None };
+        let set_up = self.operator(deform)?;
+        // Sub-steps prescribe the whole boundary, also where the deformation lets go of some of it.
+        let at_reference = Arc::ptr_eq(&base.points, &self.reference) && !deform.lets_go();
+        let operator = at_reference.then(|| Arc::clone(set_up.operator()));
+        let carrier = deform.lets_go().then_some(set_up);
+        let known = self.untangler.clone().map_or_else(OnceCell::new, OnceCell::from);
+        let untangler = || {
+            let made = || Arc::new(Untangler::of_part(&self.mesh, boundary.vertices(), boundary.partition()));
+            Arc::clone(known.get_or_init(made))
+        };
         let ground = displacement(self.editor.as_mut(), &boundary, below, carrier.as_deref())?;
         let reference = boundary.places(&self.reference);
         let as_stated = boundary
@@ -252,7 +258,12 @@ impl Shaper {
             edit: edit.clone(),
             ground: (!as_stated).then_some((places, ground)),
         };
-        let domain = Domain { mesh: &self.mesh, boundary: boundary.vertices(), partition: boundary.partition() };
+        let domain = Domain {
+            mesh: &self.mesh,
+            boundary: boundary.vertices(),
+            partition: boundary.partition(),
+            operator: operator.as_ref(),
+        };
         let mut route = follow(domain, &base.points, &mut motion, &deform.equation, guard, Some(&untangler));
         // No volume can follow a surface that folds or shrinks to nothing: it is asked for in another way.
         if matches!(route, Err(FollowError::Stalled(_))) && !deform.lets_go() {
@@ -266,6 +277,7 @@ impl Shaper {
                 }
             }
         }
+        self.untangler = known.into_inner();
         let place = stack.len() - 1;
         let mut target = match route {
             Ok(route) => extended(base, with_ghosts(&boundary, route)?),

@@ -1,0 +1,126 @@
+//! Four numbers side by side, which processors with wide registers compute at once.
+//!
+//! Every operation is that of its numbers one by one, so that the bits do not depend on the processor.
+#![expect(clippy::needless_range_loop, reason = "loops over lanes and axes read like the formulas, and vectorise")]
+
+use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Sub, SubAssign};
+
+/// How many there are.
+pub(crate) const LANES: usize = 4;
+
+/// Four numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(align(32))]
+pub(crate) struct Lanes(pub(crate) [f64; LANES]);
+
+impl Lanes {
+    pub(crate) const ZERO: Self = Self::all(0.0);
+
+    /// The same number four times.
+    #[inline(always)]
+    pub(crate) const fn all(value: f64) -> Self {
+        Self([value; LANES])
+    }
+
+    #[inline(always)]
+    fn zip(self, other: Self, operation: impl Fn(f64, f64) -> f64) -> Self {
+        let mut result = [0.0; LANES];
+        for lane in 0..LANES {
+            result[lane] = operation(self.0[lane], other.0[lane]);
+        }
+        Self(result)
+    }
+
+    #[inline(always)]
+    pub(crate) fn sqrt(self) -> Self {
+        self.zip(self, |value, _| value.sqrt())
+    }
+
+    /// Its numbers where those of `test` are finite, those of `other` elsewhere.
+    #[inline(always)]
+    pub(crate) fn where_finite(self, test: Self, other: Self) -> Self {
+        let mut result = [0.0; LANES];
+        for lane in 0..LANES {
+            result[lane] = if test.0[lane].abs() < f64::INFINITY { self.0[lane] } else { other.0[lane] };
+        }
+        Self(result)
+    }
+
+    /// The smaller ones; that of `self` where one is no number.
+    #[inline(always)]
+    pub(crate) fn least(self, other: Self) -> Self {
+        self.zip(other, |a, b| if b < a { b } else { a })
+    }
+
+    #[inline(always)]
+    pub(crate) fn sum(self) -> f64 {
+        let [a, b, c, d] = self.0;
+        (a + b) + (c + d)
+    }
+
+    #[inline(always)]
+    pub(crate) fn product(self) -> f64 {
+        let [a, b, c, d] = self.0;
+        (a * b) * (c * d)
+    }
+
+    /// Whether all are greater than `bound`; none is that is no number.
+    #[inline(always)]
+    pub(crate) fn all_above(self, bound: f64) -> bool {
+        let mut above = true;
+        for lane in 0..LANES {
+            above &= self.0[lane] > bound;
+        }
+        above
+    }
+}
+
+macro_rules! operator {
+    ($trait:ident $method:ident $assign_trait:ident $assign:ident $sign:tt) => {
+        operator!($trait $method $sign);
+
+        impl $assign_trait for Lanes {
+            #[inline(always)]
+            fn $assign(&mut self, other: Self) {
+                *self = *self $sign other;
+            }
+        }
+    };
+    ($trait:ident $method:ident $sign:tt) => {
+        impl $trait for Lanes {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                self.zip(other, |a, b| a $sign b)
+            }
+        }
+    };
+}
+
+operator!(Add add AddAssign add_assign +);
+operator!(Sub sub SubAssign sub_assign -);
+operator!(Mul mul MulAssign mul_assign *);
+operator!(Div div /);
+
+/// Calls `work`, compiled for the widest registers that this processor has. What is to use them must be inlined into it.
+#[inline(always)]
+pub(crate) fn with_wide_registers<R>(work: impl FnOnce() -> R) -> R {
+    #[cfg(target_arch = "x86_64")]
+    {
+        struct Task<F>(F);
+        impl<R, F: FnOnce() -> R> pulp::WithSimd for Task<F> {
+            type Output = R;
+
+            #[inline(always)]
+            fn with_simd<S: pulp::Simd>(self, _: S) -> R {
+                (self.0)()
+            }
+        }
+        pulp::Arch::new().dispatch(Task(work))
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    {
+        work()
+    }
+}

@@ -1,0 +1,435 @@
+//! The energy whose minimum has good cells around a vertex.
+#![expect(clippy::needless_range_loop, reason = "loops over lanes and axes read like the formulas, and vectorise")]
+
+use crate::lanes::{LANES, Lanes, with_wide_registers};
+use crate::mesh::Vector;
+use crate::vector::{add, cross, dot, scale, subtract};
+
+/// The weight of the mean against the barrier.
+const MEAN: f64 = 0.01;
+
+/// Longest and shortest step tried along a direction, as powers of 2.
+const LONGER: usize = 30;
+const SHORTER: usize = 12;
+
+/// Where a vertex comes first, the others of a tetrahedron follow so that its orientation stays.
+const FIRST: [[usize; 4]; 4] = [[0, 1, 2, 3], [1, 0, 3, 2], [2, 0, 1, 3], [3, 0, 2, 1]];
+
+/// A tetrahedron at a corner of a cell, or a cell that is one.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Piece {
+    pub(super) vertices: [u32; 4],
+    /// Makes a corner's determinant by the product of its edges the quality.
+    pub(super) factor: f64,
+    /// Whether all four corners count, or the first alone.
+    pub(super) whole: bool,
+}
+
+impl Piece {
+    /// The least quality at its corners.
+    pub(super) fn least(&self, points: &[Vector]) -> f64 {
+        let [a, b, c, d] = self.vertices.map(|vertex| points[vertex as usize]);
+        let [ab, ac, ad] = [b, c, d].map(|other| subtract(other, a));
+        let determinant = self.factor * dot(cross(ab, ac), ad);
+        let square = |edge: Vector| dot(edge, edge);
+        let [ab, ac, ad] = [ab, ac, ad].map(square);
+        let first = ab * ac * ad;
+        if !self.whole {
+            return determinant / first.sqrt();
+        }
+        let [bc, bd, cd] = [subtract(c, b), subtract(d, b), subtract(d, c)].map(square);
+        // The largest product makes the smallest quality.
+        let most = first.max(ab * bc * bd).max(ac * bc * cd).max(ad * bd * cd);
+        determinant / most.sqrt()
+    }
+}
+
+/// Four pieces as one of their vertices sees them.
+#[derive(Debug, Clone, Copy)]
+struct Four {
+    /// The coordinates of each other vertex.
+    others: [[Lanes; 3]; 3],
+    /// The gradient of the determinant by the vertex.
+    normal: [Lanes; 3],
+    factor: Lanes,
+    /// What does not depend on the vertex of the product of the squared edges at each corner, the vertex's own first; infinite
+    /// for corners that do not count.
+    products: [Lanes; 4],
+}
+
+/// The pieces around a vertex, as it sees them.
+#[derive(Debug, Default)]
+pub(super) struct Star {
+    fours: Vec<Four>,
+    pieces: usize,
+}
+
+impl Four {
+    const NONE: Self = Self {
+        others: [[Lanes::ZERO; 3]; 3],
+        normal: [Lanes::ZERO; 3],
+        factor: Lanes::ZERO,
+        products: [Lanes::all(f64::INFINITY); 4],
+    };
+
+    /// The edges from the others to the vertex, and their squared lengths.
+    #[inline(always)]
+    fn edges(&self, point: [Lanes; 3]) -> ([[Lanes; 3]; 3], [Lanes; 3]) {
+        let mut edges = [[Lanes::ZERO; 3]; 3];
+        let mut squares = [Lanes::ZERO; 3];
+        for other in 0..3 {
+            for axis in 0..3 {
+                edges[other][axis] = point[axis] - self.others[other][axis];
+            }
+            let [x, y, z] = edges[other];
+            squares[other] = x * x + y * y + z * z;
+        }
+        (edges, squares)
+    }
+
+    /// The determinants and, from them, the quality at each corner; 0 at corners that do not count.
+    #[inline(always)]
+    fn qualities(&self, edges: &[[Lanes; 3]; 3], squares: &[Lanes; 3]) -> (Lanes, [Lanes; 4]) {
+        let [x, y, z] = edges[0];
+        let determinant = self.normal[0] * x + self.normal[1] * y + self.normal[2] * z;
+        let own = [squares[0] * squares[1] * squares[2], squares[0], squares[1], squares[2]];
+        let scaled = self.factor * determinant;
+        let mut qualities = [Lanes::ZERO; 4];
+        for corner in 0..4 {
+            qualities[corner] = scaled / (own[corner] * self.products[corner]).sqrt();
+        }
+        (determinant, qualities)
+    }
+}
+
+impl Star {
+    pub(super) fn clear(&mut self) {
+        self.fours.clear();
+        self.pieces = 0;
+    }
+
+    /// Adds a piece, of whose vertices `place` is the star's own.
+    pub(super) fn push(&mut self, piece: &Piece, place: usize, points: &[Vector]) {
+        let order = FIRST[place];
+        let others = [order[1], order[2], order[3]].map(|local| points[piece.vertices[local] as usize]);
+        let [a, b, c] = others;
+        let square = |p: Vector, q: Vector| {
+            let edge = subtract(p, q);
+            dot(edge, edge)
+        };
+        let (ab, ac, bc) = (square(a, b), square(a, c), square(b, c));
+        let products = [1.0, ab * ac, ab * bc, ac * bc];
+        let normal = cross(subtract(c, a), subtract(b, a));
+        let lane = self.pieces % LANES;
+        if lane == 0 {
+            self.fours.push(Four::NONE);
+        }
+        self.pieces += 1;
+        let Some(four) = self.fours.last_mut() else { return };
+        for axis in 0..3 {
+            for (lanes, other) in four.others.iter_mut().zip(&others) {
+                lanes[axis].0[lane] = other[axis];
+            }
+            four.normal[axis].0[lane] = normal[axis];
+        }
+        four.factor.0[lane] = piece.factor;
+        for ((local, product), lanes) in order.into_iter().zip(products).zip(&mut four.products) {
+            if piece.whole || local == 0 {
+                lanes.0[lane] = product;
+            }
+        }
+    }
+
+    /// Whether every quality is at least `bound` where the vertex is at `point`.
+    pub(super) fn is_above(&self, point: Vector, bound: f64) -> bool {
+        with_wide_registers(
+            #[inline(always)]
+            || {
+                let point = point.map(Lanes::all);
+                self.fours.iter().all(|four| {
+                    let (edges, squares) = four.edges(point);
+                    let (_, qualities) = four.qualities(&edges, &squares);
+                    let mut least = Lanes::all(f64::INFINITY);
+                    for corner in 0..4 {
+                        let infinite = Lanes::all(f64::INFINITY);
+                        least = least.least(qualities[corner].where_finite(four.products[corner], infinite));
+                    }
+                    least.all_above(bound)
+                })
+            },
+        )
+    }
+}
+
+/// What one sweep brings down: `Σ (δ / (q - τ))² - 0.01 ln q` over the corners `q` of a star.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Barrier {
+    /// `τ`.
+    pub(super) floor: f64,
+    /// `δ`.
+    pub(super) gap: f64,
+}
+
+impl Barrier {
+    /// The energy; infinite where a corner is not above the barrier.
+    pub(super) fn energy(&self, point: Vector, star: &Star) -> f64 {
+        with_wide_registers(
+            #[inline(always)]
+            || {
+                let point = point.map(Lanes::all);
+                let (floor, gap, one) = (Lanes::all(self.floor), Lanes::all(self.gap), Lanes::all(1.0));
+                let (mut sum, mut logarithms) = (Lanes::ZERO, 0.0);
+                for four in &star.fours {
+                    let (edges, squares) = four.edges(point);
+                    let (_, qualities) = four.qualities(&edges, &squares);
+                    let mut product = one;
+                    let mut lowest = one;
+                    for corner in 0..4 {
+                        let counts = four.products[corner];
+                        let above = (qualities[corner] - floor).where_finite(counts, one);
+                        let part = gap / above;
+                        sum += (part * part).where_finite(counts, Lanes::ZERO);
+                        product *= qualities[corner].where_finite(counts, one);
+                        lowest = lowest.least(above);
+                    }
+                    if !lowest.all_above(0.0) {
+                        return f64::INFINITY;
+                    }
+                    logarithms += product.product().ln();
+                }
+                let energy = sum.sum() - MEAN * logarithms;
+                if energy.is_nan() { f64::INFINITY } else { energy }
+            },
+        )
+    }
+
+    /// A better place of a vertex, or its own where all its qualities are above `good`.
+    pub(super) fn improved(&self, point: Vector, star: &Star, good: f64) -> Vector {
+        if star.is_above(point, good) {
+            return point;
+        }
+        let (gradient, hessian) = self.derivatives(point, star);
+        let Some(direction) = newton(&gradient, &hessian) else { return point };
+        let energy = |length: f64| self.energy(add(point, scale(direction, length)), star);
+        searched(point, direction, dot(direction, gradient), energy)
+    }
+
+    /// The energy's gradient and Hessian by the place of the vertex.
+    pub(super) fn derivatives(&self, point: Vector, star: &Star) -> (Vector, [Vector; 3]) {
+        with_wide_registers(
+            #[inline(always)]
+            || {
+                let point = point.map(Lanes::all);
+                let (floor, gap, zero) = (Lanes::all(self.floor), Lanes::all(self.gap), Lanes::ZERO);
+                let (mean, two, six) = (Lanes::all(MEAN), Lanes::all(2.0), Lanes::all(6.0));
+                let mut gradient = [zero; 3];
+                let mut hessian = [[zero; 3]; 3];
+                for four in &star.fours {
+                    let (edges, squares) = four.edges(point);
+                    let (determinant, qualities) = four.qualities(&edges, &squares);
+                    let mut normal = [zero; 3];
+                    let mut units = [[zero; 3]; 3];
+                    let mut inverse = [zero; 3];
+                    for other in 0..3 {
+                        inverse[other] = Lanes::all(1.0) / squares[other];
+                        for axis in 0..3 {
+                            units[other][axis] = edges[other][axis] * inverse[other];
+                        }
+                    }
+                    for axis in 0..3 {
+                        normal[axis] = four.normal[axis] / determinant;
+                    }
+                    for corner in 0..4 {
+                        // The derivatives of -ln q.
+                        let own = if corner == 0 { 0..3 } else { corner - 1..corner };
+                        let mut slope = [zero; 3];
+                        let mut bend = [[zero; 3]; 3];
+                        for row in 0..3 {
+                            slope[row] = zero - normal[row];
+                            for column in 0..=row {
+                                bend[row][column] = normal[row] * normal[column];
+                            }
+                        }
+                        for other in own {
+                            for row in 0..3 {
+                                slope[row] += units[other][row];
+                                bend[row][row] += inverse[other];
+                                for column in 0..=row {
+                                    bend[row][column] -= two * units[other][row] * units[other][column];
+                                }
+                            }
+                        }
+                        let quality = qualities[corner];
+                        let above = quality - floor;
+                        let part = gap / above;
+                        let barrier = part * part;
+                        // The first and second derivative by q, times q and its square.
+                        let ratio = quality / above;
+                        let first = zero - two * barrier * ratio - mean;
+                        let second = six * barrier * ratio * ratio + mean;
+                        let counts = four.products[corner];
+                        let outer = second + first;
+                        for row in 0..3 {
+                            gradient[row] -= (slope[row] * first).where_finite(counts, zero);
+                            for column in 0..=row {
+                                let value = slope[row] * slope[column] * outer - bend[row][column] * first;
+                                hessian[row][column] += value.where_finite(counts, zero);
+                            }
+                        }
+                    }
+                }
+                let h = |row: usize, column: usize| hessian[row.max(column)][row.min(column)].sum();
+                (gradient.map(Lanes::sum), std::array::from_fn(|row| std::array::from_fn(|column| h(row, column))))
+            },
+        )
+    }
+}
+
+/// All steps that [`searched`] may try, and none.
+pub(super) const LENGTHS: usize = LONGER + SHORTER;
+
+pub(super) fn length(index: usize) -> f64 {
+    let power = |power: usize| f64::from(i32::try_from(power).unwrap_or(0));
+    if index == 0 { 0.0 } else { (power(index) - power(SHORTER)).exp2() }
+}
+
+/// The place along a direction where the energy, a function of the length, has fallen enough: where the direction itself is not too
+/// long but falls short, as it does near the barrier, it is doubled while that helps.
+pub(super) fn searched(point: Vector, direction: Vector, slope: f64, mut energy: impl FnMut(f64) -> f64) -> Vector {
+    let before = energy(0.0);
+    if !before.is_finite() {
+        return point;
+    }
+    let at = |length: f64| add(point, scale(direction, length));
+    let mut length = 1.0;
+    for _ in 0..SHORTER {
+        let reached = energy(length);
+        if reached <= before + 1e-4 * length * slope {
+            if length < 1.0 {
+                return at(length);
+            }
+            let mut least = reached;
+            for _ in 0..LONGER {
+                let longer = energy(2.0 * length);
+                if longer.is_nan() || longer >= least {
+                    break;
+                }
+                (least, length) = (longer, 2.0 * length);
+            }
+            return at(length);
+        }
+        length *= 0.5;
+    }
+    point
+}
+
+/// The direction of Newton's method, with as much of the identity added to the Hessian as makes it positive definite.
+pub(super) fn newton(gradient: &Vector, hessian: &[Vector; 3]) -> Option<Vector> {
+    let size = (hessian[0][0] + hessian[1][1] + hessian[2][2]).abs();
+    let least = 1e-9 * size;
+    let mut shift = 0.0;
+    for _ in 0..20 {
+        let added = shift;
+        let h = |row: usize, column: usize| hessian[row][column] + if row == column { added } else { 0.0 };
+        shift = if shift == 0.0 { 1e-3 * size } else { 4.0 * shift };
+        let first = h(0, 0);
+        if first.is_nan() || first <= least {
+            continue;
+        }
+        let (l10, l20) = (h(1, 0) / first, h(2, 0) / first);
+        let second = h(1, 1) - l10 * h(1, 0);
+        if second <= least {
+            continue;
+        }
+        let l21 = (h(2, 1) - l20 * h(1, 0)) / second;
+        let third = h(2, 2) - l20 * h(2, 0) - l21 * l21 * second;
+        if third <= least {
+            continue;
+        }
+        let y = [-gradient[0], -gradient[1] + l10 * gradient[0]];
+        let y = [y[0], y[1], -gradient[2] - l20 * y[0] - l21 * y[1]];
+        let z = y[2] / third;
+        let middle = y[1] / second - l21 * z;
+        let direction = [y[0] / first - l10 * middle - l20 * z, middle, z];
+        return direction.iter().all(|value| value.is_finite()).then_some(direction);
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An octahedron's four tetrahedra and two of its corners, seen from a place near the middle.
+    fn star() -> (Vector, Star) {
+        let points = [
+            [0.05, -0.03, 0.04],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.1],
+            [-1.0, 0.2, 0.0],
+            [0.0, -1.0, 0.0],
+            [0.1, 0.0, 1.2],
+            [0.0, 0.0, -1.0],
+        ];
+        let piece = |vertices, whole| Piece { vertices, factor: 1.2, whole };
+        let mut star = Star::default();
+        for (vertices, place, whole) in [
+            ([0, 1, 2, 5], 0, true),
+            ([2, 3, 0, 5], 2, true),
+            ([4, 3, 5, 0], 3, true),
+            ([4, 0, 5, 1], 1, true),
+            ([0, 2, 1, 6], 0, false),
+            ([2, 3, 6, 0], 3, false),
+        ] {
+            star.push(&piece(vertices, whole), place, &points);
+        }
+        (points[0], star)
+    }
+
+    #[test]
+    fn derivatives_are_those_of_the_energy() {
+        let (point, star) = star();
+        let barrier = Barrier { floor: 0.2, gap: 0.1 };
+        let (gradient, hessian) = barrier.derivatives(point, &star);
+        for axis in 0..3 {
+            let at = |step: f64| {
+                let mut moved = point;
+                moved[axis] += step;
+                moved
+            };
+            let slope = (barrier.energy(at(1e-6), &star) - barrier.energy(at(-1e-6), &star)) / 2e-6;
+            assert!((slope - gradient[axis]).abs() < 1e-5 * (1.0 + slope.abs()), "{slope} {}", gradient[axis]);
+            let [after, before] = [1e-6, -1e-6].map(|step| barrier.derivatives(at(step), &star).0);
+            for row in 0..3 {
+                let bend = (after[row] - before[row]) / 2e-6;
+                assert!((bend - hessian[row][axis]).abs() < 1e-4 * (1.0 + bend.abs()), "{bend} {}", hessian[row][axis]);
+            }
+        }
+    }
+
+    /// Three edges of length 1 at right angles: the quality at their corner is the factor, at the others the factor by the root of 4.
+    #[test]
+    fn corners_count_as_their_piece_says() {
+        let points = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let barrier = Barrier { floor: 0.1, gap: 0.3 };
+        for (whole, least, corners) in [(true, 0.4, vec![0.8, 0.4, 0.4, 0.4]), (false, 0.8, vec![0.8])] {
+            let piece = Piece { vertices: [0, 1, 2, 3], factor: 0.8, whole };
+            assert!((piece.least(&points) - least).abs() < 1e-15);
+            let expected: f64 = corners.iter().map(|q: &f64| (0.3 / (q - 0.1)).powi(2) - MEAN * q.ln()).sum();
+            for place in 0..4 {
+                let mut star = Star::default();
+                star.push(&piece, place, &points);
+                assert!((barrier.energy(points[place], &star) - expected).abs() < 1e-13, "{place}");
+                assert!(star.is_above(points[place], 0.999 * least) && !star.is_above(points[place], 1.001 * least));
+            }
+            assert_eq!(
+                Barrier { floor: least, ..barrier }.energy(points[0], &{
+                    let mut star = Star::default();
+                    star.push(&piece, 0, &points);
+                    star
+                }),
+                f64::INFINITY
+            );
+        }
+    }
+}
