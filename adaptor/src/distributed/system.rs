@@ -426,10 +426,13 @@ impl<const B: usize> LinearSolver<B> for System<B> {
     }
 }
 
+/// A rank's own cycle: from a residual to a correction.
+type Cycle<'a, const B: usize> = &'a mut dyn FnMut(&[[f64; B]], &mut [[f64; B]]);
+
 /// What the preconditioner of a solve under way needs.
 struct Context<'a, const B: usize> {
     system: &'a System<B>,
-    cycle: &'a mut dyn FnMut(&[[f64; B]], &mut [[f64; B]]),
+    cycle: Cycle<'a, B>,
     values: (Vec<[f64; B]>, Vec<[f64; B]>),
 }
 
