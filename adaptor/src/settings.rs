@@ -30,7 +30,7 @@ pub struct Settings {
     pub config: Config,
     /// The processes that the mesh is distributed over.
     pub communicator: Arc<dyn Communicator>,
-    /// What puts solvers of linear systems in place of the ones that the ranks have otherwise, such as PETSc's; `None`: these.
+    /// What puts solvers of linear systems in place of the ones that several ranks have otherwise, such as PETSc's; `None`: these.
     pub solvers: Option<Solvers>,
     /// The numbers of the solver that can be steered.
     pub parameters: Vec<Parameter>,

@@ -128,16 +128,14 @@ pub fn whole() -> Arc<dyn Partition> {
 }
 
 /// The solver for a symmetric positive definite matrix that is the sum of the ranks', each with a row for each of its `vertices`:
-/// the partition's own, or [`Schwarz`]; on one process that of [`linear::solver`](crate::linear::solver). Collective.
+/// the partition's own, or [`Schwarz`]; of one process that of [`linear::solver`](crate::linear::solver). Collective.
 ///
 /// # Errors
 /// [`LinearError`], on all ranks.
 pub fn scalar_solver(partition: &Arc<dyn Partition>, matrix: Arc<SparseMatrix<1>>, vertices: &[u32]) -> Solver<1> {
-    if partition.ranks() == 1 {
-        return crate::linear::solver(matrix);
-    }
     match partition.scalar_solver(&matrix, vertices) {
         Some(solver) => solver,
+        None if partition.ranks() == 1 => crate::linear::solver(matrix),
         None => Ok(Box::new(Schwarz::new(Arc::clone(partition), matrix, vertices)?)),
     }
 }
@@ -147,11 +145,9 @@ pub fn scalar_solver(partition: &Arc<dyn Partition>, matrix: Arc<SparseMatrix<1>
 /// # Errors
 /// [`LinearError`], on all ranks.
 pub fn vector_solver(partition: &Arc<dyn Partition>, matrix: Arc<SparseMatrix<3>>, vertices: &[u32]) -> Solver<3> {
-    if partition.ranks() == 1 {
-        return crate::linear::solver(matrix);
-    }
     match partition.vector_solver(&matrix, vertices) {
         Some(solver) => solver,
+        None if partition.ranks() == 1 => crate::linear::solver(matrix),
         None => Ok(Box::new(Schwarz::new(Arc::clone(partition), matrix, vertices)?)),
     }
 }
