@@ -259,7 +259,9 @@ fn mesh(kind: usize) -> Mesh {
 #[test]
 fn nothing_broken_is_ever_handed_out() {
     let seen: RefCell<[Vec<Vec<Vector>>; MESHES]> = RefCell::default();
-    let mut runner = TestRunner::new(ProptestConfig { cases: 48, max_shrink_iters: 20, ..ProptestConfig::default() });
+    let settings =
+        ProptestConfig { cases: 48, max_shrink_iters: 20, failure_persistence: None, ..ProptestConfig::default() };
+    let mut runner = TestRunner::new(settings);
     let outcome = runner.run(&any_run(), |(kind, orders, otherwise, steps)| {
         let mut shaper = shaper(mesh(kind));
         let mesh = Arc::clone(shaper.mesh());

@@ -135,10 +135,11 @@ def polygonal(directory):
         print(name)
 
 
-if sys.argv[1] == "--rewrite":
-    rewrite(*sys.argv[2:])
-elif sys.argv[1] == "--polygonal":
-    polygonal(*sys.argv[2:])
-else:
-    for argument in sys.argv[1:]:
-        describe(read(argument))
+if __name__ == "__main__":
+    if sys.argv[1] == "--rewrite":
+        rewrite(*sys.argv[2:])
+    elif sys.argv[1] == "--polygonal":
+        polygonal(*sys.argv[2:])
+    else:
+        for argument in sys.argv[1:]:
+            describe(read(argument))
