@@ -63,8 +63,11 @@ fn dealings() -> [(usize, &'static [&'static str]); 7] {
     ]
 }
 
+/// A number of ranks, and the options that say how the mesh is dealt out to them.
+type Dealing<'a> = (usize, &'a [&'a str]);
+
 /// The same case on one process and dealt out in each way: the orders take effect at the same cycles, the meshes and fields agree.
-fn agrees(small: &Small, common: &[&str], dealings: &[(usize, &[&str])]) {
+fn agrees(small: &Small, common: &[&str], dealings: &[Dealing<'_>]) {
     let (status, text) = Run::flow(&small.arguments(common)).finish(LIMIT);
     assert!(status.success(), "{text}");
     let alone = small.read("report.json");
@@ -146,7 +149,7 @@ fn a_bypass_is_bent_alike_on_any_ranks() {
     let common = ["--pipelines", "@pipelines.json", "--orders", "@orders.json", "--headless", "--steps", "5"];
     // A skeleton depends on how the surface is numbered, if little: where the ranks do not say which vertices are the same, one that is
     // not dragged.
-    let runs: [(&str, &[(usize, &[&str])]); 2] = [
+    let runs: [(&str, &[Dealing<'_>]); 2] = [
         ("bypass-angle", &[(2, &[]), (4, &["--empty-rank", "0", "--shuffle", "3"])]),
         ("bypass-widen", &[(4, &["--empty-rank", "1", "--shuffle", "3", "--without-numbers"])]),
     ];
