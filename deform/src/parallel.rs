@@ -60,6 +60,14 @@ pub(crate) fn for_each_rows<T: Send, U: Send>(
     }
 }
 
+/// Sorts values that are all different.
+pub(crate) fn sort<T: Ord + Send>(values: &mut [T]) {
+    #[cfg(feature = "parallel")]
+    values.par_sort_unstable();
+    #[cfg(not(feature = "parallel"))]
+    values.sort_unstable();
+}
+
 /// Does two things, at the same time where there are threads.
 pub(crate) fn join<A: Send, B: Send>(first: impl FnOnce() -> A + Send, second: impl FnOnce() -> B + Send) -> (A, B) {
     #[cfg(feature = "parallel")]

@@ -1,8 +1,10 @@
 //! Gauss–Seidel sweeps that give the same bits on any number of threads.
 
+use std::ops::Range;
+
 use super::matrix::invert_positive;
 use super::real::Real;
-use super::rows::Rows;
+use super::rows::{Rows, Run};
 use super::{ROW_CHUNK, SparseMatrix};
 use crate::parallel;
 
@@ -94,29 +96,45 @@ struct Half<T, const B: usize> {
     inverse_diagonal: Vec<[[T; B]; B]>,
 }
 
+/// The blocks of one row.
+struct Parts {
+    /// Of its own piece, before and after the diagonal.
+    lower: Run,
+    upper: Run,
+    /// Of the pieces before and after it.
+    cross: [Run; 2],
+}
+
+impl Parts {
+    /// Those of the row in a slot, which is the one of number `index` in its half.
+    fn new<const B: usize>(matrix: &SparseMatrix<B>, pieces: Pieces, slot: usize, index: usize) -> Self {
+        let row = pieces.row(slot);
+        let piece = row / pieces.piece_rows;
+        let own = piece * pieces.piece_rows;
+        let (first, columns) = (matrix.offsets()[row], matrix.row(row).0);
+        let below = |bound: usize| first + columns.partition_point(|&column| (column as usize) < bound);
+        let (begin, middle, end) = (below(own), below(row), below(own + pieces.piece_rows));
+        let after = middle + usize::from(columns.get(middle - first).is_some_and(|&column| column as usize == row));
+        #[expect(clippy::cast_possible_truncation, reason = "columns are 32-bit")]
+        let run = |places: Range<usize>, from: usize, to: usize| Run { places, shift: to.wrapping_sub(from) as u32 };
+        // No piece couples with any but the ones beside it.
+        let beside = |piece: usize| (piece * pieces.piece_rows, piece / 2 * pieces.piece_rows);
+        let ((before, before_place), (next, next_place)) = (beside(piece.saturating_sub(1)), beside(piece + 1));
+        Self {
+            lower: run(begin..middle, row, index),
+            upper: run(after..end, row, index),
+            cross: [run(first..begin, before, before_place), run(end..first + columns.len(), next, next_place)],
+        }
+    }
+}
+
 impl<T: Real, const B: usize> GaussSeidel<T, B> {
     /// `None` where a diagonal block is missing, or not positive definite, or has no inverse in this precision.
     pub(super) fn new(matrix: &SparseMatrix<B>, pieces: Pieces) -> Option<Self> {
         let half = |odd: bool| {
             let slots = if odd { pieces.even_rows..pieces.rows } else { 0..pieces.even_rows };
             let (start, count) = (slots.start, slots.len());
-            let part = |wanted: fn(std::cmp::Ordering, bool) -> bool| {
-                Rows::new(count, |index, push| {
-                    let row = pieces.row(start + index);
-                    let own = row / pieces.piece_rows * pieces.piece_rows;
-                    let (columns, blocks) = matrix.row(row);
-                    for (&column, block) in columns.iter().zip(blocks) {
-                        let column = column as usize;
-                        // No piece couples with any but the ones beside it.
-                        let across = column < own || column >= own + pieces.piece_rows;
-                        if wanted(column.cmp(&row), across) {
-                            let place = if across { pieces.place(column).1 } else { index + column - row };
-                            #[expect(clippy::cast_possible_truncation, reason = "columns are 32-bit")]
-                            push(place as u32, block);
-                        }
-                    }
-                })
-            };
+            let parts = |index: usize| Parts::new(matrix, pieces, start + index, index);
             let inverse_diagonal = parallel::map_chunks(count, ROW_CHUNK, |range| {
                 let invert = |index: usize| {
                     let row = pieces.row(start + index);
@@ -128,9 +146,9 @@ impl<T: Real, const B: usize> GaussSeidel<T, B> {
                 range.map(invert).collect::<Option<Vec<_>>>()
             });
             Some(Half {
-                lower: part(|order, across| order.is_lt() && !across),
-                upper: part(|order, across| order.is_gt() && !across),
-                cross: part(|_, across| across),
+                lower: Rows::new(matrix, count, |index| [parts(index).lower, Run::default()]),
+                upper: Rows::new(matrix, count, |index| [parts(index).upper, Run::default()]),
+                cross: Rows::new(matrix, count, |index| parts(index).cross),
                 inverse_diagonal: inverse_diagonal.into_iter().collect::<Option<Vec<_>>>()?.concat(),
             })
         };
@@ -216,9 +234,9 @@ impl<T: Real, const B: usize> Half<T, B> {
         for index in (0..part.len()).rev() {
             let row = first + index;
             let mut sum = [[T::default(); B]; K];
-            self.cross.add_product(row, other, 0, &mut sum);
-            self.lower.add_product(row, part, first, &mut sum);
-            self.upper.add_product(row, part, first, &mut sum);
+            self.cross.add_product_backwards(row, other, 0, &mut sum);
+            self.lower.add_product_backwards(row, part, first, &mut sum);
+            self.upper.add_product_backwards(row, part, first, &mut sum);
             part[index] = self.divide(row, &right_side[row], &sum);
         }
     }

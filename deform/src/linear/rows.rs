@@ -1,7 +1,9 @@
 //! Blocks in compressed rows, as a preconditioner keeps them.
 
-use super::ROW_CHUNK;
+use std::ops::Range;
+
 use super::real::Real;
+use super::{ROW_CHUNK, SparseMatrix};
 use crate::parallel;
 
 /// Blocks in compressed rows, each stored column after column.
@@ -13,16 +15,20 @@ pub(super) struct Rows<T, const B: usize> {
     entries: Vec<T>,
 }
 
+/// Blocks of a matrix that lie side by side.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Run {
+    /// Their places among its blocks.
+    pub(super) places: Range<usize>,
+    /// What is added to their columns, wrapping around.
+    pub(super) shift: u32,
+}
+
 impl<T: Real, const B: usize> Rows<T, B> {
-    /// Rows from what `blocks` calls its second argument with for each of them; it is called twice for each row.
-    pub(super) fn new(count: usize, blocks: impl Fn(usize, &mut dyn FnMut(u32, &[[f64; B]; B])) + Sync) -> Self {
+    /// `count` rows of blocks of a matrix, each of two runs.
+    pub(super) fn new(matrix: &SparseMatrix<B>, count: usize, runs: impl Fn(usize) -> [Run; 2] + Sync) -> Self {
         let lengths = parallel::map_chunks(count, ROW_CHUNK, |range| {
-            let length = |row| {
-                let mut length = 0;
-                blocks(row, &mut |_, _| length += 1);
-                length
-            };
-            range.map(length).collect::<Vec<usize>>()
+            range.map(|row| runs(row).iter().map(|run| run.places.len()).sum()).collect::<Vec<usize>>()
         });
         let mut offsets = Vec::with_capacity(count + 1);
         offsets.push(0);
@@ -36,14 +42,16 @@ impl<T: Real, const B: usize> Rows<T, B> {
         let (found, _) = entries.as_chunks_mut::<B>();
         let (found, _) = found.as_chunks_mut::<B>();
         parallel::for_each_rows(ROW_CHUNK, (&offsets, &mut columns), (&offsets, found), |rows, columns, found| {
-            let mut places = columns.iter_mut().zip(found);
+            let mut kept = columns.iter_mut().zip(found);
             for row in rows {
-                blocks(row, &mut |column, block| {
-                    if let Some((place, found)) = places.next() {
-                        *place = column;
+                for Run { places, shift } in runs(row) {
+                    let blocks = matrix.columns()[places.clone()].iter().zip(&matrix.values()[places]);
+                    // The blocks come first, so that none of those to be kept is passed over where they end.
+                    for ((&column, block), (place, found)) in blocks.zip(kept.by_ref()) {
+                        *place = column.wrapping_add(shift);
                         *found = std::array::from_fn(|j| std::array::from_fn(|i| T::of(block[i][j])));
                     }
-                });
+                }
             }
         });
         Self { offsets, columns, entries }
@@ -58,15 +66,42 @@ impl<T: Real, const B: usize> Rows<T, B> {
         first: usize,
         sum: &mut [[T; B]; K],
     ) {
+        self.add_product_either_way::<K, false>(row, vector, first, sum);
+    }
+
+    /// The same from the last block to the first: where rows are gone through backwards, memory is then read in one direction
+    /// throughout, which processors see coming.
+    #[inline(always)]
+    pub(super) fn add_product_backwards<const K: usize>(
+        &self,
+        row: usize,
+        vector: &[[[T; B]; K]],
+        first: usize,
+        sum: &mut [[T; B]; K],
+    ) {
+        self.add_product_either_way::<K, true>(row, vector, first, sum);
+    }
+
+    #[inline(always)]
+    fn add_product_either_way<const K: usize, const BACKWARDS: bool>(
+        &self,
+        row: usize,
+        vector: &[[[T; B]; K]],
+        first: usize,
+        sum: &mut [[T; B]; K],
+    ) {
         let range = self.offsets[row]..self.offsets[row + 1];
         let entries = &self.entries[B * B * range.start..=B * B * range.end];
+        let columns = &self.columns[range];
+        let places = (0..columns.len()).map(|place| if BACKWARDS { columns.len() - 1 - place } else { place });
         if B == 3 {
-            // Four entries at a time, as processors have it; the fourth is the next column's and comes to nothing.
-            let mut wide = [[T::default(); 4]; K];
-            for (index, &column) in self.columns[range].iter().enumerate() {
-                let Some(block) = entries[9 * index..].first_chunk::<10>() else { break };
-                for (sum, vector) in wide.iter_mut().zip(&vector[column as usize - first]) {
-                    for j in 0..3 {
+            // Four entries at a time, as processors have it; the fourth is the next column's and comes to nothing. Each column of
+            // a block has its own sum, so that none need wait for another.
+            let mut wide = [[[T::default(); 4]; 3]; K];
+            for place in places {
+                let Some(block) = entries[9 * place..].first_chunk::<10>() else { break };
+                for (sums, vector) in wide.iter_mut().zip(&vector[columns[place] as usize - first]) {
+                    for (j, sum) in sums.iter_mut().enumerate() {
                         for lane in 0..4 {
                             sum[lane] += block[3 * j + lane] * vector[j];
                         }
@@ -74,14 +109,17 @@ impl<T: Real, const B: usize> Rows<T, B> {
                 }
             }
             for (sum, wide) in sum.iter_mut().zip(&wide) {
-                for (sum, &wide) in sum.iter_mut().zip(wide) {
-                    *sum += wide;
+                for (axis, sum) in sum.iter_mut().enumerate() {
+                    *sum += wide[0][axis];
+                    *sum += wide[1][axis];
+                    *sum += wide[2][axis];
                 }
             }
             return;
         }
-        for (block, &column) in entries.chunks_exact(B * B).zip(&self.columns[range]) {
-            for (sum, vector) in sum.iter_mut().zip(&vector[column as usize - first]) {
+        for place in places {
+            let block = &entries[B * B * place..B * B * (place + 1)];
+            for (sum, vector) in sum.iter_mut().zip(&vector[columns[place] as usize - first]) {
                 for (column, &value) in block.chunks_exact(B).zip(vector) {
                     for (total, &entry) in sum.iter_mut().zip(column) {
                         *total += entry * value;

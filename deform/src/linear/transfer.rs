@@ -88,6 +88,7 @@ pub(super) fn galerkin<const F: usize, const C: usize>(
                     }
                 }
             }
+            // The sums that follow take the columns in any order.
             row.finish(&mut found);
         }
         found
@@ -112,6 +113,7 @@ pub(super) fn galerkin<const F: usize, const C: usize>(
                     entries[axis] += stiffness;
                 }
             }
+            row.sort();
             row.finish(&mut found);
         }
         found
@@ -240,11 +242,15 @@ impl<T: Copy> Accumulator<T> {
         &mut self.entries[*place as usize].1
     }
 
+    /// Puts the entries in the order of their columns; nothing may be looked up any more.
+    fn sort(&mut self) {
+        self.entries.sort_unstable_by_key(|(column, _)| *column);
+    }
+
     fn finish(&mut self, found: &mut RowsFound<T>) {
         for (column, _) in &self.entries {
             self.places[*column as usize] = NONE;
         }
-        self.entries.sort_unstable_by_key(|(column, _)| *column);
         for (column, block) in self.entries.drain(..) {
             found.columns.push(column);
             found.blocks.push(block);

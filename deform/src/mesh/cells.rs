@@ -205,6 +205,29 @@ impl Cells {
         }
     }
 
+    /// The cells of `order`, one after the other, with other numbers for their vertices.
+    pub(super) fn renumbered(&self, order: &[u32], number: &[u32]) -> Self {
+        let mut cells = Self {
+            types: Vec::with_capacity(order.len()),
+            offsets: Vec::with_capacity(order.len() + 1),
+            connectivity: Vec::with_capacity(self.connectivity.len()),
+            polyhedra: Vec::new(),
+        };
+        cells.offsets.push(0);
+        let renumbered = |vertices: &[u32]| vertices.iter().map(|&vertex| number[vertex as usize]).collect();
+        for (place, &cell) in order.iter().enumerate() {
+            let cell = cell as usize;
+            cells.types.push(self.types[cell]);
+            cells.connectivity.extend(self.vertices(cell).iter().map(|&vertex| number[vertex as usize]));
+            cells.offsets.push(cells.connectivity.len());
+            if self.types[cell] == CellType::Polyhedron {
+                let faces = self.polyhedron_faces(cell).iter().map(|face| renumbered(face)).collect();
+                cells.polyhedra.push(PolyhedronFaces { cell: place, faces });
+            }
+        }
+        cells
+    }
+
     /// Refuses a vertex number at or above `vertex_count`.
     ///
     /// # Errors

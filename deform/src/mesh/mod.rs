@@ -3,14 +3,20 @@
 //! The kernel works on owned meshes in double precision. A solver's arrays are borrowed as they lie in its memory, strided,
 //! separate or interleaved, of any common number type ([`ArrayView`], [`CellsView`]); nothing is copied until something needs it.
 
+use std::sync::Arc;
+
 mod cell_type;
 mod cells;
 mod feature;
+mod ordered;
 mod view;
 
 pub use cell_type::CellType;
 pub use cells::Cells;
 pub use feature::{FeatureSource, TaggedFaces};
+#[cfg(test)]
+pub(crate) use ordered::shuffled;
+pub(crate) use ordered::{Numbering, Ordered};
 pub use view::{ArrayView, CellsView, Indices, MeshView, Values};
 
 /// A point or vector in space.
@@ -22,8 +28,9 @@ pub type Vector = [f64; 3];
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
     points: Vec<Vector>,
-    cells: Cells,
-    features: FeatureSource,
+    // Shared with the same cells at other coordinates.
+    cells: Arc<Cells>,
+    features: Arc<FeatureSource>,
 }
 
 impl Mesh {
@@ -36,7 +43,7 @@ impl Mesh {
         check_finite(&points)?;
         cells.validate(points.len())?;
         features.validate(points.len())?;
-        Ok(Self { points, cells, features })
+        Ok(Self { points, cells: Arc::new(cells), features: Arc::new(features) })
     }
 
     /// The coordinates of each vertex.
@@ -57,7 +64,12 @@ impl Mesh {
         &self.features
     }
 
-    /// The same cells at other coordinates.
+    /// The cells, to be kept without a copy.
+    pub(crate) fn shared_cells(&self) -> &Arc<Cells> {
+        &self.cells
+    }
+
+    /// The same cells at other coordinates, without a copy of them.
     ///
     /// # Errors
     /// [`MeshError::PointCount`] where there are more or fewer points than before; [`MeshError::NotFinite`].
@@ -66,7 +78,7 @@ impl Mesh {
             return Err(MeshError::PointCount { found: points.len(), expected: self.points.len() });
         }
         check_finite(&points)?;
-        Ok(Self { points, cells: self.cells.clone(), features: self.features.clone() })
+        Ok(Self { points, cells: Arc::clone(&self.cells), features: Arc::clone(&self.features) })
     }
 }
 

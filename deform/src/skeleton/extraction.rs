@@ -37,7 +37,7 @@ impl Default for SkeletonSettings {
             shortest_edge: 0.002,
             area_change: 1e-4,
             iterations: 500,
-            least_vertices: 2000,
+            least_vertices: 3500,
             most_vertices: 8000,
             shortest_branch: 1.75,
         }

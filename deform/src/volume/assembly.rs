@@ -1,9 +1,11 @@
 //! From a mesh to the equations of its free vertices.
 
+use std::sync::Arc;
+
 use super::element::{Elements, Scratch};
 use super::{VolumeError, agreed};
 use crate::linear::{Block, SparseMatrix, reverse_cuthill_mckee};
-use crate::mesh::{Mesh, Vector};
+use crate::mesh::{Mesh, Ordered, Vector};
 use crate::parallel;
 use crate::partition::{Partition, Reduction, Shares, all, any};
 use crate::quality::centroid;
@@ -107,17 +109,21 @@ impl Form<3> for Elastic {
 /// The graph of a mesh's free vertices, in the order in which they are solved for.
 #[derive(Debug)]
 pub(super) struct Graph {
+    /// The cells as they are gone through.
+    pub(super) ordered: Arc<Ordered>,
     /// The vertex of each unknown.
     pub(super) vertices: Vec<u32>,
-    /// For each vertex of the mesh the number of its unknown; for boundary vertices the number of unknowns and their number
-    /// on the boundary.
+    /// For each vertex of the ordered mesh the number of its unknown; for boundary vertices the number of unknowns and their
+    /// number on the boundary.
     slots: Vec<u32>,
+    /// The other way round: the vertices of the ordered mesh that are solved for, and those of the boundary.
+    slot_vertices: Vec<u32>,
     incidence: Incidence,
     matrix: (Vec<usize>, Vec<u32>),
     coupling: (Vec<usize>, Vec<u32>),
 }
 
-/// The volume cells at each vertex.
+/// The volume cells at each vertex of the ordered mesh.
 #[derive(Debug)]
 struct Incidence {
     offsets: Vec<usize>,
@@ -158,8 +164,9 @@ impl Incidence {
 impl Graph {
     /// # Errors
     /// [`VolumeError::BoundaryVertex`], [`VolumeError::BoundaryTwice`], [`VolumeError::Unattached`].
-    pub(super) fn new(mesh: &Mesh, boundary: &[u32], partition: &dyn Partition) -> Result<Self, VolumeError> {
-        agreed(partition, check_boundary(mesh, boundary))?;
+    pub(super) fn new(ordered: Arc<Ordered>, boundary: &[u32], partition: &dyn Partition) -> Result<Self, VolumeError> {
+        let boundary: Vec<u32> = agreed(partition, boundary_places(&ordered, boundary))?;
+        let mesh = ordered.mesh();
         let vertex_count = mesh.points().len();
         let mut on_boundary = vec![false; vertex_count];
         boundary.iter().for_each(|&vertex| on_boundary[vertex as usize] = true);
@@ -171,7 +178,7 @@ impl Graph {
         #[expect(clippy::cast_possible_truncation, reason = "no more than there are vertices")]
         let free_count = free.len() as u32;
         let mut slots = vec![NONE; vertex_count];
-        for (slot, &vertex) in (0..).zip(free.iter().chain(boundary)) {
+        for (slot, &vertex) in (0..).zip(free.iter().chain(&boundary)) {
             slots[vertex as usize] = slot;
         }
 
@@ -203,23 +210,29 @@ impl Graph {
         });
         let (inner, outer): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
         let (matrix, coupling) = (compressed(inner), compressed(outer));
-        let vertices: Vec<u32> = order.iter().map(|&old| free[old as usize]).collect();
-        agreed(partition, check_attached(&vertices, (&matrix.0, &matrix.1), &coupling.0, partition))?;
-        for (slot, &vertex) in (0..).zip(&vertices) {
+        let slot_vertices: Vec<u32> = order.iter().map(|&old| free[old as usize]).chain(boundary).collect();
+        for (slot, &vertex) in (0..).zip(&slot_vertices) {
             slots[vertex as usize] = slot;
         }
-        Ok(Self { vertices, slots, incidence, matrix, coupling })
+        let vertices: Vec<u32> =
+            slot_vertices[..free.len()].iter().map(|&vertex| ordered.numbering().vertex(vertex)).collect();
+        agreed(partition, check_attached(&vertices, (&matrix.0, &matrix.1), &coupling.0, partition))?;
+        Ok(Self { ordered, vertices, slots, slot_vertices, incidence, matrix, coupling })
     }
 
     /// The unknown of a vertex that is solved for.
     pub(super) fn unknown(&self, vertex: u32) -> Option<usize> {
-        self.slots.get(vertex as usize).map(|&slot| slot as usize).filter(|&slot| slot < self.vertices.len())
+        Some(self.slot(vertex) as usize).filter(|&slot| slot < self.vertices.len())
     }
 
     /// Whether a vertex's displacement is prescribed.
     pub(super) fn is_boundary(&self, vertex: u32) -> bool {
-        let slot = self.slots.get(vertex as usize).copied().unwrap_or(NONE);
+        let slot = self.slot(vertex);
         slot != NONE && slot as usize >= self.vertices.len()
+    }
+
+    fn slot(&self, vertex: u32) -> u32 {
+        self.ordered.numbering().place(vertex).map_or(NONE, |place| self.slots[place as usize])
     }
 
     /// How many vertices the mesh has.
@@ -227,7 +240,8 @@ impl Graph {
         self.slots.len()
     }
 
-    /// The matrix of the free vertices, and that which couples them to the boundary. `stiffness` has a factor for each cell.
+    /// The matrix of the free vertices, and that which couples them to the boundary. `mesh` is in the order of the graph, and
+    /// `stiffness` has a factor for each of its cells.
     pub(super) fn assemble<const B: usize, F: Form<B>>(
         &self,
         mesh: &Mesh,
@@ -246,7 +260,7 @@ impl Graph {
             (outer_offsets, outer_values),
             |rows, inner, outer| {
                 let mut scratch = Scratch::default();
-                // Where in the present row the block of each vertex of the mesh lies.
+                // Where in the present row the block of each vertex of the ordered mesh lies.
                 let mut places = vec![0u32; self.slots.len()];
                 let mut sums: Vec<F::Sum> = Vec::new();
                 let (first, outer_first) = (offsets[rows.start], outer_offsets[rows.start]);
@@ -257,11 +271,11 @@ impl Graph {
                     let outer_columns =
                         outer_columns[outer_range.clone()].iter().map(|&column| free_count + column as usize);
                     for (place, slot) in (0..).zip(inner_columns.chain(outer_columns)) {
-                        places[slot] = place;
+                        places[self.slot_vertices[slot] as usize] = place;
                     }
                     sums.clear();
                     sums.resize(inner_range.len() + outer_range.len(), F::Sum::default());
-                    let vertex = self.vertices[row];
+                    let vertex = self.slot_vertices[row];
                     for &cell in self.incidence.cells(vertex) {
                         let cell = cell as usize;
                         let vertices = mesh.cells().vertices(cell);
@@ -270,8 +284,7 @@ impl Graph {
                             let weight = weight * stiffness[cell];
                             let own: Vector = gradients[own].map(|value| value * weight);
                             for (&other, &gradient) in vertices.iter().zip(gradients) {
-                                let place = places[self.slots[other as usize] as usize];
-                                F::add(&mut sums[place as usize], own, gradient);
+                                F::add(&mut sums[places[other as usize] as usize], own, gradient);
                             }
                         });
                     }
@@ -330,18 +343,18 @@ fn compressed(parts: Vec<(Vec<usize>, Vec<u32>)>) -> (Vec<usize>, Vec<u32>) {
     (offsets, all)
 }
 
-/// Each of the boundary vertices exists, and is named once.
-fn check_boundary(mesh: &Mesh, boundary: &[u32]) -> Result<(), VolumeError> {
-    let vertex_count = mesh.points().len();
+/// The places of the boundary vertices, each of which must exist and be named once.
+fn boundary_places(ordered: &Ordered, boundary: &[u32]) -> Result<Vec<u32>, VolumeError> {
+    let vertex_count = ordered.mesh().points().len();
     let mut named = vec![false; vertex_count];
-    for &vertex in boundary {
-        match named.get_mut(vertex as usize) {
-            None => return Err(VolumeError::BoundaryVertex { vertex, vertex_count }),
-            Some(true) => return Err(VolumeError::BoundaryTwice { vertex }),
-            Some(seen) => *seen = true,
+    let mut place = |&vertex: &u32| {
+        let place = ordered.numbering().place(vertex).ok_or(VolumeError::BoundaryVertex { vertex, vertex_count })?;
+        if std::mem::replace(&mut named[place as usize], true) {
+            return Err(VolumeError::BoundaryTwice { vertex });
         }
-    }
-    Ok(())
+        Ok(place)
+    };
+    boundary.iter().map(&mut place).collect()
 }
 
 /// Every free vertex must be connected to the boundary, be it on other ranks. `vertices` are in the order of Cuthill and McKee,
@@ -390,11 +403,12 @@ fn check_attached(
 }
 
 /// The stiffness of each cell, `(mean volume / volume)^stiffening`; 0 for cells that are not of volume. Divided by the size of
-/// a mean cell, so that the equations are of order 1 whatever the unit of length.
+/// a mean cell, so that the equations are of order 1 whatever the unit of length. `mesh` has the order of `ordered`.
 ///
 /// # Errors
 /// [`VolumeError::InvertedCell`].
 pub(super) fn stiffness(
+    ordered: &Ordered,
     mesh: &Mesh,
     elements: &Elements<'_>,
     stiffening: f64,
@@ -435,14 +449,16 @@ pub(super) fn stiffness(
     }
     // A NaN sum makes all of them NaN: the cells are looked at again to tell which are to blame.
     let mut scratch = Scratch::default();
-    let mut broken = (0..cells.len())
-        .filter(|&cell| cells.cell_type(cell).dimension() == 3 && elements.volume(cell, &mut scratch).is_none());
+    let is_broken =
+        |&cell: &usize| cells.cell_type(cell).dimension() == 3 && elements.volume(cell, &mut scratch).is_none();
+    let broken: Vec<usize> = (0..cells.len()).filter(is_broken).collect();
     // With cells of another rank to blame there may be none here.
-    let Some(cell) = broken.next() else { return Err(VolumeError::OtherRank) };
+    let first = broken.iter().copied().min_by_key(|&cell| ordered.cell(cell));
+    let Some(cell) = first else { return Err(VolumeError::OtherRank) };
     Err(VolumeError::InvertedCell {
-        cell: partition.cell_number(cell),
+        cell: partition.cell_number(ordered.cell(cell)),
         cell_type: cells.cell_type(cell),
         centroid: centroid(cells, cell, mesh.points()),
-        count: 1 + broken.count(),
+        count: broken.len(),
     })
 }

@@ -1,9 +1,9 @@
 //! Colours of vertices, of which no two that share a cell have the same.
 
-use crate::mesh::{Mesh, Vector};
+use crate::mesh::{Ordered, Vector};
 use crate::partition::{Partition, Shares, any, most};
 
-/// The vertices of this rank's cells, and which of them other ranks have in theirs.
+/// The vertices of this rank's cells, by the numbers of the ordered mesh, and which of them other ranks have in theirs.
 #[derive(Debug)]
 pub(super) struct Held {
     vertices: Vec<u32>,
@@ -14,11 +14,13 @@ pub(super) struct Held {
 
 impl Held {
     /// Collective.
-    pub(super) fn new(mesh: &Mesh, partition: &dyn Partition) -> Self {
+    pub(super) fn new(ordered: &Ordered, partition: &dyn Partition) -> Self {
+        let mesh = ordered.mesh();
         let mut used = vec![false; mesh.points().len()];
         mesh.cells().connectivity().iter().for_each(|&vertex| used[vertex as usize] = true);
         let vertices: Vec<u32> = (0..).zip(&used).filter(|(_, used)| **used).map(|(vertex, _)| vertex).collect();
-        let shares = Shares::new(partition, &vertices);
+        let numbers: Vec<u32> = vertices.iter().map(|&place| ordered.numbering().vertex(place)).collect();
+        let shares = Shares::new(partition, &numbers);
         let mut places = vec![None; used.len()];
         shares.places().iter().for_each(|&place| places[vertices[place as usize] as usize] = Some(place));
         Self { vertices, shares, places }

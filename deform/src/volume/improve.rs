@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::barrier::{Barrier, LENGTHS, Piece, Star, length, newton, searched};
 use super::colours::{Held, colours};
-use crate::mesh::{CellType, Mesh, Vector};
+use crate::mesh::{CellType, Mesh, Numbering, Ordered, Vector};
 use crate::parallel;
 use crate::partition::{Partition, Reduction, Shares, all, most, whole};
 use crate::quality::{
@@ -48,6 +48,8 @@ const LOST: f64 = 0.05;
 ///   parts the mesh is in.
 #[derive(Debug)]
 pub struct Improver {
+    /// That of the ordered mesh, whose numbers all vertices here have.
+    numbering: Numbering,
     pieces: Vec<Piece>,
     /// Free vertices, none of a list with a cell in common.
     colours: Vec<Vec<u32>>,
@@ -79,14 +81,12 @@ impl Improver {
     /// of the whole mesh. Collective, as is its use.
     #[must_use]
     pub fn of_part(mesh: &Mesh, boundary: &[u32], partition: &Arc<dyn Partition>) -> Self {
+        let ordered = Ordered::new(mesh);
+        let held = (partition.ranks() > 1).then(|| Held::new(&ordered, &**partition));
+        let (mesh, numbering) = ordered.into_parts();
         let mut free = vec![true; mesh.points().len()];
-        for &vertex in boundary {
-            if let Some(free) = free.get_mut(vertex as usize) {
-                *free = false;
-            }
-        }
-        let pieces = pieces(mesh, &mut free);
-        let held = (partition.ranks() > 1).then(|| Held::new(mesh, &**partition));
+        boundary.iter().filter_map(|&vertex| numbering.place(vertex)).for_each(|place| free[place as usize] = false);
+        let pieces = pieces(&mesh, &mut free);
         if let Some(held) = &held {
             held.all(&**partition, &mut free);
         }
@@ -113,7 +113,7 @@ impl Improver {
                 movable.push(number);
             }
         }
-        let mut improver = Self { pieces, colours: Vec::new(), incident, offsets, movable, parts: None };
+        let mut improver = Self { numbering, pieces, colours: Vec::new(), incident, offsets, movable, parts: None };
         let around = |vertex: u32, visit: &mut dyn FnMut(u32)| {
             for &code in improver.incident(vertex) {
                 improver.pieces[(code / 4) as usize].vertices.iter().for_each(|&other| visit(other));
@@ -149,19 +149,19 @@ impl Improver {
         if !self.parts.as_ref().map_or(fits, |parts| all(&*parts.partition, fits)) {
             return false;
         }
-        let before = self.least(points);
+        let mut near = self.numbering.gather(points).into_owned();
+        let before = self.least(&near);
         if sweeps == 0 || before.is_nan() || before <= 0.0 || before >= GOOD {
             return false;
         }
-        let start = points.to_vec();
         let mut least = before;
         for _ in 0..sweeps {
-            self.sweep(points, least);
-            least = self.least(points);
+            self.sweep(&mut near, least);
+            least = self.least(&near);
         }
         let better = least >= before;
-        if !better {
-            points.copy_from_slice(&start);
+        if better {
+            self.numbering.scatter(&near, points);
         }
         better
     }

@@ -8,7 +8,7 @@ use super::rigid::RigidMotion;
 use super::sliding::{Constraint, Sliding, constrain, constraints};
 use super::{Deform, Method, VolumeError, agreed};
 use crate::linear::{Convergence, LinearError, LinearSolver, SparseMatrix, Tolerance};
-use crate::mesh::{Cells, Mesh, Vector};
+use crate::mesh::{Cells, Mesh, Ordered, Vector};
 use crate::partition::{Partition, Reduction, Shares, all, any, scalar_solver, vector_solver, whole};
 use crate::vector::{add, subtract};
 
@@ -47,7 +47,7 @@ const ROUNDING: f64 = 1e-12;
 pub struct VolumeOperator {
     /// What depends on the cells alone.
     graph: Arc<Graph>,
-    cells: Cells,
+    cells: Arc<Cells>,
     settings: Deform,
     boundary: Vec<u32>,
     boundary_points: Vec<Vector>,
@@ -156,16 +156,17 @@ impl VolumeOperator {
         let cells = mesh.cells().len();
         let countable = if u32::try_from(cells).is_ok() { Ok(()) } else { Err(VolumeError::TooLarge { cells }) };
         agreed(&**partition, countable)?;
-        let elements = Elements::new(mesh);
-        let stiffness = stiffness(mesh, &elements, settings.stiffening, &**partition)?;
-        let graph = Arc::new(Graph::new(mesh, boundary, &**partition)?);
+        let ordered = Arc::new(Ordered::new(mesh));
+        let elements = Elements::new(ordered.mesh());
+        let stiffness = stiffness(&ordered, ordered.mesh(), &elements, settings.stiffening, &**partition)?;
+        let graph = Arc::new(Graph::new(Arc::clone(&ordered), boundary, &**partition)?);
         let constraints = agreed(&**partition, checked_constraints(mesh, &graph, sliding))?;
-        let equations =
-            equations(&graph, mesh, &elements, &stiffness, &constraints, settings, Start::Fresh(partition))?;
+        let start = Start::Fresh(partition);
+        let equations = equations(&graph, ordered.mesh(), &elements, &stiffness, &constraints, settings, start)?;
         let places = |vertices: &[u32]| vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect();
         let owned = (0..).zip(boundary).filter(|(_, vertex)| partition.owns(**vertex));
         Ok(Self {
-            cells: mesh.cells().clone(),
+            cells: Arc::clone(mesh.shared_cells()),
             settings: *settings,
             boundary_points: places(boundary),
             boundary: boundary.to_vec(),
@@ -197,16 +198,17 @@ impl VolumeOperator {
     pub fn restiffened(&self, mesh: &Mesh, stiffening: f64) -> Result<Self, VolumeError> {
         let settings = Deform { stiffening, ..self.settings };
         settings.validate()?;
-        let same = *mesh.cells() == self.cells && mesh.points().len() == self.graph.vertex_count();
+        let same = *mesh.shared_cells() == self.cells && mesh.points().len() == self.graph.vertex_count();
         agreed(&*self.partition, if same { Ok(()) } else { Err(VolumeError::OtherCells) })?;
-        let elements = Elements::new(mesh);
-        let stiffness = stiffness(mesh, &elements, stiffening, &*self.partition)?;
+        let ordered = self.graph.ordered.like(mesh);
+        let elements = Elements::new(&ordered);
+        let stiffness = stiffness(&self.graph.ordered, &ordered, &elements, stiffening, &*self.partition)?;
         let like = Start::Like(&self.equations);
-        let equations = equations(&self.graph, mesh, &elements, &stiffness, &self.constraints, &settings, like)?;
+        let equations = equations(&self.graph, &ordered, &elements, &stiffness, &self.constraints, &settings, like)?;
         let places = |vertices: &[u32]| vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect();
         Ok(Self {
             graph: Arc::clone(&self.graph),
-            cells: self.cells.clone(),
+            cells: Arc::clone(&self.cells),
             settings,
             boundary: self.boundary.clone(),
             boundary_points: places(&self.boundary),
@@ -245,8 +247,19 @@ impl VolumeOperator {
         &self.unknown_points
     }
 
-    /// Where the three components are solved for together, as with [`Method::Elasticity`], the matrix and the right side of the equations that [`VolumeOperator::solve`] solves for
-    /// these displacements of the boundary, less the rigid motion nearest to them: to try other solvers on.
+    /// Where each component is solved for by itself, as with [`Method::Harmonic`] unless vertices slide, the matrix of its
+    /// equations: to try other solvers on.
+    #[must_use]
+    pub fn separate_matrix(&self) -> Option<&SparseMatrix<1>> {
+        match &self.equations {
+            Equations::Separate(system) => Some(&system.matrix),
+            Equations::Coupled(_) => None,
+        }
+    }
+
+    /// Where the three components are solved for together, as with [`Method::Elasticity`], the matrix and the right side of the
+    /// equations that [`VolumeOperator::solve`] solves for these displacements of the boundary, less the rigid motion nearest to
+    /// them: to try other solvers on.
     ///
     /// # Panics
     /// Where there is not one displacement for each of [`VolumeOperator::boundary`].

@@ -1,5 +1,7 @@
 //! The volume operator against closed forms.
 
+mod numbering;
+
 use proptest::prelude::*;
 
 use super::*;

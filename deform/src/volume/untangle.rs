@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::foldover;
 use crate::linear::{ConjugateGradients, Schwarz, SparseMatrix, Tolerance, reverse_cuthill_mckee};
-use crate::mesh::{CellType, Mesh, Vector};
+use crate::mesh::{CellType, Mesh, Numbering, Ordered, Vector};
 use crate::parallel;
 use crate::partition::{Partition, Reduction, Shares, Solver, all, any, whole};
 use crate::quality::{
@@ -43,6 +43,8 @@ const NONE: u32 = u32::MAX;
 /// It does *not* guarantee to find a mesh that is valid, even where there is one.
 #[derive(Debug)]
 pub struct Untangler {
+    /// That of the ordered mesh, whose numbers all vertices here have.
+    numbering: Numbering,
     corners: Vec<Corner>,
     /// The vertex of each unknown.
     unknowns: Vec<u32>,
@@ -81,13 +83,10 @@ impl Untangler {
     /// of the whole mesh. Collective, as is its use.
     #[must_use]
     pub fn of_part(mesh: &Mesh, boundary: &[u32], partition: &Arc<dyn Partition>) -> Self {
-        let corners = corners(mesh);
+        let (near, numbering) = Ordered::new(mesh).into_parts();
+        let corners = corners(&near);
         let mut free = vec![true; mesh.points().len()];
-        for &vertex in boundary {
-            if let Some(free) = free.get_mut(vertex as usize) {
-                *free = false;
-            }
-        }
+        boundary.iter().filter_map(|&vertex| numbering.place(vertex)).for_each(|place| free[place as usize] = false);
         let mut pairs = Vec::with_capacity(12 * corners.len());
         let mut used = vec![false; free.len()];
         for corner in &corners {
@@ -137,8 +136,9 @@ impl Untangler {
         for (slot, &vertex) in (0..).zip(&unknowns) {
             slots[vertex as usize] = slot;
         }
-        let shares = Shares::new(&**partition, &unknowns);
-        Self { corners, unknowns, slots, offsets, columns, partition: Arc::clone(partition), shares }
+        let vertices: Vec<u32> = unknowns.iter().map(|&place| numbering.vertex(place)).collect();
+        let shares = Shares::new(&**partition, &vertices);
+        Self { numbering, corners, unknowns, slots, offsets, columns, partition: Arc::clone(partition), shares }
     }
 
     /// Moves the free vertices of `points` until every corner's determinant is positive and every scaled Jacobian at least
@@ -150,6 +150,19 @@ impl Untangler {
         if all(partition, self.unknowns.is_empty()) || any(partition, points.len() != self.slots.len()) {
             return false;
         }
+        let mut near = self.numbering.gather(points).into_owned();
+        let lowered = self.lower(&mut near);
+        self.numbering.scatter(&near, points);
+        if !lowered {
+            return false;
+        }
+        let sum = quality_in_parts(mesh.cells(), points, partition);
+        sum.inverted == 0 && sum.min >= floor
+    }
+
+    /// Brings the energy down until it settles. Whether the equations on the way could be solved.
+    fn lower(&self, points: &mut [Vector]) -> bool {
+        let partition = &*self.partition;
         let mut epsilon = 1.0;
         let mut direction = vec![[0.0; 3]; self.unknowns.len()];
         for step in 0..STEPS {
@@ -171,8 +184,7 @@ impl Untangler {
                 break;
             }
         }
-        let sum = quality_in_parts(mesh.cells(), points, partition);
-        sum.inverted == 0 && sum.min >= floor
+        true
     }
 
     fn solver(&self, matrix: SparseMatrix<3>) -> Solver<3> {
