@@ -202,37 +202,57 @@ fn pipeline(node: &Node<'_, '_>, found: &mut Found) -> Result<(), CatalystError>
     }
 }
 
-/// ParaView's pattern as ours. Files of VTK's other kinds are written as .vtu, which holds the same mesh.
+/// ParaView's pattern as ours: `{timestep:04d}` of today and `%04ts` of before, `{time:.3f}` and `%.3t`. Files of VTK's other kinds
+/// are written as .vtpd, which holds any mesh.
 fn written_file(file: &str) -> (String, Option<String>) {
     let mut pattern = String::new();
     let mut rest = file;
-    while let Some((before, after)) = rest.split_once('{') {
-        pattern.push_str(before);
-        let Some((name, behind)) = after.split_once('}') else {
-            rest = after;
-            pattern.push('{');
-            break;
+    while let Some(at) = rest.find(['{', '%']) {
+        pattern.push_str(&rest[..at]);
+        let behind = &rest[at + 1..];
+        let (name, format, length) = if rest[at..].starts_with('{') {
+            let inside = behind.split_once('}').map_or(behind, |(inside, _)| inside);
+            let (name, format) = inside.split_once(':').unwrap_or((inside, ""));
+            (name, format, (inside.len() + 1).min(behind.len()))
+        } else {
+            let digits = behind.len() - behind.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.').len();
+            let (name, letters) = match &behind[digits..] {
+                text if text.starts_with("ts") => ("timestep", 2),
+                text if text.starts_with('t') => ("time", 1),
+                _ => ("", 0),
+            };
+            (name, &behind[..digits], digits + letters)
         };
-        // A format may follow the name: `{timestep:06d}`.
-        let name = match name.split(':').next().unwrap_or_default() {
-            "timestep" | "cycle" => "cycle",
-            other => other,
-        };
-        pattern.push_str(&format!("{{{name}}}"));
-        rest = behind;
+        match name {
+            "timestep" | "cycle" => pattern.push_str(&format!("{{cycle:{}}}", digits(format).max(1))),
+            "time" if format.contains('.') => {
+                pattern
+                    .push_str(&format!("{{time:{}}}", digits(format.split_once('.').map_or("", |(_, after)| after))));
+            }
+            "time" => pattern.push_str("{time}"),
+            // Not one of ParaView's: what checks the configuration tells what may stand in braces.
+            _ => pattern.push_str(&rest[at..=at + length]),
+        }
+        rest = &behind[length..];
     }
     pattern.push_str(rest);
     let extension = Path::new(&pattern).extension().map(|extension| extension.to_string_lossy().into_owned());
     match extension.as_deref() {
-        Some("vtu" | "vtp") => (pattern, None),
+        Some("vtu" | "vtp" | "vtpd" | "pvtu" | "pvtp") => (pattern, None),
         Some(other) if other.starts_with("vt") || other.starts_with("pvt") => {
             let stem = pattern.trim_end_matches(other);
-            let written = format!("{stem}vtu");
+            let written = format!("{stem}vtpd");
             let note = format!("a .{other} file is written as {written}");
             (written, Some(note))
         }
         _ => (pattern, None),
     }
+}
+
+/// The number at the head of a format such as `06d`; 20 at most.
+fn digits(format: &str) -> usize {
+    let end = format.find(|c: char| !c.is_ascii_digit()).unwrap_or(format.len());
+    format[..end].parse().map_or(0, |digits: usize| digits.min(20))
 }
 
 /// A number that can be steered: `{value, minimum, maximum}`, or a number without bounds. Texts are those of others.
@@ -263,11 +283,20 @@ mod tests {
 
     #[test]
     fn patterns_of_paraview_become_ours() {
-        assert_eq!(written_file("out-{timestep}.vtu"), ("out-{cycle}.vtu".into(), None));
-        assert_eq!(written_file("out-{timestep:06d}-{time}.vtp"), ("out-{cycle}-{time}.vtp".into(), None));
-        let (file, note) = written_file("out-{timestep}.vtpd");
-        assert_eq!(file, "out-{cycle}.vtu");
-        assert!(note.is_some_and(|note| note.contains(".vtpd")));
+        for (theirs, ours) in [
+            ("out-{timestep}.vtu", "out-{cycle:1}.vtu"),
+            ("out-{timestep:06d}-{time}.vtp", "out-{cycle:6}-{time}.vtp"),
+            ("out-%04ts.vtpd", "out-{cycle:4}.vtpd"),
+            ("%ts-%t-%.3t-{time:.2f}.pvtu", "{cycle:1}-{time}-{time:3}-{time:2}.pvtu"),
+            ("100%-{other}-{.vtu", "100%-{other}-{.vtu"),
+            ("%", "%"),
+            ("über-%03tsß.vtu", "über-{cycle:3}ß.vtu"),
+        ] {
+            assert_eq!(written_file(theirs), (ours.into(), None));
+        }
+        let (file, note) = written_file("out-{timestep}.vtm");
+        assert_eq!(file, "out-{cycle:1}.vtpd");
+        assert!(note.is_some_and(|note| note.contains(".vtm")));
         assert_eq!(written_file("plain.vtu"), ("plain.vtu".into(), None));
     }
 }

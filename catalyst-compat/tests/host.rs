@@ -110,7 +110,7 @@ struct Written {
 
 impl Written {
     fn read(directory: &Path, channel: &str, cycle: u64) -> Self {
-        let path = directory.join(format!("{channel}-{cycle:06}.vtu"));
+        let path = directory.join(format!("{channel}-{cycle}.vtu"));
         Self { file: read_mesh(&path).unwrap_or_else(|error| panic!("{error}")) }
     }
 

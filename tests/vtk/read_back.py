@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Reads mesh files with VTK and prints all that is in them, numbers as their bits; or has VTK write files for us to read.
 
-    read_back.py FILE...                    .vtu or .vtp
+    read_back.py FILE...                    .vtu, .vtp, .pvtu, .pvtp or, its first partition, .vtpd
     read_back.py --rewrite FILE.vtu DIR     writes FILE anew in every way VTK knows, and prints the names
     read_back.py --polygonal DIR            writes polygonal data of all kinds of cells, and prints the names
 
@@ -28,11 +28,17 @@ class Errors:
 
 
 def read(path):
-    reader = vtk.vtkXMLPolyDataReader() if path.endswith(".vtp") else vtk.vtkXMLUnstructuredGridReader()
+    reader = {
+        ".vtp": vtk.vtkXMLPolyDataReader,
+        ".pvtp": vtk.vtkXMLPPolyDataReader,
+        ".pvtu": vtk.vtkXMLPUnstructuredGridReader,
+        ".vtpd": vtk.vtkXMLPartitionedDataSetReader,
+    }.get(os.path.splitext(path)[1], vtk.vtkXMLUnstructuredGridReader)()
     Errors(reader)
     reader.SetFileName(path)
     reader.Update()
-    return reader.GetOutput()
+    data = reader.GetOutputDataObject(0)
+    return data.GetPartition(0) if isinstance(data, vtk.vtkPartitionedDataSet) else data
 
 
 def bits(values):

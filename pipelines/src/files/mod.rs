@@ -111,6 +111,9 @@ fn unknown_extension(found: &str, expected: &'static str) -> Flaw {
 /// Writes an extract: as `.vtp`, which holds cells up to dimension 2, or `.vtu`, which holds any. Folders are made where they are
 /// missing, and the file takes its place in one step, so that no reader ever sees half of it.
 ///
+/// A file that ends in `.vtpd`, `.pvtu` or `.pvtp` names one that holds the data: of `out.vtpd` that is `out/out_0.vtu`. It takes its
+/// place after the other, which it must be kept beside.
+///
 /// Numbers are written as they are, in double precision. In a `.vtp` file cells stand in VTK's order of kinds: vertices, lines,
 /// polygons, strips.
 ///
@@ -127,9 +130,19 @@ pub fn write(path: impl AsRef<Path>, extract: &Extract) -> Result<(), FileError>
 /// As [`write`](fn@write).
 pub fn write_compressed(path: impl AsRef<Path>, extract: &Extract, compression: Compression) -> Result<(), FileError> {
     let path = path.as_ref();
-    let polygonal = is_polygonal(path)?;
+    let index = vtk::Index::of(&extension(path));
+    let piece = index.map(|index| index.piece(path));
+    let data = piece.as_ref().map_or_else(|| path.to_path_buf(), |piece| path.with_file_name(piece));
+    let polygonal = is_polygonal(&data)?;
     let bytes = vtk::from_extract(extract, polygonal, compression).map_err(|error| Flaw::from(error).in_file(path))?;
-    write_atomically(path, |file| file.write_all(&bytes))
+    write_atomically(&data, |file| file.write_all(&bytes))?;
+    match (index, piece) {
+        (Some(index), Some(piece)) => {
+            let text = index.text(&piece, extract);
+            write_atomically(path, |file| file.write_all(text.as_bytes()))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Writes a whole mesh with its fields to a `.vtu` (or, a surface mesh, `.vtp`) file, so that [`read_mesh`] gives the same again,
@@ -155,7 +168,7 @@ fn is_polygonal(path: &Path) -> Result<bool, FileError> {
     match extension(path).as_str() {
         "vtp" => Ok(true),
         "vtu" => Ok(false),
-        found => Err(unknown_extension(found, ".vtu and .vtp").in_file(path)),
+        found => Err(unknown_extension(found, ".vtu, .vtp, .vtpd, .pvtu and .pvtp").in_file(path)),
     }
 }
 

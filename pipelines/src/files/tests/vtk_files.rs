@@ -162,6 +162,32 @@ fn vtk_reads_what_is_written() {
     }
 }
 
+/// A file that names another is read by VTK as that other is, but for field data, which VTK does not look for there.
+#[test]
+fn vtk_finds_the_data_that_an_index_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let without_field_data = |text: &str| -> Vec<String> {
+        let kept = |line: &&str| !(line.starts_with("field ") || line.starts_with("text "));
+        text.lines().filter(kept).map(str::to_owned).collect()
+    };
+    for (name, piece, dimension) in
+        [("a & b.vtpd", "a & b_0.vtu", 3), ("c.pvtu", "c_0.vtu", 3), ("d.pvtp", "d_0.vtp", 2), ("e.vtpd", "e_0.vtu", 2)]
+    {
+        let mesh = one_of_each(dimension);
+        let mut extract = extract(&mesh);
+        extract.fields[0].name = "velocity <m/s>".into();
+        let index = folder.path().join(name);
+        write(&index, &extract).unwrap();
+        let piece = index.with_extension("").join(piece);
+        let (Some(found), Some(expected)) = (vtk(&[&index]), vtk(&[&piece])) else { return };
+        assert_eq!(without_field_data(&found), without_field_data(&expected), "{name}");
+        assert!(found.contains("velocity <m/s>"), "{found}");
+    }
+    let refused = write(folder.path().join("f.pvtp"), &extract(&one_of_each(3))).unwrap_err().to_string();
+    assert!(refused.contains(".vtu"), "{refused}");
+    assert!(!folder.path().join("f.pvtp").exists() && !folder.path().join("f").exists());
+}
+
 /// VTK writes its own files in every way it can; each reads the same.
 #[test]
 fn what_vtk_writes_is_read() {

@@ -1,13 +1,15 @@
-//! VTK's files: XML (.vtu, .vtp), legacy (.vtk) and collections (.pvd).
+//! VTK's files: XML (.vtu, .vtp, and .vtpd, .pvtu, .pvtp that name them), legacy (.vtk) and collections (.pvd).
 
 mod array;
 mod dataset;
 mod encoding;
+mod index;
 mod legacy;
 mod series;
 mod write;
 mod xml;
 
+pub(super) use index::Index;
 pub(super) use legacy::parse as parse_legacy;
 pub use series::Series;
 pub use write::Compression;
