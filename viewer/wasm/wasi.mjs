@@ -3,7 +3,11 @@
  * `CARGO_TARGET_WASM32_WASIP1_RUNNER="node viewer/wasm/wasi.mjs"`. The program sees the directory that it is started in.
  */
 import { readFileSync } from "node:fs";
+import { setFlagsFromString } from "node:v8";
 import { WASI } from "node:wasi";
+
+// Node 20 collects garbage inside such calls, where it must not: what the collector moves or frees is still in use, and Node dies.
+setFlagsFromString("--no-turbo-fast-api-calls");
 
 const [program, ...programArguments] = process.argv.slice(2);
 if (!program) {

@@ -18,6 +18,9 @@ const CAP: f64 = 0.82;
 /// How much farther that is where a tube is flat, in parts of what its mean radius is more than the least.
 const WIDE: f64 = 2.5;
 
+/// A piece whose only curve is shorter than this many times its radius is as long as wide: it has one node.
+const LONE: f64 = 2.0;
+
 /// How many times the least radius the mean one is at least where a tube counts as flat.
 const FLAT: f64 = 1.3;
 
@@ -127,15 +130,14 @@ impl Pruning {
             let found = chains.into_iter().find_map(|chain| {
                 let [first, last] = [chain.vertices[0], chain.vertices[chain.vertices.len() - 1]];
                 let [radius_first, radius_last] = [first, last].map(|end| self.radii[end as usize]);
+                // The widest, not where a branch begins: at a corner that may lie well off the middle.
+                let widest = || chain.vertices.iter().map(|&vertex| self.radii[vertex as usize]).fold(0.0, f64::max);
+                let is_short = || chain.length < shortest * widest();
                 match (self.degree(first) == 1, self.degree(last) == 1) {
-                    (true, true) => {
-                        let widest =
-                            chain.vertices.iter().map(|&vertex| self.radii[vertex as usize]).fold(0.0, f64::max);
-                        (alone && chain.length < shortest * widest)
-                            .then(|| (chain.vertices[chain.vertices.len() / 2], chain))
-                    }
-                    (true, false) => (chain.length < shortest * radius_last).then_some((last, chain)),
-                    (false, true) => (chain.length < shortest * radius_first).then_some((first, chain)),
+                    (true, true) => (alone && chain.length < LONE * widest())
+                        .then(|| (chain.vertices[chain.vertices.len() / 2], chain)),
+                    (true, false) => is_short().then_some((last, chain)),
+                    (false, true) => is_short().then_some((first, chain)),
                     (false, false) => (first != last
                         && chain.length < 0.25 * shortest * radius_first.max(radius_last)
                         && self.may_join(first, last, &chain.vertices))

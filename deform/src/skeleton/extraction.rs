@@ -25,7 +25,7 @@ pub struct SkeletonSettings {
     pub least_vertices: usize,
     /// Pieces of more vertices are coarsened to about so many.
     pub most_vertices: usize,
-    /// Branches shorter than this many times the radius where they begin are taken for noise and cut off.
+    /// Branches shorter than this many times the largest radius along them are taken for noise and cut off.
     pub shortest_branch: f64,
 }
 
