@@ -33,6 +33,11 @@ fn a_torus() {
 }
 
 #[test]
+fn a_coarse_torus() {
+    agree("coarse torus", &shapes::torus(1.0, 0.3, [60, 24]), [1, 1, 0, 0]);
+}
+
+#[test]
 fn a_surface_of_genus_three() {
     agree("genus 3", &windows(3, 8, 30), [1, 3, 4, 0]);
 }
