@@ -113,6 +113,7 @@ impl Adaptor {
     /// Collective, as the other two calls are.
     pub fn initialize(settings: Settings) -> Result<Self, InitializeError> {
         let communicator = Arc::clone(&settings.communicator);
+        let _alarm = comm::Alarm::among(&communicator);
         let own = serde_json::to_vec(&(&settings.config, &settings.orders));
         let adaptor = Self::set_up(settings);
         if communicator.size() == 1 {
@@ -210,6 +211,7 @@ impl Adaptor {
     /// here. A mistake on one rank is an error on all of them.
     pub fn execute(&mut self, step: &Step, channels: &[Channel<'_>]) -> Result<Steering<'_>, ExecuteError> {
         let entered = Instant::now();
+        let _alarm = comm::Alarm::among(&self.communicator);
         if let Some(left) = self.timing.left.take() {
             self.timing.steps.add(entered - left);
         }
@@ -250,6 +252,12 @@ impl Adaptor {
             || self.pipelines.is_due(Moment { cycle: step.cycle, time: step.time })
     }
 
+    /// Lets only those pipelines run from now on whose names are chosen, until this is called again; at first all are. Those that
+    /// wait are due once more when they are chosen. To be called on all ranks alike.
+    pub fn choose_pipelines(&mut self, is_chosen: impl Fn(&str) -> bool) {
+        self.pipelines.choose(is_chosen);
+    }
+
     /// Stops changing the shape of the mesh, because the solver has made another one of it: views go on, orders are rejected with
     /// this reason from now on. To be called on all ranks.
     pub fn release_shape(&mut self, reason: &str) {
@@ -275,6 +283,7 @@ impl Adaptor {
     /// # Errors
     /// [`FinalizeError`] where a file that a pipeline asked for could not be written; it holds the report all the same.
     pub fn finalize(mut self) -> Result<Report, FinalizeError> {
+        let _alarm = comm::Alarm::among(&self.communicator);
         self.mesh = SteeredMesh::Unknown;
         self.server = None;
         let faults = self.pipelines.finish();

@@ -90,6 +90,11 @@ impl Pipelines {
         let _ = self.runner.set_surface(channels, None, surface);
     }
 
+    /// Lets only those run from now on whose names are chosen.
+    pub(crate) fn choose(&mut self, is_chosen: impl Fn(&str) -> bool) {
+        self.runner.choose(is_chosen);
+    }
+
     #[inline]
     pub(crate) fn is_due(&self, moment: Moment) -> bool {
         self.runner.is_due(moment.cycle, moment.time)

@@ -3,14 +3,14 @@
 
 use std::{
     os::raw::c_int,
-    process::{Command, ExitCode},
+    process::{Command, ExitCode, ExitStatus, Stdio},
     sync::Arc,
     time::{Duration, Instant},
 };
 
 use tombolo::{
     comm::{
-        Communicator, Counted, Reduction,
+        Alarm, Communicator, Counted, Reduction,
         mpi::{Mpi, MpiError, rsmpi},
         threads,
     },
@@ -31,9 +31,12 @@ unsafe extern "C" {
 }
 
 const PATIENCE: Duration = Duration::from_secs(60);
+/// Set where one of the ranks is to fail in itself.
+const FAILING: &str = "TOMBOLO_TEST_FAILING_RANK";
 
 fn main() -> ExitCode {
     match std::env::var("OMPI_COMM_WORLD_SIZE").or_else(|_| std::env::var("PMI_SIZE")) {
+        Ok(_) if std::env::var_os(FAILING).is_some() => as_failing_ranks(),
         Ok(_) => {
             as_rank();
             ExitCode::SUCCESS
@@ -42,32 +45,63 @@ fn main() -> ExitCode {
     }
 }
 
+/// This program on several ranks.
+fn on(ranks: usize) -> Command {
+    let mut command = Command::new("mpirun");
+    command.args(["--oversubscribe", "--allow-run-as-root", "-n", &ranks.to_string()]);
+    command.arg(std::env::current_exe().unwrap());
+    command
+}
+
+/// Runs it to its end, which is waited for with patience.
+fn finish(command: &mut Command) -> Option<ExitStatus> {
+    let begun = Instant::now();
+    let mut child = command.spawn().expect("mpirun: install openmpi-bin, or run scripts/setup --distributed");
+    loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            return Some(status);
+        }
+        if begun.elapsed() > PATIENCE {
+            let _ = child.kill();
+            return None;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
 /// Runs this program on several ranks.
 fn launch() -> ExitCode {
-    let program = std::env::current_exe().unwrap();
-    let mut failed = 0;
-    for ranks in 1..=4 {
-        let mut command = Command::new("mpirun");
-        command.args(["--oversubscribe", "--allow-run-as-root", "-n", &ranks.to_string()]).arg(&program);
-        let begun = Instant::now();
-        let mut child = command.spawn().expect("mpirun: install openmpi-bin, or run scripts/setup --distributed");
-        let status = loop {
-            if let Some(status) = child.try_wait().unwrap() {
-                break Some(status);
-            }
-            if begun.elapsed() > PATIENCE {
-                let _ = child.kill();
-                break None;
-            }
-            std::thread::sleep(Duration::from_millis(20));
-        };
-        let passed = status.is_some_and(|status| status.success());
-        println!("test ranks_{ranks} ... {}", if passed { "ok" } else { "FAILED" });
-        failed += usize::from(!passed);
+    let mut outcomes: Vec<(String, bool)> = (1..=4)
+        .map(|ranks| (format!("ranks_{ranks}"), finish(&mut on(ranks)).is_some_and(|status| status.success())))
+        .collect();
+    // All ranks are ended where one has a defect: none waits for it.
+    let status = finish(on(3).env(FAILING, "1").stderr(Stdio::null()));
+    outcomes.push(("a_defect_on_one_rank_ends_all".into(), status.is_some_and(|status| !status.success())));
+    let failed = outcomes.iter().filter(|(_, passed)| !passed).count();
+    for (name, passed) in &outcomes {
+        println!("test {name} ... {}", if *passed { "ok" } else { "FAILED" });
     }
     let outcome = if failed == 0 { "ok" } else { "FAILED" };
-    println!("\ntest result: {outcome}. {} passed; {failed} failed; 0 ignored", 4 - failed);
+    println!("\ntest result: {outcome}. {} passed; {failed} failed; 0 ignored", outcomes.len() - failed);
     if failed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// One rank fails in itself, and who called it goes on as if nothing were wrong; the others wait for it. Ends with success
+/// where nobody ends it.
+fn as_failing_ranks() -> ExitCode {
+    let universe = rsmpi::initialize().unwrap();
+    let ranks: Arc<dyn Communicator> = Arc::new(Mpi::new(&universe.world()).unwrap());
+    let failed = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+        let _alarm = Alarm::among(&ranks);
+        assert!(ranks.rank() != 1, "a defect");
+        ranks.barrier();
+    }));
+    if failed.is_ok() {
+        ExitCode::SUCCESS
+    } else {
+        std::thread::sleep(2 * PATIENCE);
+        ExitCode::SUCCESS
+    }
 }
 
 fn as_rank() {

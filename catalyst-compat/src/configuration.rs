@@ -23,9 +23,10 @@ const REPORT: &str = "TOMBOLO_REPORT";
 /// What a run is set up with.
 #[derive(Debug)]
 pub(crate) struct Configuration {
-    pub(crate) config: Config,
-    /// Whether nobody asked for this configuration.
-    pub(crate) is_default: bool,
+    /// What to watch; `None` where nobody says.
+    pub(crate) config: Option<Config>,
+    /// The pipelines of each script and pipeline of the node, by its name there; none where the node names no configuration.
+    pub(crate) groups: Groups,
     pub(crate) parameters: Vec<Parameter>,
     pub(crate) orders: Vec<TimedCommand>,
     pub(crate) output: PathBuf,
@@ -35,10 +36,16 @@ pub(crate) struct Configuration {
     pub(crate) notes: Vec<String>,
 }
 
+/// Names, each with those of the pipelines that it stands for.
+pub(crate) type Groups = Vec<(String, Vec<String>)>;
+
 /// What is found on the way through the node.
 #[derive(Default)]
 struct Found {
-    files: Vec<String>,
+    /// The names that the node gives them, and the files.
+    files: Vec<(String, String)>,
+    /// The names of scripts that are not run.
+    others: Vec<String>,
     pipelines: Vec<serde_json::Value>,
     notes: Vec<String>,
 }
@@ -64,16 +71,18 @@ impl Configuration {
                 communicator = Some(value.ok_or_else(|| handle.wrong("the Fortran handle of a communicator".into()))?);
             }
         }
-        if found.files.is_empty() && found.pipelines.is_empty() {
-            found.files.extend(variable(PIPELINES));
+        let named_here = !found.files.is_empty() || !found.pipelines.is_empty();
+        if !named_here {
+            found.files.extend(variable(PIPELINES).map(|file| (String::new(), file)));
         }
         if let Some(file) = variable(ORDERS) {
             orders = language::parse_orders(&text(&file)?, &file).map_err(unreadable)?;
         }
         let is_default = found.files.is_empty() && found.pipelines.is_empty();
+        let (config, groups) = if is_default { (None, Groups::new()) } else { merged(&found)? };
         Ok(Self {
-            config: if is_default { default_config()? } else { merged(&found)? },
-            is_default,
+            config,
+            groups: if named_here { groups } else { Groups::new() },
             parameters,
             orders,
             output: variable(OUTPUT).map_or_else(|| PathBuf::from("."), PathBuf::from),
@@ -101,22 +110,27 @@ fn unreadable(error: impl ToString) -> CatalystError {
     CatalystError::Configuration(error.to_string())
 }
 
-/// The surface of the first channel, for whoever opens the link.
-fn default_config() -> Result<Config, CatalystError> {
-    let config = json!({
-        "version": 1,
-        "stream": {},
-        "pipelines": [{"name": "surface", "every": {"steps": 1}, "stages": [{"surface": {}}, {"stream": {}}]}]
-    });
+/// The surface of each channel, for whoever opens the link.
+pub(crate) fn default_config(channels: &[String]) -> Result<Config, CatalystError> {
+    let stages = json!([{"surface": {}}, {"stream": {}}]);
+    let view = |channel: &String| {
+        // One channel needs no name beside what is seen of it.
+        let name = if channels.len() == 1 { "surface" } else { channel };
+        json!({"name": name, "channel": channel, "every": {"steps": 1}, "stages": stages})
+    };
+    let pipelines: Vec<_> = channels.iter().map(view).collect();
+    let config = json!({"version": 1, "stream": {}, "pipelines": pipelines});
     language::parse(&config.to_string(), "the default configuration").map_err(unreadable)
 }
 
-/// The configurations of all files as one, and what the node itself asks for.
-fn merged(found: &Found) -> Result<Config, CatalystError> {
+/// The configurations of all files as one, and what the node itself asks for; and which pipelines each name in the node stands for.
+fn merged(found: &Found) -> Result<(Option<Config>, Groups), CatalystError> {
     let own = json!({"version": 1, "pipelines": found.pipelines});
     let mut config: Option<Config> = None;
-    for file in &found.files {
+    let mut groups: Groups = found.others.iter().map(|name| (name.clone(), Vec::new())).collect();
+    for (name, file) in &found.files {
         let next = language::parse(&text(file)?, file).map_err(unreadable)?;
+        groups.push((name.clone(), next.pipelines.iter().map(|pipeline| pipeline.name.clone()).collect()));
         match &mut config {
             None => config = Some(next),
             Some(config) => {
@@ -127,13 +141,20 @@ fn merged(found: &Found) -> Result<Config, CatalystError> {
         }
     }
     let own = language::parse(&own.to_string(), "catalyst/pipelines").map_err(unreadable)?;
-    Ok(match config {
+    let config = match config {
         None => own,
         Some(mut config) => {
             config.pipelines.extend(own.pipelines);
             config
         }
-    })
+    };
+    // A pipeline stands for itself too, unless something in the node has its name.
+    for pipeline in &config.pipelines {
+        if !groups.iter().any(|(name, _)| *name == pipeline.name) {
+            groups.push((pipeline.name.clone(), vec![pipeline.name.clone()]));
+        }
+    }
+    Ok((Some(config), groups))
 }
 
 fn each(
@@ -162,9 +183,10 @@ fn script(node: &Node<'_, '_>, found: &mut Found) -> Result<(), CatalystError> {
         _ => node.need(c"filename", "the script's file")?.text()?.into_owned(),
     };
     if is_json(&file) {
-        found.files.push(file);
+        found.files.push((node.name().into_owned(), file));
     } else {
         let path = node.path();
+        found.others.push(node.name().into_owned());
         found.notes.push(format!("'{path}': {file} is not run: a configuration is a file that ends in .json"));
     }
     Ok(())
@@ -280,6 +302,21 @@ fn parameter(node: &Node<'_, '_>, parameters: &mut Vec<Parameter>) -> Result<(),
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_channel_is_seen_where_nobody_says_what_is() {
+        let names = |channels: &[&str]| -> Vec<(String, Option<String>)> {
+            let channels: Vec<String> = channels.iter().map(|&name| name.to_owned()).collect();
+            let pipelines = default_config(&channels).expect("a configuration").pipelines;
+            pipelines.into_iter().map(|pipeline| (pipeline.name, pipeline.channel)).collect()
+        };
+        let some = |name: &str| Some(name.to_owned());
+        assert_eq!(names(&["grid"]), [("surface".to_owned(), some("grid"))]);
+        assert_eq!(
+            names(&["fluid", "solid"]),
+            [("fluid".to_owned(), some("fluid")), ("solid".to_owned(), some("solid"))]
+        );
+    }
 
     #[test]
     fn patterns_of_paraview_become_ours() {

@@ -69,6 +69,9 @@ pub enum CatalystError {
         /// Its status.
         status: Status,
     },
+    /// Ranks let different pipelines run.
+    #[error("'catalyst/state/pipelines': found other names on other ranks; expected the same on all")]
+    Choices,
     /// The adaptor could not be set up.
     #[error(transparent)]
     Initialize(#[from] InitializeError),

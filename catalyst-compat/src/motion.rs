@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use tombolo::Steering;
 use tombolo::deform::mesh::Vector;
+use tombolo::{Parameter, Steering};
 
 /// A motion of the mesh over one step.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -27,6 +27,12 @@ pub(crate) struct Asked {
 }
 
 impl Asked {
+    /// Nothing but what the parameters are.
+    pub(crate) fn of(parameters: &[Parameter]) -> Self {
+        let parameters = parameters.iter().map(|parameter| (parameter.name.clone(), parameter.value)).collect();
+        Self { parameters, ..Self::default() }
+    }
+
     /// The mesh stays where it is.
     pub(crate) fn rest(&mut self) {
         self.motion = None;

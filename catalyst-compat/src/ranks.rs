@@ -43,23 +43,28 @@ pub(crate) fn communicator(_: Option<i32>) -> Result<Arc<dyn Communicator>, Cata
 
 /// Goes on where all ranks can; where one cannot, all get its error with its status. Collective.
 pub(crate) fn agree<T>(ranks: &dyn Communicator, mine: Result<T, CatalystError>) -> Result<T, CatalystError> {
-    agree_and_ask(ranks, mine, false).map(|(mine, _)| mine)
+    agree_and_ask(ranks, mine, false, 0).map(|(mine, _)| mine)
 }
 
-/// The same; says too whether any rank says yes.
+/// The same; says too whether any rank says yes, and is an error where not all have the same `choice` of pipelines.
 pub(crate) fn agree_and_ask<T>(
     ranks: &dyn Communicator,
     mine: Result<T, CatalystError>,
     yes: bool,
+    choice: u32,
 ) -> Result<(T, bool), CatalystError> {
     if ranks.size() == 1 {
         return mine.map(|mine| (mine, yes));
     }
     #[expect(clippy::cast_precision_loss, reason = "ranks below 2^53")]
     let (own, none) = (ranks.rank() as f64, ranks.size() as f64);
-    let mut first = [if mine.is_err() { own } else { none }, if yes { -1.0 } else { 0.0 }];
+    let choice = f64::from(choice);
+    let mut first = [if mine.is_err() { own } else { none }, if yes { -1.0 } else { 0.0 }, choice, -choice];
     ranks.reduce(Reduction::Minimum, &mut first);
     if first[0] >= none {
+        if first[2] != -first[3] {
+            return Err(CatalystError::Choices);
+        }
         return mine.map(|mine| (mine, first[1] < 0.0));
     }
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a rank")]

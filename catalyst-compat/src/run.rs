@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tombolo::comm::Communicator;
+use tombolo::comm::{Alarm, Communicator};
 use tombolo::deform::mesh::MeshView;
 use tombolo::pipelines::extract::{self, FieldView};
 use tombolo::{Adaptor, FinalizeError, OrderReport, Report, Settings, Step};
@@ -27,14 +27,14 @@ pub(crate) struct Run {
     last_time: Option<f64>,
     time_step: f64,
     asked: Asked,
+    /// What the chosen pipelines hash to; 0 where all are.
+    choice: u32,
 }
 
 impl Run {
     /// Begins. Collective.
     pub(crate) fn new(settings: Settings) -> Result<Self, CatalystError> {
-        let mut asked = Asked::default();
-        let parameters = settings.parameters.iter();
-        asked.parameters.extend(parameters.map(|parameter| (parameter.name.clone(), parameter.value)));
+        let asked = Asked::of(&settings.parameters);
         let communicator = Arc::clone(&settings.communicator);
         let adaptor = Adaptor::initialize(settings)?;
         Ok(Self {
@@ -46,7 +46,26 @@ impl Run {
             last_time: None,
             time_step: 0.0,
             asked,
+            choice: 0,
         })
+    }
+
+    /// To be held while all ranks are in a call.
+    pub(crate) fn alarm(&self) -> Alarm {
+        Alarm::among(&self.communicator)
+    }
+
+    /// Lets only these pipelines run from now on; `None`: all.
+    pub(crate) fn choose(&mut self, names: Option<&[&str]>) {
+        let choice = names.map_or(0, |names| {
+            let bytes = names.iter().flat_map(|name| name.bytes().chain([b'\n']));
+            // Not 0, which is all of them.
+            bytes.fold(0x811c_9dc5, |hash: u32, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)).max(1)
+        });
+        if choice != self.choice {
+            self.choice = choice;
+            self.adaptor.choose_pipelines(|name| names.is_none_or(|names| names.contains(&name)));
+        }
     }
 
     /// Whether anything is due that looks at the mesh and its fields.
@@ -100,7 +119,8 @@ impl Run {
             }
             Ok((step, channels))
         });
-        let ((step, mut channels), is_other) = ranks::agree_and_ask(&*self.communicator, prepared, is_other)?;
+        let ((step, mut channels), is_other) =
+            ranks::agree_and_ask(&*self.communicator, prepared, is_other, self.choice)?;
         if is_other {
             self.adaptor.release_shape(OTHER_MESH);
         }

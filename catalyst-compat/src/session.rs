@@ -2,11 +2,14 @@
 
 use std::sync::Arc;
 
+use tombolo::comm::{Alarm, Communicator};
+use tombolo::pipelines::language::nearest;
 use tombolo::{InitializeError, Settings, Step};
 
-use crate::configuration::{self, Configuration};
+use crate::configuration::{self, Configuration, Groups, default_config};
 use crate::error::CatalystError;
 use crate::mesh::Channel;
+use crate::motion::Asked;
 use crate::node::{Kind, Node, NodeMut};
 use crate::ranks;
 use crate::results::{self, STEERING};
@@ -14,8 +17,18 @@ use crate::run::Run;
 
 /// A run that is described by nodes.
 pub(crate) struct Session {
-    run: Run,
-    is_first: bool,
+    stage: Stage,
+    communicator: Arc<dyn Communicator>,
+    groups: Groups,
+}
+
+enum Stage {
+    /// Nobody says what to watch, so that it begins with the first step: its channels are watched.
+    Waiting {
+        settings: Box<Settings>,
+        asked: Asked,
+    },
+    UnderWay(Box<Run>),
 }
 
 impl Session {
@@ -24,37 +37,68 @@ impl Session {
         let configuration = Configuration::read(node);
         let handle = configuration.as_ref().ok().and_then(|configuration| configuration.communicator);
         let communicator = ranks::communicator(handle)?;
-        let Configuration { config, is_default, parameters, orders, output, notes, .. } =
+        let Configuration { config, groups, parameters, orders, output, notes, .. } =
             ranks::agree(&*communicator, configuration)?;
-        let is_first = communicator.rank() == 0;
-        if is_first {
+        let is_default = config.is_none();
+        let config = config.unwrap_or_else(|| Settings::default().config);
+        let settings =
+            Settings { config, communicator: Arc::clone(&communicator), solvers: None, parameters, orders, output };
+        let stage = if is_default {
+            let asked = Asked::of(&settings.parameters);
+            Stage::Waiting { settings: Box::new(settings), asked }
+        } else {
+            Stage::UnderWay(Box::new(Run::new(settings)?))
+        };
+        let session = Self { stage, communicator, groups };
+        if session.communicator.rank() == 0 {
             notes.iter().for_each(|note| eprintln!("tombolo: {note}"));
         }
-        let mut settings =
-            Settings { config, communicator: Arc::clone(&communicator), solvers: None, parameters, orders, output };
-        let run = match Run::new(settings.clone()) {
-            // Nobody asked for that very port.
-            Err(CatalystError::Initialize(InitializeError::Stream(_))) if is_default && communicator.size() == 1 => {
-                if let Some(stream) = &mut settings.config.stream {
-                    stream.listen.set_port(0);
-                }
-                Run::new(settings)?
-            }
-            run => run?,
-        };
-        if let Some(link) = run.link().filter(|_| is_first) {
+        session.tell_link();
+        Ok(session)
+    }
+
+    fn tell_link(&self) {
+        if let Stage::UnderWay(run) = &self.stage
+            && let Some(link) = run.link().filter(|_| self.communicator.rank() == 0)
+        {
             eprintln!("tombolo: open {link}");
         }
-        Ok(Self { run, is_first })
     }
 
     /// Shows a step to the adaptor. Collective.
     pub(crate) fn execute(&mut self, node: &Node<'_, '_>) -> Result<(), CatalystError> {
-        let given = self.read(node);
-        self.run.execute(given)
+        let _alarm = Alarm::among(&self.communicator);
+        let mut given = self.read(node);
+        if let Stage::Waiting { settings, .. } = &mut self.stage {
+            let (step, channels) = ranks::agree(&*self.communicator, given)?;
+            let own: Vec<&str> = channels.iter().map(|channel| channel.name.as_str()).collect();
+            let names = ranks::union(&*self.communicator, &own);
+            // A solver that shows nothing yet is asked for nothing.
+            if names.is_empty() {
+                return Ok(());
+            }
+            settings.config = default_config(&names)?;
+            let run = match Run::new((**settings).clone()) {
+                // Nobody asked for that very port.
+                Err(CatalystError::Initialize(InitializeError::Stream(_))) if self.communicator.size() == 1 => {
+                    if let Some(stream) = &mut settings.config.stream {
+                        stream.listen.set_port(0);
+                    }
+                    Run::new((**settings).clone())?
+                }
+                run => run?,
+            };
+            self.stage = Stage::UnderWay(Box::new(run));
+            self.tell_link();
+            given = Ok((step, channels));
+        }
+        match &mut self.stage {
+            Stage::UnderWay(run) => run.execute(given),
+            Stage::Waiting { .. } => Ok(()),
+        }
     }
 
-    fn read<'call>(&self, node: &Node<'_, 'call>) -> Result<(Step, Vec<Channel<'call>>), CatalystError> {
+    fn read<'call>(&mut self, node: &Node<'_, 'call>) -> Result<(Step, Vec<Channel<'call>>), CatalystError> {
         let catalyst = node.need(c"catalyst", "an object with 'state' and 'channels'")?;
         let state = catalyst.need(c"state", "an object with 'timestep' (or 'cycle') and 'time'")?;
         let cycle = match state.child(c"timestep") {
@@ -71,10 +115,11 @@ impl Session {
                 value if value >= 0.0 => value,
                 value => return Err(length.wrong_found(format!("{value}"), "a number from 0 on".into())),
             },
-            None => self.run.likely_time_step(time),
+            None => self.under_way().map_or(0.0, |run| run.likely_time_step(time)),
         };
         let step = Step { cycle, time, time_step };
-        let looked_at = self.run.looks_at(&step);
+        self.choose(state.child(c"pipelines").or_else(|| catalyst.child(c"pipelines")).as_ref())?;
+        let looked_at = self.under_way().is_none_or(|run| run.looks_at(&step));
         let mut channels = Vec::new();
         if let Some(all) = catalyst.child(c"channels") {
             if !matches!(all.kind(), Kind::Object | Kind::Empty) {
@@ -92,16 +137,57 @@ impl Session {
         Ok((step, channels))
     }
 
+    fn under_way(&self) -> Option<&Run> {
+        match &self.stage {
+            Stage::UnderWay(run) => Some(run),
+            Stage::Waiting { .. } => None,
+        }
+    }
+
+    /// Lets the pipelines run that a list of names chooses; all where there is none, and none where it is anything else.
+    fn choose(&mut self, node: Option<&Node<'_, '_>>) -> Result<(), CatalystError> {
+        let Stage::UnderWay(run) = &mut self.stage else { return Ok(()) };
+        // The names are those of another implementation's scripts where the configuration does not come from the solver.
+        let Some(node) = node.filter(|_| !self.groups.is_empty()) else {
+            run.choose(None);
+            return Ok(());
+        };
+        let mut chosen: Vec<&str> = Vec::new();
+        if matches!(node.kind(), Kind::Object | Kind::List) {
+            for (index, name) in node.names().iter().enumerate() {
+                let Some(child) = node.at(index, name) else { continue };
+                let wanted = child.text()?;
+                let Some((_, pipelines)) = self.groups.iter().find(|(name, _)| *name == *wanted) else {
+                    let known: Vec<&str> = self.groups.iter().map(|(name, _)| name.as_str()).collect();
+                    let hint = nearest(&wanted, known.iter().copied())
+                        .map_or_else(String::new, |name| format!("; did you mean '{name}'?"));
+                    let expected = format!("one of {}{hint}", known.join(", "));
+                    return Err(child.wrong_found(format!("'{wanted}'"), expected));
+                };
+                chosen.extend(pipelines.iter().map(String::as_str));
+            }
+        }
+        run.choose(Some(&chosen));
+        Ok(())
+    }
+
     /// Fills in what the adaptor asks for the step that follows.
     pub(crate) fn results(&self, node: &mut NodeMut<'_>) {
-        let (steered, blocks) = self.run.steered();
-        results::fill(node, self.run.asked(), steered, blocks);
+        match &self.stage {
+            Stage::UnderWay(run) => {
+                let (steered, blocks) = run.steered();
+                results::fill(node, run.asked(), steered, blocks);
+            }
+            Stage::Waiting { asked, .. } => results::fill(node, asked, "", &[]),
+        }
     }
 
     /// Ends the run. Collective.
     pub(crate) fn finalize(self) -> Result<(), CatalystError> {
-        let (report, ended) = self.run.finalize();
-        if let (Some(report), Some(file)) = (report.filter(|_| self.is_first), configuration::report_file()) {
+        let Stage::UnderWay(run) = self.stage else { return Ok(()) };
+        let (report, ended) = run.finalize();
+        let report = report.filter(|_| self.communicator.rank() == 0);
+        if let (Some(report), Some(file)) = (report, configuration::report_file()) {
             let text = serde_json::to_string_pretty(&report).unwrap_or_default();
             std::fs::write(&file, text).map_err(|error| CatalystError::Configuration(format!("{file}: {error}")))?;
         }

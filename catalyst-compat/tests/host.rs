@@ -213,6 +213,34 @@ fn every_mesh_of_the_blueprint_arrives() {
 }
 
 #[test]
+fn a_step_says_which_pipelines_run() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let pipelines = directory.path().join("pipelines.json");
+    let write = r#"{"version": 1, "pipelines": [
+        {"name": "inner", "stages": [{"write": {"file": "inner-{cycle:1}.vtu"}}]},
+        {"name": "outer", "stages": [{"surface": {}}, {"write": {"file": "outer-{cycle:1}.vtp"}}]}]}"#;
+    std::fs::write(&pipelines, write).expect("a file");
+    let written = directory.path().join("out");
+    let program = compile(directory.path(), "choice", true);
+    let (output, errors) = run(&program, Some(&pipelines), &[("TOMBOLO_OUTPUT", &written.to_string_lossy())]);
+    assert!(output.status.success(), "{errors}");
+    assert!(errors.contains("'catalyst/state/pipelines/[0]': found 'bothh'; expected one of"), "{errors}");
+    assert!(errors.contains("did you mean 'both'?"), "{errors}");
+    let mut files: Vec<String> = std::fs::read_dir(&written)
+        .expect("files were written")
+        .map(|file| file.expect("a file").file_name().to_string_lossy().into_owned())
+        .filter(|name| !name.ends_with(".pvd"))
+        .collect();
+    files.sort_unstable();
+    let all = |cycle: u32| ["a", "b", "inner", "outer"].map(|name| format!("{name}-{cycle}"));
+    let mut expected: Vec<String> = all(0).into_iter().chain(all(6)).collect();
+    expected.extend(["a-1", "inner-3", "outer-3", "b-4", "inner-4"].map(str::to_owned));
+    expected.iter_mut().for_each(|name| name.push_str(if name.starts_with("outer") { ".vtp" } else { ".vtu" }));
+    expected.sort_unstable();
+    assert_eq!(files, expected);
+}
+
+#[test]
 fn rubbish_is_answered() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let stream = directory.path().join("stream.json");

@@ -3,9 +3,11 @@
 //! A [`Communicator`] is one process ([`Solo`]), the ranks of an MPI communicator (the adaptor's, with its feature `distributed`),
 //! or a number of [`threads`] of one process. [`Counted`] counts what goes through one.
 
+mod alarm;
 mod counted;
 pub mod threads;
 
+pub use alarm::Alarm;
 pub use counted::{Counted, Traffic};
 pub use threads::Threads;
 
@@ -13,8 +15,8 @@ pub use tombolo_deform::partition::Reduction;
 
 /// The processes that run together: one ([`Solo`]) or the ranks of an MPI communicator.
 ///
-/// Every method but [`rank`](Communicator::rank) and [`size`](Communicator::size) is collective: all ranks call it, in the same
-/// order, or all wait.
+/// Every method but [`rank`](Communicator::rank), [`size`](Communicator::size) and [`abort`](Communicator::abort) is collective: all
+/// ranks call it, in the same order, or all wait.
 pub trait Communicator: Send + Sync {
     /// This process's number, from 0.
     fn rank(&self) -> usize;
@@ -31,6 +33,8 @@ pub trait Communicator: Send + Sync {
     /// Sends each message to its rank, this one too if it is named, and returns those sent here with their senders, in the
     /// order of the senders and for each in the order in which it named them. A rank with nothing to say sends nothing, but calls.
     fn exchange(&self, messages: Vec<(usize, Vec<u8>)>) -> Vec<(usize, Vec<u8>)>;
+    /// Ends all ranks, because this one cannot go on; where the others are processes, this one too. For defects alone: see [`Alarm`].
+    fn abort(&self);
 }
 
 /// How many ranks hand what they have to one of them in the tree by which values come together.
@@ -142,6 +146,9 @@ macro_rules! forwarded {
             fn exchange(&self, messages: Vec<(usize, Vec<u8>)>) -> Vec<(usize, Vec<u8>)> {
                 (**self).exchange(messages)
             }
+            fn abort(&self) {
+                (**self).abort();
+            }
         }
     )*};
 }
@@ -168,6 +175,7 @@ impl Communicator for Solo {
     fn exchange(&self, messages: Vec<(usize, Vec<u8>)>) -> Vec<(usize, Vec<u8>)> {
         messages.into_iter().filter(|(to, _)| *to == 0).collect()
     }
+    fn abort(&self) {}
 }
 
 #[cfg(test)]

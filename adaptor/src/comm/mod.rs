@@ -5,7 +5,7 @@ mod meeting;
 pub mod mpi;
 
 pub use tombolo_pipelines::communicator::{
-    Communicator, Counted, RankError, Reduction, Solo, Threads, Traffic, agree as agree_on, threads,
+    Alarm, Communicator, Counted, RankError, Reduction, Solo, Threads, Traffic, agree as agree_on, threads,
 };
 
 pub(crate) use meeting::meet;

@@ -339,4 +339,13 @@ impl Communicator for Mpi {
         heard.sort_by_key(|(from, _)| *from);
         heard
     }
+
+    fn abort(&self) {
+        eprintln!(
+            "tombolo: rank {} failed in itself; all ranks are ended, because the others would wait for it",
+            self.rank
+        );
+        // SAFETY: the handle is alive while this is.
+        unsafe { ffi::MPI_Abort(self.as_raw(), 1) };
+    }
 }

@@ -8,9 +8,11 @@
 )]
 
 use std::{
+    any::Any,
     ffi::CStr,
     fmt,
     os::raw::c_void,
+    panic::{AssertUnwindSafe, catch_unwind, resume_unwind},
     ptr::null_mut,
     sync::{Arc, Mutex, PoisonError},
 };
@@ -403,13 +405,17 @@ impl<const B: usize> LinearSolver<B> for System<B> {
         let convergence = match &self.schwarz {
             None => self.iterate(handles, tolerance, whole)?,
             Some(schwarz) => schwarz.with_own_cycle(1.0 / whole, |cycle| {
-                let mut context = Context::<B> { system: self, cycle, values: (Vec::new(), Vec::new()) };
-                context.values = (vec![[0.0; B]; self.rows], vec![[0.0; B]; self.rows]);
+                let values = (vec![[0.0; B]; self.rows], vec![[0.0; B]; self.rows]);
+                let mut context = Context::<B> { system: self, cycle, values, panic: None };
                 // SAFETY: the context lives until the solve has ended, and is taken away then.
                 done(unsafe { sys::PCShellSetContext(handles.preconditioner, (&raw mut context).cast()) })?;
                 let convergence = self.iterate(handles, tolerance, whole);
                 // SAFETY: as above.
                 done(unsafe { sys::PCShellSetContext(handles.preconditioner, null_mut()) })?;
+                // Not through PETSc, but on: the other ranks wait for this one.
+                if let Some(panic) = context.panic {
+                    resume_unwind(panic);
+                }
                 convergence
             })?,
         };
@@ -434,6 +440,8 @@ struct Context<'a, const B: usize> {
     system: &'a System<B>,
     cycle: Cycle<'a, B>,
     values: (Vec<[f64; B]>, Vec<[f64; B]>),
+    /// What a cycle panicked with.
+    panic: Option<Box<dyn Any + Send>>,
 }
 
 /// Applies a rank's own cycle, and adds up what all ranks have found.
@@ -448,15 +456,22 @@ unsafe extern "C" fn apply<const B: usize>(pc: sys::PC, vector: sys::Vec, result
     let code = unsafe { sys::PCShellGetContext(pc, (&raw mut context).cast::<c_void>()) };
     // SAFETY: it lives until the solve ends, and nobody else has it meanwhile: the solve holds the handles' lock.
     let Some(context) = (unsafe { context.as_mut() }).filter(|_| code == 0) else { return USER };
-    let Context { system, cycle, values: (before, after) } = context;
-    let applied = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+    let Context { system, cycle, values: (before, after), panic } = context;
+    let applied = catch_unwind(AssertUnwindSafe(|| {
         system.spread(vector, before)?;
         after.fill([0.0; B]);
         cycle(before, after);
         system.numbering.shares.sum(&*system.partition, B, after.as_flattened_mut());
         system.put(after, result)
     }));
-    if matches!(applied, Ok(Ok(()))) { 0 } else { USER }
+    match applied {
+        Ok(Ok(())) => 0,
+        Ok(Err(_)) => USER,
+        Err(reason) => {
+            *panic = Some(reason);
+            USER
+        }
+    }
 }
 
 /// Calls `work` with this rank's values of a vector.

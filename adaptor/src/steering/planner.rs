@@ -86,8 +86,8 @@ impl Planner {
         let Wish { stack, kept, start, deform, schedule, guard } = wish;
         let shaper = &mut self.shaper;
         let plan = match target {
-            Some(target) => caught(|| shaper.go(start, &target, schedule, guard)),
-            None => caught(|| shaper.reach(stack, *kept, start, deform, schedule, guard)),
+            Some(target) => caught(shaper, |shaper| shaper.go(start, &target, schedule, guard)),
+            None => caught(shaper, |shaper| shaper.reach(stack, *kept, start, deform, schedule, guard)),
         };
         let plan = plan.map_err(|rejection| Rejection { seconds: self.shaper.spent(), ..rejection });
         if self.known.len() >= REMEMBERED {
@@ -109,14 +109,19 @@ impl Planner {
 
     /// Sets the operator of the volume up. One that cannot be made is reported by the order that needs it.
     pub(crate) fn prepare(&mut self, deform: &DeformStage) {
-        let _ = caught(|| self.shaper.prepare(deform));
+        let _ = caught(&mut self.shaper, |shaper| shaper.prepare(deform));
     }
 }
 
 /// Runs a piece of the kernel so that a fault in it rejects one order instead of ending the solver. A panic leaves at worst a
-/// cache without its entry.
-fn caught<T>(attempt: impl FnOnce() -> Result<T, Refused>) -> Result<T, Rejection> {
-    match std::panic::catch_unwind(std::panic::AssertUnwindSafe(attempt)) {
+/// cache without its entry. In parts it goes through, because the ranks that did not panic wait for this one.
+fn caught<T>(shaper: &mut Shaper, attempt: impl FnOnce(&mut Shaper) -> Result<T, Refused>) -> Result<T, Rejection> {
+    let attempted = if shaper.partition().ranks() > 1 {
+        Ok(attempt(shaper))
+    } else {
+        std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| attempt(shaper)))
+    };
+    match attempted {
         Ok(result) => result.map_err(|refused| Rejection {
             min_scaled_jacobian: refused.min_scaled_jacobian(),
             fraction: refused.feasible_fraction(),

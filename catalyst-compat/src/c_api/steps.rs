@@ -22,6 +22,7 @@ pub unsafe extern "C" fn tombolo_execute(run: *mut Handle, cycle: u64, time: f64
         let Stage::UnderWay(under_way) = &mut run.stage else {
             return Err(Fault::Call("called outside of tombolo_initialize ... tombolo_finalize".into()));
         };
+        let _alarm = under_way.alarm();
         // SAFETY: as the module says: the arrays live while this call runs.
         let channels: Result<Vec<_>, _> = run.channels.iter().map(|named| unsafe { named.channel() }).collect();
         let given = channels.map(|channels| (Step { cycle, time, time_step }, channels));

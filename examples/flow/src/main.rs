@@ -82,7 +82,10 @@ fn under_mpirun() -> bool {
 #[cfg(feature = "distributed")]
 fn on_ranks(work: impl FnOnce(Ranks, Option<Solvers>) -> Result<(), Box<dyn std::error::Error>>) -> Result<(), String> {
     use tombolo::{
-        comm::mpi::{Mpi, rsmpi},
+        comm::{
+            Alarm,
+            mpi::{Mpi, rsmpi},
+        },
         distributed::{Petsc, Preconditioning},
     };
     if !under_mpirun() {
@@ -91,6 +94,8 @@ fn on_ranks(work: impl FnOnce(Ranks, Option<Solvers>) -> Result<(), Box<dyn std:
     let (universe, _) = rsmpi::initialize_with_threading(rsmpi::Threading::Funneled)
         .ok_or_else(|| "MPI could not be initialized".to_owned())?;
     let ranks: Ranks = Arc::new(Mpi::new(&universe.world()).map_err(|error| error.to_string())?);
+    // Before MPI would be finalized, which waits for the other ranks.
+    let _alarm = Alarm::among(&ranks);
     let is_first = ranks.rank() == 0;
     let solvers = Petsc::solvers(&universe.world(), Preconditioning::default()).map_err(|error| error.to_string())?;
     work(ranks, Some(solvers)).map_err(|error| {

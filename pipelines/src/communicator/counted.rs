@@ -150,4 +150,8 @@ impl<C: Communicator> Communicator for Counted<C> {
         others(&heard, &self.heard);
         heard
     }
+
+    fn abort(&self) {
+        self.communicator.abort();
+    }
 }

@@ -126,6 +126,12 @@ impl Communicator for Threads {
     fn exchange(&self, messages: Vec<(usize, Vec<u8>)>) -> Vec<(usize, Vec<u8>)> {
         self.meet("exchange", messages)
     }
+
+    /// The others panic where they wait for this one, now or later.
+    fn abort(&self) {
+        self.board.state.lock().unwrap_or_else(PoisonError::into_inner).gone.get_or_insert(self.rank);
+        self.board.met.notify_all();
+    }
 }
 
 /// Tells the others when its rank ends before its time.
@@ -134,9 +140,7 @@ struct Presence(Threads);
 impl Drop for Presence {
     fn drop(&mut self) {
         if thread::panicking() {
-            let Threads { rank, board, .. } = &self.0;
-            board.state.lock().unwrap_or_else(PoisonError::into_inner).gone.get_or_insert(*rank);
-            board.met.notify_all();
+            self.0.abort();
         }
     }
 }

@@ -87,7 +87,15 @@ impl Runner {
     #[must_use]
     #[inline]
     pub fn is_due(&self, cycle: u64, time: f64) -> bool {
-        self.pipelines.iter().any(|prepared| prepared.due.is_due(cycle, time))
+        self.pipelines.iter().any(|prepared| prepared.is_chosen && prepared.due.is_due(cycle, time))
+    }
+
+    /// Lets only those pipelines run from now on whose names are chosen; the others wait, and are due again once they are chosen. On
+    /// all processes alike.
+    pub fn choose(&mut self, is_chosen: impl Fn(&str) -> bool) {
+        for prepared in &mut self.pipelines {
+            prepared.is_chosen = is_chosen(&prepared.pipeline.name);
+        }
     }
 
     /// Runs the pipelines that are due, in the order of the configuration. Collective.
@@ -97,7 +105,7 @@ impl Runner {
     pub fn run(&mut self, snapshot: &Snapshot) -> Vec<Output> {
         let mut outputs = Vec::new();
         for prepared in &mut self.pipelines {
-            if !prepared.due.is_due(snapshot.cycle, snapshot.time) {
+            if !prepared.is_chosen || !prepared.due.is_due(snapshot.cycle, snapshot.time) {
                 continue;
             }
             prepared.due.take(snapshot.cycle, snapshot.time);

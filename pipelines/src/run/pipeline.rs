@@ -24,6 +24,8 @@ const QUALITY_FIELD: &str = "scaled_jacobian";
 pub(super) struct Prepared {
     pub(super) pipeline: Pipeline,
     pub(super) due: Clock,
+    /// Whether it runs when it is due.
+    pub(super) is_chosen: bool,
     name: Arc<str>,
     /// The fields to keep, where a `select` stage says so.
     selected: Option<HashSet<String>>,
@@ -79,6 +81,7 @@ impl Prepared {
         }
         Ok(Self {
             due: Clock::new(pipeline.due),
+            is_chosen: true,
             name: pipeline.name.as_str().into(),
             selected,
             condition,
