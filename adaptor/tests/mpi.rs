@@ -183,8 +183,13 @@ fn everything(ranks: &dyn Communicator) {
     ranks.barrier();
 }
 
-const PRECONDITIONINGS: [Preconditioning; 4] =
-    [Preconditioning::Schwarz, Preconditioning::IncompleteCholesky, Preconditioning::Gamg, Preconditioning::Jacobi];
+const PRECONDITIONINGS: [Preconditioning; 5] = [
+    Preconditioning::Automatic,
+    Preconditioning::Schwarz,
+    Preconditioning::IncompleteCholesky,
+    Preconditioning::Gamg,
+    Preconditioning::Jacobi,
+];
 
 /// PETSc moves the volume as one process does, again on cells that have moved, and says why it cannot.
 fn solved(world: &rsmpi::topology::SimpleCommunicator, preconditioning: Preconditioning, cells: [usize; 3]) {

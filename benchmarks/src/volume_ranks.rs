@@ -13,6 +13,7 @@ use tombolo::{
     },
     deform::{
         mesh::{FeatureSource, Mesh, Vector},
+        partition::Partition as _,
         surface::FeatureSettings,
         volume::{Deform, VolumeOperator},
     },
@@ -79,6 +80,9 @@ pub fn run(number: usize, displacement: &Path) -> Result<(), Box<dyn Error>> {
     let shared = Arc::new(shared);
     let own = Mesh::new(part.points.clone(), part.cells.clone(), FeatureSource::SharpEdges)?;
     let motion: Vec<Vector> = boundary.vertices().iter().map(|&vertex| motion[vertex as usize]).collect();
+    // Those whose displacement is not prescribed.
+    let mut prescribed = vec![false; part.points.len()];
+    boundary.vertices().iter().for_each(|&vertex| prescribed[vertex as usize] = true);
     let solvers = [
         ("kernel", None),
         ("PETSc, Schwarz", Some(Preconditioning::Schwarz)),
@@ -91,11 +95,15 @@ pub fn run(number: usize, displacement: &Path) -> Result<(), Box<dyn Error>> {
         let petsc: Option<Solvers> =
             preconditioning.map(|preconditioning| Petsc::solvers(&world, preconditioning)).transpose()?;
         let ranks = Ranks::new(Arc::clone(&communicator), Arc::clone(&shared), &boundary, Vec::new());
+        let mut unknown =
+            [(0..).zip(&prescribed).filter(|&(vertex, &known)| !known && ranks.owns(vertex)).count() as f64];
+        communicator.reduce(Reduction::Sum, &mut unknown);
+        let default = Preconditioning::default().chosen(unknown[0] as usize, communicator.size());
         let partition = match &petsc {
             Some(petsc) => petsc(ranks, &part.points),
             None => Arc::new(ranks),
         };
-        let mut measure = || -> Result<OnRanks, Box<dyn Error + Send + Sync>> {
+        let measure = || -> Result<OnRanks, Box<dyn Error + Send + Sync>> {
             let (mut set_up, mut first, mut later, mut iterations) = (vec![], vec![], vec![], 0);
             let settings = Deform { tolerance: TOLERANCE, ..Deform::default() };
             for _ in 0..RUNS {
@@ -123,7 +131,7 @@ pub fn run(number: usize, displacement: &Path) -> Result<(), Box<dyn Error>> {
             let middle = |times: &mut Vec<f64>| crate::measure::middle(times);
             Ok(OnRanks {
                 solver: solver.into(),
-                is_default: preconditioning == Some(Preconditioning::default()),
+                is_default: preconditioning == Some(default),
                 set_up: middle(&mut set_up),
                 first: middle(&mut first),
                 later: middle(&mut later),
@@ -131,7 +139,7 @@ pub fn run(number: usize, displacement: &Path) -> Result<(), Box<dyn Error>> {
                 difference: sizes[0] / sizes[1],
             })
         };
-        found.push(threads.install(&mut measure).map_err(|error| error.to_string())?);
+        found.push(threads.install(measure).map_err(|error| error.to_string())?);
     }
     if rank == 0 {
         println!("tombolo {}", serde_json::to_string(&found)?);

@@ -113,10 +113,10 @@ fn unreadable(error: impl ToString) -> CatalystError {
 /// The surface of each channel, for whoever opens the link.
 pub(crate) fn default_config(channels: &[String]) -> Result<Config, CatalystError> {
     let stages = json!([{"surface": {}}, {"stream": {}}]);
-    let view = |channel: &String| {
+    let view = |channel: &String| match channels {
         // One channel needs no name beside what is seen of it.
-        let name = if channels.len() == 1 { "surface" } else { channel };
-        json!({"name": name, "channel": channel, "every": {"steps": 1}, "stages": stages})
+        [_] => json!({"name": "surface", "every": {"steps": 1}, "stages": stages}),
+        _ => json!({"name": channel, "channel": channel, "every": {"steps": 1}, "stages": stages}),
     };
     let pipelines: Vec<_> = channels.iter().map(view).collect();
     let config = json!({"version": 1, "stream": {}, "pipelines": pipelines});
@@ -311,7 +311,7 @@ mod tests {
             pipelines.into_iter().map(|pipeline| (pipeline.name, pipeline.channel)).collect()
         };
         let some = |name: &str| Some(name.to_owned());
-        assert_eq!(names(&["grid"]), [("surface".to_owned(), some("grid"))]);
+        assert_eq!(names(&["grid"]), [("surface".to_owned(), None)]);
         assert_eq!(
             names(&["fluid", "solid"]),
             [("fluid".to_owned(), some("fluid")), ("solid".to_owned(), some("solid"))]

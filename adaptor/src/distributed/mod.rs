@@ -38,8 +38,11 @@ use system::System;
 /// What conjugate gradients are preconditioned by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Preconditioning {
-    /// The V-cycles of the kernel's own multigrid on each rank, added up: see [`Schwarz`](tombolo_deform::linear::Schwarz).
+    /// The one of the others that takes least from the first set-up to the first displacement, by what was measured: see
+    /// [`chosen`](Self::chosen).
     #[default]
+    Automatic,
+    /// The V-cycles of the kernel's own multigrid on each rank, added up: see [`Schwarz`](tombolo_deform::linear::Schwarz).
     Schwarz,
     /// Incomplete Cholesky without fill on each rank.
     IncompleteCholesky,
@@ -48,6 +51,23 @@ pub enum Preconditioning {
     Gamg,
     /// The diagonal.
     Jacobi,
+}
+
+/// From how many unknown vertices on V-cycles are quicker than incomplete Cholesky, on one rank and on several, between which V-cycles
+/// do not see: the benchmark `volume` measures it.
+const FROM_VERTICES: [usize; 2] = [25_000, 120_000];
+
+impl Preconditioning {
+    /// What [`Automatic`](Self::Automatic) comes to for so many unknown vertices of all ranks together: [`Schwarz`](Self::Schwarz) for
+    /// many, [`IncompleteCholesky`](Self::IncompleteCholesky) for few. The others are what they are.
+    #[must_use]
+    pub fn chosen(self, vertices: usize, ranks: usize) -> Self {
+        match self {
+            Self::Automatic if vertices >= FROM_VERTICES[usize::from(ranks > 1)] => Self::Schwarz,
+            Self::Automatic => Self::IncompleteCholesky,
+            other => other,
+        }
+    }
 }
 
 /// The [`Partition`] of a mesh whose linear systems PETSc solves. PETSc is initialized by the first one on the ranks of its

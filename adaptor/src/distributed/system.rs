@@ -49,6 +49,8 @@ struct Numbering {
     numbers: Arc<[PetscInt]>,
     /// The unknowns that this rank speaks for, in the order of their numbers.
     owned: Arc<[u32]>,
+    /// How many there are in all.
+    total: usize,
 }
 
 impl Numbering {
@@ -71,7 +73,7 @@ impl Numbering {
         shares.sum(partition, 1, &mut numbers);
         #[expect(clippy::cast_possible_truncation, reason = "checked above")]
         let numbers = numbers.into_iter().map(|number| number as PetscInt).collect();
-        Ok(Self { shares, numbers, owned: owned.into() })
+        Ok(Self { shares, numbers, owned: owned.into(), total: total as usize })
     }
 }
 
@@ -137,6 +139,7 @@ impl<const B: usize> System<B> {
         preconditioning: Preconditioning,
     ) -> Result<Self, LinearError> {
         let numbering = Numbering::new(&*partition, vertices)?;
+        let preconditioning = preconditioning.chosen(numbering.total, partition.ranks());
         let schwarz = (preconditioning == Preconditioning::Schwarz)
             .then(|| Schwarz::new(Arc::clone(&partition), Arc::clone(&matrix), vertices))
             .transpose()?;
@@ -266,7 +269,8 @@ impl<const B: usize> System<B> {
     fn precondition(&self, handles: &mut Handles, comm: mpi::ffi::MPI_Comm) -> Result<(), LinearError> {
         let name: &CStr = match self.preconditioning {
             Preconditioning::Schwarz => c"shell",
-            Preconditioning::IncompleteCholesky => c"bjacobi",
+            // Chosen before.
+            Preconditioning::Automatic | Preconditioning::IncompleteCholesky => c"bjacobi",
             Preconditioning::Gamg => c"gamg",
             Preconditioning::Jacobi => c"pbjacobi",
         };
