@@ -334,6 +334,38 @@ const steps = [
     check(Math.abs(pixels - shared.pixels) <= 3, `the throat is ${pixels} pixels high, it was ${shared.pixels}`);
     await picture("undone");
   }],
+  ["the shape is bent by a node of its skeleton", async () => {
+    await page.click("#skeleton");
+    const bones = await (await page.waitForFunction(() => window.tombolo.skeleton, null, { timeout: 60000 })).jsonValue();
+    check(bones.segments >= bones.nodes - 1 && bones.places.length > 10, `the skeleton has ${bones.nodes} nodes and ${bones.segments} segments`);
+    await page.waitForTimeout(300);
+    const { messages } = traffic;
+    const place = await page.evaluate(() => window.tombolo.skeleton.places).then((places) => places[places.length >> 1]);
+    await page.keyboard.down("Control");
+    await page.mouse.move(...place);
+    await page.mouse.down();
+    for (let step = 1; step <= 5; step++) {
+      await page.mouse.move(place[0], place[1] - 3 * step);
+      await until("the preview of the bend", ({ preview: now }) => {
+        check(now.state !== "failed", `there is no preview: ${now.reason}`);
+        return now.state === "shown";
+      }, 30000);
+    }
+    await page.mouse.up();
+    await page.keyboard.up("Control");
+    check(traffic.messages === messages, "messages were sent while bending");
+    const by = await Promise.all(["x", "y", "z"].map((axis) => page.inputValue(`.object:not([hidden]) input[aria-label="by ${axis}"]`)));
+    const { preview } = await look();
+    const length = Math.hypot(...by.map(Number));
+    check(length > 0 && preview.largest > 0.5 * length && preview.largest < 3 * length, `a node was dragged by ${by}, the surface moves by up to ${preview.largest}`);
+    const { forecast } = await until("the forecast of the bend", ({ forecast: now }) => now.state === "told", 60000);
+    check(forecast.inverted === 0 || forecast.reason, `the forecast is ${JSON.stringify(forecast)}`);
+    await picture("bent");
+    await page.click("#cancel");
+    await page.click("#skeleton");
+    check((await page.evaluate(() => window.tombolo.skeleton)) === null, "the skeleton is still there");
+    await page.selectOption("#action", { label: "scale direction" });
+  }],
   ["pause holds the run, resume lets it go on", async () => {
     await page.click("#pause");
     await until("the run paused", (now) => now.status?.paused === true);
