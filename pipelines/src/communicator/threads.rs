@@ -40,12 +40,21 @@ pub struct Threads {
 }
 
 impl Threads {
+    /// # Panics
+    /// Where a rank will not come any more.
+    fn require_all(&self, purpose: &str, state: &State) {
+        if let Some(gone) = state.gone {
+            panic!("rank {} waits in `{purpose}` for rank {gone}, which has ended", self.rank);
+        }
+    }
+
     /// Brings messages to the next meeting of all ranks and takes those for this rank home from it.
     ///
     /// # Panics
     /// Where another rank has come for something else, or will not come at all: with MPI both would wait for ever.
     fn meet(&self, purpose: &'static str, messages: Vec<Message>) -> Vec<Message> {
         let mut state = self.board.state.lock().unwrap_or_else(PoisonError::into_inner);
+        self.require_all(purpose, &state);
         if state.arrived == 0 {
             state.purpose = purpose;
         } else if state.purpose != purpose {
@@ -67,9 +76,7 @@ impl Threads {
             self.board.met.notify_all();
         }
         while state.meeting == meeting {
-            if let Some(gone) = state.gone {
-                panic!("rank {} waits in `{purpose}` for rank {gone}, which has ended", self.rank);
-            }
+            self.require_all(purpose, &state);
             state = self.board.met.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
         let mut mine = std::mem::take(&mut state.left[self.rank]);
