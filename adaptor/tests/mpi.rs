@@ -75,8 +75,11 @@ fn launch() -> ExitCode {
         .map(|ranks| (format!("ranks_{ranks}"), finish(&mut on(ranks)).is_some_and(|status| status.success())))
         .collect();
     // All ranks are ended where one has a defect: none waits for it.
-    let status = finish(on(3).env(FAILING, "1").stderr(Stdio::null()));
-    outcomes.push(("a_defect_on_one_rank_ends_all".into(), status.is_some_and(|status| !status.success())));
+    let said = tempfile::NamedTempFile::new().unwrap();
+    let status = finish(on(3).env(FAILING, "1").stderr(Stdio::from(said.reopen().unwrap())));
+    let said = std::fs::read_to_string(said.path()).unwrap();
+    let ended = status.is_some_and(|status| !status.success()) && said.contains("rank 1 failed in itself");
+    outcomes.push(("a_defect_on_one_rank_ends_all".into(), ended));
     let failed = outcomes.iter().filter(|(_, passed)| !passed).count();
     for (name, passed) in &outcomes {
         println!("test {name} ... {}", if *passed { "ok" } else { "FAILED" });

@@ -79,7 +79,12 @@ impl Configuration {
             orders = language::parse_orders(&text(&file)?, &file).map_err(unreadable)?;
         }
         let is_default = found.files.is_empty() && found.pipelines.is_empty();
-        let (config, groups) = if is_default { (None, Groups::new()) } else { merged(&found)? };
+        let (config, groups) = if is_default {
+            (None, Groups::new())
+        } else {
+            let (config, groups) = merged(&found)?;
+            (Some(config), groups)
+        };
         Ok(Self {
             config,
             groups: if named_here { groups } else { Groups::new() },
@@ -124,7 +129,7 @@ pub(crate) fn default_config(channels: &[String]) -> Result<Config, CatalystErro
 }
 
 /// The configurations of all files as one, and what the node itself asks for; and which pipelines each name in the node stands for.
-fn merged(found: &Found) -> Result<(Option<Config>, Groups), CatalystError> {
+fn merged(found: &Found) -> Result<(Config, Groups), CatalystError> {
     let own = json!({"version": 1, "pipelines": found.pipelines});
     let mut config: Option<Config> = None;
     let mut groups: Groups = found.others.iter().map(|name| (name.clone(), Vec::new())).collect();
@@ -154,7 +159,7 @@ fn merged(found: &Found) -> Result<(Option<Config>, Groups), CatalystError> {
             groups.push((pipeline.name.clone(), vec![pipeline.name.clone()]));
         }
     }
-    Ok((Some(config), groups))
+    Ok((config, groups))
 }
 
 fn each(

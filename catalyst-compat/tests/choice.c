@@ -2,6 +2,8 @@
  *
  *   cc -rdynamic choice.c -o choice -ldl -lm && ./choice libtombolo_catalyst.so pipelines.json
  *
+ * Without a configuration: three steps of two channels, which nobody said are to be watched.
+ *
  * Writes a-<cycle>.vtu and b-<cycle>.vtu by two pipelines of its own, and whatever the configuration `both` writes. */
 #include <dlfcn.h>
 
@@ -19,18 +21,15 @@ static void writer(conduit_node* setup, const char* name)
   text(setup, path, "grid");
 }
 
-/* A step; `names` are chosen where they are given, up to a null. */
-static int step(const struct catalyst_impl* impl, int cycle, const char* where, const char** names)
+/* A channel of one tetrahedron. */
+static void channel(conduit_node* node, const char* name)
 {
-  static conduit_node node;
   static const char* axes[] = { "x", "y", "z" };
   static double values[3][4] = { { 0, 1, 0, 0 }, { 0, 0, 1, 0 }, { 0, 0, 0, 1 } };
   static int32_t tet[4] = { 0, 1, 2, 3 };
-  clear(&node);
-  integer(&node, "catalyst/state/timestep", cycle);
-  number(&node, "catalyst/state/time", 0.1 * cycle);
-  text(&node, "catalyst/channels/grid/type", "mesh");
-  conduit_node* mesh = at(&node, "catalyst/channels/grid/data");
+  conduit_node* own = at(at(node, "catalyst/channels"), name);
+  text(own, "type", "mesh");
+  conduit_node* mesh = at(own, "data");
   text(mesh, "coordsets/coords/type", "explicit");
   for (int axis = 0; axis < 3; ++axis) {
     char path[64];
@@ -41,6 +40,17 @@ static int step(const struct catalyst_impl* impl, int cycle, const char* where, 
   text(mesh, "topologies/mesh/coordset", "coords");
   text(mesh, "topologies/mesh/elements/shape", "tet");
   array(mesh, "topologies/mesh/elements/connectivity", INT32, tet, 4, 0, 0);
+}
+
+/* A step; `names` are chosen where they are given, up to a null. */
+static int step(const struct catalyst_impl* impl, int cycle, const char* where, const char** names)
+{
+  static conduit_node node;
+  clear(&node);
+  integer(&node, "catalyst/state/timestep", cycle);
+  number(&node, "catalyst/state/time", 0.1 * cycle);
+  channel(&node, "grid");
+  if (!where) channel(&node, "other grid");
   if (names) {
     conduit_node* chosen = at(&node, where);
     if (!*names) integer(&node, where, 0);
@@ -54,10 +64,17 @@ static int step(const struct catalyst_impl* impl, int cycle, const char* where, 
 
 int main(int argc, char** argv)
 {
-  void* library = argc > 2 ? dlopen(argv[1], RTLD_LAZY | RTLD_GLOBAL) : NULL;
+  void* library = argc > 1 ? dlopen(argv[1], RTLD_LAZY | RTLD_GLOBAL) : NULL;
   const struct catalyst_impl* impl = library ? dlsym(library, "catalyst_api_impl") : NULL;
   if (!impl) return 1;
-  static conduit_node setup, end;
+  static conduit_node setup, end, results;
+  if (argc == 2) {
+    if (impl->initialize(&setup) || impl->results(&results)) return 1;
+    if (!walk(&results, "catalyst/steering/fields/stop/values", 0)) return 1;
+    for (int cycle = 0; cycle < 3; ++cycle)
+      if (step(impl, cycle, NULL, NULL)) return 1;
+    return impl->finalize(&end);
+  }
   writer(&setup, "a");
   writer(&setup, "b");
   text(&setup, "catalyst/scripts/both", argv[2]);

@@ -241,6 +241,18 @@ fn a_step_says_which_pipelines_run() {
 }
 
 #[test]
+fn every_channel_is_watched_where_nobody_says_what_is() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let report = directory.path().join("report.json");
+    let program = compile(directory.path(), "choice", true);
+    let (output, errors) = run(&program, None, &[("TOMBOLO_REPORT", &report.to_string_lossy())]);
+    assert!(output.status.success(), "{errors}");
+    assert!(errors.starts_with("tombolo: open http://127.0.0.1:") && errors.lines().count() == 1, "{errors}");
+    let report = std::fs::read_to_string(report).expect("a report");
+    assert!(report.contains("\"cycles\": 3"), "{report}");
+}
+
+#[test]
 fn rubbish_is_answered() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let stream = directory.path().join("stream.json");

@@ -179,3 +179,21 @@ impl Partition for Petsc {
         Some(self.system(matrix, vertices))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Preconditioning::{Automatic, Gamg, IncompleteCholesky, Schwarz};
+
+    #[test]
+    fn many_unknowns_are_preconditioned_by_cycles_and_few_by_a_factor() {
+        for (vertices, ranks, expected) in [
+            (9_000, 1, IncompleteCholesky),
+            (36_000, 1, Schwarz),
+            (36_000, 2, IncompleteCholesky),
+            (205_000, 2, Schwarz),
+        ] {
+            assert_eq!(Automatic.chosen(vertices, ranks), expected, "{vertices} on {ranks}");
+            assert_eq!(Gamg.chosen(vertices, ranks), Gamg);
+        }
+    }
+}
