@@ -85,7 +85,7 @@ pub fn run(number: usize, displacement: &Path) -> Result<(), Box<dyn Error>> {
     boundary.vertices().iter().for_each(|&vertex| prescribed[vertex as usize] = true);
     let solvers = [
         ("kernel", None),
-        ("PETSc, Schwarz", Some(Preconditioning::Schwarz)),
+        ("PETSc, multigrid", Some(Preconditioning::Multigrid)),
         ("PETSc, incomplete Cholesky", Some(Preconditioning::IncompleteCholesky)),
         ("PETSc, GAMG", Some(Preconditioning::Gamg)),
         ("PETSc, Jacobi", Some(Preconditioning::Jacobi)),
@@ -93,12 +93,12 @@ pub fn run(number: usize, displacement: &Path) -> Result<(), Box<dyn Error>> {
     let mut found = Vec::new();
     for (solver, preconditioning) in solvers {
         let petsc: Option<Solvers> =
-            preconditioning.map(|preconditioning| Petsc::solvers(&world, preconditioning)).transpose()?;
+            preconditioning.map(|preconditioning| Petsc::solvers(&world, Some(preconditioning))).transpose()?;
         let ranks = Ranks::new(Arc::clone(&communicator), Arc::clone(&shared), &boundary, Vec::new());
         let mut unknown =
             [(0..).zip(&prescribed).filter(|&(vertex, &known)| !known && ranks.owns(vertex)).count() as f64];
         communicator.reduce(Reduction::Sum, &mut unknown);
-        let default = Preconditioning::default().chosen(unknown[0] as usize, communicator.size());
+        let default = Preconditioning::quickest(unknown[0] as usize, communicator.size());
         let partition = match &petsc {
             Some(petsc) => petsc(ranks, &part.points),
             None => Arc::new(ranks),

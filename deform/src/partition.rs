@@ -7,11 +7,14 @@
 //!
 //! [`VolumeError::OtherRank`]: crate::volume::VolumeError::OtherRank
 
+mod shares;
+
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use crate::linear::{LinearError, LinearSolver, Schwarz, SparseMatrix};
+use crate::linear::{DistributedMultigrid, LinearError, LinearSolver, SparseMatrix};
 use crate::mesh::Cells;
+pub use shares::Shares;
 
 /// How the values of the ranks are combined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,6 +79,12 @@ pub trait Partition: Debug + Send + Sync {
         messages
     }
 
+    /// The same where every rank knows whom it hears: each of the ranks `from`, rising, sends one message here, and no other does.
+    fn exchange_with(&self, messages: Vec<(usize, Vec<f64>)>, from: &[usize]) -> Vec<(usize, Vec<f64>)> {
+        let _ = from;
+        self.exchange(messages)
+    }
+
     /// Whether this rank is the one of those that have a vertex in a cell of their own that speaks for it.
     fn owns(&self, vertex: u32) -> bool {
         let _ = vertex;
@@ -128,7 +137,7 @@ pub fn whole() -> Arc<dyn Partition> {
 }
 
 /// The solver for a symmetric positive definite matrix that is the sum of the ranks', each with a row for each of its `vertices`:
-/// the partition's own, or [`Schwarz`]; of one process that of [`linear::solver`](crate::linear::solver). Collective.
+/// the partition's own, or [`DistributedMultigrid`]; of one process that of [`linear::solver`](crate::linear::solver). Collective.
 ///
 /// # Errors
 /// [`LinearError`], on all ranks.
@@ -136,7 +145,7 @@ pub fn scalar_solver(partition: &Arc<dyn Partition>, matrix: Arc<SparseMatrix<1>
     match partition.scalar_solver(&matrix, vertices) {
         Some(solver) => solver,
         None if partition.ranks() == 1 => crate::linear::solver(matrix),
-        None => Ok(Box::new(Schwarz::new(Arc::clone(partition), matrix, vertices)?)),
+        None => Ok(Box::new(DistributedMultigrid::new(Arc::clone(partition), matrix, vertices)?)),
     }
 }
 
@@ -148,7 +157,7 @@ pub fn vector_solver(partition: &Arc<dyn Partition>, matrix: Arc<SparseMatrix<3>
     match partition.vector_solver(&matrix, vertices) {
         Some(solver) => solver,
         None if partition.ranks() == 1 => crate::linear::solver(matrix),
-        None => Ok(Box::new(Schwarz::new(Arc::clone(partition), matrix, vertices)?)),
+        None => Ok(Box::new(DistributedMultigrid::new(Arc::clone(partition), matrix, vertices)?)),
     }
 }
 
@@ -178,106 +187,4 @@ pub(crate) fn most(partition: &dyn Partition, mine: usize) -> usize {
     let mut most = [mine as f64];
     partition.reduce(Reduction::Maximum, &mut most);
     most[0] as usize
-}
-
-/// Which of a list of values, one for each of some vertices, are those of vertices that other ranks list too.
-#[derive(Debug, Clone)]
-pub struct Shares {
-    rank: usize,
-    /// The other ranks, rising, and the places of what is shared with each, in the same order on both.
-    others: Vec<(usize, Vec<u32>)>,
-    /// All places that are shared, each once.
-    places: Vec<u32>,
-    /// Whether this rank speaks for each value; empty where it does for all.
-    owned: Arc<[bool]>,
-}
-
-impl Shares {
-    /// What is shared of a list of vertices, no vertex twice. Collective.
-    #[must_use]
-    pub fn new(partition: &dyn Partition, vertices: &[u32]) -> Self {
-        let rank = partition.rank();
-        if partition.ranks() == 1 {
-            return Self { rank, others: Vec::new(), places: Vec::new(), owned: Arc::new([]) };
-        }
-        let count = vertices.iter().max().map_or(0, |&last| last as usize + 1);
-        let mut place_of = vec![u32::MAX; count];
-        (0..).zip(vertices).for_each(|(place, &vertex)| place_of[vertex as usize] = place);
-        let place = |vertex: u32| place_of.get(vertex as usize).copied().filter(|&place| place != u32::MAX);
-        let listed = |neighbour: &Neighbour| -> Vec<f64> {
-            neighbour.vertices.iter().map(|&vertex| f64::from(u8::from(place(vertex).is_some()))).collect()
-        };
-        let messages = partition.neighbours().iter().map(|neighbour| (neighbour.rank, listed(neighbour))).collect();
-        let heard = partition.exchange(messages);
-        let mut others = Vec::new();
-        for neighbour in partition.neighbours() {
-            let theirs = heard.iter().find(|(from, _)| *from == neighbour.rank).map_or(&[][..], |(_, marks)| marks);
-            let common = neighbour.vertices.iter().zip(theirs).filter(|(_, mark)| **mark > 0.0);
-            let common: Vec<u32> = common.filter_map(|(&vertex, _)| place(vertex)).collect();
-            if !common.is_empty() {
-                others.push((neighbour.rank, common));
-            }
-        }
-        let mut places: Vec<u32> = others.iter().flat_map(|(_, places)| places.iter().copied()).collect();
-        places.sort_unstable();
-        places.dedup();
-        let owned = vertices.iter().map(|&vertex| partition.owns(vertex)).collect();
-        Self { rank, others, places, owned }
-    }
-
-    /// The places of what other ranks list too, rising.
-    #[must_use]
-    pub fn places(&self) -> &[u32] {
-        &self.places
-    }
-
-    /// Whether this rank speaks for the value at a place: exactly one of those that list the vertex does.
-    #[must_use]
-    pub fn owns(&self, place: usize) -> bool {
-        self.owned.get(place).is_none_or(|&owned| owned)
-    }
-
-    /// Those of the places for which `wanted` holds, the same ones on all ranks.
-    #[must_use]
-    pub fn only(&self, wanted: impl Fn(u32) -> bool) -> Self {
-        let filter = |places: &[u32]| places.iter().copied().filter(|&place| wanted(place)).collect::<Vec<u32>>();
-        let others = self.others.iter().map(|(rank, places)| (*rank, filter(places)));
-        Self {
-            rank: self.rank,
-            others: others.filter(|(_, places)| !places.is_empty()).collect(),
-            places: filter(&self.places),
-            owned: Arc::clone(&self.owned),
-        }
-    }
-
-    /// Adds up what the ranks have at the places that they share, in the order of the ranks: all get the same bits. `values` holds
-    /// `width` values for each place. What is missing of a message becomes NaN. Collective.
-    pub fn sum(&self, partition: &dyn Partition, width: usize, values: &mut [f64]) {
-        if partition.ranks() == 1 {
-            return;
-        }
-        let at = |place: u32| place as usize * width..(place as usize + 1) * width;
-        let message = |places: &[u32], values: &[f64]| {
-            let mut message = Vec::with_capacity(width * places.len());
-            places.iter().for_each(|&place| message.extend_from_slice(&values[at(place)]));
-            message
-        };
-        let messages = self.others.iter().map(|(rank, places)| (*rank, message(places, values))).collect();
-        let heard = partition.exchange(messages);
-        let own = message(&self.places, values);
-        self.places.iter().for_each(|&place| values[at(place)].fill(0.0));
-        let mut add = |places: &[u32], more: &[f64]| {
-            let mut more = more.iter();
-            for &place in places {
-                for value in &mut values[at(place)] {
-                    *value += more.next().copied().unwrap_or(f64::NAN);
-                }
-            }
-        };
-        let theirs = |rank: usize| heard.iter().find(|(from, _)| *from == rank).map_or(&[][..], |(_, values)| values);
-        let below = self.others.partition_point(|(rank, _)| *rank < self.rank);
-        self.others[..below].iter().for_each(|(rank, places)| add(places, theirs(*rank)));
-        add(&self.places, &own);
-        self.others[below..].iter().for_each(|(rank, places)| add(places, theirs(*rank)));
-    }
 }

@@ -33,6 +33,12 @@ pub trait Communicator: Send + Sync {
     /// Sends each message to its rank, this one too if it is named, and returns those sent here with their senders, in the
     /// order of the senders and for each in the order in which it named them. A rank with nothing to say sends nothing, but calls.
     fn exchange(&self, messages: Vec<(usize, Vec<u8>)>) -> Vec<(usize, Vec<u8>)>;
+    /// The same where every rank knows whom it hears: each of the ranks `from`, none twice, sends one message here, and no other does.
+    /// No rank waits for others than those.
+    fn exchange_with(&self, messages: Vec<(usize, Vec<u8>)>, from: &[usize]) -> Vec<(usize, Vec<u8>)> {
+        let _ = from;
+        self.exchange(messages)
+    }
     /// Ends all ranks, because this one cannot go on; where the others are processes, this one too. For defects alone: see [`Alarm`].
     fn abort(&self);
 }
@@ -145,6 +151,9 @@ macro_rules! forwarded {
             }
             fn exchange(&self, messages: Vec<(usize, Vec<u8>)>) -> Vec<(usize, Vec<u8>)> {
                 (**self).exchange(messages)
+            }
+            fn exchange_with(&self, messages: Vec<(usize, Vec<u8>)>, from: &[usize]) -> Vec<(usize, Vec<u8>)> {
+                (**self).exchange_with(messages, from)
             }
             fn abort(&self) {
                 (**self).abort();

@@ -35,7 +35,10 @@ use tombolo_pipelines::communicator::tree;
 const PIECE: usize = 1 << 30;
 /// The tag of what goes up the tree.
 const TREE: c_int = 0;
-/// Tags that exchanges take in turn: a rank may be in the next one before this one has seen that all are through with this.
+/// The tag of what neighbours tell each other: of any two, messages come in the order in which they were sent.
+const NEIGHBOURS: c_int = 1;
+/// Tags from here on that exchanges take in turn: a rank may be in the next one before this one has seen that all are through with this.
+const FIRST_ROUND: c_int = 2;
 const ROUNDS: c_int = 1024;
 
 /// Ranks of MPI, of any communicator: what is said here goes through a copy of it, and so can never be taken for what the solver
@@ -187,11 +190,11 @@ impl Ranks {
         pieces(bytes).for_each(|piece| process.send_with_tag(piece, TREE));
     }
 
-    fn receive(&self, from: usize) -> Vec<u8> {
+    fn receive(&self, from: usize, tag: c_int) -> Vec<u8> {
         let process = self.communicator.process_at_rank(number(from));
         let mut bytes = Vec::new();
         loop {
-            let (message, status) = process.matched_probe_with_tag(TREE);
+            let (message, status) = process.matched_probe_with_tag(tag);
             let piece = receive_piece(message, &status);
             let last = piece.len() < PIECE;
             if bytes.is_empty() {
@@ -233,7 +236,7 @@ impl Communicator for Mpi {
         packed.extend((bytes.len() as u64).to_le_bytes());
         packed.extend(bytes);
         for child in children {
-            packed.extend(ranks.receive(back(child)));
+            packed.extend(ranks.receive(back(child), TREE));
         }
         if let Some(parent) = parent {
             ranks.send(back(parent), &packed);
@@ -255,7 +258,7 @@ impl Communicator for Mpi {
         let ranks = self.ranks();
         let (children, parent) = tree(self.rank, self.size);
         for child in children {
-            let bytes = ranks.receive(child);
+            let bytes = ranks.receive(child, TREE);
             let more: Vec<f64> = bytes.as_chunks().0.iter().map(|eight| f64::from_le_bytes(*eight)).collect();
             reduction.take_in(values, &more);
         }
@@ -277,7 +280,7 @@ impl Communicator for Mpi {
     fn exchange(&self, messages: Vec<(usize, Vec<u8>)>) -> Vec<(usize, Vec<u8>)> {
         let mut ranks = self.ranks();
         ranks.round = (ranks.round + 1) % ROUNDS;
-        let tag = TREE + 1 + ranks.round;
+        let tag = FIRST_ROUND + ranks.round;
         let ranks = &*ranks;
         let (own, others): (Vec<_>, Vec<_>) = messages.into_iter().partition(|(to, _)| *to == self.rank);
         let mut heard = own;
@@ -336,6 +339,29 @@ impl Communicator for Mpi {
             }
         });
         // Of each sender they came in order.
+        heard.sort_by_key(|(from, _)| *from);
+        heard
+    }
+
+    fn exchange_with(&self, messages: Vec<(usize, Vec<u8>)>, from: &[usize]) -> Vec<(usize, Vec<u8>)> {
+        let ranks = &*self.ranks();
+        let (own, others): (Vec<_>, Vec<_>) = messages.into_iter().partition(|(to, _)| *to == self.rank);
+        let mut heard = own;
+        request::scope(|scope| {
+            let sends: Vec<_> = others
+                .iter()
+                .flat_map(|(to, bytes)| pieces(bytes).map(move |piece| (*to, piece)))
+                .map(|(to, piece)| {
+                    let process = ranks.communicator.process_at_rank(number(to));
+                    process.immediate_send_with_tag(scope, piece, NEIGHBOURS)
+                })
+                .collect();
+            let others = from.iter().filter(|&&from| from != self.rank);
+            heard.extend(others.map(|&from| (from, ranks.receive(from, NEIGHBOURS))));
+            for send in sends {
+                send.wait();
+            }
+        });
         heard.sort_by_key(|(from, _)| *from);
         heard
     }

@@ -5,11 +5,11 @@
 //!
 //! ```no_run
 //! use std::sync::Arc;
-//! use tombolo::{Settings, comm::mpi::{Mpi, rsmpi}, distributed::{Petsc, Preconditioning}};
+//! use tombolo::{Settings, comm::mpi::{Mpi, rsmpi}, distributed::Petsc};
 //!
 //! let universe = rsmpi::initialize().ok_or("MPI was initialized before")?;
 //! let settings = Settings {
-//!     solvers: Some(Petsc::solvers(&universe.world(), Preconditioning::default())?),
+//!     solvers: Some(Petsc::solvers(&universe.world(), None)?),
 //!     communicator: Arc::new(Mpi::new(&universe.world())?),
 //!     ..Settings::default()
 //! };
@@ -36,14 +36,11 @@ pub use library::PetscError;
 use system::System;
 
 /// What conjugate gradients are preconditioned by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Preconditioning {
-    /// The one of the others that takes least from the first set-up to the first displacement, by what was measured: see
-    /// [`chosen`](Self::chosen).
-    #[default]
-    Automatic,
-    /// The V-cycles of the kernel's own multigrid on each rank, added up: see [`Schwarz`](tombolo_deform::linear::Schwarz).
-    Schwarz,
+    /// A V-cycle of the kernel's own multigrid over all ranks: see
+    /// [`DistributedMultigrid`](tombolo_deform::linear::DistributedMultigrid).
+    Multigrid,
     /// Incomplete Cholesky without fill on each rank.
     IncompleteCholesky,
     /// PETSc's algebraic multigrid over all ranks; with rigid bodies as its near null space where three components are solved for
@@ -53,20 +50,16 @@ pub enum Preconditioning {
     Jacobi,
 }
 
-/// From how many unknown vertices on V-cycles are quicker than incomplete Cholesky, on one rank and on several, between which V-cycles
-/// do not see: the benchmark `volume` measures it.
-const FROM_VERTICES: [usize; 2] = [25_000, 120_000];
+/// From how many unknown vertices on V-cycles are quicker than incomplete Cholesky, on one rank and on several: the benchmark `volume`
+/// measures it.
+const FROM_VERTICES: [usize; 2] = [15_000, 30_000];
 
 impl Preconditioning {
-    /// What [`Automatic`](Self::Automatic) comes to for so many unknown vertices of all ranks together: [`Schwarz`](Self::Schwarz) for
-    /// many, [`IncompleteCholesky`](Self::IncompleteCholesky) for few. The others are what they are.
+    /// The one that takes least from the first set-up to the first displacement of so many unknown vertices of all ranks together, by
+    /// what was measured: [`Multigrid`](Self::Multigrid) for many, [`IncompleteCholesky`](Self::IncompleteCholesky) for few.
     #[must_use]
-    pub fn chosen(self, vertices: usize, ranks: usize) -> Self {
-        match self {
-            Self::Automatic if vertices >= FROM_VERTICES[usize::from(ranks > 1)] => Self::Schwarz,
-            Self::Automatic => Self::IncompleteCholesky,
-            other => other,
-        }
+    pub fn quickest(vertices: usize, ranks: usize) -> Self {
+        if vertices >= FROM_VERTICES[usize::from(ranks > 1)] { Self::Multigrid } else { Self::IncompleteCholesky }
     }
 }
 
@@ -76,7 +69,7 @@ impl Preconditioning {
 pub struct Petsc {
     ranks: Ranks,
     library: Arc<Library>,
-    preconditioning: Preconditioning,
+    preconditioning: Option<Preconditioning>,
     /// Where the vertices of the part lie, for rigid bodies.
     points: Arc<[Vector]>,
 }
@@ -89,13 +82,14 @@ impl fmt::Debug for Petsc {
 
 impl Petsc {
     /// What [`Settings::solvers`](crate::Settings::solvers) takes: PETSc on the ranks of `communicator`, which must be those of the
-    /// adaptor's. Collective over them; the communicator stays the caller's.
+    /// adaptor's; without a preconditioning each system gets the [`quickest`](Preconditioning::quickest). Collective over them; the
+    /// communicator stays the caller's.
     ///
     /// # Errors
     /// [`PetscError`].
     pub fn solvers(
         communicator: &impl AsRaw<Raw = MPI_Comm>,
-        preconditioning: Preconditioning,
+        preconditioning: Option<Preconditioning>,
     ) -> Result<Solvers, PetscError> {
         // SAFETY: a communicator of rsmpi is alive for as long as it is borrowed.
         unsafe { Self::solvers_from_raw(communicator.as_raw(), preconditioning) }
@@ -110,7 +104,7 @@ impl Petsc {
     /// `communicator` must be a handle that MPI gave out and that has not been freed.
     pub unsafe fn solvers_from_raw(
         communicator: MPI_Comm,
-        preconditioning: Preconditioning,
+        preconditioning: Option<Preconditioning>,
     ) -> Result<Solvers, PetscError> {
         // SAFETY: as the caller vouches for.
         let library = Arc::new(unsafe { Library::open(communicator) }?);
@@ -155,6 +149,10 @@ impl Partition for Petsc {
         self.ranks.exchange(messages)
     }
 
+    fn exchange_with(&self, messages: Vec<(usize, Vec<f64>)>, from: &[usize]) -> Vec<(usize, Vec<f64>)> {
+        self.ranks.exchange_with(messages, from)
+    }
+
     fn owns(&self, vertex: u32) -> bool {
         self.ranks.owns(vertex)
     }
@@ -182,18 +180,17 @@ impl Partition for Petsc {
 
 #[cfg(test)]
 mod tests {
-    use super::Preconditioning::{Automatic, Gamg, IncompleteCholesky, Schwarz};
+    use super::Preconditioning::{self, IncompleteCholesky, Multigrid};
 
     #[test]
     fn many_unknowns_are_preconditioned_by_cycles_and_few_by_a_factor() {
         for (vertices, ranks, expected) in [
             (9_000, 1, IncompleteCholesky),
-            (36_000, 1, Schwarz),
-            (36_000, 2, IncompleteCholesky),
-            (205_000, 2, Schwarz),
+            (36_000, 1, Multigrid),
+            (18_000, 2, IncompleteCholesky),
+            (36_000, 2, Multigrid),
         ] {
-            assert_eq!(Automatic.chosen(vertices, ranks), expected, "{vertices} on {ranks}");
-            assert_eq!(Gamg.chosen(vertices, ranks), Gamg);
+            assert_eq!(Preconditioning::quickest(vertices, ranks), expected, "{vertices} on {ranks}");
         }
     }
 }

@@ -18,7 +18,7 @@ use std::{
 };
 
 use tombolo_deform::{
-    linear::{Convergence, LinearError, LinearSolver, Schwarz, SparseMatrix, Tolerance},
+    linear::{Convergence, DistributedMultigrid, LinearError, LinearSolver, SparseMatrix, Tolerance},
     mesh::Vector,
     partition::{Partition, Reduction, Shares},
 };
@@ -117,7 +117,7 @@ pub(super) struct System<const B: usize> {
     numbering: Numbering,
     places: Arc<[Vector]>,
     preconditioning: Preconditioning,
-    schwarz: Option<Schwarz<B>>,
+    multigrid: Option<DistributedMultigrid<B>>,
     rows: usize,
     library: Arc<Library>,
 }
@@ -136,14 +136,15 @@ impl<const B: usize> System<B> {
         matrix: Arc<SparseMatrix<B>>,
         vertices: &[u32],
         places: Vec<Vector>,
-        preconditioning: Preconditioning,
+        preconditioning: Option<Preconditioning>,
     ) -> Result<Self, LinearError> {
         let numbering = Numbering::new(&*partition, vertices)?;
-        let preconditioning = preconditioning.chosen(numbering.total, partition.ranks());
-        let schwarz = (preconditioning == Preconditioning::Schwarz)
-            .then(|| Schwarz::new(Arc::clone(&partition), Arc::clone(&matrix), vertices))
+        let quickest = || Preconditioning::quickest(numbering.total, partition.ranks());
+        let preconditioning = preconditioning.unwrap_or_else(quickest);
+        let multigrid = (preconditioning == Preconditioning::Multigrid)
+            .then(|| DistributedMultigrid::new(Arc::clone(&partition), Arc::clone(&matrix), vertices))
             .transpose()?;
-        Self::assembled(library, partition, numbering, places.into(), preconditioning, schwarz, &matrix)
+        Self::assembled(library, partition, numbering, places.into(), preconditioning, multigrid, &matrix)
     }
 
     fn assembled(
@@ -152,7 +153,7 @@ impl<const B: usize> System<B> {
         numbering: Numbering,
         places: Arc<[Vector]>,
         preconditioning: Preconditioning,
-        schwarz: Option<Schwarz<B>>,
+        multigrid: Option<DistributedMultigrid<B>>,
         matrix: &SparseMatrix<B>,
     ) -> Result<Self, LinearError> {
         let handles = Handles {
@@ -166,7 +167,7 @@ impl<const B: usize> System<B> {
         };
         let rows = matrix.rows();
         let handles = Mutex::new(handles);
-        let system = Self { handles, partition, numbering, places, preconditioning, schwarz, rows, library };
+        let system = Self { handles, partition, numbering, places, preconditioning, multigrid, rows, library };
         system.set_up(matrix)?;
         Ok(system)
     }
@@ -268,9 +269,8 @@ impl<const B: usize> System<B> {
 
     fn precondition(&self, handles: &mut Handles, comm: mpi::ffi::MPI_Comm) -> Result<(), LinearError> {
         let name: &CStr = match self.preconditioning {
-            Preconditioning::Schwarz => c"shell",
-            // Chosen before.
-            Preconditioning::Automatic | Preconditioning::IncompleteCholesky => c"bjacobi",
+            Preconditioning::Multigrid => c"shell",
+            Preconditioning::IncompleteCholesky => c"bjacobi",
             Preconditioning::Gamg => c"gamg",
             Preconditioning::Jacobi => c"pbjacobi",
         };
@@ -283,7 +283,7 @@ impl<const B: usize> System<B> {
             done(sys::KSPSetNormType(handles.solver, sys::KSP_NORM_UNPRECONDITIONED))?;
             done(sys::KSPGetPC(handles.solver, &raw mut handles.preconditioner))?;
             done(sys::PCSetType(handles.preconditioner, name.as_ptr()))?;
-            if self.preconditioning == Preconditioning::Schwarz {
+            if self.preconditioning == Preconditioning::Multigrid {
                 done(sys::PCShellSetApply(handles.preconditioner, apply::<B>))?;
             }
             done(sys::KSPSetUp(handles.solver))?;
@@ -406,9 +406,9 @@ impl<const B: usize> LinearSolver<B> for System<B> {
         }
         self.put(&summed, handles.right_side)?;
         self.put(solution, handles.solution)?;
-        let convergence = match &self.schwarz {
+        let convergence = match &self.multigrid {
             None => self.iterate(handles, tolerance, whole)?,
-            Some(schwarz) => schwarz.with_own_cycle(1.0 / whole, |cycle| {
+            Some(multigrid) => multigrid.with_cycle(1.0 / whole, |cycle| {
                 let values = (vec![[0.0; B]; self.rows], vec![[0.0; B]; self.rows]);
                 let mut context = Context::<B> { system: self, cycle, values, panic: None };
                 // SAFETY: the context lives until the solve has ended, and is taken away then.
@@ -428,15 +428,16 @@ impl<const B: usize> LinearSolver<B> for System<B> {
     }
 
     fn renewed(&self, matrix: Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
-        let schwarz = self.schwarz.as_ref().map(|schwarz| schwarz.of_like_matrix(Arc::clone(&matrix))).transpose()?;
+        let multigrid =
+            self.multigrid.as_ref().map(|multigrid| multigrid.of_like_matrix(Arc::clone(&matrix))).transpose()?;
         let (library, partition) = (Arc::clone(&self.library), Arc::clone(&self.partition));
         let (numbering, places) = (self.numbering.clone(), Arc::clone(&self.places));
-        let renewed = Self::assembled(library, partition, numbering, places, self.preconditioning, schwarz, &matrix)?;
+        let renewed = Self::assembled(library, partition, numbering, places, self.preconditioning, multigrid, &matrix)?;
         Ok(Box::new(renewed))
     }
 }
 
-/// A rank's own cycle: from a residual to a correction.
+/// From a residual to a correction.
 type Cycle<'a, const B: usize> = &'a mut dyn FnMut(&[[f64; B]], &mut [[f64; B]]);
 
 /// What the preconditioner of a solve under way needs.
@@ -448,7 +449,7 @@ struct Context<'a, const B: usize> {
     panic: Option<Box<dyn Any + Send>>,
 }
 
-/// Applies a rank's own cycle, and adds up what all ranks have found.
+/// Applies the cycle.
 ///
 /// # Safety
 /// PETSc calls it within `KSPSolve` or `PCApply`, with the context set, on the thread that called these.
@@ -463,9 +464,7 @@ unsafe extern "C" fn apply<const B: usize>(pc: sys::PC, vector: sys::Vec, result
     let Context { system, cycle, values: (before, after), panic } = context;
     let applied = catch_unwind(AssertUnwindSafe(|| {
         system.spread(vector, before)?;
-        after.fill([0.0; B]);
         cycle(before, after);
-        system.numbering.shares.sum(&*system.partition, B, after.as_flattened_mut());
         system.put(after, result)
     }));
     match applied {

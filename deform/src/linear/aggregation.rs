@@ -1,5 +1,7 @@
 //! Which rows a coarser system puts together, by smoothed aggregation.
 
+use std::collections::BTreeMap;
+
 use super::transfer::Interpolation;
 use super::{ROW_CHUNK, SparseMatrix};
 use crate::mesh::Vector;
@@ -24,10 +26,13 @@ pub(super) fn couplings<const B: usize>(matrix: &SparseMatrix<B>) -> Vec<f64> {
     couplings
 }
 
-/// Rows put together into coarser ones.
+/// For rows how strongly they are coupled to aggregates by what is not in their own columns.
+pub(super) type Across = BTreeMap<u32, Vec<(u32, f64)>>;
+
+/// Rows put together into coarser ones: all rows of a matrix, or the first ones, which make aggregates by themselves.
 #[derive(Debug)]
 pub(super) struct Aggregates {
-    /// For each block of the matrix, whether it counts in smoothing.
+    /// For each block of these rows, whether it counts in smoothing.
     strong: Vec<bool>,
     /// The aggregate of each row.
     of_row: Vec<u32>,
@@ -35,10 +40,16 @@ pub(super) struct Aggregates {
 }
 
 impl Aggregates {
-    /// Rows with the rows that they are strongly coupled to: `a_ij² > threshold² a_ii a_jj`. A row that is so coupled to none is
-    /// in no aggregate: smoothing alone solves for it.
-    pub(super) fn new<const B: usize>(matrix: &SparseMatrix<B>, couplings: &[f64], threshold: f64) -> Self {
-        let rows = matrix.rows();
+    /// The first `rows` rows with those of them that they are strongly coupled to: `a_ij² > threshold² a_ii a_jj`. A row that is so
+    /// coupled to none is in no aggregate, smoothing alone solves for it; or in one of its own, where `reaches` says that it is
+    /// coupled to other rows than these.
+    pub(super) fn new<const B: usize>(
+        matrix: &SparseMatrix<B>,
+        couplings: &[f64],
+        threshold: f64,
+        rows: usize,
+        reaches: impl Fn(usize) -> bool,
+    ) -> Self {
         let diagonal: Vec<f64> = parallel::map_chunks(rows, ROW_CHUNK, |range| {
             let own = |row: usize| {
                 let place = matrix.row(row).0.binary_search_by_key(&row, |&column| column as usize);
@@ -54,29 +65,30 @@ impl Aggregates {
                 let couplings = &couplings[matrix.offsets()[row]..matrix.offsets()[row + 1]];
                 strong.extend(matrix.row(row).0.iter().zip(couplings).map(|(&column, coupling)| {
                     let other = column as usize;
-                    other != row && coupling * coupling > threshold * diagonal[row] * diagonal[other]
+                    other != row && other < rows && coupling * coupling > threshold * diagonal[row] * diagonal[other]
                 }));
             }
             strong
         })
         .concat();
-        let (of_row, count) = group(matrix, &strong);
+        let (of_row, count) = group(matrix, &strong, rows, reaches);
         Self { strong, of_row, count }
     }
 
     /// The interpolation from the aggregates to the rows: constant on each, smoothed by one step of damped Jacobi with the
     /// matrix of couplings, the weak ones lumped into its diagonal (P. Vaněk, J. Mandel, M. Brezina 1996).
     ///
-    /// With `bodies` each aggregate turns as well.
+    /// With `bodies` each aggregate turns as well. `across` are couplings beside those of the rows with each other, all of them strong.
     pub(super) fn interpolation<const B: usize>(
         &self,
         matrix: &SparseMatrix<B>,
         couplings: &[f64],
         damping: f64,
         bodies: Option<&Bodies>,
+        across: &Across,
     ) -> Interpolation {
-        let offsets = matrix.offsets();
-        let parts = parallel::map_chunks(matrix.rows(), ROW_CHUNK, |range| {
+        let (offsets, rows) = (matrix.offsets(), self.of_row.len());
+        let parts = parallel::map_chunks(rows, ROW_CHUNK, |range| {
             let (mut lengths, mut columns, mut weights, mut arms) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
             let mut found: Vec<(u32, f64, Vector)> = Vec::new();
             for row in range {
@@ -86,7 +98,8 @@ impl Aggregates {
                     lengths.push(0);
                     continue;
                 }
-                let places = offsets[row]..offsets[row + 1];
+                let among = matrix.row(row).0.partition_point(|&column| (column as usize) < rows);
+                let places = offsets[row]..offsets[row] + among;
                 let (mut lumped, mut whole) = (0.0, 0.0);
                 for place in places.clone().filter(|&place| !self.strong[place]) {
                     lumped += couplings[place];
@@ -113,6 +126,10 @@ impl Aggregates {
                         gather(other, aggregate, -damping * couplings[place] / diagonal);
                     }
                 }
+                #[expect(clippy::cast_possible_truncation, reason = "rows are 32-bit")]
+                for &(aggregate, coupling) in across.get(&(row as u32)).into_iter().flatten() {
+                    gather(row, aggregate, -damping * coupling / diagonal);
+                }
                 found.sort_unstable_by_key(|(aggregate, ..)| *aggregate);
                 lengths.push(found.len());
                 for &(aggregate, weight, arm) in &found {
@@ -138,6 +155,11 @@ impl Aggregates {
             result.arms.extend(arms);
         }
         result
+    }
+
+    /// The aggregate of a row.
+    pub(super) fn of(&self, row: usize) -> Option<u32> {
+        self.of_row.get(row).copied().filter(|&aggregate| aggregate != NONE)
     }
 
     /// How many aggregates there are.
@@ -201,7 +223,12 @@ impl Bodies {
 }
 
 /// Each row that is free, with all that it is coupled to, makes an aggregate; then what is left joins its neighbours.
-fn group<const B: usize>(matrix: &SparseMatrix<B>, strong: &[bool]) -> (Vec<u32>, usize) {
+fn group<const B: usize>(
+    matrix: &SparseMatrix<B>,
+    strong: &[bool],
+    rows: usize,
+    reaches: impl Fn(usize) -> bool,
+) -> (Vec<u32>, usize) {
     let (offsets, columns) = (matrix.offsets(), matrix.columns());
     let neighbours = |row: usize| {
         let range = offsets[row]..offsets[row + 1];
@@ -211,9 +238,9 @@ fn group<const B: usize>(matrix: &SparseMatrix<B>, strong: &[bool]) -> (Vec<u32>
             .filter(|(_, strong)| **strong)
             .map(|(&column, _)| column as usize)
     };
-    let mut of_row = vec![NONE; matrix.rows()];
+    let mut of_row = vec![NONE; rows];
     let mut count = 0u32;
-    for row in 0..matrix.rows() {
+    for row in 0..rows {
         if of_row[row] == NONE && neighbours(row).next().is_some() && neighbours(row).all(|other| of_row[other] == NONE)
         {
             of_row[row] = count;
@@ -231,8 +258,8 @@ fn group<const B: usize>(matrix: &SparseMatrix<B>, strong: &[bool]) -> (Vec<u32>
             *own = first[other];
         }
     }
-    for row in 0..matrix.rows() {
-        if of_row[row] == NONE && neighbours(row).next().is_some() {
+    for row in 0..rows {
+        if of_row[row] == NONE && (neighbours(row).next().is_some() || reaches(row)) {
             of_row[row] = count;
             for other in neighbours(row) {
                 if of_row[other] == NONE {

@@ -40,16 +40,6 @@ impl<const B: usize> ConjugateGradients<B> {
         &self.matrix
     }
 
-    /// The preconditioner, applied to each column by itself.
-    pub(super) fn precondition<const K: usize>(&self, vector: &[Columns<B, K>], result: &mut [Columns<B, K>]) {
-        for column in 0..K {
-            let one: Vec<[f64; B]> = vector.iter().map(|value| value[column]).collect();
-            let mut found = vec![[0.0; B]; one.len()];
-            self.preconditioner.apply(&one, &mut found);
-            result.iter_mut().zip(found).for_each(|(value, found)| value[column] = found);
-        }
-    }
-
     fn iterate(
         &self,
         preconditioner: &BlockPreconditioner<B>,

@@ -24,10 +24,10 @@ pub(super) struct Pieces {
 }
 
 impl Pieces {
-    pub(super) fn new<const B: usize>(matrix: &SparseMatrix<B>) -> Self {
-        let rows = matrix.rows();
+    /// Those of the first `rows` rows and columns of a matrix.
+    pub(super) fn new<const B: usize>(matrix: &SparseMatrix<B>, rows: usize) -> Self {
         let width = |row: usize| {
-            let columns = matrix.row(row).0;
+            let columns = among(matrix, row, rows);
             let first = columns.first().map_or(0, |&column| row.saturating_sub(column as usize));
             columns.last().map_or(0, |&column| (column as usize).saturating_sub(row)).max(first)
         };
@@ -76,7 +76,19 @@ impl Pieces {
     }
 }
 
-/// The sweeps of Gauss–Seidel through one matrix, its rows in the order of [`Pieces`]: first through all even pieces, then
+/// Those of a row's columns that are below `count`.
+fn among<const B: usize>(matrix: &SparseMatrix<B>, row: usize, count: usize) -> &[u32] {
+    let columns = matrix.row(row).0;
+    // Most rows have no others.
+    match columns.last() {
+        Some(&last) if last as usize >= count => {
+            &columns[..columns.partition_point(|&column| (column as usize) < count)]
+        }
+        _ => columns,
+    }
+}
+
+/// The sweeps of Gauss–Seidel through the first rows and columns of one matrix, its rows in the order of [`Pieces`]: first through all even pieces, then
 /// through all odd ones, or back.
 #[derive(Debug)]
 pub(super) struct GaussSeidel<T, const B: usize> {
@@ -111,7 +123,7 @@ impl Parts {
         let row = pieces.row(slot);
         let piece = row / pieces.piece_rows;
         let own = piece * pieces.piece_rows;
-        let (first, columns) = (matrix.offsets()[row], matrix.row(row).0);
+        let (first, columns) = (matrix.offsets()[row], among(matrix, row, pieces.rows));
         let below = |bound: usize| first + columns.partition_point(|&column| (column as usize) < bound);
         let (begin, middle, end) = (below(own), below(row), below(own + pieces.piece_rows));
         let after = middle + usize::from(columns.get(middle - first).is_some_and(|&column| column as usize == row));
@@ -129,8 +141,9 @@ impl Parts {
 }
 
 impl<T: Real, const B: usize> GaussSeidel<T, B> {
-    /// `None` where a diagonal block is missing, or not positive definite, or has no inverse in this precision.
-    pub(super) fn new(matrix: &SparseMatrix<B>, pieces: Pieces) -> Option<Self> {
+    /// The rows and columns of `pieces`, with what is `added` to the diagonal of each, if anything is. `None` where a diagonal block is
+    /// missing, or not positive definite, or has no inverse in this precision.
+    pub(super) fn new(matrix: &SparseMatrix<B>, pieces: Pieces, added: &[[f64; B]]) -> Option<Self> {
         let half = |odd: bool| {
             let slots = if odd { pieces.even_rows..pieces.rows } else { 0..pieces.even_rows };
             let (start, count) = (slots.start, slots.len());
@@ -140,7 +153,11 @@ impl<T: Real, const B: usize> GaussSeidel<T, B> {
                     let row = pieces.row(start + index);
                     let (columns, blocks) = matrix.row(row);
                     let place = columns.binary_search_by_key(&row, |&column| column as usize).ok()?;
-                    let inverse = invert_positive(&blocks[place])?.map(|entries| entries.map(T::of));
+                    let mut block = blocks[place];
+                    for (axis, more) in added.get(row).into_iter().flatten().enumerate() {
+                        block[axis][axis] += more;
+                    }
+                    let inverse = invert_positive(&block)?.map(|entries| entries.map(T::of));
                     inverse.as_flattened().iter().all(|value| value.wide().is_finite()).then_some(inverse)
                 };
                 range.map(invert).collect::<Option<Vec<_>>>()

@@ -1,19 +1,30 @@
 //! The levels of a multigrid method, and one cycle through them.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::ROW_CHUNK;
 use super::SparseMatrix;
-use super::aggregation::{Aggregates, Bodies, couplings};
-use super::cholesky::Factor;
+use super::aggregation::{Across, Aggregates, Bodies, couplings};
+use super::border::Border;
+use super::direct::Direct;
 use super::gauss_seidel::{GaussSeidel, Pieces};
+use super::parts::{Order, Parts};
 use super::real::Real;
-use super::transfer::{Interpolation, Transfer, galerkin};
+use super::transfer::{Transfer, galerkin};
 use crate::mesh::Vector;
 use crate::parallel;
+use crate::partition::{Partition, Shares};
 
 /// Systems of at most this many equations are solved directly.
-const COARSEST: usize = 1000;
+pub(super) const COARSEST: usize = 1000;
+
+/// Where the ranks' own aggregates would not make a system smaller, because they have few rows each, one of at most this many
+/// equations is gathered on all of them.
+const LARGEST: usize = 100_000;
+
+/// A coarser system of ranks is to have at most this part of the rows.
+const COARSER: f64 = 0.5;
 
 /// Couplings weaker than this are left out where aggregates are formed; half of it on each coarser level.
 const THRESHOLD: f64 = 0.08;
@@ -23,35 +34,43 @@ const DAMPING: f64 = 2.0 / 3.0;
 
 /// A system of `B` by `B` blocks and ever coarser ones of `C` by `C`, by smoothed aggregation. `C` is `B`, or 6 where aggregates
 /// turn as rigid bodies.
+///
+/// The system may be a sum of ranks' parts ([`Parts`]): each rank then makes aggregates of the rows that it speaks for, and sweeps
+/// through these; couplings between ranks count in the interpolation, in residuals and in coarser matrices as all others do.
 #[derive(Debug)]
 pub(super) struct Hierarchy<T, const B: usize, const C: usize> {
+    /// The order of the rows, where they are parts of a sum.
+    order: Option<Order>,
     finest: Option<Level<T, B>>,
     coarser: Vec<Level<T, C>>,
-    coarsest: Coarsest<B, C>,
+    coarsest: Coarsest<T, B, C>,
 }
 
 /// The smallest system of all.
 #[derive(Debug)]
-enum Coarsest<const B: usize, const C: usize> {
+enum Coarsest<T, const B: usize, const C: usize> {
     /// The one to be solved is small.
-    Finest(Factor<B>, usize),
-    Coarse(Factor<C>, usize),
+    Finest(Direct<T, B>),
+    Coarse(Direct<T, C>),
 }
 
 #[derive(Debug)]
 struct Level<T, const B: usize> {
     aggregates: Arc<Aggregates>,
     pieces: Pieces,
+    /// How many rows vectors have here; those of other ranks come after the pieces.
+    rows: usize,
     smoother: GaussSeidel<T, B>,
+    border: Option<Border<T, B>>,
     interpolation: Transfer<T>,
     restriction: Transfer<T>,
 }
 
 /// The vectors of one level.
 #[derive(Debug)]
-struct Vectors<T, const B: usize, const K: usize> {
-    right_side: Vec<[[T; B]; K]>,
-    solution: Vec<[[T; B]; K]>,
+pub(super) struct Vectors<T, const B: usize, const K: usize> {
+    pub(super) right_side: Vec<[[T; B]; K]>,
+    pub(super) solution: Vec<[[T; B]; K]>,
     residual: Vec<[[T; B]; K]>,
 }
 
@@ -72,44 +91,92 @@ pub(super) struct Workspace<T, const B: usize, const C: usize, const K: usize> {
 /// Where rows lie, and the size that a turn of theirs is told by (0 where they do not turn).
 type Places = (Vec<Vector>, f64);
 
-impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
-    /// `None` where a diagonal block of any level is not positive definite. `like` is a hierarchy of a matrix with the same
-    /// pattern, whose aggregates are used again. `places` are those of the rows where aggregates are to turn.
-    pub(super) fn new(matrix: &SparseMatrix<B>, like: Option<&Self>, places: Option<&[Vector]>) -> Option<Self> {
-        if B * matrix.rows() <= COARSEST {
-            let coarsest = Coarsest::Finest(Factor::new(matrix)?, matrix.rows());
-            return Some(Self { finest: None, coarser: Vec::new(), coarsest });
+/// A system while its levels are made: the matrix, the pieces of its own rows, and whose its rows are.
+struct System<'a, const B: usize> {
+    matrix: Cow<'a, SparseMatrix<B>>,
+    parts: Option<Parts>,
+    pieces: Pieces,
+}
+
+impl<'a, const B: usize> System<'a, B> {
+    /// Collective over the ranks of `parts`, as all that is done with it.
+    fn new(matrix: Cow<'a, SparseMatrix<B>>, parts: Option<Parts>, order: Option<&Order>) -> Self {
+        let matrix = match &parts {
+            Some(parts) => Cow::Owned(parts.assembled(&matrix, order)),
+            None => matrix,
+        };
+        let own = parts.as_ref().map_or(matrix.rows(), Parts::own);
+        let pieces = if B * own <= COARSEST { Pieces::whole(own) } else { Pieces::new(&matrix, own) };
+        Self { matrix, parts, pieces }
+    }
+
+    /// The number of rows of all ranks.
+    fn total(&self) -> usize {
+        self.parts.as_ref().map_or(self.matrix.rows(), |parts| parts.sum(parts.own()))
+    }
+
+    fn agreed<R>(&self, found: Option<R>) -> Option<R> {
+        match &self.parts {
+            Some(parts) => parts.agreed(found),
+            None => found,
         }
+    }
+}
+
+impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
+    /// `None` where a diagonal block of any level is not positive definite, or the ranks' rows cannot be aggregated. `parts` says where
+    /// the matrix is one of those that ranks have of a sum. `like` is a hierarchy of a matrix with the same pattern, whose aggregates
+    /// are used again. `places` are those of the rows where aggregates are to turn, which those of parts cannot.
+    pub(super) fn new(
+        matrix: &SparseMatrix<B>,
+        parts: Option<(&Arc<dyn Partition>, &Shares)>,
+        like: Option<&Self>,
+        places: Option<&[Vector]>,
+    ) -> Option<Self> {
+        let parts = parts.map(|(partition, shares)| Parts::new(Arc::clone(partition), shares, matrix.rows()));
+        let (parts, order) = parts.map_or((None, None), |(parts, order)| (Some(parts), Some(order)));
         let mut places = places.map(|places| (places.to_vec(), 0.0));
+        let system = System::new(Cow::Borrowed(matrix), parts, order.as_ref());
         let known = like.and_then(|like| like.finest.as_ref()).map(|level| Arc::clone(&level.aggregates));
-        let (finest, mut current, mut pieces) =
-            coarsened::<T, B, C>(matrix, Pieces::new(matrix), known, THRESHOLD, &mut places)?;
+        let (finest, mut current) = match coarsened::<T, B, C>(system, known, THRESHOLD, &mut places)? {
+            Step::Last(direct) => {
+                return Some(Self { order, finest: None, coarser: Vec::new(), coarsest: Coarsest::Finest(direct) });
+            }
+            Step::Level(finest, next) => (finest, next),
+        };
         let mut coarser: Vec<Level<T, C>> = Vec::new();
         let mut threshold = THRESHOLD;
-        while C * current.rows() > COARSEST {
+        loop {
             threshold *= 0.5;
             let known = like.and_then(|like| like.coarser.get(coarser.len()));
             let known = known.map(|level| Arc::clone(&level.aggregates));
-            let (level, next, next_pieces) = coarsened::<T, C, C>(&current, pieces, known, threshold, &mut places)?;
-            coarser.push(level);
-            (current, pieces) = (next, next_pieces);
+            match coarsened::<T, C, C>(current, known, threshold, &mut places)? {
+                Step::Last(direct) => {
+                    return Some(Self { order, finest: Some(finest), coarser, coarsest: Coarsest::Coarse(direct) });
+                }
+                Step::Level(level, next) => {
+                    coarser.push(level);
+                    current = next;
+                }
+            }
         }
-        let coarsest = Coarsest::Coarse(Factor::new(&current)?, current.rows());
-        Some(Self { finest: Some(finest), coarser, coarsest })
     }
 
     pub(super) fn workspace<const K: usize>(&self) -> Workspace<T, B, C, K> {
-        let coarsest = match self.coarsest {
-            Coarsest::Finest(_, rows) => return Workspace { finest: Vectors::new(rows), coarser: Vec::new() },
-            Coarsest::Coarse(_, rows) => rows,
+        let coarsest = match &self.coarsest {
+            Coarsest::Finest(direct) => {
+                return Workspace { finest: Vectors::new(direct.rows()), coarser: Vec::new() };
+            }
+            Coarsest::Coarse(direct) => direct.rows(),
         };
-        let rows = self.coarser.iter().map(|level| level.pieces.rows()).chain([coarsest]);
-        let finest = self.finest.as_ref().map_or(0, |level| level.pieces.rows());
+        let rows = self.coarser.iter().map(|level| level.rows).chain([coarsest]);
+        let finest = self.finest.as_ref().map_or(0, |level| level.rows);
         Workspace { finest: Vectors::new(finest), coarser: rows.map(Vectors::new).collect() }
     }
 
     /// One V-cycle: `result` becomes an approximate inverse of the matrix times `vector`, a symmetric positive definite one.
-    /// `scale` brings each column of the vector to the order of 1.
+    /// `scale` brings each column of the vector to the order of 1. Of parts of a sum, all ranks have the same `vector` where they
+    /// share rows, and get the same `result`; collective.
     pub(super) fn apply<const K: usize>(
         &self,
         workspace: &mut Workspace<T, B, C, K>,
@@ -119,13 +186,25 @@ impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
     ) {
         let Workspace { finest, coarser } = workspace;
         let pieces = self.finest.as_ref().map_or_else(|| Pieces::whole(vector.len()), |level| level.pieces);
-        pieces.for_each_run(|rows, slots| {
-            parallel::for_each_chunk(&mut finest.right_side[slots], ROW_CHUNK, |chunk, part| {
-                for (value, wide) in part.iter_mut().zip(&vector[rows.start + chunk * ROW_CHUNK..rows.end]) {
-                    *value = std::array::from_fn(|column| wide[column].map(|entry| T::of(scale[column] * entry)));
+        let narrow = |wide: &[[f64; B]; K]| -> [[T; B]; K] {
+            std::array::from_fn(|column| wide[column].map(|entry| T::of(scale[column] * entry)))
+        };
+        match &self.order {
+            None => pieces.for_each_run(|rows, slots| {
+                parallel::for_each_chunk(&mut finest.right_side[slots], ROW_CHUNK, |chunk, part| {
+                    for (value, wide) in part.iter_mut().zip(&vector[rows.start + chunk * ROW_CHUNK..rows.end]) {
+                        *value = narrow(wide);
+                    }
+                });
+            }),
+            Some(order) => {
+                let own = pieces.rows();
+                for (row, &old) in order.old.iter().enumerate() {
+                    let slot = if row < own { pieces.slot(row) } else { row };
+                    finest.right_side[slot] = narrow(&vector[old as usize]);
                 }
-            });
-        });
+            }
+        }
         match (&self.finest, &self.coarsest, coarser.first_mut()) {
             (Some(level), _, Some(next)) => {
                 level.down(finest, next);
@@ -134,28 +213,43 @@ impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
                     level.up(finest, next);
                 }
             }
-            (_, Coarsest::Finest(factor, _), _) => solve(factor, finest),
+            (_, Coarsest::Finest(direct), _) => direct.solve(finest),
             _ => {}
         }
         let scale = scale.map(|scale| 1.0 / scale);
-        pieces.for_each_run(|rows, slots| {
-            parallel::for_each_chunk(&mut result[rows], ROW_CHUNK, |chunk, part| {
-                for (wide, value) in part.iter_mut().zip(&finest.solution[slots.start + chunk * ROW_CHUNK..slots.end]) {
-                    *wide = std::array::from_fn(|column| value[column].map(|entry| scale[column] * entry.wide()));
+        let widen = |value: &[[T; B]; K]| -> [[f64; B]; K] {
+            std::array::from_fn(|column| value[column].map(|entry| scale[column] * entry.wide()))
+        };
+        match &self.order {
+            None => pieces.for_each_run(|rows, slots| {
+                parallel::for_each_chunk(&mut result[rows], ROW_CHUNK, |chunk, part| {
+                    let found = &finest.solution[slots.start + chunk * ROW_CHUNK..slots.end];
+                    part.iter_mut().zip(found).for_each(|(wide, value)| *wide = widen(value));
+                });
+            }),
+            Some(order) => {
+                let own = pieces.rows();
+                for (row, &old) in order.old.iter().enumerate() {
+                    let slot = if row < own { pieces.slot(row) } else { row };
+                    result[old as usize] = widen(&finest.solution[slot]);
                 }
-            });
-        });
+            }
+        }
     }
 
     fn cycle<const K: usize>(&self, levels: &[Level<T, C>], vectors: &mut [Vectors<T, C, K>]) {
         let Some((own, coarser)) = vectors.split_first_mut() else { return };
         let Some((level, coarser_levels)) = levels.split_first() else {
-            if let Coarsest::Coarse(factor, _) = &self.coarsest {
-                solve(factor, own);
+            if let Coarsest::Coarse(direct) = &self.coarsest {
+                direct.sum(&mut own.right_side);
+                direct.solve(own);
             }
             return;
         };
         let Some(next) = coarser.first_mut() else { return };
+        if let Some(border) = &level.border {
+            border.sum(&mut own.right_side);
+        }
         level.down(own, next);
         self.cycle(coarser_levels, coarser);
         if let Some(next) = coarser.first() {
@@ -164,68 +258,86 @@ impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
     }
 }
 
-fn solve<T: Real, const B: usize, const K: usize>(factor: &Factor<B>, vectors: &mut Vectors<T, B, K>) {
-    let wide: Vec<[[f64; B]; K]> =
-        vectors.right_side.iter().map(|value| value.map(|column| column.map(T::wide))).collect();
-    let mut solution = wide.clone();
-    factor.solve(&wide, &mut solution);
-    for (value, wide) in vectors.solution.iter_mut().zip(&solution) {
-        *value = wide.map(|column| column.map(T::of));
-    }
+/// What becomes of a system.
+enum Step<T, const B: usize, const C: usize> {
+    /// It is small: the last one.
+    Last(Direct<T, B>),
+    /// A level, and the next coarser system.
+    Level(Level<T, B>, System<'static, C>),
 }
 
-/// The level of a matrix, the next coarser matrix, and the pieces of its rows. `places` becomes that of the coarser rows.
+/// `places` becomes that of the coarser rows. `None` where there is no inverse on the way.
 fn coarsened<T: Real, const B: usize, const C: usize>(
-    matrix: &SparseMatrix<B>,
-    pieces: Pieces,
+    system: System<'_, B>,
     known: Option<Arc<Aggregates>>,
     threshold: f64,
     places: &mut Option<Places>,
-) -> Option<(Level<T, B>, SparseMatrix<C>, Pieces)> {
+) -> Option<Step<T, B, C>> {
+    let System { matrix, parts, pieces } = &system;
+    let total = system.total();
+    let last = || system.agreed(Direct::new(matrix, *pieces, parts.as_ref())).map(Step::Last);
+    if B * total <= COARSEST {
+        return last();
+    }
     let couplings = couplings(matrix);
-    let aggregates = known.unwrap_or_else(|| Arc::new(Aggregates::new(matrix, &couplings, threshold)));
+    let (border, added) = parts.as_ref().map(|parts| Border::new(parts, matrix, *pieces)).unzip();
+    let added = added.unwrap_or_default();
+    let reaches = |row: usize| added.get(row).is_some_and(|added| added.iter().any(|&value| value != 0.0));
+    let aggregates =
+        known.unwrap_or_else(|| Arc::new(Aggregates::new(matrix, &couplings, threshold, pieces.rows(), reaches)));
+    #[expect(clippy::cast_precision_loss, reason = "counts below 2^53")]
+    if let Some(parts) = parts
+        && parts.sum(aggregates.count()) as f64 > COARSER * total as f64
+    {
+        return if B * total <= LARGEST { last() } else { None };
+    }
     let bodies = places.take().map(|(places, size)| Bodies::new(&aggregates, places, size));
-    let interpolation = aggregates.interpolation(matrix, &couplings, DAMPING, bodies.as_ref());
-    let (starts, entries) = interpolation.transposed(aggregates.count());
+    let (interpolation, coarse) = match parts {
+        Some(parts) => {
+            let (interpolation, coarse) = parts.interpolation(matrix, &couplings, &aggregates, DAMPING);
+            (interpolation, Some(coarse))
+        }
+        None => {
+            let none = Across::default();
+            (aggregates.interpolation(matrix, &couplings, DAMPING, bodies.as_ref(), &none), None)
+        }
+    };
+    let (starts, entries) = interpolation.transposed(coarse.as_ref().map_or(aggregates.count(), Parts::rows));
     let sizes = bodies.as_ref().map_or(&[][..], Bodies::sizes);
     let next = galerkin::<B, C>(matrix, &interpolation, (&starts, &entries), sizes);
     *places = bodies.map(Bodies::into_coarse);
-    let next_pieces = if C * next.rows() <= COARSEST { Pieces::whole(next.rows()) } else { Pieces::new(&next) };
-    let level = Level::new(matrix, &interpolation, (&starts, &entries), pieces, next_pieces, aggregates)?;
-    Some((level, next, next_pieces))
+    let next = System::new(Cow::Owned(next), coarse, None);
+    let smoother = system.agreed(GaussSeidel::new(matrix, *pieces, &added))?;
+    let slot = |pieces: Pieces, row: usize| if row < pieces.rows() { pieces.slot(row) } else { row };
+    let row = |pieces: Pieces, slot: usize| if slot < pieces.rows() { pieces.row(slot) } else { slot };
+    let (own, coarse) = (*pieces, next.pieces);
+    let level = Level {
+        aggregates,
+        pieces: own,
+        rows: matrix.rows(),
+        smoother,
+        border,
+        interpolation: Transfer::interpolation(&interpolation, |place| row(own, place), |column| slot(coarse, column)),
+        restriction: Transfer::restriction(
+            &interpolation,
+            (&starts, &entries),
+            |place| row(coarse, place),
+            |row| slot(own, row),
+        ),
+    };
+    Some(Step::Level(level, next))
 }
 
 impl<T: Real, const B: usize> Level<T, B> {
-    fn new(
-        matrix: &SparseMatrix<B>,
-        interpolation: &Interpolation,
-        transposed: (&[usize], &[(u32, u32)]),
-        pieces: Pieces,
-        coarse: Pieces,
-        aggregates: Arc<Aggregates>,
-    ) -> Option<Self> {
-        Some(Self {
-            aggregates,
-            pieces,
-            smoother: GaussSeidel::new(matrix, pieces)?,
-            interpolation: Transfer::interpolation(
-                interpolation,
-                |slot| pieces.row(slot),
-                |column| coarse.slot(column),
-            ),
-            restriction: Transfer::restriction(
-                interpolation,
-                transposed,
-                |slot| coarse.row(slot),
-                |row| pieces.slot(row),
-            ),
-        })
-    }
-
     /// A sweep, and what it leaves to the coarser level.
     fn down<const C: usize, const K: usize>(&self, own: &mut Vectors<T, B, K>, next: &mut Vectors<T, C, K>) {
-        self.smoother.forward(&own.right_side, &mut own.solution);
-        self.smoother.residual(&own.solution, &mut own.residual);
+        let count = self.pieces.rows();
+        self.smoother.forward(&own.right_side[..count], &mut own.solution[..count]);
+        self.smoother.residual(&own.solution[..count], &mut own.residual[..count]);
+        if let Some(border) = &self.border {
+            border.spread(&mut own.solution);
+            border.complete(&own.solution, &mut own.residual);
+        }
         parallel::for_each_chunk(&mut next.right_side, ROW_CHUNK / 8, |chunk, part| {
             for (index, value) in part.iter_mut().enumerate() {
                 *value = [[T::default(); C]; K];
@@ -241,6 +353,13 @@ impl<T: Real, const B: usize> Level<T, B> {
                 self.interpolation.interpolate(chunk * ROW_CHUNK + index, &next.solution, value);
             }
         });
-        self.smoother.backward(&own.right_side, &mut own.solution);
+        if let Some(border) = &self.border {
+            border.prepare(&own.solution, &mut own.right_side, &mut own.residual);
+        }
+        let count = self.pieces.rows();
+        self.smoother.backward(&own.right_side[..count], &mut own.solution[..count]);
+        if let Some(border) = &self.border {
+            border.spread(&mut own.solution);
+        }
     }
 }

@@ -120,6 +120,13 @@ fn multiply_add<const B: usize, const K: usize>(sum: &mut [[f64; B]; K], block: 
     }
 }
 
+/// `sum += block`.
+pub(super) fn add<const B: usize>(sum: &mut Block<B>, block: &Block<B>) {
+    for (sum, value) in sum.as_flattened_mut().iter_mut().zip(block.as_flattened()) {
+        *sum += value;
+    }
+}
+
 /// The inverse of a symmetric positive definite block; `None` where a pivot falls below `1e-10` of its diagonal entry.
 #[expect(clippy::needless_range_loop, reason = "the indices are those of the formulas")]
 pub(crate) fn invert_positive<const B: usize>(block: &Block<B>) -> Option<Block<B>> {

@@ -8,31 +8,36 @@
 use std::sync::Arc;
 
 mod aggregation;
+mod border;
 mod cholesky;
 mod conjugate_gradients;
+mod direct;
+mod distributed;
 mod gauss_seidel;
 mod hierarchy;
 mod iteration;
 mod matrix;
 mod multigrid;
 mod ordering;
+mod parts;
 mod preconditioner;
 mod real;
 mod rows;
-mod schwarz;
 #[cfg(test)]
 mod tests;
 mod transfer;
 
 pub use cholesky::Cholesky;
 pub use conjugate_gradients::ConjugateGradients;
+pub use distributed::DistributedMultigrid;
 pub(crate) use iteration::norms;
+use matrix::add;
 pub use matrix::{Block, SparseMatrix};
 pub(crate) use matrix::{ROW_CHUNK, invert_positive};
 pub use multigrid::{Multigrid, MultigridSettings, Precision};
 pub use ordering::reverse_cuthill_mckee;
 pub use preconditioner::{BlockPreconditioner, Factorization};
-pub use schwarz::Schwarz;
+pub(crate) use real::Real;
 
 /// Systems of at most this many equations are solved directly.
 const DIRECT: usize = 1500;

@@ -69,8 +69,8 @@ impl<const B: usize> Multigrid<B> {
     pub fn new(matrix: impl Into<Arc<SparseMatrix<B>>>, settings: MultigridSettings) -> Result<Self, LinearError> {
         let matrix = matrix.into();
         let levels = match settings.precision {
-            Precision::Single => Hierarchy::new(&matrix, None, None).map(Levels::Single),
-            Precision::Double => Hierarchy::new(&matrix, None, None).map(Levels::Double),
+            Precision::Single => Hierarchy::new(&matrix, None, None, None).map(Levels::Single),
+            Precision::Double => Hierarchy::new(&matrix, None, None, None).map(Levels::Double),
         };
         Self::with_levels(matrix, settings, levels)
     }
@@ -90,7 +90,7 @@ impl<const B: usize> Multigrid<B> {
         if B != 3 || places.len() != matrix.rows() {
             return Err(LinearError::Places { found: places.len(), expected: matrix.rows(), block: B });
         }
-        let levels = Hierarchy::new(&matrix, None, Some(&places));
+        let levels = Hierarchy::new(&matrix, None, None, Some(&places));
         Self::with_levels(matrix, settings, levels.map(|levels| Levels::Bodies(Box::new(levels), places)))
     }
 
@@ -98,10 +98,10 @@ impl<const B: usize> Multigrid<B> {
     pub(super) fn of_like_matrix(&self, matrix: Arc<SparseMatrix<B>>) -> Result<Self, LinearError> {
         let same = self.matrix.has_pattern_of(&matrix);
         let levels = match &self.levels {
-            Levels::Single(like) => Hierarchy::new(&matrix, same.then_some(like), None).map(Levels::Single),
-            Levels::Double(like) => Hierarchy::new(&matrix, same.then_some(like), None).map(Levels::Double),
+            Levels::Single(like) => Hierarchy::new(&matrix, None, same.then_some(like), None).map(Levels::Single),
+            Levels::Double(like) => Hierarchy::new(&matrix, None, same.then_some(like), None).map(Levels::Double),
             Levels::Bodies(like, places) => (places.len() == matrix.rows())
-                .then(|| Hierarchy::new(&matrix, same.then_some(&**like), Some(places)))
+                .then(|| Hierarchy::new(&matrix, None, same.then_some(&**like), Some(places)))
                 .flatten()
                 .map(|levels| Levels::Bodies(Box::new(levels), Arc::clone(places))),
             Levels::None => return Self::new(matrix, self.settings),
@@ -129,32 +129,6 @@ impl<const B: usize> Multigrid<B> {
 
     fn fallback(&self) -> Result<&ConjugateGradients<B>, LinearError> {
         self.fallback.get_or_init(|| ConjugateGradients::new(Arc::clone(&self.matrix))).as_ref().map_err(|error| *error)
-    }
-
-    /// Calls `work` with one V-cycle, an approximate inverse of the matrix that is symmetric and positive definite; where there are
-    /// no levels, with the fallback's preconditioner. `scale` brings each column of what it is given to the order of 1.
-    pub(super) fn with_cycle<const K: usize, R>(
-        &self,
-        scale: [f64; K],
-        work: impl FnOnce(&mut dyn FnMut(&[Columns<B, K>], &mut [Columns<B, K>])) -> R,
-    ) -> R {
-        fn cycle<T: Real, const B: usize, const C: usize, const K: usize, R>(
-            hierarchy: &Hierarchy<T, B, C>,
-            scale: [f64; K],
-            work: impl FnOnce(&mut dyn FnMut(&[Columns<B, K>], &mut [Columns<B, K>])) -> R,
-        ) -> R {
-            let mut workspace = hierarchy.workspace();
-            work(&mut |vector, result| hierarchy.apply(&mut workspace, scale, vector, result))
-        }
-        match &self.levels {
-            Levels::Single(hierarchy) => cycle(hierarchy, scale, work),
-            Levels::Double(hierarchy) => cycle(hierarchy, scale, work),
-            Levels::Bodies(hierarchy, _) => cycle(&**hierarchy, scale, work),
-            Levels::None => work(&mut |vector, result| match self.fallback() {
-                Ok(fallback) => fallback.precondition(vector, result),
-                Err(_) => result.copy_from_slice(vector),
-            }),
-        }
     }
 
     fn iterate<T: Real, const C: usize, const K: usize>(

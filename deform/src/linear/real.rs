@@ -3,7 +3,7 @@
 use std::ops::{AddAssign, Mul, Neg, Sub};
 
 /// `f32` or `f64`.
-pub(super) trait Real:
+pub(crate) trait Real:
     Copy
     + Default
     + Send

@@ -118,7 +118,7 @@ pub(super) fn galerkin<const F: usize, const C: usize>(
         }
         found
     });
-    collect(&parts)
+    collected(COARSE_CHUNK, &parts)
 }
 
 /// `sum += row P_block` for one row of a block of the matrix.
@@ -176,7 +176,7 @@ fn first_three<const F: usize>(row: &[f64; F]) -> Vector {
 
 /// Some rows of a matrix while it is built.
 #[derive(Debug)]
-struct RowsFound<T> {
+pub(super) struct RowsFound<T> {
     /// Where each row ends.
     ends: Vec<usize>,
     columns: Vec<u32>,
@@ -190,14 +190,25 @@ impl<T> Default for RowsFound<T> {
 }
 
 impl<T> RowsFound<T> {
+    /// One more block of the row that is being built.
+    pub(super) fn push(&mut self, column: u32, block: T) {
+        self.columns.push(column);
+        self.blocks.push(block);
+    }
+
+    /// The row is complete.
+    pub(super) fn end(&mut self) {
+        self.ends.push(self.columns.len());
+    }
+
     fn row(&self, row: usize) -> (&[u32], &[T]) {
         let range = row.checked_sub(1).map_or(0, |before| self.ends[before])..self.ends[row];
         (&self.columns[range.clone()], &self.blocks[range])
     }
 }
 
-/// One matrix of rows that were built [`COARSE_CHUNK`] at a time.
-fn collect<const B: usize>(parts: &[RowsFound<Block<B>>]) -> SparseMatrix<B> {
+/// One matrix of rows that were built `chunk` at a time.
+pub(super) fn collected<const B: usize>(chunk: usize, parts: &[RowsFound<Block<B>>]) -> SparseMatrix<B> {
     let mut offsets = vec![0];
     let mut base = 0;
     for part in parts {
@@ -206,16 +217,11 @@ fn collect<const B: usize>(parts: &[RowsFound<Block<B>>]) -> SparseMatrix<B> {
     }
     let mut columns = vec![0; base];
     let mut blocks = vec![[[0.0; B]; B]; base];
-    parallel::for_each_rows(
-        COARSE_CHUNK,
-        (&offsets, &mut columns),
-        (&offsets, &mut blocks),
-        |rows, columns, blocks| {
-            let part = &parts[rows.start / COARSE_CHUNK];
-            columns.copy_from_slice(&part.columns);
-            blocks.copy_from_slice(&part.blocks);
-        },
-    );
+    parallel::for_each_rows(chunk, (&offsets, &mut columns), (&offsets, &mut blocks), |rows, columns, blocks| {
+        let part = &parts[rows.start / chunk];
+        columns.copy_from_slice(&part.columns);
+        blocks.copy_from_slice(&part.blocks);
+    });
     SparseMatrix::from_parts(offsets, columns, blocks)
 }
 
@@ -252,10 +258,9 @@ impl<T: Copy> Accumulator<T> {
             self.places[*column as usize] = NONE;
         }
         for (column, block) in self.entries.drain(..) {
-            found.columns.push(column);
-            found.blocks.push(block);
+            found.push(column, block);
         }
-        found.ends.push(found.columns.len());
+        found.end();
     }
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::foldover;
-use crate::linear::{ConjugateGradients, Schwarz, SparseMatrix, Tolerance, reverse_cuthill_mckee};
+use crate::linear::{ConjugateGradients, DistributedMultigrid, SparseMatrix, Tolerance, reverse_cuthill_mckee};
 use crate::mesh::{CellType, Mesh, Numbering, Ordered, Vector};
 use crate::parallel;
 use crate::partition::{Partition, Reduction, Shares, Solver, all, any, whole};
@@ -192,7 +192,7 @@ impl Untangler {
             return Ok(Box::new(ConjugateGradients::new(matrix)?));
         }
         let shares = self.shares.clone();
-        Ok(Box::new(Schwarz::with_shares(Arc::clone(&self.partition), shares, Arc::new(matrix), None)?))
+        Ok(Box::new(DistributedMultigrid::with_shares(Arc::clone(&self.partition), shares, Arc::new(matrix), None)?))
     }
 
     /// Goes along `direction` as far as the energy falls enough (Armijo); the energy there.

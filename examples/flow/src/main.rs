@@ -86,7 +86,7 @@ fn on_ranks(work: impl FnOnce(Ranks, Option<Solvers>) -> Result<(), Box<dyn std:
             Alarm,
             mpi::{Mpi, rsmpi},
         },
-        distributed::{Petsc, Preconditioning},
+        distributed::Petsc,
     };
     if !under_mpirun() {
         return work(Arc::new(Solo), None).map_err(|error| error.to_string());
@@ -97,7 +97,7 @@ fn on_ranks(work: impl FnOnce(Ranks, Option<Solvers>) -> Result<(), Box<dyn std:
     // Before MPI would be finalized, which waits for the other ranks.
     let _alarm = Alarm::among(&ranks);
     let is_first = ranks.rank() == 0;
-    let solvers = Petsc::solvers(&universe.world(), Preconditioning::default()).map_err(|error| error.to_string())?;
+    let solvers = Petsc::solvers(&universe.world(), None).map_err(|error| error.to_string())?;
     work(ranks, Some(solvers)).map_err(|error| {
         // Before MPI is finalized: once a rank has failed and gone, mpirun ends the others.
         if is_first {

@@ -83,6 +83,24 @@ impl<C: Communicator> Counted<C> {
         self.calls.fetch_add(1, Ordering::Relaxed);
     }
 
+    /// What `exchange` makes of messages.
+    fn counted(
+        &self,
+        messages: Vec<(usize, Vec<u8>)>,
+        exchange: impl FnOnce(Vec<(usize, Vec<u8>)>) -> Vec<(usize, Vec<u8>)>,
+    ) -> Vec<(usize, Vec<u8>)> {
+        self.call();
+        let rank = self.rank();
+        let others = |messages: &[(usize, Vec<u8>)], counts: &[AtomicU64; 2]| {
+            let others = messages.iter().filter(|(other, _)| *other != rank);
+            others.for_each(|(_, bytes)| Self::count(counts, bytes.len()));
+        };
+        others(&messages, &self.sent);
+        let heard = exchange(messages);
+        others(&heard, &self.heard);
+        heard
+    }
+
     fn count([messages, bytes]: &[AtomicU64; 2], length: usize) {
         messages.fetch_add(1, Ordering::Relaxed);
         bytes.fetch_add(length as u64, Ordering::Relaxed);
@@ -139,16 +157,11 @@ impl<C: Communicator> Communicator for Counted<C> {
     }
 
     fn exchange(&self, messages: Vec<(usize, Vec<u8>)>) -> Vec<(usize, Vec<u8>)> {
-        self.call();
-        let rank = self.rank();
-        let others = |messages: &[(usize, Vec<u8>)], counts: &[AtomicU64; 2]| {
-            let others = messages.iter().filter(|(other, _)| *other != rank);
-            others.for_each(|(_, bytes)| Self::count(counts, bytes.len()));
-        };
-        others(&messages, &self.sent);
-        let heard = self.communicator.exchange(messages);
-        others(&heard, &self.heard);
-        heard
+        self.counted(messages, |messages| self.communicator.exchange(messages))
+    }
+
+    fn exchange_with(&self, messages: Vec<(usize, Vec<u8>)>, from: &[usize]) -> Vec<(usize, Vec<u8>)> {
+        self.counted(messages, |messages| self.communicator.exchange_with(messages, from))
     }
 
     fn abort(&self) {

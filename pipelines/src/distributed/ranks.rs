@@ -79,6 +79,12 @@ impl Partition for Ranks {
         heard.into_iter().map(|(from, bytes)| (from, from_bytes(&bytes))).collect()
     }
 
+    fn exchange_with(&self, messages: Vec<(usize, Vec<f64>)>, from: &[usize]) -> Vec<(usize, Vec<f64>)> {
+        let messages = messages.into_iter().map(|(to, values)| (to, to_bytes(&values))).collect();
+        let heard = self.communicator.exchange_with(messages, from);
+        heard.into_iter().map(|(from, bytes)| (from, from_bytes(&bytes))).collect()
+    }
+
     fn owns(&self, vertex: u32) -> bool {
         self.shared.owns(vertex)
     }

@@ -7,8 +7,10 @@ use std::{
 
 use tombolo_deform::{
     mesh::{ArrayView, Cells, FeatureSource, Mesh, TaggedFaces, Vector},
+    partition::Partition,
     shapes::{box_of_hexahedra, box_of_tets},
     surface::{FeatureSettings, Surface},
+    volume::{Deform, Method, VolumeOperator},
 };
 
 use super::*;
@@ -376,4 +378,68 @@ fn a_field_that_is_wrong_on_one_rank_stops_nobody() {
     let said = outcomes[0].join("\n");
     assert!(said.contains("rank 1: statistics: the channel has no field `other`"), "{said}");
     assert!(said.contains("rank 2: cycle 0: field `speed` is NaN"), "{said}");
+}
+
+/// The largest difference of a displacement of parts from that of one process, and the iterations that it took: solved from the
+/// reference, and by an operator that was renewed.
+fn deformed_in_parts(mesh: &Mesh, method: Method, ranks: usize, of_cells: &[usize]) -> (f64, usize) {
+    let settings = Deform { method, tolerance: 1e-10, ..Deform::default() };
+    let wave = |[x, y, z]: Vector| [0.1 * (3.0 * y).sin(), 0.2 * x * z, -0.1 * (4.0 * x).cos()];
+    let on = |mesh: &Mesh, vertices: &[u32]| -> Vec<Vector> {
+        vertices.iter().map(|&vertex| wave(mesh.points()[vertex as usize])).collect()
+    };
+    let surface = Surface::extract(mesh, &FeatureSettings::default()).unwrap();
+    let serial = VolumeOperator::new(mesh, surface.vertices(), &settings).unwrap();
+    let expected = serial.solve(&on(mesh, surface.vertices())).unwrap().displacement;
+    let found = threads::run(ranks, |ranks| {
+        let part = Part::cut(mesh, of_cells, ranks.rank(), false).unwrap();
+        let ranks: Arc<dyn Communicator> = Arc::new(ranks);
+        let (shared, boundary) = PartBoundary::find(&*ranks, &part, &FeatureSettings::default()).unwrap();
+        let partition: Arc<dyn Partition> = Arc::new(Ranks::new(ranks, Arc::new(shared), &boundary, Vec::new()));
+        let own = Mesh::new(part.points.clone(), part.cells.clone(), FeatureSource::SharpEdges).unwrap();
+        let operator = VolumeOperator::of_part(&own, boundary.vertices(), &[], &settings, &partition).unwrap();
+        let again = operator.updated(&own).unwrap();
+        let numbers: Vec<usize> = part.global_vertices.iter().flatten().map(|&number| number as usize).collect();
+        [&operator, &again].map(|operator| {
+            let found = operator.solve(&on(&own, boundary.vertices())).unwrap();
+            let off = found.displacement.iter().zip(&numbers).flat_map(|(value, &number)| {
+                let expected = expected[number];
+                (0..3).map(move |axis| (value[axis] - expected[axis]).abs())
+            });
+            (off.fold(0.0, f64::max), found.iterations)
+        })
+    });
+    let found = found.as_flattened();
+    assert!(found.iter().all(|(_, iterations)| *iterations == found[0].1), "all ranks iterate together");
+    (found.iter().fold(0.0, |most: f64, (off, _)| most.max(*off)), found[0].1)
+}
+
+/// Cutting a mesh costs no iterations to speak of: multigrid sees through the borders.
+#[test]
+fn multigrid_over_ranks_takes_the_iterations_of_one_process() {
+    let mesh = box_of_tets([17, 13, 12], [0.0; 3], [1.5, 1.0, 1.0]);
+    for method in [Method::Elasticity, Method::Harmonic] {
+        let (_, alone) = deformed_in_parts(&mesh, method, 1, &vec![0; mesh.cells().len()]);
+        for (ranks, empty) in [(2, None), (3, None), (4, Some(1)), (5, None)] {
+            let (off, iterations) = deformed_in_parts(&mesh, method, ranks, &dealt(&mesh, ranks, empty));
+            assert!(off < 1e-8, "{method:?} on {ranks} ranks: {off:e}");
+            assert!(iterations <= alone + 3, "{method:?} on {ranks} ranks: {iterations} iterations, alone {alone}");
+        }
+    }
+}
+
+/// Parts that hang together nowhere, and ranks that have a handful of rows each: slower, but solved.
+#[test]
+fn scattered_parts_are_solved_too() {
+    let mesh = box_of_tets([14, 12, 11], [0.0; 3], [1.2, 1.0, 1.0]);
+    let count = mesh.cells().len();
+    for (ranks, of_cells) in [
+        (3, shuffled(count, 7).into_iter().map(|place| place % 3).collect::<Vec<usize>>()),
+        (40, dealt(&mesh, 40, None)),
+        (24, shuffled(count, 9).into_iter().map(|place| place % 24).collect()),
+    ] {
+        let (off, iterations) = deformed_in_parts(&mesh, Method::Elasticity, ranks, &of_cells);
+        assert!(off < 1e-8, "{ranks} ranks: {off:e} in {iterations} iterations");
+        assert!(iterations <= 40, "{ranks} ranks: {iterations} iterations");
+    }
 }
