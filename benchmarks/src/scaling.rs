@@ -1,15 +1,21 @@
-//! Meshes in parts: what it takes to find their surface, and what goes from rank to rank for it.
+//! Meshes in parts: what it takes to find their surface and to move their volume, and what goes from rank to rank for it.
 //!
 //! The ranks are threads of this process, so that the bytes and messages are those of MPI, and the seconds those of as many cores
 //! as there are.
 
-use std::{fmt, time::Instant};
+use std::{fmt, sync::Arc, time::Instant};
 
 use serde::Serialize;
 use tombolo::{
     comm::{Communicator, Counted, Traffic, threads},
-    deform::{mesh::Mesh, shapes::box_of_tets, surface::FeatureSettings},
-    pipelines::distributed::{Part, PartBoundary},
+    deform::{
+        mesh::{FeatureSource, Mesh, Vector},
+        partition::Partition,
+        shapes::box_of_tets,
+        surface::FeatureSettings,
+        volume::{Deform, VolumeOperator},
+    },
+    pipelines::distributed::{Part, PartBoundary, Ranks},
 };
 
 use crate::report::Target;
@@ -43,6 +49,11 @@ struct Row {
     scatter: [Traffic; 2],
     /// The same of bringing the coordinates of the surface to rank 0.
     gather: [Traffic; 2],
+    /// The same of setting the volume's elasticity up, and of one solve.
+    set_up: [Traffic; 2],
+    solve: [Traffic; 2],
+    /// The iterations of the solve.
+    iterations: usize,
 }
 
 pub fn run() -> Result<Scaling, Box<dyn std::error::Error>> {
@@ -62,7 +73,8 @@ struct Measured {
     seconds: Vec<f64>,
     surface: usize,
     shared: usize,
-    traffic: [Traffic; 3],
+    traffic: [Traffic; 5],
+    iterations: usize,
 }
 
 fn measured(mesh: &Mesh, along: [usize; 3]) -> Result<Row, Box<dyn std::error::Error>> {
@@ -80,34 +92,48 @@ fn measured(mesh: &Mesh, along: [usize; 3]) -> Result<Row, Box<dyn std::error::E
         .collect();
     let parts: Vec<Part> = (0..count).map(|rank| Part::cut(mesh, &of_cells, rank, false)).collect::<Result<_, _>>()?;
     let outcomes = threads::run(count, |ranks| {
-        let ranks = Counted::new(ranks);
+        let ranks = Arc::new(Counted::new(ranks));
         let part = &parts[ranks.rank()];
         let mut seconds = Vec::new();
         let mut last = None;
         for _ in 0..RUNS {
             ranks.barrier();
             let (begun, before) = (Instant::now(), ranks.traffic());
-            let found = PartBoundary::find(&ranks, part, &FeatureSettings::default())?;
+            let found = PartBoundary::find(&*ranks, part, &FeatureSettings::default())?;
             seconds.push(begun.elapsed().as_secs_f64());
             last = Some((found, ranks.traffic() - before));
         }
         let Some(((shared, boundary), find)) = last else { return Ok(None) };
         let before = ranks.traffic();
         let displacement = boundary.surface().map(|surface| vec![[0.0; 3]; surface.points().len()]);
-        boundary.scatter(&ranks, displacement.as_deref())?;
+        boundary.scatter(&*ranks, displacement.as_deref())?;
         let scatter = ranks.traffic() - before;
         let before = ranks.traffic();
-        let places = boundary.gather(&ranks, &part.points)?;
-        let traffic = [find, scatter, ranks.traffic() - before];
+        let places = boundary.gather(&*ranks, &part.points)?;
+        let gather = ranks.traffic() - before;
         let surface = places.map_or(0, |places| places.len());
-        Ok::<_, tombolo::pipelines::distributed::DistributedError>(Some(Measured {
+        let shares = shared.shared().count();
+        let communicator: Arc<dyn Communicator> = Arc::<Counted<threads::Threads>>::clone(&ranks);
+        let partition: Arc<dyn Partition> = Arc::new(Ranks::new(communicator, Arc::new(shared), &boundary, Vec::new()));
+        let own = Mesh::new(part.points.clone(), part.cells.clone(), FeatureSource::SharpEdges)?;
+        let before = ranks.traffic();
+        let operator = VolumeOperator::of_part(&own, boundary.vertices(), &[], &Deform::default(), &partition)?;
+        let set_up = ranks.traffic() - before;
+        let wave = |[x, y, z]: Vector| [0.02 * (9.0 * y).sin(), 0.02 * (8.0 * z).sin(), 0.02 * (7.0 * x).sin()];
+        let motion: Vec<Vector> =
+            boundary.vertices().iter().map(|&vertex| wave(part.points[vertex as usize])).collect();
+        let before = ranks.traffic();
+        let iterations = operator.solve(&motion)?.iterations;
+        let traffic = [find, scatter, gather, set_up, ranks.traffic() - before];
+        Ok::<_, Box<dyn std::error::Error + Send + Sync>>(Some(Measured {
             seconds,
             surface,
-            shared: shared.shared().count(),
+            shared: shares,
             traffic,
+            iterations,
         }))
     });
-    let outcomes = outcomes.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let outcomes = outcomes.into_iter().collect::<Result<Vec<_>, _>>().map_err(|error| error.to_string())?;
     let outcomes: Vec<Measured> = outcomes.into_iter().flatten().collect();
     let traffic = |part: usize| {
         let of = |measured: &Measured| measured.traffic[part];
@@ -126,6 +152,9 @@ fn measured(mesh: &Mesh, along: [usize; 3]) -> Result<Row, Box<dyn std::error::E
         find: traffic(0),
         scatter: traffic(1),
         gather: traffic(2),
+        set_up: traffic(3),
+        solve: traffic(4),
+        iterations: outcomes[0].iterations,
     })
 }
 
@@ -140,7 +169,7 @@ impl fmt::Display for Scaling {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "{:>9} {:>5} {:>8} {:>7} {:>9}   {:>22} {:>22} {:>22} {:>22}",
+            "{:>9} {:>5} {:>8} {:>7} {:>9}   {:>22} {:>22} {:>22} {:>22} {:>22} {:>22} {:>10}",
             "tets",
             "ranks",
             "surface",
@@ -149,7 +178,10 @@ impl fmt::Display for Scaling {
             "find: a rank",
             "find: rank 0",
             "scatter: rank 0",
-            "gather: rank 0"
+            "gather: rank 0",
+            "set-up: a rank",
+            "solve: a rank",
+            "iterations"
         )?;
         let said = |traffic: &Traffic| {
             let (bytes, messages) =
@@ -159,7 +191,7 @@ impl fmt::Display for Scaling {
         for row in &self.rows {
             writeln!(
                 f,
-                "{:>9} {:>5} {:>8} {:>7} {:>9.4}   {:>22} {:>22} {:>22} {:>22}",
+                "{:>9} {:>5} {:>8} {:>7} {:>9.4}   {:>22} {:>22} {:>22} {:>22} {:>22} {:>22} {:>10}",
                 row.tets,
                 row.ranks,
                 row.surface,
@@ -168,7 +200,10 @@ impl fmt::Display for Scaling {
                 said(&row.find[0]),
                 said(&row.find[1]),
                 said(&row.scatter[1]),
-                said(&row.gather[1])
+                said(&row.gather[1]),
+                said(&row.set_up[0]),
+                said(&row.solve[0]),
+                row.iterations
             )?;
         }
         for target in &self.targets {

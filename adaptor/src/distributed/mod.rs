@@ -16,9 +16,13 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod assembled;
 mod library;
+mod numbering;
+mod shell;
 mod sys;
 mod system;
+mod vector;
 
 use std::{fmt, sync::Arc};
 
@@ -52,7 +56,7 @@ pub enum Preconditioning {
 
 /// From how many unknown vertices on V-cycles are quicker than incomplete Cholesky, on one rank and on several: the benchmark `volume`
 /// measures it.
-const FROM_VERTICES: [usize; 2] = [15_000, 30_000];
+const FROM_VERTICES: [usize; 2] = [12_000, 20_000];
 
 impl Preconditioning {
     /// The one that takes least from the first set-up to the first displacement of so many unknown vertices of all ranks together, by

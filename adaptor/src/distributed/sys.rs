@@ -34,6 +34,8 @@ pub(super) type MatNullSpace = *mut NullSpace;
 /// Add to what is there.
 pub(super) const ADD_VALUES: c_int = 2;
 pub(super) const MAT_FINAL_ASSEMBLY: c_int = 0;
+/// The product with a vector.
+pub(super) const MATOP_MULT: c_int = 3;
 /// The 2-norm of the residual itself.
 pub(super) const KSP_NORM_UNPRECONDITIONED: c_int = 2;
 /// The default of a number.
@@ -75,6 +77,24 @@ unsafe extern "C" {
     ) -> ErrorCode;
     pub(super) fn MatAssemblyBegin(matrix: Mat, kind: c_int) -> ErrorCode;
     pub(super) fn MatAssemblyEnd(matrix: Mat, kind: c_int) -> ErrorCode;
+    pub(super) fn MatCreateShell(
+        comm: MPI_Comm,
+        rows: PetscInt,
+        cols: PetscInt,
+        all_rows: PetscInt,
+        all_cols: PetscInt,
+        context: *mut c_void,
+        matrix: *mut Mat,
+    ) -> ErrorCode;
+    /// The function is of the type of the operation.
+    pub(super) fn MatShellSetOperation(
+        matrix: Mat,
+        operation: c_int,
+        function: unsafe extern "C" fn(Mat, Vec, Vec) -> ErrorCode,
+    ) -> ErrorCode;
+    pub(super) fn MatShellSetContext(matrix: Mat, context: *mut c_void) -> ErrorCode;
+    /// `context` is where the pointer is written to.
+    pub(super) fn MatShellGetContext(matrix: Mat, context: *mut c_void) -> ErrorCode;
     pub(super) fn MatMult(matrix: Mat, vector: Vec, result: Vec) -> ErrorCode;
     pub(super) fn MatDestroy(matrix: *mut Mat) -> ErrorCode;
     pub(super) fn MatSetNearNullSpace(matrix: Mat, space: MatNullSpace) -> ErrorCode;

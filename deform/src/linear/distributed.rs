@@ -134,6 +134,11 @@ impl<const B: usize> DistributedMultigrid<B> {
         &self.matrix
     }
 
+    /// `result` becomes the product of the sum with a vector that all ranks have the same of. Collective.
+    pub fn multiply(&self, vector: &[[f64; B]], result: &mut [[f64; B]]) {
+        self.sum().multiply(single_column(vector), single_column_mut(result));
+    }
+
     /// Calls `work` with the preconditioner, an approximate inverse of the sum: from a vector that all ranks have the same of, to one
     /// that they do. `scale`, the same on all ranks, brings vectors to the order of 1. Collective, as the preconditioner is.
     pub fn with_cycle<R>(&self, scale: f64, work: impl FnOnce(&mut dyn FnMut(&[[f64; B]], &mut [[f64; B]])) -> R) -> R {
