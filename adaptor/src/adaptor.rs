@@ -68,7 +68,7 @@ struct Meetings {
     fault: Option<ExecuteError>,
 }
 
-/// The mesh that orders change: that of the solver's first channel.
+/// The mesh that orders change: that of the channel which the pipeline that runs on orders names, or of the first.
 enum SteeredMesh {
     /// The first call will take it over.
     Unknown,
@@ -195,9 +195,9 @@ impl Adaptor {
 
     /// Shows the solver's present state and says what to do in the step that follows.
     ///
-    /// `channels` are borrowed for the length of the call; the first is the mesh that orders change. Its mesh at the first call
-    /// is the reference from which all shapes are measured. A motion must be carried out by the solver over the coming step;
-    /// the adaptor takes it for done.
+    /// `channels` are borrowed for the length of the call; the mesh that orders change is the first one's, or that of the
+    /// [`steered_channel`](Adaptor::steered_channel). As it is at the first call it is the reference from which all shapes are
+    /// measured. A motion must be carried out by the solver over the coming step; the adaptor takes it for done.
     ///
     /// Where no pipeline is due, no command has arrived and no motion is under way, it costs one atomic load and a few
     /// comparisons and allocates nothing; on several ranks also one reduction of six numbers, at every call or, where the
@@ -262,13 +262,25 @@ impl Adaptor {
     /// this reason from now on. To be called on all ranks.
     pub fn release_shape(&mut self, reason: &str) {
         if matches!(self.mesh, SteeredMesh::Steered(..)) {
-            if self.communicator.rank() == 0 {
-                self.complain(reason);
-            }
-            self.mesh = SteeredMesh::Refused(reason.to_owned());
-            self.describe();
-            self.tell_conditions();
+            self.refuse(reason);
         }
+    }
+
+    fn refuse(&mut self, reason: &str) {
+        if self.communicator.rank() == 0 {
+            self.complain(reason);
+        }
+        self.mesh = SteeredMesh::Refused(reason.to_owned());
+        self.describe();
+        self.tell_conditions();
+    }
+
+    /// The name of the channel whose mesh orders change, where the configuration names one: the `channel` of the pipeline with
+    /// `"on": "order"`. Without one it is the first that `execute` is shown.
+    #[must_use]
+    pub fn steered_channel(&self) -> Option<&str> {
+        let pipeline = self.config.pipelines.iter().find(|pipeline| pipeline.due == Due::OnOrder);
+        pipeline.and_then(|pipeline| pipeline.channel.as_deref())
     }
 
     /// The orders so far and what became of each, in the order in which they came in; of more than
@@ -317,11 +329,15 @@ impl Adaptor {
         if !(step.time_step >= 0.0 && step.time_step.is_finite()) {
             return Err(ExecuteError::Time { cycle, what: "time_step", value: step.time_step });
         }
-        let channel = channels.first().ok_or(ExecuteError::NoChannel { cycle })?;
+        if channels.is_empty() {
+            return Err(ExecuteError::NoChannel { cycle });
+        }
         let expected = match &self.mesh {
             SteeredMesh::Steered(steerer, _) => steerer.vertex_count(),
             SteeredMesh::Unknown | SteeredMesh::Unsteered | SteeredMesh::Refused(_) => return Ok(()),
         };
+        let channel = Channel::find(channels, self.steered_channel())
+            .map_err(|reason| ExecuteError::SteeredChannel { cycle, reason })?;
         let found = channel.mesh.points.len();
         if found != expected {
             return Err(ExecuteError::VertexCount { cycle, channel: channel.name.into(), found, expected });
@@ -411,7 +427,14 @@ impl Adaptor {
     /// Copies the mesh as it is now as the reference of all shapes, if anybody could ask for one.
     fn take_reference(&mut self, step: &Step, channels: &[Channel<'_>]) -> Result<(), ExecuteError> {
         let cycle = step.cycle;
-        let channel = channels.first().ok_or(ExecuteError::NoChannel { cycle })?;
+        let channel = match comm::agree_on(&*self.communicator, Channel::find(channels, self.steered_channel())) {
+            Ok(channel) => channel,
+            // The configuration's mistake, not the solver's.
+            Err(comm::RankError { message, .. }) => {
+                self.refuse(&format!("no shape can be changed: {message}"));
+                return Ok(());
+            }
+        };
         self.mesh = if self.config.stream.is_none() && self.timed.is_empty() && !self.pipelines.can_order() {
             SteeredMesh::Unsteered
         } else {
@@ -426,7 +449,7 @@ impl Adaptor {
                 Ok(steerer) => {
                     let surface = steerer.surface();
                     if let Some(surface) = surface.as_ref().filter(|_| self.communicator.size() == 1) {
-                        self.pipelines.share_surface(channels, Arc::clone(surface));
+                        self.pipelines.share_surface(channels, channel.name, Arc::clone(surface));
                     }
                     SteeredMesh::Steered(Box::new(steerer), surface)
                 }

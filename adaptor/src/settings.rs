@@ -128,10 +128,18 @@ pub enum InitializeError {
 #[non_exhaustive]
 pub enum ExecuteError {
     /// Nothing was handed over.
-    #[error("cycle {cycle}: no channel was given; the first channel is the mesh to be steered")]
+    #[error("cycle {cycle}: no channel was given")]
     NoChannel {
         /// The step.
         cycle: u64,
+    },
+    /// The channel that orders change was there, and is not any more.
+    #[error("cycle {cycle}: {reason}; orders change the shape of that channel")]
+    SteeredChannel {
+        /// The step.
+        cycle: u64,
+        /// Which channel, and which there are.
+        reason: String,
     },
     /// A time that is none.
     #[error("cycle {cycle}: {what} is {value}; it must be finite{}", if *what == "time_step" { " and not below 0" } else { "" })]

@@ -84,10 +84,10 @@ impl Pipelines {
         self.drags_skeleton
     }
 
-    /// Lets the views use a surface of the first channel that is known already.
-    pub(crate) fn share_surface(&mut self, channels: &[Channel<'_>], surface: Arc<Surface>) {
+    /// Lets the views use a surface of a channel that is known already.
+    pub(crate) fn share_surface(&mut self, channels: &[Channel<'_>], channel: &str, surface: Arc<Surface>) {
         // Where it does not fit, the pipelines work out their own and say what is wrong.
-        let _ = self.runner.set_surface(channels, None, surface);
+        let _ = self.runner.set_surface(channels, Some(channel), surface);
     }
 
     /// Lets only those run from now on whose names are chosen.

@@ -308,3 +308,45 @@ fn a_journal_holds_what_a_displacement_file_held() {
     let (again, _) = run("second.jsonl", parse_orders(&journal, "first.jsonl").unwrap());
     assert!(shape == again);
 }
+
+/// Two boxes as two channels, and a configuration in which orders change the one called `named`.
+fn two_channels(named: &str) -> (Vec<(u64, usize)>, OrderStatus, String) {
+    let text = json!({"version": 1, "pipelines": [{"name": "shape", "on": "order", "channel": named, "stages": []}]});
+    let settings = Settings {
+        config: config(&text.to_string()),
+        orders: orders(&json!([at(1, squeeze(0.2))])),
+        ..Settings::default()
+    };
+    let mut adaptor = Adaptor::initialize(settings).expect("initialize");
+    assert_eq!(adaptor.steered_channel(), Some(named));
+    let boxes = [box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]), box_of_tets([3, 3, 3], [2.0; 3], [3.0; 3])];
+    let mut motions = Vec::new();
+    for cycle in 0..4 {
+        let [first, second] = &boxes;
+        let channels = [
+            Channel { name: "particles", mesh: MeshView::from(first), fields: &[] },
+            Channel { name: "fluid", mesh: MeshView::from(second), fields: &[] },
+        ];
+        let step = Step { cycle, time: cycle as f64, time_step: 1.0 };
+        let steering = adaptor.execute(&step, &channels).expect("execute");
+        motions.extend(steering.motion.map(|motion| (cycle, motion.coordinates.len())));
+        if cycle == 3 && named == "fluid" {
+            let error = adaptor.execute(&Step { cycle: 4, ..step }, &channels[..1]).map(|_| ()).unwrap_err();
+            assert!(matches!(&error, ExecuteError::SteeredChannel { cycle: 4, .. }), "{error}");
+            assert!(error.to_string().contains("no channel `fluid`; its channels are particles"), "{error}");
+        }
+    }
+    let report = adaptor.finalize().expect("report");
+    let order = report.orders.into_iter().next().expect("an order");
+    (motions, order.status, order.reason.unwrap_or_default())
+}
+
+#[test]
+fn orders_change_the_channel_that_the_configuration_names() {
+    assert_eq!(two_channels("fluid"), (vec![(1, 64)], OrderStatus::Applied, String::new()));
+    assert_eq!(two_channels("particles").0, [(1, 27)]);
+    // A channel that is not there is no mistake of the solver's: it goes on, and orders are told why they are rejected.
+    let (motions, status, reason) = two_channels("fluids");
+    assert_eq!((motions.len(), status), (0, OrderStatus::Rejected));
+    assert!(reason.contains("no channel `fluids`") && reason.contains("did you mean `fluid`?"), "{reason}");
+}

@@ -92,7 +92,8 @@ int tombolo_initialize(tombolo* run);
 /* The link that a browser opens, cut to `bytes`; empty without a server. */
 int tombolo_link(const tombolo* run, char* text, size_t bytes);
 
-/* ---- The mesh. The first channel that is named is the one that orders change; its vertices and cells stay the same. */
+/* ---- The mesh. The first channel that is named is the one that orders change, or the one that the configuration's
+ * pipeline with "on": "order" has as its channel; its vertices and cells stay the same. */
 
 /* Coordinates of the vertices: `dimension` (2 or 3) values for each, `stride` values from one vertex to the next. */
 int tombolo_mesh(tombolo* run, const char* channel, enum tombolo_type type, const void* coordinates, size_t vertices,
@@ -121,8 +122,8 @@ int tombolo_field(tombolo* run, const char* channel, const char* name, enum tomb
 
 /* Shows the state before the step from `time` to `time + time_step` (0 in a steady solver). */
 int tombolo_execute(tombolo* run, uint64_t cycle, double time, double time_step);
-/* Where the first channel's vertices are to be at the end of the step, x y z for each; NULL where the mesh stays. Valid until the
- * next call of tombolo_execute. */
+/* Where the vertices of the channel that orders change are to be at the end of the step, x y z for each; NULL where the mesh
+ * stays. Valid until the next call of tombolo_execute. */
 const double* tombolo_coordinates(const tombolo* run);
 /* The same as the way from where they are, and divided by the time step. */
 const double* tombolo_displacement(const tombolo* run);

@@ -12,12 +12,12 @@
 //! # What is read
 //! - `catalyst_initialize`: `catalyst/scripts` and `catalyst/pipelines` (files of pipelines that end in `.json`; the type `io`
 //!   writes files), `catalyst/parameters/<name>/{value, minimum, maximum}`, `catalyst/mpi_comm`. Where the node names no pipelines
-//!   the variable `TOMBOLO_PIPELINES` may; else the surface of the first channel is streamed. `TOMBOLO_ORDERS` names a file of
+//!   the variable `TOMBOLO_PIPELINES` may; else the surface of every channel is streamed. `TOMBOLO_ORDERS` names a file of
 //!   orders, `TOMBOLO_OUTPUT` the directory of what is written, `TOMBOLO_REPORT` the file of the report at the end.
 //! - `catalyst_execute`: `catalyst/state/{timestep | cycle, time, time_step}`, and each of `catalyst/channels`: `mesh`, `multimesh`,
 //!   `amrmesh`, all topologies and shapes of the Blueprint. Arrays are lent to the adaptor as they lie in memory wherever it reads
-//!   their type. The first channel's mesh is the one that orders change. The cells are those of the topology of the highest
-//!   dimension; an integer element field `features`, `boundary_attribute` or `<topology>_attribute` on a topology of its faces says
+//!   their type. The first channel's mesh is the one that orders change, or that of the `channel` of the pipeline with
+//!   `"on": "order"`. The cells are those of the topology of the highest dimension; an integer element field `features`, `boundary_attribute` or `<topology>_attribute` on a topology of its faces says
 //!   which feature each belongs to, and `state/features/<name>` of the channel names them. An integer vertex field `features` does
 //!   so for vertices.
 //!

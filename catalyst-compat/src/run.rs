@@ -128,13 +128,15 @@ impl Run {
         self.last_time = Some(step.time);
         self.complete(&mut channels)?;
         // A solver that shows nothing yet is asked for nothing.
-        let Some(steered) = channels.first() else {
+        if channels.is_empty() {
             self.asked.rest();
             return Ok(());
-        };
-        self.steered.clone_from(&steered.name);
-        self.blocks.clear();
-        self.blocks.extend(steered.blocks.iter().map(|block: &Block| (block.name.clone(), block.vertex_count())));
+        }
+        let named = self.adaptor.steered_channel();
+        let steered = channels.iter().find(|channel| named.is_none_or(|name| channel.name == name));
+        self.steered = steered.map_or_else(String::new, |channel| channel.name.clone());
+        let blocks = steered.iter().flat_map(|channel| &channel.blocks);
+        self.blocks = blocks.map(|block: &Block| (block.name.clone(), block.vertex_count())).collect();
         let Self { adaptor, kept, asked, .. } = self;
         let mut fields: Vec<Vec<FieldView<'_>>> = channels.iter().map(|_| Vec::new()).collect();
         let mut meshes: Vec<MeshView<'_>> = Vec::with_capacity(channels.len());

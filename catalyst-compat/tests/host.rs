@@ -294,7 +294,8 @@ const ORDERS: &str = r#"[
 fn results_hold_the_motion_while_there_is_one() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let (pipelines, orders) = (directory.path().join("pipelines.json"), directory.path().join("orders.json"));
-    std::fs::write(&pipelines, r#"{"version": 1}"#).expect("a file");
+    let config = r#"{"version": 1, "pipelines": [{"name": "shape", "on": "order", "channel": "box", "stages": []}]}"#;
+    std::fs::write(&pipelines, config).expect("a file");
     std::fs::write(&orders, ORDERS).expect("a file");
     let program = compile(directory.path(), "motion", true);
     let (output, errors) = run(&program, Some(&pipelines), &[("TOMBOLO_ORDERS", &orders.to_string_lossy())]);

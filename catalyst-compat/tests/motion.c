@@ -1,5 +1,5 @@
-/* What catalyst_results hands back while an order is carried out: a mesh in one piece, and one of two blocks; in both layouts; and nothing
- * once the mesh rests, though the node is the same.
+/* What catalyst_results hands back while an order is carried out: a mesh in one piece, one of two blocks, and one that is not the first
+ * channel; in both layouts; and nothing once the mesh rests, though the node is the same.
  *
  *   cc -rdynamic motion.c -o motion -ldl -lm && TOMBOLO_ORDERS=orders.json ./motion libtombolo_catalyst.so pipelines.json
  *
@@ -73,11 +73,16 @@ int main(int argc, char** argv)
   void* library = argc > 2 ? dlopen(argv[1], RTLD_LAZY | RTLD_GLOBAL) : NULL;
   const struct catalyst_impl* impl = library ? dlsym(library, "catalyst_api_impl") : NULL;
   if (impl == NULL) return 2;
-  for (int blocks = 0; blocks < 2; ++blocks) {
+  for (int pass = 0; pass < 3; ++pass) {
+    const int blocks = pass == 1;
     static conduit_node setup, node, results;
     text(&setup, "catalyst/scripts/script", argv[2]);
     number(&setup, "catalyst/parameters/heating/value", 1.5);
     if (impl->initialize(&setup) != 0) return 1;
+    if (pass == 2) {
+      text(&node, "catalyst/channels/aside/type", "mesh");
+      cube(at(&node, "catalyst/channels/aside/data"), 20.0);
+    }
     text(&node, "catalyst/channels/box/type", blocks ? "multimesh" : "mesh");
     if (blocks) {
       cube(at(&node, "catalyst/channels/box/data/left"), 0.0);
@@ -93,6 +98,7 @@ int main(int argc, char** argv)
       if (impl->execute(&node) != 0 || impl->results(&results) != 0) return 1;
       const int moves = cycle == 2 || cycle == 4;
       check(catalyst_conduit_node_has_path(&results, "catalyst/box") == moves, "the mesh moves at cycles 2 and 4 alone", cycle);
+      check(!catalyst_conduit_node_has_path(&results, "catalyst/aside"), "another channel stays", cycle);
       check(value(&results, "catalyst/steering/fields/moving/values", 0) == moves, "moving", cycle);
       check(value(&results, "catalyst/steering/data/fields/heating/values", 0) == (cycle < 3 ? 1.5 : 2.5), "a parameter", cycle);
       check(value(&results, "catalyst/steering/fields/stop/values", 0) == (cycle >= 6), "stop", cycle);

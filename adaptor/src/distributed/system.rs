@@ -293,7 +293,13 @@ impl<const B: usize> LinearSolver<B> for System<B> {
         let convergence = match &self.method {
             Method::Multigrid(multigrid) => {
                 let objects = (handles.matrix, handles.preconditioner);
-                shell::with_context(objects, numbering, multigrid, 1.0 / whole, work)?
+                match shell::with_context(objects, numbering, multigrid, 1.0 / whole, work) {
+                    // It can do without the cycle.
+                    Err(LinearError::NotConverged { .. }) => {
+                        return multigrid.solve_from(right_side, solution, tolerance);
+                    }
+                    outcome => outcome?,
+                }
             }
             Method::IncompleteCholesky | Method::Gamg(_) | Method::Jacobi => work()?,
         };

@@ -88,8 +88,8 @@ fn among<const B: usize>(matrix: &SparseMatrix<B>, row: usize, count: usize) -> 
     }
 }
 
-/// The sweeps of Gauss–Seidel through the first rows and columns of one matrix, its rows in the order of [`Pieces`]: first through all even pieces, then
-/// through all odd ones, or back.
+/// The sweeps of Gauss–Seidel through the first rows and columns of one matrix, in the order of [`Pieces`]: first through all even
+/// pieces, then through all odd ones, or back.
 #[derive(Debug)]
 pub(super) struct GaussSeidel<T, const B: usize> {
     pieces: Pieces,

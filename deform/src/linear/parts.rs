@@ -209,10 +209,10 @@ impl Parts {
                 theirs[row as usize - self.own] = weights;
             }
         }
-        let foreign: BTreeSet<Key> = theirs.iter().flatten().map(|(key, _)| *key).filter(|key| key.0 != rank).collect();
-        let foreign: Vec<Key> =
-            foreign.into_iter().chain(met.iter().copied()).collect::<BTreeSet<Key>>().into_iter().collect();
-        let mut result = Interpolation { offsets: own.offsets.clone(), weights: own.weights.clone(), ..own.clone() };
+        let foreign = theirs.iter().flatten().map(|(key, _)| *key).chain(met.iter().copied());
+        let foreign: BTreeSet<Key> = foreign.filter(|key| key.0 != rank).collect();
+        let foreign: Vec<Key> = foreign.into_iter().collect();
+        let mut result = own.clone();
         result.columns.iter_mut().for_each(|column| *column = numbered(&foreign, &key_of(*column)));
         for weights in theirs {
             result.columns.extend(weights.iter().map(|(key, _)| numbered(&foreign, key)));

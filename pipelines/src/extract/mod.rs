@@ -21,6 +21,8 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use tombolo_deform::mesh::{ArrayView, Cells, MeshView, Vector};
 
+use crate::language::nearest;
+
 /// What a field has one value for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -73,6 +75,26 @@ pub struct Channel<'a> {
     pub mesh: MeshView<'a>,
     /// The fields on it.
     pub fields: &'a [FieldView<'a>],
+}
+
+impl<'a> Channel<'a> {
+    /// The channel of this name; without one the first.
+    ///
+    /// # Errors
+    /// A text that names the channels that there are, and the nearest.
+    pub fn find<'c>(channels: &'c [Channel<'a>], name: Option<&str>) -> Result<&'c Self, String> {
+        let found = match name {
+            None => channels.first(),
+            Some(name) => channels.iter().find(|channel| channel.name == name),
+        };
+        found.ok_or_else(|| {
+            let known: Vec<&str> = channels.iter().map(|channel| channel.name).collect();
+            let Some(name) = name.filter(|_| !known.is_empty()) else { return "the solver has no channel".to_owned() };
+            let hint =
+                nearest(name, known.iter().copied()).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            format!("the solver has no channel `{name}`; its channels are {}{hint}", known.join(", "))
+        })
+    }
 }
 
 /// All that a solver shows of one step.

@@ -79,7 +79,7 @@ impl Default for Steering {
 pub struct Pipeline {
     /// Its name, which is also that of its view; no two pipelines share one.
     pub name: String,
-    /// The channel it reads; `None` is the solver's first.
+    /// The channel it reads, and of one that runs on orders the channel whose mesh they change; `None` is the solver's first.
     pub channel: Option<String>,
     /// When it runs.
     pub due: Due,
@@ -131,7 +131,7 @@ impl At {
 struct PipelineFields {
     /// Its name, which is also that of its view; no two pipelines share one.
     name: String,
-    /// The channel it reads; left out, the solver's first.
+    /// The channel it reads; left out, the solver's first. Of a pipeline with `"on": "order"`, the channel whose mesh orders change.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     channel: Option<String>,
     /// How often it runs. At most one of `every`, `at` and `on` is given; without any it runs at every step.

@@ -11,7 +11,7 @@ use tombolo_deform::surface::Surface;
 
 use crate::communicator::{Communicator, Reduction, Solo, agree};
 use crate::extract::{Channel, ExtractError, Snapshot, Source};
-use crate::language::{Config, Due, Problem, Stage, Validate, nearest};
+use crate::language::{Config, Due, Problem, Stage, Validate};
 use pipeline::Prepared;
 
 pub use output::{Encoding, Frame, MonitorValues, Output, View, ViewKind};
@@ -153,7 +153,7 @@ fn source<'a, 'c>(
     name: Option<&str>,
     communicator: &dyn Communicator,
 ) -> Result<(&'c Channel<'c>, &'a mut Source), String> {
-    let found = channel_of(channels, name);
+    let found = Channel::find(channels, name);
     if communicator.size() > 1 {
         let channel = agree(communicator, found).map_err(|error| error.to_string())?;
         // Taken anew where the cells of any rank have changed.
@@ -182,18 +182,4 @@ fn source<'a, 'c>(
             Ok((channel, entry.insert(source)))
         }
     }
-}
-
-fn channel_of<'c>(channels: &'c [Channel<'c>], name: Option<&str>) -> Result<&'c Channel<'c>, String> {
-    let found = match name {
-        None => channels.first(),
-        Some(name) => channels.iter().find(|channel| channel.name == name),
-    };
-    found.ok_or_else(|| {
-        let known: Vec<&str> = channels.iter().map(|channel| channel.name).collect();
-        let Some(name) = name.filter(|_| !known.is_empty()) else { return "the solver has no channel".to_owned() };
-        let hint =
-            nearest(name, known.iter().copied()).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-        format!("the solver has no channel `{name}`; its channels are {}{hint}", known.join(", "))
-    })
 }
