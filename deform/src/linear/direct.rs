@@ -22,7 +22,7 @@ pub(super) struct Direct<T, const B: usize> {
 /// What stands for the inverse of a matrix.
 #[derive(Debug)]
 enum Inverse<T, const B: usize> {
-    Factor(Factor<B>),
+    Factor(Box<Factor<B>>),
     /// A cycle: many ranks have many rows between them, however few each of them has.
     Cycle(Box<Hierarchy<T, B, B>>),
 }
@@ -30,7 +30,7 @@ enum Inverse<T, const B: usize> {
 impl<T: Real, const B: usize> Inverse<T, B> {
     fn new(matrix: &SparseMatrix<B>) -> Option<Self> {
         if B * matrix.rows() <= COARSEST {
-            return Factor::new(matrix).map(Self::Factor);
+            return Factor::new(matrix).map(|factor| Self::Factor(Box::new(factor)));
         }
         Hierarchy::new(matrix, None, None, None).map(|levels| Self::Cycle(Box::new(levels)))
     }

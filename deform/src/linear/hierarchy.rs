@@ -142,7 +142,7 @@ impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
             Step::Last(direct) => {
                 return Some(Self { order, finest: None, coarser: Vec::new(), coarsest: Coarsest::Finest(direct) });
             }
-            Step::Level(finest, next) => (finest, next),
+            Step::Level(found) => *found,
         };
         let mut coarser: Vec<Level<T, C>> = Vec::new();
         let mut threshold = THRESHOLD;
@@ -154,7 +154,8 @@ impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
                 Step::Last(direct) => {
                     return Some(Self { order, finest: Some(finest), coarser, coarsest: Coarsest::Coarse(direct) });
                 }
-                Step::Level(level, next) => {
+                Step::Level(found) => {
+                    let (level, next) = *found;
                     coarser.push(level);
                     current = next;
                 }
@@ -263,7 +264,7 @@ enum Step<T, const B: usize, const C: usize> {
     /// It is small: the last one.
     Last(Direct<T, B>),
     /// A level, and the next coarser system.
-    Level(Level<T, B>, System<'static, C>),
+    Level(Box<(Level<T, B>, System<'static, C>)>),
 }
 
 /// `places` becomes that of the coarser rows. `None` where there is no inverse on the way.
@@ -325,7 +326,7 @@ fn coarsened<T: Real, const B: usize, const C: usize>(
             |row| slot(own, row),
         ),
     };
-    Some(Step::Level(level, next))
+    Some(Step::Level(Box::new((level, next))))
 }
 
 impl<T: Real, const B: usize> Level<T, B> {

@@ -93,7 +93,6 @@ impl Parts {
     /// A part of the same sum: blocks between rows that one rank speaks for are moved there, those between rows of different ranks
     /// stay where they are. So the first [`own`](Self::own) rows and columns are those of the sum. `order` is that of the rows where
     /// those of `matrix` have another one.
-    #[expect(clippy::cast_precision_loss, reason = "places in lists of 32-bit numbers")]
     pub(super) fn assembled<const B: usize>(&self, matrix: &SparseMatrix<B>, order: Option<&Order>) -> SparseMatrix<B> {
         let old = |row: usize| order.map_or(row, |order| order.old[row] as usize);
         let new = |row: u32| order.map_or(row, |order| order.new[row as usize]);

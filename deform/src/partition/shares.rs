@@ -9,6 +9,9 @@ use crate::linear::Real;
 /// Other ranks, rising, and places of what is shared with each, in the same order on both.
 type WithOthers = Vec<(usize, Vec<u32>)>;
 
+/// A place, and whether the other rank speaks for it.
+type Shared = (u32, bool);
+
 /// Which of a list of values, one for each of some vertices, are those of vertices that other ranks list too.
 #[derive(Debug, Clone)]
 pub struct Shares {
@@ -84,8 +87,8 @@ impl Shares {
                 reply.extend(holding.iter().filter(|&&other| other != to).map(|&other| other as f64));
             }
         }
-        // By the other rank, then by the owner's number, which both have: (place, whether the other one speaks for it).
-        let mut found: BTreeMap<usize, BTreeMap<(usize, u32), (u32, bool)>> = BTreeMap::new();
+        // By the other rank, then by the owner's number, which both have.
+        let mut found: BTreeMap<usize, BTreeMap<(usize, u32), Shared>> = BTreeMap::new();
         for (&index, holding) in &holders {
             for &other in holding {
                 found.entry(other).or_default().insert((rank, index), (index, false));
@@ -108,11 +111,10 @@ impl Shares {
         Self::with_others(rank, others, (0..own + foreign.len()).map(|place| place < own).collect())
     }
 
-    /// `others` says of each place whether the other rank speaks for it.
-    fn with_others(rank: usize, others: Vec<(usize, Vec<(u32, bool)>)>, owned: Arc<[bool]>) -> Self {
+    fn with_others(rank: usize, others: Vec<(usize, Vec<Shared>)>, owned: Arc<[bool]>) -> Self {
         let owns = |place: u32| owned.get(place as usize).is_none_or(|&owned| owned);
         let only = |wanted: &dyn Fn(u32, bool) -> bool| -> WithOthers {
-            let filter = |shared: &[(u32, bool)]| -> Vec<u32> {
+            let filter = |shared: &[Shared]| -> Vec<u32> {
                 shared.iter().filter(|(place, theirs)| wanted(*place, *theirs)).map(|(place, _)| *place).collect()
             };
             others
