@@ -178,6 +178,7 @@ fn yaml_is_read_as_it_is_meant() {
         ("a: |1\n  one", r#"{"a": " one\n"}"#),
         ("- - 1\n  - x\n- y", r#"[[1, "x"], "y"]"#),
         ("\"a: b\": 1\n'it''s': 2\n\"\\x41\\u00e9\": 3", r#"{"a: b": 1, "it's": 2, "A\u00e9": 3}"#),
+        ("a: 'one : two'\nb: http://x:1\nc: 12:30 # d: e", r#"{"a": "one : two", "b": "http://x:1", "c": "12:30"}"#),
         ("a: true\nb: {c: true}\nd: +3\ne: 1e3", r#"{"a": "true", "b": {"c": "true"}, "d": 3, "e": 1000.0}"#),
         ("{a: [1, 2],\n b: {c: text}}", r#"{"a": [1, 2], "b": {"c": "text"}}"#),
     ];
@@ -188,6 +189,8 @@ fn yaml_is_read_as_it_is_meant() {
     }
     for (yaml, told) in [
         ("a: 1\n  b: 2", "line 2: a name is not expected here"),
+        ("a: a text with a colon : in it", "line 1: a name is not expected here"),
+        ("a:\n- one: two: three", "line 2: a name is not expected here"),
         ("a: *b", "there is no anchor 'b'"),
         ("a: &a [*a]", "there is no anchor 'a'"),
         ("? a\n: b", "no scalars"),
