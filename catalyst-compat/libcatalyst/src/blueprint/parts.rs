@@ -199,8 +199,13 @@ fn elements_of(elements: &Node, report: &mut Report) {
     let connectivity = report.integers(elements, "connectivity");
     match shape.as_deref() {
         Some("polygonal" | "polyhedral") => {
-            report.integers(elements, "sizes");
-            optional_integers(elements, "offsets", report);
+            let sizes = report.integers(elements, "sizes").map(|sizes| sizes.datatype().elements);
+            let offsets = elements.get("offsets").and_then(|_| report.integers(elements, "offsets"));
+            if let (Some(sizes), Some(offsets)) = (sizes, offsets)
+                && offsets.datatype().elements != sizes
+            {
+                report.wrong(offsets, &format!("{} offsets for {sizes} sizes", offsets.datatype().elements));
+            }
         }
         Some("mixed") => {
             if let Some(map) = report.object(elements, "shape_map") {
@@ -231,7 +236,9 @@ fn elements_of(elements: &Node, report: &mut Report) {
             if count % size != 0 {
                 report.remark(&format!("{count} vertices are no whole number of '{shape}', which has {size}"));
             }
-            optional_integers(elements, "offsets", report);
+            if elements.get("offsets").is_some() {
+                report.remark(&format!("'offsets' are not read: each '{shape}' has as many vertices"));
+            }
         }
         None => {}
     }
@@ -244,12 +251,6 @@ fn faces_of(faces: &Node, report: &mut Report) {
     }
     if report.one_of(faces, "shape", &["polygonal", "tri", "quad", "mixed"]).is_some() {
         elements_of(faces, report);
-    }
-}
-
-fn optional_integers(node: &Node, name: &str, report: &mut Report) {
-    if node.get(name).is_some() {
-        report.integers(node, name);
     }
 }
 

@@ -48,6 +48,8 @@ static const struct
   { 0, "topology", "{type: unstructured, coordset: c, elements: {shape: polyhedral, connectivity: [0, 1], sizes: [2], offsets: [0]}}" },
   { 0, "topology", "{type: unstructured, coordset: c, elements: {a: {shape: polyhedral, connectivity: [0], sizes: [1], offsets: [0]}}, subelements: {shape: polygonal, connectivity: [0, 1, 2], sizes: [3]}}" },
   { 1, "topology", "{type: unstructured, coordset: c, elements: {a: {shape: polyhedral, connectivity: [0], sizes: [1], offsets: [0]}}, subelements: {a: {shape: polygonal, connectivity: [0, 1, 2], sizes: [3]}}}" },
+  { 0, "topology", "{type: unstructured, coordset: c, elements: {shape: polygonal, connectivity: [0, 1, 2, 0, 1, 2], sizes: [3, 3], offsets: [0]}}" },
+  { 1, "topology", "{type: unstructured, coordset: c, elements: {shape: tri, connectivity: [0, 1, 2], offsets: [0.5]}}" },
   { 0, "topology", "{type: unstructured, coordset: c, elements: {shape: mixed, shape_map: {tri: 5}, shapes: [5, 9], sizes: [3, 4], offsets: [0, 3], connectivity: [0, 1, 2, 0, 1, 2, 3]}}" },
   { 1, "topology", "{type: unstructured, coordset: c, elements: {shape: mixed, shape_map: {tri: 5, quad: 9}, shapes: [5, 9], sizes: [3, 4], offsets: [0, 3], connectivity: [0, 1, 2, 0, 1, 2, 3]}}" },
   { 0, "topology", "{type: points, coordset: c, grid_function: 10}" }, { 1, "field/basis", "H1" }, { 0, "field/basis", "1" },
@@ -68,6 +70,9 @@ static const struct
   { 1, "matset", "{topology: t, volume_fractions: {a: [0.5]}, element_ids: {a: [0]}}" },
   { 0, "matset", "{topology: t, volume_fractions: {a: [0.5]}, element_ids: {b: [0]}}" },
   { 0, "matset", "{topology: t, volume_fractions: {a: [0.5]}, element_ids: {a: [0.5]}}" },
+  { 1, "matset", "{topology: t, volume_fractions: {a: {values: [0.5], sizes: [1], offsets: [0]}}}" },
+  { 0, "matset", "{topology: t, volume_fractions: {a: {values: [0.5], sizes: [1]}}}" },
+  { 0, "matset", "{topology: t, volume_fractions: {a: {below: {values: [0.5]}}}}" },
   { 1, "specset", "{matset: m, matset_values: {a: {s: [0.1, 0.2]}, b: {s: [0.1, 0.2]}}}" },
   { 0, "specset", "{matset: m, matset_values: {a: {s: [0.1, 0.2]}, b: {s: [0.1]}}}" }, { 0, "specset", "{matset: m}" },
   { 1, "adjset", "{topology: t, association: vertex, groups: {g: {neighbors: [1], values: [0, 1]}}}" },
@@ -254,6 +259,8 @@ static void blueprint(void)
   CHECK(fails("mesh/coordset", "{type: explicit, values: {x: [0.0, 1.0], y: [0.0]}}", "errors/[0]", "1 elements"));
   CHECK(fails("mesh/field", "{association: face, topology: t, values: [1]}", "errors/[0]", "'face' is none of vertex, element"));
   CHECK(fails("table", "{values: {a: [1, 2], b: [1, 2, 3]}}", "values/b/errors/[0]", "3 rows"));
+  CHECK(fails("o2mrelation", "{a: [0.5], offsets: [0]}", "errors/[0]", "one is missing"));
+  CHECK(fails("o2mrelation", "{a: {b: [0.5]}, sizes: [1], offsets: [0]}", "errors/[0]", "no data"));
   CHECK(fails("mash", "{}", "errors/[0]", "there are mesh, mcarray"));
   CHECK(!conduit_blueprint_table_verify(info, index) && !conduit_blueprint_table_verify_sub_protocol("sub", node, index));
   conduit_blueprint_about(info);
