@@ -262,9 +262,15 @@ static void blueprint(void)
   CHECK(fails("o2mrelation", "{a: [0.5], offsets: [0]}", "errors/[0]", "one is missing"));
   CHECK(fails("o2mrelation", "{a: {b: [0.5]}, sizes: [1], offsets: [0]}", "errors/[0]", "no data"));
   CHECK(fails("mash", "{}", "errors/[0]", "there are mesh, mcarray"));
+  conduit_node_parse(index, "{one: {values: {a: [1, 2, 3], b: {u: [1, 2, 3], v: [4, 5, 6]}}}, two: {values: {c: 1}}}", "yaml");
+  CHECK(conduit_blueprint_table_verify(index, info) && conduit_node_fetch_path_as_int64(info, "tables") == 2);
+  CHECK(conduit_node_fetch_path_as_int64(info, "one/values/rows") == 3);
+  CHECK(conduit_node_fetch_path_as_int64(info, "one/values/columns") == 2);
+  CHECK(conduit_node_fetch_path_as_int64(info, "two/values/c/elements") == 1);
   CHECK(!conduit_blueprint_table_verify(info, index) && !conduit_blueprint_table_verify_sub_protocol("sub", node, index));
   conduit_blueprint_about(info);
-  CHECK(conduit_node_has_path(info, "protocols/mesh"));
+  CHECK(!strcmp(conduit_node_fetch_path_as_char8_str(info, "protocols/mesh/coordset"), "enabled"));
+  CHECK(!strcmp(conduit_node_fetch_path_as_char8_str(info, "protocols/table"), "enabled"));
   conduit_about(info);
   CHECK(conduit_node_has_path(info, "version"));
   conduit_node_destroy(node);
