@@ -143,15 +143,11 @@ fn points(coordset: &Node) -> Result<(Vec<Axis>, [usize; 3])> {
             let number = |path: String, otherwise: f64| {
                 coordset.find(&path).and_then(|node| node.number(0)).map_or(otherwise, |number| number.as_f64())
             };
+            let named = crate::blueprint::index::axes(coordset);
             let axis = |(index, count): (usize, &usize)| {
-                let (first, step) = (
-                    number(format!("origin/{}", NAMES[index]), 0.0),
-                    number(format!("spacing/d{}", NAMES[index]), 1.0),
-                );
-                (
-                    NAMES[index].to_owned(),
-                    (0..(*count).min(MOST_POINTS)).map(|point| first + step * point as f64).collect(),
-                )
+                let name = named.get(index).copied().unwrap_or(NAMES[index]);
+                let (first, step) = (number(format!("origin/{name}"), 0.0), number(format!("spacing/d{name}"), 1.0));
+                (name.to_owned(), (0..(*count).min(MOST_POINTS)).map(|point| first + step * point as f64).collect())
             };
             dims.iter().enumerate().filter(|(_, count)| **count > 0).map(axis).collect()
         }

@@ -176,8 +176,8 @@ static void polyhedra(void)
   conduit_node_parse(mesh, WEDGES, "yaml");
   CHECK(conduit_blueprint_mesh_verify(mesh, info));
   conduit_blueprint_mesh_flatten(mesh, NULL, whole);
-  CHECK(conduit_node_fetch_path_as_float64_ptr(whole, "element_data/values/z")[0] == 0.5);
-  CHECK(conduit_node_fetch_path_as_float64_ptr(whole, "element_data/values/z")[1] == 1.5);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(whole, "element_data/values/element_centers/z")[0] == 0.5);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(whole, "element_data/values/element_centers/z")[1] == 1.5);
   conduit_node_set_path_int(options, "target", 2);
   conduit_blueprint_mesh_partition(mesh, options, parts);
   CHECK(conduit_node_number_of_children(parts) == 2 && conduit_blueprint_mesh_verify(parts, info));
@@ -206,7 +206,7 @@ static void polyhedra(void)
   CHECK(strcmp(conduit_node_fetch_path_as_char8_str(whole, "topologies/t/elements/shape"), "mixed") == 0);
   CHECK(conduit_node_number_of_elements(conduit_node_fetch(whole, "coordsets/c/values/x")) == 10);
   conduit_blueprint_mesh_flatten(whole, NULL, parts);
-  CHECK(conduit_node_fetch_path_as_float64_ptr(parts, "element_data/values/z")[2] == 2.25);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(parts, "element_data/values/element_centers/z")[2] == 2.25);
   /* A face that is not there. */
   conduit_int64 faces[10] = { 0, 1, 2, 3, 99, 1, 5, 6, 7, 8 };
   conduit_node_set_path_int64_ptr(mesh, "topologies/t/elements/connectivity", faces, 10);
@@ -291,7 +291,10 @@ static void partition(void)
   conduit_node_parse(mesh, grid, "yaml");
   conduit_blueprint_mesh_flatten(mesh, NULL, whole);
   CHECK(conduit_blueprint_table_verify(whole, info));
-  CHECK(conduit_node_fetch_path_as_float64_ptr(whole, "element_data/values/y")[5] == 3.0);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(whole, "element_data/values/element_centers/y")[5] == 3.0);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(whole, "vertex_data/values/c/x")[5] == 0.5);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(whole, "vertex_data/values/vertex_id")[11] == 11);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(whole, "element_data/values/domain_id")[5] == 0);
   CHECK(conduit_node_fetch_path_as_int64_ptr(whole, "vertex_data/values/v/b")[11] == 11);
   conduit_node_set_path_int(options, "target", 4);
   conduit_blueprint_mesh_partition(mesh, options, parts);
@@ -327,6 +330,61 @@ static void partition(void)
   conduit_node_destroy(whole);
 }
 
+/* Two domains as tables: their numbers, a field that one has not, types, and what may be left out. */
+static void tables(void)
+{
+  conduit_node *mesh = conduit_node_create(), *options = conduit_node_create();
+  conduit_node *out = conduit_node_create(), *info = conduit_node_create();
+  conduit_node_parse(mesh,
+    "a: {state: {domain_id: 7}, coordsets: {cyl: {type: uniform, dims: {i: 3, j: 1}, origin: {r: 1.0, z: 5.0}}},\n"
+    "  topologies: {t: {type: points, coordset: cyl}}, fields: {f: {association: vertex, topology: t, values: [1, 2, 3]}}}\n"
+    "b: {state: {domain_id: 3}, coordsets: {cyl: {type: explicit, values: {r: [0.0, 1.0], z: [0.0, 2.0]}}},\n"
+    "  topologies: {t: {type: unstructured, coordset: cyl, elements: {shape: line, connectivity: [0, 1]}}},\n"
+    "  fields: {g: {association: vertex, topology: t, values: {u: [0.5, 1.5], v: [1, 2]}}}}\n", "yaml");
+  float single[] = { 2.0F };
+  conduit_node_set_path_float32_ptr(mesh, "b/fields/h/values", single, 1);
+  conduit_node_set_path_char8_str(mesh, "b/fields/h/topology", "t");
+  conduit_node_set_path_char8_str(mesh, "b/fields/h/association", "element");
+  conduit_node_parse(options, "{fill_value: {int: -1, float: 0.25}}", "yaml");
+  conduit_blueprint_mesh_flatten(mesh, options, out);
+  CHECK(conduit_blueprint_table_verify(out, info));
+  CHECK(conduit_node_fetch_path_as_int64(info, "vertex_data/values/rows") == 5);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(out, "vertex_data/values/cyl/r")[2] == 3.0);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(out, "vertex_data/values/cyl/z")[2] == 5.0);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(out, "vertex_data/values/f")[4] == -1);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(out, "vertex_data/values/g/v")[0] == 0.25);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(out, "vertex_data/values/g/v")[4] == 2.0);
+  CHECK(conduit_node_fetch_path_as_float32_ptr(out, "element_data/values/h")[0] == 0.25F);
+  CHECK(conduit_node_fetch_path_as_float32_ptr(out, "element_data/values/h")[3] == 2.0F);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(out, "element_data/values/element_centers/z")[3] == 1.0);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(out, "vertex_data/values/domain_id")[2] == 7);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(out, "vertex_data/values/domain_id")[3] == 3);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(out, "vertex_data/values/vertex_id")[3] == 0);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(out, "element_data/values/element_id")[2] == 2);
+  conduit_node_parse(options, "{field_names: [g], add_element_centers: 0, add_vertex_locations: 0, add_domain_info: 0}", "yaml");
+  conduit_blueprint_mesh_flatten(mesh, options, out);
+  CHECK(!conduit_node_has_child(out, "element_data"));
+  CHECK(conduit_node_number_of_children(conduit_node_fetch(out, "vertex_data/values")) == 1);
+  conduit_node_parse(options, "{field_names: g}", "yaml");
+  conduit_blueprint_mesh_flatten(mesh, options, out);
+  CHECK(strstr(last, "'field_names' is no list") != NULL);
+  /* Four faces of a pyramid have its tip, three have each other vertex. */
+  conduit_node_parse(mesh,
+    "coordsets: {c: {type: explicit, values: {z: [0.0, 0.0, 0.0, 0.0, 1.0]}}}\n"
+    "topologies: {t: {type: unstructured, coordset: c, elements: {shape: polyhedral, connectivity: [0, 1, 2, 3, 4], sizes: [5],\n"
+    "  offsets: [0]}, subelements: {shape: polygonal, connectivity: [0, 1, 2, 3, 0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4],\n"
+    "  sizes: [4, 3, 3, 3, 3], offsets: [0, 4, 7, 10, 13]}}}\n", "yaml");
+  conduit_blueprint_mesh_flatten(mesh, NULL, out);
+  CHECK(conduit_node_fetch_path_as_float64(out, "element_data/values/element_centers/z") == 0.25);
+  conduit_node_reset(mesh);
+  conduit_blueprint_mesh_flatten(mesh, NULL, out);
+  CHECK(conduit_node_number_of_children(out) == 0);
+  conduit_node_destroy(mesh);
+  conduit_node_destroy(options);
+  conduit_node_destroy(out);
+  conduit_node_destroy(info);
+}
+
 int main(void)
 {
   conduit_utils_set_error_handler(note);
@@ -334,6 +392,7 @@ int main(void)
   verdicts();
   references();
   partition();
+  tables();
   polyhedra();
   puts("blueprint.c: ok");
   return 0;
