@@ -110,6 +110,15 @@ impl<'a> Domain<'a> {
     }
 }
 
+/// The numbers of the domains: what each says of itself in `state/domain_id`, or its place where one says nothing.
+#[must_use]
+pub fn numbers_of(domains: &[&Node]) -> Vec<i64> {
+    let said =
+        |domain: &&Node| domain.find("state/domain_id").filter(|id| id.kind().is_integer()).and_then(Node::integer);
+    let said: Option<Vec<i64>> = domains.iter().map(said).collect();
+    said.unwrap_or_else(|| (0..).take(domains.len()).collect())
+}
+
 fn text(node: &Node, name: &str) -> Result<String> {
     let found = node.existing(name)?;
     found.text().ok_or_else(|| Error::new(format!("{} is no text", found.place())))

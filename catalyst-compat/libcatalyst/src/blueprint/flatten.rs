@@ -1,6 +1,6 @@
 //! A mesh as tables: a row for each vertex and for each element.
 
-use crate::blueprint::domain::Domain;
+use crate::blueprint::domain::{Domain, Element, numbers_of};
 use crate::blueprint::mesh::domains;
 use crate::datatype::Kind;
 use crate::error::{Error, Result};
@@ -147,14 +147,6 @@ impl Wanted {
     }
 }
 
-/// The numbers of the domains: what each says of itself in `state/domain_id`, or its place where one says nothing.
-fn numbers_of(domains: &[&Node]) -> Vec<i64> {
-    let said =
-        |domain: &&Node| domain.find("state/domain_id").filter(|id| id.kind().is_integer()).and_then(Node::integer);
-    let said: Option<Vec<i64>> = domains.iter().map(said).collect();
-    said.unwrap_or_else(|| (0..).take(domains.len()).collect())
-}
-
 /// The values of a field that belongs to vertices, or to elements.
 fn values_of<'a>(domain: &Domain<'a>, name: &str, of_vertices: bool) -> Option<&'a Node> {
     let (.., field) = domain.fields.iter().find(|(known, at, _)| known == name && *at == of_vertices)?;
@@ -193,7 +185,7 @@ fn coordinates(domain: &Domain<'_>, axis: usize, of_vertices: bool) -> Vec<f64> 
         sum / count.max(1) as f64
     };
     // A vertex of a polyhedron counts as often as faces have it.
-    let centre = |element: &crate::blueprint::domain::Element| match element.faces.as_slice() {
+    let centre = |element: &Element| match element.faces.as_slice() {
         [] => mean(&mut element.vertices.iter()),
         faces => mean(&mut faces.iter().flatten()),
     };

@@ -320,6 +320,32 @@ static void partition(void)
   conduit_blueprint_mesh_partition(mesh, options, parts);
   CHECK(conduit_node_fetch_path_as_int64_ptr(parts, "domain_00000/fields/original_element_ids/values/ids")[2] == 4);
   CHECK(conduit_node_fetch_path_as_int64(parts, "domain_00001/fields/e/values") == 0);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(parts, "domain_00001/fields/original_vertex_ids/values/ids")[2] == 5);
+  conduit_node_parse(options, "{mapping: 0, fields: [e], target: 0}", "yaml");
+  conduit_blueprint_mesh_partition(mesh, options, parts);
+  CHECK(conduit_node_number_of_children(conduit_node_fetch(parts, "fields")) == 1);
+  CHECK(conduit_node_has_path(parts, "fields/e/values"));
+  /* Selections go by the numbers that domains say; pieces by those that a field, or the selection, says. */
+  conduit_node_set_node(conduit_node_fetch(whole, "two/a"), mesh);
+  conduit_node_set_node(conduit_node_fetch(whole, "two/b"), mesh);
+  conduit_node_set_path_int(whole, "two/a/state/domain_id", 10);
+  conduit_node_set_path_int(whole, "two/b/state/domain_id", 20);
+  conduit_node* two = conduit_node_fetch(whole, "two");
+  conduit_node_parse(options, "{selections: [{type: explicit, domain_id: 20, elements: [4]}, {type: explicit, elements: [99]}],"
+    " original_element_ids: from}", "yaml");
+  conduit_blueprint_mesh_partition(two, options, parts);
+  CHECK(conduit_node_fetch_path_as_int64(parts, "fields/from/values/domains") == 20);
+  CHECK(conduit_node_fetch_path_as_int64(parts, "fields/from/values/ids") == 4);
+  conduit_node_parse(options, "{selections: [{type: field, domain_id: any, field: e}]}", "yaml");
+  conduit_blueprint_mesh_partition(two, options, parts);
+  CHECK(conduit_node_number_of_children(parts) == 6);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(parts, "domain_00005/fields/original_element_ids/values/domains")[1] == 20);
+  conduit_node_parse(options, "{selections: [{type: ranges, domain_id: 10, ranges: [1, 2], destination_domain: 7},"
+    " {type: explicit, domain_id: 20, elements: [5], destination_domain: 7}, {type: explicit, domain_id: 10, elements: [0]}]}", "yaml");
+  conduit_blueprint_mesh_partition(two, options, parts);
+  CHECK(conduit_node_number_of_children(parts) == 2);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(parts, "domain_00007/fields/e/values")[2] == 5);
+  CHECK(conduit_node_fetch_path_as_int64(parts, "domain_00000/fields/e/values") == 0);
   conduit_node_parse(options, "{selections: [{type: explicit, elements: [7]}]}", "yaml");
   conduit_blueprint_mesh_partition(mesh, options, parts);
   CHECK(strstr(last, "element 7 of 6") != NULL);
