@@ -216,6 +216,32 @@ fn yaml_is_read_as_it_is_meant() {
     assert!(schema::parse(&format!("a0: &a0 [x]\n{}", lines.join("\n")), Protocol::Yaml).is_err());
 }
 
+/// JSON has no such numbers; what stands for them is read among numbers as the numbers that were written.
+#[test]
+fn arrays_that_are_not_finite_stay_arrays() {
+    let mut node = Node::new();
+    for (name, values) in [("some", [f64::NAN, 1.0, f64::NEG_INFINITY]), ("all", [f64::INFINITY, f64::NAN, f64::NAN])] {
+        node.at(name).expect("a path").set_numbers(&values).expect("memory");
+    }
+    for (text, protocol) in [
+        (node.to_json(&Style::default(), Detail::Values), Protocol::Json),
+        (node.to_yaml(&Style::default()), Protocol::Yaml),
+    ] {
+        let read = schema::parse(&text, protocol).expect("what was written");
+        for (name, written) in node.children() {
+            let found: Vec<f64> =
+                read.get(name).expect("it is there").numbers().map(|number| number.as_f64()).collect();
+            let written: Vec<f64> = written.numbers().map(|number| number.as_f64()).collect();
+            assert_eq!(format!("{found:?}"), format!("{written:?}"), "{text}");
+        }
+    }
+    let read = schema::parse(r#"["nan", 0, 1]"#, Protocol::Json).expect("JSON");
+    assert_eq!((read.kind(), read.datatype().elements), (catalyst::datatype::Kind::Float64, 3));
+    let read = schema::parse(r#"{"a": "nan", "b": ["nan", "text"]}"#, Protocol::Json).expect("JSON");
+    assert_eq!(read.get("a").and_then(Node::text).as_deref(), Some("nan"));
+    assert_eq!(read.get("b").map(Node::kind), Some(catalyst::datatype::Kind::List));
+}
+
 /// Children are found by name whether few or many, after any of them has gone, come or changed its name.
 #[test]
 fn many_children_are_found_by_name() {
