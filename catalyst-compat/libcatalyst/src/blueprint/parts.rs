@@ -199,13 +199,7 @@ fn elements_of(elements: &Node, report: &mut Report) {
     let connectivity = report.integers(elements, "connectivity");
     match shape.as_deref() {
         Some("polygonal" | "polyhedral") => {
-            let sizes = report.integers(elements, "sizes").map(|sizes| sizes.datatype().elements);
-            let offsets = elements.get("offsets").and_then(|_| report.integers(elements, "offsets"));
-            if let (Some(sizes), Some(offsets)) = (sizes, offsets)
-                && offsets.datatype().elements != sizes
-            {
-                report.wrong(offsets, &format!("{} offsets for {sizes} sizes", offsets.datatype().elements));
-            }
+            sizes_and_offsets(elements, report);
         }
         Some("mixed") => {
             if let Some(map) = report.object(elements, "shape_map") {
@@ -241,6 +235,20 @@ fn elements_of(elements: &Node, report: &mut Report) {
             }
         }
         None => {}
+    }
+}
+
+/// Of polygons and polyhedra: both or neither, as many of the one as of the other.
+fn sizes_and_offsets(elements: &Node, report: &mut Report) {
+    if elements.get("sizes").is_none() && elements.get("offsets").is_none() {
+        return report.remark("without 'sizes' and 'offsets' nothing says where one element ends");
+    }
+    let sizes = report.integers(elements, "sizes").map(|sizes| sizes.datatype().elements);
+    let offsets = report.integers(elements, "offsets");
+    if let (Some(sizes), Some(offsets)) = (sizes, offsets)
+        && offsets.datatype().elements != sizes
+    {
+        report.wrong(offsets, &format!("{} offsets for {sizes} sizes", offsets.datatype().elements));
     }
 }
 

@@ -47,7 +47,10 @@ static const struct
   { 0, "topology", "{type: unstructured, coordset: c, elements: {a: {shape: quad, connectivity: 1}, b: {shape: quad}}}" },
   { 0, "topology", "{type: unstructured, coordset: c, elements: {shape: polyhedral, connectivity: [0, 1], sizes: [2], offsets: [0]}}" },
   { 0, "topology", "{type: unstructured, coordset: c, elements: {a: {shape: polyhedral, connectivity: [0], sizes: [1], offsets: [0]}}, subelements: {shape: polygonal, connectivity: [0, 1, 2], sizes: [3]}}" },
-  { 1, "topology", "{type: unstructured, coordset: c, elements: {a: {shape: polyhedral, connectivity: [0], sizes: [1], offsets: [0]}}, subelements: {a: {shape: polygonal, connectivity: [0, 1, 2], sizes: [3]}}}" },
+  { 1, "topology", "{type: unstructured, coordset: c, elements: {a: {shape: polyhedral, connectivity: [0], sizes: [1], offsets: [0]}}, subelements: {a: {shape: polygonal, connectivity: [0, 1, 2], sizes: [3], offsets: [0]}}}" },
+  { 0, "topology", "{type: unstructured, coordset: c, elements: {shape: polygonal, connectivity: [0, 1, 2], sizes: [3]}}" },
+  { 0, "topology", "{type: unstructured, coordset: c, elements: {shape: polygonal, connectivity: [0, 1, 2], offsets: [0]}}" },
+  { 1, "topology", "{type: unstructured, coordset: c, elements: {shape: polygonal, connectivity: [0, 1, 2]}}" },
   { 0, "topology", "{type: unstructured, coordset: c, elements: {shape: polygonal, connectivity: [0, 1, 2, 0, 1, 2], sizes: [3, 3], offsets: [0]}}" },
   { 1, "topology", "{type: unstructured, coordset: c, elements: {shape: tri, connectivity: [0, 1, 2], offsets: [0.5]}}" },
   { 0, "topology", "{type: unstructured, coordset: c, elements: {shape: mixed, shape_map: {tri: 5}, shapes: [5, 9], sizes: [3, 4], offsets: [0, 3], connectivity: [0, 1, 2, 0, 1, 2, 3]}}" },
@@ -169,7 +172,8 @@ static void polyhedra(void)
     "topologies: {t: {type: unstructured, coordset: c,"
     "  elements: {shape: polyhedral, connectivity: [0, 1, 2, 3, 4, 1, 5, 6, 7, 8], sizes: [5, 5], offsets: [0, 5]},"
     "  subelements: {shape: polygonal, connectivity: [0, 2, 1, 3, 4, 5, 0, 1, 4, 3, 1, 2, 5, 4, 2, 0, 3, 5,"
-    "    6, 7, 8, 3, 4, 7, 6, 4, 5, 8, 7, 5, 3, 6, 8], sizes: [3, 3, 4, 4, 4, 3, 4, 4, 4]}}}\n"
+    "    6, 7, 8, 3, 4, 7, 6, 4, 5, 8, 7, 5, 3, 6, 8], sizes: [3, 3, 4, 4, 4, 3, 4, 4, 4],"
+    "    offsets: [0, 3, 6, 10, 14, 18, 21, 25, 29]}}}\n"
     "fields: {f: {association: element, topology: t, values: [10, 20]}}\n";
   conduit_node *mesh = conduit_node_create(), *options = conduit_node_create(), *info = conduit_node_create();
   conduit_node *parts = conduit_node_create(), *whole = conduit_node_create();
