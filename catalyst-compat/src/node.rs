@@ -157,7 +157,7 @@ impl<'call> Node<'_, 'call> {
                     }
                     let copy = CStr::from_ptr(name).to_owned();
                     libc::free(name.cast());
-                    copy
+                    bare(copy)
                 }
             })
             .collect()
@@ -359,4 +359,25 @@ impl NodeMut<'_> {
 /// A C string; what follows a nul is left out.
 fn c_string(text: &str) -> CString {
     CString::new(text.split('\0').next().unwrap_or_default()).unwrap_or_default()
+}
+
+/// A name as it was given: Conduit tells one with a slash in it in braces, because it is no path.
+fn bare(name: CString) -> CString {
+    let bytes = name.as_bytes();
+    match bytes.strip_prefix(b"{").and_then(|rest| rest.strip_suffix(b"}")) {
+        Some(inner) if inner.contains(&b'/') => CString::new(inner).unwrap_or_default(),
+        _ => name,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_those_that_were_given() {
+        for (told, given) in [(c"{a/b}", c"a/b"), (c"a", c"a"), (c"{a}", c"{a}"), (c"{", c"{"), (c"", c"")] {
+            assert_eq!(bare(told.to_owned()).as_c_str(), given);
+        }
+    }
 }

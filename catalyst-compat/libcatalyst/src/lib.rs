@@ -18,7 +18,8 @@
 //! # Where it differs
 //! - Messages are in other words than Conduit's, and name the place. Blueprint's reports have the same `valid`, `errors` and `info`.
 //! - In YAML a quoted number is a text, `null` holds nothing, and `!!str` makes a text.
-//! - Blueprint wants `sizes` for polygons, and for elements of mixed shapes also `offsets`; components of a field have one length.
+//! - Blueprint wants `sizes` and `offsets` for elements of mixed shapes; components of a field have one length.
+//! - What `conduit_blueprint_mesh_partition` makes is unstructured, whatever it cut, and joins only points that are equal.
 //! - Names that release candidates of Catalyst 2 had (`catalyst_error`, `catalyst_library` of CMake) are not there, nor is the C++
 //!   interface of Conduit itself (`conduit::Node`): `conduit_cpp::Node` is.
 

@@ -201,7 +201,7 @@ impl Node {
         false
     }
 
-    /// The node's name in its parent: `[3]` in a list, empty for a root.
+    /// The node's name in its parent: `[3]` in a list, `{a/b}` for one with a slash in it, which is no path; empty for a root.
     #[must_use]
     pub fn name(&self) -> String {
         // SAFETY: as in `depth`.
@@ -211,7 +211,11 @@ impl Node {
         let Some(index) = parent.children.list().iter().position(|child| ptr::eq(child.node.as_ptr(), self)) else {
             return String::new();
         };
-        if parent.kind() == Kind::List { format!("[{index}]") } else { parent.name_of(index).to_owned() }
+        match parent.name_of(index) {
+            _ if parent.kind() == Kind::List => format!("[{index}]"),
+            name if name.contains('/') => format!("{{{name}}}"),
+            name => name.to_owned(),
+        }
     }
 
     /// The names from the root to this node, joined by slashes; empty for a root.

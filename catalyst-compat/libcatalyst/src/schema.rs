@@ -146,7 +146,12 @@ fn plain(value: &Value, node: &mut Node) -> Result<()> {
             entries.iter().try_for_each(|(name, value)| plain(value, new_child(node, name)?))
         }
         Value::List(values) => {
-            let numbers = |value: &Value| matches!(value, Value::Integer(_) | Value::Unsigned(_) | Value::Real(_));
+            // JSON has no numbers that are not finite: among numbers they are written as texts.
+            let numbers = |value: &Value| match value {
+                Value::Integer(_) | Value::Unsigned(_) | Value::Real(_) => true,
+                Value::Text(text) => matches!(text.as_str(), "nan" | "inf" | "-inf"),
+                _ => false,
+            };
             if values.is_empty() || !values.iter().all(numbers) {
                 node.become_tree(Kind::List);
                 return values.iter().try_for_each(|value| plain(value, node.append()?));

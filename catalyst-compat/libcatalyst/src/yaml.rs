@@ -234,6 +234,9 @@ impl<'a> Reader<'a> {
                 flow.end()?;
                 Ok(value)
             }
+            _ if split_key(text).is_some() => {
+                Err(wrong(line.number, "a name is not expected here; a text with ': ' in it stands in quotes"))
+            }
             _ => self.plain(text, parent),
         }
     }

@@ -110,6 +110,15 @@ impl<'a> Domain<'a> {
     }
 }
 
+/// The numbers of the domains: what each says of itself in `state/domain_id`, or its place where one says nothing.
+#[must_use]
+pub fn numbers_of(domains: &[&Node]) -> Vec<i64> {
+    let said =
+        |domain: &&Node| domain.find("state/domain_id").filter(|id| id.kind().is_integer()).and_then(Node::integer);
+    let said: Option<Vec<i64>> = domains.iter().map(said).collect();
+    said.unwrap_or_else(|| (0..).take(domains.len()).collect())
+}
+
 fn text(node: &Node, name: &str) -> Result<String> {
     let found = node.existing(name)?;
     found.text().ok_or_else(|| Error::new(format!("{} is no text", found.place())))
@@ -143,15 +152,11 @@ fn points(coordset: &Node) -> Result<(Vec<Axis>, [usize; 3])> {
             let number = |path: String, otherwise: f64| {
                 coordset.find(&path).and_then(|node| node.number(0)).map_or(otherwise, |number| number.as_f64())
             };
+            let named = crate::blueprint::index::axes(coordset);
             let axis = |(index, count): (usize, &usize)| {
-                let (first, step) = (
-                    number(format!("origin/{}", NAMES[index]), 0.0),
-                    number(format!("spacing/d{}", NAMES[index]), 1.0),
-                );
-                (
-                    NAMES[index].to_owned(),
-                    (0..(*count).min(MOST_POINTS)).map(|point| first + step * point as f64).collect(),
-                )
+                let name = named.get(index).copied().unwrap_or(NAMES[index]);
+                let (first, step) = (number(format!("origin/{name}"), 0.0), number(format!("spacing/d{name}"), 1.0));
+                (name.to_owned(), (0..(*count).min(MOST_POINTS)).map(|point| first + step * point as f64).collect())
             };
             dims.iter().enumerate().filter(|(_, count)| **count > 0).map(axis).collect()
         }

@@ -91,7 +91,8 @@ pub fn generate(mesh: &Node, path: &str, count: i64) -> Result<Node> {
 }
 
 /// The axes of a coordinate set.
-fn axes(coordset: &Node) -> Vec<&str> {
+#[must_use]
+pub fn axes(coordset: &Node) -> Vec<&str> {
     let named = coordset.get("values").or_else(|| coordset.get("origin"));
     if let Some(named) = named.filter(|named| named.count() > 0) {
         return named.children().map(|(name, _)| name).collect();

@@ -18,6 +18,9 @@ use report::Report;
 /// The protocols that can be verified.
 pub const PROTOCOLS: [&str; 5] = ["mesh", "mcarray", "table", "zfparray", "o2mrelation"];
 
+/// The parts of a mesh that can be verified by themselves.
+pub const MESH_PARTS: [&str; 8] = ["coordset", "topology", "field", "matset", "specset", "adjset", "nestset", "index"];
+
 /// Verifies a tree and fills `info` with what was found.
 ///
 /// # Errors

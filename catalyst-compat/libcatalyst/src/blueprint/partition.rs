@@ -1,9 +1,10 @@
 //! Cutting a mesh into domains, and joining domains.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
-use crate::blueprint::domain::{Domain, gather_values};
+use crate::blueprint::domain::{Domain, gather_values, numbers_of};
 use crate::blueprint::mesh::domains;
+use crate::datatype::Kind;
 use crate::error::{Error, Result};
 use crate::node::Node;
 
@@ -24,36 +25,74 @@ const NUMBERS: [(&str, i32); 10] = [
 /// Elements of one domain.
 type Piece = (usize, Vec<usize>);
 
+/// Pieces, and the number of the domain that they are to be part of, where one is given.
+type Selected = Vec<(Option<i64>, Piece)>;
+
 /// Makes new domains of a mesh. Without `selections` each domain is a piece; else each selection is one: `explicit` (`elements`),
-/// `ranges` (pairs of first and last), `logical` (`start` and `end`), or `field` (an element field that says which piece). Then the
-/// pieces are halved or joined until there are `target` domains. Points at the same place become one where domains are joined.
-/// One domain is a mesh, several are an object of meshes. `original_element_ids` says where elements come from.
+/// `ranges` (pairs of first and last), `logical` (`start` and `end`), or `field` (an element field that says to which domain an
+/// element goes). A selection takes from the domain whose number is its `domain_id`, 0 if it says none, and from each if it says
+/// `any`; it goes to `destination_domain`, if it says one. Then the other pieces are halved or joined until there are
+/// `target` domains. Points at the same place become one where domains are joined. One domain is a mesh, several are an object
+/// of meshes; all are unstructured.
+///
+/// Of the fields those in the list `fields` are taken, or all. `original_element_ids` and `original_vertex_ids` say where elements
+/// and vertices come from; the options of these names name them otherwise, and `mapping: 0` leaves them out.
 ///
 /// # Errors
-/// A domain cannot be read, or a selection names what is not there.
+/// A domain cannot be read, or a selection names elements or a field that are not there.
 pub fn partition(mesh: &Node, options: &Node) -> Result<Node> {
     let topology = options.get("topology").and_then(Node::text);
-    let read: Result<Vec<_>> =
-        domains(mesh).into_iter().map(|domain| Domain::read(domain, topology.as_deref())).collect();
-    let read = read?;
-    let mut pieces: Vec<Piece> = match options.get("selections").filter(|selections| selections.count() > 0) {
-        None => read.iter().enumerate().map(|(index, domain)| (index, (0..domain.elements.len()).collect())).collect(),
+    let sources = domains(mesh);
+    let read: Result<Vec<_>> = sources.iter().map(|domain| Domain::read(domain, topology.as_deref())).collect();
+    let numbers = numbers_of(&sources);
+    let mut source = Source { domains: read?, numbers };
+    if let Some(wanted) = options.get("fields").filter(|fields| fields.kind() == Kind::List) {
+        let wanted: Vec<_> = wanted.children().filter_map(|(_, name)| name.text()).collect();
+        source.domains.iter_mut().for_each(|domain| domain.fields.retain(|(name, ..)| wanted.contains(name)));
+    }
+    let mut selected = Selected::new();
+    match options.get("selections").filter(|selections| selections.count() > 0) {
+        None => {
+            let all = source.domains.iter().map(|domain| (0..domain.elements.len()).collect());
+            selected.extend(all.enumerate().map(|piece| (None, piece)));
+        }
         Some(selections) => {
-            let mut pieces = Vec::new();
             for (_, selection) in selections.children() {
-                select(selection, &read, &mut pieces)?;
+                select(selection, &source, &mut selected)?;
             }
-            pieces
         }
-    };
-    pieces.retain(|(_, elements)| !elements.is_empty());
-    let target = match options.get("target") {
-        None => pieces.len(),
-        Some(node) => {
-            let target = node.integer().and_then(|target| usize::try_from(target).ok()).filter(|target| *target > 0);
-            target.ok_or_else(|| Error::new(format!("{} is no number of domains", node.place())))?
+    }
+    let mut groups: BTreeMap<i64, Vec<Piece>> = BTreeMap::new();
+    let mut pieces = Vec::new();
+    for (destination, piece) in selected.into_iter().filter(|(_, (_, elements))| !elements.is_empty()) {
+        match destination {
+            Some(number) => groups.entry(number).or_default().push(piece),
+            None => pieces.push(piece),
         }
-    };
+    }
+    let target = options.get("target").and_then(Node::integer).and_then(|target| usize::try_from(target).ok());
+    let target = target.filter(|target| *target > 0).map(|target| target.saturating_sub(groups.len()).max(1));
+    let free = arranged(pieces, target);
+    let mut unused =
+        (0..).filter(|number| !groups.contains_key(number)).take(free.len()).collect::<Vec<_>>().into_iter();
+    groups.extend(free.into_iter().filter_map(|group| Some((unused.next()?, group))));
+    let mapping = options.get("mapping").and_then(Node::integer) != Some(0);
+    let count = groups.len();
+    let mut output = Node::new();
+    for (number, group) in &groups {
+        let domain = if count == 1 { &mut output } else { output.child_named(&format!("domain_{number:05}"))? };
+        let origins = write(group, &source.domains, domain)?;
+        if mapping {
+            origins.write(group, &source, options, domain)?;
+        }
+        domain.at("state/domain_id")?.set_number(*number)?;
+    }
+    Ok(output)
+}
+
+/// Halves pieces, or joins them, until there are as many as wanted.
+fn arranged(mut pieces: Vec<Piece>, target: Option<usize>) -> Vec<Vec<Piece>> {
+    let target = target.unwrap_or(pieces.len());
     while pieces.len() < target {
         let largest = (0..pieces.len()).max_by_key(|index| (pieces[*index].1.len(), usize::MAX - index));
         let Some(index) = largest.filter(|index| pieces[*index].1.len() > 1) else {
@@ -69,13 +108,39 @@ pub fn partition(mesh: &Node, options: &Node) -> Result<Node> {
     for (index, piece) in pieces.into_iter().enumerate() {
         groups[index * count / total].push(piece);
     }
-    let mut output = Node::new();
-    for (index, group) in groups.iter().enumerate() {
-        let domain = if count == 1 { &mut output } else { output.child_named(&format!("domain_{index:05}"))? };
-        write(group, &read, domain)?;
-        domain.at("state/domain_id")?.set_number(i64::try_from(index).unwrap_or(i64::MAX))?;
+    groups
+}
+
+/// The domains that are cut, and their numbers.
+struct Source<'a> {
+    domains: Vec<Domain<'a>>,
+    numbers: Vec<i64>,
+}
+
+/// Where the vertices of a new domain come from: the domain, and the vertex there.
+struct Origins {
+    topology: String,
+    vertices: Vec<(usize, usize)>,
+}
+
+impl Origins {
+    fn write(&self, group: &[Piece], source: &Source<'_>, options: &Node, output: &mut Node) -> Result<()> {
+        let elements = group.iter().flat_map(|(domain, elements)| elements.iter().map(|element| (*domain, *element)));
+        for (name, association, rows) in [
+            ("original_element_ids", "element", elements.collect::<Vec<_>>()),
+            ("original_vertex_ids", "vertex", self.vertices.clone()),
+        ] {
+            let named = options.get(name).and_then(Node::text).unwrap_or_else(|| name.to_owned());
+            let ids = output.at("fields")?.child_named(&named)?;
+            ids.at("association")?.set_text(association)?;
+            ids.at("topology")?.set_text(&self.topology)?;
+            let of_domains: Vec<i64> = rows.iter().map(|(domain, _)| source.numbers[*domain]).collect();
+            let numbers: Vec<i64> = rows.iter().map(|(_, row)| i64::try_from(*row).unwrap_or(i64::MAX)).collect();
+            ids.at("values/domains")?.set_numbers(&of_domains)?;
+            ids.at("values/ids")?.set_numbers(&numbers)?;
+        }
+        Ok(())
     }
-    Ok(output)
 }
 
 fn indices(node: &Node) -> Result<Vec<usize>> {
@@ -84,11 +149,26 @@ fn indices(node: &Node) -> Result<Vec<usize>> {
     all.ok_or_else(|| Error::new(format!("{} holds something else than numbers of elements", node.place())))
 }
 
-fn select(selection: &Node, domains: &[Domain<'_>], pieces: &mut Vec<Piece>) -> Result<()> {
-    let number = selection.get("domain").or_else(|| selection.get("domain_id")).and_then(Node::integer).unwrap_or(0);
-    let known = usize::try_from(number).ok().and_then(|number| Some((number, domains.get(number)?)));
-    let (number, domain) =
-        known.ok_or_else(|| Error::new(format!("{}: there is no domain {number}", selection.place())))?;
+fn select(selection: &Node, source: &Source<'_>, selected: &mut Selected) -> Result<()> {
+    let said = selection.get("domain_id").or_else(|| selection.get("domain"));
+    let any = said.and_then(Node::text).as_deref() == Some("any");
+    let wanted = said.and_then(Node::integer).unwrap_or(0);
+    let destination = selection.get("destination_domain").and_then(Node::integer);
+    for (index, (domain, number)) in source.domains.iter().zip(&source.numbers).enumerate() {
+        if any || *number == wanted {
+            choose(selection, index, domain, destination, selected)?;
+        }
+    }
+    Ok(())
+}
+
+fn choose(
+    selection: &Node,
+    number: usize,
+    domain: &Domain<'_>,
+    destination: Option<i64>,
+    selected: &mut Selected,
+) -> Result<()> {
     let count = domain.elements.len();
     let kind = selection.existing("type")?.text().unwrap_or_default();
     let chosen: Vec<usize> = match kind.as_str() {
@@ -119,11 +199,11 @@ fn select(selection: &Node, domains: &[Domain<'_>], pieces: &mut Vec<Piece>) -> 
             let field = domain.fields.iter().find(|(known, vertex, _)| *known == name && !*vertex);
             let values = field.and_then(|(_, _, field)| field.get("values"));
             let values = values.ok_or_else(|| Error::new(format!("there is no element field '{name}'")))?;
-            let mut by_value: std::collections::BTreeMap<i64, Vec<usize>> = std::collections::BTreeMap::new();
+            let mut by_value: BTreeMap<i64, Vec<usize>> = BTreeMap::new();
             for (element, value) in values.numbers().enumerate() {
                 by_value.entry(value.as_i64().unwrap_or(0)).or_default().push(element);
             }
-            pieces.extend(by_value.into_values().map(|elements| (number, elements)));
+            selected.extend(by_value.into_iter().map(|(value, elements)| (Some(value), (number, elements))));
             return Ok(());
         }
         _ => return Err(Error::new(format!("'{kind}' is none of explicit, ranges, logical, field"))),
@@ -131,7 +211,7 @@ fn select(selection: &Node, domains: &[Domain<'_>], pieces: &mut Vec<Piece>) -> 
     if let Some(wrong) = chosen.iter().find(|element| **element >= count) {
         return Err(Error::new(format!("{}: element {wrong} of {count}", selection.place())));
     }
-    pieces.push((number, chosen));
+    selected.push((destination, (number, chosen)));
     Ok(())
 }
 
@@ -202,10 +282,9 @@ fn length<T>(values: &[T]) -> i64 {
     i64::try_from(values.len()).unwrap_or(i64::MAX)
 }
 
-fn write(group: &[Piece], domains: &[Domain<'_>], output: &mut Node) -> Result<()> {
-    let Some(first) = group.first().map(|(number, _)| &domains[*number]) else {
-        return Ok(());
-    };
+/// Writes a new domain of at least one piece.
+fn write(group: &[Piece], domains: &[Domain<'_>], output: &mut Node) -> Result<Origins> {
+    let first = &domains[group[0].0];
     let joined = group.iter().any(|(number, _)| *number != group[0].0);
     let mut vertices = Vertices { joined, ..Vertices::default() };
     let (mut runs, mut faces) = (Runs::default(), Runs::default());
@@ -271,10 +350,5 @@ fn write(group: &[Piece], domains: &[Domain<'_>], output: &mut Node) -> Result<(
         }
         target.child_named("values")?.take(gather_values(&found)?)?;
     }
-    let ids = output.at("fields/original_element_ids")?;
-    ids.at("association")?.set_text("element")?;
-    ids.at("topology")?.set_text(&first.topology)?;
-    let number = |value: usize| i64::try_from(value).unwrap_or(i64::MAX);
-    ids.at("values/domains")?.set_numbers(&elements.iter().map(|(domain, _)| number(*domain)).collect::<Vec<_>>())?;
-    ids.at("values/ids")?.set_numbers(&elements.iter().map(|(_, element)| number(*element)).collect::<Vec<_>>())
+    Ok(Origins { topology: first.topology.clone(), vertices })
 }

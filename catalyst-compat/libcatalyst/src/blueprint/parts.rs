@@ -199,8 +199,7 @@ fn elements_of(elements: &Node, report: &mut Report) {
     let connectivity = report.integers(elements, "connectivity");
     match shape.as_deref() {
         Some("polygonal" | "polyhedral") => {
-            report.integers(elements, "sizes");
-            optional_integers(elements, "offsets", report);
+            sizes_and_offsets(elements, report);
         }
         Some("mixed") => {
             if let Some(map) = report.object(elements, "shape_map") {
@@ -231,9 +230,25 @@ fn elements_of(elements: &Node, report: &mut Report) {
             if count % size != 0 {
                 report.remark(&format!("{count} vertices are no whole number of '{shape}', which has {size}"));
             }
-            optional_integers(elements, "offsets", report);
+            if elements.get("offsets").is_some() {
+                report.remark(&format!("'offsets' are not read: each '{shape}' has as many vertices"));
+            }
         }
         None => {}
+    }
+}
+
+/// Of polygons and polyhedra: both or neither, as many of the one as of the other.
+fn sizes_and_offsets(elements: &Node, report: &mut Report) {
+    if elements.get("sizes").is_none() && elements.get("offsets").is_none() {
+        return report.remark("without 'sizes' and 'offsets' nothing says where one element ends");
+    }
+    let sizes = report.integers(elements, "sizes").map(|sizes| sizes.datatype().elements);
+    let offsets = report.integers(elements, "offsets");
+    if let (Some(sizes), Some(offsets)) = (sizes, offsets)
+        && offsets.datatype().elements != sizes
+    {
+        report.wrong(offsets, &format!("{} offsets for {sizes} sizes", offsets.datatype().elements));
     }
 }
 
@@ -244,12 +259,6 @@ fn faces_of(faces: &Node, report: &mut Report) {
     }
     if report.one_of(faces, "shape", &["polygonal", "tri", "quad", "mixed"]).is_some() {
         elements_of(faces, report);
-    }
-}
-
-fn optional_integers(node: &Node, name: &str, report: &mut Report) {
-    if node.get(name).is_some() {
-        report.integers(node, name);
     }
 }
 

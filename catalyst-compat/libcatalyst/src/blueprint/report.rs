@@ -1,4 +1,4 @@
-//! What a verification found: a tree of `valid`, `errors` and `optional` that follows the tree that was verified.
+//! What a verification found: a tree of `valid`, `errors`, `info` and counts that follows the tree that was verified.
 
 use crate::datatype::Kind;
 use crate::error::Result;
@@ -10,6 +10,7 @@ pub struct Report {
     protocol: String,
     errors: Vec<String>,
     remarks: Vec<String>,
+    counts: Vec<(&'static str, i64)>,
     below: Vec<(String, Report)>,
 }
 
@@ -34,6 +35,11 @@ impl Report {
     /// Notes something that is allowed but worth knowing.
     pub fn remark(&mut self, what: &str) {
         self.remarks.push(what.to_owned());
+    }
+
+    /// Notes how many of something there are.
+    pub fn count(&mut self, name: &'static str, count: i64) {
+        self.counts.push((name, count));
     }
 
     /// The report on what is below a name.
@@ -128,6 +134,9 @@ impl Report {
             for text in texts {
                 node.child_named(name)?.append()?.set_text(text)?;
             }
+        }
+        for (name, count) in &self.counts {
+            node.child_named(name)?.set_number(*count)?;
         }
         node.child_named("valid")?.set_text(if self.is_valid() { "true" } else { "false" })
     }

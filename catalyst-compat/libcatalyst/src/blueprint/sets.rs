@@ -158,14 +158,18 @@ pub fn verify_relation(node: &Node, report: &mut Report) {
             report.integers(node, name);
         }
     }
-    if let (Some(sizes), Some(offsets)) = (node.get("sizes"), node.get("offsets"))
-        && sizes.datatype().elements != offsets.datatype().elements
-    {
-        let (sizes, offset) = (sizes.datatype().elements, offsets.datatype().elements);
-        report.wrong(node, &format!("{sizes} sizes, but {offset} offsets"));
+    let entries = |name| node.get(name).map(|found| found.datatype().elements);
+    match (entries("sizes"), entries("offsets")) {
+        (Some(sizes), Some(offsets)) if sizes != offsets => {
+            report.wrong(node, &format!("{sizes} sizes, but {offsets} offsets"));
+        }
+        (Some(_), None) | (None, Some(_)) => {
+            report.wrong(node, "'sizes' and 'offsets' go together, but one is missing");
+        }
+        _ => {}
     }
     let data = |name: &str| !["sizes", "offsets", "indices"].contains(&name);
-    if !node.children().any(|(name, child)| data(name) && (child.kind().is_number() || child.count() > 0)) {
+    if !node.children().any(|(name, child)| data(name) && child.kind().is_number()) {
         report.wrong(node, "there are no data that it relates");
     }
 }

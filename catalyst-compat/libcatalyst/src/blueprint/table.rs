@@ -20,6 +20,9 @@ pub fn verify(node: &Node, report: &mut Report) {
             verify_one(table, below);
         }
     }
+    if report.is_valid() {
+        report.count("tables", i64::try_from(node.count()).unwrap_or(i64::MAX));
+    }
 }
 
 fn verify_one(table: &Node, report: &mut Report) {
@@ -30,15 +33,23 @@ fn verify_one(table: &Node, report: &mut Report) {
         return report.wrong(values, &format!("columns are expected, not {}", described(values)));
     }
     let mut rows = None;
+    let of_values = report.below("values", "table");
     for (index, (name, column)) in values.children().enumerate() {
         let name = if name.is_empty() { format!("[{index}]") } else { name.to_owned() };
-        let below = report.below("values", "table").below(&name, "table");
+        let below = of_values.below(&name, "table");
         mcarray::verify_values(column, below);
         let length = column.child(0).unwrap_or(column).datatype().elements;
         let expected = *rows.get_or_insert(length);
         if length != expected {
             below.wrong(column, &format!("{length} rows, where the first column has {expected}"));
         }
+        if below.is_valid() {
+            below.count("elements", length);
+        }
+    }
+    if of_values.is_valid() {
+        of_values.count("columns", i64::try_from(values.count()).unwrap_or(i64::MAX));
+        of_values.count("rows", rows.unwrap_or(0));
     }
 }
 

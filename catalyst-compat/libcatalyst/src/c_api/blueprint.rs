@@ -4,7 +4,7 @@ use std::ffi::{c_char, c_int};
 
 use super::{node, node_mut, run, string};
 use crate::blueprint::mcarray::{self, Arrangement};
-use crate::blueprint::{self, PROTOCOLS};
+use crate::blueprint::{self, MESH_PARTS, PROTOCOLS};
 use crate::error::Result;
 use crate::node::Node;
 
@@ -59,8 +59,12 @@ unsafe extern "C-unwind" fn catalyst_conduit_blueprint_about(target: *mut Node) 
         // SAFETY: the caller keeps to `c_api`'s rules.
         let target = unsafe { node_mut(target)? };
         target.reset();
-        for protocol in PROTOCOLS {
-            target.at("protocols")?.child_named(protocol)?.set_text("enabled")?;
+        let protocols = target.at("protocols")?;
+        for part in MESH_PARTS {
+            protocols.at("mesh")?.child_named(part)?.set_text("enabled")?;
+        }
+        for protocol in PROTOCOLS.into_iter().filter(|protocol| *protocol != "mesh") {
+            protocols.child_named(protocol)?.set_text("enabled")?;
         }
         Ok(())
     });

@@ -47,7 +47,12 @@ static const struct
   { 0, "topology", "{type: unstructured, coordset: c, elements: {a: {shape: quad, connectivity: 1}, b: {shape: quad}}}" },
   { 0, "topology", "{type: unstructured, coordset: c, elements: {shape: polyhedral, connectivity: [0, 1], sizes: [2], offsets: [0]}}" },
   { 0, "topology", "{type: unstructured, coordset: c, elements: {a: {shape: polyhedral, connectivity: [0], sizes: [1], offsets: [0]}}, subelements: {shape: polygonal, connectivity: [0, 1, 2], sizes: [3]}}" },
-  { 1, "topology", "{type: unstructured, coordset: c, elements: {a: {shape: polyhedral, connectivity: [0], sizes: [1], offsets: [0]}}, subelements: {a: {shape: polygonal, connectivity: [0, 1, 2], sizes: [3]}}}" },
+  { 1, "topology", "{type: unstructured, coordset: c, elements: {a: {shape: polyhedral, connectivity: [0], sizes: [1], offsets: [0]}}, subelements: {a: {shape: polygonal, connectivity: [0, 1, 2], sizes: [3], offsets: [0]}}}" },
+  { 0, "topology", "{type: unstructured, coordset: c, elements: {shape: polygonal, connectivity: [0, 1, 2], sizes: [3]}}" },
+  { 0, "topology", "{type: unstructured, coordset: c, elements: {shape: polygonal, connectivity: [0, 1, 2], offsets: [0]}}" },
+  { 1, "topology", "{type: unstructured, coordset: c, elements: {shape: polygonal, connectivity: [0, 1, 2]}}" },
+  { 0, "topology", "{type: unstructured, coordset: c, elements: {shape: polygonal, connectivity: [0, 1, 2, 0, 1, 2], sizes: [3, 3], offsets: [0]}}" },
+  { 1, "topology", "{type: unstructured, coordset: c, elements: {shape: tri, connectivity: [0, 1, 2], offsets: [0.5]}}" },
   { 0, "topology", "{type: unstructured, coordset: c, elements: {shape: mixed, shape_map: {tri: 5}, shapes: [5, 9], sizes: [3, 4], offsets: [0, 3], connectivity: [0, 1, 2, 0, 1, 2, 3]}}" },
   { 1, "topology", "{type: unstructured, coordset: c, elements: {shape: mixed, shape_map: {tri: 5, quad: 9}, shapes: [5, 9], sizes: [3, 4], offsets: [0, 3], connectivity: [0, 1, 2, 0, 1, 2, 3]}}" },
   { 0, "topology", "{type: points, coordset: c, grid_function: 10}" }, { 1, "field/basis", "H1" }, { 0, "field/basis", "1" },
@@ -68,6 +73,9 @@ static const struct
   { 1, "matset", "{topology: t, volume_fractions: {a: [0.5]}, element_ids: {a: [0]}}" },
   { 0, "matset", "{topology: t, volume_fractions: {a: [0.5]}, element_ids: {b: [0]}}" },
   { 0, "matset", "{topology: t, volume_fractions: {a: [0.5]}, element_ids: {a: [0.5]}}" },
+  { 1, "matset", "{topology: t, volume_fractions: {a: {values: [0.5], sizes: [1], offsets: [0]}}}" },
+  { 0, "matset", "{topology: t, volume_fractions: {a: {values: [0.5], sizes: [1]}}}" },
+  { 0, "matset", "{topology: t, volume_fractions: {a: {below: {values: [0.5]}}}}" },
   { 1, "specset", "{matset: m, matset_values: {a: {s: [0.1, 0.2]}, b: {s: [0.1, 0.2]}}}" },
   { 0, "specset", "{matset: m, matset_values: {a: {s: [0.1, 0.2]}, b: {s: [0.1]}}}" }, { 0, "specset", "{matset: m}" },
   { 1, "adjset", "{topology: t, association: vertex, groups: {g: {neighbors: [1], values: [0, 1]}}}" },
@@ -164,15 +172,16 @@ static void polyhedra(void)
     "topologies: {t: {type: unstructured, coordset: c,"
     "  elements: {shape: polyhedral, connectivity: [0, 1, 2, 3, 4, 1, 5, 6, 7, 8], sizes: [5, 5], offsets: [0, 5]},"
     "  subelements: {shape: polygonal, connectivity: [0, 2, 1, 3, 4, 5, 0, 1, 4, 3, 1, 2, 5, 4, 2, 0, 3, 5,"
-    "    6, 7, 8, 3, 4, 7, 6, 4, 5, 8, 7, 5, 3, 6, 8], sizes: [3, 3, 4, 4, 4, 3, 4, 4, 4]}}}\n"
+    "    6, 7, 8, 3, 4, 7, 6, 4, 5, 8, 7, 5, 3, 6, 8], sizes: [3, 3, 4, 4, 4, 3, 4, 4, 4],"
+    "    offsets: [0, 3, 6, 10, 14, 18, 21, 25, 29]}}}\n"
     "fields: {f: {association: element, topology: t, values: [10, 20]}}\n";
   conduit_node *mesh = conduit_node_create(), *options = conduit_node_create(), *info = conduit_node_create();
   conduit_node *parts = conduit_node_create(), *whole = conduit_node_create();
   conduit_node_parse(mesh, WEDGES, "yaml");
   CHECK(conduit_blueprint_mesh_verify(mesh, info));
   conduit_blueprint_mesh_flatten(mesh, NULL, whole);
-  CHECK(conduit_node_fetch_path_as_float64_ptr(whole, "element_data/values/z")[0] == 0.5);
-  CHECK(conduit_node_fetch_path_as_float64_ptr(whole, "element_data/values/z")[1] == 1.5);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(whole, "element_data/values/element_centers/z")[0] == 0.5);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(whole, "element_data/values/element_centers/z")[1] == 1.5);
   conduit_node_set_path_int(options, "target", 2);
   conduit_blueprint_mesh_partition(mesh, options, parts);
   CHECK(conduit_node_number_of_children(parts) == 2 && conduit_blueprint_mesh_verify(parts, info));
@@ -201,7 +210,7 @@ static void polyhedra(void)
   CHECK(strcmp(conduit_node_fetch_path_as_char8_str(whole, "topologies/t/elements/shape"), "mixed") == 0);
   CHECK(conduit_node_number_of_elements(conduit_node_fetch(whole, "coordsets/c/values/x")) == 10);
   conduit_blueprint_mesh_flatten(whole, NULL, parts);
-  CHECK(conduit_node_fetch_path_as_float64_ptr(parts, "element_data/values/z")[2] == 2.25);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(parts, "element_data/values/element_centers/z")[2] == 2.25);
   /* A face that is not there. */
   conduit_int64 faces[10] = { 0, 1, 2, 3, 99, 1, 5, 6, 7, 8 };
   conduit_node_set_path_int64_ptr(mesh, "topologies/t/elements/connectivity", faces, 10);
@@ -254,10 +263,18 @@ static void blueprint(void)
   CHECK(fails("mesh/coordset", "{type: explicit, values: {x: [0.0, 1.0], y: [0.0]}}", "errors/[0]", "1 elements"));
   CHECK(fails("mesh/field", "{association: face, topology: t, values: [1]}", "errors/[0]", "'face' is none of vertex, element"));
   CHECK(fails("table", "{values: {a: [1, 2], b: [1, 2, 3]}}", "values/b/errors/[0]", "3 rows"));
+  CHECK(fails("o2mrelation", "{a: [0.5], offsets: [0]}", "errors/[0]", "one is missing"));
+  CHECK(fails("o2mrelation", "{a: {b: [0.5]}, sizes: [1], offsets: [0]}", "errors/[0]", "no data"));
   CHECK(fails("mash", "{}", "errors/[0]", "there are mesh, mcarray"));
+  conduit_node_parse(index, "{one: {values: {a: [1, 2, 3], b: {u: [1, 2, 3], v: [4, 5, 6]}}}, two: {values: {c: 1}}}", "yaml");
+  CHECK(conduit_blueprint_table_verify(index, info) && conduit_node_fetch_path_as_int64(info, "tables") == 2);
+  CHECK(conduit_node_fetch_path_as_int64(info, "one/values/rows") == 3);
+  CHECK(conduit_node_fetch_path_as_int64(info, "one/values/columns") == 2);
+  CHECK(conduit_node_fetch_path_as_int64(info, "two/values/c/elements") == 1);
   CHECK(!conduit_blueprint_table_verify(info, index) && !conduit_blueprint_table_verify_sub_protocol("sub", node, index));
   conduit_blueprint_about(info);
-  CHECK(conduit_node_has_path(info, "protocols/mesh"));
+  CHECK(!strcmp(conduit_node_fetch_path_as_char8_str(info, "protocols/mesh/coordset"), "enabled"));
+  CHECK(!strcmp(conduit_node_fetch_path_as_char8_str(info, "protocols/table"), "enabled"));
   conduit_about(info);
   CHECK(conduit_node_has_path(info, "version"));
   conduit_node_destroy(node);
@@ -278,7 +295,10 @@ static void partition(void)
   conduit_node_parse(mesh, grid, "yaml");
   conduit_blueprint_mesh_flatten(mesh, NULL, whole);
   CHECK(conduit_blueprint_table_verify(whole, info));
-  CHECK(conduit_node_fetch_path_as_float64_ptr(whole, "element_data/values/y")[5] == 3.0);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(whole, "element_data/values/element_centers/y")[5] == 3.0);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(whole, "vertex_data/values/c/x")[5] == 0.5);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(whole, "vertex_data/values/vertex_id")[11] == 11);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(whole, "element_data/values/domain_id")[5] == 0);
   CHECK(conduit_node_fetch_path_as_int64_ptr(whole, "vertex_data/values/v/b")[11] == 11);
   conduit_node_set_path_int(options, "target", 4);
   conduit_blueprint_mesh_partition(mesh, options, parts);
@@ -304,6 +324,32 @@ static void partition(void)
   conduit_blueprint_mesh_partition(mesh, options, parts);
   CHECK(conduit_node_fetch_path_as_int64_ptr(parts, "domain_00000/fields/original_element_ids/values/ids")[2] == 4);
   CHECK(conduit_node_fetch_path_as_int64(parts, "domain_00001/fields/e/values") == 0);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(parts, "domain_00001/fields/original_vertex_ids/values/ids")[2] == 5);
+  conduit_node_parse(options, "{mapping: 0, fields: [e], target: 0}", "yaml");
+  conduit_blueprint_mesh_partition(mesh, options, parts);
+  CHECK(conduit_node_number_of_children(conduit_node_fetch(parts, "fields")) == 1);
+  CHECK(conduit_node_has_path(parts, "fields/e/values"));
+  /* Selections go by the numbers that domains say; pieces by those that a field, or the selection, says. */
+  conduit_node_set_node(conduit_node_fetch(whole, "two/a"), mesh);
+  conduit_node_set_node(conduit_node_fetch(whole, "two/b"), mesh);
+  conduit_node_set_path_int(whole, "two/a/state/domain_id", 10);
+  conduit_node_set_path_int(whole, "two/b/state/domain_id", 20);
+  conduit_node* two = conduit_node_fetch(whole, "two");
+  conduit_node_parse(options, "{selections: [{type: explicit, domain_id: 20, elements: [4]}, {type: explicit, elements: [99]}],"
+    " original_element_ids: from}", "yaml");
+  conduit_blueprint_mesh_partition(two, options, parts);
+  CHECK(conduit_node_fetch_path_as_int64(parts, "fields/from/values/domains") == 20);
+  CHECK(conduit_node_fetch_path_as_int64(parts, "fields/from/values/ids") == 4);
+  conduit_node_parse(options, "{selections: [{type: field, domain_id: any, field: e}]}", "yaml");
+  conduit_blueprint_mesh_partition(two, options, parts);
+  CHECK(conduit_node_number_of_children(parts) == 6);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(parts, "domain_00005/fields/original_element_ids/values/domains")[1] == 20);
+  conduit_node_parse(options, "{selections: [{type: ranges, domain_id: 10, ranges: [1, 2], destination_domain: 7},"
+    " {type: explicit, domain_id: 20, elements: [5], destination_domain: 7}, {type: explicit, domain_id: 10, elements: [0]}]}", "yaml");
+  conduit_blueprint_mesh_partition(two, options, parts);
+  CHECK(conduit_node_number_of_children(parts) == 2);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(parts, "domain_00007/fields/e/values")[2] == 5);
+  CHECK(conduit_node_fetch_path_as_int64(parts, "domain_00000/fields/e/values") == 0);
   conduit_node_parse(options, "{selections: [{type: explicit, elements: [7]}]}", "yaml");
   conduit_blueprint_mesh_partition(mesh, options, parts);
   CHECK(strstr(last, "element 7 of 6") != NULL);
@@ -314,6 +360,61 @@ static void partition(void)
   conduit_node_destroy(whole);
 }
 
+/* Two domains as tables: their numbers, a field that one has not, types, and what may be left out. */
+static void tables(void)
+{
+  conduit_node *mesh = conduit_node_create(), *options = conduit_node_create();
+  conduit_node *out = conduit_node_create(), *info = conduit_node_create();
+  conduit_node_parse(mesh,
+    "a: {state: {domain_id: 7}, coordsets: {cyl: {type: uniform, dims: {i: 3, j: 1}, origin: {r: 1.0, z: 5.0}}},\n"
+    "  topologies: {t: {type: points, coordset: cyl}}, fields: {f: {association: vertex, topology: t, values: [1, 2, 3]}}}\n"
+    "b: {state: {domain_id: 3}, coordsets: {cyl: {type: explicit, values: {r: [0.0, 1.0], z: [0.0, 2.0]}}},\n"
+    "  topologies: {t: {type: unstructured, coordset: cyl, elements: {shape: line, connectivity: [0, 1]}}},\n"
+    "  fields: {g: {association: vertex, topology: t, values: {u: [0.5, 1.5], v: [1, 2]}}}}\n", "yaml");
+  float single[] = { 2.0F };
+  conduit_node_set_path_float32_ptr(mesh, "b/fields/h/values", single, 1);
+  conduit_node_set_path_char8_str(mesh, "b/fields/h/topology", "t");
+  conduit_node_set_path_char8_str(mesh, "b/fields/h/association", "element");
+  conduit_node_parse(options, "{fill_value: {int: -1, float: 0.25}}", "yaml");
+  conduit_blueprint_mesh_flatten(mesh, options, out);
+  CHECK(conduit_blueprint_table_verify(out, info));
+  CHECK(conduit_node_fetch_path_as_int64(info, "vertex_data/values/rows") == 5);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(out, "vertex_data/values/cyl/r")[2] == 3.0);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(out, "vertex_data/values/cyl/z")[2] == 5.0);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(out, "vertex_data/values/f")[4] == -1);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(out, "vertex_data/values/g/v")[0] == 0.25);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(out, "vertex_data/values/g/v")[4] == 2.0);
+  CHECK(conduit_node_fetch_path_as_float32_ptr(out, "element_data/values/h")[0] == 0.25F);
+  CHECK(conduit_node_fetch_path_as_float32_ptr(out, "element_data/values/h")[3] == 2.0F);
+  CHECK(conduit_node_fetch_path_as_float64_ptr(out, "element_data/values/element_centers/z")[3] == 1.0);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(out, "vertex_data/values/domain_id")[2] == 7);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(out, "vertex_data/values/domain_id")[3] == 3);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(out, "vertex_data/values/vertex_id")[3] == 0);
+  CHECK(conduit_node_fetch_path_as_int64_ptr(out, "element_data/values/element_id")[2] == 2);
+  conduit_node_parse(options, "{field_names: [g], add_element_centers: 0, add_vertex_locations: 0, add_domain_info: 0}", "yaml");
+  conduit_blueprint_mesh_flatten(mesh, options, out);
+  CHECK(!conduit_node_has_child(out, "element_data"));
+  CHECK(conduit_node_number_of_children(conduit_node_fetch(out, "vertex_data/values")) == 1);
+  conduit_node_parse(options, "{field_names: g}", "yaml");
+  conduit_blueprint_mesh_flatten(mesh, options, out);
+  CHECK(strstr(last, "'field_names' is no list") != NULL);
+  /* Four faces of a pyramid have its tip, three have each other vertex. */
+  conduit_node_parse(mesh,
+    "coordsets: {c: {type: explicit, values: {z: [0.0, 0.0, 0.0, 0.0, 1.0]}}}\n"
+    "topologies: {t: {type: unstructured, coordset: c, elements: {shape: polyhedral, connectivity: [0, 1, 2, 3, 4], sizes: [5],\n"
+    "  offsets: [0]}, subelements: {shape: polygonal, connectivity: [0, 1, 2, 3, 0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4],\n"
+    "  sizes: [4, 3, 3, 3, 3], offsets: [0, 4, 7, 10, 13]}}}\n", "yaml");
+  conduit_blueprint_mesh_flatten(mesh, NULL, out);
+  CHECK(conduit_node_fetch_path_as_float64(out, "element_data/values/element_centers/z") == 0.25);
+  conduit_node_reset(mesh);
+  conduit_blueprint_mesh_flatten(mesh, NULL, out);
+  CHECK(conduit_node_number_of_children(out) == 0);
+  conduit_node_destroy(mesh);
+  conduit_node_destroy(options);
+  conduit_node_destroy(out);
+  conduit_node_destroy(info);
+}
+
 int main(void)
 {
   conduit_utils_set_error_handler(note);
@@ -321,6 +422,7 @@ int main(void)
   verdicts();
   references();
   partition();
+  tables();
   polyhedra();
   puts("blueprint.c: ok");
   return 0;

@@ -115,6 +115,8 @@ static void trees(void)
   conduit_node_set_int(odd, 1);
   CHECK(conduit_node_has_child(node, "with/slash") && !conduit_node_has_path(node, "with/slash"));
   CHECK(conduit_node_child_by_name(node, "with/slash") == odd);
+  check_text(conduit_node_name(odd), "{with/slash}");
+  check_text(conduit_node_path(conduit_node_fetch(odd, "below")), "{with/slash}/below");
   conduit_node_remove_child_by_name(node, "with/slash");
   conduit_node_rename_child(node, "list", "renamed");
   CHECK(conduit_node_has_path(node, "renamed/[0]") && !conduit_node_has_path(node, "list"));
