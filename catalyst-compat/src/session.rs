@@ -79,8 +79,8 @@ impl Session {
             }
             settings.config = default_config(&names)?;
             let run = match Run::new((**settings).clone()) {
-                // Nobody asked for that very port.
-                Err(CatalystError::Initialize(InitializeError::Stream(_))) if self.communicator.size() == 1 => {
+                // Nobody asked for that very port. On several ranks all have the error of the one that could not have it.
+                Err(CatalystError::Initialize(InitializeError::Stream(_) | InitializeError::Rank(_))) => {
                     if let Some(stream) = &mut settings.config.stream {
                         stream.listen.set_port(0);
                     }
