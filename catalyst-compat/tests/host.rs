@@ -199,6 +199,7 @@ fn every_mesh_of_the_blueprint_arrives() {
     let amr = Written::read(&written, "amr", 0);
     assert_eq!(amr.types(), [Quad; 12 + 16]);
     assert_eq!(amr.field("level").iter().sum::<f64>(), 16.0);
+    assert_eq!(Written::read(&written, "levels", 0).types(), [Quad; 12 + 14 + 8]);
 
     let uniform = Written::read(&written, "uniform", 2);
     assert_eq!(uniform.field("single"), [1.5, 2.5]);
