@@ -216,6 +216,7 @@ int main(int argc, char** argv)
   const float one = 1.0f, two = 2.0f;
   uniform(at(blocks, "left"), 2, 2, 2, 0.0, 1.0);
   field(at(blocks, "left"), "which", "element", FLOAT32, &one, 1);
+  field(at(blocks, "left"), "alone", "element", FLOAT32, &one, 1);
   uniform(at(blocks, "right"), 2, 2, 2, 5.0, 2.0);
   field(at(blocks, "right"), "which", "element", FLOAT32, &two, 1);
 
