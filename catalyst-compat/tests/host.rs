@@ -199,6 +199,7 @@ fn every_mesh_of_the_blueprint_arrives() {
     let amr = Written::read(&written, "amr", 0);
     assert_eq!(amr.types(), [Quad; 12 + 16]);
     assert_eq!(amr.field("level").iter().sum::<f64>(), 16.0);
+    assert_eq!(Written::read(&written, "levels", 0).types(), [Quad; 12 + 14 + 8]);
 
     let uniform = Written::read(&written, "uniform", 2);
     assert_eq!(uniform.field("single"), [1.5, 2.5]);
@@ -209,7 +210,9 @@ fn every_mesh_of_the_blueprint_arrives() {
     assert_eq!(hex.field("place")[33..], [2.0, 1.0, 1.0]);
     assert_eq!(hex.field("big"), [258.0, 5.0]);
     assert_eq!(Written::read(&written, "mixed", 0).field("each"), [1.0, 2.0, 3.0, 4.0]);
-    assert_eq!(Written::read(&written, "blocks", 0).field("which"), [1.0, 2.0]);
+    let blocks = Written::read(&written, "blocks", 0);
+    assert_eq!(blocks.field("which"), [1.0, 2.0]);
+    assert!(blocks.field("alone")[0] == 1.0 && blocks.field("alone")[1].is_nan(), "one block has no such field");
 }
 
 #[test]

@@ -216,6 +216,7 @@ int main(int argc, char** argv)
   const float one = 1.0f, two = 2.0f;
   uniform(at(blocks, "left"), 2, 2, 2, 0.0, 1.0);
   field(at(blocks, "left"), "which", "element", FLOAT32, &one, 1);
+  field(at(blocks, "left"), "alone", "element", FLOAT32, &one, 1);
   uniform(at(blocks, "right"), 2, 2, 2, 5.0, 2.0);
   field(at(blocks, "right"), "which", "element", FLOAT32, &two, 1);
 
@@ -244,6 +245,30 @@ int main(int argc, char** argv)
   double finer[16];
   for (int i = 0; i < 16; ++i) finer[i] = 1.0;
   field(fine, "level", "element", FLOAT64, finer, 16);
+
+  /* The same by the levels that the grids give, with a window that names its own grid; and a third level in two more cells. */
+  blocks = channel("levels", "amrmesh");
+  coarse = at(blocks, "domain_0");
+  uniform(coarse, 5, 5, 0, 0.0, 1.0);
+  integer(coarse, "state/domain_id", 0);
+  integer(coarse, "state/level", 0);
+  window = at(coarse, "nestsets/nest/windows/window_0");
+  integer(window, "domain_id", 0);
+  text(window, "domain_type", "child");
+  integer(window, "origin/i", 0);
+  integer(window, "origin/j", 0);
+  integer(window, "dims/i", 4);
+  integer(window, "dims/j", 4);
+  fine = at(blocks, "domain_1");
+  uniform(fine, 5, 5, 0, 1.0, 0.5);
+  number(fine, "coordsets/coords/origin/y", 1.0);
+  integer(fine, "state/domain_id", 1);
+  integer(fine, "state/level", 1);
+  fine = at(blocks, "domain_2");
+  uniform(fine, 5, 3, 0, 2.0, 0.25);
+  number(fine, "coordsets/coords/origin/y", 2.5);
+  integer(fine, "state/domain_id", 2);
+  integer(fine, "state/level", 2);
 
   text(&setup, "catalyst/pipelines/script/filename", argv[2]);
   if (impl->initialize(&setup) != 0) return 1;

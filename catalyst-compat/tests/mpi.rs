@@ -222,7 +222,11 @@ fn no_rank_waits_for_one_that_goes_wrong() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let (pipelines, program) = (directory.path().join("surface.json"), directory.path().join("ranks"));
     let watch = json!({"version": 1, "pipelines": [
-        {"name": "surface", "stages": [{"surface": {}}, {"write": {"file": "surface-{cycle}.vtp"}}]}]});
+        {"name": "surface", "stages": [{"surface": {}}, {"write": {"file": "surface-{cycle}.vtp"}}]},
+        {"name": "touching", "channel": "touching", "stages": [{"write": {"file": "touching-{cycle}.vtu"}}]},
+        {"name": "levels", "channel": "levels", "stages": [{"surface": {}}, {"write": {"file": "levels-{cycle}.vtp"}}]},
+        {"name": "drops", "channel": "drops", "stages": [{"write": {"file": "drops-{cycle}.vtu"}}]},
+        {"name": "skin", "channel": "drops", "stages": [{"surface": {}}, {"write": {"file": "skin-{cycle}.vtp"}}]}]});
     std::fs::write(&pipelines, watch.to_string()).expect("a file");
     let mut query = Command::new("pkg-config");
     query.env("PKG_CONFIG_PATH", built.prefix.join("lib/pkgconfig")).args(["--cflags", "--libs", "catalyst"]);
@@ -245,6 +249,15 @@ fn no_rank_waits_for_one_that_goes_wrong() {
         tombolo::pipelines::files::read_mesh(directory.path().join("surface-000002.vtp")).expect("was written");
     // Two cubes side by side, without the face between them.
     assert_eq!(surface.mesh.cells().len(), 10);
+    // Two blocks on each of two ranks: only what is matched beyond doubt is one vertex.
+    let written = |name: &str| tombolo::pipelines::files::read_mesh(directory.path().join(name)).expect("was written");
+    let touching = written("touching-000002.vtu").mesh;
+    assert_eq!((touching.cells().len(), touching.points().len()), (4, 28));
+    // All faces of a coarse cell and eight fine ones on each rank, but where two fine cells lie against two.
+    assert_eq!(written("levels-000002.vtp").mesh.cells().len(), 2 * (6 + 24 - 2));
+    assert_eq!(written("drops-000002.vtu").mesh.cells().len(), 4);
+    let skin = "pipeline 'skin': the mesh has no surface: none of its 4 cells has dimension 2 or 3";
+    assert_eq!(told.matches(skin).count(), 1, "{told}");
 }
 
 #[test]

@@ -19,6 +19,58 @@ static void expect(const char* what, int status, int wanted)
   }
 }
 
+static conduit_node* grid(conduit_node* channel, const char* path, const int dims[3], double z, double spacing)
+{
+  static const char* names[3][2] = { { "dims/i", "spacing/dx" }, { "dims/j", "spacing/dy" }, { "dims/k", "spacing/dz" } };
+  conduit_node* mesh = conduit_node_fetch(channel, path);
+  conduit_node* coords = conduit_node_fetch(mesh, "coordsets/coords");
+  conduit_node_set_path_char8_str(coords, "type", "uniform");
+  for (int axis = 0; axis < 3; ++axis) {
+    conduit_node_set_path_int32(coords, names[axis][0], dims[axis]);
+    conduit_node_set_path_float64(coords, names[axis][1], spacing);
+  }
+  conduit_node_set_path_float64(coords, "origin/x", rank);
+  conduit_node_set_path_float64(coords, "origin/z", z);
+  conduit_node_set_path_char8_str(mesh, "topologies/mesh/type", "uniform");
+  conduit_node_set_path_char8_str(mesh, "topologies/mesh/coordset", "coords");
+  return mesh;
+}
+
+/* Two blocks, one above the other: where they touch, each rank has two vertices. */
+static void touching(conduit_node* channels)
+{
+  conduit_node* channel = conduit_node_fetch(channels, "touching");
+  conduit_node_set_path_char8_str(channel, "type", "multimesh");
+  const int dims[3] = { 2, 2, 2 };
+  grid(channel, "data/low", dims, 0.0, 1.0);
+  grid(channel, "data/high", dims, 1.0, 1.0);
+}
+
+/* Two cells, the upper one covered by eight finer ones. */
+static void levels(conduit_node* channels)
+{
+  conduit_node* channel = conduit_node_fetch(channels, "levels");
+  conduit_node_set_path_char8_str(channel, "type", "amrmesh");
+  const int coarse[3] = { 2, 2, 3 }, fine[3] = { 3, 3, 3 };
+  for (int level = 0; level < 2; ++level) {
+    conduit_node* mesh = grid(channel, level ? "data/fine" : "data/coarse", level ? fine : coarse, level, level ? 0.5 : 1.0);
+    conduit_node_set_path_int32(mesh, "state/domain_id", 2 * rank + level);
+    conduit_node_set_path_int32(mesh, "state/level", level);
+  }
+}
+
+/* Points alone, which have no surface. */
+static void drops(conduit_node* channels)
+{
+  conduit_node* channel = conduit_node_fetch(channels, "drops");
+  conduit_node_set_path_char8_str(channel, "type", "mesh");
+  const double at[2] = { rank, rank + 0.5 };
+  conduit_node_set_path_char8_str(channel, "data/coordsets/coords/type", "explicit");
+  conduit_node_set_path_float64_ptr(channel, "data/coordsets/coords/values/x", (double*)at, 2);
+  conduit_node_set_path_char8_str(channel, "data/topologies/mesh/type", "points");
+  conduit_node_set_path_char8_str(channel, "data/topologies/mesh/coordset", "coords");
+}
+
 static double points[24];
 static const int32_t hex[8] = { 0, 1, 3, 2, 4, 5, 7, 6 };
 static double heat[8];
@@ -47,6 +99,9 @@ static conduit_node* step(int cycle)
   conduit_node_set_path_char8_str(mesh, "fields/heat/association", "vertex");
   conduit_node_set_path_char8_str(mesh, "fields/heat/topology", "mesh");
   conduit_node_set_path_external_float64_ptr(mesh, "fields/heat/values", heat, 8);
+  touching(conduit_node_fetch(node, "catalyst/channels"));
+  levels(conduit_node_fetch(node, "catalyst/channels"));
+  drops(conduit_node_fetch(node, "catalyst/channels"));
   return node;
 }
 

@@ -53,6 +53,7 @@ endif ()
 # Where Python finds the packages `catalyst` and `catalyst_conduit`.
 set(catalyst_PYTHON_FOUND 0)
 file(GLOB CATALYST_PYTHON_MODULE_DIRECTORY "${_catalyst_library_directory}/python3*/site-packages")
+set(CATALYST_PYTHONPATH "${CATALYST_PYTHON_MODULE_DIRECTORY}")
 if (CATALYST_PYTHON_MODULE_DIRECTORY)
   set(CATALYST_WRAP_PYTHON ON)
   set(catalyst_PYTHON_FOUND 1)

@@ -1,12 +1,66 @@
 //! Overlapping grids of several levels: which cells finer grids cover.
 
-use super::coordset::counts;
+use super::coordset::{Coordset, counts};
+use super::domain::Domain;
+use super::topology::Topology;
 use crate::error::CatalystError;
 use crate::node::Node;
 
-/// A box of cells: the first along each axis, and how many.
+/// A grid among those of its channel: what nesting sets call it, how fine it is, and where it lies.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Grid {
+    id: Option<i64>,
+    level: i64,
+    lower: [f64; 3],
+    spacing: [f64; 3],
+    cells: [usize; 3],
+}
+
+impl Grid {
+    /// Reads a domain that says its level; `None` for one that does not, or is no uniform grid.
+    pub(super) fn read(node: &Node<'_, '_>, domain: &Domain<'_>) -> Result<Option<Self>, CatalystError> {
+        let (Coordset::Uniform { origin, spacing, .. }, Topology::Grid { cells }) =
+            (&domain.coordset, &domain.topology)
+        else {
+            return Ok(None);
+        };
+        let Some(state) = node.child(c"state") else { return Ok(None) };
+        let number = |name| state.child(name).map(|child| whole_number(&child)).transpose();
+        let (id, level) = (number(c"domain_id")?, number(c"level")?);
+        Ok(level.map(|level| Self { id, level, lower: *origin, spacing: *spacing, cells: *cells }))
+    }
+
+    /// The cells of this grid whose middle lies in a finer one.
+    fn covered_by(&self, finer: &Grid) -> Option<Covered> {
+        let mut covered = Covered { child: None, origin: [0; 3], counts: [1; 3] };
+        for axis in (0..3).filter(|&axis| self.cells[axis] > 0) {
+            #[expect(clippy::cast_precision_loss, reason = "a number of cells below 2^32")]
+            let [own, length] = [self.cells[axis] as f64, finer.cells[axis] as f64 * finer.spacing[axis]];
+            let at = |place: f64| ((place - self.lower[axis]) / self.spacing[axis] - 0.5).ceil().clamp(0.0, own);
+            let (from, to) = (at(finer.lower[axis]), at(finer.lower[axis] + length));
+            // False for what is no number, too.
+            let has_any = from < to;
+            if !has_any {
+                return None;
+            }
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "from 0 to the number of cells"
+            )]
+            {
+                covered.origin[axis] = from as i64;
+                covered.counts[axis] = (to - from) as usize;
+            }
+        }
+        Some(covered)
+    }
+}
+
+/// A box of cells: the first along each axis, and how many; and the domain that was said to cover them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Covered {
+    child: Option<i64>,
     origin: [i64; 3],
     counts: [usize; 3],
 }
@@ -36,10 +90,20 @@ impl Mask {
                 let corner =
                     whole_numbers(&window.need(c"origin", "the first cell that the child covers")?, ["i", "j", "k"])?;
                 let origin = std::array::from_fn(|axis| corner[axis] - origin[axis]);
-                mask.covered.push(Covered { origin, counts: counts.map(|count| count.max(1)) });
+                let child = window.child(c"domain_id").map(|child| whole_number(&child)).transpose()?;
+                mask.covered.push(Covered { child, origin, counts: counts.map(|count| count.max(1)) });
             }
         }
         Ok(mask)
+    }
+
+    /// Takes the word of the finer grids that are at hand for what they cover. Windows tell of those of other ranks; one that
+    /// names its own grid tells nothing.
+    pub(super) fn settle(&mut self, own: &Grid, others: &[Option<Grid>]) {
+        let known = |id: i64| own.id == Some(id) || others.iter().flatten().any(|grid| grid.id == Some(id));
+        self.covered.retain(|window| !window.child.is_some_and(known));
+        let finer = others.iter().flatten().filter(|grid| grid.level > own.level);
+        self.covered.extend(finer.filter_map(|finer| own.covered_by(finer)));
     }
 
     /// Whether no finer grid covers the cell.
@@ -83,10 +147,14 @@ fn whole_numbers(node: &Node<'_, '_>, names: [&str; 3]) -> Result<[i64; 3], Cata
     for (number, name) in numbers.iter_mut().zip(names) {
         let name = std::ffi::CString::new(name).unwrap_or_default();
         if let Some(child) = node.child(&name) {
-            let array = child.array()?;
-            let value = (array.len() == 1).then(|| array.integer(0)).flatten();
-            *number = value.ok_or_else(|| child.wrong("one whole number".into()))?;
+            *number = whole_number(&child)?;
         }
     }
     Ok(numbers)
+}
+
+fn whole_number(node: &Node<'_, '_>) -> Result<i64, CatalystError> {
+    let array = node.array()?;
+    let value = (array.len() == 1).then(|| array.integer(0)).flatten();
+    value.ok_or_else(|| node.wrong("one whole number".into()))
 }

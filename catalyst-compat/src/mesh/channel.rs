@@ -2,7 +2,7 @@
 
 use std::ffi::CString;
 
-use super::amr::Mask;
+use super::amr::{Grid, Mask};
 use super::domain::Domain;
 use super::topology::Topology;
 use crate::array::Fingerprint;
@@ -66,11 +66,17 @@ impl<'call> Channel<'call> {
         let has_domains = data.child(c"coordsets").is_none()
             && data.names().first().and_then(|name| data.at(0, name)?.child(c"coordsets").map(drop)).is_some();
         if kind_name == "mesh" && !has_domains {
-            channel.push(String::new(), &data, false, looked_at)?;
+            channel.push(String::new(), &data, None, looked_at)?;
         } else {
+            let mut grids = (kind_name == "amrmesh").then(Vec::new);
             for (index, name) in data.names().iter().enumerate() {
                 let Some(block) = data.at(index, name) else { continue };
-                channel.push(name.to_string_lossy().into_owned(), &block, kind_name == "amrmesh", looked_at)?;
+                channel.push(name.to_string_lossy().into_owned(), &block, grids.as_mut(), looked_at)?;
+            }
+            for (block, own) in channel.blocks.iter_mut().zip(grids.iter().flatten()) {
+                if let (Some(own), Some(grids)) = (own, &grids) {
+                    block.mask.settle(own, grids);
+                }
             }
         }
         channel.refuse_too_many()?;
@@ -81,14 +87,17 @@ impl<'call> Channel<'call> {
         &mut self,
         name: String,
         node: &Node<'_, 'call>,
-        nested: bool,
+        nested: Option<&mut Vec<Option<Grid>>>,
         looked_at: bool,
     ) -> Result<(), CatalystError> {
         let Some(domain) = Domain::read(node, looked_at)? else { return Ok(()) };
-        let mask = match &domain.topology {
-            Topology::Grid { cells } if nested => Mask::read(node, *cells)?,
-            _ => Mask::default(),
-        };
+        let mut mask = Mask::default();
+        if let Some(grids) = nested {
+            if let Topology::Grid { cells } = &domain.topology {
+                mask = Mask::read(node, *cells)?;
+            }
+            grids.push(Grid::read(node, &domain)?);
+        }
         self.blocks.push(Block { name, domain, mask });
         Ok(())
     }

@@ -3,7 +3,7 @@
 use tombolo::deform::mesh::{
     ArrayView, Cells, CellsView, FeatureSource, Indices, MeshView, TaggedFaces, Values, Vector,
 };
-use tombolo::pipelines::extract::{Association, FieldView};
+use tombolo::pipelines::extract::{ABSENT, Association, FieldView};
 
 use super::channel::Channel;
 use super::domain::Domain;
@@ -139,7 +139,7 @@ impl Kept {
                     match of_block {
                         Some(field) => copied.values.extend(field.components.iter().map(|array| array.get(entity))),
                         // A block that lacks the field has no values to show.
-                        None => copied.values.extend(std::iter::repeat_n(f64::NAN, components)),
+                        None => copied.values.extend(std::iter::repeat_n(ABSENT, components)),
                     }
                 }
             }

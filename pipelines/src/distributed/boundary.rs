@@ -8,6 +8,7 @@ use tombolo_deform::{
 };
 
 use super::message::{Reader, Writer};
+use super::places::Doubt;
 use super::shared::SharedVertices;
 use super::{DistributedError, Part, TOLERANCE};
 use crate::communicator::{Communicator, Reduction, agree};
@@ -63,13 +64,46 @@ pub(super) fn outer_faces(communicator: &dyn Communicator, part: &Part) -> Resul
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 3")]
     let dimension = dimension[0] as usize;
     if dimension < 2 {
-        return Err(SurfaceError::NoFaces { cells: part.cells.len(), dimension }.into());
+        return Err(no_faces(communicator, part, dimension).into());
     }
     let found = BoundaryFaces::find(&part.points, &part.cells, dimension, part.ghosts.as_deref());
     Ok(agree(communicator, found)?)
 }
 
+fn no_faces(communicator: &dyn Communicator, part: &Part, dimension: usize) -> SurfaceError {
+    #[expect(clippy::cast_precision_loss, reason = "a count below 2^53")]
+    let mut cells = [(0..part.cells.len()).filter(|&cell| !part.is_ghost(cell)).count() as f64];
+    communicator.reduce(Reduction::Sum, &mut cells);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
+    let cells = cells[0] as usize;
+    SurfaceError::NoFaces { cells, dimension }
+}
+
 impl PartBoundary {
+    /// What is to be shown of a mesh, but not moved: a vertex that could be one of two of another rank is taken for neither, and a
+    /// mesh without faces has no boundary; the error is then what there is to say where somebody asks for it. Collective.
+    ///
+    /// # Errors
+    /// [`DistributedError`], the same on all ranks.
+    pub(crate) fn shown(
+        communicator: &dyn Communicator,
+        part: &Part,
+    ) -> Result<(SharedVertices, Self, Option<SurfaceError>), DistributedError> {
+        let (outer, error) = match outer_faces(communicator, part) {
+            Err(DistributedError::Surface(error @ SurfaceError::NoFaces { .. })) => {
+                (BoundaryFaces::default(), Some(error))
+            }
+            outer => (outer?, None),
+        };
+        let shared = SharedVertices::beside(communicator, part, &outer, TOLERANCE, Doubt::Apart)?;
+        if let Some(error) = error {
+            let none = Self { vertices: Vec::new(), owned: Vec::new(), faces: outer, root: None };
+            return Ok((shared, none, Some(error)));
+        }
+        let boundary = Self::of(communicator, part, &FeatureSettings::default(), outer, &shared)?;
+        Ok((shared, boundary, None))
+    }
+
     /// Finds the boundary together with the other ranks, and with it the vertices that they share. Collective.
     ///
     /// # Errors
@@ -80,8 +114,19 @@ impl PartBoundary {
         settings: &FeatureSettings,
     ) -> Result<(SharedVertices, Self), DistributedError> {
         let outer = outer_faces(communicator, part)?;
-        let shared = SharedVertices::beside(communicator, part, &outer, TOLERANCE)?;
-        let faces = boundary_faces(communicator, outer, &shared)?;
+        let shared = SharedVertices::beside(communicator, part, &outer, TOLERANCE, Doubt::Refused)?;
+        let boundary = Self::of(communicator, part, settings, outer, &shared)?;
+        Ok((shared, boundary))
+    }
+
+    fn of(
+        communicator: &dyn Communicator,
+        part: &Part,
+        settings: &FeatureSettings,
+        outer: BoundaryFaces,
+        shared: &SharedVertices,
+    ) -> Result<Self, DistributedError> {
+        let faces = boundary_faces(communicator, outer, shared)?;
         let mut marks = vec![false; part.points.len()];
         faces.faces.connectivity().iter().for_each(|&vertex| marks[vertex as usize] = true);
         shared.any(communicator, &mut marks);
@@ -90,11 +135,11 @@ impl PartBoundary {
         vertices.sort_unstable_by_key(|&vertex| numbers[vertex as usize]);
         let owned = (0..).zip(&vertices).filter(|(_, vertex)| shared.owns(**vertex)).map(|(place, _)| place).collect();
         let mut boundary = Self { vertices, owned, faces, root: None };
-        let message = boundary.described(part, &shared);
+        let message = boundary.described(part, shared);
         let gathered = communicator.gather(0, &message);
         let root = gathered.map(|messages| Root::assembled(&messages, settings)).transpose();
         boundary.root = agree(communicator, root)?;
-        Ok((shared, boundary))
+        Ok(boundary)
     }
 
     /// The vertices of the part that lie on the boundary of the whole mesh, in the order of their numbers in it. They are those of

@@ -98,6 +98,15 @@ pub(super) fn by_number(
     Ok(twins)
 }
 
+/// What becomes of a vertex that could be one of two of another rank.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Doubt {
+    /// It is an error.
+    Refused,
+    /// It is taken for none of them.
+    Apart,
+}
+
 /// Vertices at one place: nearer to each other than `tolerance` times the diagonal of the bounding box of all. Collective, as
 /// above.
 pub(super) fn by_place(
@@ -105,6 +114,7 @@ pub(super) fn by_place(
     part: &Part,
     candidates: &[Candidate],
     tolerance: f64,
+    doubt: Doubt,
 ) -> Result<Twins, DistributedError> {
     let size = communicator.size();
     let mut bounds = [f64::INFINITY; 6];
@@ -196,6 +206,9 @@ pub(super) fn by_place(
     }
     let mut twins = heard(communicator.exchange(addressed(answers)))?;
     let rank = communicator.rank();
+    if doubt == Doubt::Apart {
+        return set_apart(communicator, twins);
+    }
     for (vertex, others) in &mut twins {
         let same_rank = others.iter().find(|twin| twin.rank as usize == rank).copied();
         others.retain(|twin| twin.rank as usize != rank);
@@ -207,6 +220,34 @@ pub(super) fn by_place(
         }
         if let Some(pair) = others.windows(2).find(|pair| pair[0].rank == pair[1].rank) {
             return Err(DistributedError::Ambiguous { place, vertices: [pair[0].vertex, pair[1].vertex] });
+        }
+    }
+    twins.retain(|(_, others)| !others.is_empty());
+    Ok(twins)
+}
+
+/// Lets go of the vertices that could be one of two, here and where others hold them to be theirs. Collective.
+fn set_apart(communicator: &dyn Communicator, mut twins: Twins) -> Result<Twins, DistributedError> {
+    let (rank, size) = (communicator.rank(), communicator.size());
+    let mut messages: Vec<Writer> = (0..size).map(|_| Writer::default()).collect();
+    for (vertex, others) in &mut twins {
+        let is_doubtful = others.iter().any(|twin| twin.rank as usize == rank)
+            || others.windows(2).any(|pair| pair[0].rank == pair[1].rank);
+        if !is_doubtful {
+            continue;
+        }
+        for twin in others.drain(..).filter(|twin| twin.rank as usize != rank) {
+            messages[twin.rank as usize].u32(twin.vertex);
+            messages[twin.rank as usize].u32(*vertex);
+        }
+    }
+    for (from, bytes) in communicator.exchange(addressed(messages)) {
+        let mut reader = Reader::new(from, &bytes);
+        while !reader.is_empty() {
+            let (own, theirs) = (reader.u32()?, reader.u32()?);
+            if let Ok(at) = twins.binary_search_by_key(&own, |(vertex, _)| *vertex) {
+                twins[at].1.retain(|twin| (twin.rank as usize, twin.vertex) != (from, theirs));
+            }
         }
     }
     twins.retain(|(_, others)| !others.is_empty());

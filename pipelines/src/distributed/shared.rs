@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use tombolo_deform::{mesh::Vector, partition::Neighbour, surface::BoundaryFaces};
 
 use super::message::{Reader, Writer};
-use super::places::{self, Candidate, Twins};
+use super::places::{self, Candidate, Doubt, Twins};
 use super::{DistributedError, Part, TOLERANCE};
 use crate::communicator::{Communicator, Reduction, agree};
 
@@ -63,7 +63,7 @@ impl SharedVertices {
             if (0.0..=0.01).contains(&tolerance) { Ok(()) } else { Err(DistributedError::Tolerance(tolerance)) };
         agree(communicator, tolerable)?;
         let outer = super::boundary::outer_faces(communicator, part)?;
-        Self::beside(communicator, part, &outer, tolerance)
+        Self::beside(communicator, part, &outer, tolerance, Doubt::Refused)
     }
 
     /// The same where the faces that belong to one cell of the part are known.
@@ -72,6 +72,7 @@ impl SharedVertices {
         part: &Part,
         outer: &BoundaryFaces,
         tolerance: f64,
+        doubt: Doubt,
     ) -> Result<Self, DistributedError> {
         let (rank, count) = (communicator.rank(), part.points.len());
         let held = held(part);
@@ -94,10 +95,16 @@ impl SharedVertices {
             .then(|| DistributedError::Numbers { other: (-numbering) as usize });
         agree(communicator, fault.map_or(Ok(()), Err))?;
 
-        let candidates = candidates(part, outer, &held, ghosts > 0.0);
+        let mut candidates = candidates(part, outer, &held, ghosts > 0.0);
+        if doubt == Doubt::Apart {
+            // A vertex of no cell, as those that finer grids cover, is not shown: it casts no doubt on others.
+            let mut used = vec![false; count];
+            part.cells.connectivity().iter().for_each(|&vertex| used[vertex as usize] = true);
+            candidates.retain(|&(vertex, _)| used[vertex as usize]);
+        }
         let twins = match (by_number, numbers) {
             (true, numbers) => places::by_number(communicator, numbers.unwrap_or_default(), &candidates),
-            (false, _) => places::by_place(communicator, part, &candidates, tolerance),
+            (false, _) => places::by_place(communicator, part, &candidates, tolerance, doubt),
         };
         let twins = agree(communicator, twins)?;
         #[expect(clippy::cast_possible_truncation, reason = "ranks are numbered with 32 bits")]

@@ -3,7 +3,7 @@
 use tombolo_deform::mesh::{ArrayView, Vector};
 
 use super::slice::Crossing;
-use super::{Association, Channel, ExtractError, Field, FieldView};
+use super::{ABSENT, Association, Channel, ExtractError, Field, FieldView, is_absent};
 
 /// Where the points of an extract come from.
 pub(super) enum Points<'a> {
@@ -83,7 +83,7 @@ fn field(
     let components = view.values.components();
     let read = |entity: usize, component: usize| {
         let value = view.values.get(entity, component);
-        if value.is_finite() {
+        if value.is_finite() || is_absent(value) {
             return Ok(value);
         }
         let (field, association) = (view.name.to_owned(), view.association);
@@ -109,7 +109,8 @@ fn field(
             for crossing in *crossings {
                 for component in 0..components {
                     let [a, b] = crossing.edge.map(|vertex| read(vertex as usize, component));
-                    values.push(crossing.between(a?, b?));
+                    let (a, b) = (a?, b?);
+                    values.push(if is_absent(a) || is_absent(b) { ABSENT } else { crossing.between(a, b) });
                 }
             }
         }

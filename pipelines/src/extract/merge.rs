@@ -5,7 +5,7 @@ use std::{collections::HashMap, sync::Arc};
 use tombolo_deform::mesh::{CellType, Cells, Vector};
 
 use super::source::{Origin, Whole};
-use super::{Association, Extract, Extracted, Field};
+use super::{ABSENT, Association, Extract, Extracted, Field, is_absent};
 use crate::communicator::{Communicator, agree};
 use crate::distributed::{DistributedError, Reader, Writer};
 
@@ -268,9 +268,9 @@ impl Fields {
             for (place, values) in places.iter().zip(field.values.chunks(components.max(1))) {
                 let start = *place as usize * components;
                 if known.values.len() < start + components {
-                    known.values.resize(start + components, f64::NAN);
+                    known.values.resize(start + components, ABSENT);
                 }
-                if known.values[start].is_nan() {
+                if is_absent(known.values[start]) {
                     known.values[start..start + components].copy_from_slice(values);
                 }
             }

@@ -55,6 +55,16 @@ pub struct Field {
     pub values: Vec<f64>,
 }
 
+/// Stands in a field where it has no value, as on a block of the mesh that lacks it: a NaN of its own bits, so that one that the
+/// solver computed is still told. It is not measured, files have NaN there, and viewers do not get the field.
+pub const ABSENT: f64 = f64::from_bits(0x7ff8_6162_7365_6e74);
+
+/// Whether a value is [`ABSENT`].
+#[must_use]
+pub fn is_absent(value: f64) -> bool {
+    value.to_bits() == ABSENT.to_bits()
+}
+
 /// A field borrowed from the solver.
 #[derive(Debug, Clone, Copy)]
 pub struct FieldView<'a> {
@@ -119,7 +129,8 @@ pub struct ExtractFeatures {
 
 /// What a source stage took out of a channel: a copy of its own, small against the mesh unless it is the whole mesh.
 ///
-/// Invariants: cells name only points that exist, fields have one tuple for each point or cell, every number is finite.
+/// Invariants: cells name only points that exist, fields have one tuple for each point or cell, every number is finite, or in a
+/// field [`ABSENT`].
 /// What stays the same from step to step is shared, not copied.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Extract {

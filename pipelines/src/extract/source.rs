@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tombolo_deform::mesh::{Cells, Mesh, MeshView};
 use tombolo_deform::quality::{Quality, quality, scaled_jacobians};
-use tombolo_deform::surface::{FeatureSettings, Surface};
+use tombolo_deform::surface::{FeatureSettings, Surface, SurfaceError};
 
 use super::gather::{self, Owners, Points};
 use super::{Association, Channel, Extract, ExtractError, ExtractFeatures, Field, slice};
@@ -73,6 +73,8 @@ pub(crate) struct Whole {
     pub(crate) boundary: PartBoundary,
     /// The surface of the whole mesh, on rank 0.
     pub(crate) surface: Option<Boundary>,
+    /// Why there is none.
+    no_surface: Option<SurfaceError>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -130,6 +132,9 @@ impl Whole {
         cycle: u64,
         wanted: &dyn Fn(&str) -> bool,
     ) -> Result<Extracted, ExtractError> {
+        if let Some(error) = &self.no_surface {
+            return Err(error.clone().into());
+        }
         let (vertices, faces) = (self.boundary.vertices(), self.boundary.faces());
         let points = gather::points(&channel.mesh.points, vertices, cycle)?;
         let from = Points::Vertices(vertices);
@@ -192,11 +197,13 @@ impl Source {
     pub fn distributed(channel: &Channel, communicator: &dyn Communicator) -> Result<Self, ExtractError> {
         let part = agree(communicator, Part::of(&channel.mesh)).map_err(DistributedError::from)?;
         let own = agree(communicator, part.own_cells()).map_err(DistributedError::from)?;
-        let (shared, boundary) = PartBoundary::find(communicator, &part, &FeatureSettings::default())?;
+        let (shared, boundary, error) = PartBoundary::shown(communicator, &part)?;
         let mut is_shared = vec![false; part.points.len()];
         shared.shared().for_each(|vertex| is_shared[vertex as usize] = true);
         let surface = boundary.surface().map(|surface| Boundary::new(Arc::clone(surface)));
-        let whole = Whole { ghosts: part.ghosts, own, shared, is_shared, boundary, surface };
+        // Rank 0 tells it for all.
+        let no_surface = error.filter(|_| communicator.rank() == 0);
+        let whole = Whole { ghosts: part.ghosts, own, shared, is_shared, boundary, surface, no_surface };
         let key = Key::of(&channel.mesh);
         Ok(Self { key, cells: Arc::new(part.cells), boundary: None, whole: Some(Box::new(whole)) })
     }

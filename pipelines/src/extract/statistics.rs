@@ -1,7 +1,7 @@
 //! Measures of a field over the whole mesh.
 
 use super::gather::check_length;
-use super::{Channel, ExtractError, FieldView};
+use super::{Channel, ExtractError, FieldView, is_absent};
 use crate::communicator::{Communicator, Reduction};
 
 /// Measures of a field: of its value for a scalar, of its magnitude for a vector or tensor.
@@ -67,6 +67,9 @@ pub fn statistics_of(
         let (mut part_sum, mut part_squares) = (0.0, 0.0);
         for tuple in (start..values.len().min(start + CHUNK)).filter(|&tuple| counts(tuple)) {
             let value = measure(tuple);
+            if (0..values.components()).any(|component| is_absent(values.get(tuple, component))) {
+                continue;
+            }
             if !value.is_finite() {
                 non_finite += 1.0;
                 let found = (0..values.components()).map(|component| values.get(tuple, component));

@@ -10,7 +10,8 @@ use super::output::{Frame, MonitorValues, Output};
 use crate::communicator::{Communicator, Reduction, agree};
 use crate::expression::Expression;
 use crate::extract::{
-    Association, Channel, Extract, Extracted, FieldView, Snapshot, Source, check_length, merged, statistics_of,
+    Association, Channel, Extract, Extracted, Field, FieldView, Snapshot, Source, check_length, is_absent, merged,
+    statistics_of,
 };
 use crate::language::{
     Action, Change, Order, OrderStage, Pipeline, Problem, Slice, Stage, StreamStage, Write, file_pattern,
@@ -315,7 +316,14 @@ impl Prepared {
     }
 
     fn stream(&self, stage: &StreamStage, progress: &mut Progress) {
-        let Some(extract) = self.finished(progress) else { return };
+        let Some(mut extract) = self.finished(progress) else { return };
+        let lacks = |field: &Field| field.values.iter().any(|&value| is_absent(value));
+        if extract.fields.iter().any(lacks) {
+            for field in Arc::make_mut(&mut extract).fields.extract_if(.., |field| lacks(field)) {
+                let message = format!("field `{}` is not on all of the mesh; it is not sent to viewers", field.name);
+                progress.errors.push((format!("absent {}", field.name), message));
+            }
+        }
         progress.outputs.push(Output::Frame(Frame {
             pipeline: Arc::clone(&self.name),
             cycle: progress.snapshot.cycle,
