@@ -144,6 +144,18 @@ fn three_ranks_and_ranks_without_cells_compute_what_one_does() {
     }
 }
 
+#[test]
+fn ranks_without_a_configuration_find_a_port() {
+    let built = Built::get();
+    // By this test or by anything else: the usual port is taken.
+    let _taken = std::net::TcpListener::bind("127.0.0.1:7070");
+    for ranks in [1, 3] {
+        let told = succeed(built.program("heat_catalyst", ranks).args(["5", "4"]));
+        assert!((numbers(&told)[0] - 1.0).abs() < 1e-12, "{told}");
+        assert!(told.contains("tombolo: open http://127.0.0.1:") && !told.contains("127.0.0.1:7070"), "{told}");
+    }
+}
+
 /// Steers an example from a viewer until it ends.
 fn steer(name: &str, ranks: usize) {
     let config = json!({"version": 1, "stream": {"listen": "127.0.0.1:0"}, "pipelines": [
