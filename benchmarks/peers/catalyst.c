@@ -51,6 +51,17 @@ static long resident(void)
   return kilobytes;
 }
 
+/* Waits until what the implementation makes ready on other threads is done. */
+static void settle(void)
+{
+  const struct timespec pause = { 0, 500000000 };
+  clock_t begun;
+  do {
+    begun = clock();
+    nanosleep(&pause, NULL);
+  } while (clock() - begun > CLOCKS_PER_SEC / 50);
+}
+
 static int compare(const void* a, const void* b)
 {
   const double x = *(const double*)a, y = *(const double*)b;
@@ -117,10 +128,11 @@ int main(int argc, char** argv)
   for (long call = 0; call < calls + 10; ++call) {
     conduit_node_set_path_int64(node, "catalyst/state/timestep", call + 1);
     conduit_node_set_path_float64(node, "catalyst/state/time", 1e-3 * (double)call);
+    /* The first calls set up; one more takes in what has been made ready. */
+    if (call == 9) settle();
     const size_t had = allocated;
     const double begun = now();
     if (catalyst_execute(node) != catalyst_status_ok) return 1;
-    /* The first calls set up. */
     if (call < 10) continue;
     seconds[call - 10] = now() - begun;
     if (allocated - had > most) most = allocated - had;
