@@ -126,6 +126,8 @@ fn as_rank() {
     for preconditioning in PRECONDITIONINGS {
         solved(&universe.world(), preconditioning, [7, 6, 5]);
     }
+    // Through several levels of multigrid.
+    solved(&universe.world(), Some(Preconditioning::Multigrid), [17, 13, 12]);
     // A solver that has PETSc itself keeps it.
     let mut finalized = 1;
     // SAFETY: MPI is there; PETSc was finalized with the last of the above, and is initialized and finalized once more here.
