@@ -134,9 +134,12 @@ impl Run {
         }
         let named = self.adaptor.steered_channel();
         let steered = channels.iter().find(|channel| named.is_none_or(|name| channel.name == name));
-        self.steered = steered.map_or_else(String::new, |channel| channel.name.clone());
-        let blocks = steered.iter().flat_map(|channel| &channel.blocks);
-        self.blocks = blocks.map(|block: &Block| (block.name.clone(), block.vertex_count())).collect();
+        self.steered.clear();
+        self.blocks.clear();
+        if let Some(channel) = steered {
+            self.steered.push_str(&channel.name);
+            self.blocks.extend(channel.blocks.iter().map(|block: &Block| (block.name.clone(), block.vertex_count())));
+        }
         let Self { adaptor, kept, asked, .. } = self;
         let mut fields: Vec<Vec<FieldView<'_>>> = channels.iter().map(|_| Vec::new()).collect();
         let mut meshes: Vec<MeshView<'_>> = Vec::with_capacity(channels.len());

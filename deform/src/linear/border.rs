@@ -1,11 +1,12 @@
 //! What a level of multigrid does about rows that other ranks speak for.
 
+use std::sync::Arc;
+
 use super::SparseMatrix;
 use super::gauss_seidel::Pieces;
 use super::parts::Parts;
 use super::real::Real;
 use crate::partition::{Partition, Shares};
-use std::sync::Arc;
 
 /// What is added to the diagonal of a row, in parts of the sum of its couplings with rows of other ranks. With half of it sweeps that
 /// each rank makes on its own rows cannot overshoot (A. Baker, R. Falgout, T. Kolev, U. Yang, Multigrid smoothers for ultraparallel
@@ -32,7 +33,7 @@ impl<T: Real, const B: usize> Border<T, B> {
     pub(super) fn new(parts: &Parts, matrix: &SparseMatrix<B>, pieces: Pieces) -> (Self, Vec<[f64; B]>) {
         let own = parts.own();
         #[expect(clippy::cast_possible_truncation, reason = "rows are 32-bit")]
-        let slot = |row: u32| if (row as usize) < own { pieces.slot(row as usize) as u32 } else { row };
+        let slot = |row: u32| pieces.slot(row as usize) as u32;
         let mut border = Self {
             partition: Arc::clone(parts.partition()),
             shares: parts.shares().moved(slot),

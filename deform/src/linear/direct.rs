@@ -88,9 +88,8 @@ impl<T: Real, const B: usize> Direct<T, B> {
         let mut solution = right_side.clone();
         self.inverse.apply(&right_side, &mut solution);
         for row in 0..self.rows {
-            let slot = if row < self.pieces.rows() { self.pieces.slot(row) } else { row };
             let number = self.spread.as_ref().map_or(row, |spread| spread.numbers[row]);
-            vectors.solution[slot] = solution[number].map(|column| column.map(T::of));
+            vectors.solution[self.pieces.slot(row)] = solution[number].map(|column| column.map(T::of));
         }
     }
 }
@@ -124,7 +123,7 @@ impl Spread {
             let block = std::array::from_fn(|i| std::array::from_fn(|j| entry[2 + B * i + j]));
             (entry[0] as usize, entry[1] as u32, block)
         });
-        let slot = |row: u32| if (row as usize) < own { pieces.slot(row as usize) as u32 } else { row };
+        let slot = |row: u32| pieces.slot(row as usize) as u32;
         let shares = parts.shares().moved(slot);
         (Self { partition, shares, numbers }, summed(total as usize, all.collect()))
     }

@@ -50,14 +50,20 @@ impl Pieces {
         (piece % 2 == 1, piece / 2 * self.piece_rows + row % self.piece_rows)
     }
 
-    /// Where a row is placed.
+    /// Where a row is placed. Rows after those of the pieces stay where they are.
     pub(super) fn slot(&self, row: usize) -> usize {
+        if row >= self.rows {
+            return row;
+        }
         let (odd, index) = self.place(row);
         if odd { self.even_rows + index } else { index }
     }
 
     /// The row that is placed there.
     pub(super) fn row(&self, slot: usize) -> usize {
+        if slot >= self.rows {
+            return slot;
+        }
         let (odd, index) = if slot < self.even_rows { (0, slot) } else { (1, slot - self.even_rows) };
         (2 * (index / self.piece_rows) + odd) * self.piece_rows + index % self.piece_rows
     }

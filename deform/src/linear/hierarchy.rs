@@ -199,10 +199,8 @@ impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
                 });
             }),
             Some(order) => {
-                let own = pieces.rows();
                 for (row, &old) in order.old.iter().enumerate() {
-                    let slot = if row < own { pieces.slot(row) } else { row };
-                    finest.right_side[slot] = narrow(&vector[old as usize]);
+                    finest.right_side[pieces.slot(row)] = narrow(&vector[old as usize]);
                 }
             }
         }
@@ -229,10 +227,8 @@ impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
                 });
             }),
             Some(order) => {
-                let own = pieces.rows();
                 for (row, &old) in order.old.iter().enumerate() {
-                    let slot = if row < own { pieces.slot(row) } else { row };
-                    result[old as usize] = widen(&finest.solution[slot]);
+                    result[old as usize] = widen(&finest.solution[pieces.slot(row)]);
                 }
             }
         }
@@ -309,8 +305,6 @@ fn coarsened<T: Real, const B: usize, const C: usize>(
     *places = bodies.map(Bodies::into_coarse);
     let next = System::new(Cow::Owned(next), coarse, None);
     let smoother = system.agreed(GaussSeidel::new(matrix, *pieces, &added))?;
-    let slot = |pieces: Pieces, row: usize| if row < pieces.rows() { pieces.slot(row) } else { row };
-    let row = |pieces: Pieces, slot: usize| if slot < pieces.rows() { pieces.row(slot) } else { slot };
     let (own, coarse) = (*pieces, next.pieces);
     let level = Level {
         aggregates,
@@ -318,12 +312,12 @@ fn coarsened<T: Real, const B: usize, const C: usize>(
         rows: matrix.rows(),
         smoother,
         border,
-        interpolation: Transfer::interpolation(&interpolation, |place| row(own, place), |column| slot(coarse, column)),
+        interpolation: Transfer::interpolation(&interpolation, |slot| own.row(slot), |column| coarse.slot(column)),
         restriction: Transfer::restriction(
             &interpolation,
             (&starts, &entries),
-            |place| row(coarse, place),
-            |row| slot(own, row),
+            |slot| coarse.row(slot),
+            |row| own.slot(row),
         ),
     };
     Some(Step::Level(Box::new((level, next))))
