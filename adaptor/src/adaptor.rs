@@ -1,6 +1,7 @@
 //! The three calls.
 
 mod commands;
+mod contract;
 mod description;
 
 use std::{
@@ -10,6 +11,7 @@ use std::{
 };
 
 use commands::Intake;
+use contract::Lent;
 use description::features;
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Value, json};
@@ -19,7 +21,7 @@ use tombolo_deform::{
 };
 use tombolo_pipelines::{
     distributed::{Part, Ranks},
-    extract::Channel,
+    extract::{Channel, ChannelError},
     language::{self, Config, Due, Stage, TimedCommand, Validate},
     shape::Shaper,
 };
@@ -52,6 +54,7 @@ pub struct Adaptor {
     forecaster: Arc<OnceLock<Forecaster>>,
     server: Option<Server>,
     mesh: SteeredMesh,
+    lent: Lent,
     told: Told,
     paused: bool,
     stopped: bool,
@@ -170,6 +173,7 @@ impl Adaptor {
             forecaster,
             server,
             mesh: SteeredMesh::Unknown,
+            lent: Lent::default(),
             told: Told { schema: language::order_schema(), ..Told::default() },
             paused: false,
             stopped: false,
@@ -220,9 +224,9 @@ impl Adaptor {
         if let Some(hub) = &self.hub {
             hub.clock.set(moment.cycle, moment.time);
         }
-        let fault = self.check(step, channels).err();
+        let fault = self.check(step, moment, channels).err();
         let moved = match self.meet(moment, fault)? {
-            Some(called) if !self.is_calm(moment, called) => self.act(step, moment, channels)?,
+            Some(called) if !self.is_calm(moment, called) => self.act(step, moment, called, channels)?,
             _ => false,
         };
         let left = Instant::now();
@@ -321,30 +325,6 @@ impl Adaptor {
         }
     }
 
-    fn check(&self, step: &Step, channels: &[Channel<'_>]) -> Result<(), ExecuteError> {
-        let cycle = step.cycle;
-        if !step.time.is_finite() {
-            return Err(ExecuteError::Time { cycle, what: "time", value: step.time });
-        }
-        if !(step.time_step >= 0.0 && step.time_step.is_finite()) {
-            return Err(ExecuteError::Time { cycle, what: "time_step", value: step.time_step });
-        }
-        if channels.is_empty() {
-            return Err(ExecuteError::NoChannel { cycle });
-        }
-        let expected = match &self.mesh {
-            SteeredMesh::Steered(steerer, _) => steerer.vertex_count(),
-            SteeredMesh::Unknown | SteeredMesh::Unsteered | SteeredMesh::Refused(_) => return Ok(()),
-        };
-        let channel = Channel::find(channels, self.steered_channel())
-            .map_err(|reason| ExecuteError::SteeredChannel { cycle, reason })?;
-        let found = channel.mesh.points.len();
-        if found != expected {
-            return Err(ExecuteError::VertexCount { cycle, channel: channel.name.into(), found, expected });
-        }
-        Ok(())
-    }
-
     /// Whether rank 0 was called to look at something; an error where any rank has one. `None` between two meetings of the ranks:
     /// then nothing is done, and a fault waits for the next, so that all ranks have it at the same call.
     #[inline]
@@ -377,7 +357,16 @@ impl Adaptor {
     }
 
     /// Does what there is to do; says whether the mesh moves over the coming step.
-    fn act(&mut self, step: &Step, moment: Moment, channels: &[Channel<'_>]) -> Result<bool, ExecuteError> {
+    fn act(
+        &mut self,
+        step: &Step,
+        moment: Moment,
+        called: bool,
+        channels: &[Channel<'_>],
+    ) -> Result<bool, ExecuteError> {
+        if called {
+            self.check_called(step, channels)?;
+        }
         if matches!(self.mesh, SteeredMesh::Unknown) {
             let begun = Instant::now();
             self.take_reference(step, channels)?;
@@ -438,7 +427,10 @@ impl Adaptor {
         self.mesh = if self.config.stream.is_none() && self.timed.is_empty() && !self.pipelines.can_order() {
             SteeredMesh::Unsteered
         } else {
-            let of_channel = |source| ExecuteError::Mesh { cycle, channel: channel.name.into(), source };
+            let of_channel = |source| {
+                let channel = channel.name.into();
+                ExecuteError::Channel { cycle, source: ChannelError::Mesh { channel, source } }
+            };
             let taken = if self.communicator.size() > 1 {
                 let part = comm::agree_on(&*self.communicator, Part::of(&channel.mesh).map_err(of_channel))?;
                 self.take_over_part(&part)
@@ -447,6 +439,7 @@ impl Adaptor {
             };
             match taken {
                 Ok(steerer) => {
+                    self.lent.take_reference(channel);
                     let surface = steerer.surface();
                     if let Some(surface) = surface.as_ref().filter(|_| self.communicator.size() == 1) {
                         self.pipelines.share_surface(channels, channel.name, Arc::clone(surface));

@@ -2,13 +2,11 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use tombolo_deform::{
-    mesh::{MeshError, Vector},
-    partition::Partition,
-};
+use tombolo_deform::{mesh::Vector, partition::Partition};
 use tombolo_pipelines::{
     communicator::{Communicator, RankError, Solo},
     distributed::Ranks,
+    extract::ChannelError,
     language::{Config, LanguageError, TimedCommand},
 };
 
@@ -151,15 +149,28 @@ pub enum ExecuteError {
         /// What it is.
         value: f64,
     },
-    /// The mesh handed over first makes no sense.
-    #[error("cycle {cycle}: channel '{channel}': {source}")]
-    Mesh {
+    /// What was lent makes no sense.
+    #[error("cycle {cycle}: {source}")]
+    Channel {
+        /// The step.
+        cycle: u64,
+        /// Which channel, which array, and what was expected.
+        source: ChannelError,
+    },
+    /// The mesh has the vertices of the first call, and other cells.
+    #[error(
+        "cycle {cycle}: channel '{channel}' has other cells than the reference mesh of the first call ({found} now, {expected} then); \
+         shapes are measured from that mesh, so its cells must stay the same, in their order; a solver that makes another mesh calls release_shape"
+    )]
+    OtherCells {
         /// The step.
         cycle: u64,
         /// The channel.
         channel: String,
-        /// What is wrong.
-        source: MeshError,
+        /// How many there are.
+        found: usize,
+        /// How many there were.
+        expected: usize,
     },
     /// Something is wrong on one rank. All ranks have this error, that of the lowest rank on which something is wrong.
     #[error(transparent)]

@@ -100,6 +100,11 @@ impl Pipelines {
         self.runner.is_due(moment.cycle, moment.time)
     }
 
+    /// Whether anything that is due looks at the channel of this name.
+    pub(crate) fn reads(&self, moment: Moment, channel: &str, is_first: bool) -> bool {
+        self.runner.reads(moment.cycle, moment.time, channel, is_first)
+    }
+
     /// Runs what is due.
     pub(crate) fn run(&mut self, moment: Moment, channels: &[Channel<'_>], hub: Option<&Arc<Hub>>) -> Asked {
         let Moment { cycle, time } = moment;

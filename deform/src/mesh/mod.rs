@@ -10,6 +10,7 @@ mod cells;
 mod feature;
 mod ordered;
 mod view;
+mod view_check;
 
 pub use cell_type::CellType;
 pub use cells::Cells;
@@ -156,6 +157,12 @@ pub enum MeshError {
         end: u64,
         /// The length of the connectivity.
         length: usize,
+    },
+    /// Coordinates of more than three components.
+    #[error("the coordinates have {found} components; expected 1 to 3")]
+    Components {
+        /// How many there are.
+        found: usize,
     },
     /// Coordinates for another number of vertices.
     #[error("{found} points given for a mesh of {expected}")]

@@ -158,6 +158,17 @@ impl<'a> ArrayView<'a> {
         std::array::from_fn(|component| if component < self.components { self.get(tuple, component) } else { 0.0 })
     }
 
+    /// The values as they lie in memory, where they lie tuple after tuple in double precision.
+    pub(super) fn contiguous(&self) -> Option<&'a [f64]> {
+        let Values::F64(first) = self.columns[0].values else { return None };
+        let follows = |(component, column): (usize, &Column<'a>)| {
+            let is_same = matches!(column.values, Values::F64(values) if std::ptr::eq(values, first));
+            is_same && column.stride == self.components && column.offset == component
+        };
+        let whole = self.columns[..self.components].iter().enumerate().all(follows);
+        first.get(..self.len * self.components).filter(|_| whole)
+    }
+
     /// A copy as vectors.
     #[must_use]
     pub fn to_vectors(&self) -> Vec<Vector> {

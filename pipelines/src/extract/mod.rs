@@ -3,6 +3,7 @@
 //! [`Source`] keeps what does not change while a channel's cells stay the same; [`Source::surface`], [`Source::slice`] and
 //! [`Source::whole`] then make an [`Extract`] of the channel as it is now.
 
+mod check;
 mod error;
 mod gather;
 mod merge;
@@ -10,10 +11,11 @@ mod slice;
 mod source;
 mod statistics;
 
+pub use check::{ChannelError, check_names};
 pub use error::ExtractError;
 pub(crate) use gather::check_length;
 pub(crate) use merge::merged;
-pub use source::{Extracted, Source};
+pub use source::{Extracted, MeshKey, Source};
 pub use statistics::{FieldStatistics, statistics, statistics_of};
 
 use std::sync::Arc;

@@ -55,7 +55,7 @@ impl Extracted {
 /// in where they lie in memory, their number, or the generation that the solver counts up.
 #[derive(Debug)]
 pub struct Source {
-    key: Key,
+    key: MeshKey,
     cells: Arc<Cells>,
     boundary: Option<Boundary>,
     whole: Option<Box<Whole>>,
@@ -77,16 +77,20 @@ pub(crate) struct Whole {
     no_surface: Option<SurfaceError>,
 }
 
+/// What tells, without a look at a value, that a solver lends the same cells as before: where they lie in memory, how many cells and
+/// vertices there are, and the generation that the solver counts up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Key {
+pub struct MeshKey {
     identity: (usize, usize),
     cells: usize,
     points: usize,
     generation: u64,
 }
 
-impl Key {
-    fn of(mesh: &MeshView) -> Self {
+impl MeshKey {
+    /// That of a mesh as it is lent now.
+    #[must_use]
+    pub fn of(mesh: &MeshView) -> Self {
         Self {
             identity: mesh.cells.identity(),
             cells: mesh.cells.len(),
@@ -186,7 +190,7 @@ impl Source {
     pub fn new(channel: &Channel) -> Result<Self, ExtractError> {
         let cells = channel.mesh.cells.to_cells()?;
         cells.validate(channel.mesh.points.len())?;
-        Ok(Self { key: Key::of(&channel.mesh), cells: Arc::new(cells), boundary: None, whole: None })
+        Ok(Self { key: MeshKey::of(&channel.mesh), cells: Arc::new(cells), boundary: None, whole: None })
     }
 
     /// The same of a channel of which each rank has a part. Extracts are then of the rank's part, its ghosts left out, and make
@@ -204,7 +208,7 @@ impl Source {
         // Rank 0 tells it for all.
         let no_surface = error.filter(|_| communicator.rank() == 0);
         let whole = Whole { ghosts: part.ghosts, own, shared, is_shared, boundary, surface, no_surface };
-        let key = Key::of(&channel.mesh);
+        let key = MeshKey::of(&channel.mesh);
         Ok(Self { key, cells: Arc::new(part.cells), boundary: None, whole: Some(Box::new(whole)) })
     }
 
@@ -225,7 +229,7 @@ impl Source {
     /// Whether the channel still has the cells that this was made of. Looks at no cell.
     #[must_use]
     pub fn is_of(&self, channel: &Channel) -> bool {
-        self.key == Key::of(&channel.mesh)
+        self.key == MeshKey::of(&channel.mesh)
     }
 
     /// The cells.

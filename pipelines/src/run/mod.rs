@@ -90,6 +90,15 @@ impl Runner {
         self.pipelines.iter().any(|prepared| prepared.is_chosen && prepared.due.is_due(cycle, time))
     }
 
+    /// Whether any pipeline that is due at this step looks at the channel of this name; `is_first` says whether it is the first that
+    /// the solver shows.
+    #[must_use]
+    pub fn reads(&self, cycle: u64, time: f64, channel: &str, is_first: bool) -> bool {
+        let reads = |name: Option<&str>| name.map_or(is_first, |name| name == channel);
+        let due = self.pipelines.iter().filter(|prepared| prepared.is_chosen && prepared.due.is_due(cycle, time));
+        due.map(|prepared| prepared.pipeline.channel.as_deref()).any(reads)
+    }
+
     /// Lets only those pipelines run from now on whose names are chosen; the others wait, and are due again once they are chosen. On
     /// all processes alike.
     pub fn choose(&mut self, is_chosen: impl Fn(&str) -> bool) {
