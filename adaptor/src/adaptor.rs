@@ -30,7 +30,9 @@ use crate::{
     comm,
     journal::Journal,
     report::{Durations, Report},
-    settings::{ExecuteError, FinalizeError, InitializeError, MeshMotion, Settings, Solvers, Steering, Step},
+    settings::{
+        ExecuteError, FinalizeError, InitializeError, MeshMotion, Settings, Solvers, Steering, Step, SurfaceMotion,
+    },
     stages::Pipelines,
     steering::{Defaults, Forecaster, Log, Moment, Parameters, Queue, Source, Steerer, Timed},
     stream::{Hub, ReferenceSurface, Server},
@@ -239,6 +241,12 @@ impl Adaptor {
                     coordinates,
                     displacement: &shape.displacement,
                     velocity: &shape.velocity,
+                    surface: SurfaceMotion {
+                        vertices: steerer.boundary(),
+                        coordinates: &shape.surface.coordinates,
+                        displacement: &shape.surface.displacement,
+                        velocity: &shape.surface.velocity,
+                    },
                     shape: shape.shape,
                     order: &shape.order,
                 })
@@ -392,7 +400,7 @@ impl Adaptor {
             self.accept(timed.id, Source::File, timed.command, moment);
         }
         let begun = Instant::now();
-        self.serve(moment);
+        self.serve(moment, channels);
         self.timing.steering.add(begun.elapsed());
         if self.paused {
             let begun = Instant::now();
@@ -400,7 +408,7 @@ impl Adaptor {
                 if self.communicator.rank() == 0 {
                     self.queue.wait();
                 }
-                self.serve(moment);
+                self.serve(moment, channels);
             }
             self.timing.paused.add(begun.elapsed());
         }

@@ -3,9 +3,9 @@
 use std::{collections::BTreeMap, time::Duration};
 
 use serde::Serialize;
-use tombolo_pipelines::shape::ShapeSeconds;
+use tombolo_pipelines::shape::{Judged, ShapeSeconds};
 
-use crate::stream::StreamCounts;
+use crate::{steering::NotFollowed, stream::StreamCounts};
 
 /// What [`Adaptor::finalize`](crate::Adaptor::finalize) hands back.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -43,6 +43,13 @@ pub struct OrderReport {
     pub shapes: u32,
     /// The least scaled Jacobian of all shapes on its way; of an order that the guard rejected, what it would have come to.
     pub min_scaled_jacobian: Option<f64>,
+    /// What the guard judged of every shape: the volume, or the surface alone where the volume is left to the solver.
+    pub judged: Option<Judged>,
+    /// That the solver did not move its mesh as it was asked to; the first shape that it did not follow.
+    pub not_followed: Option<NotFollowed>,
+    /// The largest distance between where a vertex was asked to be and where it was lent at the next call, in units of the mesh,
+    /// beyond rounding: the solver's own motion, or what it did not follow.
+    pub deviation: Option<f64>,
     /// The longest way that a vertex of the surface goes for it, in units of the mesh.
     pub largest_displacement: Option<f64>,
     /// The fraction of its amounts that is done: below 1 where the guard clamped it; of one that was rejected, what would pass,

@@ -79,19 +79,40 @@ pub struct Steering<'a> {
 }
 
 /// A motion of the mesh over one step.
+///
+/// It is asked for, not assumed to be made: the coordinates lent at the next call say whether it was.
 #[derive(Debug, Clone, Copy)]
 pub struct MeshMotion<'a> {
     /// The coordinates of each vertex at the end of the step: the reference's plus the displacement that the stack of edits
-    /// makes (or a shape on the way there). With every order taken back they are the reference's, bit for bit.
+    /// makes (or a shape on the way there), plus what the solver has moved the mesh by itself. With every order taken back, and no
+    /// motion of the solver's own, they are the reference's, bit for bit.
     pub coordinates: &'a [Vector],
-    /// From the present coordinates to these.
+    /// From the coordinates as they were lent to these.
     pub displacement: &'a [Vector],
     /// `displacement / time_step`, for an arbitrary Lagrangian-Eulerian (ALE) solver; 0 in a steady one.
     pub velocity: &'a [Vector],
+    /// The motion of the boundary's vertices alone, for a solver that moves its volume by itself.
+    pub surface: SurfaceMotion<'a>,
     /// Which shape of the order's schedule this is, counted from 1, and how many there are.
     pub shape: (u32, u32),
     /// The order's name.
     pub order: &'a str,
+}
+
+/// A motion of the boundary over one step: one entry for each of its vertices on this rank.
+///
+/// It holds what [`MeshMotion`] holds of these vertices. With `"deform": {"method": "surface"}` there is no other motion: no volume
+/// is solved for, the vertices inside are handed back as they were lent, and the solver moves them by itself.
+#[derive(Debug, Clone, Copy)]
+pub struct SurfaceMotion<'a> {
+    /// The vertices: numbers into the coordinates that the solver lends. The same, in the same order, in the whole run.
+    pub vertices: &'a [u32],
+    /// Where each is at the end of the step.
+    pub coordinates: &'a [Vector],
+    /// From where it was lent to there.
+    pub displacement: &'a [Vector],
+    /// `displacement / time_step`; 0 in a steady solver.
+    pub velocity: &'a [Vector],
 }
 
 /// Why a run could not be set up.

@@ -9,7 +9,7 @@ use common::{config, squeeze};
 use serde_json::json;
 use tombolo::{
     Adaptor, ExecuteError, OrderStatus, Settings, Step,
-    comm::threads,
+    comm::{Communicator, threads},
     deform::{
         mesh::{ArrayView, CellsView, FeatureSource, Indices, MeshView, Values},
         shapes::box_of_tets,

@@ -5,6 +5,7 @@ mod carry;
 mod forecast;
 mod mend;
 mod plan;
+mod surface_only;
 #[cfg(test)]
 mod tests;
 
@@ -30,7 +31,7 @@ use boundary::{Boundary, Parts};
 use carry::Carrier;
 pub use forecast::{Forecast, Outcome};
 use mend::Mended;
-pub use plan::{Place, Plan};
+pub use plan::{Judged, Place, Plan};
 
 /// Volume operators kept, one for each way to deform that was asked for: the newest ones.
 const OPERATORS: usize = 2;
@@ -150,6 +151,8 @@ pub struct Target {
     pub iterations: usize,
     /// Sub-steps that it took beyond one solve from the reference.
     pub sub_steps: usize,
+    /// Whether only the boundary is where it should be, and the volume is left to the solver.
+    pub surface_only: bool,
 }
 
 impl Target {
@@ -160,7 +163,7 @@ impl Target {
         if !self.way.is_empty() && !Arc::ptr_eq(&self.points, &self.reference) {
             back.push(Arc::clone(&self.reference));
         }
-        Place { points: Arc::clone(&self.points), back }
+        Place { points: Arc::clone(&self.points), back, surface_only: self.surface_only }
     }
 }
 
@@ -331,6 +334,9 @@ impl Shaper {
     /// # Errors
     /// [`Refused::Volume`] where the mesh has none; [`Refused::Feature`].
     pub fn prepare(&mut self, deform: &DeformStage) -> Result<(), Refused> {
+        if deform.surface_only {
+            return Ok(());
+        }
         self.operator(deform).map(drop)
     }
 
@@ -386,7 +392,11 @@ impl Shaper {
         if still {
             let points = Arc::clone(&reference);
             let (way, fraction, iterations, sub_steps) = (Vec::new(), 1.0, 0, 0);
-            return Ok(Target { points, reference, way, fraction, seconds, iterations, sub_steps });
+            let surface_only = deform.surface_only;
+            return Ok(Target { points, reference, way, fraction, seconds, iterations, sub_steps, surface_only });
+        }
+        if deform.surface_only {
+            return self.of_surface(&surface, seconds);
         }
         let watch = Stopwatch::start();
         let solution = self.operator(deform)?.solve(&surface).and_then(|solution| {
@@ -407,7 +417,7 @@ impl Shaper {
             sound?;
         }
         let (way, fraction, sub_steps) = (Vec::new(), 1.0, 0);
-        Ok(Target { points, reference, way, fraction, seconds, iterations, sub_steps })
+        Ok(Target { points, reference, way, fraction, seconds, iterations, sub_steps, surface_only: false })
     }
 
     /// The shape with its worst cells lifted, where that could be done.

@@ -4,6 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use serde_json::{Value, json};
 use tombolo_pipelines::{
+    extract::Channel,
     files::{UnreadFile, read_displacements},
     language::{self, Command, Question},
 };
@@ -74,7 +75,7 @@ impl Adaptor {
     }
 
     /// Carries out what viewers have asked for meanwhile, as far as it can be now.
-    pub(super) fn serve(&mut self, moment: Moment) {
+    pub(super) fn serve(&mut self, moment: Moment, channels: &[Channel<'_>]) {
         let received: Vec<Received> = self.queue.take().into();
         let clients: Vec<u64> = received.iter().map(|received| received.client).collect();
         let own = received.into_iter().map(|received| (received.id, received.command)).collect();
@@ -82,6 +83,13 @@ impl Adaptor {
             // Only rank 0 has viewers to answer.
             let client = clients.get(place).copied().unwrap_or_default();
             self.obey(id, &Source::Viewer(client), command, moment);
+        }
+        let named = self.steered_channel().map(str::to_owned);
+        if let (SteeredMesh::Steered(steerer, _), Ok(channel)) =
+            (&mut self.mesh, Channel::find(channels, named.as_deref()))
+            && steerer.looks_at_mesh()
+        {
+            steerer.observe(&channel.mesh.points);
         }
         self.foretell();
         let step_seconds = self.timing.steps.median();

@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
+use tombolo_deform::mesh::Vector;
 use tombolo_pipelines::{
     language::Order,
     shape::{Forecast, Place},
@@ -9,7 +10,7 @@ use tombolo_pipelines::{
 
 use super::{
     Defaults, EditStack,
-    planner::Rejection,
+    planner::{Rejection, Wish},
     worker::{Jobs, lock},
 };
 
@@ -18,6 +19,8 @@ use super::{
 pub(super) struct Present {
     pub(super) stack: EditStack,
     pub(super) place: Place,
+    /// What the solver's own motion has added to it, as far as it was looked at.
+    pub(super) own: Option<Arc<[Vector]>>,
 }
 
 /// Asks the worker without going through the solver's thread, so that an answer does not wait for the end of a step.
@@ -31,9 +34,9 @@ impl Forecaster {
     /// Has `answer` called with what `order` would come to, were it given now. What the same `asker` asked for before and was
     /// not told yet is forgotten: its answer never comes.
     pub(crate) fn ask(&self, asker: u64, order: &Order, answer: impl FnOnce(Forecast) + Send + 'static) {
-        let Present { stack, place } = lock(&self.present).clone();
+        let Present { stack, place, own } = lock(&self.present).clone();
         match self.defaults.wish(&stack, place, order) {
-            Ok((_, wish)) => self.jobs.forecast(asker, wish, Box::new(answer)),
+            Ok((_, wish)) => self.jobs.forecast(asker, Wish { own, ..wish }, Box::new(answer)),
             Err(error) => {
                 let Rejection { reason, seconds, .. } = Rejection::from(error);
                 answer(Forecast::rejected(reason, None, None, seconds));

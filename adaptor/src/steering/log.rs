@@ -11,7 +11,7 @@ use tombolo_pipelines::{
     shape::ShapeSeconds,
 };
 
-use super::planner::Rejection;
+use super::{NotFollowed, planner::Rejection};
 use crate::{
     journal::Journal,
     report::{ORDERS_KEPT, OrderReport, OrderStatus},
@@ -104,6 +104,9 @@ impl Log {
                     shape: 0,
                     shapes: 0,
                     min_scaled_jacobian: None,
+                    judged: None,
+                    not_followed: None,
+                    deviation: None,
                     largest_displacement: None,
                     fraction: None,
                     seconds: ShapeSeconds::default(),
@@ -163,8 +166,39 @@ impl Log {
     }
 
     /// Notes that the motion of an order begins; `clamped` is the fraction that is done, where that is not all of it.
-    pub(crate) fn begin(&self, id: &str, moment: Moment, min_scaled_jacobian: f64, clamped: Option<f64>) {
-        self.journal(id, JournalStatus::Applied, moment, None, None, [Some(min_scaled_jacobian), clamped]);
+    pub(crate) fn begin(&self, id: &str, moment: Moment, min_scaled_jacobian: Option<f64>, clamped: Option<f64>) {
+        self.journal(id, JournalStatus::Applied, moment, None, None, [min_scaled_jacobian, clamped]);
+    }
+
+    /// Notes how far the mesh was from where it was asked to be, which is not far.
+    pub(crate) fn deviates(&self, id: &str, distance: f64) {
+        if distance > 0.0 {
+            self.update(id, |order| {
+                order.deviation = Some(order.deviation.map_or(distance, |known| known.max(distance)))
+            });
+        }
+    }
+
+    /// Notes that the solver did not take a motion; it is said once for each order.
+    pub(crate) fn not_followed(&self, id: &str, not: NotFollowed) {
+        let NotFollowed { cycle, shape, distance } = not;
+        let mut first = None;
+        self.update(id, |order| {
+            order.deviation = Some(order.deviation.map_or(distance, |known| known.max(distance)));
+            if order.not_followed.is_none() {
+                order.not_followed = Some(not);
+                first = Some(order.shapes);
+            }
+        });
+        let Some(shapes) = first else { return };
+        let message = format!(
+            "order '{id}': applied, not followed: shape {shape} of {shapes}, handed out at cycle {cycle}, is not where the \
+             solver's mesh is at the next call; its vertices are up to {distance:.3e} from there"
+        );
+        eprintln!("tombolo: {message}");
+        if let Some(hub) = &self.hub {
+            hub.tell(&json!({"error": {"message": message, "id": id}}));
+        }
     }
 
     fn journal(

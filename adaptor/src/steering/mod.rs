@@ -11,6 +11,7 @@
 //! out, so that what a journal replays is the same bits: the start of each motion depends only on the cycle at which it began.
 
 mod forecaster;
+mod lent;
 mod log;
 mod parameters;
 mod planner;
@@ -26,17 +27,20 @@ use std::{
 };
 
 use tombolo_deform::{
-    mesh::Vector,
-    quality::{Guard, Quality, quality_in_parts},
+    mesh::{ArrayView, Mesh, Vector},
+    partition::Partition,
+    quality::{Guard, Quality, judge_in_parts, quality_in_parts},
     schedule::Schedule,
     surface::Surface,
 };
 use tombolo_pipelines::{
     language::{DeformStage, Order},
-    shape::{Forecast, Place, Plan, Shaper},
+    shape::{Forecast, Judged, Place, Plan, Shaper},
 };
 
 pub(crate) use forecaster::Forecaster;
+pub use lent::NotFollowed;
+use lent::{HandedOut, Own, Rounding};
 pub(crate) use log::{Log, Moment, Source};
 pub(crate) use parameters::Parameters;
 pub use parameters::{Parameter, ParameterError};
@@ -68,6 +72,7 @@ impl Defaults {
             stack: after.edits(),
             kept: stack.shared(&after),
             start,
+            own: None,
             deform,
             schedule: order.schedule.unwrap_or(self.schedule),
             guard,
@@ -96,8 +101,23 @@ struct Computing {
 struct Motion {
     id: String,
     plan: Plan,
+    guard: Guard,
     begun: Moment,
+    /// Shapes that were handed out.
     taken: u32,
+    /// The shape that the mesh has, which is the last one taken if that was followed.
+    reached: u32,
+}
+
+/// The last shape that was handed out, until the next call shows whether the solver went there.
+struct Pending {
+    handed: HandedOut,
+    /// Where the shape was before, and its quality.
+    before: (Place, Option<(f64, f64)>),
+    reached: u32,
+    id: String,
+    shape: u32,
+    cycle: u64,
 }
 
 /// One change of the mesh, to be made over the coming step.
@@ -105,8 +125,20 @@ struct Motion {
 pub(crate) struct Shape {
     pub(crate) displacement: Vec<Vector>,
     pub(crate) velocity: Vec<Vector>,
+    /// Where the mesh will be, where that is not the shape itself.
+    carried: Option<Arc<[Vector]>>,
+    /// The same of the vertices of the boundary.
+    pub(crate) surface: SurfaceShape,
     pub(crate) shape: (u32, u32),
     pub(crate) order: String,
+}
+
+/// One change of the boundary.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct SurfaceShape {
+    pub(crate) coordinates: Vec<Vector>,
+    pub(crate) displacement: Vec<Vector>,
+    pub(crate) velocity: Vec<Vector>,
 }
 
 /// The shape of one mesh and the orders that change it.
@@ -125,6 +157,13 @@ pub(crate) struct Steerer {
     computing: Option<Computing>,
     motion: Option<Motion>,
     shape: Shape,
+    mesh: Arc<Mesh>,
+    partition: Arc<dyn Partition>,
+    boundary: Arc<[u32]>,
+    rounding: Rounding,
+    pending: Option<Pending>,
+    /// The mesh as it was lent last, against the shape.
+    own: Own,
     /// The quality of the present shape as far as it is known: least and mean scaled Jacobian.
     quality: Option<(f64, f64)>,
     reference_quality: Option<(f64, f64, usize)>,
@@ -164,10 +203,19 @@ impl Steerer {
 
     fn of_shaper(shaper: Shaper, defaults: Defaults, log: Arc<Log>) -> Self {
         let place: Place = Arc::clone(shaper.reference()).into();
+        let (mesh, partition) = (Arc::clone(shaper.mesh()), Arc::clone(shaper.partition()));
+        let boundary = shaper.boundary_vertices().into();
+        let rounding = Rounding::of(shaper.reference(), &*partition);
         let planner = Arc::new(Mutex::new(Planner::new(shaper)));
         let stack = EditStack::default();
-        let present = Arc::new(Mutex::new(Present { stack: stack.clone(), place: place.clone() }));
+        let present = Arc::new(Mutex::new(Present { stack: stack.clone(), place: place.clone(), own: None }));
         Self {
+            mesh,
+            partition,
+            boundary,
+            rounding,
+            pending: None,
+            own: Own::default(),
             log,
             defaults,
             planner,
@@ -198,7 +246,7 @@ impl Steerer {
 
     /// What an order would come to, found out at once. Collective, where the mesh is in parts.
     pub(crate) fn forecast(&self, order: &Order) -> Forecast {
-        match self.defaults.wish(&self.stack, self.place.clone(), order) {
+        match self.wish(order) {
             Ok((_, wish)) => lock(&self.planner).forecast(&wish),
             Err(error) => {
                 let Rejection { reason, seconds, .. } = Rejection::from(error);
@@ -214,11 +262,14 @@ impl Steerer {
         };
         self.foreseen = true;
         // What is wrong with it is told when its turn comes.
-        if let (Some(worker), Ok((_, wish))) =
-            (&self.worker, self.defaults.wish(&self.stack, self.place.clone(), order))
-        {
+        if let (Some(worker), Ok((_, wish))) = (&self.worker, self.wish(order)) {
             worker.look_ahead(wish);
         }
+    }
+
+    fn wish(&self, order: &Order) -> Result<(EditStack, Wish), StackError> {
+        let (stack, wish) = self.defaults.wish(&self.stack, self.place.clone(), order)?;
+        Ok((stack, Wish { own: self.own.offsets.clone(), ..wish }))
     }
 
     /// How many vertices the mesh has.
@@ -229,7 +280,34 @@ impl Steerer {
     /// Whether nothing is under way and nothing waits.
     #[inline]
     pub(crate) fn is_at_rest(&self) -> bool {
-        self.motion.is_none() && self.waiting.is_empty()
+        self.motion.is_none() && self.waiting.is_empty() && self.pending.is_none()
+    }
+
+    /// Whether it will compare the mesh as it is lent now with the shape that it was asked to have.
+    pub(crate) fn looks_at_mesh(&self) -> bool {
+        !self.is_at_rest() || self.computing.is_some()
+    }
+
+    /// Finds out where the solver has moved the mesh since the last call: whether it followed what was handed out, and what motion
+    /// of its own there is. Collective.
+    pub(crate) fn observe(&mut self, lent: &ArrayView<'_>) {
+        let partition = &*self.partition;
+        if let Some(Pending { handed, before, reached, id, shape, cycle }) = self.pending.take() {
+            let outcome = self.rounding.compare(&handed, lent, partition);
+            let distance = outcome.distance;
+            if outcome.is_followed {
+                self.log.deviates(&id, distance);
+            } else {
+                self.log.not_followed(&id, NotFollowed { cycle, shape, distance });
+                (self.place, self.quality) = before;
+                lock(&self.present).place.clone_from(&self.place);
+                if let Some(motion) = self.motion.as_mut().filter(|motion| motion.id == id) {
+                    motion.reached = reached;
+                }
+            }
+        }
+        self.own = self.rounding.own(&self.place.points, lent, partition);
+        lock(&self.present).own.clone_from(&self.own.offsets);
     }
 
     pub(crate) fn stack(&self) -> &EditStack {
@@ -238,8 +316,9 @@ impl Steerer {
 
     /// The least and the mean scaled Jacobian of the present shape and its inverted elements, as far as they are known.
     pub(crate) fn quality(&self) -> Option<(f64, f64, usize)> {
-        // A shape that passed the guard holds no inverted element.
-        self.quality.map(|(min, mean)| (min, mean, 0)).or(self.reference_quality)
+        // A shape that passed the guard holds no inverted element; of a volume that is the solver's nothing is known.
+        let reference = self.reference_quality.filter(|_| !self.place.surface_only);
+        self.quality.map(|(min, mean)| (min, mean, 0)).or(reference)
     }
 
     /// Puts an order at the end of the queue.
@@ -286,7 +365,7 @@ impl Steerer {
 
     fn start(&mut self, task: Task, moment: Moment, step_seconds: Option<f64>) {
         let Task { id, order, background } = task;
-        let (stack, wish) = match self.defaults.wish(&self.stack, self.place.clone(), &order) {
+        let (stack, wish) = match self.wish(&order) {
             Ok(wish) => wish,
             Err(error) => return self.log.reject(&id, moment, &error.into()),
         };
@@ -318,6 +397,7 @@ impl Steerer {
                     if let Some(worker) = self.worker.as_ref().filter(|_| is_stale) {
                         // The worker may be at a forecast: the mesh waits for the way from here, not the solver.
                         computing.wish.start = self.place.clone();
+                        computing.wish.own.clone_from(&self.own.offsets);
                         computing.resting = true;
                         worker.plan(computing.wish.clone());
                         self.computing = Some(computing);
@@ -354,23 +434,29 @@ impl Steerer {
         self.foreseen = false;
         lock(&self.present).stack.clone_from(&self.stack);
         let clamped = (fraction < 1.0).then_some(fraction);
-        self.log.begin(&id, moment, plan.quality().min_scaled_jacobian, clamped);
+        self.log.begin(&id, moment, plan.min_scaled_jacobian(), clamped);
         self.log.update(&id, |order| {
             order.status = OrderStatus::Applying;
             order.cycle_applied = Some(moment.cycle);
             order.shapes = plan.shapes();
-            order.min_scaled_jacobian = Some(plan.quality().min_scaled_jacobian);
+            order.min_scaled_jacobian = plan.min_scaled_jacobian();
+            order.judged = Some(plan.judged());
             order.largest_displacement = Some(plan.largest_displacement());
             order.fraction = Some(fraction);
             order.seconds = plan.seconds();
             order.added_steps = step_seconds.map(|step| begun.elapsed().as_secs_f64() / step);
         });
-        self.motion = Some(Motion { id, plan, begun: moment, taken: 0 });
+        self.motion = Some(Motion { id, plan, guard: wish.guard, begun: moment, taken: 0, reached: 0 });
     }
 
     /// The last change of the mesh and the coordinates at its end.
     pub(crate) fn present(&self) -> (&Shape, &[Vector]) {
-        (&self.shape, &self.place.points)
+        (&self.shape, self.shape.carried.as_deref().unwrap_or(&self.place.points))
+    }
+
+    /// The vertices of the boundary, in the order of [`Shape::surface`].
+    pub(crate) fn boundary(&self) -> &[u32] {
+        &self.boundary
     }
 
     /// Takes the next shape of the schedule under way for the coming step, if it is due; says whether it was.
@@ -383,33 +469,70 @@ impl Steerer {
         if !motion.plan.schedule().is_due(motion.taken, cycles, time) {
             return false;
         }
-        motion.taken += 1;
-        let last = motion.taken >= motion.plan.shapes();
+        let next = motion.taken + 1;
+        if !motion.plan.is_straight(motion.reached, next) {
+            let reason =
+                format!("the mesh stayed at shape {}, from which shape {next} is not a straight step", motion.reached);
+            self.give_up(&reason);
+            return false;
+        }
+        let last = next >= motion.plan.shapes();
         let points: Arc<[Vector]> = if last {
             Arc::clone(motion.plan.end())
         } else {
             let mut points = vec![[0.0; 3]; self.place.points.len()];
-            motion.plan.write_shape(motion.taken, &mut points);
+            motion.plan.write_shape(next, &mut points);
             points.into()
         };
+        let before = self.own.lent.as_ref().unwrap_or(&self.place.points);
+        let carried: Option<Arc<[Vector]>> = self.own.lent.as_ref().map(|lent| {
+            let shapes = self.place.points.iter().zip(&*points);
+            lent.iter().zip(shapes).map(|(&lent, (&now, &next))| self.rounding.carried(lent, now, next)).collect()
+        });
+        let after = carried.as_ref().unwrap_or(&points);
+        // The shape was judged as it is; what the mesh will be with the solver's own motion was known up to the last call at most.
+        if self.own.offsets.is_some() && motion.plan.judged() == Judged::Volume {
+            let judged = judge_in_parts(&self.mesh, before, after, &[1.0], &motion.guard, &*self.partition);
+            if let Err(refusal) = judged {
+                let reason = format!("shape {next} is not handed out; with the mesh's own motion {refusal}");
+                self.give_up(&reason);
+                return false;
+            }
+        }
         let shape = &mut self.shape;
         shape.displacement.resize(points.len(), [0.0; 3]);
         shape.velocity.resize(points.len(), [0.0; 3]);
         for (((displacement, velocity), new), old) in
-            shape.displacement.iter_mut().zip(&mut shape.velocity).zip(&*points).zip(&*self.place.points)
+            shape.displacement.iter_mut().zip(&mut shape.velocity).zip(&**after).zip(&**before)
         {
             for axis in 0..3 {
                 displacement[axis] = new[axis] - old[axis];
                 velocity[axis] = if time_step > 0.0 { displacement[axis] / time_step } else { 0.0 };
             }
         }
+        let of_boundary = |all: &[Vector], surface: &mut Vec<Vector>| {
+            surface.clear();
+            surface.extend(self.boundary.iter().map(|&vertex| all[vertex as usize]));
+        };
+        of_boundary(after, &mut shape.surface.coordinates);
+        of_boundary(&shape.displacement, &mut shape.surface.displacement);
+        of_boundary(&shape.velocity, &mut shape.surface.velocity);
+        self.pending = Some(Pending {
+            handed: HandedOut { from: Arc::clone(before), to: Arc::clone(after) },
+            before: (self.place.clone(), self.quality),
+            reached: motion.reached,
+            id: motion.id.clone(),
+            shape: next,
+            cycle: moment.cycle,
+        });
+        shape.carried = carried;
+        (motion.taken, motion.reached) = (next, next);
         shape.shape = (motion.taken, motion.plan.shapes());
         shape.order.clone_from(&motion.id);
         self.place = motion.plan.place(motion.taken, points);
         lock(&self.present).place.clone_from(&self.place);
-        if let Some(quality) = motion.plan.quality().shapes.get(motion.taken as usize - 1) {
-            self.quality = Some((quality.min, quality.mean));
-        }
+        let quality = motion.plan.quality().shapes.get(motion.taken as usize - 1);
+        self.quality = quality.map(|quality| (quality.min, quality.mean));
         let taken = motion.taken;
         self.log.update(&motion.id, |order| {
             order.shape = taken;
@@ -421,5 +544,14 @@ impl Steerer {
             self.motion = None;
         }
         true
+    }
+
+    /// Ends the schedule under way where the mesh is.
+    fn give_up(&mut self, reason: &str) {
+        let Some(motion) = self.motion.take() else { return };
+        self.log.update(&motion.id, |order| {
+            order.status = OrderStatus::Applied;
+            order.reason = Some(format!("ended at shape {} of {}: {reason}", motion.reached, motion.plan.shapes()));
+        });
     }
 }

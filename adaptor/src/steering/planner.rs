@@ -3,13 +3,14 @@
 use std::{collections::VecDeque, sync::Arc};
 
 use tombolo_deform::{
-    quality::{Guard, Otherwise},
+    mesh::Vector,
+    quality::{Guard, Otherwise, judge_in_parts},
     schedule::Schedule,
     surface::Edit,
 };
 use tombolo_pipelines::{
     language::DeformStage,
-    shape::{Forecast, Place, Plan, Refused, ShapeSeconds, Shaper},
+    shape::{Forecast, Judged, Place, Plan, Refused, ShapeSeconds, Shaper},
 };
 
 /// Plans that are remembered: that of a forecast and that of the next order of a file.
@@ -22,6 +23,8 @@ pub(crate) struct Wish {
     /// How many of them the present shape has already.
     pub(crate) kept: usize,
     pub(crate) start: Place,
+    /// What the solver's own motion has added to the present shape.
+    pub(crate) own: Option<Arc<[Vector]>>,
     pub(crate) deform: DeformStage,
     pub(crate) schedule: Schedule,
     pub(crate) guard: Guard,
@@ -34,7 +37,13 @@ impl Wish {
     }
 
     pub(crate) fn is(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.start.points, &other.start.points) && self.schedule == other.schedule && self.ends_like(other)
+        let same_own = match (&self.own, &other.own) {
+            (None, None) => true,
+            (Some(own), Some(other)) => Arc::ptr_eq(own, other),
+            _ => false,
+        };
+        let same_start = Arc::ptr_eq(&self.start.points, &other.start.points) && same_own;
+        same_start && self.schedule == other.schedule && self.ends_like(other)
     }
 }
 
@@ -83,18 +92,44 @@ impl Planner {
             Some((_, Ok(plan))) => Some(plan.target().clone()),
             _ => None,
         };
-        let Wish { stack, kept, start, deform, schedule, guard } = wish;
+        let Wish { stack, kept, start, own, deform, schedule, guard } = wish;
         let shaper = &mut self.shaper;
         let plan = match target {
             Some(target) => caught(shaper, |shaper| shaper.go(start, &target, schedule, guard)),
             None => caught(shaper, |shaper| shaper.reach(stack, *kept, start, deform, schedule, guard)),
         };
+        let plan = plan.and_then(|plan| match own {
+            Some(own) if plan.judged() == Judged::Volume => self.with_own_motion(plan, own, guard),
+            _ => Ok(plan),
+        });
         let plan = plan.map_err(|rejection| Rejection { seconds: self.shaper.spent(), ..rejection });
         if self.known.len() >= REMEMBERED {
             self.known.pop_front();
         }
         self.known.push_back((wish.clone(), plan.clone()));
         plan
+    }
+
+    /// Judges a plan of the mesh that will be there: each shape and the solver's own motion up to now.
+    fn with_own_motion(&self, plan: Plan, own: &[Vector], guard: &Guard) -> Result<Plan, Rejection> {
+        let moved = |shape: &Arc<[Vector]>| -> Vec<Vector> {
+            let sum = |(shape, own): (&Vector, &Vector)| std::array::from_fn(|axis| shape[axis] + own[axis]);
+            shape.iter().zip(own).map(sum).collect()
+        };
+        let partition = &**self.shaper.partition();
+        for ends in plan.way().windows(2) {
+            let judged =
+                judge_in_parts(self.shaper.mesh(), &moved(&ends[0]), &moved(&ends[1]), &[1.0], guard, partition);
+            if let Err(refusal) = judged {
+                let refused = Refused::from(refusal);
+                return Err(Rejection {
+                    min_scaled_jacobian: refused.min_scaled_jacobian(),
+                    fraction: refused.feasible_fraction(),
+                    ..Rejection::from(format!("with the mesh's own motion {refused}"))
+                });
+            }
+        }
+        Ok(plan)
     }
 
     /// What a wish would come to.
@@ -161,6 +196,7 @@ mod tests {
             .unwrap(),
             kept: 0,
             start: reference.clone(),
+            own: None,
             deform: DeformStage::default(),
             schedule: Schedule::default(),
             guard: Guard::default(),

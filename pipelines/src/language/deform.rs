@@ -21,6 +21,8 @@ pub struct DeformStage {
     pub sliding: Vec<String>,
     /// Features whose vertices follow the volume.
     pub free: Vec<String>,
+    /// Whether only the boundary is moved, and the volume is left to the solver: then no equation is solved.
+    pub surface_only: bool,
 }
 
 impl From<Deform> for DeformStage {
@@ -47,6 +49,11 @@ impl DeformStage {
                 }
             }
         }
+        if self.surface_only && self.lets_go() {
+            let key = if self.free.is_empty() { "sliding" } else { "free" };
+            let message = "found features although `method` is `surface`: no volume is moved that they could follow";
+            return Err(Problem::new(message).within(key));
+        }
         match self.free.iter().position(|name| self.sliding.contains(name)) {
             Some(index) => {
                 let message = format!("found `{}`, which is among `sliding` too", self.free[index]);
@@ -62,8 +69,8 @@ impl DeformStage {
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Deform")]
 struct Fields {
-    /// The equation that is solved for the displacement.
-    method: Method,
+    /// The equation that is solved for the displacement, or that there is none.
+    method: Following,
     /// How much stiffer small cells are than large ones: the stiffness of a cell is (mean volume / volume) to this power.
     /// 0 is a uniform material; 1 keeps thin boundary layers more nearly rigid and bends the cells about them the more. 0 to 4.
     #[schemars(range(min = 0.0, max = 4.0))]
@@ -92,6 +99,22 @@ struct Fields {
     free: Vec<String>,
 }
 
+/// How the volume follows its surface.
+#[derive(Clone, Copy, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "Method")]
+enum Following {
+    /// Linear elasticity: the three components of the displacement are one coupled problem. The better choice for thin
+    /// cells at walls.
+    Elasticity,
+    /// Laplace's equation for each component by itself; a component that moves nowhere costs nothing. The cheaper choice
+    /// for motion along one axis.
+    Harmonic,
+    /// Not at all: the vertices of the boundary move, and the solver moves its volume by itself. Nothing is solved, no other
+    /// setting here counts, and the guard judges the surface alone.
+    Surface,
+}
+
 impl Default for Fields {
     fn default() -> Self {
         DeformStage::default().into()
@@ -101,13 +124,24 @@ impl Default for Fields {
 impl From<Fields> for DeformStage {
     fn from(fields: Fields) -> Self {
         let Fields { method, stiffening, poisson_ratio, tolerance, improve, sliding, free } = fields;
-        Self { equation: Deform { method, stiffening, poisson_ratio, tolerance, improve }, sliding, free }
+        let (method, surface_only) = match method {
+            Following::Elasticity => (Method::Elasticity, false),
+            Following::Harmonic => (Method::Harmonic, false),
+            Following::Surface => (Method::Elasticity, true),
+        };
+        let equation = Deform { method, stiffening, poisson_ratio, tolerance, improve };
+        Self { equation, sliding, free, surface_only }
     }
 }
 
 impl From<DeformStage> for Fields {
     fn from(stage: DeformStage) -> Self {
         let Deform { method, stiffening, poisson_ratio, tolerance, improve } = stage.equation;
+        let method = match method {
+            _ if stage.surface_only => Following::Surface,
+            Method::Elasticity => Following::Elasticity,
+            Method::Harmonic => Following::Harmonic,
+        };
         Self { method, stiffening, poisson_ratio, tolerance, improve, sliding: stage.sliding, free: stage.free }
     }
 }

@@ -9,7 +9,7 @@ use tombolo_deform::{
 
 use crate::language::DeformStage;
 
-use super::{Place, Plan, ShapeSeconds, Shaper};
+use super::{Judged, Place, Plan, ShapeSeconds, Shaper};
 
 /// Whether an order would be carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -34,6 +34,8 @@ pub struct Forecast {
     pub fraction: Option<f64>,
     /// The least scaled Jacobian on the way.
     pub min_scaled_jacobian: Option<f64>,
+    /// What was judged of every mesh on the way; `None` where the order would be rejected.
+    pub judged: Option<Judged>,
     /// The longest way that a vertex of the surface would go, in units of the mesh.
     pub largest_displacement: Option<f64>,
     /// In how many shapes it would be reached.
@@ -93,17 +95,19 @@ impl Shaper {
     #[must_use]
     pub fn outlook(&self, plan: &Plan) -> Forecast {
         let target = plan.target();
+        let volume = plan.judged() == Judged::Volume;
         let (cells, partition) = (self.mesh.cells(), &**self.partition());
         Forecast {
             outcome: if target.fraction < 1.0 { Outcome::Clamped } else { Outcome::Applied },
             reason: None,
             fraction: Some(target.fraction),
-            min_scaled_jacobian: Some(plan.quality().min_scaled_jacobian),
+            min_scaled_jacobian: plan.min_scaled_jacobian(),
+            judged: Some(plan.judged()),
             largest_displacement: Some(plan.largest_displacement()),
             shapes: plan.shapes(),
             sub_steps: target.sub_steps,
-            quality: Some(quality_in_parts(cells, plan.end(), partition)),
-            change: Some(change_in_parts(cells, self.mesh.points(), plan.end(), partition)),
+            quality: volume.then(|| quality_in_parts(cells, plan.end(), partition)),
+            change: volume.then(|| change_in_parts(cells, self.mesh.points(), plan.end(), partition)),
             seconds: plan.seconds(),
         }
     }
@@ -123,6 +127,7 @@ impl Forecast {
             reason: Some(reason),
             fraction,
             min_scaled_jacobian,
+            judged: None,
             largest_displacement: None,
             shapes: 0,
             sub_steps: 0,

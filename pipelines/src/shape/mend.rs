@@ -155,7 +155,7 @@ impl Shaper {
     ) -> Result<Plan, Refused> {
         self.spent = ShapeSeconds::default();
         match guard.otherwise {
-            Otherwise::Untangle => {
+            Otherwise::Untangle if !deform.surface_only => {
                 let target = self.settled(stack, deform, guard)?;
                 let shape = self.boundary.gather(&target.points)?;
                 self.require_sound(&shape, guard.surface)?;
@@ -175,6 +175,13 @@ impl Shaper {
     /// [`Refused::Guard`].
     pub fn go(&mut self, start: &Place, target: &Target, schedule: &Schedule, guard: &Guard) -> Result<Plan, Refused> {
         let watch = Stopwatch::start();
+        if target.surface_only || start.surface_only {
+            let plan = self.along_surface(start, target, schedule, guard);
+            let spent = watch.seconds();
+            self.spent.guard += spent;
+            let seconds = ShapeSeconds { guard: target.seconds.guard + spent, ..target.seconds };
+            return Ok(plan?.finished(&self.boundary, seconds));
+        }
         let body = Body { mesh: &self.mesh, boundary: &self.boundary };
         // Of several ranks all say the same, each with its own cells' numbers in it.
         let plan = self.boundary.agree(travel(body, start, target, schedule, guard));

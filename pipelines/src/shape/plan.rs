@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use serde::Serialize;
 use tombolo_deform::{
     mesh::{Mesh, Vector},
     partition::Reduction,
@@ -25,12 +26,14 @@ pub struct Place {
     /// The shapes from here back to the reference, which is the last; every straight piece between them was judged. Empty
     /// where no such way is known, and at the reference itself.
     pub back: Vec<Arc<[Vector]>>,
+    /// Whether only the boundary is known to lie there: the volume is the solver's.
+    pub surface_only: bool,
 }
 
 impl From<Arc<[Vector]>> for Place {
     /// A shape from which no way back is known.
     fn from(points: Arc<[Vector]>) -> Self {
-        Self { points, back: Vec::new() }
+        Self { points, back: Vec::new(), surface_only: false }
     }
 }
 
@@ -58,6 +61,18 @@ pub struct Plan {
     target: Target,
     largest_displacement: f64,
     seconds: ShapeSeconds,
+    /// Whether only the surface was judged.
+    surface_only: bool,
+}
+
+/// What the guard has judged of every mesh on a way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Judged {
+    /// All cells.
+    Volume,
+    /// The surface alone: the volume is left to the solver.
+    Surface,
 }
 
 impl Plan {
@@ -118,7 +133,33 @@ impl Plan {
         &self.target
     }
 
-    /// The quality of the meshes on the way.
+    /// What was judged of the meshes on the way.
+    #[must_use]
+    pub fn judged(&self) -> Judged {
+        if self.surface_only { Judged::Surface } else { Judged::Volume }
+    }
+
+    /// The least scaled Jacobian on the way; `None` where the volume was not judged.
+    #[must_use]
+    pub fn min_scaled_jacobian(&self) -> Option<f64> {
+        (!self.surface_only).then_some(self.quality.min_scaled_jacobian)
+    }
+
+    /// Whether the way from one shape to another, counted from 1 with 0 for the start, is a piece of a straight one.
+    #[must_use]
+    pub fn is_straight(&self, from: u32, to: u32) -> bool {
+        let piece =
+            |shape: u32| (shape as usize).checked_sub(1).and_then(|index| self.shapes.get(index)).map(|at| at.piece);
+        let end = piece(to);
+        // The end of a piece is the start of the next.
+        let begins = |shape: u32| {
+            let at = (shape as usize).checked_sub(1).and_then(|index| self.shapes.get(index));
+            at.map_or(Some(0), |at| Some(at.piece + usize::from(at.fraction >= 1.0)))
+        };
+        end == piece(from) || end == begins(from)
+    }
+
+    /// The quality of the meshes on the way; nothing is known of it where only the surface was judged.
     #[must_use]
     pub fn quality(&self) -> &PathQuality {
         &self.quality
@@ -149,6 +190,10 @@ impl Plan {
     /// The place of the `shape`-th shape, counted from 1, whose coordinates are `points`.
     #[must_use]
     pub fn place(&self, shape: u32, points: Arc<[Vector]>) -> Place {
+        if self.surface_only {
+            let surface_only = self.target.surface_only || shape < self.shapes();
+            return Place { points, back: Vec::new(), surface_only };
+        }
         if shape >= self.shapes() && !self.target.way.is_empty() {
             return self.target.place();
         }
@@ -159,7 +204,7 @@ impl Plan {
         if (self.back.is_empty() && !self.starts_at_reference()) || back.len() > REMEMBERED {
             back.clear();
         }
-        Place { points, back }
+        Place { points, back, surface_only: false }
     }
 
     fn starts_at_reference(&self) -> bool {
@@ -170,6 +215,22 @@ impl Plan {
 fn write(start: &[Vector], end: &[Vector], fraction: f64, points: &mut [Vector]) {
     for ((point, &start), &end) in points.iter_mut().zip(start).zip(end) {
         *point = shape_at(start, end, fraction);
+    }
+}
+
+/// The straight plan from `start` to `end`, of which only the surface was judged.
+pub(super) fn of_surface(start: &Place, end: Arc<[Vector]>, target: &Target, schedule: &Schedule) -> Plan {
+    Plan {
+        way: vec![Arc::clone(&start.points), end],
+        shapes: schedule.fractions().iter().map(|&fraction| Shape { piece: 0, fraction }).collect(),
+        asked: *schedule,
+        schedule: *schedule,
+        quality: PathQuality { floor: 0.0, min_scaled_jacobian: 1.0, shapes: Vec::new() },
+        back: Vec::new(),
+        target: target.clone(),
+        largest_displacement: 0.0,
+        seconds: target.seconds,
+        surface_only: true,
     }
 }
 
@@ -214,6 +275,7 @@ pub(super) fn travel(
             target: target.clone(),
             largest_displacement: 0.0,
             seconds: target.seconds,
+            surface_only: false,
         }),
         Err(refusal @ Refusal::Quality(_)) => match around(body, start, target, guard) {
             Some(way) => along(body, way, start, target, schedule, guard),
@@ -308,6 +370,7 @@ fn along(
         target: target.clone(),
         largest_displacement: 0.0,
         seconds: target.seconds,
+        surface_only: false,
     })
 }
 

@@ -121,6 +121,12 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
         seconds,
     };
     let mut deform = order.deform.unwrap_or_default();
+    deform.surface_only &= options.method.is_none();
+    if deform.surface_only && options.out.is_some() {
+        let reason =
+            "`method` is `surface`, which leaves the volume to a solver: name one with --method, or leave --out out";
+        return Err(Failure::Refused(reason.into()));
+    }
     let equation = &mut deform.equation;
     equation.method = match options.method {
         None => equation.method,
