@@ -203,7 +203,7 @@ impl Adaptor {
     ///
     /// `channels` are borrowed for the length of the call; the mesh that orders change is the first one's, or that of the
     /// [`steered_channel`](Adaptor::steered_channel). As it is at the first call it is the reference from which all shapes are
-    /// measured. A motion must be carried out by the solver over the coming step; the adaptor takes it for done.
+    /// measured. A motion is asked for, for the coming step; the coordinates lent at the next call say whether it was made.
     ///
     /// Where no pipeline is due, no command has arrived and no motion is under way, it costs one atomic load and a few
     /// comparisons and allocates nothing; on several ranks also one reduction of six numbers, at every call or, where the
@@ -214,7 +214,10 @@ impl Adaptor {
     ///
     /// # Errors
     /// [`ExecuteError`] for a mistake of the solver alone; nothing that a viewer, a file of orders or the network did ends up
-    /// here. A mistake on one rank is an error on all of them.
+    /// here. Nothing has changed then, and the solver may call again. A mistake on one rank is an error on all of them.
+    ///
+    /// Lengths, associations and counts are compared in every call; the numbers of vertices and the coordinates are looked at
+    /// when a mesh is lent first or replaced, and the coordinates once more where a pipeline is due or an order is planned.
     pub fn execute(&mut self, step: &Step, channels: &[Channel<'_>]) -> Result<Steering<'_>, ExecuteError> {
         let entered = Instant::now();
         let _alarm = comm::Alarm::among(&self.communicator);
@@ -257,11 +260,19 @@ impl Adaptor {
     }
 
     /// Whether `execute` will look at the mesh and the fields of this step, which a solver that would have to copy them first can
-    /// ask. Where it will not, it needs the number of the mesh's vertices all the same. The same on all ranks.
+    /// ask. Where it will not, it needs the number of the mesh's vertices all the same.
+    ///
+    /// The same on all ranks; of what a viewer has just asked for, several ranks learn inside `execute` alone.
     #[must_use]
     pub fn looks_at(&self, step: &Step) -> bool {
-        matches!(self.mesh, SteeredMesh::Unknown)
-            || self.pipelines.is_due(Moment { cycle: step.cycle, time: step.time })
+        let moment = Moment { cycle: step.cycle, time: step.time };
+        let is_called = self.communicator.size() == 1 && self.queue.has_called();
+        let by_orders = match &self.mesh {
+            SteeredMesh::Unknown => true,
+            SteeredMesh::Unsteered | SteeredMesh::Refused(_) => false,
+            SteeredMesh::Steered(steerer, _) => is_called || steerer.looks_at_mesh() || self.timed.is_due(moment),
+        };
+        by_orders || self.pipelines.is_due(moment)
     }
 
     /// Lets only those pipelines run from now on whose names are chosen, until this is called again; at first all are. Those that

@@ -11,8 +11,18 @@ pub(crate) struct Motion {
     pub(crate) coordinates: Vec<Vector>,
     pub(crate) displacement: Vec<Vector>,
     pub(crate) velocity: Vec<Vector>,
+    pub(crate) surface: Surface,
     pub(crate) shape: (u32, u32),
     pub(crate) order: String,
+}
+
+/// The motion of the boundary's vertices alone.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Surface {
+    pub(crate) vertices: Vec<u32>,
+    pub(crate) coordinates: Vec<Vector>,
+    pub(crate) displacement: Vec<Vector>,
+    pub(crate) velocity: Vec<Vector>,
 }
 
 /// What the adaptor asks for the step that follows.
@@ -44,10 +54,15 @@ impl Asked {
         self.parameters.extend(steering.parameters.iter().cloned());
         let Some(motion) = &steering.motion else { return };
         let kept = self.motion.get_or_insert_default();
+        kept.surface.vertices.clear();
+        kept.surface.vertices.extend_from_slice(motion.surface.vertices);
         for (kept, given) in [
             (&mut kept.coordinates, motion.coordinates),
             (&mut kept.displacement, motion.displacement),
             (&mut kept.velocity, motion.velocity),
+            (&mut kept.surface.coordinates, motion.surface.coordinates),
+            (&mut kept.surface.displacement, motion.surface.displacement),
+            (&mut kept.surface.velocity, motion.surface.velocity),
         ] {
             kept.clear();
             kept.extend_from_slice(given);

@@ -1,7 +1,8 @@
 //! What `catalyst_results` hands back, as meshes of the Blueprint in the two layouts that solvers read.
 //!
 //! `catalyst/<channel>` is there in the calls after which the mesh moves, and only then: points at the new `coordinates`, with the
-//! fields `displacement` and `velocity`. `catalyst/steering` is always there: one point with a field for each parameter, and `stop`,
+//! fields `displacement` and `velocity`; the boundary's vertices once more as a topology `surface`, with their numbers, for solvers that
+//! move their volume by themselves. `catalyst/steering` is always there: one point with a field for each parameter, and `stop`,
 //! `moving`, `shape`, `shapes`.
 
 use crate::motion::{Asked, Motion};
@@ -11,6 +12,13 @@ use crate::node::NodeMut;
 pub(crate) const STEERING: &str = "steering";
 /// Fields that every solver finds beside its parameters, which may not bear these names.
 pub(crate) const RESERVED: [&str; 4] = ["stop", "moving", "shape", "shapes"];
+
+/// A topology and its coordset.
+type Names = (&'static str, &'static str);
+/// All vertices.
+const MESH: Names = ("mesh", "coords");
+/// Those of the boundary.
+const SURFACE: Names = ("surface", "surface");
 
 /// Fills in what was asked. `blocks` are the names of the steered channel's meshes and how many vertices each has.
 pub(crate) fn fill(node: &mut NodeMut<'_>, asked: &Asked, channel: &str, blocks: &[(String, usize)]) {
@@ -49,7 +57,7 @@ pub(crate) fn fill(node: &mut NodeMut<'_>, asked: &Asked, channel: &str, blocks:
 fn settings(node: &mut NodeMut<'_>, asked: &Asked) {
     let root = format!("catalyst/{STEERING}");
     let origin = [[0.0; 3]];
-    coordinates(node, &root, &origin);
+    coordinates(node, &root, MESH, &origin);
     let shape = asked.motion.as_ref().map_or((0, 0), |motion| motion.shape);
     let flags = [
         ("stop", f64::from(u8::from(asked.stop))),
@@ -59,7 +67,7 @@ fn settings(node: &mut NodeMut<'_>, asked: &Asked) {
     ];
     let parameters = asked.parameters.iter().map(|(name, value)| (name.as_str(), *value));
     for (name, value) in flags.into_iter().chain(parameters) {
-        let field = field(node, &root, name);
+        let field = field(node, &root, MESH, name);
         node.set_number(&format!("{field}/values"), value);
     }
     second_layout(node, &root);
@@ -67,27 +75,47 @@ fn settings(node: &mut NodeMut<'_>, asked: &Asked) {
 
 fn points(node: &mut NodeMut<'_>, root: &str, motion: &Motion, range: std::ops::Range<usize>) {
     let part = |vectors: &'_ [[f64; 3]]| vectors.get(range.clone()).unwrap_or_default().to_vec();
-    coordinates(node, root, &part(&motion.coordinates));
+    coordinates(node, root, MESH, &part(&motion.coordinates));
     for (name, vectors) in [("displacement", &motion.displacement), ("velocity", &motion.velocity)] {
-        let field = field(node, root, name);
+        let field = field(node, root, MESH, name);
         axes(node, &field, &part(vectors));
     }
+    surface(node, root, motion, &range);
 }
 
-fn coordinates(node: &mut NodeMut<'_>, root: &str, points: &[[f64; 3]]) {
-    let coordset = format!("{root}/coordsets/coords");
-    node.set_text(&format!("{coordset}/type"), "explicit");
-    axes(node, &coordset, points);
-    let topology = format!("{root}/topologies/mesh");
+/// The boundary's vertices among those of `range`, by their numbers in it.
+fn surface(node: &mut NodeMut<'_>, root: &str, motion: &Motion, range: &std::ops::Range<usize>) {
+    let surface = &motion.surface;
+    let places: Vec<usize> =
+        (0..surface.vertices.len()).filter(|&place| range.contains(&(surface.vertices[place] as usize))).collect();
+    let part = |vectors: &[[f64; 3]]| -> Vec<[f64; 3]> {
+        places.iter().map(|&place| vectors.get(place).copied().unwrap_or_default()).collect()
+    };
+    coordinates(node, root, SURFACE, &part(&surface.coordinates));
+    for (name, vectors) in [("surface_displacement", &surface.displacement), ("surface_velocity", &surface.velocity)] {
+        let field = field(node, root, SURFACE, name);
+        axes(node, &field, &part(vectors));
+    }
+    let number = |&place: &usize| i64::from(surface.vertices[place]) - i64::try_from(range.start).unwrap_or_default();
+    let numbers: Vec<i64> = places.iter().map(number).collect();
+    let field = field(node, root, SURFACE, "surface_vertices");
+    node.set_integers(&format!("{field}/values"), &numbers);
+}
+
+fn coordinates(node: &mut NodeMut<'_>, root: &str, (topology, coordset): Names, points: &[[f64; 3]]) {
+    let values = format!("{root}/coordsets/{coordset}");
+    node.set_text(&format!("{values}/type"), "explicit");
+    axes(node, &values, points);
+    let topology = format!("{root}/topologies/{topology}");
     node.set_text(&format!("{topology}/type"), "points");
-    node.set_text(&format!("{topology}/coordset"), "coords");
+    node.set_text(&format!("{topology}/coordset"), coordset);
 }
 
 /// Begins a field on the vertices; where it stands.
-fn field(node: &mut NodeMut<'_>, root: &str, name: &str) -> String {
+fn field(node: &mut NodeMut<'_>, root: &str, (topology, _): Names, name: &str) -> String {
     let field = format!("{root}/fields/{name}");
     node.set_text(&format!("{field}/association"), "vertex");
-    node.set_text(&format!("{field}/topology"), "mesh");
+    node.set_text(&format!("{field}/topology"), topology);
     node.set_text(&format!("{field}/volume_dependent"), "false");
     field
 }
