@@ -37,6 +37,7 @@ export class Orders {
     const known = this.records.get(status.id);
     const record: OrderRecord = { ...known, ...status, text: known?.text ?? (status.order === undefined ? `order ${status.id}` : describeOrder(status.order)), sentAt: known?.sentAt ?? null };
     this.put(record);
+    if (record.not_followed && !known?.not_followed) this.announce(`Order ${record.text}: applied, not followed`);
     if (known?.status !== record.status && (record.status === "applied" || record.status === "rejected")) {
       this.announce(`Order ${record.text}: ${record.status}${record.reason ? `, ${record.reason}` : ""}`);
     }
@@ -84,7 +85,7 @@ export class Orders {
     }
     parts.item.dataset.status = record.status;
     write(parts.title, record.text);
-    write(parts.chip, PHASES[record.status] ?? String(record.status));
+    write(parts.chip, phaseOf(record));
     write(parts.detail, detailOf(record));
     parts.bar.hidden = record.status !== "applying" && record.status !== "computing";
     parts.bar.classList.toggle("indefinite", record.status === "computing");
@@ -100,6 +101,10 @@ export class Orders {
   }
 }
 
+function phaseOf(record: OrderRecord): string {
+  return (PHASES[record.status] ?? String(record.status)) + (record.not_followed ? ", not followed" : "");
+}
+
 function detailOf(record: OrderRecord): string {
   const waited = record.sentAt === null ? "" : ` · ${Math.round((performance.now() - record.sentAt) / 1000)} s`;
   switch (record.status) {
@@ -111,6 +116,9 @@ function detailOf(record: OrderRecord): string {
     case "rejected": return record.reason ?? "no reason was given";
     case "applied": {
       const parts = [`at cycle ${record.cycle_applied ?? "?"}`];
+      const not = record.not_followed;
+      if (not) parts.push(`not followed: the mesh was ${digits(not.distance, 3)} from shape ${not.shape} of cycle ${not.cycle}`);
+      if (record.judged === "surface") parts.push("only the surface was judged");
       if (typeof record.min_scaled_jacobian === "number") parts.push(`quality ${digits(record.min_scaled_jacobian, 3)}`);
       const spent = record.seconds;
       if (spent) {

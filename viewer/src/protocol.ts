@@ -71,6 +71,11 @@ export interface OrderStatus {
   shape?: number | null;
   shapes?: number | null;
   min_scaled_jacobian?: number | null;
+  /** What the guard judged; the surface alone where the solver moves its volume by itself. */
+  judged?: "volume" | "surface" | null;
+  /** The first shape that the solver did not move its mesh to. */
+  not_followed?: { cycle: number; shape: number; distance: number } | null;
+  deviation?: number | null;
   largest_displacement?: number | null;
   seconds?: { surface?: number; volume?: number; guard?: number } | null;
   added_steps?: number | null;
@@ -84,6 +89,7 @@ export interface ForecastAnswer {
     reason?: string | null;
     fraction?: number | null;
     min_scaled_jacobian?: number | null;
+    judged?: "volume" | "surface" | null;
     largest_displacement?: number | null;
     shapes?: number | null;
     sub_steps?: number | null;
