@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 use tombolo_deform::{
-    mesh::{Cells, FeatureSource, Mesh, Vector},
+    mesh::{FeatureSource, Mesh, Vector},
     partition::Partition,
     quality::{Guard, Refusal, SurfaceRule, keeps_in_parts},
     schedule::Schedule,
@@ -65,6 +65,23 @@ pub enum Refused {
         /// The name, and those that there are.
         source: UnknownFeature,
     },
+    /// Features that slide or are free leave nothing that holds a part of the mesh.
+    #[error(
+        "deform.{}: nothing holds the part of the mesh that {} {}, so that it could go anywhere; keep a feature of it off the list",
+        match (sliding.is_empty(), free.is_empty()) {
+            (false, true) => "sliding",
+            (true, _) => "free",
+            _ => "sliding and deform.free",
+        },
+        sliding.iter().chain(free).map(|name| format!("'{name}'")).collect::<Vec<_>>().join(", "),
+        if sliding.len() + free.len() == 1 { "bounds" } else { "bound" }
+    )]
+    LetGo {
+        /// Those of its features that slide.
+        sliding: Vec<String>,
+        /// Those that are free.
+        free: Vec<String>,
+    },
     /// The volume cannot follow.
     #[error(transparent)]
     Volume(#[from] VolumeError),
@@ -73,9 +90,10 @@ pub enum Refused {
     Guard(#[from] Refusal),
     /// An edit cannot be followed to its end, not in sub-steps and not by untangling.
     #[error(
-        "edit {edit} ({name}) can be done to {:.2} % of its amount; beyond that{} {refusal}",
+        "edit {edit} ({name}) can be done to {:.2} % of its amount; beyond that{} {}",
         (1e4 * fraction).floor() / 1e2,
-        if *folds { " the surface itself folds:" } else { "" }
+        if *folds { " the surface itself folds:" } else { "" },
+        refusal.flaw()
     )]
     Stalled {
         /// The place of the edit in the stack, counted from 0.
@@ -473,13 +491,7 @@ fn displaced(editor: Option<&mut Editor>, stack: &[Edit]) -> Result<Vec<Vector>,
 fn own_mesh(part: &Part) -> Result<(Mesh, Vec<usize>), tombolo_deform::mesh::MeshError> {
     let is_own = |cell: &usize| !part.is_ghost(*cell) && part.cells.cell_type(*cell).dimension() == 3;
     let own: Vec<usize> = (0..part.cells.len()).filter(is_own).collect();
-    let mut cells = Cells::new();
-    for &cell in &own {
-        match part.cells.polyhedron_faces(cell) {
-            [] => cells.push(part.cells.cell_type(cell), part.cells.vertices(cell))?,
-            faces => cells.push_polyhedron(faces)?,
-        }
-    }
+    let cells = part.cells.subset(own.iter().copied());
     Ok((Mesh::new(part.points.clone(), cells, FeatureSource::SharpEdges)?, own))
 }
 
