@@ -65,8 +65,8 @@ fn run(settings: Settings, moves: Move<'_>) -> (Vec<Vec<Vector>>, Vec<OrderRepor
 
 fn starts_where_it_was_lent(motion: &MeshMotion<'_>, lent: &[Vector], time_step: f64) {
     for (vertex, point) in lent.iter().enumerate() {
-        for axis in 0..3 {
-            assert_eq!(motion.displacement[vertex][axis], motion.coordinates[vertex][axis] - point[axis]);
+        for (axis, from) in point.iter().enumerate() {
+            assert_eq!(motion.displacement[vertex][axis], motion.coordinates[vertex][axis] - from);
             assert_eq!(motion.velocity[vertex][axis], motion.displacement[vertex][axis] / time_step);
         }
     }
@@ -140,13 +140,13 @@ fn a_solver_that_follows_gets_the_shapes_bit_for_bit() {
             let Some(motion) = motion else { return };
             handed = motion.coordinates.to_vec();
             for (vertex, point) in points.iter_mut().enumerate() {
-                for axis in 0..3 {
+                for (axis, at) in point.iter_mut().enumerate() {
                     let by = if by_velocity {
                         0.1 * motion.velocity[vertex][axis]
                     } else {
                         motion.displacement[vertex][axis]
                     };
-                    point[axis] += by;
+                    *at += by;
                 }
             }
         });
