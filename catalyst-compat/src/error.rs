@@ -56,6 +56,16 @@ pub enum CatalystError {
         /// What should.
         expected: String,
     },
+    /// An argument, or an array that was named, makes no sense.
+    #[error("{what}: found {found}; expected {expected}")]
+    Argument {
+        /// What is wrong.
+        what: String,
+        /// What it is.
+        found: String,
+        /// What it should be.
+        expected: String,
+    },
     /// The configuration cannot be read.
     #[error("{0}")]
     Configuration(String),

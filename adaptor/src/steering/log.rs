@@ -214,7 +214,7 @@ impl Log {
         let entry = JournalEntry { id: id.into(), status, cycle, time, command, reason, min_scaled_jacobian, fraction };
         if let Err(error) = self.journal.write(&entry) {
             // The solver goes on without; it must not go unsaid.
-            eprintln!("tombolo: {error}; this run has no journal from here on");
+            log::warn!("{error}; this run has no journal from here on");
             if let Some(hub) = &self.hub {
                 hub.tell(&json!({"error": {"message": format!("{error}; this run has no journal from here on")}}));
             }
