@@ -27,6 +27,7 @@ static int32_t tets[8] = { 0, 1, 2, 3, 1, 4, 2, 3 };
 static int32_t triangles[18] = { 0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 4, 1, 3, 4, 2, 3, 4 };
 static int32_t features[6] = { 1, 1, 1, 2, 2, 2 };
 static double warm[5] = { 1, 2, 3, 4, 5 };
+static int64_t numbers[5] = { 0, 1, 2, 3, 4 };
 static const void* axes[3] = { points, points + 1, points + 2 };
 
 /* A run whose mesh is looked at, with all that is right. */
@@ -199,7 +200,7 @@ static void arguments(void)
   AT_ONCE(TOMBOLO_INVALID, tombolo_cells_i32(run, "solid", (enum tombolo_cell_type)-1, tets, 2), "found the cell type -1");
   AT_ONCE(TOMBOLO_INVALID, tombolo_cells_i32(run, "solid", TOMBOLO_TETRA, NULL, 2), "the address of 8 values");
   AT_ONCE(TOMBOLO_INVALID, tombolo_cells_i32(run, "solid", TOMBOLO_TETRA, tets, (size_t)-2), "as many as memory can hold");
-  AT_ONCE(TOMBOLO_INVALID, tombolo_cells_i64(run, "solid", TOMBOLO_TETRA, NULL, SIZE_MAX / 4), "as many as memory can hold");
+  AT_ONCE(TOMBOLO_INVALID, tombolo_cells_i64(run, "solid", TOMBOLO_TETRA, numbers, SIZE_MAX / 4), "as many as memory can hold");
   AT_ONCE(TOMBOLO_INVALID, tombolo_faces_i32(run, "solid", TOMBOLO_TETRA, tets, features, 2), "found tetra; expected TOMBOLO_TRIANGLE or TOMBOLO_QUAD");
   AT_ONCE(TOMBOLO_INVALID, tombolo_faces_i32(run, "solid", TOMBOLO_TRIANGLE, triangles, NULL, 6), "faces, features: found a null pointer");
   AT_ONCE(TOMBOLO_INVALID, tombolo_feature(run, "solid", 1, "high"), "channel 'solid', feature 1: found the name 'high'; expected 'low', as it was named before");
@@ -223,9 +224,8 @@ static void arrays(void)
 {
   static int32_t beyond[8] = { 0, 1, 2, 3, 1, 5, 2, 3 }, negative[8] = { 0, 1, 2, 3, 1, -4, 2, 3 };
   static double infinite[15] = { 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, INFINITY, 1 };
-  static int32_t inside[3] = { 1, 2, 3 }, nowhere[3] = { 0, 1, 4 }, one[1] = { 1 };
+  static int32_t nowhere[18] = { 0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 4, 1, 3, 4, 0, 1, 4 }, lid[6] = { 1, 1, 7, 2, 2, 2 };
   static unsigned char ghosts[2] = { 0, 0 };
-  static int64_t numbers[5] = { 0, 1, 2, 3, 4 };
 
   AT_EXECUTE(tombolo_points_f64(run, "sold", points, 5), "channel 'sold': found points without cells; expected tombolo_cells", tombolo_point_cells(run, "sold"));
   AT_EXECUTE(tombolo_field_f64(run, "solid", "warm", TOMBOLO_CELL, warm, 5, 1), "warm", tombolo_field_f64(run, "solid", "warm", TOMBOLO_VERTEX, warm, 5, 1));
@@ -238,7 +238,16 @@ static void arrays(void)
   AT_EXECUTE(tombolo_ghost_cells(run, "solid", ghosts, 1), "ghost", tombolo_ghost_cells(run, "solid", ghosts, 2));
   AT_EXECUTE(tombolo_global_vertices_i64(run, "solid", numbers, 4), "global vert", tombolo_global_vertices_i64(run, "solid", numbers, 5));
   AT_EXECUTE(tombolo_global_cells_i64(run, "solid", numbers, 4), "global cell", tombolo_global_cells_i64(run, "solid", numbers, 2));
-  (void)inside, (void)nowhere, (void)one;
+  AT_EXECUTE(tombolo_faces_i32(run, "solid", TOMBOLO_TRIANGLE, nowhere, features, 6), "channel 'solid': face 5 of those with features (2, vertices 0, 1, 4) is no face of any cell", tombolo_faces_i32(run, "solid", TOMBOLO_TRIANGLE, triangles, features, 6));
+  AT_EXECUTE(tombolo_feature(run, "solid", 7, "lid"), "feature 'lid' has the number 7, which no face has; the faces have 1, 2", tombolo_faces_i32(run, "solid", TOMBOLO_TRIANGLE, triangles, lid, 6));
+
+  tombolo* run = NULL;
+  OK(tombolo_open(NULL, TOMBOLO_COMM_WORLD, &run));
+  OK(tombolo_points_f64(run, "solid", points, 5));
+  OK(tombolo_cells_i32(run, "solid", TOMBOLO_TETRA, tets, 2));
+  OK(tombolo_feature(run, "solid", 1, "low"));
+  INVALID(tombolo_execute(run, 0, 0.0, 0.1), "channel 'solid', feature 'low' (1): found no faces; expected tombolo_faces");
+  OK(tombolo_close(&run));
 }
 
 static char told[4096];
@@ -267,7 +276,7 @@ static void log_of_messages(void)
     OK(tombolo_execute(run, 0, 0.0, 0.1));
     OK(tombolo_close(&run));
     const int expected = level >= TOMBOLO_LOG_WARNING;
-    if ((tellings > 0) != expected || (expected && !strstr(told, "2 pipeline 'health'"))) {
+    if ((tellings > 0) != expected || (expected && !strstr(told, "2 cycle 0, pipeline 'health'"))) {
       ++wrong;
       fprintf(stderr, "level %d: %d messages, '%s'\n", level, tellings, told);
     }

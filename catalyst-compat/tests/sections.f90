@@ -1,7 +1,21 @@
 ! Sections of arrays, as solvers in Fortran have them, lent to the module `tombolo`: what is written of each shows the values that it
 ! has at the time, or the call is an error.
+module listener
+  use, intrinsic :: iso_c_binding, only: c_int
+  use tombolo
+  implicit none
+  integer :: told = 0
+contains
+  subroutine listen(level, message)
+    integer(c_int), intent(in) :: level
+    character(len=*), intent(in) :: message
+    if (level == TOMBOLO_LOG_WARNING .and. index(message, "'lost'") > 0) told = told + 1
+  end subroutine
+end module listener
+
 program sections
   use, intrinsic :: iso_fortran_env, only: int32, int64, real32, real64
+  use listener
   use tombolo
   implicit none
 
@@ -13,10 +27,9 @@ program sections
   integer(int32), target :: small(2 * n), tets(4, 2), wide(8, 2), faces(3, 6), features(6), gaps(12)
   integer(int64), target :: large(3, n), long_tets(4, 2)
   real(real64), target :: odd(2 * n)
-  integer :: wrong, told, cycle, row, i
+  integer :: wrong, cycle, row, i
 
   wrong = 0
-  told = 0
   allocate (store(7, 2 * n), places(4, 2 * n), columns(n, 3), bounds(0:2, -2:2))
   places = -1
   places(1:3, 1:2 * n:2) = reshape(real([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1], real64), [3, n])
@@ -106,13 +119,6 @@ contains
   subroutine assumed(values)
     real(real64), intent(in), target :: values(:, :)
     call right(tombolo_field(run, "solid", "assumed", TOMBOLO_VERTEX, values))
-  end subroutine
-
-  subroutine listen(level, message)
-    use, intrinsic :: iso_c_binding, only: c_int
-    integer(c_int), intent(in) :: level
-    character(len=*), intent(in) :: message
-    if (level == TOMBOLO_LOG_WARNING .and. index(message, "'lost'") > 0) told = told + 1
   end subroutine
 
   subroutine right(status)

@@ -31,7 +31,7 @@ int main(int argc, char** argv)
     || tombolo_cells_i32(run, "box", TOMBOLO_HEXAHEDRON, cubes, CUBES)
     || tombolo_field_f64(run, "box", "temperature", TOMBOLO_VERTEX, temperature, POINTS, 1)
     || tombolo_start(run);
-  if (!failed && tombolo_link(run)) printf("open %s\n", tombolo_link(run));
+  if (!failed && tombolo_link(run)) fprintf(stderr, "open %s\n", tombolo_link(run));
 
   const long steps = argc > 2 ? atol(argv[2]) : 1000000000;
   for (long step = 0; !failed && step < steps && !tombolo_stopped(run); ++step) {

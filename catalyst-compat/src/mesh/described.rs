@@ -1,7 +1,7 @@
 //! Channels described by arrays themselves, without a node: what the C interface of `tombolo.h` says.
 
 use tombolo::deform::mesh::CellType;
-use tombolo::pipelines::extract::Association;
+use tombolo::pipelines::extract::{Association, check_field_length};
 
 use super::amr::Mask;
 use super::channel::{Block, Channel};
@@ -70,24 +70,17 @@ impl<'call> Description<'call> {
                 }
             }
         };
-        let elements = topology.len();
         let faces: Vec<Faces<'call>> = faces
             .into_iter()
             .map(|(cell_type, connectivity, tags)| {
                 Ok(Faces { topology: uniform("faces", cell_type, connectivity)?, tags })
             })
             .collect::<Result<_, CatalystError>>()?;
+        let counts = (vertices, topology.len());
         let mut own = Vec::with_capacity(fields.len());
         for (field, association, components) in fields {
-            let expected = match association {
-                Association::Vertex => vertices,
-                Association::Element => elements,
-            };
-            let found = components.first().map_or(0, Array::len);
-            if found != expected {
-                let what = format!("field '{field}'");
-                return Err(wrong(&what, format!("{found} tuples"), format!("{expected}, one for each {association}")));
-            }
+            // What has to be copied is copied before the adaptor sees it, so that it is asked here.
+            check_field_length(&name, (&field, association), components.first().map_or(0, Array::len), counts)?;
             own.push(Field { name: field, association, components });
         }
         let roles = Roles { ghosts, global_vertices, global_cells, vertex_features: None };
