@@ -448,11 +448,11 @@ impl Adaptor {
             let channel = channel.name.into();
             ExecuteError::Channel { cycle, source: ChannelError::Mesh { channel, source } }
         };
-        let features = self.check_features(channel).map_err(of_channel);
+        let checked = self.check_features(channel).map_err(of_channel);
         if self.communicator.size() == 1 {
-            features?;
+            checked?;
         } else {
-            comm::agree_on(&*self.communicator, features)?;
+            comm::agree_on(&*self.communicator, checked)?;
         }
         self.mesh = if self.config.stream.is_none() && self.timed.is_empty() && !self.pipelines.can_order() {
             SteeredMesh::Unsteered

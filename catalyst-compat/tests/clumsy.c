@@ -236,8 +236,8 @@ static void arrays(void)
   AT_EXECUTE(tombolo_cells_i32(run, "solid", TOMBOLO_TETRA, beyond, 2), "5", tombolo_cells_i32(run, "solid", TOMBOLO_TETRA, tets, 2));
   AT_EXECUTE(tombolo_cells_i32(run, "solid", TOMBOLO_TETRA, negative, 2), "-4", tombolo_cells_i32(run, "solid", TOMBOLO_TETRA, tets, 2));
   AT_EXECUTE(tombolo_ghost_cells(run, "solid", ghosts, 1), "ghost", tombolo_ghost_cells(run, "solid", ghosts, 2));
-  AT_EXECUTE(tombolo_global_vertices_i64(run, "solid", numbers, 4), "global vert", tombolo_global_vertices_i64(run, "solid", numbers, 5));
-  AT_EXECUTE(tombolo_global_cells_i64(run, "solid", numbers, 4), "global cell", tombolo_global_cells_i64(run, "solid", numbers, 2));
+  AT_EXECUTE(tombolo_global_vertices_i64(run, "solid", numbers, 4), "array 'global_vertices': 4 values where 5 are needed", tombolo_global_vertices_i64(run, "solid", numbers, 5));
+  AT_EXECUTE(tombolo_global_cells_i64(run, "solid", numbers, 4), "array 'global_cells': 4 values where 2 are needed", tombolo_global_cells_i64(run, "solid", numbers, 2));
   AT_EXECUTE(tombolo_faces_i32(run, "solid", TOMBOLO_TRIANGLE, nowhere, features, 6), "channel 'solid': face 5 of those with features (2, vertices 0, 1, 4) is no face of any cell", tombolo_faces_i32(run, "solid", TOMBOLO_TRIANGLE, triangles, features, 6));
   AT_EXECUTE(tombolo_feature(run, "solid", 7, "lid"), "feature 'lid' has the number 7, which no face has; the faces have 1, 2", tombolo_faces_i32(run, "solid", TOMBOLO_TRIANGLE, triangles, lid, 6));
 

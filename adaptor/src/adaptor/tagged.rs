@@ -9,7 +9,6 @@ use tombolo_deform::{
 use tombolo_pipelines::{communicator::Reduction, extract::Channel};
 
 use super::Adaptor;
-use crate::comm;
 
 impl Adaptor {
     /// Refuses faces with features that are none of the mesh, and names of features that no face of any rank has. Faces that lie
