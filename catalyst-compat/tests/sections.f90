@@ -112,6 +112,7 @@ program sections
     write (0, '(a, i0)') "messages: ", told
     wrong = wrong + 1
   end if
+  deallocate (store, places, columns, bounds)
   if (wrong > 0) error stop 1
 
 contains
