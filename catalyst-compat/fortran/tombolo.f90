@@ -57,6 +57,7 @@ module tombolo
   public :: tombolo_points, tombolo_cells, tombolo_mixed_cells, tombolo_point_cells, tombolo_ghost_cells
   public :: tombolo_faces, tombolo_feature, tombolo_global_vertices, tombolo_global_cells, tombolo_field
   public :: tombolo_execute, tombolo_coordinates, tombolo_displacement, tombolo_velocity
+  public :: tombolo_surface_vertices, tombolo_surface_coordinates, tombolo_surface_displacement, tombolo_surface_velocity
   public :: tombolo_motion_order, tombolo_motion_shape, tombolo_parameter_value, tombolo_stopped
   public :: tombolo_order_count, tombolo_order
 
@@ -363,7 +364,32 @@ module tombolo
       type(c_ptr), value :: run
       type(c_ptr) :: first
     end function
+    function c_surface_vertices(run) bind(C, name="tombolo_surface_vertices") result(first)
+      import :: c_ptr
+      type(c_ptr), value :: run
+      type(c_ptr) :: first
+    end function
+    function c_surface_coordinates(run) bind(C, name="tombolo_surface_coordinates") result(first)
+      import :: c_ptr
+      type(c_ptr), value :: run
+      type(c_ptr) :: first
+    end function
+    function c_surface_displacement(run) bind(C, name="tombolo_surface_displacement") result(first)
+      import :: c_ptr
+      type(c_ptr), value :: run
+      type(c_ptr) :: first
+    end function
+    function c_surface_velocity(run) bind(C, name="tombolo_surface_velocity") result(first)
+      import :: c_ptr
+      type(c_ptr), value :: run
+      type(c_ptr) :: first
+    end function
     function c_motion_count(run) bind(C, name="tombolo_motion_count") result(count)
+      import :: c_ptr, c_size_t
+      type(c_ptr), value :: run
+      integer(c_size_t) :: count
+    end function
+    function c_surface_count(run) bind(C, name="tombolo_surface_count") result(count)
       import :: c_ptr, c_size_t
       type(c_ptr), value :: run
       integer(c_size_t) :: count
@@ -1147,27 +1173,55 @@ contains
   function tombolo_coordinates(run) result(values)
     type(tombolo_run), intent(in) :: run
     real(c_double), pointer :: values(:, :)
-    values => vectors(run, c_coordinates(run%handle))
+    values => vectors(c_coordinates(run%handle), c_motion_count(run%handle))
   end function
 
   function tombolo_displacement(run) result(values)
     type(tombolo_run), intent(in) :: run
     real(c_double), pointer :: values(:, :)
-    values => vectors(run, c_displacement(run%handle))
+    values => vectors(c_displacement(run%handle), c_motion_count(run%handle))
   end function
 
   function tombolo_velocity(run) result(values)
     type(tombolo_run), intent(in) :: run
     real(c_double), pointer :: values(:, :)
-    values => vectors(run, c_velocity(run%handle))
+    values => vectors(c_velocity(run%handle), c_motion_count(run%handle))
   end function
 
-  function vectors(run, first) result(values)
+  ! The vertices of the boundary, counted from 0 as those of cells are; not associated where the mesh stays.
+  function tombolo_surface_vertices(run) result(values)
     type(tombolo_run), intent(in) :: run
+    integer(int32), pointer :: values(:)
+    type(c_ptr) :: first
+    nullify (values)
+    first = c_surface_vertices(run%handle)
+    if (c_associated(first)) call c_f_pointer(first, values, [c_surface_count(run%handle)])
+  end function
+
+  function tombolo_surface_coordinates(run) result(values)
+    type(tombolo_run), intent(in) :: run
+    real(c_double), pointer :: values(:, :)
+    values => vectors(c_surface_coordinates(run%handle), c_surface_count(run%handle))
+  end function
+
+  function tombolo_surface_displacement(run) result(values)
+    type(tombolo_run), intent(in) :: run
+    real(c_double), pointer :: values(:, :)
+    values => vectors(c_surface_displacement(run%handle), c_surface_count(run%handle))
+  end function
+
+  function tombolo_surface_velocity(run) result(values)
+    type(tombolo_run), intent(in) :: run
+    real(c_double), pointer :: values(:, :)
+    values => vectors(c_surface_velocity(run%handle), c_surface_count(run%handle))
+  end function
+
+  function vectors(first, count) result(values)
     type(c_ptr), intent(in) :: first
+    integer(c_size_t), intent(in) :: count
     real(c_double), pointer :: values(:, :)
     nullify (values)
-    if (c_associated(first)) call c_f_pointer(first, values, [3_c_size_t, c_motion_count(run%handle)])
+    if (c_associated(first)) call c_f_pointer(first, values, [3_c_size_t, count])
   end function
 
   integer(c_int) function tombolo_motion_shape(run, shape, shapes) result(status)

@@ -202,6 +202,14 @@ const double* tombolo_displacement(tombolo* run);
 const double* tombolo_velocity(tombolo* run);
 /* How many vertices these are of; 0 where the mesh stays. */
 size_t tombolo_motion_count(tombolo* run);
+/* The motion of the boundary's vertices alone, for a solver that moves its volume by itself (with "deform": {"method": "surface"} there
+ * is no other): how many there are on this rank, which, counted from 0 and in one order in the whole run, and of each what the functions
+ * above say of all. */
+size_t tombolo_surface_count(tombolo* run);
+const uint32_t* tombolo_surface_vertices(tombolo* run);
+const double* tombolo_surface_coordinates(tombolo* run);
+const double* tombolo_surface_displacement(tombolo* run);
+const double* tombolo_surface_velocity(tombolo* run);
 /* The name of the order whose motion it is, NULL where the mesh stays; valid until the next tombolo_execute or the end. */
 const char* tombolo_motion_order(tombolo* run);
 /* Which shape of that order's schedule this is, counted from 1, and how many there are; 0 and 0 where the mesh stays. */

@@ -118,6 +118,14 @@ fn every_mistake_is_an_error_with_its_reason() {
     succeed(&mut under_valgrind(&program));
 }
 
+#[test]
+fn a_solver_can_take_the_motion_of_the_boundary_alone() {
+    let directory = installed();
+    let program = compile(directory.path(), "c99", &project("catalyst-compat/tests/surface.c"));
+    assert_eq!(succeed(&mut Command::new(&program)), "");
+    succeed(&mut under_valgrind(&program));
+}
+
 /// A Fortran program; `Err` with what the compiler says.
 fn fortran(directory: &Path, source: &Path) -> Result<PathBuf, String> {
     let program = directory.join("program");

@@ -105,6 +105,11 @@ static void without_a_run(tombolo* run, const char* words)
   NONE(tombolo_displacement(run) != NULL, words);
   NONE(tombolo_velocity(run) != NULL, words);
   NONE(tombolo_motion_count(run) != 0, words);
+  NONE(tombolo_surface_count(run) != 0, words);
+  NONE(tombolo_surface_vertices(run) != NULL, words);
+  NONE(tombolo_surface_coordinates(run) != NULL, words);
+  NONE(tombolo_surface_displacement(run) != NULL, words);
+  NONE(tombolo_surface_velocity(run) != NULL, words);
   NONE(tombolo_motion_order(run) != NULL, words);
   NONE(!tombolo_stopped(run), words);
   NONE(tombolo_order_count(run) != 0, words);

@@ -99,7 +99,9 @@ program sections
   call right(tombolo_close(run))
   call refused(tombolo_start(run), "the run is a null pointer")
 
-  ! Several lengths and messages to a procedure.
+  call boundary()
+
+  ! Three arrays of coordinates, and messages to a procedure.
   call right(tombolo_log(TOMBOLO_LOG_WARNING, listen))
   call right(tombolo_open("", TOMBOLO_COMM_WORLD, run))
   call right(tombolo_configure(run, '{"version": 1, "pipelines": [{"name": "lost", "channel": "fluid", "stages": [{"quality": {}}]}]}'))
@@ -120,6 +122,50 @@ contains
   subroutine assumed(values)
     real(real64), intent(in), target :: values(:, :)
     call right(tombolo_field(run, "solid", "assumed", TOMBOLO_VERTEX, values))
+  end subroutine
+
+  ! A box of cubes whose upper side goes down, of which the boundary's motion is taken.
+  subroutine boundary()
+    integer, parameter :: side = 4
+    real(real64), allocatable, target :: points(:, :)
+    integer(int32), allocatable, target :: cubes(:, :)
+    integer(int32), pointer :: vertices(:)
+    real(real64), pointer :: all(:, :), surface(:, :)
+    integer :: v, c, corner, low, motions
+    integer, parameter :: corners(8) = [0, 1, side + 1, side, side**2, side**2 + 1, side**2 + side + 1, side**2 + side]
+    allocate (points(3, side**3), cubes(8, (side - 1)**3))
+    do v = 0, side**3 - 1
+      points(:, v + 1) = real([mod(v, side), mod(v / side, side), v / side**2], real64) / (side - 1)
+    end do
+    do c = 0, (side - 1)**3 - 1
+      low = mod(c, side - 1) + mod(c / (side - 1), side - 1) * side + c / (side - 1)**2 * side**2
+      cubes(:, c + 1) = [(low + corners(corner), corner = 1, 8)]
+    end do
+    call right(tombolo_open("", TOMBOLO_COMM_WORLD, run))
+    call right(tombolo_orders(run, '[{"at": {"cycle": 1}, "order": {"edits": [{"translate": {"region": {"half_space": ' // &
+      '{"origin": [0, 0, 0.99], "normal": [0, 0, 1]}}, "fixed_region": {"half_space": {"origin": [0, 0, 0.01], ' // &
+      '"normal": [0, 0, -1]}}, "by": [0, 0, -0.3]}}], "schedule": {"steps": 1}}}]'))
+    call right(tombolo_points(run, "box", points))
+    call right(tombolo_cells(run, "box", TOMBOLO_HEXAHEDRON, cubes))
+    motions = 0
+    do v = 0, 2
+      call right(tombolo_execute(run, v, 0.5d0 * v, 0.5d0))
+      vertices => tombolo_surface_vertices(run)
+      if (.not. associated(vertices)) cycle
+      motions = motions + 1
+      all => tombolo_coordinates(run)
+      surface => tombolo_surface_coordinates(run)
+      if (size(vertices) /= side**3 - (side - 2)**3 .or. any(shape(surface) /= [3, size(vertices)])) wrong = wrong + 1
+      if (any(all(:, vertices + 1) /= surface)) wrong = wrong + 1
+      surface => tombolo_surface_displacement(run)
+      if (any(abs(all(:, vertices + 1) - points(:, vertices + 1) - surface) > 1d-15)) wrong = wrong + 1
+      if (any(abs(tombolo_surface_velocity(run) - surface / 0.5d0) > 1d-15)) wrong = wrong + 1
+      if (tombolo_motion_order(run) == "") wrong = wrong + 1
+      points = all
+    end do
+    if (motions /= 1 .or. abs(maxval(points(3, :)) - 0.7d0) > 1d-9) wrong = wrong + 1
+    if (tombolo_order_count(run) /= 1 .or. index(tombolo_order(run, 1), '"applied"') == 0) wrong = wrong + 1
+    call right(tombolo_close(run))
   end subroutine
 
   subroutine right(status)

@@ -195,7 +195,7 @@ impl Log {
             "order '{id}': applied, not followed: shape {shape} of {shapes}, handed out at cycle {cycle}, is not where the \
              solver's mesh is at the next call; its vertices are up to {distance:.3e} from there"
         );
-        eprintln!("tombolo: {message}");
+        log::warn!("{message}");
         if let Some(hub) = &self.hub {
             hub.tell(&json!({"error": {"message": message, "id": id}}));
         }

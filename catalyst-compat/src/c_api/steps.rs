@@ -88,6 +88,51 @@ pub unsafe extern "C" fn tombolo_motion_count(run: *mut Handle) -> usize {
 /// # Safety
 /// As the module says.
 #[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_surface_coordinates(run: *mut Handle) -> *const f64 {
+    value(ptr::null(), || Ok(motion(run, |motion, _| first(&motion.surface.coordinates)).unwrap_or(ptr::null())))
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_surface_displacement(run: *mut Handle) -> *const f64 {
+    value(ptr::null(), || Ok(motion(run, |motion, _| first(&motion.surface.displacement)).unwrap_or(ptr::null())))
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_surface_velocity(run: *mut Handle) -> *const f64 {
+    value(ptr::null(), || Ok(motion(run, |motion, _| first(&motion.surface.velocity)).unwrap_or(ptr::null())))
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_surface_vertices(run: *mut Handle) -> *const u32 {
+    value(ptr::null(), || Ok(motion(run, |motion, _| motion.surface.vertices.as_ptr()).unwrap_or(ptr::null())))
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_surface_count(run: *mut Handle) -> usize {
+    value(0, || Ok(motion(run, |motion, _| motion.surface.vertices.len()).unwrap_or(0)))
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module says.
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn tombolo_motion_order(run: *mut Handle) -> *const c_char {
     value(ptr::null(), || Ok(motion(run, |_, run| run.motion_order.as_ptr()).unwrap_or(ptr::null())))
 }
