@@ -40,12 +40,18 @@ pub unsafe extern "C" fn tombolo_open(file: *const c_char, communicator: c_int, 
         // SAFETY: as the module says.
         let run = unsafe { run.as_mut() }.ok_or_else(|| Fault::null("the address of the run"))?;
         *run = ptr::null_mut();
-        // SAFETY: as the module says.
-        let file = if file.is_null() { None } else { Some(unsafe { text(file, "file") }?) };
         let communicator = ranks::communicator((communicator != WORLD).then_some(communicator))?;
         let mut settings = Settings { communicator: Arc::clone(&communicator), ..Settings::default() };
-        if let Some(file) = file {
-            settings.config = ranks::agree(&*communicator, read_configuration(&file))?;
+        // SAFETY: as the module says.
+        let file = if file.is_null() { Ok(None) } else { unsafe { text(file, "file") }.map(Some) };
+        // A rank whose file cannot be read must not leave the others waiting.
+        let config = file.and_then(|file| Ok(file.map(|file| read_configuration(&file)).transpose()?));
+        let config = config.map_err(|fault| match fault {
+            Fault::Error(error) => error,
+            Fault::Call(message) => CatalystError::Configuration(message),
+        });
+        if let Some(config) = ranks::agree(&*communicator, config)? {
+            settings.config = config;
         }
         *run = register(Opened {
             stage: Stage::Opened(Box::new(settings)),
