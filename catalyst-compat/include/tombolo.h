@@ -120,7 +120,7 @@ int tombolo_log(enum tombolo_level level, tombolo_log_function function, void* u
 /* Opens a run: of a file with the pipelines and the server, or of NULL where tombolo_configure says it or nothing is watched; on the
  * ranks of a communicator, by its handle in Fortran (MPI_Comm_c2f). `*run` is NULL where it is not TOMBOLO_OK. */
 int tombolo_open(const char* file, int communicator, tombolo** run);
-/* The pipelines and the server, as JSON. */
+/* The pipelines and the server, as JSON; in place of those of a file. */
 int tombolo_configure(tombolo* run, const char* json);
 /* Orders that are carried out at their cycle, as JSON, or a file of them or a journal. */
 int tombolo_orders(tombolo* run, const char* json);
