@@ -121,7 +121,8 @@ mod tests {
         for mesh in [box_of_tets([3, 2, 2], [0.0; 3], [1.0; 3]), box_of_hexahedra([3, 2, 2], [0.0; 3], [1.0; 3])] {
             let FeatureSource::Faces(mut tagged) = mesh.features().clone() else { panic!("sides") };
             assert_eq!(check_tagged_faces(&tagged, mesh.cells()), Ok(0));
-            let triangle: Vec<u32> = mesh.cells().vertices(0)[..3].iter().map(|vertex| vertex + 1).collect();
+            // From one corner of the box to the opposite one.
+            let triangle = vec![0, 1, mesh.points().len() as u32 - 1];
             tagged.faces.push(CellType::Triangle, &triangle).expect("a triangle");
             tagged.tags.push(7);
             tagged.names.push((7, "lid".into()));
