@@ -14,7 +14,8 @@
 ! A status other than TOMBOLO_OK is explained by tombolo_message(). Texts are trimmed of blanks at their end.
 !
 ! Arrays are lent, not copied: they stay where they are while tombolo_execute runs, and need the attribute `target` (or `pointer`), without
-! which the compiler refuses the call. It refuses expressions and sections by a vector of indices, too, which have no place in memory.
+! which the compiler refuses the call. It refuses expressions, too, which have no place in memory. Never lend a section by a vector of
+! indices, x([1, 3, 5]): it is a copy that ends with the call, which Fortran forbids here and gfortran does not see.
 ! Points and fields may be sections with strides, such as x(:, 1:n:2) or x(1, :), of real32 or real64, fields also of int32 or int64.
 ! Connectivities, of int32 or int64, and numbers are contiguous; what is not is an error.
 !
