@@ -3,6 +3,7 @@
 mod commands;
 mod contract;
 mod description;
+mod tagged;
 
 use std::{
     net::SocketAddr,
@@ -443,13 +444,19 @@ impl Adaptor {
                 return Ok(());
             }
         };
+        let of_channel = |source| {
+            let channel = channel.name.into();
+            ExecuteError::Channel { cycle, source: ChannelError::Mesh { channel, source } }
+        };
+        let checked = self.check_features(channel).map_err(of_channel);
+        if self.communicator.size() == 1 {
+            checked?;
+        } else {
+            comm::agree_on(&*self.communicator, checked)?;
+        }
         self.mesh = if self.config.stream.is_none() && self.timed.is_empty() && !self.pipelines.can_order() {
             SteeredMesh::Unsteered
         } else {
-            let of_channel = |source| {
-                let channel = channel.name.into();
-                ExecuteError::Channel { cycle, source: ChannelError::Mesh { channel, source } }
-            };
             let taken = if self.communicator.size() > 1 {
                 let part = comm::agree_on(&*self.communicator, Part::of(&channel.mesh).map_err(of_channel))?;
                 self.tell_handedness(&part.cells);

@@ -37,6 +37,7 @@ pub mod comm;
 #[cfg(feature = "distributed")]
 pub mod distributed;
 mod journal;
+pub mod logging;
 mod report;
 mod settings;
 mod stages;

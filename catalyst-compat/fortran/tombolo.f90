@@ -1,187 +1,353 @@
-! Tombolo for solvers in Fortran: the interface of tombolo.h. What each function does, and what its arguments mean, is told there;
-! a status other than TOMBOLO_OK is explained by tombolo_message().
+! Tombolo for solvers in Fortran: the functions of tombolo.h, which says what each does.
 !
-! Texts are trimmed of blanks at their end. Arrays are borrowed, not copied: they need the attribute `target` and must stay where they
-! are while tombolo_execute runs.
+!   type(tombolo_run) :: run
+!   status = tombolo_open("pipelines.json", MPI_COMM_WORLD, run)
+!   status = tombolo_points(run, "solid", coordinates)                    (3, points)
+!   status = tombolo_cells(run, "solid", TOMBOLO_TETRA, tets)             (4, cells), counted from 0
+!   status = tombolo_field(run, "solid", "temperature", TOMBOLO_VERTEX, temperature)
+!   do step = 0, steps - 1
+!     status = tombolo_execute(run, step, time, time_step)
+!     moved => tombolo_coordinates(run)                                   not associated: the mesh stays
+!   end do
+!   status = tombolo_close(run)
+!
+! A status other than TOMBOLO_OK is explained by tombolo_message(). Texts are trimmed of blanks at their end.
+!
+! Arrays are lent, not copied: they stay where they are while tombolo_execute runs, and need the attribute `target` (or `pointer`), without
+! which the compiler refuses the call. It refuses expressions, too, which have no place in memory. Never lend a section by a vector of
+! indices, x([1, 3, 5]): it is a copy that ends with the call, which Fortran forbids here and gfortran does not see.
+! Points and fields may be sections with strides, such as x(:, 1:n:2) or x(1, :), of real32 or real64, fields also of int32 or int64.
+! Connectivities, of int32 or int64, and numbers are contiguous; what is not is an error.
+!
+! An array that a caller handed to your procedure with an explicit shape may be a copy that ends with the procedure: lend what you
+! declared yourself, or what came with an assumed shape.
 module tombolo
   use, intrinsic :: iso_c_binding
+  use, intrinsic :: iso_fortran_env, only: int8, int32, int64, real32, real64
   implicit none
   private
 
   integer(c_int), parameter, public :: TOMBOLO_OK = 0, TOMBOLO_WRONG_CALL = 1, TOMBOLO_INVALID = 100, TOMBOLO_FAILED = 102
-  integer(c_int), parameter, public :: TOMBOLO_INT32 = 5, TOMBOLO_INT64 = 6, TOMBOLO_FLOAT32 = 11, TOMBOLO_FLOAT64 = 12
-  integer(c_int), parameter, public :: TOMBOLO_VERTEX = 0, TOMBOLO_ELEMENT = 1
+  integer(c_int), parameter, public :: TOMBOLO_VERTEX = 0, TOMBOLO_CELL = 1
   integer(c_int), parameter, public :: TOMBOLO_POINT = 1, TOMBOLO_LINE = 3, TOMBOLO_TRIANGLE = 5, TOMBOLO_QUAD = 9, &
     TOMBOLO_TETRA = 10, TOMBOLO_HEXAHEDRON = 12, TOMBOLO_WEDGE = 13, TOMBOLO_PYRAMID = 14
+  integer(c_int), parameter, public :: TOMBOLO_LOG_OFF = 0, TOMBOLO_LOG_ERROR = 1, TOMBOLO_LOG_WARNING = 2, &
+    TOMBOLO_LOG_INFO = 3, TOMBOLO_LOG_DEBUG = 4
+  ! All ranks where MPI runs, else this process.
+  integer(c_int), parameter, public :: TOMBOLO_COMM_WORLD = -1
 
-  public :: tombolo_create, tombolo_destroy, tombolo_initialize, tombolo_finalize, tombolo_execute, tombolo_stopped
-  public :: tombolo_communicator, tombolo_order_count
-  public :: tombolo_message, tombolo_configure, tombolo_configure_file, tombolo_orders_file, tombolo_output
-  public :: tombolo_parameter, tombolo_parameter_value, tombolo_link, tombolo_mesh, tombolo_cells, tombolo_mixed_cells
-  public :: tombolo_faces, tombolo_feature, tombolo_global_numbers, tombolo_ghosts, tombolo_field
-  public :: tombolo_coordinates, tombolo_displacement, tombolo_velocity, tombolo_schedule, tombolo_order, tombolo_report
+  ! A run: opened, begun, or ended.
+  type, public :: tombolo_run
+    private
+    type(c_ptr) :: handle = c_null_ptr
+  end type
 
-  interface
-    function tombolo_create() bind(C) result(run)
-      import :: c_ptr
-      type(c_ptr) :: run
-    end function
-    subroutine tombolo_destroy(run) bind(C)
-      import :: c_ptr
-      type(c_ptr), value :: run
+  abstract interface
+    ! Takes what is told besides the errors of calls.
+    subroutine tombolo_log_procedure(level, message)
+      import :: c_int
+      integer(c_int), intent(in) :: level
+      character(len=*), intent(in) :: message
     end subroutine
-    function tombolo_initialize(run) bind(C) result(status)
-      import :: c_ptr, c_int
-      type(c_ptr), value :: run
-      integer(c_int) :: status
-    end function
-    function tombolo_finalize(run) bind(C) result(status)
-      import :: c_ptr, c_int
-      type(c_ptr), value :: run
-      integer(c_int) :: status
-    end function
-    function tombolo_execute(run, cycle, time, time_step) bind(C) result(status)
-      import :: c_ptr, c_int, c_int64_t, c_double
-      type(c_ptr), value :: run
-      integer(c_int64_t), value :: cycle
-      real(c_double), value :: time, time_step
-      integer(c_int) :: status
-    end function
-    function tombolo_stopped(run) bind(C) result(stopped)
-      import :: c_ptr, c_int
-      type(c_ptr), value :: run
-      integer(c_int) :: stopped
-    end function
-    ! The handle of the communicator as Fortran has it.
-    function tombolo_communicator(run, communicator) bind(C) result(status)
-      import :: c_ptr, c_int
-      type(c_ptr), value :: run
-      integer(c_int), value :: communicator
-      integer(c_int) :: status
-    end function
-    function tombolo_order_count(run) bind(C) result(count)
-      import :: c_ptr, c_size_t
-      type(c_ptr), value :: run
-      integer(c_size_t) :: count
-    end function
+  end interface
+  public :: tombolo_log_procedure
+
+  public :: tombolo_version, tombolo_message, tombolo_log
+  public :: tombolo_open, tombolo_configure, tombolo_orders, tombolo_orders_file, tombolo_output, tombolo_parameter
+  public :: tombolo_start, tombolo_link, tombolo_finalize, tombolo_close, tombolo_report
+  public :: tombolo_points, tombolo_cells, tombolo_mixed_cells, tombolo_point_cells, tombolo_ghost_cells
+  public :: tombolo_faces, tombolo_feature, tombolo_global_vertices, tombolo_global_cells, tombolo_field
+  public :: tombolo_execute, tombolo_coordinates, tombolo_displacement, tombolo_velocity
+  public :: tombolo_surface_vertices, tombolo_surface_coordinates, tombolo_surface_displacement, tombolo_surface_velocity
+  public :: tombolo_motion_order, tombolo_motion_shape, tombolo_parameter_value, tombolo_stopped
+  public :: tombolo_order_count, tombolo_order
+
+  integer(c_int), parameter :: INT32_TYPE = 5, INT64_TYPE = 6, FLOAT32_TYPE = 11, FLOAT64_TYPE = 12
+
+  procedure(tombolo_log_procedure), pointer :: log_procedure => null()
+
+  ! An array (2 or 3, points), or the two or three coordinates in an array each.
+  interface tombolo_points
+    procedure points_real32, points_real64, axes_real32, axes_real64
+  end interface
+  ! Of vertices counted from 0, (vertices of a cell, cells).
+  interface tombolo_cells
+    procedure cells_int32, cells_int64
+  end interface
+  interface tombolo_mixed_cells
+    procedure mixed_cells_int32, mixed_cells_int64
+  end interface
+  ! Of vertices counted from 0, (vertices of a face, faces), and the number of each face's feature.
+  interface tombolo_faces
+    procedure faces_int32, faces_int64
+  end interface
+  interface tombolo_feature
+    procedure feature_int32, feature_int64
+  end interface
+  interface tombolo_global_vertices
+    procedure global_vertices_int32, global_vertices_int64
+  end interface
+  interface tombolo_global_cells
+    procedure global_cells_int32, global_cells_int64
+  end interface
+  ! An array of one value for each vertex or cell, an array (components, vertices or cells), or up to three components in an array each.
+  interface tombolo_field
+    procedure field_real32, field_real64, field_int32, field_int64
+    procedure components_real32, components_real64, components_int32, components_int64
+  end interface
+  interface tombolo_execute
+    procedure execute_int32, execute_int64
   end interface
 
-  ! The same functions with C's texts.
   interface
+    function c_version() bind(C, name="tombolo_version") result(text)
+      import :: c_ptr
+      type(c_ptr) :: text
+    end function
     function c_message() bind(C, name="tombolo_message") result(text)
       import :: c_ptr
       type(c_ptr) :: text
+    end function
+    function c_log(level, function, user_data) bind(C, name="tombolo_log") result(status)
+      import :: c_funptr, c_int, c_ptr
+      integer(c_int), value :: level
+      type(c_funptr), value :: function
+      type(c_ptr), value :: user_data
+      integer(c_int) :: status
+    end function
+    function c_refuse(what, found, expected) bind(C, name="tombolo_refuse") result(status)
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: what(*)
+      character(kind=c_char), intent(in) :: found(*)
+      character(kind=c_char), intent(in) :: expected(*)
+      integer(c_int) :: status
+    end function
+    function c_vertices_of_cell(cell_type) bind(C, name="tombolo_vertices_of_cell") result(vertices)
+      import :: c_int
+      integer(c_int), value :: cell_type
+      integer(c_int) :: vertices
+    end function
+    function c_open(file, communicator, run) bind(C, name="tombolo_open") result(status)
+      import :: c_int, c_ptr
+      type(c_ptr), value :: file
+      integer(c_int), value :: communicator
+      type(c_ptr), intent(out) :: run
+      integer(c_int) :: status
+    end function
+    function c_configure(run, json) bind(C, name="tombolo_configure") result(status)
+      import :: c_char, c_int, c_ptr
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: json(*)
+      integer(c_int) :: status
+    end function
+    function c_orders(run, json) bind(C, name="tombolo_orders") result(status)
+      import :: c_char, c_int, c_ptr
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: json(*)
+      integer(c_int) :: status
+    end function
+    function c_orders_file(run, file) bind(C, name="tombolo_orders_file") result(status)
+      import :: c_char, c_int, c_ptr
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: file(*)
+      integer(c_int) :: status
+    end function
+    function c_output(run, directory) bind(C, name="tombolo_output") result(status)
+      import :: c_char, c_int, c_ptr
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: directory(*)
+      integer(c_int) :: status
+    end function
+    function c_parameter(run, name, value, minimum, maximum) bind(C, name="tombolo_parameter") result(status)
+      import :: c_char, c_double, c_int, c_ptr
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: name(*)
+      real(c_double), value :: value
+      real(c_double), value :: minimum
+      real(c_double), value :: maximum
+      integer(c_int) :: status
+    end function
+    function c_start(run) bind(C, name="tombolo_start") result(status)
+      import :: c_int, c_ptr
+      type(c_ptr), value :: run
+      integer(c_int) :: status
+    end function
+    function c_link(run) bind(C, name="tombolo_link") result(text)
+      import :: c_ptr
+      type(c_ptr), value :: run
+      type(c_ptr) :: text
+    end function
+    function c_finalize(run) bind(C, name="tombolo_finalize") result(status)
+      import :: c_int, c_ptr
+      type(c_ptr), value :: run
+      integer(c_int) :: status
     end function
     function c_report(run) bind(C, name="tombolo_report") result(text)
       import :: c_ptr
       type(c_ptr), value :: run
       type(c_ptr) :: text
     end function
-    function c_configure(run, json) bind(C, name="tombolo_configure") result(status)
-      import :: c_ptr, c_int, c_char
-      type(c_ptr), value :: run
-      character(kind=c_char), intent(in) :: json(*)
+    function c_close(run) bind(C, name="tombolo_close") result(status)
+      import :: c_int, c_ptr
+      type(c_ptr), intent(inout) :: run
       integer(c_int) :: status
     end function
-    function c_configure_file(run, file) bind(C, name="tombolo_configure_file") result(status)
-      import :: c_ptr, c_int, c_char
+    function c_points_strided(run, channel, kind, axes, dimension, count, stride) &
+        bind(C, name="tombolo_points_strided") result(status)
+      import :: c_char, c_int, c_ptr, c_ptrdiff_t, c_size_t
       type(c_ptr), value :: run
-      character(kind=c_char), intent(in) :: file(*)
-      integer(c_int) :: status
-    end function
-    function c_orders_file(run, file) bind(C, name="tombolo_orders_file") result(status)
-      import :: c_ptr, c_int, c_char
-      type(c_ptr), value :: run
-      character(kind=c_char), intent(in) :: file(*)
-      integer(c_int) :: status
-    end function
-    function c_output(run, directory) bind(C, name="tombolo_output") result(status)
-      import :: c_ptr, c_int, c_char
-      type(c_ptr), value :: run
-      character(kind=c_char), intent(in) :: directory(*)
-      integer(c_int) :: status
-    end function
-    function c_parameter(run, name, value, minimum, maximum) bind(C, name="tombolo_parameter") result(status)
-      import :: c_ptr, c_int, c_char, c_double
-      type(c_ptr), value :: run
-      character(kind=c_char), intent(in) :: name(*)
-      real(c_double), value :: value, minimum, maximum
-      integer(c_int) :: status
-    end function
-    function c_parameter_value(run, name, value) bind(C, name="tombolo_parameter_value") result(status)
-      import :: c_ptr, c_int, c_char, c_double
-      type(c_ptr), value :: run
-      character(kind=c_char), intent(in) :: name(*)
-      real(c_double), intent(inout) :: value
-      integer(c_int) :: status
-    end function
-    function c_link(run, text, bytes) bind(C, name="tombolo_link") result(status)
-      import :: c_ptr, c_int, c_char, c_size_t
-      type(c_ptr), value :: run
-      character(kind=c_char), intent(out) :: text(*)
-      integer(c_size_t), value :: bytes
-      integer(c_int) :: status
-    end function
-    function c_mesh(run, channel, kind, coordinates, vertices, dimension, stride) bind(C, name="tombolo_mesh") result(status)
-      import :: c_ptr, c_int, c_char, c_size_t
-      type(c_ptr), value :: run, coordinates
       character(kind=c_char), intent(in) :: channel(*)
-      integer(c_int), value :: kind, dimension
-      integer(c_size_t), value :: vertices, stride
+      integer(c_int), value :: kind
+      type(c_ptr), intent(in) :: axes(*)
+      integer(c_int), value :: dimension
+      integer(c_size_t), value :: count
+      integer(c_ptrdiff_t), value :: stride
       integer(c_int) :: status
     end function
-    function c_cells(run, channel, cell, kind, connectivity, cells) bind(C, name="tombolo_cells") result(status)
-      import :: c_ptr, c_int, c_char, c_size_t
-      type(c_ptr), value :: run, connectivity
+    function c_cells_i32(run, channel, cell_type, connectivity, cells) &
+        bind(C, name="tombolo_cells_i32") result(status)
+      import :: c_char, c_int, c_ptr, c_size_t
+      type(c_ptr), value :: run
       character(kind=c_char), intent(in) :: channel(*)
-      integer(c_int), value :: cell, kind
+      integer(c_int), value :: cell_type
+      type(c_ptr), value :: connectivity
       integer(c_size_t), value :: cells
       integer(c_int) :: status
     end function
-    function c_mixed_cells(run, channel, cell_types, kind, sizes, cells, connectivity, length) &
-        bind(C, name="tombolo_mixed_cells") result(status)
-      import :: c_ptr, c_int, c_char, c_size_t
-      type(c_ptr), value :: run, cell_types, sizes, connectivity
+    function c_mixed_cells_i32(run, channel, cell_types, sizes, cells, connectivity, length) &
+        bind(C, name="tombolo_mixed_cells_i32") result(status)
+      import :: c_char, c_int, c_ptr, c_size_t
+      type(c_ptr), value :: run
       character(kind=c_char), intent(in) :: channel(*)
-      integer(c_int), value :: kind
-      integer(c_size_t), value :: cells, length
+      type(c_ptr), value :: cell_types
+      type(c_ptr), value :: sizes
+      integer(c_size_t), value :: cells
+      type(c_ptr), value :: connectivity
+      integer(c_size_t), value :: length
       integer(c_int) :: status
     end function
-    function c_faces(run, channel, cell, kind, connectivity, features, faces) bind(C, name="tombolo_faces") result(status)
-      import :: c_ptr, c_int, c_char, c_size_t
-      type(c_ptr), value :: run, connectivity, features
+    function c_faces_i32(run, channel, face_type, connectivity, features, faces) &
+        bind(C, name="tombolo_faces_i32") result(status)
+      import :: c_char, c_int, c_ptr, c_size_t
+      type(c_ptr), value :: run
       character(kind=c_char), intent(in) :: channel(*)
-      integer(c_int), value :: cell, kind
+      integer(c_int), value :: face_type
+      type(c_ptr), value :: connectivity
+      type(c_ptr), value :: features
       integer(c_size_t), value :: faces
       integer(c_int) :: status
     end function
-    function c_feature(run, channel, number, name) bind(C, name="tombolo_feature") result(status)
-      import :: c_ptr, c_int, c_char, c_int64_t
+    function c_global_vertices_i32(run, channel, numbers, count) &
+        bind(C, name="tombolo_global_vertices_i32") result(status)
+      import :: c_char, c_int, c_ptr, c_size_t
       type(c_ptr), value :: run
-      character(kind=c_char), intent(in) :: channel(*), name(*)
+      character(kind=c_char), intent(in) :: channel(*)
+      type(c_ptr), value :: numbers
+      integer(c_size_t), value :: count
+      integer(c_int) :: status
+    end function
+    function c_global_cells_i32(run, channel, numbers, count) &
+        bind(C, name="tombolo_global_cells_i32") result(status)
+      import :: c_char, c_int, c_ptr, c_size_t
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: channel(*)
+      type(c_ptr), value :: numbers
+      integer(c_size_t), value :: count
+      integer(c_int) :: status
+    end function
+    function c_cells_i64(run, channel, cell_type, connectivity, cells) &
+        bind(C, name="tombolo_cells_i64") result(status)
+      import :: c_char, c_int, c_ptr, c_size_t
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: channel(*)
+      integer(c_int), value :: cell_type
+      type(c_ptr), value :: connectivity
+      integer(c_size_t), value :: cells
+      integer(c_int) :: status
+    end function
+    function c_mixed_cells_i64(run, channel, cell_types, sizes, cells, connectivity, length) &
+        bind(C, name="tombolo_mixed_cells_i64") result(status)
+      import :: c_char, c_int, c_ptr, c_size_t
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: channel(*)
+      type(c_ptr), value :: cell_types
+      type(c_ptr), value :: sizes
+      integer(c_size_t), value :: cells
+      type(c_ptr), value :: connectivity
+      integer(c_size_t), value :: length
+      integer(c_int) :: status
+    end function
+    function c_faces_i64(run, channel, face_type, connectivity, features, faces) &
+        bind(C, name="tombolo_faces_i64") result(status)
+      import :: c_char, c_int, c_ptr, c_size_t
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: channel(*)
+      integer(c_int), value :: face_type
+      type(c_ptr), value :: connectivity
+      type(c_ptr), value :: features
+      integer(c_size_t), value :: faces
+      integer(c_int) :: status
+    end function
+    function c_global_vertices_i64(run, channel, numbers, count) &
+        bind(C, name="tombolo_global_vertices_i64") result(status)
+      import :: c_char, c_int, c_ptr, c_size_t
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: channel(*)
+      type(c_ptr), value :: numbers
+      integer(c_size_t), value :: count
+      integer(c_int) :: status
+    end function
+    function c_global_cells_i64(run, channel, numbers, count) &
+        bind(C, name="tombolo_global_cells_i64") result(status)
+      import :: c_char, c_int, c_ptr, c_size_t
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: channel(*)
+      type(c_ptr), value :: numbers
+      integer(c_size_t), value :: count
+      integer(c_int) :: status
+    end function
+    function c_point_cells(run, channel) bind(C, name="tombolo_point_cells") result(status)
+      import :: c_char, c_int, c_ptr
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: channel(*)
+      integer(c_int) :: status
+    end function
+    function c_ghost_cells(run, channel, ghosts, cells) bind(C, name="tombolo_ghost_cells") result(status)
+      import :: c_char, c_int, c_ptr, c_size_t
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: channel(*)
+      type(c_ptr), value :: ghosts
+      integer(c_size_t), value :: cells
+      integer(c_int) :: status
+    end function
+    function c_feature(run, channel, number, name) bind(C, name="tombolo_feature") result(status)
+      import :: c_char, c_int, c_int64_t, c_ptr
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: channel(*)
       integer(c_int64_t), value :: number
+      character(kind=c_char), intent(in) :: name(*)
       integer(c_int) :: status
     end function
-    function c_global_numbers(run, channel, kind, vertices, cells) bind(C, name="tombolo_global_numbers") result(status)
-      import :: c_ptr, c_int, c_char
-      type(c_ptr), value :: run, vertices, cells
+    function c_field_strided(run, channel, name, association, kind, components, component_count, count, stride) &
+        bind(C, name="tombolo_field_strided") result(status)
+      import :: c_char, c_int, c_ptr, c_ptrdiff_t, c_size_t
+      type(c_ptr), value :: run
       character(kind=c_char), intent(in) :: channel(*)
+      character(kind=c_char), intent(in) :: name(*)
+      integer(c_int), value :: association
       integer(c_int), value :: kind
+      type(c_ptr), intent(in) :: components(*)
+      integer(c_int), value :: component_count
+      integer(c_size_t), value :: count
+      integer(c_ptrdiff_t), value :: stride
       integer(c_int) :: status
     end function
-    function c_ghosts(run, channel, ghosts) bind(C, name="tombolo_ghosts") result(status)
-      import :: c_ptr, c_int, c_char
-      type(c_ptr), value :: run, ghosts
-      character(kind=c_char), intent(in) :: channel(*)
-      integer(c_int) :: status
-    end function
-    function c_field(run, channel, name, association, kind, values, components, stride) &
-        bind(C, name="tombolo_field") result(status)
-      import :: c_ptr, c_int, c_char, c_size_t
-      type(c_ptr), value :: run, values
-      character(kind=c_char), intent(in) :: channel(*), name(*)
-      integer(c_int), value :: association, kind, components
-      integer(c_size_t), value :: stride
+    function c_execute(run, cycle, time, time_step) bind(C, name="tombolo_execute") result(status)
+      import :: c_double, c_int, c_int64_t, c_ptr
+      type(c_ptr), value :: run
+      integer(c_int64_t), value :: cycle
+      real(c_double), value :: time
+      real(c_double), value :: time_step
       integer(c_int) :: status
     end function
     function c_coordinates(run) bind(C, name="tombolo_coordinates") result(first)
@@ -199,20 +365,70 @@ module tombolo
       type(c_ptr), value :: run
       type(c_ptr) :: first
     end function
-    function c_schedule(run, shape, shapes, order, bytes) bind(C, name="tombolo_schedule") result(status)
-      import :: c_ptr, c_int, c_char, c_size_t
+    function c_surface_vertices(run) bind(C, name="tombolo_surface_vertices") result(first)
+      import :: c_ptr
       type(c_ptr), value :: run
-      integer(c_int), intent(out) :: shape, shapes
-      character(kind=c_char), intent(out) :: order(*)
-      integer(c_size_t), value :: bytes
+      type(c_ptr) :: first
+    end function
+    function c_surface_coordinates(run) bind(C, name="tombolo_surface_coordinates") result(first)
+      import :: c_ptr
+      type(c_ptr), value :: run
+      type(c_ptr) :: first
+    end function
+    function c_surface_displacement(run) bind(C, name="tombolo_surface_displacement") result(first)
+      import :: c_ptr
+      type(c_ptr), value :: run
+      type(c_ptr) :: first
+    end function
+    function c_surface_velocity(run) bind(C, name="tombolo_surface_velocity") result(first)
+      import :: c_ptr
+      type(c_ptr), value :: run
+      type(c_ptr) :: first
+    end function
+    function c_motion_count(run) bind(C, name="tombolo_motion_count") result(count)
+      import :: c_ptr, c_size_t
+      type(c_ptr), value :: run
+      integer(c_size_t) :: count
+    end function
+    function c_surface_count(run) bind(C, name="tombolo_surface_count") result(count)
+      import :: c_ptr, c_size_t
+      type(c_ptr), value :: run
+      integer(c_size_t) :: count
+    end function
+    function c_motion_order(run) bind(C, name="tombolo_motion_order") result(text)
+      import :: c_ptr
+      type(c_ptr), value :: run
+      type(c_ptr) :: text
+    end function
+    function c_motion_shape(run, shape, shapes) bind(C, name="tombolo_motion_shape") result(status)
+      import :: c_int, c_ptr
+      type(c_ptr), value :: run
+      integer(c_int), intent(out) :: shape
+      integer(c_int), intent(out) :: shapes
       integer(c_int) :: status
     end function
-    function c_order(run, index, json, bytes) bind(C, name="tombolo_order") result(status)
-      import :: c_ptr, c_int, c_char, c_size_t
+    function c_parameter_value(run, name, value) bind(C, name="tombolo_parameter_value") result(status)
+      import :: c_char, c_double, c_int, c_ptr
       type(c_ptr), value :: run
-      integer(c_size_t), value :: index, bytes
-      character(kind=c_char), intent(out) :: json(*)
+      character(kind=c_char), intent(in) :: name(*)
+      real(c_double), intent(inout) :: value
       integer(c_int) :: status
+    end function
+    function c_stopped(run) bind(C, name="tombolo_stopped") result(stopped)
+      import :: c_int, c_ptr
+      type(c_ptr), value :: run
+      integer(c_int) :: stopped
+    end function
+    function c_order_count(run) bind(C, name="tombolo_order_count") result(count)
+      import :: c_ptr, c_size_t
+      type(c_ptr), value :: run
+      integer(c_size_t) :: count
+    end function
+    function c_order(run, index) bind(C, name="tombolo_order") result(text)
+      import :: c_ptr, c_size_t
+      type(c_ptr), value :: run
+      integer(c_size_t), value :: index
+      type(c_ptr) :: text
     end function
     function c_length(text) bind(C, name="strlen") result(length)
       import :: c_ptr, c_size_t
@@ -243,191 +459,800 @@ contains
     end do
   end function
 
-  ! A text that C has written: blanks from its end on.
-  subroutine blank_rest(text)
-    character(len=*), intent(inout) :: text
-    integer :: last
-    last = index(text, c_null_char)
-    if (last > 0) text(last:) = " "
-  end subroutine
+  ! An error of this module, in the words of all others.
+  integer(c_int) function refuse(channel, what, found, expected) result(status)
+    character(len=*), intent(in) :: channel, what, found, expected
+    status = c_refuse(c_text("channel '" // trim(channel) // "', " // what), c_text(found), c_text(expected))
+  end function
+
+  function text_of(number) result(text)
+    integer(c_size_t), intent(in) :: number
+    character(len=:), allocatable :: text
+    character(len=20) :: digits
+    write (digits, '(i0)') number
+    text = trim(digits)
+  end function
+
+  ! The bytes from one element to the next; where there is no next, those of the element itself.
+  integer(c_ptrdiff_t) function distance(first, next)
+    type(c_ptr), intent(in) :: first, next
+    distance = transfer(next, 0_c_ptrdiff_t) - transfer(first, 0_c_ptrdiff_t)
+  end function
+
+  function tombolo_version() result(text)
+    character(len=:), allocatable :: text
+    text = from_c(c_version())
+  end function
 
   function tombolo_message() result(text)
     character(len=:), allocatable :: text
     text = from_c(c_message())
   end function
 
-  function tombolo_report(run) result(text)
-    type(c_ptr), intent(in) :: run
-    character(len=:), allocatable :: text
-    text = from_c(c_report(run))
+  ! Hands messages up to a level to a procedure; without one, to standard error.
+  integer(c_int) function tombolo_log(level, procedure) result(status)
+    integer(c_int), intent(in) :: level
+    procedure(tombolo_log_procedure), optional :: procedure
+    if (present(procedure)) then
+      log_procedure => procedure
+      status = c_log(level, c_funloc(forward), c_null_ptr)
+    else
+      status = c_log(level, c_null_funptr, c_null_ptr)
+    end if
+  end function
+
+  subroutine forward(level, message, user_data) bind(C)
+    integer(c_int), value :: level
+    type(c_ptr), value :: message, user_data
+    if (associated(log_procedure) .and. .not. c_associated(user_data)) call log_procedure(level, from_c(message))
+  end subroutine
+
+  ! Of a file; of "" where tombolo_configure says what to watch, or nothing is watched.
+  integer(c_int) function tombolo_open(file, communicator, run) result(status)
+    character(len=*), intent(in) :: file
+    integer(c_int), intent(in) :: communicator
+    type(tombolo_run), intent(out) :: run
+    character(kind=c_char, len=:), allocatable, target :: name
+    name = c_text(file)
+    if (file == "") then
+      status = c_open(c_null_ptr, communicator, run%handle)
+    else
+      status = c_open(c_loc(name), communicator, run%handle)
+    end if
   end function
 
   integer(c_int) function tombolo_configure(run, json) result(status)
-    type(c_ptr), intent(in) :: run
+    type(tombolo_run), intent(in) :: run
     character(len=*), intent(in) :: json
-    status = c_configure(run, c_text(json))
+    status = c_configure(run%handle, c_text(json))
   end function
 
-  integer(c_int) function tombolo_configure_file(run, file) result(status)
-    type(c_ptr), intent(in) :: run
-    character(len=*), intent(in) :: file
-    status = c_configure_file(run, c_text(file))
+  integer(c_int) function tombolo_orders(run, json) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: json
+    status = c_orders(run%handle, c_text(json))
   end function
 
   integer(c_int) function tombolo_orders_file(run, file) result(status)
-    type(c_ptr), intent(in) :: run
+    type(tombolo_run), intent(in) :: run
     character(len=*), intent(in) :: file
-    status = c_orders_file(run, c_text(file))
+    status = c_orders_file(run%handle, c_text(file))
   end function
 
   integer(c_int) function tombolo_output(run, directory) result(status)
-    type(c_ptr), intent(in) :: run
+    type(tombolo_run), intent(in) :: run
     character(len=*), intent(in) :: directory
-    status = c_output(run, c_text(directory))
+    status = c_output(run%handle, c_text(directory))
   end function
 
   integer(c_int) function tombolo_parameter(run, name, value, minimum, maximum) result(status)
-    type(c_ptr), intent(in) :: run
+    type(tombolo_run), intent(in) :: run
     character(len=*), intent(in) :: name
     real(c_double), intent(in) :: value, minimum, maximum
-    status = c_parameter(run, c_text(name), value, minimum, maximum)
+    status = c_parameter(run%handle, c_text(name), value, minimum, maximum)
   end function
 
-  integer(c_int) function tombolo_parameter_value(run, name, value) result(status)
-    type(c_ptr), intent(in) :: run
-    character(len=*), intent(in) :: name
-    real(c_double), intent(inout) :: value
-    status = c_parameter_value(run, c_text(name), value)
+  integer(c_int) function tombolo_start(run) result(status)
+    type(tombolo_run), intent(in) :: run
+    status = c_start(run%handle)
   end function
 
-  integer(c_int) function tombolo_link(run, text) result(status)
-    type(c_ptr), intent(in) :: run
-    character(len=*), intent(out) :: text
-    text = c_null_char
-    status = c_link(run, text, len(text, c_size_t))
-    call blank_rest(text)
+  integer(c_int) function tombolo_finalize(run) result(status)
+    type(tombolo_run), intent(in) :: run
+    status = c_finalize(run%handle)
   end function
 
-  ! Coordinates in double precision, (dimension, vertices).
-  integer(c_int) function tombolo_mesh(run, channel, coordinates) result(status)
-    type(c_ptr), intent(in) :: run
+  integer(c_int) function tombolo_close(run) result(status)
+    type(tombolo_run), intent(inout) :: run
+    status = c_close(run%handle)
+  end function
+
+  ! The link that a browser opens; empty without a server.
+  function tombolo_link(run) result(text)
+    type(tombolo_run), intent(in) :: run
+    character(len=:), allocatable :: text
+    text = from_c(c_link(run%handle))
+  end function
+
+  function tombolo_report(run) result(text)
+    type(tombolo_run), intent(in) :: run
+    character(len=:), allocatable :: text
+    text = from_c(c_report(run%handle))
+  end function
+
+  ! The name of the order whose motion it is; empty where the mesh stays.
+  function tombolo_motion_order(run) result(text)
+    type(tombolo_run), intent(in) :: run
+    character(len=:), allocatable :: text
+    text = from_c(c_motion_order(run%handle))
+  end function
+
+  integer(c_int) function points_real32(run, channel, points) result(status)
+    type(tombolo_run), intent(in) :: run
     character(len=*), intent(in) :: channel
-    real(c_double), intent(in), target, contiguous :: coordinates(:, :)
-    integer(c_size_t) :: each
-    each = size(coordinates, 1)
-    status = c_mesh(run, c_text(channel), TOMBOLO_FLOAT64, c_loc(coordinates), size(coordinates, 2, c_size_t), int(each, c_int), each)
+    real(real32), pointer, intent(in) :: points(:, :)
+    type(c_ptr) :: first(9)
+    integer(c_ptrdiff_t) :: stride
+    if (.not. associated(points)) then
+      status = refuse(channel, "points", "an array that is not allocated", "an array (2 or 3, points)")
+      return
+    end if
+    call start_real32(points, first, stride)
+    status = c_points_strided(run%handle, c_text(channel), FLOAT32_TYPE, first, size(points, 1, c_int), &
+      size(points, 2, c_size_t), stride)
   end function
 
-  ! Vertices from 0 on, (corners, cells).
-  integer(c_int) function tombolo_cells(run, channel, cell, connectivity) result(status)
-    type(c_ptr), intent(in) :: run
+  integer(c_int) function axes_real32(run, channel, x, y, z) result(status)
+    type(tombolo_run), intent(in) :: run
     character(len=*), intent(in) :: channel
-    integer(c_int), intent(in) :: cell
-    integer(c_int32_t), intent(in), target, contiguous :: connectivity(:, :)
-    status = c_cells(run, c_text(channel), cell, TOMBOLO_INT32, c_loc(connectivity), size(connectivity, 2, c_size_t))
+    real(real32), pointer, intent(in) :: x(:), y(:)
+    real(real32), pointer, intent(in), optional :: z(:)
+    type(c_ptr) :: first(3)
+    integer(c_int) :: dimension
+    integer(c_ptrdiff_t) :: stride
+    call starts_real32("points", channel, x, y, z, dimension, first, stride, status)
+    if (status == TOMBOLO_OK) status = c_points_strided(run%handle, c_text(channel), FLOAT32_TYPE, first, dimension, &
+      size(x, kind=c_size_t), stride)
   end function
 
-  integer(c_int) function tombolo_mixed_cells(run, channel, cell_types, sizes, connectivity) result(status)
-    type(c_ptr), intent(in) :: run
+  integer(c_int) function points_real64(run, channel, points) result(status)
+    type(tombolo_run), intent(in) :: run
     character(len=*), intent(in) :: channel
-    integer(c_int8_t), intent(in), target, contiguous :: cell_types(:)
-    integer(c_int32_t), intent(in), target, contiguous :: sizes(:), connectivity(:)
-    status = c_mixed_cells(run, c_text(channel), c_loc(cell_types), TOMBOLO_INT32, c_loc(sizes), size(sizes, kind=c_size_t), &
+    real(real64), pointer, intent(in) :: points(:, :)
+    type(c_ptr) :: first(9)
+    integer(c_ptrdiff_t) :: stride
+    if (.not. associated(points)) then
+      status = refuse(channel, "points", "an array that is not allocated", "an array (2 or 3, points)")
+      return
+    end if
+    call start_real64(points, first, stride)
+    status = c_points_strided(run%handle, c_text(channel), FLOAT64_TYPE, first, size(points, 1, c_int), &
+      size(points, 2, c_size_t), stride)
+  end function
+
+  integer(c_int) function axes_real64(run, channel, x, y, z) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: channel
+    real(real64), pointer, intent(in) :: x(:), y(:)
+    real(real64), pointer, intent(in), optional :: z(:)
+    type(c_ptr) :: first(3)
+    integer(c_int) :: dimension
+    integer(c_ptrdiff_t) :: stride
+    call starts_real64("points", channel, x, y, z, dimension, first, stride, status)
+    if (status == TOMBOLO_OK) status = c_points_strided(run%handle, c_text(channel), FLOAT64_TYPE, first, dimension, &
+      size(x, kind=c_size_t), stride)
+  end function
+
+  integer(c_int) function field_real32(run, channel, name, association, values) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: channel, name
+    integer(c_int), intent(in) :: association
+    real(real32), pointer, intent(in) :: values(:, :)
+    type(c_ptr) :: first(9)
+    integer(c_ptrdiff_t) :: stride
+    if (.not. associated(values)) then
+      status = refuse(channel, "field '" // trim(name) // "'", "an array that is not allocated", "an array (components, values)")
+      return
+    end if
+    call start_real32(values, first, stride)
+    status = c_field_strided(run%handle, c_text(channel), c_text(name), association, FLOAT32_TYPE, first, &
+      size(values, 1, c_int), size(values, 2, c_size_t), stride)
+  end function
+
+  integer(c_int) function components_real32(run, channel, name, association, x, y, z) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: channel, name
+    integer(c_int), intent(in) :: association
+    real(real32), pointer, intent(in) :: x(:)
+    real(real32), pointer, intent(in), optional :: y(:), z(:)
+    type(c_ptr) :: first(3)
+    integer(c_int) :: dimension
+    integer(c_ptrdiff_t) :: stride
+    call starts_real32("field '" // trim(name) // "'", channel, x, y, z, dimension, first, stride, status)
+    if (status == TOMBOLO_OK) status = c_field_strided(run%handle, c_text(channel), c_text(name), association, FLOAT32_TYPE, &
+      first, dimension, size(x, kind=c_size_t), stride)
+  end function
+
+  ! Where each component of an array begins, and how far its tuples are apart.
+  subroutine start_real32(values, first, stride)
+    real(real32), pointer, intent(in) :: values(:, :)
+    type(c_ptr), intent(out) :: first(9)
+    integer(c_ptrdiff_t), intent(out) :: stride
+    integer :: component
+    first = c_null_ptr
+    stride = storage_size(values, c_ptrdiff_t) / 8
+    if (size(values) == 0) return
+    do component = 1, min(9, size(values, 1))
+      first(component) = c_loc(values(lbound(values, 1) + component - 1, lbound(values, 2)))
+    end do
+    if (size(values, 2) > 1) &
+      stride = distance(first(1), c_loc(values(lbound(values, 1), lbound(values, 2) + 1)))
+  end subroutine
+
+  ! Where each of up to three components begins that have an array each, of one length and with one stride.
+  subroutine starts_real32(what, channel, x, y, z, dimension, first, stride, status)
+    character(len=*), intent(in) :: what, channel
+    real(real32), pointer, intent(in) :: x(:)
+    real(real32), pointer, intent(in), optional :: y(:), z(:)
+    integer(c_int), intent(out) :: dimension, status
+    type(c_ptr), intent(out) :: first(3)
+    integer(c_ptrdiff_t), intent(out) :: stride
+    dimension = 0
+    status = TOMBOLO_OK
+    call add(x)
+    if (present(y)) call add(y)
+    if (present(z)) call add(z)
+  contains
+    subroutine add(values)
+      real(real32), pointer, intent(in) :: values(:)
+      integer(c_ptrdiff_t) :: own
+      if (status /= TOMBOLO_OK) return
+      if (.not. associated(values)) then
+        status = refuse(channel, what, "an array that is not allocated", "an array for each component")
+        return
+      end if
+      dimension = dimension + 1
+      first(dimension) = c_null_ptr
+      own = storage_size(values, c_ptrdiff_t) / 8
+      if (size(values) > 0) first(dimension) = c_loc(values(lbound(values, 1)))
+      if (size(values) > 1) own = distance(first(dimension), c_loc(values(lbound(values, 1) + 1)))
+      if (dimension == 1) stride = own
+      if (size(values) /= size(x)) then
+        status = refuse(channel, what, "components of " // text_of(size(x, kind=c_size_t)) // " and " // &
+          text_of(size(values, kind=c_size_t)) // " values", "as many of each")
+      else if (own /= stride) then
+        status = refuse(channel, what, "components whose values are " // text_of(int(stride, c_size_t)) // " and " // &
+          text_of(int(own, c_size_t)) // " bytes apart", "one stride for all")
+      end if
+    end subroutine
+  end subroutine
+
+  integer(c_int) function field_real64(run, channel, name, association, values) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: channel, name
+    integer(c_int), intent(in) :: association
+    real(real64), pointer, intent(in) :: values(:, :)
+    type(c_ptr) :: first(9)
+    integer(c_ptrdiff_t) :: stride
+    if (.not. associated(values)) then
+      status = refuse(channel, "field '" // trim(name) // "'", "an array that is not allocated", "an array (components, values)")
+      return
+    end if
+    call start_real64(values, first, stride)
+    status = c_field_strided(run%handle, c_text(channel), c_text(name), association, FLOAT64_TYPE, first, &
+      size(values, 1, c_int), size(values, 2, c_size_t), stride)
+  end function
+
+  integer(c_int) function components_real64(run, channel, name, association, x, y, z) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: channel, name
+    integer(c_int), intent(in) :: association
+    real(real64), pointer, intent(in) :: x(:)
+    real(real64), pointer, intent(in), optional :: y(:), z(:)
+    type(c_ptr) :: first(3)
+    integer(c_int) :: dimension
+    integer(c_ptrdiff_t) :: stride
+    call starts_real64("field '" // trim(name) // "'", channel, x, y, z, dimension, first, stride, status)
+    if (status == TOMBOLO_OK) status = c_field_strided(run%handle, c_text(channel), c_text(name), association, FLOAT64_TYPE, &
+      first, dimension, size(x, kind=c_size_t), stride)
+  end function
+
+  ! Where each component of an array begins, and how far its tuples are apart.
+  subroutine start_real64(values, first, stride)
+    real(real64), pointer, intent(in) :: values(:, :)
+    type(c_ptr), intent(out) :: first(9)
+    integer(c_ptrdiff_t), intent(out) :: stride
+    integer :: component
+    first = c_null_ptr
+    stride = storage_size(values, c_ptrdiff_t) / 8
+    if (size(values) == 0) return
+    do component = 1, min(9, size(values, 1))
+      first(component) = c_loc(values(lbound(values, 1) + component - 1, lbound(values, 2)))
+    end do
+    if (size(values, 2) > 1) &
+      stride = distance(first(1), c_loc(values(lbound(values, 1), lbound(values, 2) + 1)))
+  end subroutine
+
+  ! Where each of up to three components begins that have an array each, of one length and with one stride.
+  subroutine starts_real64(what, channel, x, y, z, dimension, first, stride, status)
+    character(len=*), intent(in) :: what, channel
+    real(real64), pointer, intent(in) :: x(:)
+    real(real64), pointer, intent(in), optional :: y(:), z(:)
+    integer(c_int), intent(out) :: dimension, status
+    type(c_ptr), intent(out) :: first(3)
+    integer(c_ptrdiff_t), intent(out) :: stride
+    dimension = 0
+    status = TOMBOLO_OK
+    call add(x)
+    if (present(y)) call add(y)
+    if (present(z)) call add(z)
+  contains
+    subroutine add(values)
+      real(real64), pointer, intent(in) :: values(:)
+      integer(c_ptrdiff_t) :: own
+      if (status /= TOMBOLO_OK) return
+      if (.not. associated(values)) then
+        status = refuse(channel, what, "an array that is not allocated", "an array for each component")
+        return
+      end if
+      dimension = dimension + 1
+      first(dimension) = c_null_ptr
+      own = storage_size(values, c_ptrdiff_t) / 8
+      if (size(values) > 0) first(dimension) = c_loc(values(lbound(values, 1)))
+      if (size(values) > 1) own = distance(first(dimension), c_loc(values(lbound(values, 1) + 1)))
+      if (dimension == 1) stride = own
+      if (size(values) /= size(x)) then
+        status = refuse(channel, what, "components of " // text_of(size(x, kind=c_size_t)) // " and " // &
+          text_of(size(values, kind=c_size_t)) // " values", "as many of each")
+      else if (own /= stride) then
+        status = refuse(channel, what, "components whose values are " // text_of(int(stride, c_size_t)) // " and " // &
+          text_of(int(own, c_size_t)) // " bytes apart", "one stride for all")
+      end if
+    end subroutine
+  end subroutine
+
+  integer(c_int) function field_int32(run, channel, name, association, values) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: channel, name
+    integer(c_int), intent(in) :: association
+    integer(int32), pointer, intent(in) :: values(:, :)
+    type(c_ptr) :: first(9)
+    integer(c_ptrdiff_t) :: stride
+    if (.not. associated(values)) then
+      status = refuse(channel, "field '" // trim(name) // "'", "an array that is not allocated", "an array (components, values)")
+      return
+    end if
+    call start_int32(values, first, stride)
+    status = c_field_strided(run%handle, c_text(channel), c_text(name), association, INT32_TYPE, first, &
+      size(values, 1, c_int), size(values, 2, c_size_t), stride)
+  end function
+
+  integer(c_int) function components_int32(run, channel, name, association, x, y, z) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: channel, name
+    integer(c_int), intent(in) :: association
+    integer(int32), pointer, intent(in) :: x(:)
+    integer(int32), pointer, intent(in), optional :: y(:), z(:)
+    type(c_ptr) :: first(3)
+    integer(c_int) :: dimension
+    integer(c_ptrdiff_t) :: stride
+    call starts_int32("field '" // trim(name) // "'", channel, x, y, z, dimension, first, stride, status)
+    if (status == TOMBOLO_OK) status = c_field_strided(run%handle, c_text(channel), c_text(name), association, INT32_TYPE, &
+      first, dimension, size(x, kind=c_size_t), stride)
+  end function
+
+  ! Where each component of an array begins, and how far its tuples are apart.
+  subroutine start_int32(values, first, stride)
+    integer(int32), pointer, intent(in) :: values(:, :)
+    type(c_ptr), intent(out) :: first(9)
+    integer(c_ptrdiff_t), intent(out) :: stride
+    integer :: component
+    first = c_null_ptr
+    stride = storage_size(values, c_ptrdiff_t) / 8
+    if (size(values) == 0) return
+    do component = 1, min(9, size(values, 1))
+      first(component) = c_loc(values(lbound(values, 1) + component - 1, lbound(values, 2)))
+    end do
+    if (size(values, 2) > 1) &
+      stride = distance(first(1), c_loc(values(lbound(values, 1), lbound(values, 2) + 1)))
+  end subroutine
+
+  ! Where each of up to three components begins that have an array each, of one length and with one stride.
+  subroutine starts_int32(what, channel, x, y, z, dimension, first, stride, status)
+    character(len=*), intent(in) :: what, channel
+    integer(int32), pointer, intent(in) :: x(:)
+    integer(int32), pointer, intent(in), optional :: y(:), z(:)
+    integer(c_int), intent(out) :: dimension, status
+    type(c_ptr), intent(out) :: first(3)
+    integer(c_ptrdiff_t), intent(out) :: stride
+    dimension = 0
+    status = TOMBOLO_OK
+    call add(x)
+    if (present(y)) call add(y)
+    if (present(z)) call add(z)
+  contains
+    subroutine add(values)
+      integer(int32), pointer, intent(in) :: values(:)
+      integer(c_ptrdiff_t) :: own
+      if (status /= TOMBOLO_OK) return
+      if (.not. associated(values)) then
+        status = refuse(channel, what, "an array that is not allocated", "an array for each component")
+        return
+      end if
+      dimension = dimension + 1
+      first(dimension) = c_null_ptr
+      own = storage_size(values, c_ptrdiff_t) / 8
+      if (size(values) > 0) first(dimension) = c_loc(values(lbound(values, 1)))
+      if (size(values) > 1) own = distance(first(dimension), c_loc(values(lbound(values, 1) + 1)))
+      if (dimension == 1) stride = own
+      if (size(values) /= size(x)) then
+        status = refuse(channel, what, "components of " // text_of(size(x, kind=c_size_t)) // " and " // &
+          text_of(size(values, kind=c_size_t)) // " values", "as many of each")
+      else if (own /= stride) then
+        status = refuse(channel, what, "components whose values are " // text_of(int(stride, c_size_t)) // " and " // &
+          text_of(int(own, c_size_t)) // " bytes apart", "one stride for all")
+      end if
+    end subroutine
+  end subroutine
+
+  integer(c_int) function field_int64(run, channel, name, association, values) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: channel, name
+    integer(c_int), intent(in) :: association
+    integer(int64), pointer, intent(in) :: values(:, :)
+    type(c_ptr) :: first(9)
+    integer(c_ptrdiff_t) :: stride
+    if (.not. associated(values)) then
+      status = refuse(channel, "field '" // trim(name) // "'", "an array that is not allocated", "an array (components, values)")
+      return
+    end if
+    call start_int64(values, first, stride)
+    status = c_field_strided(run%handle, c_text(channel), c_text(name), association, INT64_TYPE, first, &
+      size(values, 1, c_int), size(values, 2, c_size_t), stride)
+  end function
+
+  integer(c_int) function components_int64(run, channel, name, association, x, y, z) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: channel, name
+    integer(c_int), intent(in) :: association
+    integer(int64), pointer, intent(in) :: x(:)
+    integer(int64), pointer, intent(in), optional :: y(:), z(:)
+    type(c_ptr) :: first(3)
+    integer(c_int) :: dimension
+    integer(c_ptrdiff_t) :: stride
+    call starts_int64("field '" // trim(name) // "'", channel, x, y, z, dimension, first, stride, status)
+    if (status == TOMBOLO_OK) status = c_field_strided(run%handle, c_text(channel), c_text(name), association, INT64_TYPE, &
+      first, dimension, size(x, kind=c_size_t), stride)
+  end function
+
+  ! Where each component of an array begins, and how far its tuples are apart.
+  subroutine start_int64(values, first, stride)
+    integer(int64), pointer, intent(in) :: values(:, :)
+    type(c_ptr), intent(out) :: first(9)
+    integer(c_ptrdiff_t), intent(out) :: stride
+    integer :: component
+    first = c_null_ptr
+    stride = storage_size(values, c_ptrdiff_t) / 8
+    if (size(values) == 0) return
+    do component = 1, min(9, size(values, 1))
+      first(component) = c_loc(values(lbound(values, 1) + component - 1, lbound(values, 2)))
+    end do
+    if (size(values, 2) > 1) &
+      stride = distance(first(1), c_loc(values(lbound(values, 1), lbound(values, 2) + 1)))
+  end subroutine
+
+  ! Where each of up to three components begins that have an array each, of one length and with one stride.
+  subroutine starts_int64(what, channel, x, y, z, dimension, first, stride, status)
+    character(len=*), intent(in) :: what, channel
+    integer(int64), pointer, intent(in) :: x(:)
+    integer(int64), pointer, intent(in), optional :: y(:), z(:)
+    integer(c_int), intent(out) :: dimension, status
+    type(c_ptr), intent(out) :: first(3)
+    integer(c_ptrdiff_t), intent(out) :: stride
+    dimension = 0
+    status = TOMBOLO_OK
+    call add(x)
+    if (present(y)) call add(y)
+    if (present(z)) call add(z)
+  contains
+    subroutine add(values)
+      integer(int64), pointer, intent(in) :: values(:)
+      integer(c_ptrdiff_t) :: own
+      if (status /= TOMBOLO_OK) return
+      if (.not. associated(values)) then
+        status = refuse(channel, what, "an array that is not allocated", "an array for each component")
+        return
+      end if
+      dimension = dimension + 1
+      first(dimension) = c_null_ptr
+      own = storage_size(values, c_ptrdiff_t) / 8
+      if (size(values) > 0) first(dimension) = c_loc(values(lbound(values, 1)))
+      if (size(values) > 1) own = distance(first(dimension), c_loc(values(lbound(values, 1) + 1)))
+      if (dimension == 1) stride = own
+      if (size(values) /= size(x)) then
+        status = refuse(channel, what, "components of " // text_of(size(x, kind=c_size_t)) // " and " // &
+          text_of(size(values, kind=c_size_t)) // " values", "as many of each")
+      else if (own /= stride) then
+        status = refuse(channel, what, "components whose values are " // text_of(int(stride, c_size_t)) // " and " // &
+          text_of(int(own, c_size_t)) // " bytes apart", "one stride for all")
+      end if
+    end subroutine
+  end subroutine
+
+  integer(c_int) function tombolo_point_cells(run, channel) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: channel
+    status = c_point_cells(run%handle, c_text(channel))
+  end function
+
+  integer(c_int) function tombolo_ghost_cells(run, channel, ghosts) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: channel
+    integer(int8), pointer, intent(in) :: ghosts(:)
+    if (.not. is_whole(associated(ghosts), is_contiguous(ghosts), channel, "ghost cells", status)) return
+    status = c_ghost_cells(run%handle, c_text(channel), c_loc(ghosts), size(ghosts, kind=c_size_t))
+  end function
+
+  ! Whether an array is there and lies in one piece; an error where it does not.
+  logical function is_whole(allocated, contiguous, channel, what, status)
+    logical, intent(in) :: allocated, contiguous
+    character(len=*), intent(in) :: channel, what
+    integer(c_int), intent(out) :: status
+    is_whole = allocated .and. contiguous
+    status = TOMBOLO_OK
+    if (.not. allocated) then
+      status = refuse(channel, what, "an array that is not allocated", "a contiguous array")
+    else if (.not. contiguous) then
+      status = refuse(channel, what, "a section with gaps", "a contiguous array")
+    end if
+  end function
+
+  ! Whether each of the cells has the vertices that its type has; an error where they do not.
+  logical function fits(cell_type, vertices, channel, what, status)
+    integer(c_int), intent(in) :: cell_type
+    integer, intent(in) :: vertices
+    character(len=*), intent(in) :: channel, what
+    integer(c_int), intent(out) :: status
+    integer(c_int) :: expected
+    expected = c_vertices_of_cell(cell_type)
+    status = TOMBOLO_OK
+    ! Of a type that is not known the call itself tells.
+    fits = expected == 0 .or. expected == vertices
+    if (.not. fits) status = refuse(channel, what, "an array with " // text_of(int(vertices, c_size_t)) // " rows", &
+      text_of(int(expected, c_size_t)) // ", the vertices of each along the first dimension")
+  end function
+
+  integer(c_int) function cells_int32(run, channel, cell_type, connectivity) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: channel
+    integer(c_int), intent(in) :: cell_type
+    integer(int32), pointer, intent(in) :: connectivity(:, :)
+    if (.not. is_whole(associated(connectivity), is_contiguous(connectivity), channel, "cells", status)) return
+    if (.not. fits(cell_type, size(connectivity, 1), channel, "cells", status)) return
+    status = c_cells_i32(run%handle, c_text(channel), cell_type, c_loc(connectivity), size(connectivity, 2, c_size_t))
+  end function
+
+  integer(c_int) function mixed_cells_int32(run, channel, cell_types, sizes, connectivity) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: channel
+    integer(int8), pointer, intent(in) :: cell_types(:)
+    integer(int32), pointer, intent(in) :: sizes(:), connectivity(:)
+    if (.not. is_whole(associated(cell_types), is_contiguous(cell_types), channel, "cell types", status)) return
+    if (.not. is_whole(associated(sizes), is_contiguous(sizes), channel, "sizes of cells", status)) return
+    if (.not. is_whole(associated(connectivity), is_contiguous(connectivity), channel, "cells", status)) return
+    if (size(cell_types) /= size(sizes)) then
+      status = refuse(channel, "cell types", text_of(size(cell_types, kind=c_size_t)) // " types", &
+        text_of(size(sizes, kind=c_size_t)) // ", as many as sizes")
+      return
+    end if
+    status = c_mixed_cells_i32(run%handle, c_text(channel), c_loc(cell_types), c_loc(sizes), size(sizes, kind=c_size_t), &
       c_loc(connectivity), size(connectivity, kind=c_size_t))
   end function
 
-  ! Vertices of faces from 0 on, (corners, faces), and the number of each face's feature.
-  integer(c_int) function tombolo_faces(run, channel, cell, connectivity, features) result(status)
-    type(c_ptr), intent(in) :: run
+  integer(c_int) function faces_int32(run, channel, face_type, connectivity, features) result(status)
+    type(tombolo_run), intent(in) :: run
     character(len=*), intent(in) :: channel
-    integer(c_int), intent(in) :: cell
-    integer(c_int32_t), intent(in), target, contiguous :: connectivity(:, :), features(:)
-    status = c_faces(run, c_text(channel), cell, TOMBOLO_INT32, c_loc(connectivity), c_loc(features), size(features, kind=c_size_t))
+    integer(c_int), intent(in) :: face_type
+    integer(int32), pointer, intent(in) :: connectivity(:, :), features(:)
+    if (.not. is_whole(associated(connectivity), is_contiguous(connectivity), channel, "faces", status)) return
+    if (.not. is_whole(associated(features), is_contiguous(features), channel, "faces, features", status)) return
+    if (.not. fits(face_type, size(connectivity, 1), channel, "faces", status)) return
+    if (size(features) /= size(connectivity, 2)) then
+      status = refuse(channel, "faces, features", text_of(size(features, kind=c_size_t)) // " numbers", &
+        text_of(size(connectivity, 2, c_size_t)) // ", one for each face")
+      return
+    end if
+    status = c_faces_i32(run%handle, c_text(channel), face_type, c_loc(connectivity), c_loc(features), &
+      size(features, kind=c_size_t))
   end function
 
-  integer(c_int) function tombolo_feature(run, channel, number, name) result(status)
-    type(c_ptr), intent(in) :: run
+  integer(c_int) function feature_int32(run, channel, number, name) result(status)
+    type(tombolo_run), intent(in) :: run
     character(len=*), intent(in) :: channel, name
-    integer, intent(in) :: number
-    status = c_feature(run, c_text(channel), int(number, c_int64_t), c_text(name))
+    integer(int32), intent(in) :: number
+    status = c_feature(run%handle, c_text(channel), int(number, c_int64_t), c_text(name))
   end function
 
-  ! Of vertices; of cells too where they are known.
-  integer(c_int) function tombolo_global_numbers(run, channel, vertices, cells) result(status)
-    type(c_ptr), intent(in) :: run
+  integer(c_int) function global_vertices_int32(run, channel, numbers) result(status)
+    type(tombolo_run), intent(in) :: run
     character(len=*), intent(in) :: channel
-    integer(c_int64_t), intent(in), target, contiguous :: vertices(:)
-    integer(c_int64_t), intent(in), optional, target, contiguous :: cells(:)
-    type(c_ptr) :: of_cells
-    of_cells = c_null_ptr
-    if (present(cells)) of_cells = c_loc(cells)
-    status = c_global_numbers(run, c_text(channel), TOMBOLO_INT64, c_loc(vertices), of_cells)
+    integer(int32), pointer, intent(in) :: numbers(:)
+    if (.not. is_whole(associated(numbers), is_contiguous(numbers), channel, "global vertices", status)) return
+    status = c_global_vertices_i32(run%handle, c_text(channel), c_loc(numbers), size(numbers, kind=c_size_t))
   end function
 
-  integer(c_int) function tombolo_ghosts(run, channel, ghosts) result(status)
-    type(c_ptr), intent(in) :: run
+  integer(c_int) function global_cells_int32(run, channel, numbers) result(status)
+    type(tombolo_run), intent(in) :: run
     character(len=*), intent(in) :: channel
-    integer(c_int8_t), intent(in), target, contiguous :: ghosts(:)
-    status = c_ghosts(run, c_text(channel), c_loc(ghosts))
+    integer(int32), pointer, intent(in) :: numbers(:)
+    if (.not. is_whole(associated(numbers), is_contiguous(numbers), channel, "global cells", status)) return
+    status = c_global_cells_i32(run%handle, c_text(channel), c_loc(numbers), size(numbers, kind=c_size_t))
   end function
 
-  ! Values in double precision, (components, vertices or cells); for one component reshape by a pointer: values(1:1, 1:n) => array.
-  integer(c_int) function tombolo_field(run, channel, name, association, values) result(status)
-    type(c_ptr), intent(in) :: run
+  integer(c_int) function execute_int32(run, cycle, time, time_step) result(status)
+    type(tombolo_run), intent(in) :: run
+    integer(int32), intent(in) :: cycle
+    real(c_double), intent(in) :: time, time_step
+    status = c_execute(run%handle, int(cycle, c_int64_t), time, time_step)
+  end function
+
+  integer(c_int) function cells_int64(run, channel, cell_type, connectivity) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: channel
+    integer(c_int), intent(in) :: cell_type
+    integer(int64), pointer, intent(in) :: connectivity(:, :)
+    if (.not. is_whole(associated(connectivity), is_contiguous(connectivity), channel, "cells", status)) return
+    if (.not. fits(cell_type, size(connectivity, 1), channel, "cells", status)) return
+    status = c_cells_i64(run%handle, c_text(channel), cell_type, c_loc(connectivity), size(connectivity, 2, c_size_t))
+  end function
+
+  integer(c_int) function mixed_cells_int64(run, channel, cell_types, sizes, connectivity) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: channel
+    integer(int8), pointer, intent(in) :: cell_types(:)
+    integer(int64), pointer, intent(in) :: sizes(:), connectivity(:)
+    if (.not. is_whole(associated(cell_types), is_contiguous(cell_types), channel, "cell types", status)) return
+    if (.not. is_whole(associated(sizes), is_contiguous(sizes), channel, "sizes of cells", status)) return
+    if (.not. is_whole(associated(connectivity), is_contiguous(connectivity), channel, "cells", status)) return
+    if (size(cell_types) /= size(sizes)) then
+      status = refuse(channel, "cell types", text_of(size(cell_types, kind=c_size_t)) // " types", &
+        text_of(size(sizes, kind=c_size_t)) // ", as many as sizes")
+      return
+    end if
+    status = c_mixed_cells_i64(run%handle, c_text(channel), c_loc(cell_types), c_loc(sizes), size(sizes, kind=c_size_t), &
+      c_loc(connectivity), size(connectivity, kind=c_size_t))
+  end function
+
+  integer(c_int) function faces_int64(run, channel, face_type, connectivity, features) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: channel
+    integer(c_int), intent(in) :: face_type
+    integer(int64), pointer, intent(in) :: connectivity(:, :), features(:)
+    if (.not. is_whole(associated(connectivity), is_contiguous(connectivity), channel, "faces", status)) return
+    if (.not. is_whole(associated(features), is_contiguous(features), channel, "faces, features", status)) return
+    if (.not. fits(face_type, size(connectivity, 1), channel, "faces", status)) return
+    if (size(features) /= size(connectivity, 2)) then
+      status = refuse(channel, "faces, features", text_of(size(features, kind=c_size_t)) // " numbers", &
+        text_of(size(connectivity, 2, c_size_t)) // ", one for each face")
+      return
+    end if
+    status = c_faces_i64(run%handle, c_text(channel), face_type, c_loc(connectivity), c_loc(features), &
+      size(features, kind=c_size_t))
+  end function
+
+  integer(c_int) function feature_int64(run, channel, number, name) result(status)
+    type(tombolo_run), intent(in) :: run
     character(len=*), intent(in) :: channel, name
-    integer(c_int), intent(in) :: association
-    real(c_double), intent(in), target, contiguous :: values(:, :)
-    integer(c_size_t) :: each
-    each = size(values, 1)
-    status = c_field(run, c_text(channel), c_text(name), association, TOMBOLO_FLOAT64, c_loc(values), int(each, c_int), each)
+    integer(int64), intent(in) :: number
+    status = c_feature(run%handle, c_text(channel), int(number, c_int64_t), c_text(name))
   end function
 
-  ! Where the `vertices` vertices are to be, (3, vertices); not associated where the mesh stays.
-  function tombolo_coordinates(run, vertices) result(values)
-    type(c_ptr), intent(in) :: run
-    integer, intent(in) :: vertices
+  integer(c_int) function global_vertices_int64(run, channel, numbers) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: channel
+    integer(int64), pointer, intent(in) :: numbers(:)
+    if (.not. is_whole(associated(numbers), is_contiguous(numbers), channel, "global vertices", status)) return
+    status = c_global_vertices_i64(run%handle, c_text(channel), c_loc(numbers), size(numbers, kind=c_size_t))
+  end function
+
+  integer(c_int) function global_cells_int64(run, channel, numbers) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: channel
+    integer(int64), pointer, intent(in) :: numbers(:)
+    if (.not. is_whole(associated(numbers), is_contiguous(numbers), channel, "global cells", status)) return
+    status = c_global_cells_i64(run%handle, c_text(channel), c_loc(numbers), size(numbers, kind=c_size_t))
+  end function
+
+  integer(c_int) function execute_int64(run, cycle, time, time_step) result(status)
+    type(tombolo_run), intent(in) :: run
+    integer(int64), intent(in) :: cycle
+    real(c_double), intent(in) :: time, time_step
+    status = c_execute(run%handle, int(cycle, c_int64_t), time, time_step)
+  end function
+
+  ! Where the vertices are to be, (3, vertices); not associated where the mesh stays.
+  function tombolo_coordinates(run) result(values)
+    type(tombolo_run), intent(in) :: run
     real(c_double), pointer :: values(:, :)
-    values => vectors(c_coordinates(run), vertices)
+    values => vectors(c_coordinates(run%handle), c_motion_count(run%handle))
   end function
 
-  function tombolo_displacement(run, vertices) result(values)
-    type(c_ptr), intent(in) :: run
-    integer, intent(in) :: vertices
+  function tombolo_displacement(run) result(values)
+    type(tombolo_run), intent(in) :: run
     real(c_double), pointer :: values(:, :)
-    values => vectors(c_displacement(run), vertices)
+    values => vectors(c_displacement(run%handle), c_motion_count(run%handle))
   end function
 
-  function tombolo_velocity(run, vertices) result(values)
-    type(c_ptr), intent(in) :: run
-    integer, intent(in) :: vertices
+  function tombolo_velocity(run) result(values)
+    type(tombolo_run), intent(in) :: run
     real(c_double), pointer :: values(:, :)
-    values => vectors(c_velocity(run), vertices)
+    values => vectors(c_velocity(run%handle), c_motion_count(run%handle))
   end function
 
-  function vectors(first, vertices) result(values)
+  ! The vertices of the boundary, counted from 0 as those of cells are; not associated where the mesh stays.
+  function tombolo_surface_vertices(run) result(values)
+    type(tombolo_run), intent(in) :: run
+    integer(int32), pointer :: values(:)
+    type(c_ptr) :: first
+    nullify (values)
+    first = c_surface_vertices(run%handle)
+    if (c_associated(first)) call c_f_pointer(first, values, [c_surface_count(run%handle)])
+  end function
+
+  function tombolo_surface_coordinates(run) result(values)
+    type(tombolo_run), intent(in) :: run
+    real(c_double), pointer :: values(:, :)
+    values => vectors(c_surface_coordinates(run%handle), c_surface_count(run%handle))
+  end function
+
+  function tombolo_surface_displacement(run) result(values)
+    type(tombolo_run), intent(in) :: run
+    real(c_double), pointer :: values(:, :)
+    values => vectors(c_surface_displacement(run%handle), c_surface_count(run%handle))
+  end function
+
+  function tombolo_surface_velocity(run) result(values)
+    type(tombolo_run), intent(in) :: run
+    real(c_double), pointer :: values(:, :)
+    values => vectors(c_surface_velocity(run%handle), c_surface_count(run%handle))
+  end function
+
+  function vectors(first, count) result(values)
     type(c_ptr), intent(in) :: first
-    integer, intent(in) :: vertices
+    integer(c_size_t), intent(in) :: count
     real(c_double), pointer :: values(:, :)
     nullify (values)
-    if (c_associated(first)) call c_f_pointer(first, values, [3, vertices])
+    if (c_associated(first)) call c_f_pointer(first, values, [3_c_size_t, count])
   end function
 
-  integer(c_int) function tombolo_schedule(run, shape, shapes, order) result(status)
-    type(c_ptr), intent(in) :: run
+  integer(c_int) function tombolo_motion_shape(run, shape, shapes) result(status)
+    type(tombolo_run), intent(in) :: run
     integer(c_int), intent(out) :: shape, shapes
-    character(len=*), intent(out) :: order
-    order = c_null_char
-    status = c_schedule(run, shape, shapes, order, len(order, c_size_t))
-    call blank_rest(order)
+    status = c_motion_shape(run%handle, shape, shapes)
   end function
 
-  ! Orders are counted from 0.
-  integer(c_int) function tombolo_order(run, index_of_order, json) result(status)
-    type(c_ptr), intent(in) :: run
-    integer(c_size_t), intent(in) :: index_of_order
-    character(len=*), intent(out) :: json
-    json = c_null_char
-    status = c_order(run, index_of_order, json, len(json, c_size_t))
-    call blank_rest(json)
+  integer(c_int) function tombolo_parameter_value(run, name, value) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: name
+    real(c_double), intent(inout) :: value
+    status = c_parameter_value(run%handle, c_text(name), value)
+  end function
+
+  logical function tombolo_stopped(run)
+    type(tombolo_run), intent(in) :: run
+    tombolo_stopped = c_stopped(run%handle) /= 0
+  end function
+
+  integer function tombolo_order_count(run)
+    type(tombolo_run), intent(in) :: run
+    tombolo_order_count = int(c_order_count(run%handle))
+  end function
+
+  ! What became of an order, counted from 1.
+  function tombolo_order(run, number) result(text)
+    type(tombolo_run), intent(in) :: run
+    integer, intent(in) :: number
+    character(len=:), allocatable :: text
+    text = from_c(c_order(run%handle, int(number, c_size_t) - 1))
   end function
 end module tombolo

@@ -1,5 +1,6 @@
 //! What can be wrong with a call, and the status that says so.
 
+use tombolo::pipelines::extract::ChannelError;
 use tombolo::{ExecuteError, FinalizeError, InitializeError};
 
 /// What a call answers: Catalyst's own statuses, and above 99 those of this implementation (100 to 102 as ParaView uses them).
@@ -56,6 +57,16 @@ pub enum CatalystError {
         /// What should.
         expected: String,
     },
+    /// An argument, or an array that was named, makes no sense.
+    #[error("{what}: found {found}; expected {expected}")]
+    Argument {
+        /// What is wrong.
+        what: String,
+        /// What it is.
+        found: String,
+        /// What it should be.
+        expected: String,
+    },
     /// The configuration cannot be read.
     #[error("{0}")]
     Configuration(String),
@@ -75,6 +86,9 @@ pub enum CatalystError {
     /// The adaptor could not be set up.
     #[error(transparent)]
     Initialize(#[from] InitializeError),
+    /// A channel's arrays do not fit together.
+    #[error(transparent)]
+    Channel(#[from] ChannelError),
     /// The adaptor refused a step.
     #[error(transparent)]
     Execute(#[from] ExecuteError),

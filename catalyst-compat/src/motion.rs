@@ -11,7 +11,7 @@ pub(crate) struct Motion {
     pub(crate) coordinates: Vec<Vector>,
     pub(crate) displacement: Vec<Vector>,
     pub(crate) velocity: Vec<Vector>,
-    pub(crate) surface: Surface,
+    pub(crate) surface: Box<Surface>,
     pub(crate) shape: (u32, u32),
     pub(crate) order: String,
 }

@@ -11,7 +11,7 @@ use crate::error::{CatalystError, Status};
 #[cfg(feature = "distributed")]
 pub(crate) fn communicator(handle: Option<i32>) -> Result<Arc<dyn Communicator>, CatalystError> {
     use tombolo::comm::{Solo, mpi};
-    let unusable = |error: mpi::MpiError| CatalystError::Configuration(format!("'catalyst/mpi_comm': {error}"));
+    let unusable = |error: mpi::MpiError| CatalystError::Configuration(format!("the communicator: {error}"));
     match handle {
         // SAFETY: Catalyst's blueprint says that `catalyst/mpi_comm` is the handle of a live communicator; a null one is told.
         Some(handle) => Ok(Arc::new(unsafe { mpi::Mpi::from_fortran(handle) }.map_err(unusable)?)),

@@ -34,6 +34,7 @@ pub(crate) struct Run {
 impl Run {
     /// Begins. Collective.
     pub(crate) fn new(settings: Settings) -> Result<Self, CatalystError> {
+        tombolo::logging::start();
         let asked = Asked::of(&settings.parameters);
         let communicator = Arc::clone(&settings.communicator);
         let adaptor = Adaptor::initialize(settings)?;
@@ -104,11 +105,12 @@ impl Run {
 
     /// Shows a step to the adaptor. Collective.
     ///
-    /// `given` is what the solver shows, or why it cannot be shown; then nothing was done, on any rank.
+    /// `given` is what the solver shows, or why it cannot be shown; then nothing was done, on any rank. Says whether any rank
+    /// showed a channel; where none did, nothing was done either.
     pub(crate) fn execute<'call>(
         &mut self,
         given: Result<(Step, Vec<Channel<'call>>), CatalystError>,
-    ) -> Result<(), CatalystError> {
+    ) -> Result<bool, CatalystError> {
         // What can be wrong here alone is agreed upon before anything that all do together.
         let mut is_other = false;
         let prepared = given.and_then(|(step, channels)| {
@@ -130,7 +132,7 @@ impl Run {
         // A solver that shows nothing yet is asked for nothing.
         if channels.is_empty() {
             self.asked.rest();
-            return Ok(());
+            return Ok(false);
         }
         let named = self.adaptor.steered_channel();
         let steered = channels.iter().find(|channel| named.is_none_or(|name| channel.name == name));
@@ -155,7 +157,7 @@ impl Run {
         // What an earlier step asked for is not asked again.
         asked.rest();
         asked.take(&adaptor.execute(&step, &views)?);
-        Ok(())
+        Ok(true)
     }
 
     fn update(&mut self, channel: &Channel<'_>, looked_at: bool) -> Result<bool, CatalystError> {

@@ -93,7 +93,7 @@ impl Session {
             given = Ok((step, channels));
         }
         match &mut self.stage {
-            Stage::UnderWay(run) => run.execute(given),
+            Stage::UnderWay(run) => run.execute(given).map(|_| ()),
             Stage::Waiting { .. } => Ok(()),
         }
     }

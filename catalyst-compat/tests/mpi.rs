@@ -273,6 +273,21 @@ fn no_rank_waits_for_one_that_goes_wrong() {
 }
 
 #[test]
+fn no_rank_of_tombolo_h_waits_for_one_that_goes_wrong() {
+    let built = Built::get();
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let program = directory.path().join("ranks");
+    let mut query = Command::new("pkg-config");
+    query.env("PKG_CONFIG_PATH", built.prefix.join("lib/pkgconfig")).args(["--cflags", "--libs", "tombolo"]);
+    let flags = succeed(&mut query);
+    let mut compile = Command::new("mpicc");
+    compile.arg(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/ranks_tombolo.c")).arg("-o").arg(&program);
+    succeed(compile.args(["-Wall", "-Wextra", "-Werror"]).args(flags.split_whitespace()));
+    let mut run = Command::new("timeout");
+    succeed(run.args(["60", "mpirun", "--oversubscribe", "--allow-run-as-root", "-n", "3"]).arg(&program));
+}
+
+#[test]
 fn valgrind_finds_nothing_in_the_examples() {
     let built = Built::get();
     let orders = json!([{"at": {"cycle": 1}, "order": press()}]);

@@ -32,32 +32,30 @@ int main(int argc, char** argv)
   double conductivity = 0.5;
   heat solver = heat_create(MPI_COMM_WORLD, cells);
 
-  tombolo* run = tombolo_create();
-  const char* pipelines = getenv("TOMBOLO_PIPELINES");
-  check(pipelines ? tombolo_configure_file(run, pipelines) : tombolo_configure(run, watch_the_surface));
-  if (getenv("TOMBOLO_ORDERS")) check(tombolo_orders_file(run, getenv("TOMBOLO_ORDERS")));
-  check(tombolo_communicator(run, MPI_Comm_c2f(MPI_COMM_WORLD)));
+  tombolo* run;
+  const char *pipelines = getenv("TOMBOLO_PIPELINES"), *orders = getenv("TOMBOLO_ORDERS");
+  check(tombolo_open(pipelines, MPI_Comm_c2f(MPI_COMM_WORLD), &run));
+  if (!pipelines) check(tombolo_configure(run, watch_the_surface));
+  if (orders) check(tombolo_orders_file(run, orders));
   check(tombolo_parameter(run, "conductivity", conductivity, 0.0, 1.0));
-  check(tombolo_initialize(run));
-  char link[256];
-  check(tombolo_link(run, link, sizeof link));
-  if (*link) fprintf(stderr, "open %s\n", link);
+  check(tombolo_start(run));
+  if (tombolo_link(run)) fprintf(stderr, "open %s\n", tombolo_link(run));
 
   /* The arrays stay the solver's: nothing is copied. */
   static const char* const names[6] = { "x-min", "x-max", "y-min", "y-max", "z-min", "z-max" };
-  check(tombolo_mesh(run, "solid", TOMBOLO_FLOAT64, solver.coordinates, (size_t)solver.vertices, 3, 3));
-  check(tombolo_cells(run, "solid", TOMBOLO_TETRA, TOMBOLO_INT32, solver.connectivity, (size_t)solver.tets));
-  check(tombolo_faces(
-    run, "solid", TOMBOLO_TRIANGLE, TOMBOLO_INT32, solver.triangles, solver.features, (size_t)solver.faces));
-  for (int feature = 0; feature < 6; ++feature) check(tombolo_feature(run, "solid", feature + 1, names[feature]));
-  check(tombolo_global_numbers(run, "solid", TOMBOLO_INT64, solver.numbers, NULL));
-  check(tombolo_field(run, "solid", "temperature", TOMBOLO_VERTEX, TOMBOLO_FLOAT64, solver.temperature, 1, 1));
+  const size_t points = (size_t)solver.vertices;
+  check(tombolo_points_f64(run, "solid", solver.coordinates, points));
+  check(tombolo_cells_i32(run, "solid", TOMBOLO_TETRA, solver.connectivity, (size_t)solver.tets));
+  check(tombolo_faces_i32(run, "solid", TOMBOLO_TRIANGLE, solver.triangles, solver.features, (size_t)solver.faces));
+  for (int side = 0; side < 6; ++side) check(tombolo_feature(run, "solid", side + 1, names[side]));
+  check(tombolo_global_vertices_i64(run, "solid", solver.numbers, points));
+  check(tombolo_field_f64(run, "solid", "temperature", TOMBOLO_VERTEX, solver.temperature, points, 1));
 
   for (long step = 0; step < steps; ++step) {
     check(tombolo_execute(run, (uint64_t)step, time_step * (double)step, time_step));
     check(tombolo_parameter_value(run, "conductivity", &conductivity));
     if (tombolo_stopped(run)) break;
-    const size_t bytes = 3 * sizeof(double) * (size_t)solver.vertices;
+    const size_t bytes = 3 * sizeof(double) * points;
     const double* coordinates = tombolo_coordinates(run);
     if (coordinates) memcpy(solver.velocity, tombolo_velocity(run), bytes);
     else memset(solver.velocity, 0, bytes);
@@ -70,12 +68,9 @@ int main(int argc, char** argv)
   if (solver.rank == 0) printf("volume %.12f mean temperature %.12f conductivity %g\n", volume, mean, conductivity);
 
   check(tombolo_finalize(run));
-  for (size_t index = 0; index < tombolo_order_count(run); ++index) {
-    char order[1024];
-    check(tombolo_order(run, index, order, sizeof order));
-    if (solver.rank == 0) printf("%s\n", order);
-  }
-  tombolo_destroy(run);
+  for (size_t index = 0; solver.rank == 0 && index < tombolo_order_count(run); ++index)
+    printf("%s\n", tombolo_order(run, index));
+  check(tombolo_close(&run));
   heat_destroy(&solver);
   MPI_Finalize();
   return 0;

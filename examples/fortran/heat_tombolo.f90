@@ -16,12 +16,11 @@ program heat_tombolo
   character(len=5), parameter :: sides(6) = ["x-min", "x-max", "y-min", "y-max", "z-min", "z-max"]
   real(c_double), parameter :: time_step = 1d-3
   type(heat_solver), target :: solver
-  type(c_ptr) :: run
-  real(c_double), pointer :: moved(:, :), velocity(:, :), temperature(:, :)
+  type(tombolo_run) :: run
+  real(c_double), pointer :: moved(:, :), velocity(:, :)
   real(c_double) :: conductivity, volume, mean
-  character(len=1024) :: text
-  integer(c_size_t) :: order
-  integer :: steps, cells, milliseconds, step, side, error
+  character(len=1024) :: pipelines, orders
+  integer :: steps, cells, milliseconds, step, side, order, error
 
   call MPI_Init(error)
   steps = argument(1, 100)
@@ -30,38 +29,31 @@ program heat_tombolo
   conductivity = 0.5d0
   call heat_create(solver, MPI_COMM_WORLD, cells)
 
-  run = tombolo_create()
-  call get_environment_variable("TOMBOLO_PIPELINES", text)
-  if (text == "") then
-    call check(tombolo_configure(run, watch_the_surface))
-  else
-    call check(tombolo_configure_file(run, text))
-  end if
-  call get_environment_variable("TOMBOLO_ORDERS", text)
-  if (text /= "") call check(tombolo_orders_file(run, text))
-  call check(tombolo_communicator(run, MPI_COMM_WORLD))
+  call get_environment_variable("TOMBOLO_PIPELINES", pipelines)
+  call get_environment_variable("TOMBOLO_ORDERS", orders)
+  call check(tombolo_open(pipelines, MPI_COMM_WORLD, run))
+  if (pipelines == "") call check(tombolo_configure(run, watch_the_surface))
+  if (orders /= "") call check(tombolo_orders_file(run, orders))
   call check(tombolo_parameter(run, "conductivity", conductivity, 0d0, 1d0))
-  call check(tombolo_initialize(run))
-  call check(tombolo_link(run, text))
-  if (text /= "") write (0, '(2a)') "open ", trim(text)
+  call check(tombolo_start(run))
+  if (tombolo_link(run) /= "") write (0, '(2a)') "open ", tombolo_link(run)
 
   ! The arrays stay the solver's: nothing is copied.
-  call check(tombolo_mesh(run, "solid", solver%coordinates))
+  call check(tombolo_points(run, "solid", solver%coordinates))
   call check(tombolo_cells(run, "solid", TOMBOLO_TETRA, solver%connectivity))
   call check(tombolo_faces(run, "solid", TOMBOLO_TRIANGLE, solver%triangles, solver%features))
   do side = 1, 6
     call check(tombolo_feature(run, "solid", side, sides(side)))
   end do
-  call check(tombolo_global_numbers(run, "solid", solver%numbers))
-  temperature(1:1, 1:solver%vertices) => solver%temperature
-  call check(tombolo_field(run, "solid", "temperature", TOMBOLO_VERTEX, temperature))
+  call check(tombolo_global_vertices(run, "solid", solver%numbers))
+  call check(tombolo_field(run, "solid", "temperature", TOMBOLO_VERTEX, solver%temperature))
 
   do step = 0, steps - 1
-    call check(tombolo_execute(run, int(step, c_int64_t), time_step * step, time_step))
+    call check(tombolo_execute(run, step, time_step * step, time_step))
     call check(tombolo_parameter_value(run, "conductivity", conductivity))
-    if (tombolo_stopped(run) /= 0) exit
-    moved => tombolo_coordinates(run, solver%vertices)
-    velocity => tombolo_velocity(run, solver%vertices)
+    if (tombolo_stopped(run)) exit
+    moved => tombolo_coordinates(run)
+    velocity => tombolo_velocity(run)
     solver%velocity = 0
     if (associated(velocity)) solver%velocity = velocity
     call heat_step(solver, conductivity, time_step)
@@ -73,11 +65,8 @@ program heat_tombolo
     print '(a, f0.12, a, f0.12, a, f0.3)', 'volume ', volume, ' mean temperature ', mean, ' conductivity ', conductivity
 
   call check(tombolo_finalize(run))
-  do order = 1, tombolo_order_count(run)
-    call check(tombolo_order(run, order - 1, text))
-    if (solver%rank == 0) print '(a)', trim(text)
-  end do
-  call tombolo_destroy(run)
+  if (solver%rank == 0) print '(a)', (tombolo_order(run, order), order = 1, tombolo_order_count(run))
+  call check(tombolo_close(run))
   call MPI_Finalize(error)
 
 contains

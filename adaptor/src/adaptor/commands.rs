@@ -68,7 +68,7 @@ impl Adaptor {
         if self.communicator.rank() > 0 {
             return;
         }
-        eprintln!("tombolo: {message}");
+        log::warn!("{message}");
         if let Some(hub) = &self.hub {
             hub.tell(&json!({"error": {"message": message}}));
         }

@@ -367,10 +367,7 @@ impl Communicator for Mpi {
     }
 
     fn abort(&self) {
-        eprintln!(
-            "tombolo: rank {} failed in itself; all ranks are ended, because the others would wait for it",
-            self.rank
-        );
+        log::error!("rank {} failed in itself; all ranks are ended, because the others would wait for it", self.rank);
         // SAFETY: the handle is alive while this is.
         unsafe { ffi::MPI_Abort(self.as_raw(), 1) };
     }

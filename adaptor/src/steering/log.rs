@@ -195,7 +195,7 @@ impl Log {
             "order '{id}': applied, not followed: shape {shape} of {shapes}, handed out at cycle {cycle}, is not where the \
              solver's mesh is at the next call; its vertices are up to {distance:.3e} from there"
         );
-        eprintln!("tombolo: {message}");
+        log::warn!("{message}");
         if let Some(hub) = &self.hub {
             hub.tell(&json!({"error": {"message": message, "id": id}}));
         }
@@ -214,7 +214,7 @@ impl Log {
         let entry = JournalEntry { id: id.into(), status, cycle, time, command, reason, min_scaled_jacobian, fraction };
         if let Err(error) = self.journal.write(&entry) {
             // The solver goes on without; it must not go unsaid.
-            eprintln!("tombolo: {error}; this run has no journal from here on");
+            log::warn!("{error}; this run has no journal from here on");
             if let Some(hub) = &self.hub {
                 hub.tell(&json!({"error": {"message": format!("{error}; this run has no journal from here on")}}));
             }

@@ -1,39 +1,58 @@
-//! The C interface of `include/tombolo.h`. What each function does is told there.
+//! The C interface of `include/tombolo.h`, which says what each function does.
+//!
+//! A handle is a number that is never given twice, so that a run that was closed is told from one that is open. Every function
+//! goes through [`answer`] or [`value`], by which no panic crosses the border.
 //!
 //! # Safety
-//! Of every function: pointers are null or point to what the header says, handles come from `tombolo_create` and are used by one
-//! thread at a time, and arrays that were named live, unchanged by others, while `tombolo_execute` runs.
+//! Of every function: pointers are null or point to what the header says, and arrays that were named live, unchanged by others,
+//! while `tombolo_execute` runs.
 
-mod arrays;
+mod lent;
+mod logging;
+mod mesh;
+mod named;
 mod setup;
 mod steps;
 
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::ffi::{CStr, CString, c_char, c_int};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::ptr;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
 use tombolo::{Report, Settings};
 
 use crate::error::CatalystError;
 use crate::run::Run;
-use arrays::Named;
+use named::Named;
 
-/// Wrong call, as the header numbers it; the other statuses are those of Catalyst.
+/// A call at the wrong time, as the header numbers it; the other statuses are those of Catalyst.
 const WRONG_CALL: c_int = 1;
+const DEFECT: &str = "a defect of tombolo stopped this call; the solver may go on";
+
+/// What a `tombolo*` points to: nothing that is ever looked at.
+#[repr(C)]
+pub struct Handle {
+    _private: [u8; 0],
+}
 
 /// How far a run has come.
 enum Stage {
-    SettingUp { settings: Box<Settings>, communicator: Option<i32> },
+    Opened(Box<Settings>),
     UnderWay(Box<Run>),
     Ended,
 }
 
-/// What the handle stands for.
-pub struct Handle {
+/// A run that was opened and not closed.
+struct Opened {
     stage: Stage,
     channels: Vec<Named>,
-    report: CString,
-    /// The report itself, for counts.
-    ended: Option<Report>,
+    /// Texts that the caller has the addresses of.
+    link: Option<CString>,
+    orders: BTreeMap<usize, CString>,
+    motion_order: CString,
+    report: Option<(Report, CString)>,
 }
 
 /// What can be wrong with a call.
@@ -42,19 +61,23 @@ enum Fault {
     Error(CatalystError),
 }
 
-impl From<CatalystError> for Fault {
-    fn from(error: CatalystError) -> Self {
-        Fault::Error(error)
+impl<E: Into<CatalystError>> From<E> for Fault {
+    fn from(error: E) -> Self {
+        Fault::Error(error.into())
     }
 }
 
 impl Fault {
-    fn invalid(what: &str, found: impl ToString, expected: impl ToString) -> Self {
-        Fault::Error(CatalystError::Wrong {
-            path: what.into(),
+    fn invalid(what: impl ToString, found: impl ToString, expected: impl ToString) -> Self {
+        Fault::Error(CatalystError::Argument {
+            what: what.to_string(),
             found: found.to_string(),
             expected: expected.to_string(),
         })
+    }
+
+    fn null(what: &str) -> Self {
+        Fault::Call(format!("{what} is a null pointer"))
     }
 }
 
@@ -63,7 +86,9 @@ thread_local! {
 }
 
 fn keep_message(text: &str) {
-    MESSAGE.with_borrow_mut(|message| *message = c_string(text));
+    let text = c_string(text);
+    // A thread that is ending keeps none.
+    let _ = MESSAGE.try_with(|message| message.replace(text));
 }
 
 fn c_string(text: &str) -> CString {
@@ -71,8 +96,8 @@ fn c_string(text: &str) -> CString {
 }
 
 /// Runs a call so that neither an error nor a panic crosses the border.
-fn answer(run: impl FnOnce() -> Result<(), Fault>) -> c_int {
-    match std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)) {
+fn answer(call: impl FnOnce() -> Result<(), Fault>) -> c_int {
+    match catch_unwind(AssertUnwindSafe(call)) {
         Ok(Ok(())) => 0,
         Ok(Err(Fault::Call(message))) => {
             keep_message(&message);
@@ -83,74 +108,205 @@ fn answer(run: impl FnOnce() -> Result<(), Fault>) -> c_int {
             error.status() as c_int
         }
         Err(_) => {
-            keep_message("a defect of tombolo stopped this call; the solver may go on");
+            keep_message(DEFECT);
             102
         }
     }
 }
 
-/// # Safety
-/// As the module says.
-unsafe fn handle<'a>(run: *mut Handle) -> Result<&'a mut Handle, Fault> {
-    // SAFETY: null, or what `tombolo_create` made and nobody else uses now.
-    unsafe { run.as_mut() }.ok_or_else(|| Fault::Call("the run is a null pointer".into()))
+/// Runs a call that answers with a value, or `otherwise` where something is wrong.
+fn value<T>(otherwise: T, call: impl FnOnce() -> Result<T, Fault>) -> T {
+    let mut found = otherwise;
+    answer(|| {
+        found = call()?;
+        Ok(())
+    });
+    found
 }
 
-/// # Safety
-/// As the module says.
-unsafe fn shared<'a>(run: *const Handle) -> Option<&'a Handle> {
-    // SAFETY: as in `handle`.
-    unsafe { run.as_ref() }
+/// The runs that are open, by the numbers that stand for them.
+#[derive(Default)]
+struct Runs {
+    last: usize,
+    open: BTreeMap<usize, Arc<Mutex<Opened>>>,
+}
+
+static RUNS: Mutex<Runs> = Mutex::new(Runs { last: 0, open: BTreeMap::new() });
+
+fn runs() -> MutexGuard<'static, Runs> {
+    RUNS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Gives a run its handle.
+fn register(run: Opened) -> *mut Handle {
+    let mut runs = runs();
+    // Distances as between addresses, for whoever looks at the lowest bits of one.
+    runs.last += 16;
+    let number = runs.last;
+    runs.open.insert(number, Arc::new(Mutex::new(run)));
+    ptr::without_provenance_mut(number)
+}
+
+fn find(run: *mut Handle) -> Result<Arc<Mutex<Opened>>, Fault> {
+    if run.is_null() {
+        return Err(Fault::null("the run"));
+    }
+    let known = runs().open.get(&run.addr()).map(Arc::clone);
+    known.ok_or_else(|| Fault::Call("the run is not open: it was closed, or never opened by tombolo_open".into()))
+}
+
+/// Holds a run for the length of a call.
+fn hold(run: &Mutex<Opened>) -> Result<MutexGuard<'_, Opened>, Fault> {
+    match run.try_lock() {
+        Ok(held) => Ok(held),
+        Err(TryLockError::Poisoned(held)) => Ok(held.into_inner()),
+        Err(TryLockError::WouldBlock) => {
+            Err(Fault::Call("the run is in another call; one thread at a time can use it".into()))
+        }
+    }
+}
+
+/// Does something with an open run.
+fn with<T>(run: *mut Handle, call: impl FnOnce(&mut Opened) -> Result<T, Fault>) -> Result<T, Fault> {
+    let run = find(run)?;
+    call(&mut *hold(&run)?)
 }
 
 /// # Safety
 /// `text` is null or a C string.
 unsafe fn text(text: *const c_char, what: &str) -> Result<String, Fault> {
     if text.is_null() {
-        return Err(Fault::Call(format!("{what} is a null pointer")));
+        return Err(Fault::null(what));
     }
     // SAFETY: a C string, by the module's contract.
     let text = unsafe { CStr::from_ptr(text) };
-    text.to_str().map(str::to_owned).map_err(|_| Fault::invalid(what, "bytes that are no UTF-8", "a text in UTF-8"))
+    text.to_str().map(str::to_owned).map_err(|_| Fault::invalid(what, "bytes that are not UTF-8", "a text in UTF-8"))
 }
 
-/// Copies a text into the caller's memory, cut where it is too long, and ends it.
+/// A text that names something.
 ///
 /// # Safety
-/// `into` is null or can be written to for `bytes` bytes.
-unsafe fn give(text: &str, into: *mut c_char, bytes: usize) {
-    if into.is_null() || bytes == 0 {
-        return;
+/// As of [`text`].
+unsafe fn name(name: *const c_char, what: &str) -> Result<String, Fault> {
+    // SAFETY: as above.
+    let name = unsafe { text(name, what) }?;
+    if name.is_empty() || name.chars().any(char::is_control) {
+        return Err(Fault::invalid(what, format!("{name:?}"), "a name of one letter or more, on one line"));
     }
-    let mut length = text.len().min(bytes - 1);
-    while !text.is_char_boundary(length) {
-        length -= 1;
-    }
-    // SAFETY: `length + 1` bytes can be written, and lie apart from the text.
-    unsafe {
-        std::ptr::copy_nonoverlapping(text.as_ptr().cast(), into, length);
-        into.add(length).write(0);
-    }
+    Ok(name)
 }
 
-impl Handle {
-    fn setting_up(&mut self) -> Result<(&mut Settings, &mut Option<i32>), Fault> {
+impl Opened {
+    fn settings(&mut self) -> Result<&mut Settings, Fault> {
         match &mut self.stage {
-            Stage::SettingUp { settings, communicator } => Ok((settings, communicator)),
-            _ => Err(Fault::Call("called after tombolo_initialize; it belongs before".into())),
+            Stage::Opened(settings) => Ok(settings),
+            _ => Err(Fault::Call(
+                "called after the run began; expected before tombolo_start and the first tombolo_execute".into(),
+            )),
         }
     }
 
-    fn under_way(&self) -> Option<&Run> {
+    /// The run, which has begun and not ended.
+    fn under_way(&self) -> Result<&Run, Fault> {
         match &self.stage {
-            Stage::UnderWay(run) => Some(run),
-            _ => None,
+            Stage::UnderWay(run) => Ok(run),
+            Stage::Opened(_) => {
+                Err(Fault::Call("called before the run began, by tombolo_start or the first tombolo_execute".into()))
+            }
+            Stage::Ended => Err(Self::after_the_end()),
         }
+    }
+
+    fn not_ended(&self) -> Result<(), Fault> {
+        if matches!(self.stage, Stage::Ended) { Err(Self::after_the_end()) } else { Ok(()) }
+    }
+
+    fn after_the_end() -> Fault {
+        Fault::Call("called after tombolo_finalize; the run has ended".into())
     }
 }
 
-/// The last message of this thread.
+/// See `tombolo.h`.
 #[unsafe(no_mangle)]
 pub extern "C" fn tombolo_message() -> *const c_char {
-    MESSAGE.with_borrow(|message| message.as_ptr())
+    // A borrowed message cannot be met: it is replaced whole, and nobody else is called meanwhile.
+    let kept = MESSAGE.try_with(|message| message.try_borrow().map_or(c"".as_ptr(), |message| message.as_ptr()));
+    kept.unwrap_or(c"".as_ptr())
+}
+
+/// See `tombolo.h`.
+#[unsafe(no_mangle)]
+pub extern "C" fn tombolo_version() -> *const c_char {
+    const VERSION: &CStr = match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
+        Ok(version) => version,
+        Err(_) => c"",
+    };
+    VERSION.as_ptr()
+}
+
+/// Lets the Fortran module refuse an array in the words of every other error: text, found, expected.
+///
+/// # Safety
+/// As the module says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_refuse(what: *const c_char, found: *const c_char, expected: *const c_char) -> c_int {
+    answer(|| {
+        // SAFETY: as the module says.
+        let [what, found, expected] =
+            unsafe { [text(what, "what")?, text(found, "found")?, text(expected, "expected")?] };
+        Err(Fault::invalid(what, found, expected))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_is_a_status_and_a_message() {
+        // SAFETY: the message is this thread's, and a C string.
+        let told = || unsafe { CStr::from_ptr(tombolo_message()) }.to_string_lossy().into_owned();
+        assert_eq!(answer(|| panic!("deliberate")), 102);
+        assert_eq!(told(), DEFECT);
+        assert_eq!(value(7, || Err(Fault::Call("other".into()))), 7);
+        assert_eq!(told(), "other");
+        assert_eq!(value(7, || panic!("deliberate")), 7);
+        assert_eq!(told(), DEFECT);
+    }
+
+    #[test]
+    fn a_run_whose_call_panicked_can_be_used() {
+        let run = register(Opened {
+            stage: Stage::Ended,
+            channels: Vec::new(),
+            link: None,
+            orders: BTreeMap::new(),
+            motion_order: CString::default(),
+            report: None,
+        });
+        assert_eq!(answer(|| with(run, |_| panic!("deliberate"))), 102);
+        assert_eq!(answer(|| with(run, |_| with(run, |_| Ok(())))), WRONG_CALL);
+        assert_eq!(answer(|| with(run, |_| Ok(()))), 0);
+        runs().open.remove(&run.addr());
+        assert_eq!(answer(|| with(run, |_| Ok(()))), WRONG_CALL);
+    }
+
+    #[test]
+    fn every_exported_function_stops_panics() {
+        let sources = [
+            include_str!("mod.rs"),
+            include_str!("logging.rs"),
+            include_str!("mesh.rs"),
+            include_str!("setup.rs"),
+            include_str!("steps.rs"),
+        ];
+        for source in sources {
+            let source = source.split("#[cfg(test)]").next().unwrap_or_default();
+            for function in source.split("extern \"C\" fn ").skip(1) {
+                let body = function.split("\n}\n").next().unwrap_or_default();
+                let guarded = ["answer(", "value(", "lend(", "MESSAGE.try_with(", "const VERSION"];
+                assert!(guarded.iter().any(|guard| body.contains(guard)), "{body}");
+            }
+        }
+    }
 }

@@ -1,48 +1,68 @@
-//! From `tombolo_create` to `tombolo_initialize`, and the end.
+//! From `tombolo_open` to `tombolo_start`, and from `tombolo_finalize` to `tombolo_close`.
 
+use std::collections::BTreeMap;
 use std::ffi::{CString, c_char, c_int};
 use std::path::PathBuf;
+use std::ptr;
+use std::sync::Arc;
 
-use tombolo::pipelines::language;
+use tombolo::pipelines::language::{self, Config};
 use tombolo::{Parameter, Settings};
 
-use super::{Fault, Handle, Stage, answer, c_string, give, handle, keep_message, shared, text};
+use super::{Fault, Handle, Opened, Stage, answer, c_string, find, hold, name, register, runs, text, value, with};
 use crate::error::CatalystError;
 use crate::ranks;
 use crate::run::Run;
 
-fn unreadable(error: impl ToString) -> Fault {
-    Fault::Error(CatalystError::Configuration(error.to_string()))
+/// The communicator that stands for all ranks where MPI runs, and for this process where it does not.
+const WORLD: c_int = -1;
+
+fn unreadable(error: impl ToString) -> CatalystError {
+    CatalystError::Configuration(error.to_string())
 }
 
-fn file_text(file: &str) -> Result<String, Fault> {
+fn file_text(file: &str) -> Result<String, CatalystError> {
     let bytes = std::fs::read(file).map_err(|error| unreadable(format!("{file}: {error}")))?;
     Ok(language::text(&bytes, file).map_err(unreadable)?.to_owned())
 }
 
-/// See `tombolo.h`.
-#[unsafe(no_mangle)]
-pub extern "C" fn tombolo_create() -> *mut Handle {
-    let stage = Stage::SettingUp { settings: Box::default(), communicator: None };
-    let handle = Handle { stage, channels: Vec::new(), report: CString::default(), ended: None };
-    Box::into_raw(Box::new(handle))
+fn read_configuration(file: &str) -> Result<Config, CatalystError> {
+    language::parse(&file_text(file)?, file).map_err(unreadable)
 }
 
 /// See `tombolo.h`.
 ///
 /// # Safety
-/// As the module says; the handle is not used again.
+/// As the module says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_destroy(run: *mut Handle) {
-    if !run.is_null() {
-        let dropped = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-            // SAFETY: `tombolo_create` made it of a box, and it is destroyed once.
-            drop(unsafe { Box::from_raw(run) });
-        }));
-        if dropped.is_err() {
-            keep_message("a defect of tombolo stopped this call; the solver may go on");
+pub unsafe extern "C" fn tombolo_open(file: *const c_char, communicator: c_int, run: *mut *mut Handle) -> c_int {
+    answer(|| {
+        // SAFETY: as the module says.
+        let run = unsafe { run.as_mut() }.ok_or_else(|| Fault::null("the address of the run"))?;
+        *run = ptr::null_mut();
+        let communicator = ranks::communicator((communicator != WORLD).then_some(communicator))?;
+        let mut settings = Settings { communicator: Arc::clone(&communicator), ..Settings::default() };
+        // SAFETY: as the module says.
+        let file = if file.is_null() { Ok(None) } else { unsafe { text(file, "file") }.map(Some) };
+        // A rank whose file cannot be read must not leave the others waiting.
+        let config = file.and_then(|file| Ok(file.map(|file| read_configuration(&file)).transpose()?));
+        let config = config.map_err(|fault| match fault {
+            Fault::Error(error) => error,
+            Fault::Call(message) => CatalystError::Configuration(message),
+        });
+        if let Some(config) = ranks::agree(&*communicator, config)? {
+            settings.config = config;
         }
-    }
+        *run = register(Opened {
+            stage: Stage::Opened(Box::new(settings)),
+            channels: Vec::new(),
+            link: None,
+            orders: BTreeMap::new(),
+            motion_order: CString::default(),
+            report: None,
+        });
+        Ok(())
+    })
 }
 
 /// See `tombolo.h`.
@@ -53,9 +73,11 @@ pub unsafe extern "C" fn tombolo_destroy(run: *mut Handle) {
 pub unsafe extern "C" fn tombolo_configure(run: *mut Handle, json: *const c_char) -> c_int {
     answer(|| {
         // SAFETY: as the module says.
-        let (run, json) = unsafe { (handle(run)?, text(json, "json")?) };
-        run.setting_up()?.0.config = language::parse(&json, "configuration").map_err(unreadable)?;
-        Ok(())
+        let json = unsafe { text(json, "json") }?;
+        with(run, |run| {
+            run.settings()?.config = language::parse(&json, "configuration").map_err(unreadable)?;
+            Ok(())
+        })
     })
 }
 
@@ -64,12 +86,14 @@ pub unsafe extern "C" fn tombolo_configure(run: *mut Handle, json: *const c_char
 /// # Safety
 /// As the module says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_configure_file(run: *mut Handle, file: *const c_char) -> c_int {
+pub unsafe extern "C" fn tombolo_orders(run: *mut Handle, json: *const c_char) -> c_int {
     answer(|| {
         // SAFETY: as the module says.
-        let (run, file) = unsafe { (handle(run)?, text(file, "file")?) };
-        run.setting_up()?.0.config = language::parse(&file_text(&file)?, &file).map_err(unreadable)?;
-        Ok(())
+        let json = unsafe { text(json, "json") }?;
+        with(run, |run| {
+            run.settings()?.orders = language::parse_orders(&json, "orders").map_err(unreadable)?;
+            Ok(())
+        })
     })
 }
 
@@ -81,9 +105,11 @@ pub unsafe extern "C" fn tombolo_configure_file(run: *mut Handle, file: *const c
 pub unsafe extern "C" fn tombolo_orders_file(run: *mut Handle, file: *const c_char) -> c_int {
     answer(|| {
         // SAFETY: as the module says.
-        let (run, file) = unsafe { (handle(run)?, text(file, "file")?) };
-        run.setting_up()?.0.orders = language::parse_orders(&file_text(&file)?, &file).map_err(unreadable)?;
-        Ok(())
+        let file = unsafe { text(file, "file") }?;
+        with(run, |run| {
+            run.settings()?.orders = language::parse_orders(&file_text(&file)?, &file).map_err(unreadable)?;
+            Ok(())
+        })
     })
 }
 
@@ -95,22 +121,11 @@ pub unsafe extern "C" fn tombolo_orders_file(run: *mut Handle, file: *const c_ch
 pub unsafe extern "C" fn tombolo_output(run: *mut Handle, directory: *const c_char) -> c_int {
     answer(|| {
         // SAFETY: as the module says.
-        let (run, directory) = unsafe { (handle(run)?, text(directory, "directory")?) };
-        run.setting_up()?.0.output = PathBuf::from(directory);
-        Ok(())
-    })
-}
-
-/// See `tombolo.h`.
-///
-/// # Safety
-/// As the module says.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_communicator(run: *mut Handle, fortran_handle: c_int) -> c_int {
-    answer(|| {
-        // SAFETY: as the module says.
-        *unsafe { handle(run) }?.setting_up()?.1 = Some(fortran_handle);
-        Ok(())
+        let directory = unsafe { text(directory, "directory") }?;
+        with(run, |run| {
+            run.settings()?.output = PathBuf::from(directory);
+            Ok(())
+        })
     })
 }
 
@@ -121,16 +136,64 @@ pub unsafe extern "C" fn tombolo_communicator(run: *mut Handle, fortran_handle: 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tombolo_parameter(
     run: *mut Handle,
-    name: *const c_char,
+    parameter: *const c_char,
     value: f64,
     minimum: f64,
     maximum: f64,
 ) -> c_int {
     answer(|| {
         // SAFETY: as the module says.
-        let (run, name) = unsafe { (handle(run)?, text(name, "name")?) };
-        run.setting_up()?.0.parameters.push(Parameter { name, value, minimum, maximum });
-        Ok(())
+        let name = unsafe { name(parameter, "the parameter's name") }?;
+        with(run, |run| {
+            run.settings()?.parameters.push(Parameter { name, value, minimum, maximum });
+            Ok(())
+        })
+    })
+}
+
+impl Opened {
+    /// Begins, where that has not been done. Collective.
+    pub(super) fn begin(&mut self) -> Result<&mut Run, Fault> {
+        if let Stage::Opened(settings) = &self.stage {
+            let run = Run::new((**settings).clone())?;
+            self.link = run.link().map(|link| c_string(&link));
+            self.stage = Stage::UnderWay(Box::new(run));
+        }
+        match &mut self.stage {
+            Stage::UnderWay(run) => Ok(run),
+            _ => Err(Self::after_the_end()),
+        }
+    }
+
+    /// Ends. Collective.
+    fn end(&mut self) -> Result<(), Fault> {
+        match std::mem::replace(&mut self.stage, Stage::Ended) {
+            Stage::UnderWay(run) => {
+                let (report, ended) = run.finalize();
+                self.orders.clear();
+                self.report = report.map(|report| {
+                    let text = c_string(&serde_json::to_string(&report).unwrap_or_default());
+                    (report, text)
+                });
+                Ok(ended?)
+            }
+            Stage::Opened(_) => Ok(()),
+            Stage::Ended => Err(Self::after_the_end()),
+        }
+    }
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_start(run: *mut Handle) -> c_int {
+    answer(|| {
+        with(run, |run| match &run.stage {
+            Stage::UnderWay(_) => Err(Fault::Call("called twice, or after tombolo_execute; the run has begun".into())),
+            _ => run.begin().map(|_| ()),
+        })
     })
 }
 
@@ -139,31 +202,12 @@ pub unsafe extern "C" fn tombolo_parameter(
 /// # Safety
 /// As the module says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_initialize(run: *mut Handle) -> c_int {
-    answer(|| {
-        // SAFETY: as the module says.
-        let run = unsafe { handle(run) }?;
-        let (settings, communicator) = run.setting_up()?;
-        let ranks = ranks::communicator(*communicator)?;
-        let settings = Settings { communicator: ranks, ..settings.clone() };
-        run.stage = Stage::UnderWay(Box::new(Run::new(settings)?));
-        Ok(())
-    })
-}
-
-/// See `tombolo.h`.
-///
-/// # Safety
-/// As the module says.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_link(run: *const Handle, into: *mut c_char, bytes: usize) -> c_int {
-    answer(|| {
-        // SAFETY: as the module says.
-        let run = unsafe { shared(run) }.ok_or_else(|| Fault::Call("the run is a null pointer".into()))?;
-        let link = run.under_way().and_then(Run::link).unwrap_or_default();
-        // SAFETY: as the module says.
-        unsafe { give(&link, into, bytes) };
-        Ok(())
+pub unsafe extern "C" fn tombolo_link(run: *mut Handle) -> *const c_char {
+    value(ptr::null(), || {
+        with(run, |run| {
+            run.under_way()?;
+            Ok(run.link.as_ref().map_or(ptr::null(), |link| link.as_ptr()))
+        })
     })
 }
 
@@ -173,23 +217,20 @@ pub unsafe extern "C" fn tombolo_link(run: *const Handle, into: *mut c_char, byt
 /// As the module says.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tombolo_finalize(run: *mut Handle) -> c_int {
-    answer(|| {
-        // SAFETY: as the module says.
-        let run = unsafe { handle(run) }?;
-        match std::mem::replace(&mut run.stage, Stage::Ended) {
-            Stage::UnderWay(under_way) => {
-                let (report, ended) = under_way.finalize();
-                if let Some(report) = &report {
-                    run.report = c_string(&serde_json::to_string(report).unwrap_or_default());
-                }
-                run.ended = report;
-                Ok(ended?)
-            }
-            before => {
-                run.stage = before;
-                Err(Fault::Call("called outside of tombolo_initialize ... tombolo_finalize".into()))
-            }
-        }
+    answer(|| with(run, Opened::end))
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_report(run: *mut Handle) -> *const c_char {
+    value(ptr::null(), || {
+        with(run, |run| match &run.stage {
+            Stage::Ended => Ok(run.report.as_ref().map_or(ptr::null(), |(_, text)| text.as_ptr())),
+            _ => Err(Fault::Call("called before tombolo_finalize; the report is made at the end".into())),
+        })
     })
 }
 
@@ -198,7 +239,17 @@ pub unsafe extern "C" fn tombolo_finalize(run: *mut Handle) -> c_int {
 /// # Safety
 /// As the module says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_report(run: *const Handle) -> *const c_char {
-    // SAFETY: as the module says.
-    unsafe { shared(run) }.map_or(c"".as_ptr(), |run| run.report.as_ptr())
+pub unsafe extern "C" fn tombolo_close(run: *mut *mut Handle) -> c_int {
+    answer(|| {
+        // SAFETY: as the module says.
+        let run = unsafe { run.as_mut() }.ok_or_else(|| Fault::null("the address of the run"))?;
+        if run.is_null() {
+            return Ok(());
+        }
+        let opened = find(*run)?;
+        let mut held = hold(&opened)?;
+        runs().open.remove(&run.addr());
+        *run = ptr::null_mut();
+        if matches!(held.stage, Stage::Ended) { Ok(()) } else { held.end() }
+    })
 }

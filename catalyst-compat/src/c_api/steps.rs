@@ -4,11 +4,11 @@ use std::ffi::{c_char, c_int, c_uint};
 use std::ptr;
 
 use tombolo::deform::mesh::Vector;
-use tombolo::{OrderReport, Step};
+use tombolo::pipelines::language::nearest;
+use tombolo::{ExecuteError, OrderReport, Step};
 
-use super::{Fault, Handle, Stage, answer, give, handle, shared, text};
+use super::{Fault, Handle, Opened, Stage, answer, c_string, text, value, with};
 use crate::motion::Motion;
-use crate::run::Run;
 
 /// See `tombolo.h`.
 ///
@@ -17,88 +17,34 @@ use crate::run::Run;
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tombolo_execute(run: *mut Handle, cycle: u64, time: f64, time_step: f64) -> c_int {
     answer(|| {
-        // SAFETY: as the module says.
-        let run = unsafe { handle(run) }?;
-        let Stage::UnderWay(under_way) = &mut run.stage else {
-            return Err(Fault::Call("called outside of tombolo_initialize ... tombolo_finalize".into()));
-        };
-        let _alarm = under_way.alarm();
-        // SAFETY: as the module says: the arrays live while this call runs.
-        let channels: Result<Vec<_>, _> = run.channels.iter().map(|named| unsafe { named.channel() }).collect();
-        let given = channels.map(|channels| (Step { cycle, time, time_step }, channels));
-        under_way.execute(given)?;
-        Ok(())
-    })
-}
-
-fn motion<'a>(run: *const Handle) -> Option<&'a Motion> {
-    // SAFETY: as the module says.
-    unsafe { shared(run) }?.under_way()?.asked().motion.as_ref()
-}
-
-fn first(run: *const Handle, part: impl Fn(&Motion) -> &Vec<Vector>) -> *const f64 {
-    motion(run).map_or(ptr::null(), |motion| part(motion).as_ptr().cast())
-}
-
-/// See `tombolo.h`.
-///
-/// # Safety
-/// As the module says.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_coordinates(run: *const Handle) -> *const f64 {
-    first(run, |motion| &motion.coordinates)
-}
-
-/// See `tombolo.h`.
-///
-/// # Safety
-/// As the module says.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_displacement(run: *const Handle) -> *const f64 {
-    first(run, |motion| &motion.displacement)
-}
-
-/// See `tombolo.h`.
-///
-/// # Safety
-/// As the module says.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_velocity(run: *const Handle) -> *const f64 {
-    first(run, |motion| &motion.velocity)
-}
-
-/// See `tombolo.h`.
-///
-/// # Safety
-/// As the module says.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_schedule(
-    run: *const Handle,
-    shape: *mut c_uint,
-    shapes: *mut c_uint,
-    order: *mut c_char,
-    bytes: usize,
-) -> c_int {
-    answer(|| {
-        let (numbers, name) = motion(run).map_or(((0, 0), ""), |motion| (motion.shape, motion.order.as_str()));
-        // SAFETY: as the module says.
-        unsafe {
-            if let Some(shape) = shape.as_mut() {
-                *shape = numbers.0;
+        with(run, |run| {
+            run.begin()?;
+            run.orders.clear();
+            let Stage::UnderWay(under_way) = &mut run.stage else { return Err(Opened::after_the_end()) };
+            let _alarm = under_way.alarm();
+            // SAFETY: as the module says: the arrays live while this call runs.
+            let channels: Result<Vec<_>, _> = run.channels.iter().map(|named| unsafe { named.channel() }).collect();
+            let given = channels.map(|channels| (Step { cycle, time, time_step }, channels));
+            if !under_way.execute(given)? {
+                return Err(ExecuteError::NoChannel { cycle }.into());
             }
-            if let Some(shapes) = shapes.as_mut() {
-                *shapes = numbers.1;
+            run.channels.iter_mut().for_each(|named| named.is_shown = true);
+            let order = under_way.asked().motion.as_ref().map(|motion| motion.order.as_str());
+            if let Some(order) = order.filter(|order| run.motion_order.to_bytes() != order.as_bytes()) {
+                run.motion_order = c_string(order);
             }
-            give(name, order, bytes);
-        }
-        Ok(())
+            Ok(())
+        })
     })
 }
 
-fn reading<'a>(run: *const Handle) -> Result<&'a Run, Fault> {
-    // SAFETY: as the module says.
-    let run = unsafe { shared(run) }.ok_or_else(|| Fault::Call("the run is a null pointer".into()))?;
-    run.under_way().ok_or_else(|| Fault::Call("called outside of tombolo_initialize ... tombolo_finalize".into()))
+/// Something of the motion that is asked for; `None` where the mesh stays.
+fn motion<T>(run: *mut Handle, part: impl FnOnce(&Motion, &Opened) -> T) -> Option<T> {
+    value(None, || with(run, |run| Ok(run.under_way()?.asked().motion.as_ref().map(|motion| part(motion, run)))))
+}
+
+fn first(vectors: &[Vector]) -> *const f64 {
+    vectors.as_ptr().cast()
 }
 
 /// See `tombolo.h`.
@@ -106,20 +52,104 @@ fn reading<'a>(run: *const Handle) -> Result<&'a Run, Fault> {
 /// # Safety
 /// As the module says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_parameter_value(run: *const Handle, name: *const c_char, value: *mut f64) -> c_int {
+pub unsafe extern "C" fn tombolo_coordinates(run: *mut Handle) -> *const f64 {
+    value(ptr::null(), || Ok(motion(run, |motion, _| first(&motion.coordinates)).unwrap_or(ptr::null())))
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_displacement(run: *mut Handle) -> *const f64 {
+    value(ptr::null(), || Ok(motion(run, |motion, _| first(&motion.displacement)).unwrap_or(ptr::null())))
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_velocity(run: *mut Handle) -> *const f64 {
+    value(ptr::null(), || Ok(motion(run, |motion, _| first(&motion.velocity)).unwrap_or(ptr::null())))
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_motion_count(run: *mut Handle) -> usize {
+    value(0, || Ok(motion(run, |motion, _| motion.coordinates.len()).unwrap_or(0)))
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_surface_coordinates(run: *mut Handle) -> *const f64 {
+    value(ptr::null(), || Ok(motion(run, |motion, _| first(&motion.surface.coordinates)).unwrap_or(ptr::null())))
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_surface_displacement(run: *mut Handle) -> *const f64 {
+    value(ptr::null(), || Ok(motion(run, |motion, _| first(&motion.surface.displacement)).unwrap_or(ptr::null())))
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_surface_velocity(run: *mut Handle) -> *const f64 {
+    value(ptr::null(), || Ok(motion(run, |motion, _| first(&motion.surface.velocity)).unwrap_or(ptr::null())))
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_surface_vertices(run: *mut Handle) -> *const u32 {
+    value(ptr::null(), || Ok(motion(run, |motion, _| motion.surface.vertices.as_ptr()).unwrap_or(ptr::null())))
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_surface_count(run: *mut Handle) -> usize {
+    value(0, || Ok(motion(run, |motion, _| motion.surface.vertices.len()).unwrap_or(0)))
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_motion_order(run: *mut Handle) -> *const c_char {
+    value(ptr::null(), || Ok(motion(run, |_, run| run.motion_order.as_ptr()).unwrap_or(ptr::null())))
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_motion_shape(run: *mut Handle, shape: *mut c_uint, shapes: *mut c_uint) -> c_int {
     answer(|| {
         // SAFETY: as the module says.
-        let name = unsafe { text(name, "name") }?;
-        let known = &reading(run)?.asked().parameters;
-        let found = known.get(&name).ok_or_else(|| {
-            let names: Vec<&str> = known.keys().map(String::as_str).collect();
-            Fault::invalid("parameter", format!("'{name}'"), format!("one of: {}", names.join(", ")))
-        })?;
-        // SAFETY: as the module says.
-        match unsafe { value.as_mut() } {
-            Some(value) => *value = *found,
-            None => return Err(Fault::Call("value is a null pointer".into())),
-        }
+        let (shape, shapes) = unsafe { (shape.as_mut(), shapes.as_mut()) };
+        let (shape, shapes) = shape.zip(shapes).ok_or_else(|| Fault::null("shape or shapes"))?;
+        (*shape, *shapes) = (0, 0);
+        let asked = with(run, |run| Ok(run.under_way()?.asked().motion.as_ref().map(|motion| motion.shape)))?;
+        (*shape, *shapes) = asked.unwrap_or_default();
         Ok(())
     })
 }
@@ -129,18 +159,48 @@ pub unsafe extern "C" fn tombolo_parameter_value(run: *const Handle, name: *cons
 /// # Safety
 /// As the module says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_stopped(run: *const Handle) -> c_int {
-    // SAFETY: as the module says.
-    let run = unsafe { shared(run) };
-    c_int::from(run.and_then(Handle::under_way).is_some_and(|run| run.asked().stop))
+pub unsafe extern "C" fn tombolo_parameter_value(run: *mut Handle, name: *const c_char, value: *mut f64) -> c_int {
+    answer(|| {
+        // SAFETY: as the module says.
+        let (name, value) = unsafe { (text(name, "the parameter's name")?, value.as_mut()) };
+        let value = value.ok_or_else(|| Fault::null("value"))?;
+        with(run, |run| {
+            let known = &run.under_way()?.asked().parameters;
+            *value = *known.get(&name).ok_or_else(|| {
+                let names = known.keys().map(String::as_str);
+                let expected = match nearest(&name, names.clone()) {
+                    Some(near) => format!("one that tombolo_parameter declared; did you mean '{near}'?"),
+                    None if known.is_empty() => "one that tombolo_parameter declared; none was".into(),
+                    None => format!("one of: {}", names.collect::<Vec<_>>().join(", ")),
+                };
+                Fault::invalid("parameter", format!("'{name}'"), expected)
+            })?;
+            Ok(())
+        })
+    })
 }
 
-fn orders(run: *const Handle) -> Vec<OrderReport> {
-    // SAFETY: as the module says.
-    let Some(run) = (unsafe { shared(run) }) else { return Vec::new() };
-    match run.under_way() {
-        Some(under_way) => under_way.orders(),
-        None => run.ended.as_ref().map(|report| report.orders.clone()).unwrap_or_default(),
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_stopped(run: *mut Handle) -> c_int {
+    // A solver whose run is not there any more is not to go on for ever.
+    value(1, || {
+        with(run, |run| match &run.stage {
+            Stage::Opened(_) => Ok(0),
+            Stage::UnderWay(under_way) => Ok(c_int::from(under_way.asked().stop)),
+            Stage::Ended => Ok(1),
+        })
+    })
+}
+
+fn orders(run: &Opened) -> Vec<OrderReport> {
+    match (&run.stage, &run.report) {
+        (Stage::UnderWay(under_way), _) => under_way.orders(),
+        (_, Some((report, _))) => report.orders.clone(),
+        _ => Vec::new(),
     }
 }
 
@@ -149,8 +209,8 @@ fn orders(run: *const Handle) -> Vec<OrderReport> {
 /// # Safety
 /// As the module says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_order_count(run: *const Handle) -> usize {
-    std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| orders(run).len())).unwrap_or(0)
+pub unsafe extern "C" fn tombolo_order_count(run: *mut Handle) -> usize {
+    value(0, || with(run, |run| Ok(orders(run).len())))
 }
 
 /// See `tombolo.h`.
@@ -158,15 +218,24 @@ pub unsafe extern "C" fn tombolo_order_count(run: *const Handle) -> usize {
 /// # Safety
 /// As the module says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_order(run: *const Handle, index: usize, json: *mut c_char, bytes: usize) -> c_int {
-    answer(|| {
-        let orders = orders(run);
-        let order = orders
-            .get(index)
-            .ok_or_else(|| Fault::invalid("order", index, format!("a number below {}", orders.len())))?;
-        let text = serde_json::to_string(order).unwrap_or_default();
-        // SAFETY: as the module says.
-        unsafe { give(&text, json, bytes) };
-        Ok(())
+pub unsafe extern "C" fn tombolo_order(run: *mut Handle, index: usize) -> *const c_char {
+    value(ptr::null(), || {
+        with(run, |run| {
+            let orders = orders(run);
+            let order = orders.get(index).ok_or_else(|| {
+                let expected = match orders.len() {
+                    0 => "no index, as there are no orders".into(),
+                    count => format!("an index from 0 to {}", count - 1),
+                };
+                Fault::invalid("order", index, expected)
+            })?;
+            let text = c_string(&serde_json::to_string(order).unwrap_or_default());
+            // A caller may hold the address of the text that was given before: it is replaced only where the order went on.
+            let kept = run.orders.entry(index).or_default();
+            if *kept != text {
+                *kept = text;
+            }
+            Ok(kept.as_ptr())
+        })
     })
 }

@@ -1,7 +1,7 @@
 //! Channels described by arrays themselves, without a node: what the C interface of `tombolo.h` says.
 
 use tombolo::deform::mesh::CellType;
-use tombolo::pipelines::extract::Association;
+use tombolo::pipelines::extract::{Association, check_field_length};
 
 use super::amr::Mask;
 use super::channel::{Block, Channel};
@@ -19,7 +19,7 @@ pub(crate) struct Description<'call> {
     pub(crate) name: String,
     pub(crate) axes: Vec<Array<'call>>,
     pub(crate) cells: Option<DescribedCells<'call>>,
-    pub(crate) faces: Option<(CellType, Array<'call>, Array<'call>)>,
+    pub(crate) faces: Vec<(CellType, Array<'call>, Array<'call>)>,
     pub(crate) feature_names: Vec<(i64, String)>,
     pub(crate) fields: Vec<(String, Association, Vec<Array<'call>>)>,
     pub(crate) ghosts: Option<Array<'call>>,
@@ -41,8 +41,8 @@ impl<'call> Description<'call> {
     pub(crate) fn channel(self) -> Result<Channel<'call>, CatalystError> {
         let Description { name, axes, cells, faces, feature_names, fields, ghosts, global_vertices, global_cells } =
             self;
-        let wrong = |what: &str, found: String, expected: String| CatalystError::Wrong {
-            path: format!("channel '{name}', {what}"),
+        let wrong = |what: &str, found: String, expected: String| CatalystError::Argument {
+            what: format!("channel '{name}', {what}"),
             found,
             expected,
         };
@@ -70,25 +70,17 @@ impl<'call> Description<'call> {
                 }
             }
         };
-        let elements = topology.len();
-        let faces = match faces {
-            None => None,
-            Some((cell_type, connectivity, tags)) => {
-                let topology = uniform("faces", cell_type, connectivity)?;
-                Some(Faces { topology, tags })
-            }
-        };
+        let faces: Vec<Faces<'call>> = faces
+            .into_iter()
+            .map(|(cell_type, connectivity, tags)| {
+                Ok(Faces { topology: uniform("faces", cell_type, connectivity)?, tags })
+            })
+            .collect::<Result<_, CatalystError>>()?;
+        let counts = (vertices, topology.len());
         let mut own = Vec::with_capacity(fields.len());
         for (field, association, components) in fields {
-            let expected = match association {
-                Association::Vertex => vertices,
-                Association::Element => elements,
-            };
-            let found = components.first().map_or(0, Array::len);
-            if found != expected {
-                let what = format!("field '{field}'");
-                return Err(wrong(&what, format!("{found} tuples"), format!("{expected}, one for each {association}")));
-            }
+            // What has to be copied is copied before the adaptor sees it, so that it is asked here.
+            check_field_length(&name, (&field, association), components.first().map_or(0, Array::len), counts)?;
             own.push(Field { name: field, association, components });
         }
         let roles = Roles { ghosts, global_vertices, global_cells, vertex_features: None };

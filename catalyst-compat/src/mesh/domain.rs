@@ -34,7 +34,8 @@ pub(super) struct Domain<'call> {
     pub(super) coordset: Coordset<'call>,
     pub(super) topology: Topology<'call>,
     pub(super) fields: Vec<Field<'call>>,
-    pub(super) faces: Option<Faces<'call>>,
+    /// Faces of one type each.
+    pub(super) faces: Vec<Faces<'call>>,
     pub(super) roles: Roles<'call>,
     path: String,
 }
@@ -79,7 +80,7 @@ impl<'call> Domain<'call> {
             coordset,
             topology: main.topology.clone(),
             fields: Vec::new(),
-            faces: None,
+            faces: Vec::new(),
             roles: Roles::default(),
             path: node.path(),
         };
@@ -94,7 +95,7 @@ impl<'call> Domain<'call> {
         coordset: Coordset<'call>,
         topology: Topology<'call>,
         fields: Vec<Field<'call>>,
-        faces: Option<Faces<'call>>,
+        faces: Vec<Faces<'call>>,
         roles: Roles<'call>,
         path: String,
     ) -> Self {
@@ -120,8 +121,8 @@ impl<'call> Domain<'call> {
         let told = metadata.as_ref().and_then(|metadata| metadata.child(c"vtk_fields"));
         for (index, name) in fields.names().iter().enumerate() {
             let Some(field_node) = fields.at(index, name) else { continue };
-            if self.faces.is_none() {
-                self.faces = faces(&field_node, name, main, others)?;
+            if self.faces.is_empty() {
+                self.faces.extend(faces(&field_node, name, main, others)?);
             }
             let Some(field) = Field::read(&field_node, &main.name, vertices, elements)? else { continue };
             let role = told.as_ref().and_then(|told| told.child(name));
@@ -157,7 +158,7 @@ impl<'call> Domain<'call> {
     pub(super) fn fingerprint(&self, into: &mut Fingerprint) {
         self.coordset.fingerprint(into);
         self.topology.fingerprint(into);
-        if let Some(faces) = &self.faces {
+        for faces in &self.faces {
             faces.topology.fingerprint(into);
             faces.tags.fingerprint(into);
         }

@@ -229,7 +229,7 @@ fn marks(channel: &Channel<'_>) -> Result<Marks, CatalystError> {
 fn features(channel: &Channel<'_>) -> Result<FeatureSource, CatalystError> {
     if let Some(domain) = channel.single()
         && let Some(numbers) = &domain.roles.vertex_features
-        && channel.blocks.iter().all(|block| block.domain.faces.is_none())
+        && channel.blocks.iter().all(|block| block.domain.faces.is_empty())
     {
         return Ok(FeatureSource::Vertices((0..numbers.len()).map(|at| numbers.integer(at).unwrap_or(0)).collect()));
     }
@@ -237,7 +237,7 @@ fn features(channel: &Channel<'_>) -> Result<FeatureSource, CatalystError> {
     let mut base = 0;
     let mut points = Vec::new();
     for block in &channel.blocks {
-        if let Some(faces) = &block.domain.faces {
+        for faces in &block.domain.faces {
             points.resize(base + block.vertex_count(), Vector::default());
             faces.topology.append(&mut tagged.faces, base, &points, &|_| true)?;
             tagged.tags.extend((0..faces.tags.len()).map(|at| faces.tags.integer(at).unwrap_or(0)));

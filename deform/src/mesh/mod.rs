@@ -103,6 +103,17 @@ pub(crate) fn check_finite(points: &[Vector]) -> Result<(), MeshError> {
     Ok(())
 }
 
+/// Numbers one after the other, as many as one reads.
+fn listed<T: ToString>(numbers: &[T]) -> String {
+    const SHOWN: usize = 12;
+    let shown = numbers.iter().take(SHOWN).map(T::to_string).collect::<Vec<_>>().join(", ");
+    match numbers.len() {
+        0 => "none".into(),
+        count if count > SHOWN => format!("{shown} and {} more", count - SHOWN),
+        _ => shown,
+    }
+}
+
 /// Why a mesh was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -209,6 +220,33 @@ pub enum MeshError {
         expected: usize,
         /// Faces or vertices.
         what: &'static str,
+    },
+    /// A tagged face is none of the mesh.
+    #[error(
+        "face {face} of those with features ({feature}, vertices {}) is no face of any cell; so are {loose} of {faces} in all",
+        listed(vertices)
+    )]
+    LooseFace {
+        /// The face.
+        face: usize,
+        /// The name of its feature, or its number.
+        feature: String,
+        /// Its vertices.
+        vertices: Vec<u32>,
+        /// How many are none.
+        loose: usize,
+        /// How many there are.
+        faces: usize,
+    },
+    /// A feature is named whose number no face has.
+    #[error("feature '{name}' has the number {number}, which no face has; the faces have {}", listed(numbers))]
+    EmptyFeature {
+        /// Its number.
+        number: i64,
+        /// Its name.
+        name: String,
+        /// The numbers that faces have.
+        numbers: Vec<i64>,
     },
     /// An array is too short for the values that its stride asks for, or has another number of values than is needed.
     #[error("array '{name}': {found} values where {expected} are needed")]

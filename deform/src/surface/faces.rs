@@ -172,7 +172,7 @@ pub(super) fn face_vertices(cells: &Cells, dimension: usize, wanted: CellFace) -
 }
 
 /// The four lowest vertices in rising order (`u32::MAX` for a triangle's fourth).
-fn key(vertices: &[u32]) -> [u32; 4] {
+pub(super) fn key(vertices: &[u32]) -> [u32; 4] {
     let mut lowest = [u32::MAX; 4];
     for &vertex in vertices {
         let mut carried = vertex;

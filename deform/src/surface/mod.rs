@@ -109,6 +109,7 @@ mod part;
 mod polyharmonic;
 mod region;
 mod sharp_edges;
+mod tagged;
 mod tetra_faces;
 mod triangle_pair;
 
@@ -128,3 +129,4 @@ pub use features::{FeatureSettings, FeatureSize, Features, UnknownFeature};
 pub use layers::Layer;
 pub use part::{BoundaryFaces, FaceTags, face_tags};
 pub use region::{BoxRegion, HalfSpaceRegion, Region, RegionError, SphereRegion};
+pub use tagged::{check_feature_names, check_tagged_faces};

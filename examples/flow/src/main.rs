@@ -61,6 +61,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
+    tombolo::logging::start();
     let arguments = Arguments::parse();
     match on_ranks(|ranks, solvers| run(arguments, ranks, solvers)) {
         Ok(()) => ExitCode::SUCCESS,

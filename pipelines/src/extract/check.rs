@@ -87,22 +87,34 @@ impl Channel<'_> {
     }
 
     fn check_field(&self, field: &FieldView<'_>) -> Result<(), ChannelError> {
-        let (vertices, cells) = (self.mesh.points.len(), self.mesh.cells.len());
-        let (expected, fitting, other) = match field.association {
-            Association::Vertex => (vertices, cells, Association::Element),
-            Association::Element => (cells, vertices, Association::Vertex),
-        };
-        let found = field.values.len();
-        if found == expected {
-            return Ok(());
-        }
-        Err(ChannelError::FieldLength {
-            channel: self.name.into(),
-            field: field.name.into(),
-            association: field.association,
-            found,
-            expected,
-            fits: (found == fitting).then_some(other),
-        })
+        let counts = (self.mesh.points.len(), self.mesh.cells.len());
+        check_field_length(self.name, (field.name, field.association), field.values.len(), counts)
     }
+}
+
+/// Refuses a field that has not one tuple for each of the vertices or of the cells, of which there are so many.
+///
+/// # Errors
+/// [`ChannelError::FieldLength`].
+pub fn check_field_length(
+    channel: &str,
+    (field, association): (&str, Association),
+    found: usize,
+    (vertices, cells): (usize, usize),
+) -> Result<(), ChannelError> {
+    let (expected, fitting, other) = match association {
+        Association::Vertex => (vertices, cells, Association::Element),
+        Association::Element => (cells, vertices, Association::Vertex),
+    };
+    if found == expected {
+        return Ok(());
+    }
+    Err(ChannelError::FieldLength {
+        channel: channel.into(),
+        field: field.into(),
+        association,
+        found,
+        expected,
+        fits: (found == fitting).then_some(other),
+    })
 }

@@ -11,7 +11,7 @@ mod slice;
 mod source;
 mod statistics;
 
-pub use check::{ChannelError, check_names};
+pub use check::{ChannelError, check_field_length, check_names};
 pub use error::ExtractError;
 pub(crate) use gather::check_length;
 pub(crate) use merge::merged;

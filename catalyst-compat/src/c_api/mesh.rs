@@ -1,0 +1,390 @@
+//! The functions that name the arrays of a channel.
+
+use std::ffi::{c_char, c_int, c_void};
+
+use tombolo::deform::mesh::CellType;
+use tombolo::pipelines::extract::Association;
+use tombolo::pipelines::language::nearest;
+
+use super::lent::{Address, Typed, number};
+use super::named::{Cells, Named};
+use super::{Fault, Handle, answer, name, text, value, with};
+use crate::array::Number;
+
+/// Names something of a channel that has points.
+///
+/// # Safety
+/// As the module above says.
+unsafe fn lend(
+    run: *mut Handle,
+    channel: *const c_char,
+    change: impl FnOnce(&mut Named, &str) -> Result<(), Fault>,
+) -> c_int {
+    answer(|| {
+        with(run, |run| {
+            run.not_ended()?;
+            // SAFETY: as the module above says.
+            let channel = unsafe { text(channel, "the channel's name") }?;
+            if let Some(known) = run.channels.iter_mut().find(|known| known.name == channel) {
+                let what = format!("channel '{channel}'");
+                return change(known, &what);
+            }
+            let names = run.channels.iter().map(|known| known.name.as_str());
+            let expected = match nearest(&channel, names.clone()) {
+                Some(near) => format!("one that tombolo_points has named; did you mean '{near}'?"),
+                None if run.channels.is_empty() => "one that tombolo_points has named; none has been yet".into(),
+                None => format!("one that tombolo_points has named: {}", names.collect::<Vec<_>>().join(", ")),
+            };
+            Err(Fault::invalid("channel", format!("'{channel}'"), expected))
+        })
+    })
+}
+
+/// Names the points of a channel, which is there from then on.
+///
+/// # Safety
+/// As the module above says.
+unsafe fn lend_points(
+    run: *mut Handle,
+    channel: *const c_char,
+    points: impl FnOnce(&str) -> Result<Vec<Address>, Fault>,
+) -> c_int {
+    answer(|| {
+        with(run, |run| {
+            run.not_ended()?;
+            // SAFETY: as the module above says.
+            let channel = unsafe { name(channel, "the channel's name") }?;
+            let points = points(&format!("channel '{channel}', points"))?;
+            match run.channels.iter_mut().find(|known| known.name == channel) {
+                Some(known) => known.points = points,
+                None => run.channels.push(Named::new(channel, points)),
+            }
+            Ok(())
+        })
+    })
+}
+
+fn fixed_cell(what: &str, number: c_int) -> Result<(CellType, usize), Fault> {
+    u8::try_from(number)
+        .ok()
+        .and_then(CellType::from_vtk)
+        .and_then(|cell_type| Some((cell_type, cell_type.vertex_count()?)))
+        .ok_or_else(|| Fault::invalid(what, format!("the cell type {number}"), "one of enum tombolo_cell_type"))
+}
+
+/// So many cells of so many vertices each.
+fn vertices<T: Typed>(what: &str, first: *const T, cells: usize, corners: usize) -> Result<Address, Fault> {
+    let count = cells
+        .checked_mul(corners)
+        .ok_or_else(|| Fault::invalid(what, format!("{cells} cells"), "as many as memory can hold"))?;
+    Address::beside(what, first, count)
+}
+
+fn association(what: &str, number: c_int) -> Result<Association, Fault> {
+    match number {
+        0 => Ok(Association::Vertex),
+        1 => Ok(Association::Element),
+        other => {
+            Err(Fault::invalid(what, format!("the association {other}"), "TOMBOLO_VERTEX (0) or TOMBOLO_CELL (1)"))
+        }
+    }
+}
+
+fn component_count(what: &str, components: c_int, least: usize, most: usize) -> Result<usize, Fault> {
+    usize::try_from(components)
+        .ok()
+        .filter(|count| (least..=most).contains(count))
+        .ok_or_else(|| Fault::invalid(what, format!("{components} components"), format!("{least} to {most}")))
+}
+
+/// Tells the Fortran module how many vertices a cell of this type has; 0 of a type that is not known.
+#[unsafe(no_mangle)]
+pub extern "C" fn tombolo_vertices_of_cell(cell_type: c_int) -> c_int {
+    value(0, || Ok(fixed_cell("", cell_type).map_or(0, |(_, vertices)| c_int::try_from(vertices).unwrap_or(0))))
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module above says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_points_strided(
+    run: *mut Handle,
+    channel: *const c_char,
+    kind: c_int,
+    axes: *const *const c_void,
+    dimension: c_int,
+    count: usize,
+    stride: isize,
+) -> c_int {
+    let points = |what: &str| {
+        let number = number(what, kind)?;
+        if !matches!(number, Number::F32 | Number::F64) {
+            return Err(Fault::invalid(what, format!("the type {}", number.name()), "float32 or float64"));
+        }
+        let dimension = component_count(what, dimension, 2, 3)?;
+        // SAFETY: as the module above says.
+        unsafe { Address::separate(what, number, axes, dimension, count, stride) }
+    };
+    // SAFETY: as the module above says.
+    unsafe { lend_points(run, channel, points) }
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module above says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_point_cells(run: *mut Handle, channel: *const c_char) -> c_int {
+    // SAFETY: as the module above says.
+    unsafe { lend(run, channel, |named, _| named.cells(Cells::Points)) }
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module above says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_feature(
+    run: *mut Handle,
+    channel: *const c_char,
+    number: i64,
+    feature: *const c_char,
+) -> c_int {
+    // SAFETY: as the module above says.
+    unsafe { lend(run, channel, |named, _| named.feature(number, name(feature, "the feature's name")?)) }
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module above says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_ghost_cells(
+    run: *mut Handle,
+    channel: *const c_char,
+    ghosts: *const u8,
+    cells: usize,
+) -> c_int {
+    let change = |named: &mut Named, what: &str| {
+        named.ghosts = Some(Address::beside(&format!("{what}, ghost cells"), ghosts, cells)?);
+        Ok(())
+    };
+    // SAFETY: as the module above says.
+    unsafe { lend(run, channel, change) }
+}
+
+/// See `tombolo.h`.
+///
+/// # Safety
+/// As the module above says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tombolo_field_strided(
+    run: *mut Handle,
+    channel: *const c_char,
+    field: *const c_char,
+    of: c_int,
+    kind: c_int,
+    components: *const *const c_void,
+    component_number: c_int,
+    count: usize,
+    stride: isize,
+) -> c_int {
+    let change = |named: &mut Named, what: &str| {
+        // SAFETY: as the module above says.
+        let field = unsafe { name(field, "the field's name") }?;
+        let what = format!("{what}, field '{field}'");
+        let association = association(&what, of)?;
+        let number = number(&what, kind)?;
+        let component_number = component_count(&what, component_number, 1, 9)?;
+        // SAFETY: as the module above says.
+        let components = unsafe { Address::separate(&what, number, components, component_number, count, stride) }?;
+        named.field(field, association, components);
+        Ok(())
+    };
+    // SAFETY: as the module above says.
+    unsafe { lend(run, channel, change) }
+}
+
+macro_rules! points {
+    ($($function:ident: $type:ty),*) => { $(
+        /// See `tombolo.h`.
+        ///
+        /// # Safety
+        /// As the module above says.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $function(
+            run: *mut Handle,
+            channel: *const c_char,
+            points: *const $type,
+            count: usize,
+        ) -> c_int {
+            // SAFETY: as the module above says.
+            unsafe { lend_points(run, channel, |what| Address::interleaved(what, points, count, 3)) }
+        }
+    )* };
+}
+
+points!(tombolo_points_f32: f32, tombolo_points_f64: f64);
+
+macro_rules! fields {
+    ($($function:ident: $type:ty),*) => { $(
+        /// See `tombolo.h`.
+        ///
+        /// # Safety
+        /// As the module above says.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $function(
+            run: *mut Handle,
+            channel: *const c_char,
+            field: *const c_char,
+            of: c_int,
+            values: *const $type,
+            count: usize,
+            components: c_int,
+        ) -> c_int {
+            let change = |named: &mut Named, what: &str| {
+                // SAFETY: as the module above says.
+                let field = unsafe { name(field, "the field's name") }?;
+                let what = format!("{what}, field '{field}'");
+                let association = association(&what, of)?;
+                let components = component_count(&what, components, 1, 9)?;
+                named.field(field, association, Address::interleaved(&what, values, count, components)?);
+                Ok(())
+            };
+            // SAFETY: as the module above says.
+            unsafe { lend(run, channel, change) }
+        }
+    )* };
+}
+
+fields!(
+    tombolo_field_f32: f32,
+    tombolo_field_f64: f64,
+    tombolo_field_i32: i32,
+    tombolo_field_i64: i64,
+    tombolo_field_u8: u8
+);
+
+macro_rules! integers {
+    ($($cells:ident, $mixed:ident, $faces:ident, $vertices:ident, $numbers:ident: $type:ty),*) => { $(
+        /// See `tombolo.h`.
+        ///
+        /// # Safety
+        /// As the module above says.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $cells(
+            run: *mut Handle,
+            channel: *const c_char,
+            cell_type: c_int,
+            connectivity: *const $type,
+            cells: usize,
+        ) -> c_int {
+            let change = |named: &mut Named, what: &str| {
+                let what = format!("{what}, cells");
+                let (cell_type, corners) = fixed_cell(&what, cell_type)?;
+                named.cells(Cells::Uniform(cell_type, vertices(&what, connectivity, cells, corners)?))
+            };
+            // SAFETY: as the module above says.
+            unsafe { lend(run, channel, change) }
+        }
+
+        /// See `tombolo.h`.
+        ///
+        /// # Safety
+        /// As the module above says.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $mixed(
+            run: *mut Handle,
+            channel: *const c_char,
+            cell_types: *const u8,
+            sizes: *const $type,
+            cells: usize,
+            connectivity: *const $type,
+            length: usize,
+        ) -> c_int {
+            let change = |named: &mut Named, what: &str| {
+                named.cells(Cells::Mixed {
+                    types: Address::beside(&format!("{what}, cell types"), cell_types, cells)?,
+                    sizes: Address::beside(&format!("{what}, sizes of cells"), sizes, cells)?,
+                    connectivity: Address::beside(&format!("{what}, cells"), connectivity, length)?,
+                })
+            };
+            // SAFETY: as the module above says.
+            unsafe { lend(run, channel, change) }
+        }
+
+        /// See `tombolo.h`.
+        ///
+        /// # Safety
+        /// As the module above says.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $faces(
+            run: *mut Handle,
+            channel: *const c_char,
+            face_type: c_int,
+            connectivity: *const $type,
+            features: *const $type,
+            faces: usize,
+        ) -> c_int {
+            let change = |named: &mut Named, what: &str| {
+                let what = format!("{what}, faces");
+                let (face_type, corners) = fixed_cell(&what, face_type)?;
+                if !matches!(face_type, CellType::Triangle | CellType::Quad) {
+                    return Err(Fault::invalid(what, face_type, "TOMBOLO_TRIANGLE or TOMBOLO_QUAD"));
+                }
+                let connectivity = vertices(&what, connectivity, faces, corners)?;
+                let features = Address::beside(&format!("{what}, features"), features, faces)?;
+                named.faces(face_type, connectivity, features);
+                Ok(())
+            };
+            // SAFETY: as the module above says.
+            unsafe { lend(run, channel, change) }
+        }
+
+        /// See `tombolo.h`.
+        ///
+        /// # Safety
+        /// As the module above says.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $vertices(
+            run: *mut Handle,
+            channel: *const c_char,
+            numbers: *const $type,
+            count: usize,
+        ) -> c_int {
+            let change = |named: &mut Named, what: &str| {
+                let what = format!("{what}, global vertices");
+                named.global_vertices = Some(Address::beside(&what, numbers, count)?);
+                Ok(())
+            };
+            // SAFETY: as the module above says.
+            unsafe { lend(run, channel, change) }
+        }
+
+        /// See `tombolo.h`.
+        ///
+        /// # Safety
+        /// As the module above says.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $numbers(
+            run: *mut Handle,
+            channel: *const c_char,
+            numbers: *const $type,
+            count: usize,
+        ) -> c_int {
+            let change = |named: &mut Named, what: &str| {
+                let what = format!("{what}, global cells");
+                named.global_cells = Some(Address::beside(&what, numbers, count)?);
+                Ok(())
+            };
+            // SAFETY: as the module above says.
+            unsafe { lend(run, channel, change) }
+        }
+    )* };
+}
+
+integers!(
+    tombolo_cells_i32, tombolo_mixed_cells_i32, tombolo_faces_i32, tombolo_global_vertices_i32, tombolo_global_cells_i32: i32,
+    tombolo_cells_i64, tombolo_mixed_cells_i64, tombolo_faces_i64, tombolo_global_vertices_i64, tombolo_global_cells_i64: i64
+);
