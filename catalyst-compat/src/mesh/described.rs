@@ -83,18 +83,19 @@ impl<'call> Description<'call> {
             let expected = match association {
                 Association::Vertex => vertices,
                 Association::Element => elements,
+                Association::Mesh => components.first().map_or(0, Array::len),
             };
             let found = components.first().map_or(0, Array::len);
             if found != expected {
                 let what = format!("field '{field}'");
                 return Err(wrong(&what, format!("{found} tuples"), format!("{expected}, one for each {association}")));
             }
-            own.push(Field { name: field, association, components });
+            own.push(Field::new(field, association, components));
         }
         let roles = Roles { ghosts, global_vertices, global_cells, vertex_features: None };
         let path = format!("channel '{name}'");
         let domain = Domain::described(coordset, topology, own, faces, roles, path);
         let block = Block { name: String::new(), domain, mask: Mask::default() };
-        Ok(Channel { name, blocks: vec![block], feature_names })
+        Ok(Channel { name, blocks: vec![block], feature_names, ..Channel::default() })
     }
 }
