@@ -323,6 +323,8 @@ impl Adaptor {
         self.mesh = SteeredMesh::Unknown;
         self.server = None;
         let faults = self.pipelines.finish();
+        // Rank 0 writes: what was asked for is there before any rank goes on.
+        self.communicator.reduce(comm::Reduction::Maximum, &mut [0.0]);
         let parts = [
             ("execute", &self.timing.execute),
             ("reference", &self.timing.reference),

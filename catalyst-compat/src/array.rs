@@ -2,52 +2,8 @@
 
 use std::marker::PhantomData;
 
+pub(crate) use tombolo::deform::mesh::Number;
 use tombolo::deform::mesh::{Indices, Values};
-
-/// A type of number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum Number {
-    I8,
-    I16,
-    I32,
-    I64,
-    U8,
-    U16,
-    U32,
-    U64,
-    F32,
-    F64,
-}
-
-impl Number {
-    pub(crate) fn bytes(self) -> usize {
-        match self {
-            Number::I8 | Number::U8 => 1,
-            Number::I16 | Number::U16 => 2,
-            Number::I32 | Number::U32 | Number::F32 => 4,
-            Number::I64 | Number::U64 | Number::F64 => 8,
-        }
-    }
-
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Number::I8 => "int8",
-            Number::I16 => "int16",
-            Number::I32 => "int32",
-            Number::I64 => "int64",
-            Number::U8 => "uint8",
-            Number::U16 => "uint16",
-            Number::U32 => "uint32",
-            Number::U64 => "uint64",
-            Number::F32 => "float32",
-            Number::F64 => "float64",
-        }
-    }
-
-    fn is_real(self) -> bool {
-        matches!(self, Number::F32 | Number::F64)
-    }
-}
 
 /// Numbers of any type at any distance from each other, borrowed from the solver for the length of one call.
 #[derive(Debug, Clone, Copy)]

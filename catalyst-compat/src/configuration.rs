@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use tombolo::Parameter;
-use tombolo::pipelines::language::{self, Config, TimedCommand};
+use tombolo::pipelines::language::{self, Config, Pipeline, Steering, StreamServer, TimedCommand};
 
 use crate::error::CatalystError;
 use crate::node::{Kind, Node};
@@ -23,9 +23,11 @@ const REPORT: &str = "TOMBOLO_REPORT";
 /// What a run is set up with.
 #[derive(Debug)]
 pub(crate) struct Configuration {
-    /// What to watch; `None` where nobody says.
-    pub(crate) config: Option<Config>,
-    /// The pipelines of each script and pipeline of the node, by its name there; none where the node names no configuration.
+    /// What to watch.
+    pub(crate) config: Config,
+    /// Whether no file says so: then the surface of every channel is watched besides.
+    pub(crate) is_default: bool,
+    /// The pipelines of each script and pipeline of the node, by its name there; none where the node names no pipelines.
     pub(crate) groups: Groups,
     pub(crate) parameters: Vec<Parameter>,
     pub(crate) orders: Vec<TimedCommand>,
@@ -71,23 +73,23 @@ impl Configuration {
                 communicator = Some(value.ok_or_else(|| handle.wrong("the Fortran handle of a communicator".into()))?);
             }
         }
-        let named_here = !found.files.is_empty() || !found.pipelines.is_empty();
-        if !named_here {
-            found.files.extend(variable(PIPELINES).map(|file| (String::new(), file)));
+        let mut of_user = None;
+        if let Some(file) = variable(PIPELINES) {
+            if found.files.is_empty() {
+                of_user = Some(file);
+            } else {
+                found.notes.push(format!("{PIPELINES}={file} is passed over: the solver names a configuration itself"));
+            }
         }
         if let Some(file) = variable(ORDERS) {
             orders = language::parse_orders(&text(&file)?, &file).map_err(unreadable)?;
         }
-        let is_default = found.files.is_empty() && found.pipelines.is_empty();
-        let (config, groups) = if is_default {
-            (None, Groups::new())
-        } else {
-            let (config, groups) = merged(&found)?;
-            (Some(config), groups)
-        };
+        let is_default = found.files.is_empty() && of_user.is_none();
+        let (config, groups) = merged(&mut found, of_user.as_deref())?;
         Ok(Self {
             config,
-            groups: if named_here { groups } else { Groups::new() },
+            is_default,
+            groups,
             parameters,
             orders,
             output: variable(OUTPUT).map_or_else(|| PathBuf::from("."), PathBuf::from),
@@ -115,8 +117,20 @@ fn unreadable(error: impl ToString) -> CatalystError {
     CatalystError::Configuration(error.to_string())
 }
 
-/// The surface of each channel, for whoever opens the link.
-pub(crate) fn default_config(channels: &[String]) -> Result<Config, CatalystError> {
+/// The surface of each channel, for whoever opens the link, beside the pipelines of a configuration.
+pub(crate) fn with_default_views(config: &Config, channels: &[String]) -> Result<Config, CatalystError> {
+    let mut views = default_config(channels)?;
+    for view in &mut views.pipelines {
+        while config.pipelines.iter().any(|pipeline| pipeline.name == view.name) {
+            view.name.insert_str(0, "view of ");
+        }
+    }
+    views.pipelines.extend(config.pipelines.iter().cloned());
+    Ok(views)
+}
+
+/// The surface of each channel.
+fn default_config(channels: &[String]) -> Result<Config, CatalystError> {
     let stages = json!([{"surface": {}}, {"stream": {}}]);
     let view = |channel: &String| match channels {
         // One channel needs no name beside what is seen of it.
@@ -129,37 +143,76 @@ pub(crate) fn default_config(channels: &[String]) -> Result<Config, CatalystErro
 }
 
 /// The configurations of all files as one, and what the node itself asks for; and which pipelines each name in the node stands for.
-fn merged(found: &Found) -> Result<(Config, Groups), CatalystError> {
+/// The user's file has no such name: no solver chooses what it says.
+fn merged(found: &mut Found, of_user: Option<&str>) -> Result<(Config, Groups), CatalystError> {
     let own = json!({"version": 1, "pipelines": found.pipelines});
-    let mut config: Option<Config> = None;
+    let mut config = language::parse(&own.to_string(), "catalyst/pipelines").map_err(unreadable)?;
     let mut groups: Groups = found.others.iter().map(|name| (name.clone(), Vec::new())).collect();
+    let mut of_solver: Vec<String> = config.pipelines.iter().map(|pipeline| pipeline.name.clone()).collect();
+    let mut settings = Settings::default();
+    let mut pipelines = Vec::new();
     for (name, file) in &found.files {
-        let next = language::parse(&text(file)?, file).map_err(unreadable)?;
-        groups.push((name.clone(), next.pipelines.iter().map(|pipeline| pipeline.name.clone()).collect()));
-        match &mut config {
-            None => config = Some(next),
-            Some(config) => {
-                config.stream = config.stream.take().or(next.stream);
-                config.journal = config.journal.take().or(next.journal);
-                config.pipelines.extend(next.pipelines);
-            }
-        }
+        let next = settings.take(file, &mut found.notes)?;
+        let names: Vec<String> = next.iter().map(|pipeline| pipeline.name.clone()).collect();
+        of_solver.extend_from_slice(&names);
+        groups.push((name.clone(), names));
+        pipelines.extend(next);
     }
-    let own = language::parse(&own.to_string(), "catalyst/pipelines").map_err(unreadable)?;
-    let config = match config {
-        None => own,
-        Some(mut config) => {
-            config.pipelines.extend(own.pipelines);
-            config
-        }
-    };
+    if let Some(file) = of_user {
+        pipelines.extend(settings.take(file, &mut found.notes)?);
+    }
+    pipelines.append(&mut config.pipelines);
+    config.pipelines = pipelines;
+    config.stream = settings.stream.map(|(stream, _)| stream);
+    config.journal = settings.journal.map(|(journal, _)| journal);
+    config.steering = settings.steering.map(|(steering, _)| steering).unwrap_or_default();
+    // Where there is nothing to choose from, the names are those of another implementation's scripts.
+    if of_solver.is_empty() {
+        groups.clear();
+    }
     // A pipeline stands for itself too, unless something in the node has its name.
-    for pipeline in &config.pipelines {
-        if !groups.iter().any(|(name, _)| *name == pipeline.name) {
-            groups.push((pipeline.name.clone(), vec![pipeline.name.clone()]));
+    for name in of_solver {
+        if !groups.iter().any(|(known, _)| *known == name) {
+            groups.push((name.clone(), vec![name]));
         }
     }
     Ok((config, groups))
+}
+
+/// What is said once for a run, with the file that says it: the first that does.
+#[derive(Default)]
+struct Settings {
+    stream: Option<(StreamServer, String)>,
+    journal: Option<(String, String)>,
+    steering: Option<(Steering, String)>,
+}
+
+impl Settings {
+    /// Takes in what a file says that none has said before, and gives its pipelines. What it says otherwise is told.
+    fn take(&mut self, file: &str, notes: &mut Vec<String>) -> Result<Vec<Pipeline>, CatalystError> {
+        fn first<T: PartialEq>(
+            known: &mut Option<(T, String)>,
+            said: Option<T>,
+            what: &str,
+            file: &str,
+            notes: &mut Vec<String>,
+        ) {
+            match (&known, said) {
+                (None, Some(said)) => *known = Some((said, file.to_owned())),
+                (Some((held, before)), Some(said)) if *held != said => {
+                    notes.push(format!("'{what}' of {file} is passed over: that of {before} holds"));
+                }
+                _ => {}
+            }
+        }
+        let config = language::parse(&text(file)?, file).map_err(unreadable)?;
+        // What a file does not say is what it would be by itself.
+        let steering = Some(config.steering).filter(|steering| *steering != Steering::default());
+        first(&mut self.stream, config.stream, "stream", file, notes);
+        first(&mut self.journal, config.journal, "journal", file, notes);
+        first(&mut self.steering, steering, "steering", file, notes);
+        Ok(config.pipelines)
+    }
 }
 
 fn each(
@@ -321,6 +374,53 @@ mod tests {
             names(&["fluid", "solid"]),
             [("fluid".to_owned(), some("fluid")), ("solid".to_owned(), some("solid"))]
         );
+    }
+
+    #[test]
+    fn configurations_are_one_and_what_is_passed_over_is_told() {
+        let directory = tempfile::tempdir().expect("a temporary directory");
+        let file = |name: &str, text: &str| {
+            let path = directory.path().join(name);
+            std::fs::write(&path, text).expect("can be written");
+            path.to_string_lossy().into_owned()
+        };
+        let pipeline = |name: &str| format!(r#""pipelines": [{{"name": "{name}", "stages": [{{"quality": {{}}}}]}}]"#);
+        let one = file("one.json", &format!(r#"{{"version": 1, "journal": "a.jsonl", {}}}"#, pipeline("one")));
+        let two = file(
+            "two.json",
+            &format!(
+                r#"{{"version": 1, "journal": "b.jsonl", "stream": {{"listen": "127.0.0.1:0"}}, "steering": {{"background": false}}, {}}}"#,
+                pipeline("two")
+            ),
+        );
+        let three =
+            file("three.json", &format!(r#"{{"version": 1, "steering": {{"poll_steps": 4}}, {}}}"#, pipeline("three")));
+        let files = [("a", &one), ("b", &two)].map(|(name, file)| (name.to_owned(), file.clone()));
+        let io =
+            json!({"name": "io", "channel": "grid", "every": {"steps": 1}, "stages": [{"write": {"file": "a.vtu"}}]});
+        let mut found = Found { files: files.to_vec(), pipelines: vec![io], ..Found::default() };
+        let (config, groups) = merged(&mut found, Some(&three)).expect("a configuration");
+        let names: Vec<&str> = config.pipelines.iter().map(|pipeline| pipeline.name.as_str()).collect();
+        assert_eq!(names, ["one", "two", "three", "io"]);
+        assert!(
+            !config.steering.background && config.steering.poll_steps.get() == 1,
+            "the second file's steering holds"
+        );
+        assert_eq!(config.journal.as_deref(), Some("a.jsonl"));
+        assert!(config.stream.as_ref().is_some_and(|stream| stream.listen.port() == 0));
+        assert_eq!(
+            found.notes,
+            [
+                format!("'journal' of {two} is passed over: that of {one} holds"),
+                format!("'steering' of {three} is passed over: that of {two} holds")
+            ]
+        );
+        // No solver chooses among what the user asks for.
+        let known: Vec<&str> = groups.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(known, ["a", "b", "io", "one", "two"]);
+        let views = with_default_views(&config, &["one".to_owned(), "grid".to_owned()]).expect("a configuration");
+        let names: Vec<&str> = views.pipelines.iter().map(|pipeline| pipeline.name.as_str()).collect();
+        assert_eq!(names, ["view of one", "grid", "one", "two", "three", "io"]);
     }
 
     #[test]

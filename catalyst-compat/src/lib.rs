@@ -11,8 +11,8 @@
 //!
 //! # What is read
 //! - `catalyst_initialize`: `catalyst/scripts` and `catalyst/pipelines` (files of pipelines that end in `.json`; the type `io`
-//!   writes files), `catalyst/parameters/<name>/{value, minimum, maximum}`, `catalyst/mpi_comm`. Where the node names no pipelines
-//!   the variable `TOMBOLO_PIPELINES` may; else the surface of every channel is streamed. `TOMBOLO_ORDERS` names a file of
+//!   writes files), `catalyst/parameters/<name>/{value, minimum, maximum}`, `catalyst/mpi_comm`. Where the node names no file
+//!   the variable `TOMBOLO_PIPELINES` may; else the surface of every channel is streamed besides. `TOMBOLO_ORDERS` names a file of
 //!   orders, `TOMBOLO_OUTPUT` the directory of what is written, `TOMBOLO_REPORT` the file of the report at the end.
 //! - `catalyst_execute`: `catalyst/state/{timestep | cycle, time, time_step}`, and each of `catalyst/channels`: `mesh`, `multimesh`,
 //!   `amrmesh`, all topologies and shapes of the Blueprint. Arrays are lent to the adaptor as they lie in memory wherever it reads

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use tombolo::comm::Communicator;
 use tombolo::pipelines::communicator::Reduction;
 
@@ -84,6 +86,29 @@ pub(crate) fn agree_and_ask<T>(
             Err(CatalystError::Rank { rank, message: message.into(), status })
         }
     }
+}
+
+/// Whether any rank that has something says yes of it. Collective.
+pub(crate) fn ask<T, E>(
+    ranks: &dyn Communicator,
+    mine: Result<T, E>,
+    is_so: impl Fn(&T) -> bool,
+) -> (Result<T, E>, bool) {
+    let mut any = [f64::from(u8::from(mine.as_ref().is_ok_and(is_so)))];
+    ranks.reduce(Reduction::Maximum, &mut any);
+    (mine, any[0] > 0.0)
+}
+
+/// What all ranks have, in their order. Collective.
+pub(crate) fn gathered<O: DeserializeOwned>(ranks: &dyn Communicator, own: &impl Serialize) -> Vec<O> {
+    let mut bytes = Vec::new();
+    if let Some(parts) = ranks.gather(0, &serde_json::to_vec(own).unwrap_or_default()) {
+        let lists = parts.iter().map(|part| serde_json::from_slice(part).unwrap_or_default());
+        let all: Vec<serde_json::Value> = lists.flat_map(|list: Vec<serde_json::Value>| list).collect();
+        bytes = serde_json::to_vec(&all).unwrap_or_default();
+    }
+    ranks.broadcast(0, &mut bytes);
+    serde_json::from_slice(&bytes).unwrap_or_default()
 }
 
 /// The names of all ranks' channels, in the order of their ranks and there in their own. Collective.

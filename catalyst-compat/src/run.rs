@@ -1,5 +1,6 @@
 //! One run: the adaptor, what is kept for it of each channel, and what it asks of the solver.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use tombolo::comm::{Alarm, Communicator};
@@ -8,7 +9,7 @@ use tombolo::pipelines::extract::{self, FieldView};
 use tombolo::{Adaptor, FinalizeError, OrderReport, Report, Settings, Step};
 
 use crate::error::CatalystError;
-use crate::mesh::{Block, Channel, Kept};
+use crate::mesh::{Block, Channel, Grid, Kept};
 use crate::motion::Asked;
 use crate::ranks;
 
@@ -29,6 +30,8 @@ pub(crate) struct Run {
     asked: Asked,
     /// What the chosen pipelines hash to; 0 where all are.
     choice: u32,
+    /// What was said to be passed over: each is said once.
+    told: HashSet<String>,
 }
 
 impl Run {
@@ -48,6 +51,7 @@ impl Run {
             time_step: 0.0,
             asked,
             choice: 0,
+            told: HashSet::new(),
         })
     }
 
@@ -56,8 +60,8 @@ impl Run {
         Alarm::among(&self.communicator)
     }
 
-    /// Lets only these pipelines run from now on; `None`: all.
-    pub(crate) fn choose(&mut self, names: Option<&[&str]>) {
+    /// Lets only these of the solver's pipelines run from now on, and all others; `None`: all.
+    pub(crate) fn choose(&mut self, names: Option<&[&str]>, of_solver: &dyn Fn(&str) -> bool) {
         let choice = names.map_or(0, |names| {
             let bytes = names.iter().flat_map(|name| name.bytes().chain([b'\n']));
             // Not 0, which is all of them.
@@ -65,7 +69,7 @@ impl Run {
         });
         if choice != self.choice {
             self.choice = choice;
-            self.adaptor.choose_pipelines(|name| names.is_none_or(|names| names.contains(&name)));
+            self.adaptor.choose_pipelines(|name| !of_solver(name) || names.is_none_or(|names| names.contains(&name)));
         }
     }
 
@@ -113,7 +117,7 @@ impl Run {
     ) -> Result<bool, CatalystError> {
         // What can be wrong here alone is agreed upon before anything that all do together.
         let mut is_other = false;
-        let prepared = given.and_then(|(step, channels)| {
+        let prepared = self.cover(given).and_then(|(step, channels)| {
             let looked_at = self.adaptor.looks_at(&step);
             for channel in &channels {
                 let changed = self.update(channel, looked_at)?;
@@ -129,6 +133,7 @@ impl Run {
         self.time_step = step.time_step;
         self.last_time = Some(step.time);
         self.complete(&mut channels)?;
+        self.tell(&channels);
         // A solver that shows nothing yet is asked for nothing.
         if channels.is_empty() {
             self.asked.rest();
@@ -166,6 +171,43 @@ impl Run {
         }
         let kept = self.kept.iter_mut().find(|(name, _)| *name == channel.name);
         kept.map_or(Ok(false), |(_, kept)| kept.update(channel, looked_at))
+    }
+
+    /// Leaves out the cells that finer grids of other ranks cover. Collective.
+    fn cover<'call>(
+        &self,
+        given: Result<(Step, Vec<Channel<'call>>), CatalystError>,
+    ) -> Result<(Step, Vec<Channel<'call>>), CatalystError> {
+        if self.communicator.size() == 1 {
+            return given;
+        }
+        let has_grids = |channels: &[Channel<'_>]| channels.iter().any(|channel| channel.grids().next().is_some());
+        let (mut given, any) = ranks::ask(&*self.communicator, given, |(step, channels)| {
+            self.adaptor.looks_at(step) && has_grids(channels)
+        });
+        if any {
+            let own: Vec<(&str, Vec<Grid>)> = given
+                .iter()
+                .flat_map(|(_, channels)| channels)
+                .map(|channel| (channel.name.as_str(), channel.grids().collect()))
+                .collect();
+            let all: Vec<(String, Vec<Grid>)> = ranks::gathered(&*self.communicator, &own);
+            for channel in given.iter_mut().flat_map(|(_, channels)| channels) {
+                let of_channel = all.iter().filter(|(name, _)| *name == channel.name);
+                let grids: Vec<Grid> = of_channel.flat_map(|(_, grids)| grids.iter().copied()).collect();
+                channel.cover(&grids);
+            }
+        }
+        given
+    }
+
+    /// Says once what is passed over.
+    fn tell(&mut self, channels: &[Channel<'_>]) {
+        for note in channels.iter().flat_map(|channel| &channel.notes) {
+            if self.communicator.rank() == 0 && self.told.insert(note.clone()) {
+                eprintln!("tombolo: {note}");
+            }
+        }
     }
 
     /// Gives every rank the channels of all, empty where it has none, in one order. Collective.

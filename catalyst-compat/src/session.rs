@@ -6,7 +6,7 @@ use tombolo::comm::{Alarm, Communicator};
 use tombolo::pipelines::language::nearest;
 use tombolo::{InitializeError, Settings, Step};
 
-use crate::configuration::{self, Configuration, Groups, default_config};
+use crate::configuration::{self, Configuration, Groups, with_default_views};
 use crate::error::CatalystError;
 use crate::mesh::Channel;
 use crate::motion::Asked;
@@ -37,10 +37,8 @@ impl Session {
         let configuration = Configuration::read(node);
         let handle = configuration.as_ref().ok().and_then(|configuration| configuration.communicator);
         let communicator = ranks::communicator(handle)?;
-        let Configuration { config, groups, parameters, orders, output, notes, .. } =
+        let Configuration { config, is_default, groups, parameters, orders, output, notes, .. } =
             ranks::agree(&*communicator, configuration)?;
-        let is_default = config.is_none();
-        let config = config.unwrap_or_else(|| Settings::default().config);
         let settings =
             Settings { config, communicator: Arc::clone(&communicator), solvers: None, parameters, orders, output };
         let stage = if is_default {
@@ -77,7 +75,7 @@ impl Session {
             if names.is_empty() {
                 return Ok(());
             }
-            settings.config = default_config(&names)?;
+            settings.config = with_default_views(&settings.config, &names)?;
             let run = match Run::new((**settings).clone()) {
                 // Nobody asked for that very port. On several ranks all have the error of the one that could not have it.
                 Err(CatalystError::Initialize(InitializeError::Stream(_) | InitializeError::Rank(_))) => {
@@ -90,7 +88,8 @@ impl Session {
             };
             self.stage = Stage::UnderWay(Box::new(run));
             self.tell_link();
-            given = Ok((step, channels));
+            // Now that there are pipelines, the step may choose among them.
+            given = self.read(node).map(|(_, channels)| (step, channels));
         }
         match &mut self.stage {
             Stage::UnderWay(run) => run.execute(given).map(|_| ()),
@@ -148,8 +147,10 @@ impl Session {
     fn choose(&mut self, node: Option<&Node<'_, '_>>) -> Result<(), CatalystError> {
         let Stage::UnderWay(run) = &mut self.stage else { return Ok(()) };
         // The names are those of another implementation's scripts where the configuration does not come from the solver.
+        let of_solver =
+            |name: &str| self.groups.iter().any(|(_, pipelines)| pipelines.iter().any(|known| known == name));
         let Some(node) = node.filter(|_| !self.groups.is_empty()) else {
-            run.choose(None);
+            run.choose(None, &of_solver);
             return Ok(());
         };
         let mut chosen: Vec<&str> = Vec::new();
@@ -167,7 +168,7 @@ impl Session {
                 chosen.extend(pipelines.iter().map(String::as_str));
             }
         }
-        run.choose(Some(&chosen));
+        run.choose(Some(&chosen), &of_solver);
         Ok(())
     }
 
@@ -187,10 +188,13 @@ impl Session {
         let Stage::UnderWay(run) = self.stage else { return Ok(()) };
         let (report, ended) = run.finalize();
         let report = report.filter(|_| self.communicator.rank() == 0);
+        let mut told = Ok(());
         if let (Some(report), Some(file)) = (report, configuration::report_file()) {
             let text = serde_json::to_string_pretty(&report).unwrap_or_default();
-            std::fs::write(&file, text).map_err(|error| CatalystError::Configuration(format!("{file}: {error}")))?;
+            told =
+                std::fs::write(&file, text).map_err(|error| CatalystError::Configuration(format!("{file}: {error}")));
         }
-        ended
+        // No rank goes on before the files are there.
+        ranks::agree(&*self.communicator, ended.and(told))
     }
 }

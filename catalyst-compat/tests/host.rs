@@ -215,6 +215,115 @@ fn every_mesh_of_the_blueprint_arrives() {
     assert!(blocks.field("alone")[0] == 1.0 && blocks.field("alone")[1].is_nan(), "one block has no such field");
 }
 
+/// What VTK finds in a file (`tests/vtk/arrays.py`).
+fn vtk(file: &Path) -> serde_json::Value {
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/vtk/arrays.py");
+    let output = Command::new("/usr/bin/python3").arg(script).arg(file).output().expect("scripts/setup installs VTK");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).expect("JSON")
+}
+
+#[test]
+fn vtk_reads_back_types_ghosts_and_fields_of_the_mesh() {
+    use serde_json::json;
+
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let watch = directory.path().join("watch.json");
+    let surfaces = r#"{"version": 1, "pipelines": [
+        {"name": "skin", "channel": "types", "stages": [{"surface": {}}, {"write": {"file": "skin.vtp"}}]},
+        {"name": "part", "channel": "types", "stages": [{"select": {"fields": ["int8"]}}, {"write": {"file": "part.vtu"}}]},
+        {"name": "cut", "channel": "types", "stages": [{"slice": {"origin": [1.5, 0.5, 0.5], "normal": [0, 1, 0]}}, {"write": {"file": "cut.vtp"}}]},
+        {"name": "amount", "channel": "types", "stages": [{"statistics": {"field": "uint8"}}],
+            "when": "uint8.max < 4", "then": [{"write": {"file": "amount.vtu"}}]},
+        {"name": "outside", "channel": "levels", "stages": [{"surface": {}}, {"write": {"file": "outside.vtp"}}]}]}"#;
+    std::fs::write(&watch, surfaces).expect("a file");
+    let program = compile(directory.path(), "arrays", true);
+    let written = directory.path().join("out");
+    let (output, errors) = run(&program, Some(&watch), &[("TOMBOLO_OUTPUT", &written.to_string_lossy())]);
+    assert!(output.status.success(), "{errors}");
+    let told =
+        "tombolo: 'catalyst/channels/types/data/state/fields/title' is passed over: fields hold numbers, not texts\n";
+    assert_eq!(errors, told, "what is passed over is told once");
+
+    let types = vtk(&written.join("types.vtu"));
+    assert_eq!((&types["cells"], &types["own_cells"], &types["points"]), (&json!(3), &json!(2), &json!(16)));
+    // The middle cell is somebody else's: its neighbours' faces towards it are the surface's.
+    assert_eq!(types["faces"], 12);
+    for (name, kind, values) in [
+        ("int8", "signed char", [-128.0, 127.0]),
+        ("int16", "short", [-32768.0, 32767.0]),
+        ("int32", "int", [-2_147_483_648.0, 2_147_483_647.0]),
+        ("int64", "long long", [-9_007_199_254_740_992.0, 9_007_199_254_740_992.0]),
+        ("uint8", "unsigned char", [0.0, 255.0]),
+        ("uint16", "unsigned short", [0.0, 65535.0]),
+        ("uint32", "unsigned int", [0.0, 4_294_967_295.0]),
+        ("uint64", "unsigned long long", [0.0, 9_007_199_254_740_992.0]),
+        ("float32", "float", [f64::from(0.1_f32), f64::from(-1e30_f32)]),
+        ("float64", "double", [0.1, -1e300]),
+    ] {
+        let found = &types["element"][name];
+        let plain = found[0].as_str().map(|kind| kind.replace("vtktypeint64", "long long"));
+        let plain = plain.as_deref().map(|found| if found == "long" { "long long" } else { found });
+        let plain = plain.map(|found| if found == "unsigned long" { "unsigned long long" } else { found });
+        assert_eq!((plain, &found[1]), (Some(kind), &json!(1)), "{name}");
+        assert_eq!(found[2], json!([values[0], values[1], 3.0]), "{name}");
+    }
+    assert_eq!(types["element"]["vtkGhostType"], json!(["unsigned char", 1, [0.0, 1.0, 0.0]]));
+    assert!(types["element"].get("halo").is_none());
+    assert_eq!(types["mesh"]["times"], json!(["float", 1, [0.5, 0.25]]));
+    assert_eq!(types["mesh"]["counts"], json!(["unsigned short", 1, [7.0]]));
+    // Ghosts are told whatever fields are chosen.
+    assert_eq!(vtk(&written.join("part.vtu"))["own_cells"], 2);
+    assert!(written.join("amount.vtu").exists(), "the greatest value is the ghost's");
+
+    let blocks = vtk(&written.join("blocks.vtu"));
+    assert_eq!((&blocks["cells"], &blocks["own_cells"]), (&json!(5), &json!(4)));
+    assert_eq!(blocks["element"]["vtkGhostType"], json!(["unsigned char", 1, [0.0, 0.0, 0.0, 1.0, 0.0]]));
+    assert_eq!(blocks["element"]["small"][0], "short");
+
+    let cells = |name: &str| read_mesh(written.join(name)).unwrap_or_else(|error| panic!("{error}")).mesh.cells().len();
+    assert_eq!((cells("skin.vtp"), cells("cut.vtp")), (12, 2));
+    assert_eq!(cells("outside.vtp"), 4 * 4 + 2, "nothing between the grids is drawn");
+}
+
+#[test]
+fn pipelines_of_the_solver_and_of_the_user_run_together() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let program = compile(directory.path(), "arrays", true);
+    let (user, solver) = (directory.path().join("user.json"), directory.path().join("solver.json"));
+    let write = |name: &str| {
+        format!(
+            r#"{{"version": 1, "pipelines": [{{"name": "{name}", "channel": "types", "stages": [{{"write": {{"file": "{name}.vtu"}}}}]}}]}}"#
+        )
+    };
+    std::fs::write(&user, write("user")).expect("a file");
+    std::fs::write(&solver, write("solver")).expect("a file");
+    let written = |name: &str| directory.path().join("out").join(name).exists();
+    let output_of = |script: Option<&Path>, user: Option<&Path>| {
+        let _ = std::fs::remove_dir_all(directory.path().join("out"));
+        let (out, user) = (directory.path().join("out"), user.map(|user| user.to_string_lossy().into_owned()));
+        let mut environment = vec![("TOMBOLO_OUTPUT", out.to_str().expect("a plain path"))];
+        environment.extend(user.as_deref().map(|user| ("TOMBOLO_PIPELINES", user)));
+        let (output, errors) = run(&program, script, &environment);
+        assert!(output.status.success(), "{errors}");
+        errors
+    };
+    // Files of the solver's, and the default view.
+    let errors = output_of(None, None);
+    assert!(errors.contains("tombolo: open http://127.0.0.1:") && written("types.vtu"), "{errors}");
+    // Files of the solver's, and what the user asks for.
+    let errors = output_of(None, Some(&user));
+    assert!(!errors.contains("open http") && written("types.vtu") && written("user.vtu"), "{errors}");
+    // The solver names a configuration: the variable is passed over, and that is told.
+    let errors = output_of(Some(&solver), Some(&user));
+    assert!(written("types.vtu") && written("solver.vtu") && !written("user.vtu"), "{errors}");
+    let told = format!(
+        "tombolo: TOMBOLO_PIPELINES={} is passed over: the solver names a configuration itself\n",
+        user.display()
+    );
+    assert_eq!(errors.matches(&told).count(), 1, "{errors}");
+}
+
 #[test]
 fn a_step_says_which_pipelines_run() {
     let directory = tempfile::tempdir().expect("a temporary directory");

@@ -237,8 +237,10 @@ fn no_rank_waits_for_one_that_goes_wrong() {
         {"name": "surface", "stages": [{"surface": {}}, {"write": {"file": "surface-{cycle}.vtp"}}]},
         {"name": "touching", "channel": "touching", "stages": [{"write": {"file": "touching-{cycle}.vtu"}}]},
         {"name": "levels", "channel": "levels", "stages": [{"surface": {}}, {"write": {"file": "levels-{cycle}.vtp"}}]},
+        {"name": "across", "channel": "across", "stages": [{"write": {"file": "across-{cycle}.vtu"}}]},
         {"name": "drops", "channel": "drops", "stages": [{"write": {"file": "drops-{cycle}.vtu"}}]},
-        {"name": "skin", "channel": "drops", "stages": [{"surface": {}}, {"write": {"file": "skin-{cycle}.vtp"}}]}]});
+        {"name": "skin", "channel": "drops", "stages": [{"surface": {}}, {"write": {"file": "skin-{cycle}.vtp"}}]},
+        {"name": "last", "channel": "touching", "stages": [{"write": {"file": "last-{cycle}.vtu"}}]}]});
     std::fs::write(&pipelines, watch.to_string()).expect("a file");
     let mut query = Command::new("pkg-config");
     query.env("PKG_CONFIG_PATH", built.prefix.join("lib/pkgconfig")).args(["--cflags", "--libs", "catalyst"]);
@@ -265,9 +267,16 @@ fn no_rank_waits_for_one_that_goes_wrong() {
     let written = |name: &str| tombolo::pipelines::files::read_mesh(directory.path().join(name)).expect("was written");
     let touching = written("touching-000002.vtu").mesh;
     assert_eq!((touching.cells().len(), touching.points().len()), (4, 28));
-    // All faces of a coarse cell and eight fine ones on each rank, but where two fine cells lie against two.
-    assert_eq!(written("levels-000002.vtp").mesh.cells().len(), 2 * (6 + 24 - 2));
-    assert_eq!(written("drops-000002.vtu").mesh.cells().len(), 4);
+    // All faces of a coarse cell and eight fine ones on each rank, but where those of the ranks lie against each other.
+    assert_eq!(written("levels-000002.vtp").mesh.cells().len(), 2 * (6 + 24 - 1 - 4));
+    // Finer cells of another rank cover a coarse one; types and fields of the mesh come along.
+    let across = written("across-000002.vtu");
+    assert_eq!(across.mesh.cells().len(), 1 + 8);
+    let field = |name: &str| across.fields.iter().find(|field| field.name == name).expect("was written");
+    assert_eq!((field("level").number.name(), field("level").values.iter().sum::<f64>()), ("uint8", 8.0));
+    assert_eq!((field("held").number.name(), field("held").values.as_slice()), ("float32", &[0.5][..]));
+    let drops = written("drops-000002.vtu").mesh;
+    assert_eq!((drops.cells().len(), drops.points().len()), (4, 4), "points are never merged");
     let skin = "pipeline 'skin': the mesh has no surface: none of its 4 cells has dimension 2 or 3";
     assert_eq!(told.matches(skin).count(), 1, "{told}");
 }

@@ -3,6 +3,7 @@
 #include <mpi.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <unistd.h>
 
 static int rank;
 
@@ -59,12 +60,30 @@ static void levels(conduit_node* channels)
   }
 }
 
-/* Points alone, which have no surface. */
+/* Two coarse cells on rank 0, one of them covered by eight finer ones of rank 1. */
+static void across(conduit_node* channels)
+{
+  conduit_node* channel = conduit_node_fetch(channels, "across");
+  conduit_node_set_path_char8_str(channel, "type", "amrmesh");
+  const int coarse[3] = { 3, 2, 2 }, fine[3] = { 3, 3, 3 };
+  conduit_node* mesh = grid(channel, rank ? "data/fine" : "data/coarse", rank ? fine : coarse, 0.0, rank ? 0.5 : 1.0);
+  conduit_node_set_path_int32(mesh, "state/domain_id", rank);
+  conduit_node_set_path_int32(mesh, "state/level", rank);
+  const float held[1] = { 0.5f };
+  conduit_node_set_path_float32_ptr(mesh, "state/fields/held", (float*)held, 1);
+  uint8_t levels[8];
+  for (int cell = 0; cell < 8; ++cell) levels[cell] = (uint8_t)rank;
+  conduit_node_set_path_char8_str(mesh, "fields/level/association", "element");
+  conduit_node_set_path_char8_str(mesh, "fields/level/topology", "mesh");
+  conduit_node_set_path_uint8_ptr(mesh, "fields/level/values", levels, rank ? 8 : 2);
+}
+
+/* Points alone, which have no surface, at the same places on each rank. */
 static void drops(conduit_node* channels)
 {
   conduit_node* channel = conduit_node_fetch(channels, "drops");
   conduit_node_set_path_char8_str(channel, "type", "mesh");
-  const double at[2] = { rank, rank + 0.5 };
+  const double at[2] = { 0.0, 0.5 };
   conduit_node_set_path_char8_str(channel, "data/coordsets/coords/type", "explicit");
   conduit_node_set_path_float64_ptr(channel, "data/coordsets/coords/values/x", (double*)at, 2);
   conduit_node_set_path_char8_str(channel, "data/topologies/mesh/type", "points");
@@ -101,6 +120,7 @@ static conduit_node* step(int cycle)
   conduit_node_set_path_external_float64_ptr(mesh, "fields/heat/values", heat, 8);
   touching(conduit_node_fetch(node, "catalyst/channels"));
   levels(conduit_node_fetch(node, "catalyst/channels"));
+  across(conduit_node_fetch(node, "catalyst/channels"));
   drops(conduit_node_fetch(node, "catalyst/channels"));
   return node;
 }
@@ -148,7 +168,11 @@ int main(int argc, char** argv)
   expect("and another", run(step(2)), 0);
   conduit_node* results = conduit_node_create();
   expect("results", (int)catalyst_results(results), 0);
-  expect("finalize", (int)catalyst_finalize(setup), 0);
+  const int ended = (int)catalyst_finalize(setup);
+  /* Looked for at once, on every rank. */
+  const int missing = access("surface-000002.vtp", F_OK) != 0 || access("last-000002.vtu", F_OK) != 0;
+  expect("finalize", ended, 0);
+  expect("files that are not there after finalize", missing, 0);
   conduit_node_destroy(results);
   conduit_node_destroy(setup);
   conduit_node_destroy(wrong);

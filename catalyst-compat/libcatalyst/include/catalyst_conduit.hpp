@@ -2,6 +2,7 @@
 #ifndef catalyst_conduit_hpp
 #define catalyst_conduit_hpp
 
+#include <climits>
 #include <cstdlib>
 #include <cstring>
 #include <exception>

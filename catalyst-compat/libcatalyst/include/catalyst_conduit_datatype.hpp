@@ -34,7 +34,7 @@ public:
 
   Id id() const
   {
-    const conduit_index_t number = this->is_valid() ? conduit_datatype_id(this->Type) : CONDUIT_EMPTY_ID;
+    const conduit_index_t number = this->is_valid() ? this->type_id() : conduit_index_t(CONDUIT_EMPTY_ID);
     return number < CONDUIT_INT8_ID || number > CONDUIT_FLOAT64_ID ? Id::unknown
                                                                   : static_cast<Id>(number - CONDUIT_INT8_ID);
   }

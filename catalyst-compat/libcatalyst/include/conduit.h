@@ -10,7 +10,7 @@ extern "C" {
 #endif
 
 /* Fills a node with which Conduit this is. */
-CONDUIT_API void conduit_about(conduit_node* target);
+CONDUIT_C_API void conduit_about(conduit_node* target);
 
 #ifdef __cplusplus
 }

@@ -1,7 +1,10 @@
-/* Marks what the library exports. */
+/* Marks what the library exports of Blueprint. */
 #ifndef conduit_blueprint_exports_h
 #define conduit_blueprint_exports_h
 
-#include "conduit_exports.h"
+#include "catalyst_conduit_blueprint_mangle.h"
+#include "catalyst_export.h"
+
+#define CONDUIT_BLUEPRINT_API CATALYST_EXPORT
 
 #endif

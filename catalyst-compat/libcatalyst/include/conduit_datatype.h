@@ -7,7 +7,7 @@
 
 #include "conduit_bitwidth_style_types.h"
 #include "conduit_endianness_types.h"
-#include "conduit_exports.h"
+#include "conduit_c_exports.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -16,24 +16,24 @@ extern "C" {
 typedef struct conduit_datatype_impl conduit_datatype;
 
 /* Bytes of conduit_index_t. */
-CONDUIT_API int conduit_datatype_sizeof_index_t(void);
+CONDUIT_C_API int conduit_datatype_sizeof_index_t(void);
 /* The number of the type, one of CONDUIT_*_ID. */
-CONDUIT_API conduit_index_t conduit_datatype_id(const conduit_datatype* datatype);
+CONDUIT_C_API conduit_index_t conduit_datatype_id(const conduit_datatype* datatype);
 /* The name of the type; freed by conduit_datatype_name_destroy. */
-CONDUIT_API char* conduit_datatype_name(const conduit_datatype* datatype);
-CONDUIT_API void conduit_datatype_name_destroy(char* name);
+CONDUIT_C_API char* conduit_datatype_name(const conduit_datatype* datatype);
+CONDUIT_C_API void conduit_datatype_name_destroy(char* name);
 
 /* Number of elements; offset, stride and element bytes in bytes; order of bytes, one of CONDUIT_ENDIANNESS_*_ID. */
-CONDUIT_API conduit_index_t conduit_datatype_number_of_elements(const conduit_datatype* datatype);
-CONDUIT_API conduit_index_t conduit_datatype_offset(const conduit_datatype* datatype);
-CONDUIT_API conduit_index_t conduit_datatype_stride(const conduit_datatype* datatype);
-CONDUIT_API conduit_index_t conduit_datatype_element_bytes(const conduit_datatype* datatype);
-CONDUIT_API conduit_index_t conduit_datatype_endianness(const conduit_datatype* datatype);
+CONDUIT_C_API conduit_index_t conduit_datatype_number_of_elements(const conduit_datatype* datatype);
+CONDUIT_C_API conduit_index_t conduit_datatype_offset(const conduit_datatype* datatype);
+CONDUIT_C_API conduit_index_t conduit_datatype_stride(const conduit_datatype* datatype);
+CONDUIT_C_API conduit_index_t conduit_datatype_element_bytes(const conduit_datatype* datatype);
+CONDUIT_C_API conduit_index_t conduit_datatype_endianness(const conduit_datatype* datatype);
 /* From the start of the data to an element, in bytes. */
-CONDUIT_API conduit_index_t conduit_datatype_element_index(const conduit_datatype* datatype, conduit_index_t index);
+CONDUIT_C_API conduit_index_t conduit_datatype_element_index(const conduit_datatype* datatype, conduit_index_t index);
 
 /* 1 for yes, 0 for no. */
-#define CONDUIT_DATATYPE_IS(what) CONDUIT_API int conduit_datatype_##what(const conduit_datatype* datatype)
+#define CONDUIT_DATATYPE_IS(what) CONDUIT_C_API int conduit_datatype_##what(const conduit_datatype* datatype)
 CONDUIT_DATATYPE_IS(is_empty);
 CONDUIT_DATATYPE_IS(is_object);
 CONDUIT_DATATYPE_IS(is_list);

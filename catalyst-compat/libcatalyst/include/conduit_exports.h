@@ -6,6 +6,5 @@
 #include "catalyst_export.h"
 
 #define CONDUIT_API CATALYST_EXPORT
-#define CONDUIT_BLUEPRINT_API CATALYST_EXPORT
 
 #endif

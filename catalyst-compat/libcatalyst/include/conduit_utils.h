@@ -3,15 +3,15 @@
 #ifndef conduit_utils_h
 #define conduit_utils_h
 
-#include "conduit_exports.h"
+#include "conduit_c_exports.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-CONDUIT_API void conduit_utils_set_info_handler(void (*handler)(const char*, const char*, int));
-CONDUIT_API void conduit_utils_set_warning_handler(void (*handler)(const char*, const char*, int));
-CONDUIT_API void conduit_utils_set_error_handler(void (*handler)(const char*, const char*, int));
+CONDUIT_C_API void conduit_utils_set_info_handler(void (*handler)(const char*, const char*, int));
+CONDUIT_C_API void conduit_utils_set_warning_handler(void (*handler)(const char*, const char*, int));
+CONDUIT_C_API void conduit_utils_set_error_handler(void (*handler)(const char*, const char*, int));
 
 #ifdef __cplusplus
 }

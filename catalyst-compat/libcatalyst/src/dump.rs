@@ -44,9 +44,14 @@ fn parse(name: &str) -> Option<(Stage, i32)> {
 /// Sees that a directory holds a whole run on `size` ranks; gives how many times it executed.
 ///
 /// # Errors
-/// The directory cannot be read, holds a run on another number of ranks, or lacks a call of a rank.
+/// A text that begins with the words of Catalyst's own program, by which scripts know what is wrong: the directory cannot be read,
+/// holds a run on another number of ranks, or lacks a call of a rank.
 pub fn check(directory: &Path, size: i32) -> Result<u64, String> {
-    let unreadable = |error| format!("'{}' cannot be read: {error}", directory.display());
+    let place = directory.display();
+    if directory.as_os_str().is_empty() {
+        return Err("ERROR: Empty data_dump_directory path detected.".to_owned());
+    }
+    let unreadable = |error| format!("ERROR: Error opening directory {place}: {error}");
     let (mut initialized, mut executed, mut finalized, mut executions) = (0_u64, 0_u64, 0_u64, 0_u64);
     for entry in fs::read_dir(directory).map_err(unreadable)? {
         let name = entry.map_err(unreadable)?.file_name();
@@ -54,7 +59,9 @@ pub fn check(directory: &Path, size: i32) -> Result<u64, String> {
             continue;
         };
         if ranks != size {
-            return Err(format!("'{}' holds a run on {ranks} ranks; this one has {size}", directory.display()));
+            return Err(format!(
+                "ERROR: Mismatch in the number of ranks: '{place}' holds a run on {ranks}; catalyst_replay runs on {size}."
+            ));
         }
         match stage {
             Stage::Initialize => initialized += 1,
@@ -65,18 +72,22 @@ pub fn check(directory: &Path, size: i32) -> Result<u64, String> {
             }
         }
     }
+    let found = format!("'{place}' holds {initialized} of initialize, {executed} of execute, {finalized} of finalize");
+    if initialized == 0 || executed == 0 || finalized == 0 {
+        return Err(format!("ERROR: Missing node data for at least one stage: {found}."));
+    }
     let ranks = u64::from(size.unsigned_abs());
-    for (call, found, wanted) in [
-        ("initialize", initialized, ranks),
-        ("execute", executed, ranks.saturating_mul(executions).max(ranks)),
-        ("finalize", finalized, ranks),
-    ] {
-        if found != wanted {
-            return Err(format!(
-                "'{}' holds {found} nodes of {call} where a run on {size} ranks leaves {wanted}",
-                directory.display()
-            ));
-        }
+    if initialized != ranks || finalized != ranks {
+        return Err(format!(
+            "ERROR: Mismatch in the number of calls to initialize or finalize: {found}; a run on {size} ranks leaves {ranks} \
+             of each."
+        ));
+    }
+    let expected = ranks.saturating_mul(executions);
+    if executed != expected {
+        return Err(format!(
+            "ERROR: Unexpected number of calls to execute: {found}; {executions} steps on {size} ranks leave {expected}."
+        ));
     }
     Ok(executions)
 }

@@ -101,24 +101,59 @@ fn nodes_work_from_c_cpp_and_fortran() {
 }
 
 #[test]
-fn python_sees_the_same_node() {
+fn every_python_sees_the_same_node() {
     let built = Built::get();
     let packages = std::fs::read_dir(built.prefix.join("lib")).expect("the prefix can be read").flatten();
     let packages = packages.map(|entry| entry.path().join("site-packages")).find(|path| path.is_dir());
     let packages = packages.expect("the Python packages are installed");
-    let has_numpy = |python: &&str| {
-        Command::new(python).args(["-c", "import numpy"]).output().is_ok_and(|output| output.status.success())
-    };
-    let python = ["python3", "/usr/bin/python3"].into_iter().find(has_numpy).expect("scripts/setup installs NumPy");
-    for (name, paths) in [("stub", PathBuf::new()), ("echo", built.implementations())] {
-        let mut run = Command::new(python);
-        run.arg(package().join("tests/programs/node.py"))
-            .arg(name)
-            .env("PYTHONPATH", &packages)
-            .env("PYTHONDONTWRITEBYTECODE", "1");
-        let told = succeed(run.env_remove("CATALYST_IMPLEMENTATION_NAME").env("CATALYST_IMPLEMENTATION_PATHS", paths));
-        assert!(told.contains(&format!("node.py: ok with {name}")), "{told}");
+    // The declarations as the compiler sees them: Python's idea of them must be the same.
+    let mut preprocess = Command::new("gcc");
+    preprocess.args(["-E", "-P", "-x", "c", "-include", "catalyst.h", "-include", "conduit_blueprint.h"]);
+    let preprocess = preprocess.arg("-I").arg(built.prefix.join("include/catalyst-2.0")).arg("/dev/null");
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let declared = directory.path().join("declared");
+    std::fs::write(&declared, succeed(preprocess)).expect("can be written");
+    let pythons = interpreters(directory.path());
+    for (python, numpy) in &pythons {
+        for (name, paths) in [("stub", PathBuf::new()), ("echo", built.implementations())] {
+            let mut run = Command::new(python);
+            run.arg(package().join("tests/programs/node.py"))
+                .arg(name)
+                .stdin(std::fs::File::open(&declared).expect("was written"))
+                .env("PYTHONPATH", std::env::join_paths([&packages, numpy]).expect("paths without a colon"))
+                .env("PYTHONDONTWRITEBYTECODE", "1");
+            let told =
+                succeed(run.env_remove("CATALYST_IMPLEMENTATION_NAME").env("CATALYST_IMPLEMENTATION_PATHS", paths));
+            assert!(told.contains(&format!("node.py: ok with {name}")), "{told}");
+        }
     }
+}
+
+/// Every Python that can have NumPy, its own or that of the system's Python, which another of the same version can load; and where
+/// it finds it. Those of a system lie below 4 GB, those that people build themselves do not: an address that is cut shows there.
+fn interpreters(directory: &Path) -> Vec<(PathBuf, PathBuf)> {
+    let home = std::env::var_os("PYENV_ROOT").map(PathBuf::from);
+    let home = home.or_else(|| std::env::var_os("HOME").map(|home| Path::new(&home).join(".pyenv")));
+    let versions = home.and_then(|home| std::fs::read_dir(home.join("versions")).ok());
+    let built = versions.into_iter().flatten().flatten().map(|version| version.path().join("bin/python3"));
+    let candidates = [PathBuf::from("python3"), PathBuf::from("/usr/bin/python3")].into_iter().chain(built);
+    let lent = directory.join("numpy");
+    std::fs::create_dir(&lent).expect("can be made");
+    let system = "/usr/lib/python3/dist-packages/numpy";
+    std::os::unix::fs::symlink(system, lent.join("numpy")).expect("can be made");
+    let mut found: Vec<(PathBuf, PathBuf)> = Vec::new();
+    for python in candidates {
+        for numpy in [PathBuf::new(), lent.clone()] {
+            let mut command = Command::new(&python);
+            command.args(["-c", "import numpy"]).env("PYTHONPATH", &numpy).env("PYTHONDONTWRITEBYTECODE", "1");
+            if command.output().is_ok_and(|output| output.status.success()) {
+                found.push((python, numpy));
+                break;
+            }
+        }
+    }
+    assert!(!found.is_empty(), "no Python has NumPy; scripts/setup installs it");
+    found
 }
 
 #[test]
@@ -134,6 +169,51 @@ fn valgrind_finds_nothing() {
     let mut session = Command::new("valgrind");
     session.args(options).arg(built.build.join("session")).args(["0", "echo"]).arg(built.implementations());
     assert!(succeed(&mut session).contains("echo"));
+}
+
+#[test]
+fn headers_define_what_programs_name() {
+    let built = Built::get();
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let headers = built.prefix.join("include/catalyst-2.0");
+    let compiled = |compiler: &str, standard: &str, source: &Path, program: &Path| {
+        let mut compile = Command::new(compiler);
+        compile.arg(format!("-std={standard}")).args(["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-I"]).arg(&headers);
+        compile.arg(source).arg("-o").arg(program).arg("-L").arg(built.prefix.join("lib")).arg("-lcatalyst");
+        succeed(&mut compile);
+    };
+    for (compiler, standard, source) in [
+        ("gcc", "c99", "names.c"),
+        ("gcc", "c11", "names.c"),
+        ("g++", "c++11", "names.cpp"),
+        ("g++", "c++17", "names.cpp"),
+        ("g++", "c++20", "names.cpp"),
+    ] {
+        let program = directory.path().join(standard);
+        compiled(compiler, standard, &package().join("tests/programs").join(source), &program);
+        let told = succeed(Command::new(&program).env("LD_LIBRARY_PATH", built.prefix.join("lib")));
+        assert!(told.contains(&format!("{source}: ok")), "{told}");
+    }
+    // Each header stands alone, and may come twice.
+    let mut count = 0;
+    for entry in std::fs::read_dir(&headers).expect("the headers are installed").flatten() {
+        let name = entry.file_name().into_string().expect("headers have plain names");
+        let languages: &[_] = match entry.path().extension().and_then(|extension| extension.to_str()) {
+            Some("h") => &[("gcc", "c99", "c"), ("g++", "c++11", "cpp")],
+            // Needs what includes it, and says so.
+            Some("hpp") if name == "catalyst_conduit_families.hpp" => continue,
+            Some("hpp") => &[("g++", "c++11", "cpp"), ("g++", "c++17", "cpp")],
+            _ => continue,
+        };
+        for (compiler, standard, extension) in languages {
+            let source = directory.path().join(format!("alone.{extension}"));
+            let text = format!("#include <{name}>\n#include <{name}>\nint main(void) {{ return 0; }}\n");
+            std::fs::write(&source, text).expect("can be written");
+            compiled(compiler, standard, &source, &directory.path().join("alone"));
+        }
+        count += 1;
+    }
+    assert!(count > 25, "{count}");
 }
 
 #[test]
@@ -223,20 +303,35 @@ fn what_is_dumped_is_played_back() {
     let refused = |directory: &Path, why: &str| {
         let refused = output(replay().arg(directory));
         assert!(!refused.status.success());
-        assert!(String::from_utf8_lossy(&refused.stderr).contains(why), "{refused:?}");
+        assert!(String::from_utf8_lossy(&refused.stderr).starts_with(why), "{refused:?}");
     };
-    refused(&directory.path().join("nothing"), "cannot be read");
-    refused(directory.path(), "0 nodes of initialize");
-    for (stage, why) in [("initialize", "0 nodes of initialize"), ("execute_invc0", "0 nodes of execute")] {
+    refused(&directory.path().join("nothing"), "ERROR: Error opening directory");
+    refused(Path::new(""), "ERROR: Empty data_dump_directory path detected");
+    refused(directory.path(), "ERROR: Missing node data for at least one stage");
+    let without = |stage: &str, why: &str| {
         let file = dumped.join(format!("{stage}_params.conduit_bin.1.0"));
         let kept = std::fs::read(&file).expect("was dumped");
         std::fs::remove_file(&file).expect("is there");
         refused(&dumped, why);
-        std::fs::write(dumped.join("execute_invc1_params.conduit_bin.1.0"), &kept).expect("can be written");
-        refused(&dumped, "holds");
-        std::fs::remove_file(dumped.join("execute_invc1_params.conduit_bin.1.0")).expect("is there");
         std::fs::write(&file, &kept).expect("can be written");
+    };
+    for stage in ["initialize", "execute_invc0", "finalize"] {
+        without(stage, "ERROR: Missing node data for at least one stage");
+    }
+    let first = dumped.join("execute_invc0_params.conduit_bin.1.0");
+    std::fs::copy(&first, dumped.join("execute_invc1_params.conduit_bin.1.0")).expect("can be written");
+    without("execute_invc0", "ERROR: Unexpected number of calls to execute");
+    std::fs::remove_file(dumped.join("execute_invc1_params.conduit_bin.1.0")).expect("is there");
+    let second = dumped.join("initialize_params.conduit_bin.1.1");
+    std::fs::copy(&first, &second).expect("can be written");
+    refused(&dumped, "ERROR: Mismatch in the number of calls to initialize or finalize");
+    std::fs::remove_file(&second).expect("is there");
+    for arguments in [&[][..], &["one", "two"]] {
+        let told = output(replay().args(arguments));
+        assert!(!told.status.success());
+        let told = String::from_utf8_lossy(&told.stderr).into_owned();
+        assert!(told.starts_with("ERROR: Expected 1 argument, the data dump directory."), "{told}");
     }
     std::fs::write(dumped.join("finalize_params.conduit_bin.2.1"), "").expect("can be written");
-    refused(&dumped, "a run on 2 ranks; this one has 1");
+    refused(&dumped, "ERROR: Mismatch in the number of ranks");
 }

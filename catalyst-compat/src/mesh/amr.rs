@@ -7,13 +7,28 @@ use crate::error::CatalystError;
 use crate::node::Node;
 
 /// A grid among those of its channel: what nesting sets call it, how fine it is, and where it lies.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Grid {
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(crate) struct Grid {
     id: Option<i64>,
     level: i64,
+    #[serde(with = "bits")]
     lower: [f64; 3],
+    #[serde(with = "bits")]
     spacing: [f64; 3],
     cells: [usize; 3],
+}
+
+/// Numbers as they are, to the last bit.
+mod bits {
+    use serde::{Deserialize as _, Deserializer, Serialize as _, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(numbers: &[f64; 3], serializer: S) -> Result<S::Ok, S::Error> {
+        numbers.map(f64::to_bits).serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; 3], D::Error> {
+        Ok(<[u64; 3]>::deserialize(deserializer)?.map(f64::from_bits))
+    }
 }
 
 impl Grid {
@@ -28,6 +43,11 @@ impl Grid {
         let number = |name| state.child(name).map(|child| whole_number(&child)).transpose();
         let (id, level) = (number(c"domain_id")?, number(c"level")?);
         Ok(level.map(|level| Self { id, level, lower: *origin, spacing: *spacing, cells: *cells }))
+    }
+
+    /// The least distance between two of its points along an axis.
+    pub(super) fn least_spacing(&self) -> f64 {
+        (0..3).filter(|&axis| self.cells[axis] > 0).map(|axis| self.spacing[axis].abs()).fold(f64::INFINITY, f64::min)
     }
 
     /// The cells of this grid whose middle lies in a finer one.
@@ -97,12 +117,12 @@ impl Mask {
         Ok(mask)
     }
 
-    /// Takes the word of the finer grids that are at hand for what they cover. Windows tell of those of other ranks; one that
-    /// names its own grid tells nothing.
-    pub(super) fn settle(&mut self, own: &Grid, others: &[Option<Grid>]) {
-        let known = |id: i64| own.id == Some(id) || others.iter().flatten().any(|grid| grid.id == Some(id));
+    /// Takes the word of the finer grids that are known for what they cover. Windows tell of those that are not; one that names
+    /// its own grid tells nothing.
+    pub(super) fn settle(&mut self, own: &Grid, others: &[Grid]) {
+        let known = |id: i64| own.id == Some(id) || others.iter().any(|grid| grid.id == Some(id));
         self.covered.retain(|window| !window.child.is_some_and(known));
-        let finer = others.iter().flatten().filter(|grid| grid.level > own.level);
+        let finer = others.iter().filter(|grid| grid.level > own.level);
         self.covered.extend(finer.filter_map(|finer| own.covered_by(finer)));
     }
 

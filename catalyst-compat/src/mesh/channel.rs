@@ -4,9 +4,11 @@ use std::ffi::CString;
 
 use super::amr::{Grid, Mask};
 use super::domain::Domain;
+use super::field::Field;
 use super::topology::Topology;
 use crate::array::Fingerprint;
 use crate::error::CatalystError;
+use crate::memory;
 use crate::node::{Kind, Node};
 
 /// One mesh of a channel.
@@ -34,6 +36,12 @@ pub(crate) struct Channel<'call> {
     pub(crate) blocks: Vec<Block<'call>>,
     /// Names of features by their numbers.
     pub(crate) feature_names: Vec<(i64, String)>,
+    /// What belongs to the mesh as a whole.
+    pub(crate) of_mesh: Vec<Field<'call>>,
+    /// The grids of levels that the blocks are; none of a channel without levels.
+    pub(crate) grids: Vec<Option<Grid>>,
+    /// What is passed over, for the log.
+    pub(crate) notes: Vec<String>,
 }
 
 const KINDS: &str = "'mesh', 'multimesh' or 'amrmesh'";
@@ -59,6 +67,8 @@ impl<'call> Channel<'call> {
             return Err(data.wrong("an object: a mesh, or meshes by their names".into()));
         }
         channel.feature_names = feature_names(node)?;
+        channel.read_of_mesh(node)?;
+        channel.read_of_mesh(&data)?;
         if kind_name == "mesh" {
             channel.feature_names.extend(feature_names(&data)?);
         }
@@ -66,18 +76,16 @@ impl<'call> Channel<'call> {
         let has_domains = data.child(c"coordsets").is_none()
             && data.names().first().and_then(|name| data.at(0, name)?.child(c"coordsets").map(drop)).is_some();
         if kind_name == "mesh" && !has_domains {
-            channel.push(String::new(), &data, None, looked_at)?;
+            channel.push(String::new(), &data, false, looked_at)?;
         } else {
-            let mut grids = (kind_name == "amrmesh").then(Vec::new);
+            let has_levels = kind_name == "amrmesh";
             for (index, name) in data.names().iter().enumerate() {
                 let Some(block) = data.at(index, name) else { continue };
-                channel.push(name.to_string_lossy().into_owned(), &block, grids.as_mut(), looked_at)?;
+                channel.push(name.to_string_lossy().into_owned(), &block, has_levels, looked_at)?;
+                channel.read_of_mesh(&block)?;
             }
-            for (block, own) in channel.blocks.iter_mut().zip(grids.iter().flatten()) {
-                if let (Some(own), Some(grids)) = (own, &grids) {
-                    block.mask.settle(own, grids);
-                }
-            }
+            let own: Vec<Grid> = channel.grids().collect();
+            channel.cover(&own);
         }
         channel.refuse_too_many()?;
         Ok(channel)
@@ -87,18 +95,54 @@ impl<'call> Channel<'call> {
         &mut self,
         name: String,
         node: &Node<'_, 'call>,
-        nested: Option<&mut Vec<Option<Grid>>>,
+        has_levels: bool,
         looked_at: bool,
     ) -> Result<(), CatalystError> {
         let Some(domain) = Domain::read(node, looked_at)? else { return Ok(()) };
         let mut mask = Mask::default();
-        if let Some(grids) = nested {
+        if has_levels {
             if let Topology::Grid { cells } = &domain.topology {
                 mask = Mask::read(node, *cells)?;
             }
-            grids.push(Grid::read(node, &domain)?);
+            self.grids.push(Grid::read(node, &domain)?);
         }
         self.blocks.push(Block { name, domain, mask });
+        Ok(())
+    }
+
+    /// The grids of levels here.
+    pub(crate) fn grids(&self) -> impl Iterator<Item = Grid> {
+        self.grids.iter().flatten().copied()
+    }
+
+    /// Leaves out the cells that finer ones of these grids cover.
+    pub(crate) fn cover(&mut self, grids: &[Grid]) {
+        for (block, own) in self.blocks.iter_mut().zip(&self.grids) {
+            if let Some(own) = own {
+                block.mask.settle(own, grids);
+            }
+        }
+    }
+
+    /// Whether its blocks are grids of levels, whose vertices at one place are one.
+    pub(super) fn has_levels(&self) -> bool {
+        self.grids.iter().any(Option::is_some)
+    }
+
+    /// Takes `state/fields` in; the first that says a name holds.
+    fn read_of_mesh(&mut self, node: &Node<'_, 'call>) -> Result<(), CatalystError> {
+        let Some(state) = node.child(c"state") else { return Ok(()) };
+        let Some(fields) = state.child(c"fields") else { return Ok(()) };
+        for (index, name) in fields.names().iter().enumerate() {
+            let Some(child) = fields.at(index, name) else { continue };
+            if self.of_mesh.iter().any(|field| field.name.as_bytes() == name.to_bytes()) {
+                continue;
+            }
+            match Field::read_of_mesh(&child)? {
+                Some(field) => self.of_mesh.push(field),
+                None => self.notes.push(format!("'{}' is passed over: fields hold numbers, not texts", child.path())),
+            }
+        }
         Ok(())
     }
 
@@ -139,7 +183,17 @@ impl<'call> Channel<'call> {
 
     /// Refuses arrays whose memory cannot be read.
     pub(crate) fn check_memory(&self) -> Result<(), CatalystError> {
-        self.blocks.iter().try_for_each(|block| block.domain.check_memory())
+        self.blocks.iter().try_for_each(|block| block.domain.check_memory())?;
+        for field in &self.of_mesh {
+            if let Some(found) = field.components.iter().find_map(memory::fault) {
+                return Err(CatalystError::Wrong {
+                    path: format!("catalyst/channels/{}/state/fields/{}", self.name, field.name),
+                    found,
+                    expected: "values in the main memory of this process, not in that of a graphics card".into(),
+                });
+            }
+        }
+        Ok(())
     }
 }
 

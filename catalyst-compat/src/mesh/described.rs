@@ -81,12 +81,12 @@ impl<'call> Description<'call> {
         for (field, association, components) in fields {
             // What has to be copied is copied before the adaptor sees it, so that it is asked here.
             check_field_length(&name, (&field, association), components.first().map_or(0, Array::len), counts)?;
-            own.push(Field { name: field, association, components });
+            own.push(Field::new(field, association, components));
         }
         let roles = Roles { ghosts, global_vertices, global_cells, vertex_features: None };
         let path = format!("channel '{name}'");
         let domain = Domain::described(coordset, topology, own, faces, roles, path);
         let block = Block { name: String::new(), domain, mask: Mask::default() };
-        Ok(Channel { name, blocks: vec![block], feature_names })
+        Ok(Channel { name, blocks: vec![block], feature_names, ..Channel::default() })
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ffi::{CStr, CString};
 
-use tombolo::pipelines::extract::Association;
+use tombolo::pipelines::extract::{Association, GHOST_FIELD};
 
 use super::coordset::Coordset;
 use super::field::{self, Field};
@@ -11,6 +11,9 @@ use crate::array::{Array, Fingerprint};
 use crate::error::CatalystError;
 use crate::memory;
 use crate::node::{Kind, Node};
+
+/// What ParaView's Catalyst calls the field that says which cells or vertices are copies of another rank's.
+const GHOSTS: &str = "Ghosts";
 
 /// What a field says besides its values.
 #[derive(Debug, Clone, Default)]
@@ -128,11 +131,11 @@ impl<'call> Domain<'call> {
             let role = told.as_ref().and_then(|told| told.child(name));
             let role = match role.as_ref().and_then(|role| role.child(c"attribute_type")) {
                 Some(role) => role.text()?.into_owned(),
-                None if field.name == "vtkGhostType" => "Ghosts".into(),
+                None if field.name == GHOST_FIELD => GHOSTS.into(),
                 None => String::new(),
             };
             self.take_role(&field, &role, &field_node)?;
-            self.fields.push(field);
+            self.fields.push(if role == GHOSTS { field.of_ghosts() } else { field });
         }
         Ok(())
     }
@@ -141,7 +144,7 @@ impl<'call> Domain<'call> {
         let [values] = field.components.as_slice() else { return Ok(()) };
         let is_features = field.name == "features" && field.association == Association::Vertex;
         let slot = match (role, field.association) {
-            ("Ghosts", Association::Element) => &mut self.roles.ghosts,
+            (GHOSTS, Association::Element) => &mut self.roles.ghosts,
             ("GlobalIds", Association::Vertex) => &mut self.roles.global_vertices,
             ("GlobalIds", Association::Element) => &mut self.roles.global_cells,
             _ if is_features && values.is_integer() => &mut self.roles.vertex_features,

@@ -3,9 +3,9 @@
 use std::ffi::CStr;
 
 use tombolo::deform::mesh::{ArrayView, Values};
-use tombolo::pipelines::extract::Association;
+use tombolo::pipelines::extract::{Association, GHOST_FIELD};
 
-use crate::array::Array;
+use crate::array::{Array, Number};
 use crate::error::CatalystError;
 use crate::node::{Kind, Node};
 
@@ -14,10 +14,18 @@ const COMPONENTS: usize = 9;
 
 /// A field of a mesh.
 #[derive(Debug, Clone)]
-pub(super) struct Field<'call> {
+pub(crate) struct Field<'call> {
     pub(super) name: String,
     pub(super) association: Association,
     pub(super) components: Vec<Array<'call>>,
+    /// What files hold it as.
+    pub(super) number: Number,
+}
+
+/// The type of all components; double precision where they differ.
+fn number(components: &[Array<'_>]) -> Number {
+    let first = components.first().map_or(Number::F64, Array::number);
+    if components.iter().all(|array| array.number() == first) { first } else { Number::F64 }
 }
 
 /// Components as they lie in the solver's memory, where each can be lent.
@@ -90,6 +98,23 @@ impl<'call> Field<'call> {
                 format!("{expected}, one for each {association} of topology '{}'", topology.to_string_lossy()),
             ));
         }
-        Ok(Some(Self { name: node.name().into_owned(), association, components }))
+        Ok(Some(Self::new(node.name().into_owned(), association, components)))
+    }
+
+    /// A field of the mesh as a whole; `None` for a text.
+    pub(super) fn read_of_mesh(node: &Node<'_, 'call>) -> Result<Option<Self>, CatalystError> {
+        if node.kind() == Kind::Text {
+            return Ok(None);
+        }
+        Ok(Some(Self::new(node.name().into_owned(), Association::Mesh, components(node)?)))
+    }
+
+    pub(super) fn new(name: String, association: Association, components: Vec<Array<'call>>) -> Self {
+        Self { name, association, number: number(&components), components }
+    }
+
+    /// The field by VTK's name for what says which cells or vertices are ghosts, and of VTK's type.
+    pub(super) fn of_ghosts(self) -> Self {
+        Self { name: GHOST_FIELD.to_owned(), number: Number::U8, ..self }
     }
 }

@@ -1,14 +1,16 @@
 //! What is kept of a channel from step to step: whatever cannot be lent as it lies in the solver's memory.
 
+use std::collections::HashMap;
+
 use tombolo::deform::mesh::{
     ArrayView, Cells, CellsView, FeatureSource, Indices, MeshView, TaggedFaces, Values, Vector,
 };
-use tombolo::pipelines::extract::{ABSENT, Association, FieldView};
+use tombolo::pipelines::extract::{ABSENT, Association, FieldView, GHOST_FIELD};
 
 use super::channel::Channel;
 use super::domain::Domain;
-use super::field;
-use crate::array::{Array, Fingerprint};
+use super::field::{self, Field};
+use crate::array::{Array, Fingerprint, Number};
 use crate::error::CatalystError;
 
 /// The bit of a ghost array that says that a cell is a copy of another rank's.
@@ -20,7 +22,29 @@ struct Copied {
     name: String,
     association: Option<Association>,
     components: usize,
+    number: Number,
     values: Vec<f64>,
+}
+
+impl Copied {
+    /// Begins anew with a field of this kind.
+    fn begin(&mut self, field: &Field<'_>) {
+        field.name.clone_into(&mut self.name);
+        self.association = Some(field.association);
+        self.components = field.components.len();
+        self.number = field.number;
+        self.values.clear();
+    }
+
+    fn is_of(&self, field: &Field<'_>) -> bool {
+        field.name == self.name
+            && Some(field.association) == self.association
+            && field.components.len() == self.components
+    }
+
+    fn append(&mut self, field: &Field<'_>, entity: usize) {
+        self.values.extend(field.components.iter().map(|array| array.get(entity)));
+    }
 }
 
 /// The numbers and marks that a mesh brings, copied.
@@ -107,42 +131,49 @@ impl Kept {
 
     /// Copies the fields that cannot be lent.
     fn copy_fields(&mut self, channel: &Channel<'_>) {
-        let mut names: Vec<(&str, Association, usize)> = Vec::new();
+        let mut of_blocks: Vec<&Field<'_>> = Vec::new();
         if let Some(domain) = channel.single() {
-            let unlent = domain.fields.iter().filter(|field| field::lent(&field.components).is_none());
-            names.extend(unlent.map(|field| (field.name.as_str(), field.association, field.components.len())));
+            of_blocks.extend(domain.fields.iter().filter(|field| field::lent(&field.components).is_none()));
         } else {
             for field in channel.blocks.iter().flat_map(|block| &block.domain.fields) {
-                if !names.iter().any(|(name, ..)| *name == field.name) {
-                    names.push((&field.name, field.association, field.components.len()));
+                if !of_blocks.iter().any(|known| known.name == field.name) {
+                    of_blocks.push(field);
                 }
             }
         }
-        self.fields.resize_with(names.len(), Copied::default);
-        for (copied, (name, association, components)) in self.fields.iter_mut().zip(names) {
-            copied.name = name.to_owned();
-            copied.association = Some(association);
-            copied.components = components;
-            copied.values.clear();
+        let of_mesh = channel.of_mesh.iter().filter(|field| field::lent(&field.components).is_none());
+        let of_mesh: Vec<&Field<'_>> = of_mesh.collect();
+        self.fields.resize_with(of_blocks.len() + of_mesh.len(), Copied::default);
+        let mut copies = self.fields.iter_mut();
+        for (copied, first) in copies.by_ref().zip(of_blocks) {
+            copied.begin(first);
             for block in &channel.blocks {
-                let entities = match association {
+                let entities = match first.association {
                     Association::Vertex => block.domain.coordset.len(),
                     Association::Element => block.domain.topology.len(),
+                    Association::Mesh => 0,
                 };
-                let of_block = block.domain.fields.iter().find(|field| {
-                    field.name == name && field.association == association && field.components.len() == components
-                });
+                let of_block = block.domain.fields.iter().find(|field| copied.is_of(field));
+                if of_block.is_some_and(|field| field.number != copied.number) {
+                    copied.number = Number::F64;
+                }
                 for entity in 0..entities {
-                    if association == Association::Element && !block.mask.keeps(entity) {
+                    if first.association == Association::Element && !block.mask.keeps(entity) {
                         continue;
                     }
                     match of_block {
-                        Some(field) => copied.values.extend(field.components.iter().map(|array| array.get(entity))),
+                        Some(field) => copied.append(field, entity),
+                        // Where a block says nothing of ghosts there are none.
+                        None if copied.name == GHOST_FIELD => copied.values.push(0.0),
                         // A block that lacks the field has no values to show.
-                        None => copied.values.extend(std::iter::repeat_n(ABSENT, components)),
+                        None => copied.values.extend(std::iter::repeat_n(ABSENT, copied.components)),
                     }
                 }
             }
+        }
+        for (copied, field) in copies.zip(of_mesh) {
+            copied.begin(field);
+            (0..field.components.first().map_or(0, Array::len)).for_each(|tuple| copied.append(field, tuple));
         }
     }
 
@@ -159,16 +190,16 @@ impl Kept {
                 connectivity: Indices::U32(&[]),
             },
         };
-        if let Some(domain) = single {
-            for field in &domain.fields {
-                if let Some(values) = field::lent(&field.components) {
-                    fields.push(FieldView { name: &field.name, association: field.association, values });
-                }
+        for field in single.iter().flat_map(|domain| &domain.fields).chain(&channel.of_mesh) {
+            if let Some(values) = field::lent(&field.components) {
+                let values = values.copied_from(field.number);
+                fields.push(FieldView { name: &field.name, association: field.association, values });
             }
         }
         for copied in &self.fields {
             let values = ArrayView::interleaved(Values::F64(&copied.values), copied.components.max(1));
             if let (Ok(values), Some(association)) = (values, copied.association) {
+                let values = values.copied_from(copied.number);
                 fields.push(FieldView { name: &copied.name, association, values });
             }
         }
@@ -199,16 +230,42 @@ fn cells(channel: &Channel<'_>, points: &[Vector]) -> Result<Cells, CatalystErro
         block.domain.topology.append(&mut cells, base, so_far, &|cell| block.mask.keeps(cell))?;
         base = end;
     }
-    Ok(cells)
+    if channel.has_levels() { joined(&cells, points, channel) } else { Ok(cells) }
+}
+
+/// The cells of grids of levels by the first of the vertices at each place, so that what lies between two grids is no surface.
+fn joined(cells: &Cells, points: &[Vector], channel: &Channel<'_>) -> Result<Cells, CatalystError> {
+    let finest = channel.grids().map(|grid| grid.least_spacing()).fold(f64::INFINITY, f64::min);
+    // Grids of one mesh have their points on one lattice, but for rounding.
+    let unit = if finest.is_finite() && finest > 0.0 { finest / 8.0 } else { 1.0 };
+    let lowest: Vector = points
+        .iter()
+        .fold([f64::INFINITY; 3], |lowest, point| std::array::from_fn(|axis| lowest[axis].min(point[axis])));
+    let mut first: HashMap<[i64; 3], u32> = HashMap::new();
+    let numbers: Vec<u32> = (0..)
+        .zip(points)
+        .map(|(number, point)| {
+            #[expect(clippy::cast_possible_truncation, reason = "eighths of the finest cell that fit into the mesh")]
+            let place = std::array::from_fn(|axis| ((point[axis] - lowest[axis]) / unit).round() as i64);
+            *first.entry(place).or_insert(number)
+        })
+        .collect();
+    let mut joined = Cells::new();
+    for (cell_type, vertices) in cells.iter() {
+        let vertices: Vec<u32> = vertices.iter().filter_map(|&vertex| numbers.get(vertex as usize).copied()).collect();
+        joined.push(cell_type, &vertices).map_err(|error| CatalystError::Wrong {
+            path: format!("catalyst/channels/{}/data", channel.name),
+            found: error.to_string(),
+            expected: "grids whose points lie apart".into(),
+        })?;
+    }
+    Ok(joined)
 }
 
 fn marks(channel: &Channel<'_>) -> Result<Marks, CatalystError> {
-    let mut marks = Marks { features: features(channel)?, ..Marks::default() };
+    let mut marks = Marks { features: features(channel)?, ghosts: ghosts(channel), ..Marks::default() };
     let Some(domain) = channel.single() else { return Ok(marks) };
     let roles = &domain.roles;
-    marks.ghosts = roles.ghosts.as_ref().map(|array| {
-        (0..array.len()).map(|index| array.integer(index).is_some_and(|bits| bits & DUPLICATE != 0)).collect()
-    });
     let numbers = |array: &Array<'_>| -> Result<Vec<u64>, CatalystError> {
         (0..array.len())
             .map(|index| {
@@ -223,6 +280,18 @@ fn marks(channel: &Channel<'_>) -> Result<Marks, CatalystError> {
     marks.global_vertices = roles.global_vertices.as_ref().map(numbers).transpose()?;
     marks.global_cells = roles.global_cells.as_ref().map(numbers).transpose()?;
     Ok(marks)
+}
+
+/// Which of the cells that are kept are copies of another rank's.
+fn ghosts(channel: &Channel<'_>) -> Option<Vec<bool>> {
+    channel.blocks.iter().find(|block| block.domain.roles.ghosts.is_some())?;
+    let is_ghost = |array: &Array<'_>, cell: usize| array.integer(cell).is_some_and(|bits| bits & DUPLICATE != 0);
+    let of_blocks = channel.blocks.iter().flat_map(|block| {
+        let (ghosts, cells) = (block.domain.roles.ghosts.as_ref(), block.domain.topology.len());
+        let kept = (0..cells).filter(|&cell| block.mask.keeps(cell));
+        kept.map(move |cell| ghosts.is_some_and(|array| is_ghost(array, cell)))
+    });
+    Some(of_blocks.collect())
 }
 
 /// Where the features come from: tagged faces, numbers at vertices, else sharp edges.

@@ -14,6 +14,7 @@ mod polyhedron;
 mod rows;
 mod topology;
 
+pub(crate) use amr::Grid;
 pub(crate) use channel::{Block, Channel};
 pub(crate) use described::{DescribedCells, Description};
 pub(crate) use kept::Kept;

@@ -23,7 +23,7 @@ pub(crate) use handedness::is_left_handed;
 #[cfg(test)]
 pub(crate) use ordered::shuffled;
 pub(crate) use ordered::{Numbering, Ordered};
-pub use view::{ArrayView, CellsView, Indices, MeshView, Values};
+pub use view::{ArrayView, CellsView, Indices, MeshView, Number, Values};
 
 /// A point or vector in space.
 pub type Vector = [f64; 3];

@@ -2,6 +2,82 @@
 
 use super::{CellType, Cells, FeatureSource, Mesh, MeshError, Vector};
 
+/// A type of number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Number {
+    /// 8-bit integers.
+    I8,
+    /// 16-bit integers.
+    I16,
+    /// 32-bit integers.
+    I32,
+    /// 64-bit integers.
+    I64,
+    /// 8-bit integers without a sign.
+    U8,
+    /// 16-bit integers without a sign.
+    U16,
+    /// 32-bit integers without a sign.
+    U32,
+    /// 64-bit integers without a sign.
+    U64,
+    /// Single precision.
+    F32,
+    /// Double precision.
+    #[default]
+    F64,
+}
+
+impl Number {
+    /// All of them.
+    pub const ALL: [Number; 10] = [
+        Number::I8,
+        Number::I16,
+        Number::I32,
+        Number::I64,
+        Number::U8,
+        Number::U16,
+        Number::U32,
+        Number::U64,
+        Number::F32,
+        Number::F64,
+    ];
+
+    /// How many bytes one takes.
+    #[must_use]
+    pub fn bytes(self) -> usize {
+        match self {
+            Number::I8 | Number::U8 => 1,
+            Number::I16 | Number::U16 => 2,
+            Number::I32 | Number::U32 | Number::F32 => 4,
+            Number::I64 | Number::U64 | Number::F64 => 8,
+        }
+    }
+
+    /// Its name, such as `int32`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Number::I8 => "int8",
+            Number::I16 => "int16",
+            Number::I32 => "int32",
+            Number::I64 => "int64",
+            Number::U8 => "uint8",
+            Number::U16 => "uint16",
+            Number::U32 => "uint32",
+            Number::U64 => "uint64",
+            Number::F32 => "float32",
+            Number::F64 => "float64",
+        }
+    }
+
+    /// Whether there are numbers between the whole ones.
+    #[must_use]
+    pub fn is_real(self) -> bool {
+        matches!(self, Number::F32 | Number::F64)
+    }
+}
+
 /// Numbers of any common type, borrowed.
 #[derive(Debug, Clone, Copy)]
 pub enum Values<'a> {
@@ -18,6 +94,16 @@ pub enum Values<'a> {
 }
 
 impl Values<'_> {
+    fn number(&self) -> Number {
+        match self {
+            Values::F32(_) => Number::F32,
+            Values::F64(_) => Number::F64,
+            Values::I32(_) => Number::I32,
+            Values::I64(_) => Number::I64,
+            Values::U8(_) => Number::U8,
+        }
+    }
+
     fn len(&self) -> usize {
         match self {
             Values::F32(values) => values.len(),
@@ -55,6 +141,7 @@ pub struct ArrayView<'a> {
     columns: [Column<'a>; 9],
     components: usize,
     len: usize,
+    number: Number,
 }
 
 impl<'a> ArrayView<'a> {
@@ -74,14 +161,14 @@ impl<'a> ArrayView<'a> {
         for (offset, column) in columns.iter_mut().enumerate() {
             column.offset = offset;
         }
-        Ok(Self { columns, components, len: values.len() / components })
+        Ok(Self { columns, components, len: values.len() / components, number: values.number() })
     }
 
     /// One value for each entity.
     #[must_use]
     pub fn scalars(values: &'a [f64]) -> Self {
         let column = Column { values: Values::F64(values), offset: 0, stride: 1 };
-        Self { columns: [column; 9], components: 1, len: values.len() }
+        Self { columns: [column; 9], components: 1, len: values.len(), number: Number::F64 }
     }
 
     /// One vector for each entity.
@@ -91,7 +178,7 @@ impl<'a> ArrayView<'a> {
         let mut columns = [Column { values: flat, offset: 0, stride: 3 }; 9];
         columns[1].offset = 1;
         columns[2].offset = 2;
-        Self { columns, components: 3, len: values.len() }
+        Self { columns, components: 3, len: values.len(), number: Number::F64 }
     }
 
     /// `len` tuples whose components each have their own values, offset and stride (in values, not bytes).
@@ -117,7 +204,22 @@ impl<'a> ArrayView<'a> {
             }
             *column = Column { values, offset, stride };
         }
-        Ok(Self { columns, components: components.len(), len })
+        let number = first.number();
+        let is_of_one = components.iter().all(|(values, ..)| values.number() == number);
+        let number = if is_of_one { number } else { Number::F64 };
+        Ok(Self { columns, components: components.len(), len, number })
+    }
+
+    /// The type of number that the values are, or are a copy of; double precision where the components differ in it.
+    #[must_use]
+    pub fn number(&self) -> Number {
+        self.number
+    }
+
+    /// The same values as a copy of numbers of another type, which is what files hold then.
+    #[must_use]
+    pub fn copied_from(self, number: Number) -> Self {
+        Self { number, ..self }
     }
 
     /// How many tuples there are.

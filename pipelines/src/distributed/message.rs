@@ -72,7 +72,7 @@ impl<'a> Reader<'a> {
         self.bytes.is_empty()
     }
 
-    fn garbled(&self) -> DistributedError {
+    pub(crate) fn garbled(&self) -> DistributedError {
         DistributedError::Garbled { rank: self.from }
     }
 

@@ -97,9 +97,11 @@ impl SharedVertices {
 
         let mut candidates = candidates(part, outer, &held, ghosts > 0.0);
         if doubt == Doubt::Apart {
-            // A vertex of no cell, as those that finer grids cover, is not shown: it casts no doubt on others.
+            // A vertex of no cell, as those that finer grids cover, is not shown: it casts no doubt on others. Points alone, such
+            // as particles, are each their own, wherever they are.
             let mut used = vec![false; count];
-            part.cells.connectivity().iter().for_each(|&vertex| used[vertex as usize] = true);
+            let connected = part.cells.iter().filter(|(cell_type, _)| cell_type.dimension() > 0);
+            connected.for_each(|(_, vertices)| vertices.iter().for_each(|&vertex| used[vertex as usize] = true));
             candidates.retain(|&(vertex, _)| used[vertex as usize]);
         }
         let twins = match (by_number, numbers) {

@@ -6,7 +6,7 @@ use std::{
 };
 
 use tombolo_deform::{
-    mesh::{ArrayView, Cells, FeatureSource, Mesh, TaggedFaces, Vector},
+    mesh::{ArrayView, CellType, Cells, FeatureSource, Mesh, Number, TaggedFaces, Vector},
     partition::Partition,
     shapes::{box_of_hexahedra, box_of_tets},
     surface::{FeatureSettings, Surface},
@@ -378,6 +378,38 @@ fn a_field_that_is_wrong_on_one_rank_stops_nobody() {
     let said = outcomes[0].join("\n");
     assert!(said.contains("rank 1: statistics: the channel has no field `other`"), "{said}");
     assert!(said.contains("rank 2: cycle 0: field `speed` is NaN"), "{said}");
+}
+
+#[test]
+fn points_alone_are_never_merged() {
+    for global in [None, Some(vec![0, 1])] {
+        let extracts = threads::run(2, |ranks| {
+            let mut cells = Cells::new();
+            (0..2).for_each(|vertex| cells.push(CellType::Vertex, &[vertex]).unwrap());
+            // Both ranks have points at the same places, and by the same numbers.
+            let points = vec![[0.0; 3], [1.0, 0.0, 0.0]];
+            let part = Part { points, cells, global_vertices: global.clone(), ..Part::default() };
+            let mass = [ranks.rank() as f64, 2.0];
+            let fields = [FieldView {
+                name: "mass",
+                association: Association::Vertex,
+                values: ArrayView::scalars(&mass).copied_from(Number::F32),
+            }];
+            let channels = [Channel { name: "drops", mesh: part.view(), fields: &fields }];
+            let text = r#"{"version": 1, "pipelines": [{"name": "all", "stages": [{"write": {"file": "a.vtu"}}]}]}"#;
+            let config = crate::language::parse(text, "test.json").unwrap();
+            let mut runner = Runner::with_communicator(&config, Arc::new(ranks)).unwrap();
+            let outputs = runner.run(&Snapshot { cycle: 0, time: 0.0, channels: &channels });
+            outputs.into_iter().find_map(|output| match output {
+                Output::Write { extract, .. } => Some(extract),
+                _ => None,
+            })
+        });
+        let extract = extracts[0].as_ref().unwrap();
+        assert_eq!((extract.points.len(), extract.cells.len()), (4, 4));
+        assert_eq!(extract.fields[0].values, [0.0, 2.0, 1.0, 2.0]);
+        assert_eq!(extract.fields[0].number, Number::F32);
+    }
 }
 
 /// The largest difference of a displacement of parts from that of one process, and the iterations that it took: solved from the

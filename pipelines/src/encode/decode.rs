@@ -1,6 +1,6 @@
 //! From frames back to numbers.
 
-use tombolo_deform::mesh::Vector;
+use tombolo_deform::mesh::{Number, Vector};
 use tombolo_deform::surface::Surface;
 
 use super::blob::{MOST_BYTES, decompress};
@@ -169,7 +169,13 @@ fn data(header: DataHeader, blobs: &[u8]) -> Result<DataFrame, DecodeError> {
             points = values.as_chunks().0.to_vec();
         } else {
             let association = array.association.unwrap_or(Association::Vertex);
-            fields.push(Field { name: array.name, association, components: array.components, values });
+            fields.push(Field {
+                name: array.name,
+                association,
+                components: array.components,
+                number: Number::F64,
+                values,
+            });
         }
     }
     let DataHeader { view, topology, cycle, time, .. } = header;

@@ -112,11 +112,11 @@ impl Encoder {
             sum.hypot(largest - least)
         });
         message.values("points", Association::Vertex, positions, 3, encoding.positions, extent)?;
-        for field in &extract.fields {
+        for field in extract.fields.iter().filter(|field| field.association != Association::Mesh) {
             let components = field.components;
             let of_triangles;
             let (count, values) = match field.association {
-                Association::Vertex => (extract.points.len(), field.values.as_slice()),
+                Association::Vertex | Association::Mesh => (extract.points.len(), field.values.as_slice()),
                 Association::Element => {
                     check_length(&field.name, field.values.len(), extract.cells.len() * components)?;
                     let cells = topology.cells.iter().map(|&cell| cell as usize * components);

@@ -1,6 +1,6 @@
 //! Values from the solver's arrays to the points and cells of an extract.
 
-use tombolo_deform::mesh::{ArrayView, Vector};
+use tombolo_deform::mesh::{ArrayView, Number, Vector};
 
 use super::slice::Crossing;
 use super::{ABSENT, Association, Channel, ExtractError, Field, FieldView, is_absent};
@@ -60,6 +60,7 @@ pub(crate) fn check_length(channel: &Channel, view: &FieldView) -> Result<(), Ex
     let expected = match view.association {
         Association::Vertex => channel.mesh.points.len(),
         Association::Element => channel.mesh.cells.len(),
+        Association::Mesh => return Ok(()),
     };
     if view.values.len() == expected {
         return Ok(());
@@ -89,7 +90,7 @@ fn field(
         let (field, association) = (view.name.to_owned(), view.association);
         Err(ExtractError::FieldNotFinite { field, association, entity, value, cycle })
     };
-    let mut values = Vec::new();
+    let (mut values, mut number) = (Vec::new(), view.values.number());
     let mut copy = |entities: &mut dyn Iterator<Item = usize>| -> Result<(), ExtractError> {
         values.reserve(entities.size_hint().0 * components);
         for entity in entities {
@@ -102,10 +103,12 @@ fn field(
     match (view.association, points, owners) {
         (Association::Vertex, Points::All, _) => copy(&mut (0..view.values.len()))?,
         (Association::Vertex, Points::Vertices(vertices), _) => copy(&mut vertices.iter().map(|&v| v as usize))?,
-        (Association::Element, _, Owners::All) => copy(&mut (0..view.values.len()))?,
+        (Association::Mesh, ..) | (Association::Element, _, Owners::All) => copy(&mut (0..view.values.len()))?,
         (Association::Element, _, Owners::Cells(cells)) => copy(&mut cells.iter().map(|&cell| cell as usize))?,
         (Association::Vertex, Points::Crossings(crossings), _) => {
             values.reserve(crossings.len() * components);
+            // Between whole numbers there are others.
+            number = if number.is_real() { number } else { Number::F64 };
             for crossing in *crossings {
                 for component in 0..components {
                     let [a, b] = crossing.edge.map(|vertex| read(vertex as usize, component));
@@ -115,5 +118,7 @@ fn field(
             }
         }
     }
-    Ok(Field { name: view.name.to_owned(), association: view.association, components, values })
+    let mut field = Field { name: view.name.to_owned(), association: view.association, components, number, values };
+    field.settle();
+    Ok(field)
 }

@@ -2,7 +2,7 @@
 
 use std::{collections::HashMap, sync::Arc};
 
-use tombolo_deform::mesh::{CellType, Cells, Vector};
+use tombolo_deform::mesh::{CellType, Cells, Number, Vector};
 
 use super::source::{Origin, Whole};
 use super::{ABSENT, Association, Extract, Extracted, Field, is_absent};
@@ -12,8 +12,8 @@ use crate::distributed::{DistributedError, Reader, Writer};
 /// What one rank brings.
 struct Piece {
     points: Vec<Vector>,
-    /// The points that other ranks may bring too, and what all of them call them: the vertices of the edge that they lie on.
-    named: Vec<(u32, [u32; 2])>,
+    /// Points and what all ranks call them: the vertices of the edge that they lie on; and whether other ranks may bring them too.
+    named: Vec<(u32, [u32; 2], bool)>,
     cells: Cells,
     fields: Vec<Field>,
 }
@@ -33,6 +33,7 @@ pub(crate) fn merged(
     let piece = extracted.ok_or("it has no extract");
     let piece = agree(communicator, piece)?;
     let result = match &piece.origin {
+        Origin::Whole => return Ok(Some(Arc::clone(&piece.extract))),
         Origin::Boundary => on_boundary(communicator, whole, piece),
         Origin::Vertices | Origin::Edges(_) => anywhere(communicator, whole, piece),
     };
@@ -94,10 +95,11 @@ fn anywhere(
         for (place, point) in (0..).zip(&piece.points) {
             #[expect(clippy::cast_possible_truncation, reason = "points are numbered with 32 bits")]
             let next = points.len() as u32;
-            let name = names.next_if(|(named, _)| *named == place).map(|(_, name)| name);
-            let number = match name {
-                Some(name) => *by_name.entry(name).or_insert(next),
-                None => next,
+            let named = names.next_if(|(named, ..)| *named == place);
+            let name = named.map(|(_, name, _)| name);
+            let number = match named {
+                Some((_, name, true)) => *by_name.entry(name).or_insert(next),
+                _ => next,
             };
             numbers[place as usize] = number;
             if number == next {
@@ -132,28 +134,32 @@ fn described(whole: &Whole, piece: &Extracted) -> Vec<u8> {
     let extract = &piece.extract;
     let numbers = whole.shared.numbers();
     let number = |vertex: u32| numbers[vertex as usize];
-    // Ends of an edge that other ranks have too are shared; of a vertex extract all are named, for its own sake.
+    // Ends of an edge that other ranks have too are shared; of a vertex extract all are named, for their own sake.
     let name = |place: usize| match &piece.origin {
         Origin::Edges(edges) => {
             let edge = edges[place].map(|vertex| vertex as usize);
             edge.iter().all(|&vertex| whole.is_shared[vertex]).then(|| {
                 let [a, b] = edge.map(|vertex| numbers[vertex]);
-                [a.min(b), a.max(b)]
+                ([a.min(b), a.max(b)], true)
             })
         }
-        _ => extract.vertices.as_ref().map(|vertices| [number(vertices[place]); 2]),
+        _ => extract.vertices.as_ref().map(|vertices| {
+            let vertex = vertices[place];
+            ([number(vertex); 2], whole.is_shared[vertex as usize])
+        }),
     };
-    let named: Vec<(usize, [u32; 2])> =
-        (0..extract.points.len()).filter_map(|place| Some((place, name(place)?))).collect();
+    let named = (0..extract.points.len()).filter_map(|place| Some((place, name(place)?)));
+    let named: Vec<(usize, ([u32; 2], bool))> = named.collect();
     let mut message = Writer::with_capacity(32 * extract.points.len() + 4 * extract.cells.connectivity().len());
     message.u64(extract.points.len() as u64);
     extract.points.iter().for_each(|point| message.f64s(point));
     message.u64(named.len() as u64);
-    for (place, [a, b]) in named {
+    for (place, ([a, b], is_shared)) in named {
         #[expect(clippy::cast_possible_truncation, reason = "points are numbered with 32 bits")]
         message.u32(place as u32);
         message.u32(a);
         message.u32(b);
+        message.u8(u8::from(is_shared));
     }
     message.u64(extract.cells.len() as u64);
     for (cell, (cell_type, vertices)) in extract.cells.iter().enumerate() {
@@ -176,8 +182,8 @@ impl Piece {
         let mut reader = Reader::new(rank, bytes);
         let count = reader.count(24)?;
         let points = (0..count).map(|_| reader.vector()).collect::<Result<Vec<_>, _>>()?;
-        let count = reader.count(12)?;
-        let named = (0..count).map(|_| Ok((reader.u32()?, [reader.u32()?, reader.u32()?])));
+        let count = reader.count(13)?;
+        let named = (0..count).map(|_| Ok((reader.u32()?, [reader.u32()?, reader.u32()?], reader.u8()? != 0)));
         let named = named.collect::<Result<Vec<_>, DistributedError>>()?;
         let mut cells = Cells::new();
         for _ in 0..reader.count(1)? {
@@ -201,9 +207,14 @@ fn write_fields(message: &mut Writer, fields: &[Field], points: &mut (dyn ExactS
     message.u64(fields.len() as u64);
     for field in fields {
         message.text(&field.name);
-        message.u8(u8::from(field.association == Association::Element));
+        message.u8(association_code(field.association));
+        message.u8(number_code(field.number));
         message.u64(field.components as u64);
         match field.association {
+            Association::Mesh => {
+                message.u64(field.values.len() as u64);
+                message.f64s(&field.values);
+            }
             Association::Element => message.f64s(&field.values),
             Association::Vertex => {
                 for &point in &points {
@@ -214,15 +225,30 @@ fn write_fields(message: &mut Writer, fields: &[Field], points: &mut (dyn ExactS
     }
 }
 
+const ASSOCIATIONS: [Association; 3] = [Association::Vertex, Association::Element, Association::Mesh];
+
+fn association_code(association: Association) -> u8 {
+    (0..).zip(ASSOCIATIONS).find(|(_, known)| *known == association).map_or(0, |(code, _)| code)
+}
+
+fn number_code(number: Number) -> u8 {
+    (0..).zip(Number::ALL).find(|(_, known)| *known == number).map_or(0, |(code, _)| code)
+}
+
 fn read_fields(reader: &mut Reader, points: usize, cells: usize) -> Result<Vec<Field>, DistributedError> {
-    (0..reader.count(17)?)
+    (0..reader.count(18)?)
         .map(|_| {
             let name = reader.text()?;
-            let association = if reader.u8()? == 0 { Association::Vertex } else { Association::Element };
+            let association = *ASSOCIATIONS.get(usize::from(reader.u8()?)).ok_or(reader.garbled())?;
+            let number = *Number::ALL.get(usize::from(reader.u8()?)).ok_or(reader.garbled())?;
             let components = usize::try_from(reader.u64()?).unwrap_or(usize::MAX);
-            let count = if association == Association::Vertex { points } else { cells };
-            let values = reader.f64s(count.saturating_mul(components))?;
-            Ok(Field { name, association, components, values })
+            let count = match association {
+                Association::Vertex => points.saturating_mul(components),
+                Association::Element => cells.saturating_mul(components),
+                Association::Mesh => reader.count(8)?,
+            };
+            let values = reader.f64s(count)?;
+            Ok(Field { name, association, components, number, values })
         })
         .collect()
 }
@@ -234,6 +260,8 @@ struct Fields {
     fields: Vec<(Field, usize)>,
     points: usize,
     cells: usize,
+    /// What belongs to the mesh as a whole, from the lowest rank that brings it.
+    of_mesh: Vec<Field>,
 }
 
 impl Fields {
@@ -241,6 +269,12 @@ impl Fields {
     fn add(&mut self, fields: Vec<Field>, points: &[u32], cells: &[u32]) {
         for field in fields {
             let (places, before) = match field.association {
+                Association::Mesh => {
+                    if self.of_mesh.iter().all(|known| known.name != field.name) {
+                        self.of_mesh.push(field);
+                    }
+                    continue;
+                }
                 Association::Vertex => (points, self.points),
                 Association::Element => (cells, self.cells),
             };
@@ -253,8 +287,8 @@ impl Fields {
             let known = match self.fields.iter().position(same) {
                 Some(known) => known,
                 None => {
-                    let Field { ref name, association, components, .. } = field;
-                    let empty = Field { name: name.clone(), association, components, values: Vec::new() };
+                    let Field { ref name, association, components, number, .. } = field;
+                    let empty = Field { name: name.clone(), association, components, number, values: Vec::new() };
                     self.fields.push((empty, 0));
                     self.fields.len() - 1
                 }
@@ -263,6 +297,9 @@ impl Fields {
             // Only a field that every rank before this one has brought can be whole.
             if *set < before {
                 continue;
+            }
+            if known.number != field.number {
+                known.number = Number::F64;
             }
             let components = known.components;
             for (place, values) in places.iter().zip(field.values.chunks(components.max(1))) {
@@ -283,13 +320,15 @@ impl Fields {
     /// Those that all ranks have brought.
     fn finish(self, points: usize, cells: usize) -> Vec<Field> {
         let (all_points, all_cells) = (self.points, self.cells);
-        let whole = |(field, set): (Field, usize)| {
+        let whole = |(mut field, set): (Field, usize)| {
             let (brought, count) = match field.association {
                 Association::Vertex => (all_points, points),
                 Association::Element => (all_cells, cells),
+                Association::Mesh => return None,
             };
+            field.settle();
             (set == brought && field.values.len() == count * field.components).then_some(field)
         };
-        self.fields.into_iter().filter_map(whole).collect()
+        self.fields.into_iter().filter_map(whole).chain(self.of_mesh).collect()
     }
 }

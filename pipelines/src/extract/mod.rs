@@ -21,7 +21,7 @@ pub use statistics::{FieldStatistics, statistics, statistics_of};
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use tombolo_deform::mesh::{ArrayView, Cells, MeshView, Vector};
+use tombolo_deform::mesh::{ArrayView, Cells, MeshView, Number, Vector};
 
 use crate::language::nearest;
 
@@ -33,6 +33,8 @@ pub enum Association {
     Vertex,
     /// Each cell.
     Element,
+    /// The mesh as a whole: any number of values, whatever the number of vertices and cells. Viewers do not get them.
+    Mesh,
 }
 
 impl std::fmt::Display for Association {
@@ -40,6 +42,7 @@ impl std::fmt::Display for Association {
         f.write_str(match self {
             Association::Vertex => "vertex",
             Association::Element => "element",
+            Association::Mesh => "mesh",
         })
     }
 }
@@ -53,9 +56,23 @@ pub struct Field {
     pub association: Association,
     /// Components of each value: 1 for a scalar, 3 for a vector, up to 9.
     pub components: usize,
+    /// The type of number that files hold; the values are those of this type. Whole numbers beyond 2^53 are rounded.
+    pub number: Number,
     /// The values, tuple after tuple: `components` times as many as there are vertices or cells.
     pub values: Vec<f64>,
 }
+
+impl Field {
+    /// Keeps to a type of number that has what was put in: no whole numbers where a value is absent.
+    pub(crate) fn settle(&mut self) {
+        if !self.number.is_real() && self.values.iter().any(|&value| is_absent(value)) {
+            self.number = Number::F64;
+        }
+    }
+}
+
+/// The element field, and vertex field, that says in VTK's bits what is a copy of another rank's (1) and what is not to be shown.
+pub const GHOST_FIELD: &str = "vtkGhostType";
 
 /// Stands in a field where it has no value, as on a block of the mesh that lacks it: a NaN of its own bits, so that one that the
 /// solver computed is still told. It is not measured, files have NaN there, and viewers do not get the field.

@@ -3,12 +3,12 @@
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
-use tombolo_deform::mesh::{Cells, Mesh, MeshView, Vector};
+use tombolo_deform::mesh::{Cells, Mesh, MeshView, Number, Vector};
 use tombolo_deform::quality::{Quality, quality, scaled_jacobians};
 use tombolo_deform::surface::{FeatureSettings, Surface, SurfaceError};
 
 use super::gather::{self, Owners, Points};
-use super::{Association, Channel, Extract, ExtractError, ExtractFeatures, Field, slice};
+use super::{Association, Channel, Extract, ExtractError, ExtractFeatures, Field, GHOST_FIELD, slice};
 use crate::communicator::{Communicator, agree};
 use crate::distributed::{DistributedError, Part, PartBoundary, SharedVertices};
 use crate::language::Slice;
@@ -29,6 +29,8 @@ pub struct Extracted {
 /// What the points of an extract are in the solver's mesh.
 #[derive(Debug, Clone)]
 pub(crate) enum Origin {
+    /// All vertices of all ranks: it needs no merging.
+    Whole,
     /// Those of the boundary.
     Boundary,
     /// Other vertices.
@@ -47,6 +49,7 @@ impl Extracted {
             name: name.to_owned(),
             association: Association::Element,
             components: 1,
+            number: Number::F64,
             values: self.owners.iter().map(value).collect(),
         });
     }
@@ -62,13 +65,20 @@ pub struct Source {
     /// As they are measured, once they are.
     right_handed: OnceLock<Arc<Cells>>,
     boundary: Option<Boundary>,
+    /// What sets own cells apart from others: on several ranks, and where there are ghosts.
     whole: Option<Box<Whole>>,
+    /// Whether other ranks have parts too.
+    is_part: bool,
 }
 
 /// What a rank knows of a mesh of which it has a part.
 #[derive(Debug)]
 pub(crate) struct Whole {
+    /// Whether this is rank 0.
+    is_first: bool,
     ghosts: Option<Vec<bool>>,
+    /// For each vertex whether it belongs to ghosts alone.
+    is_ghostly: Vec<bool>,
     /// The cells but the ghosts.
     own: Cells,
     pub(crate) shared: SharedVertices,
@@ -187,15 +197,20 @@ impl Source {
     pub fn new(channel: &Channel) -> Result<Self, ExtractError> {
         let cells = channel.mesh.cells.to_cells()?;
         cells.validate(channel.mesh.points.len())?;
-        Ok(Self::of(MeshKey::of(&channel.mesh), cells, OnceLock::new(), None))
+        Ok(Self::of(MeshKey::of(&channel.mesh), cells, OnceLock::new(), None, false))
     }
 
-    /// The same of a channel of which each rank has a part. Extracts are then of the rank's part, its ghosts left out, and make
-    /// one on rank 0 when they are merged. Collective.
+    /// Knows the cells of a channel of which each of several ranks has a part, or one process all, ghosts among them. What is taken
+    /// is then of the rank's own cells, and makes one extract on rank 0 when it is merged; the whole mesh of one process has its
+    /// ghosts too, and says which they are. Collective.
     ///
     /// # Errors
-    /// [`ExtractError::Distributed`], the same on all ranks.
+    /// [`ExtractError::Distributed`], the same on all ranks; on one process as [`new`](Self::new).
     pub fn distributed(channel: &Channel, communicator: &dyn Communicator) -> Result<Self, ExtractError> {
+        let is_part = communicator.size() > 1;
+        if !is_part && !channel.mesh.ghost_cells.is_some_and(|ghosts| ghosts.contains(&true)) {
+            return Self::new(channel);
+        }
         let part = agree(communicator, Part::of(&channel.mesh)).map_err(DistributedError::from)?;
         let own = part.own_cells();
         let (shared, boundary, error) = PartBoundary::shown(communicator, &part)?;
@@ -204,13 +219,26 @@ impl Source {
         let surface = boundary.surface().map(|surface| Boundary::new(Arc::clone(surface)));
         // Rank 0 tells it for all.
         let no_surface = error.filter(|_| communicator.rank() == 0);
-        let whole = Whole { ghosts: part.ghosts, own, shared, is_shared, boundary, surface, no_surface };
+        let mut is_ghostly = vec![false; part.points.len()];
+        let of_ghosts = part.cells.iter().enumerate().filter(|(cell, _)| part.is_ghost(*cell));
+        of_ghosts.for_each(|(_, (_, vertices))| vertices.iter().for_each(|&vertex| is_ghostly[vertex as usize] = true));
+        own.connectivity().iter().for_each(|&vertex| is_ghostly[vertex as usize] = false);
+        let is_first = communicator.rank() == 0;
+        let whole =
+            Whole { is_first, ghosts: part.ghosts, is_ghostly, own, shared, is_shared, boundary, surface, no_surface };
         let given = part.cells.as_given().into_owned();
-        Ok(Self::of(MeshKey::of(&channel.mesh), given, Arc::new(part.cells).into(), Some(Box::new(whole))))
+        let key = MeshKey::of(&channel.mesh);
+        Ok(Self::of(key, given, Arc::new(part.cells).into(), Some(Box::new(whole)), is_part))
     }
 
-    fn of(key: MeshKey, cells: Cells, right_handed: OnceLock<Arc<Cells>>, whole: Option<Box<Whole>>) -> Self {
-        Self { key, cells: Arc::new(cells), right_handed, boundary: None, whole }
+    fn of(
+        key: MeshKey,
+        cells: Cells,
+        right_handed: OnceLock<Arc<Cells>>,
+        whole: Option<Box<Whole>>,
+        is_part: bool,
+    ) -> Self {
+        Self { key, cells: Arc::new(cells), right_handed, boundary: None, whole, is_part }
     }
 
     /// What is known of the whole mesh where this is a part of one.
@@ -218,12 +246,16 @@ impl Source {
         self.whole.as_deref()
     }
 
-    /// Whether a vertex or cell counts to this rank: each counts to one.
+    /// Whether a vertex or cell counts to this rank: each counts to one. What belongs to the mesh as a whole counts to rank 0.
     #[must_use]
     pub fn counts(&self, association: Association, entity: usize) -> bool {
         self.whole.as_ref().is_none_or(|whole| match association {
             Association::Element => !whole.is_ghost(entity),
-            Association::Vertex => u32::try_from(entity).is_ok_and(|vertex| whole.shared.owns(vertex)),
+            Association::Vertex => {
+                let is_ghostly = whole.is_ghostly.get(entity).is_some_and(|&is_ghostly| is_ghostly);
+                !is_ghostly && u32::try_from(entity).is_ok_and(|vertex| whole.shared.owns(vertex))
+            }
+            Association::Mesh => whole.is_first,
         })
     }
 
@@ -327,12 +359,24 @@ impl Source {
         cycle: u64,
         wanted: &dyn Fn(&str) -> bool,
     ) -> Result<Extracted, ExtractError> {
-        if let Some(whole) = &self.whole {
+        if let Some(whole) = self.whole.as_ref().filter(|_| self.is_part) {
             return whole.piece(channel, cycle, wanted, &self.cells);
         }
         let view = &channel.mesh.points;
         let points: Result<Vec<_>, _> = (0..view.len()).map(|vertex| gather::point(view, vertex, cycle)).collect();
-        let (fields, errors) = gather::fields(channel, cycle, wanted, &Points::All, &Owners::All);
+        let wanted = |name: &str| name == GHOST_FIELD || wanted(name);
+        let (mut fields, errors) = gather::fields(channel, cycle, &wanted, &Points::All, &Owners::All);
+        let ghosts = channel.mesh.ghost_cells.filter(|ghosts| ghosts.contains(&true));
+        let is_told = |field: &Field| field.name == GHOST_FIELD && field.association == Association::Element;
+        if let Some(ghosts) = ghosts.filter(|_| !fields.iter().any(is_told)) {
+            fields.push(Field {
+                name: GHOST_FIELD.to_owned(),
+                association: Association::Element,
+                components: 1,
+                number: Number::U8,
+                values: ghosts.iter().map(|&is_ghost| f64::from(u8::from(is_ghost))).collect(),
+            });
+        }
         #[expect(clippy::cast_possible_truncation, reason = "vertices and cells are numbered with 32 bits")]
         let numbers = |count: usize| (0..count as u32).collect::<Arc<[u32]>>();
         let extract = Extract {
@@ -343,7 +387,7 @@ impl Source {
             fields,
         };
         let owners = numbers(self.cells.len());
-        Ok(Extracted { extract: Arc::new(extract), owners, errors, origin: Origin::Vertices })
+        Ok(Extracted { extract: Arc::new(extract), owners, errors, origin: Origin::Whole })
     }
 
     /// The quality of the cells at the present coordinates.

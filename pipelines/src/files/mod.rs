@@ -114,7 +114,7 @@ fn unknown_extension(found: &str, expected: &'static str) -> Flaw {
 /// A file that ends in `.vtpd`, `.pvtu` or `.pvtp` names one that holds the data: of `out.vtpd` that is `out/out_0.vtu`. It takes its
 /// place after the other, which it must be kept beside.
 ///
-/// Numbers are written as they are, in double precision. In a `.vtp` file cells stand in VTK's order of kinds: vertices, lines,
+/// Fields are written as numbers of their type, coordinates in double precision. In a `.vtp` file cells stand in VTK's order of kinds: vertices, lines,
 /// polygons, strips.
 ///
 /// # Errors

@@ -187,7 +187,7 @@ fn source<'a, 'c>(
     match sources.entry(channel.name.to_owned()) {
         std::collections::hash_map::Entry::Occupied(entry) => Ok((channel, entry.into_mut())),
         std::collections::hash_map::Entry::Vacant(entry) => {
-            let source = Source::new(channel).map_err(describe)?;
+            let source = Source::distributed(channel, communicator).map_err(describe)?;
             Ok((channel, entry.insert(source)))
         }
     }

@@ -82,7 +82,13 @@ fn polylines(skeleton: &Skeleton, surface: &Surface) -> Result<Extract, Failure>
         cells.push(CellType::PolyLine, polyline.nodes())?;
         curve.push(number as f64);
     }
-    let field = |name: &str, association, values| Field { name: name.to_owned(), association, components: 1, values };
+    let field = |name: &str, association, values| Field {
+        name: name.to_owned(),
+        association,
+        components: 1,
+        number: tombolo::deform::mesh::Number::F64,
+        values,
+    };
     let fields = vec![
         field("node", Association::Vertex, (0..nodes).map(|node| node as f64).collect()),
         field("degree", Association::Vertex, (0..nodes).map(|node| skeleton.degree(node) as f64).collect()),

@@ -6,7 +6,8 @@
     mesh["fields/p/values"].set_external(pressure)   # a NumPy array, read where it is
 
 A place that holds nothing, an object or a list is a `Node` itself; one that holds a text is a `str`, one number a NumPy scalar,
-several an array that shows the node's memory. `fetch` gives the `Node` in each case.
+several an array that shows the node's memory. `fetch` gives the `Node` in each case. A `DataType` says what a leaf holds and how it
+lies in memory, a `Schema` so for a tree.
 """
 
 import ctypes
@@ -14,12 +15,12 @@ import numbers
 
 import numpy
 
-from ._library import Error, called, taken, text_of
+from ._datatype import DataType
+from ._library import TYPES, Error, called, taken, text_of
+from ._schema import Schema
 
-__all__ = ["Error", "Node", "about", "blueprint"]
+__all__ = ["DataType", "Error", "Node", "Schema", "about", "blueprint"]
 
-_LIST, _TEXT = 2, 13
-_TYPES = "int8 int16 int32 int64 uint8 uint16 uint32 uint64 float32 float64".split()
 _ORDERS = {0: "=", 1: ">", 2: "<"}
 
 
@@ -36,8 +37,8 @@ def _array(value):
     array = numpy.asarray(value)
     if array.dtype == bool:
         array = array.astype(numpy.uint8)
-    if array.dtype.name not in _TYPES:
-        raise TypeError(f"a node holds {', '.join(_TYPES)} and texts, not {array.dtype.name}")
+    if array.dtype.name not in TYPES:
+        raise TypeError(f"a node holds {', '.join(TYPES)} and texts, not {array.dtype.name}")
     return array.reshape(1) if array.ndim == 0 else array
 
 
@@ -48,6 +49,8 @@ class Node:
         self._handle = called("catalyst_conduit_node_create")
         self._root = self
         self._lent = {}
+        # Trees with which this one has changed its children: places of either may lie in the other.
+        self._swapped = []
         if value is not None:
             self.set(value)
 
@@ -75,9 +78,15 @@ class Node:
 
     # ---- Setting.
     def set(self, value):
-        """Copies a number, a text, an array, another node, or a `dict` or a list of such; numbers in a list are an array."""
+        """Copies a number, a text, an array, another node, or a `dict` or a list of such; numbers in a list are an array. Of a
+        `Schema` or a `DataType` it holds zeros."""
         if isinstance(value, Node):
             self._call("set_node", value.handle)
+        elif isinstance(value, (Schema, DataType)):
+            compact = Schema()
+            Schema(value).compact_to(compact)
+            zeros = ctypes.create_string_buffer(max(compact.total_bytes_compact(), 1))
+            self._call("generate", compact.to_json(), "conduit_json", zeros)
         elif isinstance(value, dict):
             self.reset()
             for name, entry in value.items():
@@ -142,9 +151,15 @@ class Node:
         """The node at a path, which must be there."""
         return self._node("fetch_existing", path)
 
-    def child(self, which):
-        """A child by its number or its name."""
-        return self._node("child_by_name" if isinstance(which, str) else "child", which)
+    def child(self, index=None, name=None):
+        """A child by its number or its name, which may hold a '/'."""
+        if isinstance(index, str):
+            index, name = None, index
+        return self._node("child", index) if name is None else self._node("child_by_name", name)
+
+    def add_child(self, name):
+        """The child of a name, which may hold a '/'; it is made where it is not there."""
+        return self._node("add_child", name)
 
     def append(self):
         """A new entry at the end of a list."""
@@ -193,6 +208,10 @@ class Node:
         else:
             self._call("remove_path", path)
 
+    def remove_child(self, name):
+        """Removes the child of a name, which may hold a '/'."""
+        self._call("remove_child_by_name", name)
+
     def rename_child(self, old, new):
         """Gives a child another name."""
         self._call("rename_child", old, new)
@@ -207,21 +226,40 @@ class Node:
 
     # ---- What is held.
     def _type(self):
-        return ctypes.c_void_p(self._call("dtype"))
+        return self._call("dtype")
 
     def dtype(self):
+        """The `DataType` of what is here."""
+        return DataType._of(self._type())
+
+    def schema(self):
+        """A `Schema` of the tree as it is now."""
+        schema = self._schema()
+        if not self.is_root():
+            # It is no root either.
+            schema._parent = Schema(DataType.object())
+            schema._parent._children[self.name()] = schema
+        return schema
+
+    def _schema(self):
+        schema = Schema()
+        dtype = self.dtype()
+        schema.set(dtype)
+        for child in self.children():
+            place = schema.add_child(child.name()) if dtype.is_object() else schema.append()
+            place.set(child._schema())
+        return schema
+
+    def _numpy(self):
         """The NumPy type of what a leaf holds, `str` of a text, `None` of others."""
-        kind = called("catalyst_conduit_datatype_id", self._type())
-        if kind == _TEXT:
+        dtype = self.dtype()
+        if dtype.is_string():
             return str
-        if not _LIST < kind < _TEXT:
-            return None
-        order = called("catalyst_conduit_datatype_endianness", self._type())
-        return numpy.dtype(_TYPES[kind - 3]).newbyteorder(_ORDERS[order])
+        return numpy.dtype(dtype.name()).newbyteorder(_ORDERS[dtype.endianness()]) if dtype.is_number() else None
 
     def value(self):
         """A text, a number or an array; the node itself where it holds none of these."""
-        held = self.dtype()
+        held = self._numpy()
         if held is None:
             return self
         if held is str:
@@ -239,6 +277,32 @@ class Node:
         """Takes over what another tree has, and keeps the rest."""
         self._call("update", other.handle)
 
+    def update_compatible(self, other):
+        """Takes over what another tree has where this one has it too."""
+        self._call("update_compatible", other.handle)
+
+    def update_external(self, other):
+        """Refers to what another tree has, and keeps the rest."""
+        self._call("update_external", other.handle)
+        self._root._swapped.append(other._root)
+
+    def swap(self, other):
+        """Changes what is here with what another node has."""
+        self._call("swap", other.handle)
+        if self._root is not other._root:
+            self._root._swapped.append(other._root)
+            other._root._swapped.append(self._root)
+
+    def move(self, other):
+        """Takes over what another node has, which is empty then."""
+        self._call("move", other.handle)
+        if self._root is not other._root:
+            self._root._swapped.append(other._root)
+
+    def compact_to(self, other):
+        """Makes another node a copy whose data lie one behind the other, without anything between."""
+        self._call("compact_to", other.handle)
+
     def compatible(self, other):
         """Whether everything of this tree is there in another with the same types."""
         return bool(self._call("compatible", other.handle))
@@ -246,6 +310,30 @@ class Node:
     def diff(self, other, info, epsilon=1e-12):
         """Whether two trees differ; how, is in `info`."""
         return bool(self._call("diff", other.handle, info.handle, float(epsilon)))
+
+    def diff_compatible(self, other, info, epsilon=1e-12):
+        """Whether another tree lacks something of this one or has it differently; how, is in `info`."""
+        return bool(self._call("diff_compatible", other.handle, info.handle, float(epsilon)))
+
+    def total_strided_bytes(self):
+        """The bytes of all leaves with what lies between their elements."""
+        return self._call("total_strided_bytes")
+
+    def total_bytes_compact(self):
+        """The bytes of all elements alone."""
+        return self._call("total_bytes_compact")
+
+    def total_bytes_allocated(self):
+        """The bytes that the tree holds itself."""
+        return self._call("total_bytes_allocated")
+
+    def is_compact(self):
+        """Whether nothing lies between elements."""
+        return bool(self._call("is_compact"))
+
+    def contiguous_with(self, other):
+        """Whether the data of this tree follow those of another."""
+        return bool(self._call("contiguous_with_node", other.handle))
 
     def info(self):
         """What the tree takes of memory."""
@@ -266,23 +354,36 @@ class Node:
         return bool(self._call("is_contiguous"))
 
     # ---- Texts and files.
-    def to_json(self):
-        """The tree as JSON."""
-        return taken(self._call("to_json"))
+    def _text(self, writer, **options):
+        chosen = Node({name: value for name, value in options.items() if value is not None})
+        return taken(self._call(writer + "_with_options", chosen.handle))
 
-    def to_yaml(self):
+    def to_json(self, protocol="json", indent=2, depth=0, pad=" ", eoe="\n"):
+        """The tree as JSON of a protocol: "json", "conduit_json" or "conduit_base64_json"."""
+        return self._text("to_json", protocol=protocol, indent=indent, depth=depth, pad=pad, eoe=eoe)
+
+    def to_yaml(self, protocol="yaml", indent=2, depth=0, pad=" ", eoe="\n"):
         """The tree as YAML."""
-        return taken(self._call("to_yaml"))
+        return self._text("to_yaml", protocol=protocol, indent=indent, depth=depth, pad=pad, eoe=eoe)
 
-    def to_string(self):
-        """The tree as YAML."""
-        return taken(self._call("to_string"))
+    def to_string(self, protocol="yaml", indent=2, depth=0, pad=" ", eoe="\n"):
+        """The tree as a text of a protocol: "yaml", "json", "conduit_json" or "conduit_base64_json"."""
+        return self._text("to_string", protocol=protocol, indent=indent, depth=depth, pad=pad, eoe=eoe)
 
-    def to_summary_string(self):
-        """The tree as YAML, long arrays shortened."""
-        return taken(self._call("to_summary_string"))
+    def to_summary_string(
+        self, num_children_threshold=None, num_elements_threshold=None, indent=2, depth=0, pad=" ", eoe="\n"
+    ):
+        """The tree as YAML, long lists and arrays shortened."""
+        thresholds = {
+            "num_children_threshold": num_children_threshold,
+            "num_elements_threshold": num_elements_threshold,
+        }
+        return self._text("to_summary_string", indent=indent, depth=depth, pad=pad, eoe=eoe, **thresholds)
 
-    __str__ = __repr__ = to_summary_string
+    def __str__(self):
+        return self.to_summary_string()
+
+    __repr__ = __str__
 
     def print_detailed(self):
         """Prints the tree with its types."""

@@ -54,7 +54,7 @@ fn open(path: &Path) -> Option<*mut c_void> {
 fn symbol(handle: *mut c_void, name: &CStr) -> Result<*mut c_void, String> {
     // SAFETY: the handle is open and the name a C string.
     let found = unsafe { libc::dlsym(handle, name.as_ptr()) };
-    if found.is_null() { Err(format!("the library has no {name:?}")) } else { Ok(found) }
+    if found.is_null() { Err(format!("ERROR: the library has no {name:?}")) } else { Ok(found) }
 }
 
 impl Catalyst {
@@ -63,7 +63,7 @@ impl Catalyst {
         let handle = beside
             .and_then(|path| open(&path))
             .or_else(|| open(Path::new("libcatalyst.so.3")))
-            .ok_or("libcatalyst.so.3 is not found; put its directory into LD_LIBRARY_PATH")?;
+            .ok_or("ERROR: libcatalyst.so.3 is not found; put its directory into LD_LIBRARY_PATH")?;
         // SAFETY: the library of this name exports these functions with these signatures.
         unsafe {
             Ok(Self {
@@ -110,7 +110,8 @@ impl Catalyst {
     }
 
     fn play(&self, path: &Path, call: Call) -> Result<(), String> {
-        let file = CString::new(path.as_os_str().as_bytes()).map_err(|_| "a path with a nul in it".to_owned())?;
+        let file =
+            CString::new(path.as_os_str().as_bytes()).map_err(|_| "ERROR: a path with a nul in it".to_owned())?;
         // SAFETY: the node is made, filled, used and destroyed here; the path is a C string.
         let status = unsafe {
             let node = (self.make)();
@@ -120,7 +121,7 @@ impl Catalyst {
             (self.unmake)(node);
             status
         };
-        if status == 0 { Ok(()) } else { Err(format!("'{}' was answered with status {status}", path.display())) }
+        if status == 0 { Ok(()) } else { Err(format!("ERROR: '{}' was answered with status {status}", path.display())) }
     }
 }
 
@@ -143,7 +144,9 @@ fn start_mpi() -> Option<unsafe extern "C" fn() -> c_int> {
 
 fn replay(directory: &Path) -> Result<(), String> {
     let world = ranks::rank_and_size();
-    let executions = dump::check(directory, world.1)?;
+    // All ranks read the same directory: one tells for all what is wrong with it.
+    let executions =
+        dump::check(directory, world.1).map_err(|message| if world.0 == 0 { message } else { String::new() })?;
     let catalyst = Catalyst::find()?;
     catalyst.play(&dump::path(directory, Stage::Initialize, world), catalyst.initialize)?;
     for number in 0..executions {
@@ -152,11 +155,11 @@ fn replay(directory: &Path) -> Result<(), String> {
     catalyst.play(&dump::path(directory, Stage::Finalize, world), catalyst.finalize)
 }
 
-fn main() -> ExitCode {
+/// Plays back what the arguments name, on as many ranks as there are.
+fn run() -> Result<(), String> {
     let arguments: Vec<_> = env::args_os().skip(1).collect();
     let [directory] = arguments.as_slice() else {
-        eprintln!("usage: catalyst_replay DIRECTORY");
-        return ExitCode::from(2);
+        return Err("ERROR: Expected 1 argument, the data dump directory.\nusage: catalyst_replay DIRECTORY".to_owned());
     };
     let end_mpi = start_mpi();
     let outcome = replay(Path::new(directory));
@@ -164,10 +167,16 @@ fn main() -> ExitCode {
         // SAFETY: MPI was initialized by `start_mpi` and is ended once.
         unsafe { end_mpi() };
     }
-    match outcome {
+    outcome
+}
+
+fn main() -> ExitCode {
+    match run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(message) => {
-            eprintln!("catalyst_replay: {message}");
+            if !message.is_empty() {
+                eprintln!("{message}");
+            }
             ExitCode::FAILURE
         }
     }

@@ -1,6 +1,8 @@
 """Catalyst and the node from Python: what is set is read back, what is lent is not copied, and errors are exceptions."""
 
+import ctypes
 import gc
+import re
 import sys
 
 import numpy
@@ -18,6 +20,47 @@ def raises(kind, text, function, *arguments):
         return
     raise AssertionError(f"{function} raises nothing")
 
+
+# Every function that is called has its types, the very ones of the headers, and keeps them. Standard input has the headers.
+of_c = {"void": None, "int": ctypes.c_int, "conduit_index_t": ctypes.c_int64, "double": ctypes.c_double}
+of_c["enum catalyst_status"] = ctypes.c_int
+of_c["conduit_float64"] = ctypes.c_double
+
+
+def of_python(text, is_argument):
+    text = re.sub(r"\s+", " ", text.strip())
+    if "(*" in text:
+        return ctypes.CFUNCTYPE(None, ctypes.c_char_p, ctypes.c_char_p, ctypes.c_int)
+    if is_argument and re.match(r"const char ?\*", text):
+        return ctypes.c_char_p
+    if "*" in text:
+        return ctypes.c_void_p
+    return of_c[re.sub(r" \w+$", "", text) if is_argument else text]
+
+
+def arguments_of(text):
+    # Of a handler too, whose own arguments are in parentheses.
+    return [part for part in re.split(r",(?![^()]*\))", text) if part.strip() != "void"]
+
+
+declared = {}
+# Without attributes, and with each declaration on a line.
+headers = re.sub(r"__attribute__ ?\(\(.*?\)\)\)?", "", re.sub(r"\s+", " ", sys.stdin.read())).replace(";", ";\n")
+for result, name, arguments in re.findall(r"([\w ]+?[ *]+)(catalyst_\w+) ?\((.*)\) ?;", headers):
+    declared[name] = (result, arguments)
+from catalyst_conduit._library import FUNCTIONS
+
+assert len(declared) > 400, len(declared)
+for name, function in FUNCTIONS.items():
+    result, arguments = declared[name]
+    result = re.sub(r"^extern \"C\" ", "", result.strip())
+    assert function.restype == of_python(result, False), (name, function.restype, result)
+    expected = [of_python(argument, True) for argument in arguments_of(arguments)]
+    if name.startswith("catalyst_conduit_utils_set_"):
+        assert [issubclass(kind, ctypes._CFuncPtr) for kind in function.argtypes] == [True]
+        continue
+    assert function.argtypes == expected, (name, function.argtypes, arguments)
+    assert conduit._library.FUNCTIONS[name] is function
 
 node = conduit.Node()
 node["a/b"] = 3
@@ -63,6 +106,95 @@ raises(TypeError, "takes a NumPy array", node["lent/list"].set_external, [1, 2])
 array = conduit.Node({"deep": {"values": numpy.ones(100)}})["deep/values"]
 gc.collect()
 assert array.sum() == 100
+
+# Addresses are whole: here memory lies beyond what an int can say.
+assert conduit.Node().handle.value and all(
+    child.handle.value == node.fetch(child.path()).handle.value for child in node["types"]
+)
+
+# Types, and schemas of trees.
+DataType, Schema = conduit.DataType, conduit.Schema
+held = node.fetch("lent/x").dtype()
+assert held.name() == "float64" and held.is_float64() and held.is_double() and held.is_floating_point()
+assert held.number_of_elements() == 4 and held.stride() == 24 and held.element_bytes() == 8 and not held.is_compact()
+assert held.strided_bytes() == 80 and held.bytes_compact() == 32 and held.endianness_matches_machine()
+assert held.element_index(2) == held.offset() + 48 and not held.is_integer() and held.is_number()
+assert node.fetch("a").dtype().is_object() and node.fetch("args").dtype().is_list()
+assert [DataType.name_to_id(DataType.id_to_name(number)) for number in range(14)] == list(range(14))
+for name in "int8 int16 int32 int64 uint8 uint16 uint32 uint64 float32 float64".split():
+    made = getattr(DataType, name)(5)
+    assert made.name() == name and made.id() == getattr(DataType, name + "_id")() and made.number_of_elements() == 5
+    assert made.element_bytes() == numpy.dtype(name).itemsize == made.stride() and made.is_compact()
+    assert made.is_signed_integer() == (name[0] == "i") and made.is_unsigned_integer() == (name[0] == "u")
+    assert conduit.Node(made).dtype().name() == name and (conduit.Node(made).value() == [0] * 5).all()
+assert DataType.c_unsigned_short().is_uint16() and DataType.c_long().is_int64() and DataType.index_t().is_index_t()
+layout = DataType()
+layout.set(dtype_name="uint32", num_elements=3, offset=4, stride=8, element_bytes=4)
+assert layout.spanned_bytes() == 24 and layout.compatible(DataType.uint32(2)) and not layout.equals(DataType.uint32(3))
+assert DataType(layout).equals(layout) and not DataType.uint32(2).compatible(layout)
+assert layout.to_string("json") == layout.to_json() and '"stride": 8' in str(layout)
+raises(ValueError, "float64", DataType.name_to_id, "float46")
+raises(ValueError, "yaml or json", layout.to_string, "xml")
+
+schema = Schema()
+schema["mesh/x"] = DataType.float64(10)
+schema["mesh/y"] = DataType.float32(10)
+schema.add_child("with/slash").set(DataType.int8(3))
+assert schema.has_child("with/slash") and not schema.has_path("with/slash") and schema.has_path("mesh/y")
+assert schema.total_strided_bytes() == 123 and schema["mesh"].total_bytes_compact() == 120
+assert schema["mesh/x"].path() == "mesh/x" and not schema["mesh"].is_root() and schema["mesh"].parent() is schema
+made = conduit.Node(schema)
+assert made.schema().is_root() and made.schema().total_strided_bytes() == 123
+assert made.child(name="with/slash").dtype().number_of_elements() == 3 and (made["mesh/x"] == numpy.zeros(10)).all()
+compact = Schema()
+schema.compact_to(compact)
+assert compact["mesh/y"].dtype().offset() == 80 and compact.spanned_bytes() == 123 and compact.is_compact()
+assert made.schema().compatible(schema) and not made.fetch("mesh").schema().is_root()
+schema.rename_child("with/slash", "plain")
+assert schema.child_names() == ["mesh", "plain"]
+raises(conduit.Error, "already", schema.rename_child, "plain", "mesh")
+raises(conduit.Error, "nothing", schema.rename_child, "nothing", "other")
+schema["mesh"].remove_child("x")
+schema.remove(index=1)
+assert schema["mesh"].child_names() == ["y"] and schema.number_of_children() == 1
+ordered = Schema()
+ordered.append().set(DataType.int32(2))
+ordered.append().set(schema)
+assert ordered.is_list() and conduit.Node(ordered).child(1)["mesh/y"].size == 10
+parsed = conduit.Node()
+parsed.parse(node.fetch("types").schema().to_json(), "json")
+assert parsed["int8/dtype"] == "int8" and parsed["int8/number_of_elements"] == 3
+parsed.parse(node.fetch("types").schema().to_yaml(), "yaml")
+assert parsed["float64/dtype"] == "float64"
+for empty in (Schema(), Schema(DataType.object())):
+    assert conduit.Node(empty).number_of_children() == 0
+
+# Children by names that a path cannot say.
+slashed = conduit.Node()
+slashed.add_child("a/b").set(5)
+assert slashed.child(name="a/b").value() == 5 and slashed.child("a/b").value() == 5 and not slashed.has_path("a/b")
+slashed.remove_child("a/b")
+assert slashed.number_of_children() == 0
+
+# Whole trees.
+info = conduit.Node()
+few, many = conduit.Node({"x": 1.0}), conduit.Node({"x": 1.0, "y": 2.0})
+assert few.diff(many, info) and not few.diff_compatible(many, info) and many.diff_compatible(few, info)
+gathered = conduit.Node()
+node.fetch("lent").compact_to(gathered)
+assert (gathered["x"] == values[:, 1]).all() and gathered.fetch("x").dtype().is_compact()
+assert gathered.total_bytes_compact() == gathered.total_strided_bytes() == gathered.total_bytes_allocated()
+one, other = conduit.Node({"one": 1}), conduit.Node()
+other["lent"].set_external(numpy.full(1000, 3.0))
+one.swap(other)
+del other
+gc.collect()
+numpy.zeros(1000)
+assert (one["lent"] == 3).all() and not one.has_path("one")
+assert one.to_string("json") == one.to_json() and one.to_string() == one.to_yaml()
+assert '"dtype":"float64"' in one.to_string("conduit_json").replace(" ", "")
+assert one.to_json(indent=0, pad="", eoe="").count("\n") == 0
+raises(conduit.Error, "xml", one.to_string, "xml")
 
 read = conduit.Node()
 read.parse(node.to_json(), "json")

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use proptest::prelude::*;
-use tombolo_deform::mesh::Vector;
+use tombolo_deform::mesh::{Number, Vector};
 use tombolo_deform::shapes::{box_of_hexahedra, box_of_tets, torus};
 use tombolo_deform::surface::{FeatureSettings, Surface};
 
@@ -65,7 +65,13 @@ fn a_volume_and_a_surface_in_single_precision_are_matched_by_coordinates() {
     let rounded = mesh.points().iter().map(|point| point.map(|part| f64::from(part as f32))).collect();
     let mesh = mesh.with_points(rounded).unwrap();
     let values: Vec<f64> = mesh.points().iter().flat_map(|&[x, y, z]| [x + 1.0, y, z]).collect();
-    let field = Field { name: "displacement".into(), association: Association::Vertex, components: 3, values };
+    let field = Field {
+        name: "displacement".into(),
+        association: Association::Vertex,
+        components: 3,
+        number: Number::F64,
+        values,
+    };
     let file = folder.path().join("volume.vtu");
     write_mesh(&file, &mesh, std::slice::from_ref(&field), Compression::Zlib).unwrap();
     let found = read_displacement(&file, &surface).unwrap();

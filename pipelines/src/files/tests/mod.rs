@@ -7,7 +7,7 @@ mod vtk_files;
 
 use std::sync::Arc;
 
-use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, TaggedFaces, Vector};
+use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, Number, TaggedFaces, Vector};
 
 use super::{Compression, MeshFile, parse_mesh, read_mesh, write_mesh};
 use crate::extract::{Association, Extract, ExtractFeatures, Field};
@@ -68,10 +68,23 @@ fn fields(mesh: &Mesh) -> Vec<Field> {
             name: "velocity".into(),
             association: Association::Vertex,
             components: 3,
+            number: Number::F64,
             values: values(3 * vertices),
         },
-        Field { name: "p <rgh>".into(), association: Association::Element, components: 1, values: values(cells) },
-        Field { name: "stress".into(), association: Association::Element, components: 9, values: values(9 * cells) },
+        Field {
+            name: "p <rgh>".into(),
+            association: Association::Element,
+            components: 1,
+            number: Number::F64,
+            values: values(cells),
+        },
+        Field {
+            name: "stress".into(),
+            association: Association::Element,
+            components: 9,
+            number: Number::F64,
+            values: values(9 * cells),
+        },
     ]
 }
 

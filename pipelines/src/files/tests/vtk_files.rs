@@ -22,6 +22,36 @@ fn a_mesh_comes_back_bit_for_bit() {
 }
 
 #[test]
+fn numbers_keep_their_type() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = one_of_each(3);
+    let counts = [
+        (Association::Vertex, mesh.points().len()),
+        (Association::Element, mesh.cells().len()),
+        (Association::Mesh, 3),
+    ];
+    let field = |number: Number, (association, count): (Association, usize)| {
+        let least = if number.name().starts_with('u') { 0.0 } else { -3.0 };
+        let step = if number.is_real() { 0.25 } else { 1.0 };
+        let values = (0..2 * count).map(|k| least + step * k as f64).collect();
+        Field { name: number.name().into(), association, components: 2, number, values }
+    };
+    let all: Vec<Field> = counts.iter().flat_map(|count| Number::ALL.map(|number| field(number, *count))).collect();
+    for compression in [Compression::None, Compression::Zlib] {
+        let path = folder.path().join("mesh.vtu");
+        write_mesh(&path, &mesh, &all, compression).unwrap();
+        assert_eq!(read_mesh(&path).unwrap().fields, all);
+        let written = Extract { fields: all.clone(), ..extract(&mesh) };
+        write_compressed(&path, &written, compression).unwrap();
+        let back = read_mesh(&path).unwrap().fields;
+        assert_eq!(back.iter().filter(|field| all.contains(field)).count(), all.len());
+    }
+    write(folder.path().join("index.pvtu"), &Extract { fields: all, ..extract(&mesh) }).unwrap();
+    let index = std::fs::read_to_string(folder.path().join("index.pvtu")).unwrap();
+    assert_eq!(index.matches("type=\"UInt16\" Name=\"uint16\"").count(), 2, "{index}");
+}
+
+#[test]
 fn an_extract_comes_back_with_its_features() {
     let folder = tempfile::tempdir().unwrap();
     let mesh = one_of_each(2);

@@ -1,5 +1,7 @@
 //! Arrays of VTK files: any number type, or text.
 
+use tombolo_deform::mesh::Number;
+
 use super::super::error::Problem;
 use super::super::scanner::Scanner;
 
@@ -45,6 +47,22 @@ impl Scalar {
             "double" => Scalar::Float(8),
             _ => return None,
         })
+    }
+
+    /// The type that fields of it have.
+    pub fn number(self) -> Number {
+        match self {
+            Scalar::Signed(1) => Number::I8,
+            Scalar::Signed(2) => Number::I16,
+            Scalar::Signed(4) => Number::I32,
+            Scalar::Signed(_) => Number::I64,
+            Scalar::Unsigned(1) => Number::U8,
+            Scalar::Unsigned(2) => Number::U16,
+            Scalar::Unsigned(4) => Number::U32,
+            Scalar::Unsigned(_) => Number::U64,
+            Scalar::Float(4) => Number::F32,
+            Scalar::Float(_) => Number::F64,
+        }
     }
 
     pub fn width(self) -> usize {
@@ -133,6 +151,8 @@ impl Numbers {
 pub(super) struct Array {
     pub name: String,
     pub components: usize,
+    /// The type that the file says; of no meaning for text.
+    pub number: Number,
     pub numbers: Numbers,
 }
 

@@ -66,15 +66,17 @@ impl Dataset {
         };
         let names = self.feature_names()?;
         let mut fields = Vec::new();
-        for (arrays, association) in
-            [(self.point_arrays, Association::Vertex), (self.cell_arrays, Association::Element)]
-        {
+        for (arrays, association) in [
+            (self.point_arrays, Association::Vertex),
+            (self.cell_arrays, Association::Element),
+            (self.field_arrays, Association::Mesh),
+        ] {
             for array in arrays {
-                let (name, components) = (array.name.clone(), array.components);
+                let (name, components, number) = (array.name.clone(), array.components, array.number);
                 if components == 0 || components > MOST_COMPONENTS {
                     self.notes.push(format!("left out: array '{name}' of {components} components"));
                 } else if let Some(values) = array.into_floats() {
-                    fields.push(Field { name, association, components, values });
+                    fields.push(Field { name, association, components, number, values });
                 } else {
                     self.notes.push(format!("left out: array '{name}' of text"));
                 }

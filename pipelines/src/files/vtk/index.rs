@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use quick_xml::escape::escape;
 
 use super::FEATURES;
+use super::write::number_name;
 use crate::extract::{Association, Extract};
 
 /// A kind of such a file.
@@ -61,10 +62,11 @@ impl Index {
                 let _ = writeln!(arrays, "<PDataArray type=\"Int64\" Name=\"{FEATURES}\" NumberOfComponents=\"1\"/>");
             }
             for field in extract.fields.iter().filter(|field| field.association == association) {
-                let (name, components) = (escape(field.name.as_str()), field.components);
+                let (name, components, kind) =
+                    (escape(field.name.as_str()), field.components, number_name(field.number));
                 let _ = writeln!(
                     arrays,
-                    "<PDataArray type=\"Float64\" Name=\"{name}\" NumberOfComponents=\"{components}\"/>"
+                    "<PDataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\"/>"
                 );
             }
             arrays

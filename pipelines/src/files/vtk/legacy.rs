@@ -1,5 +1,7 @@
 //! VTK's legacy files (.vtk): unstructured grids and polygonal data, text and binary, file versions 1 to 5.
 
+use tombolo_deform::mesh::Number;
+
 use super::super::MeshFile;
 use super::super::error::{Flaw, Problem};
 use super::super::scanner::Scanner;
@@ -62,7 +64,7 @@ impl Legacy<'_> {
                     let count: u64 = self.scanner.number("the number of points")?;
                     let kind = self.scalar()?;
                     let numbers = self.numbers(kind, count.saturating_mul(3), "point coordinates")?;
-                    let array = Array { name: "points".into(), components: 3, numbers };
+                    let array = Array { name: "points".into(), components: 3, number: kind.number(), numbers };
                     self.dataset.points = points(array).map_err(|problem| self.scanner.flaw(problem))?;
                 }
                 b"CELLS" => self.rows(None)?,
@@ -240,7 +242,8 @@ impl Legacy<'_> {
             _ => return Ok(false),
         };
         let numbers = self.numbers(kind, tuples.saturating_mul(components), &name)?;
-        self.push(owner, Array { name, components: usize::try_from(components).unwrap_or(usize::MAX), numbers });
+        let components = usize::try_from(components).unwrap_or(usize::MAX);
+        self.push(owner, Array { name, components, number: kind.number(), numbers });
         Ok(true)
     }
 
@@ -265,16 +268,16 @@ impl Legacy<'_> {
             let tuples: u64 = self.scanner.number("a number of tuples")?;
             let values = components.saturating_mul(tuples);
             let is_text = matches!(self.scanner.peek_word(), b"string" | b"utf8_string");
-            let numbers = if is_text {
+            let (number, numbers) = if is_text {
                 self.scanner.word();
                 self.scanner.line();
-                Numbers::Text(self.strings(values)?)
+                (Number::default(), Numbers::Text(self.strings(values)?))
             } else {
                 let kind = self.scalar()?;
-                self.numbers(kind, values, &name)?
+                (kind.number(), self.numbers(kind, values, &name)?)
             };
             let components = usize::try_from(components).unwrap_or(usize::MAX);
-            self.push(owner, Array { name, components, numbers });
+            self.push(owner, Array { name, components, number, numbers });
         }
         Ok(())
     }

@@ -6,7 +6,7 @@ use std::collections::hash_map::Entry;
 use std::fmt::Write as _;
 use std::io::Write as _;
 
-use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, TaggedFaces, Vector};
+use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, Number, TaggedFaces, Vector};
 
 use super::super::assemble::{owners_of_faces, sorted};
 use super::super::error::Problem;
@@ -101,6 +101,10 @@ fn with_faces(field: &Field, cell_count: usize, owners: &[Option<usize>]) -> Res
                 field.values.push(value);
             }
         }
+        // Whole numbers have none that says that there is nothing.
+        if !field.number.is_real() && owners.contains(&None) {
+            field.number = Number::F64;
+        }
     }
     Ok(field)
 }
@@ -133,7 +137,8 @@ fn check_length(name: &str, found: usize, expected: usize) -> Result<(), Problem
 }
 
 enum Values<'a> {
-    Floats(Cow<'a, [f64]>),
+    /// Values of a field, which are written as numbers of this type.
+    Numbers(Cow<'a, [f64]>, Number),
     Integers(Vec<i64>),
     Bytes(Vec<u8>),
 }
@@ -149,19 +154,29 @@ struct Grid<'a> {
     cells: Cow<'a, Cells>,
     point_arrays: Vec<Array<'a>>,
     cell_arrays: Vec<Array<'a>>,
+    field_arrays: Vec<Array<'a>>,
     names: Vec<(i64, String)>,
 }
 
 impl<'a> Grid<'a> {
     fn new(points: &'a [Vector], cells: Cow<'a, Cells>) -> Self {
-        Self { points, cells, point_arrays: Vec::new(), cell_arrays: Vec::new(), names: Vec::new() }
+        Self {
+            points,
+            cells,
+            point_arrays: Vec::new(),
+            cell_arrays: Vec::new(),
+            field_arrays: Vec::new(),
+            names: Vec::new(),
+        }
     }
 
     fn add_fields(&mut self, fields: &'a [Field]) -> Result<(), Problem> {
         for field in fields {
+            let tuples = field.values.len() / field.components.max(1);
             let (arrays, count) = match field.association {
                 Association::Vertex => (&mut self.point_arrays, self.points.len()),
                 Association::Element => (&mut self.cell_arrays, self.cells.len()),
+                Association::Mesh => (&mut self.field_arrays, tuples),
             };
             check_length(&field.name, field.values.len(), field.components.saturating_mul(count))?;
             if arrays.iter().any(|array| array.name == field.name) {
@@ -170,7 +185,7 @@ impl<'a> Grid<'a> {
                     instead: "give each array a name of its own; 'features' holds the mesh's features",
                 });
             }
-            let values = Values::Floats(Cow::Borrowed(&field.values));
+            let values = Values::Numbers(Cow::Borrowed(&field.values), field.number);
             arrays.push(Array { name: &field.name, components: field.components, values });
         }
         Ok(())
@@ -194,7 +209,7 @@ impl<'a> Grid<'a> {
             "<VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\"{compressor}>"
         ));
         file.line(format_args!("<{kind}>"));
-        self.write_names(&mut file)?;
+        self.write_field_data(&mut file)?;
         let sections = if polygonal { Sections::new(&self.cells) } else { Sections::default() };
         let counts = if polygonal { sections.counts() } else { format!(" NumberOfCells=\"{}\"", self.cells.len()) };
         file.line(format_args!("<Piece NumberOfPoints=\"{}\"{counts}>", self.points.len()));
@@ -204,9 +219,8 @@ impl<'a> Grid<'a> {
             self.cell_arrays.iter_mut().for_each(|array| array.permute(&order));
         }
         file.section("CellData", &self.cell_arrays)?;
-        let points =
-            Array { name: "Points", components: 3, values: Values::Floats(Cow::Borrowed(self.points.as_flattened())) };
-        file.section("Points", &[points])?;
+        let points = Values::Numbers(Cow::Borrowed(self.points.as_flattened()), Number::F64);
+        file.section("Points", &[Array { name: "Points", components: 3, values: points }])?;
         if polygonal {
             for (name, cells) in sections.named() {
                 file.section(name, &polygonal_rows(&self.cells, cells))?;
@@ -219,11 +233,22 @@ impl<'a> Grid<'a> {
         Ok(file.finish())
     }
 
-    fn write_names(&self, file: &mut File) -> Result<(), Problem> {
-        if self.names.is_empty() {
+    fn write_field_data(&self, file: &mut File) -> Result<(), Problem> {
+        if self.names.is_empty() && self.field_arrays.is_empty() {
             return Ok(());
         }
         file.line(format_args!("<FieldData>"));
+        for array in &self.field_arrays {
+            file.array(array, Some(array.tuples()))?;
+        }
+        if !self.names.is_empty() {
+            self.write_names(file)?;
+        }
+        file.line(format_args!("</FieldData>"));
+        Ok(())
+    }
+
+    fn write_names(&self, file: &mut File) -> Result<(), Problem> {
         let mut codes = String::new();
         for (_, name) in &self.names {
             for byte in name.bytes().filter(|&byte| byte != 0).chain([0]) {
@@ -237,13 +262,20 @@ impl<'a> Grid<'a> {
         file.line(format_args!("{}", codes.trim_end()));
         file.line(format_args!("</Array>"));
         let numbers = self.names.iter().map(|(number, _)| *number).collect();
-        file.array(&Array { name: FEATURE_NUMBERS, components: 1, values: Values::Integers(numbers) }, Some(count))?;
-        file.line(format_args!("</FieldData>"));
-        Ok(())
+        file.array(&Array { name: FEATURE_NUMBERS, components: 1, values: Values::Integers(numbers) }, Some(count))
     }
 }
 
 impl Array<'_> {
+    fn tuples(&self) -> usize {
+        let values = match &self.values {
+            Values::Numbers(values, _) => values.len(),
+            Values::Integers(values) => values.len(),
+            Values::Bytes(values) => values.len(),
+        };
+        values / self.components.max(1)
+    }
+
     /// Puts the tuples into this order.
     fn permute(&mut self, order: &[usize]) {
         fn permuted<T: Copy>(values: &[T], components: usize, order: &[usize]) -> Vec<T> {
@@ -251,7 +283,7 @@ impl Array<'_> {
             order.iter().flat_map(tuple).copied().collect()
         }
         match &mut self.values {
-            Values::Floats(values) => *values = Cow::Owned(permuted(values, self.components, order)),
+            Values::Numbers(values, _) => *values = Cow::Owned(permuted(values, self.components, order)),
             Values::Integers(values) => *values = permuted(values, self.components, order),
             Values::Bytes(values) => *values = permuted(values, self.components, order),
         }
@@ -344,6 +376,46 @@ fn integers(name: &'static str, values: Vec<i64>) -> Array<'static> {
     Array { name, components: 1, values: Values::Integers(values) }
 }
 
+/// What VTK calls a type of number.
+pub(super) fn number_name(number: Number) -> &'static str {
+    match number {
+        Number::I8 => "Int8",
+        Number::I16 => "Int16",
+        Number::I32 => "Int32",
+        Number::I64 => "Int64",
+        Number::U8 => "UInt8",
+        Number::U16 => "UInt16",
+        Number::U32 => "UInt32",
+        Number::U64 => "UInt64",
+        Number::F32 => "Float32",
+        Number::F64 => "Float64",
+    }
+}
+
+/// The values as numbers of a type, which they are.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "the values are of the type that they are cast to"
+)]
+fn encoded(values: &[f64], number: Number) -> Vec<u8> {
+    fn all<const N: usize>(values: &[f64], bytes: impl Fn(f64) -> [u8; N]) -> Vec<u8> {
+        values.iter().flat_map(|&value| bytes(value)).collect()
+    }
+    match number {
+        Number::I8 => all(values, |value| (value as i8).to_le_bytes()),
+        Number::I16 => all(values, |value| (value as i16).to_le_bytes()),
+        Number::I32 => all(values, |value| (value as i32).to_le_bytes()),
+        Number::I64 => all(values, |value| (value as i64).to_le_bytes()),
+        Number::U8 => all(values, |value| (value as u8).to_le_bytes()),
+        Number::U16 => all(values, |value| (value as u16).to_le_bytes()),
+        Number::U32 => all(values, |value| (value as u32).to_le_bytes()),
+        Number::U64 => all(values, |value| (value as u64).to_le_bytes()),
+        Number::F32 => all(values, |value| (value as f32).to_le_bytes()),
+        Number::F64 => all(values, f64::to_le_bytes),
+    }
+}
+
 /// A file in the making: its elements, and the data that follow them.
 struct File {
     text: String,
@@ -367,7 +439,7 @@ impl File {
 
     fn array(&mut self, array: &Array, tuples: Option<usize>) -> Result<(), Problem> {
         let (kind, bytes): (_, Vec<u8>) = match &array.values {
-            Values::Floats(values) => ("Float64", values.iter().flat_map(|value| value.to_le_bytes()).collect()),
+            Values::Numbers(values, number) => (number_name(*number), encoded(values, *number)),
             Values::Integers(values) => ("Int64", values.iter().flat_map(|value| value.to_le_bytes()).collect()),
             Values::Bytes(values) => ("UInt8", values.clone()),
         };

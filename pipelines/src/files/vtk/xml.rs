@@ -227,7 +227,8 @@ impl<'a> Document<'a> {
     fn array(&self, element: &Element) -> Result<Array, Flaw> {
         let numbers =
             self.numbers(element).map_err(|problem| Flaw { place: Place::Byte(element.position), problem })?;
-        Ok(Array { name: element.name.clone(), components: element.components, numbers })
+        let number = Scalar::from_xml(&element.kind).map(Scalar::number).unwrap_or_default();
+        Ok(Array { name: element.name.clone(), components: element.components, number, numbers })
     }
 
     fn numbers(&self, element: &Element) -> Result<Numbers, Problem> {
