@@ -2,16 +2,20 @@
 
 use std::{num::NonZeroU32, path::PathBuf, sync::Arc, time::Instant};
 
-use clap::{Args, ValueEnum};
+use clap::{ArgGroup, Args, ValueEnum};
 use serde::Serialize;
 use tombolo::{
     deform::{
+        mesh::Mesh,
         quality::{Quality, quality},
         surface::{BrokenSurface, Edit, Layer, SurfaceError},
         volume::Method,
     },
     pipelines::{
-        files::{Compression, read_displacements, read_mesh, write_displacement, write_mesh},
+        files::{
+            Compression, check_displacement_name, check_mesh_name, read_displacements, read_mesh, write_displacement,
+            write_mesh,
+        },
         language::{Change, Order, parse_valid, place_beside},
         shape::{Forecast, Outcome as Expected, Place, Refused, Shaper},
     },
@@ -20,6 +24,7 @@ use tombolo::{
 use crate::{Failure, features::surface, json, read, say};
 
 #[derive(Debug, Args)]
+#[command(group(ArgGroup::new("result").required(true).multiple(true).args(["out", "displacement", "forecast"])))]
 pub(crate) struct Options {
     /// The mesh to start from: .vtu, .vtk, .vtp or .msh
     #[arg(long, value_name = "IN")]
@@ -28,12 +33,12 @@ pub(crate) struct Options {
     #[arg(long, value_name = "EDITS.json")]
     edits: PathBuf,
     /// The file to write: .vtu, or .vtp for a surface
-    #[arg(long, value_name = "OUT.vtu", required_unless_present = "forecast")]
+    #[arg(long, value_name = "OUT.vtu")]
     out: Option<PathBuf>,
     /// Say what the edits would come to, and write nothing; it succeeds also where they would be rejected
     #[arg(long, conflicts_with_all = ["out", "displacement"])]
     forecast: bool,
-    /// Also write what each surface vertex was moved by: .txt, .csv or .vtp; an edit `displacement` reads it again
+    /// Write what each surface vertex was moved by, beside the mesh or alone: .txt, .csv or .vtp; an edit `displacement` reads it again
     #[arg(long, value_name = "OUT.txt")]
     displacement: Option<PathBuf>,
     /// Print one JSON object
@@ -98,6 +103,7 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
     let mut seconds = Seconds::default();
     let mesh_file = timed(&mut seconds.read, || read_mesh(&options.mesh))?;
     let mesh = Arc::new(mesh_file.mesh);
+    check_results(options, &mesh)?;
     let made = timed(&mut seconds.features, || {
         let surface = Arc::new(surface(&mesh, options.angle)?);
         Ok::<_, SurfaceError>((Shaper::new(Arc::clone(&mesh), Arc::clone(&surface))?, surface))
@@ -183,6 +189,21 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
         write_displacement(file, &surface, &displacement)?;
     }
     if options.json { json(&outcome) } else { tell(&outcome, options) }
+}
+
+/// Refuses files that could not be written, before the work that would be lost.
+fn check_results(options: &Options, mesh: &Mesh) -> Result<(), Failure> {
+    if let Some(out) = &options.out {
+        check_mesh_name(out, mesh.cells())?;
+    }
+    if let Some(file) = &options.displacement {
+        check_displacement_name(file)?;
+    }
+    if options.out.is_some() && options.out == options.displacement {
+        let message = "--out and --displacement name the same file; each writes one of its own";
+        return Err(Failure::Wrong(message.to_owned()));
+    }
+    Ok(())
 }
 
 /// The edits and the order's settings.

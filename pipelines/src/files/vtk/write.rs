@@ -1,8 +1,8 @@
 //! Writes .vtu and .vtp: appended raw data, little endian, 64-bit headers, every number as it is.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
 use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
 use std::io::Write as _;
 
@@ -10,7 +10,8 @@ use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, TaggedFaces, Ve
 
 use super::super::assemble::{owners_of_faces, sorted};
 use super::super::error::Problem;
-use super::{FEATURE_NAMES, FEATURE_NUMBERS, FEATURES};
+use super::names::encoded;
+use super::{FACE_DIMENSION, FEATURES};
 use crate::extract::{Association, Extract, Field};
 
 /// How arrays are compressed in the file.
@@ -132,6 +133,17 @@ fn check_length(name: &str, found: usize, expected: usize) -> Result<(), Problem
     Err(Problem::Count { what, found: found as u64, expected: expected as u64 })
 }
 
+/// Refuses cells that polygonal data cannot hold.
+pub(in super::super) fn check_polygonal(cells: &Cells) -> Result<(), Problem> {
+    if cells.dimension() <= 2 {
+        return Ok(());
+    }
+    Err(Problem::Unsupported {
+        what: "a volume cell in polygonal data (.vtp)".into(),
+        instead: "write it as .vtu, or take its surface",
+    })
+}
+
 enum Values<'a> {
     Floats(Cow<'a, [f64]>),
     Integers(Vec<i64>),
@@ -177,11 +189,8 @@ impl<'a> Grid<'a> {
     }
 
     fn write(mut self, polygonal: bool, compression: Compression) -> Result<Vec<u8>, Problem> {
-        if polygonal && self.cells.dimension() > 2 {
-            return Err(Problem::Unsupported {
-                what: "a volume cell in polygonal data (.vtp)".into(),
-                instead: "write it as .vtu, or take its surface",
-            });
+        if polygonal {
+            check_polygonal(&self.cells)?;
         }
         let mut file = File { text: String::new(), appended: Vec::new(), compression };
         let kind = if polygonal { "PolyData" } else { "UnstructuredGrid" };
@@ -219,25 +228,21 @@ impl<'a> Grid<'a> {
         Ok(file.finish())
     }
 
+    /// For each name an array that is called so, of the feature's number and the dimension of its faces: what meshio takes for the
+    /// name of a physical group. An array of text would be refused there.
     fn write_names(&self, file: &mut File) -> Result<(), Problem> {
-        if self.names.is_empty() {
+        let mut numbers: BTreeMap<String, Vec<i64>> = BTreeMap::new();
+        for (number, name) in self.names.iter().filter(|(_, name)| !name.is_empty()) {
+            numbers.entry(encoded(name)).or_default().extend([*number, FACE_DIMENSION]);
+        }
+        if numbers.is_empty() {
             return Ok(());
         }
         file.line(format_args!("<FieldData>"));
-        let mut codes = String::new();
-        for (_, name) in &self.names {
-            for byte in name.bytes().filter(|&byte| byte != 0).chain([0]) {
-                let _ = write!(codes, "{byte} ");
-            }
+        for (name, numbers) in numbers {
+            let count = numbers.len();
+            file.array(&Array { name: &name, components: 1, values: Values::Integers(numbers) }, Some(count))?;
         }
-        let count = self.names.len();
-        file.line(format_args!(
-            "<Array type=\"String\" Name=\"{FEATURE_NAMES}\" NumberOfTuples=\"{count}\" format=\"ascii\">"
-        ));
-        file.line(format_args!("{}", codes.trim_end()));
-        file.line(format_args!("</Array>"));
-        let numbers = self.names.iter().map(|(number, _)| *number).collect();
-        file.array(&Array { name: FEATURE_NUMBERS, components: 1, values: Values::Integers(numbers) }, Some(count))?;
         file.line(format_args!("</FieldData>"));
         Ok(())
     }
@@ -374,12 +379,15 @@ impl File {
         // Control characters have no place in XML.
         let name: String = array.name.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect();
         let name = quick_xml::escape::escape(&name);
-        let components = array.components;
+        // One component goes without saying: meshio makes columns of arrays that say it.
+        let components = match array.components {
+            1 => String::new(),
+            count => format!(" NumberOfComponents=\"{count}\""),
+        };
         let tuples = tuples.map_or(String::new(), |count| format!(" NumberOfTuples=\"{count}\""));
         let offset = self.appended.len();
         self.line(format_args!(
-            "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\"{tuples} format=\"appended\" \
-             offset=\"{offset}\"/>"
+            "<DataArray type=\"{kind}\" Name=\"{name}\"{components}{tuples} format=\"appended\" offset=\"{offset}\"/>"
         ));
         match self.compression {
             Compression::None => {
