@@ -16,7 +16,7 @@ use tombolo::{
             Compression, check_displacement_name, check_mesh_name, read_displacements, read_mesh, write_displacement,
             write_mesh,
         },
-        language::{Change, Order, parse_valid, place_beside},
+        language::{Change, Order, Validate, parse_valid, place_beside},
         shape::{Forecast, Outcome as Expected, Place, Refused, Shaper},
     },
 };
@@ -126,18 +126,8 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
         layers: Vec::new(),
         seconds,
     };
-    let mut deform = order.deform.unwrap_or_default();
-    let equation = &mut deform.equation;
-    equation.method = match options.method {
-        None => equation.method,
-        Some(VolumeMethod::Elasticity) => Method::Elasticity,
-        Some(VolumeMethod::Harmonic) => Method::Harmonic,
-    };
-    equation.stiffening = options.stiffening.unwrap_or(equation.stiffening);
-    let mut guard = order.guard.unwrap_or_default();
-    guard.min_scaled_jacobian = options.min_quality.unwrap_or(guard.min_scaled_jacobian);
-    let mut schedule = order.schedule.unwrap_or_default();
-    schedule.steps = options.steps.unwrap_or(schedule.steps);
+    let (deform, guard, schedule) =
+        (order.deform.unwrap_or_default(), order.guard.unwrap_or_default(), order.schedule.unwrap_or_default());
 
     if options.forecast {
         let here = Place::from(Arc::clone(shaper.reference()));
@@ -217,6 +207,7 @@ fn read_order(options: &Options) -> Result<(Vec<Edit>, Order), Failure> {
     } else {
         parse_valid(&text, &name)?
     };
+    let order = with_options(order, options)?;
     match &order.change {
         Change::Edits(edits) | Change::Stack(edits) => {
             let mut edits = edits.clone();
@@ -225,6 +216,27 @@ fn read_order(options: &Options) -> Result<(Vec<Edit>, Order), Failure> {
         }
         Change::Undo(_) => Err(Failure::Wrong(format!("{name}: undo: a mesh from a file has no orders to take back"))),
     }
+}
+
+/// The order with what the options say in place of its own settings, held to the same limits.
+fn with_options(mut order: Order, options: &Options) -> Result<Order, Failure> {
+    if let Some(method) = options.method {
+        order.deform.get_or_insert_default().equation.method = match method {
+            VolumeMethod::Elasticity => Method::Elasticity,
+            VolumeMethod::Harmonic => Method::Harmonic,
+        };
+    }
+    if let Some(stiffening) = options.stiffening {
+        order.deform.get_or_insert_default().equation.stiffening = stiffening;
+    }
+    if let Some(least) = options.min_quality {
+        order.guard.get_or_insert_default().min_scaled_jacobian = least;
+    }
+    if let Some(steps) = options.steps {
+        order.schedule.get_or_insert_default().steps = steps;
+    }
+    order.validate().map_err(|problem| Failure::Wrong(format!("with the options that are given, {problem}")))?;
+    Ok(order)
 }
 
 fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {

@@ -352,7 +352,8 @@ fn integers(name: &'static str, values: Vec<i64>) -> Array<'static> {
 /// A file in the making: its elements, and the data that follow them.
 struct File {
     text: String,
-    appended: Vec<u8>,
+    /// The data of each array, with where in the text its offset goes.
+    appended: Vec<(usize, Vec<u8>)>,
     compression: Compression,
 }
 
@@ -385,41 +386,52 @@ impl File {
             count => format!(" NumberOfComponents=\"{count}\""),
         };
         let tuples = tuples.map_or(String::new(), |count| format!(" NumberOfTuples=\"{count}\""));
-        let offset = self.appended.len();
-        self.line(format_args!(
-            "<DataArray type=\"{kind}\" Name=\"{name}\"{components}{tuples} format=\"appended\" offset=\"{offset}\"/>"
-        ));
-        match self.compression {
-            Compression::None => {
-                self.appended.extend((bytes.len() as u64).to_le_bytes());
-                self.appended.extend(bytes);
-                Ok(())
-            }
-            Compression::Zlib => self.append_compressed(&bytes),
-        }
-    }
-
-    fn append_compressed(&mut self, bytes: &[u8]) -> Result<(), Problem> {
-        const BLOCK: usize = 1 << 20;
-        let mut packed = Vec::new();
-        let mut header = vec![bytes.len().div_ceil(BLOCK) as u64, BLOCK as u64, (bytes.len() % BLOCK) as u64];
-        for block in bytes.chunks(BLOCK) {
-            let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
-            encoder.write_all(block)?;
-            let block = encoder.finish()?;
-            header.push(block.len() as u64);
-            packed.extend(block);
-        }
-        self.appended.extend(header.iter().flat_map(|number| number.to_le_bytes()));
-        self.appended.extend(packed);
+        let _ = write!(
+            self.text,
+            "<DataArray type=\"{kind}\" Name=\"{name}\"{components}{tuples} format=\"appended\" offset=\""
+        );
+        let data = match self.compression {
+            Compression::None => [&(bytes.len() as u64).to_le_bytes()[..], &bytes].concat(),
+            Compression::Zlib => compressed(&bytes)?,
+        };
+        self.appended.push((self.text.len(), data));
+        self.line(format_args!("\"/>"));
         Ok(())
     }
 
-    fn finish(mut self) -> Vec<u8> {
-        self.text.push_str("<AppendedData encoding=\"raw\">\n_");
-        let mut bytes = self.text.into_bytes();
-        bytes.extend(self.appended);
+    /// The data stand in the opposite order of the elements: meshio renumbers the offsets one by one, and would take an array that it has
+    /// renumbered for a later one.
+    fn finish(self) -> Vec<u8> {
+        let mut offset = self.appended.iter().map(|(_, data)| data.len()).sum::<usize>();
+        let mut bytes = Vec::with_capacity(self.text.len() + offset + 32 * self.appended.len());
+        let mut written = 0;
+        for (place, data) in &self.appended {
+            offset -= data.len();
+            bytes.extend(self.text.as_bytes().get(written..*place).unwrap_or(&[]));
+            bytes.extend(offset.to_string().as_bytes());
+            written = *place;
+        }
+        bytes.extend(self.text.as_bytes().get(written..).unwrap_or(&[]));
+        bytes.extend(b"<AppendedData encoding=\"raw\">\n_");
+        self.appended.iter().rev().for_each(|(_, data)| bytes.extend(data));
         bytes.extend(b"\n</AppendedData>\n</VTKFile>\n");
         bytes
     }
+}
+
+/// The blocks of an array by zlib, behind the counts that say where each ends.
+fn compressed(bytes: &[u8]) -> Result<Vec<u8>, Problem> {
+    const BLOCK: usize = 1 << 20;
+    let mut packed = Vec::new();
+    let mut header = vec![bytes.len().div_ceil(BLOCK) as u64, BLOCK as u64, (bytes.len() % BLOCK) as u64];
+    for block in bytes.chunks(BLOCK) {
+        let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+        encoder.write_all(block)?;
+        let block = encoder.finish()?;
+        header.push(block.len() as u64);
+        packed.extend(block);
+    }
+    let mut data: Vec<u8> = header.iter().flat_map(|number| number.to_le_bytes()).collect();
+    data.extend(packed);
+    Ok(data)
 }
