@@ -49,7 +49,8 @@ contains
   end subroutine
 
   ! One process has nobody to send to.
-  subroutine MPI_Sendrecv(sent, count, type, to, tag, received, received_count, received_type, from, received_tag, ranks, status, error)
+  subroutine MPI_Sendrecv(sent, count, type, to, tag, received, received_count, received_type, from, received_tag, ranks, &
+    status, error)
     integer, intent(in) :: count, type, to, tag, received_count, received_type, from, received_tag, ranks
     double precision, intent(in) :: sent(count)
     double precision, intent(out) :: received(received_count)
