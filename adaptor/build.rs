@@ -2,6 +2,9 @@
 
 use std::{env, fmt::Write, fs, io, path::Path};
 
+/// Leaves the viewer out, though it is there.
+const WITHOUT_VIEWER: &str = "TOMBOLO_WITHOUT_VIEWER";
+
 fn main() -> io::Result<()> {
     #[cfg(feature = "distributed")]
     petsc()?;
@@ -9,8 +12,11 @@ fn main() -> io::Result<()> {
     let viewer = Path::new(&manifest).join("../viewer/dist");
     let mut files = Vec::new();
     println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-env-changed={WITHOUT_VIEWER}");
     // A path that does not exist would make every build start from here, so the viewer is built first or this file touched.
-    if let Ok(viewer) = viewer.canonicalize() {
+    if env::var_os(WITHOUT_VIEWER).is_none()
+        && let Ok(viewer) = viewer.canonicalize()
+    {
         println!("cargo::rerun-if-changed={}", viewer.display());
         collect(&viewer, "", &mut files)?;
     }

@@ -282,3 +282,53 @@ fn a_left_handed_mesh_keeps_its_order_of_vertices() {
         assert!(before.notes.iter().any(|note| note.contains("left-handed")), "{:?}", before.notes);
     }
 }
+
+/// Where nothing is refused but something is wrong, scripts must not take it for a refusal.
+#[test]
+fn wrong_arguments_are_no_refusal() {
+    let (directory, _) = with_box(r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, 0.1]}}]"#);
+    let edit = ["edit", "--mesh", "box.vtu", "--edits", "edits.json"];
+    let wrong = |more: &[&str], why: &str| {
+        let output = tombolo(directory.path(), &[&edit[..], more].concat());
+        let text = error_text(&output);
+        assert_eq!(output.status.code(), Some(1), "{more:?}: {text}");
+        assert!(text.contains(why), "{more:?}: {text}");
+    };
+    wrong(&[], "--displacement");
+    wrong(&["--output", "out.vtu"], "'--out'");
+    wrong(&["--out", "out.vtu", "--steps", "0"], "--steps");
+    wrong(&["--out", "out.vtu", "--stiffening", "9"], "stiffening");
+    wrong(&["--out", "out.vtu", "--stiffening", "nan"], "stiffening");
+    wrong(&["--out", "out.vtu", "--min-quality", "5"], "min_scaled_jacobian");
+    // Before the work, not after it.
+    wrong(&["--out", "out.stl"], "known are .vtu and .vtp");
+    wrong(&["--out", "out.vtp"], "write it as .vtu");
+    wrong(&["--displacement", "out.stl"], ".txt, .csv and .vtp");
+    wrong(&["--out", "same.vtu", "--displacement", "same.vtu"], ".txt, .csv and .vtp");
+    let surface = ["features", "--mesh", "box.vtu", "--out", "box.vtp"];
+    assert!(tombolo(directory.path(), &surface).status.success());
+    let same = ["edit", "--mesh", "box.vtp", "--edits", "edits.json", "--out", "a.vtp", "--displacement", "a.vtp"];
+    assert!(error_text(&tombolo(directory.path(), &same)).contains("the same file"));
+    for usage in [&[][..], &["mesh"], &["nonsense"]] {
+        assert_eq!(tombolo(directory.path(), usage).status.code(), Some(1), "{usage:?}");
+    }
+    let help = tombolo(directory.path(), &["--help"]);
+    assert!(help.status.success() && String::from_utf8_lossy(&help.stdout).contains("Exit codes: 0"));
+    let version = tombolo(directory.path(), &["--version"]);
+    assert_eq!(String::from_utf8_lossy(&version.stdout), concat!("tombolo ", env!("CARGO_PKG_VERSION"), "\n"));
+}
+
+/// The displacement is enough to ask for; so are the numbers of a skeleton.
+#[test]
+fn one_result_is_enough() {
+    let (directory, _) = with_box(r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, 0.1]}}]"#);
+    let edit = ["edit", "--mesh", "box.vtu", "--edits", "edits.json", "--displacement", "lift.txt", "--json"];
+    let outcome = json(&tombolo(directory.path(), &edit));
+    assert_eq!(outcome["status"], "applied");
+    let both = [&edit[..5], &["--out", "out.vtu", "--displacement", "both.txt"]].concat();
+    assert!(tombolo(directory.path(), &both).status.success());
+    let read = |name: &str| std::fs::read(directory.path().join(name)).unwrap();
+    assert_eq!(read("lift.txt"), read("both.txt"));
+    let skeleton = json(&tombolo(directory.path(), &["skeleton", "--mesh", "box.vtu", "--json"]));
+    assert!(skeleton["nodes"].as_u64().unwrap() > 0, "{skeleton}");
+}

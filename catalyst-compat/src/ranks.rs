@@ -9,12 +9,16 @@ use tombolo::pipelines::communicator::Reduction;
 
 use crate::error::{CatalystError, Status};
 
-/// The communicator of this Fortran handle; without one, MPI's world where MPI runs, else this process by itself.
+/// In place of a communicator's handle: all ranks there are, with MPI or without.
+#[cfg(feature = "distributed")]
+const WORLD: i32 = -1;
+
+/// The communicator of this Fortran handle; without one or with -1, MPI's world where MPI runs, else this process by itself.
 #[cfg(feature = "distributed")]
 pub(crate) fn communicator(handle: Option<i32>) -> Result<Arc<dyn Communicator>, CatalystError> {
     use tombolo::comm::{Solo, mpi};
     let unusable = |error: mpi::MpiError| CatalystError::Configuration(format!("the communicator: {error}"));
-    match handle {
+    match handle.filter(|&handle| handle != WORLD) {
         // SAFETY: Catalyst's blueprint says that `catalyst/mpi_comm` is the handle of a live communicator; a null one is told.
         Some(handle) => Ok(Arc::new(unsafe { mpi::Mpi::from_fortran(handle) }.map_err(unusable)?)),
         None => {

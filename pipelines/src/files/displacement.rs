@@ -106,12 +106,22 @@ pub fn write_displacement(path: impl AsRef<Path>, surface: &Surface, displacemen
         let (found, expected) = (displacement.len() as u64, surface.points().len() as u64);
         return Err(Flaw::from(Problem::Count { what, found, expected }).in_file(path));
     }
+    check_displacement_name(path)?;
+    if extension(path) == "vtp" {
+        return write(path, &to_extract(surface, displacement));
+    }
+    let text = to_text(surface, displacement, if extension(path) == "csv" { "," } else { " " });
+    write_atomically(path, |file| file.write_all(text.as_bytes()))
+}
+
+/// Whether [`write_displacement`] takes a file of this name: for whoever wants to know before long work.
+///
+/// # Errors
+/// [`FileError`] for another extension.
+pub fn check_displacement_name(path: impl AsRef<Path>) -> Result<(), FileError> {
+    let path = path.as_ref();
     match extension(path).as_str() {
-        "txt" | "csv" => {
-            let text = to_text(surface, displacement, if extension(path) == "csv" { "," } else { " " });
-            write_atomically(path, |file| file.write_all(text.as_bytes()))
-        }
-        "vtp" => write(path, &to_extract(surface, displacement)),
+        "txt" | "csv" | "vtp" => Ok(()),
         found => Err(unknown_extension(found, ".txt, .csv and .vtp").in_file(path)),
     }
 }

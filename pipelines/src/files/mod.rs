@@ -12,7 +12,9 @@
 //! # Features
 //! Physical surfaces of Gmsh become [`FeatureSource::Faces`]. In a VTK file a cell array named `features` says which feature each
 //! face belongs to (a negative number: none), on cells of dimension 2 beside the volume cells or on the cells of a surface; a
-//! point array of that name becomes [`FeatureSource::Vertices`]. The field-data array `feature_names` names them, feature 0 first,
+//! point array of that name becomes [`FeatureSource::Vertices`]. A feature's name is the name of a field-data array of two integers:
+//! its number, and 2, the dimension of its faces. That is how meshio keeps the names of physical groups. In such a name `"`, `%`, `&`,
+//! `<` and `>` stand as `%` and two hexadecimal digits. A field-data array of text, `feature_names`, is read as well: feature 0 first,
 //! or in the order of the numbers in `feature_numbers` where that is there.
 //!
 //! # What is left out
@@ -38,11 +40,11 @@ mod vtk;
 use std::io::Write;
 use std::path::Path;
 
-use tombolo_deform::mesh::Mesh;
+use tombolo_deform::mesh::{Cells, Mesh};
 
 pub use displacement::{
-    SurfaceDisplacement, TOLERANCE, UnreadFile, parse_displacement, read_displacement, read_displacements,
-    write_displacement,
+    SurfaceDisplacement, TOLERANCE, UnreadFile, check_displacement_name, parse_displacement, read_displacement,
+    read_displacements, write_displacement,
 };
 pub use error::{FileError, Place, Problem};
 pub use vtk::{Compression, Series};
@@ -158,10 +160,24 @@ pub fn write_mesh(
     compression: Compression,
 ) -> Result<(), FileError> {
     let path = path.as_ref();
+    check_mesh_name(path, mesh.cells())?;
     let polygonal = is_polygonal(path)?;
     let bytes =
         vtk::from_mesh(mesh, fields, polygonal, compression).map_err(|error| Flaw::from(error).in_file(path))?;
     write_atomically(path, |file| file.write_all(&bytes))
+}
+
+/// Whether [`write_mesh`] takes a mesh of these cells for a file of this name: for whoever wants to know before long work.
+///
+/// # Errors
+/// [`FileError`] for another extension, and for volume cells in a `.vtp`.
+pub fn check_mesh_name(path: impl AsRef<Path>, cells: &Cells) -> Result<(), FileError> {
+    let path = path.as_ref();
+    match extension(path).as_str() {
+        "vtp" => vtk::check_polygonal(cells).map_err(|problem| Flaw::from(problem).in_file(path)),
+        "vtu" => Ok(()),
+        found => Err(unknown_extension(found, ".vtu and .vtp").in_file(path)),
+    }
 }
 
 fn is_polygonal(path: &Path) -> Result<bool, FileError> {

@@ -2,17 +2,21 @@
 
 use std::{num::NonZeroU32, path::PathBuf, sync::Arc, time::Instant};
 
-use clap::{Args, ValueEnum};
+use clap::{ArgGroup, Args, ValueEnum};
 use serde::Serialize;
 use tombolo::{
     deform::{
+        mesh::Mesh,
         quality::{Quality, quality},
         surface::{BrokenSurface, Edit, Layer, SurfaceError},
         volume::Method,
     },
     pipelines::{
-        files::{Compression, read_displacements, read_mesh, write_displacement, write_mesh},
-        language::{Change, Order, parse_valid, place_beside},
+        files::{
+            Compression, check_displacement_name, check_mesh_name, read_displacements, read_mesh, write_displacement,
+            write_mesh,
+        },
+        language::{Change, Order, Validate, parse_valid, place_beside},
         shape::{Forecast, Outcome as Expected, Place, Refused, Shaper},
     },
 };
@@ -20,6 +24,7 @@ use tombolo::{
 use crate::{Failure, features::surface, json, read, say};
 
 #[derive(Debug, Args)]
+#[command(group(ArgGroup::new("result").required(true).multiple(true).args(["out", "displacement", "forecast"])))]
 pub(crate) struct Options {
     /// The mesh to start from: .vtu, .vtk, .vtp or .msh
     #[arg(long, value_name = "IN")]
@@ -28,12 +33,12 @@ pub(crate) struct Options {
     #[arg(long, value_name = "EDITS.json")]
     edits: PathBuf,
     /// The file to write: .vtu, or .vtp for a surface
-    #[arg(long, value_name = "OUT.vtu", required_unless_present = "forecast")]
+    #[arg(long, value_name = "OUT.vtu")]
     out: Option<PathBuf>,
     /// Say what the edits would come to, and write nothing; it succeeds also where they would be rejected
     #[arg(long, conflicts_with_all = ["out", "displacement"])]
     forecast: bool,
-    /// Also write what each surface vertex was moved by: .txt, .csv or .vtp; an edit `displacement` reads it again
+    /// Write what each surface vertex was moved by, beside the mesh or alone: .txt, .csv or .vtp; an edit `displacement` reads it again
     #[arg(long, value_name = "OUT.txt")]
     displacement: Option<PathBuf>,
     /// Print one JSON object
@@ -101,6 +106,7 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
         eprintln!("note: {note}");
     }
     let mesh = Arc::new(mesh_file.mesh);
+    check_results(options, &mesh)?;
     let made = timed(&mut seconds.features, || {
         let surface = Arc::new(surface(&mesh, options.angle)?);
         Ok::<_, SurfaceError>((Shaper::new(Arc::clone(&mesh), Arc::clone(&surface))?, surface))
@@ -123,24 +129,8 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
         layers: Vec::new(),
         seconds,
     };
-    let mut deform = order.deform.unwrap_or_default();
-    deform.surface_only &= options.method.is_none();
-    if deform.surface_only && options.out.is_some() {
-        let reason =
-            "`method` is `surface`, which leaves the volume to a solver: name one with --method, or leave --out out";
-        return Err(Failure::Refused(reason.into()));
-    }
-    let equation = &mut deform.equation;
-    equation.method = match options.method {
-        None => equation.method,
-        Some(VolumeMethod::Elasticity) => Method::Elasticity,
-        Some(VolumeMethod::Harmonic) => Method::Harmonic,
-    };
-    equation.stiffening = options.stiffening.unwrap_or(equation.stiffening);
-    let mut guard = order.guard.unwrap_or_default();
-    guard.min_scaled_jacobian = options.min_quality.unwrap_or(guard.min_scaled_jacobian);
-    let mut schedule = order.schedule.unwrap_or_default();
-    schedule.steps = options.steps.unwrap_or(schedule.steps);
+    let (deform, guard, schedule) =
+        (order.deform.unwrap_or_default(), order.guard.unwrap_or_default(), order.schedule.unwrap_or_default());
 
     if options.forecast {
         let here = Place::from(Arc::clone(shaper.reference()));
@@ -194,6 +184,21 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
     if options.json { json(&outcome) } else { tell(&outcome, options) }
 }
 
+/// Refuses files that could not be written, before the work that would be lost.
+fn check_results(options: &Options, mesh: &Mesh) -> Result<(), Failure> {
+    if let Some(out) = &options.out {
+        check_mesh_name(out, mesh.cells())?;
+    }
+    if let Some(file) = &options.displacement {
+        check_displacement_name(file)?;
+    }
+    if options.out.is_some() && options.out == options.displacement {
+        let message = "--out and --displacement name the same file; each writes one of its own";
+        return Err(Failure::Wrong(message.to_owned()));
+    }
+    Ok(())
+}
+
 /// The edits and the order's settings.
 fn read_order(options: &Options) -> Result<(Vec<Edit>, Order), Failure> {
     let name = options.edits.to_string_lossy();
@@ -205,6 +210,7 @@ fn read_order(options: &Options) -> Result<(Vec<Edit>, Order), Failure> {
     } else {
         parse_valid(&text, &name)?
     };
+    let order = with_options(order, options)?;
     match &order.change {
         Change::Edits(edits) | Change::Stack(edits) => {
             let mut edits = edits.clone();
@@ -213,6 +219,35 @@ fn read_order(options: &Options) -> Result<(Vec<Edit>, Order), Failure> {
         }
         Change::Undo(_) => Err(Failure::Wrong(format!("{name}: undo: a mesh from a file has no orders to take back"))),
     }
+}
+
+/// The order with what the options say in place of its own settings, held to the same limits.
+fn with_options(mut order: Order, options: &Options) -> Result<Order, Failure> {
+    if let Some(method) = options.method {
+        let deform = order.deform.get_or_insert_default();
+        deform.surface_only = false;
+        deform.equation.method = match method {
+            VolumeMethod::Elasticity => Method::Elasticity,
+            VolumeMethod::Harmonic => Method::Harmonic,
+        };
+    }
+    if options.out.is_some() && order.deform.as_ref().is_some_and(|deform| deform.surface_only) {
+        return Err(Failure::Wrong(
+            "`method` is `surface`, which leaves the volume to a solver: name one with --method, or leave --out out"
+                .into(),
+        ));
+    }
+    if let Some(stiffening) = options.stiffening {
+        order.deform.get_or_insert_default().equation.stiffening = stiffening;
+    }
+    if let Some(least) = options.min_quality {
+        order.guard.get_or_insert_default().min_scaled_jacobian = least;
+    }
+    if let Some(steps) = options.steps {
+        order.schedule.get_or_insert_default().steps = steps;
+    }
+    order.validate().map_err(|problem| Failure::Wrong(format!("with the options that are given, {problem}")))?;
+    Ok(order)
 }
 
 fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {

@@ -9,7 +9,7 @@ use tombolo::{
         mesh::{FeatureSource, Mesh, TaggedFaces},
         surface::{FeatureSettings, FeatureSize, Surface, SurfaceError},
     },
-    pipelines::files::{Compression, read_mesh, write_mesh},
+    pipelines::files::{Compression, check_mesh_name, read_mesh, write_mesh},
 };
 
 use crate::{Failure, json, say};
@@ -49,6 +49,9 @@ struct Found {
 pub(crate) fn features(options: &Options) -> Result<(), Failure> {
     let mesh = read_mesh(&options.mesh)?.mesh;
     let surface = surface(&mesh, options.angle)?;
+    if let Some(out) = &options.out {
+        check_mesh_name(out, surface.faces())?;
+    }
     let by_angle = options.angle.is_some() || matches!(mesh.features(), FeatureSource::SharpEdges);
     let faces = match &options.faces {
         Some(name) => Some(surface.features().faces(surface.features().index(name)?).collect()),

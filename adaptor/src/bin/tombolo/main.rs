@@ -15,9 +15,12 @@ use std::{
 use clap::{Parser, Subcommand};
 use tombolo::pipelines::language;
 
+const EXIT_CODES: &str =
+    "Exit codes: 0 done; 1 something is wrong with what was given; 2 the shape that was asked for is refused.";
+
 /// Checks configurations, looks at meshes, and gives them other shapes without a solver.
 #[derive(Debug, Parser)]
-#[command(name = "tombolo", version)]
+#[command(name = "tombolo", version, after_help = EXIT_CODES)]
 struct Arguments {
     #[command(subcommand)]
     task: Task,
@@ -70,7 +73,11 @@ impl<E: std::error::Error> From<E> for Failure {
 }
 
 fn main() -> ExitCode {
-    let done = match Arguments::parse().task {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(asked) => return answer(&asked),
+    };
+    let done = match arguments.task {
         Task::Check { file } => check(&file),
         Task::Schema => json(&language::config_schema()),
         Task::Mesh(MeshTask::Info { file, json }) => mesh::info(&file, json),
@@ -89,6 +96,12 @@ fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// Prints the help or version that was asked for, or what is wrong with the arguments: 1 then, because 2 says that a shape is refused.
+fn answer(asked: &clap::Error) -> ExitCode {
+    let printed = asked.print().is_ok();
+    if printed && asked.exit_code() == 0 { ExitCode::SUCCESS } else { ExitCode::from(1) }
 }
 
 fn check(file: &Path) -> Result<(), Failure> {

@@ -11,7 +11,7 @@ use tombolo::{
     },
     pipelines::{
         extract::{Association, Extract, Field},
-        files::{read_mesh, write},
+        files::{check_mesh_name, read_mesh, write},
     },
 };
 
@@ -20,11 +20,11 @@ use crate::{Failure, json, say};
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
     /// The mesh: .vtu, .vtk, .vtp or .msh; its boundary is taken where it has volume cells
-    #[arg(long)]
+    #[arg(long, value_name = "IN")]
     mesh: PathBuf,
-    /// Where the skeleton goes: .vtp. Polylines with the fields `curve` (of the polyline), `node`, `degree` and `radius`
-    #[arg(long)]
-    out: PathBuf,
+    /// The file to write: .vtp or .vtu. Polylines with the fields `curve` (of the polyline), `node`, `degree` and `radius`
+    #[arg(long, value_name = "OUT.vtp")]
+    out: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -46,10 +46,15 @@ struct Summary {
 pub(crate) fn skeleton(options: &Options) -> Result<(), Failure> {
     let read = read_mesh(&options.mesh)?;
     let surface = Surface::extract(&read.mesh, &FeatureSettings::default())?;
+    if let Some(out) = &options.out {
+        check_mesh_name(out, surface.faces())?;
+    }
     let start = Instant::now();
     let skeleton = Skeleton::extract(&surface, &SkeletonSettings::default())?;
     let seconds = start.elapsed().as_secs_f64();
-    write(&options.out, &polylines(&skeleton, &surface)?)?;
+    if let Some(out) = &options.out {
+        write(out, &polylines(&skeleton, &surface)?)?;
+    }
     let summary = Summary {
         file: options.mesh.display().to_string(),
         vertices: surface.points().len(),
@@ -66,7 +71,11 @@ pub(crate) fn skeleton(options: &Options) -> Result<(), Failure> {
     }
     let Summary { file, vertices, nodes, curves, branches, ends, loops, components, .. } = &summary;
     say(format_args!("{file}: {vertices} surface vertices on {nodes} nodes in {components} connected piece(s)"))?;
-    say(format_args!("{curves} curve(s), {branches} branch node(s), {ends} end(s), {loops} loop(s); {seconds:.3} s"))
+    say(format_args!("{curves} curve(s), {branches} branch node(s), {ends} end(s), {loops} loop(s); {seconds:.3} s"))?;
+    match &options.out {
+        Some(out) => say(format_args!("wrote {}", out.display())),
+        None => Ok(()),
+    }
 }
 
 /// The curves as polylines; a node without a curve is a cell of one vertex, of curve -1.

@@ -3,6 +3,7 @@
 mod corruption;
 mod displacement_files;
 mod gmsh_files;
+mod meshio_files;
 mod vtk_files;
 
 use std::sync::Arc;

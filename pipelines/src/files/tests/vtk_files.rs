@@ -78,6 +78,39 @@ fn negative_tags_keep_their_names() {
     assert_eq!(back.names, [(back.tags[0], "feature--5".to_owned())]);
 }
 
+/// Names that stand in an array of text, as they were written up to now and as other programs may write them.
+#[test]
+fn names_as_text_are_read() {
+    let text = |field_data: &str| {
+        format!(
+            "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\"><UnstructuredGrid><FieldData>{field_data}</FieldData>\
+             <Piece NumberOfPoints=\"3\" NumberOfCells=\"1\"><CellData><DataArray type=\"Int64\" Name=\"features\">7</DataArray>\
+             </CellData><Points><DataArray type=\"Float64\" NumberOfComponents=\"3\">0 0 0 1 0 0 0 1 0</DataArray></Points>\
+             <Cells><DataArray type=\"Int64\" Name=\"connectivity\">0 1 2</DataArray><DataArray type=\"Int64\" \
+             Name=\"offsets\">3</DataArray><DataArray type=\"UInt8\" Name=\"types\">5</DataArray></Cells></Piece>\
+             </UnstructuredGrid></VTKFile>"
+        )
+    };
+    let names = |field_data: &str| {
+        let read = parse_mesh(Path::new("a.vtu"), text(field_data).as_bytes()).unwrap();
+        let FeatureSource::Faces(tagged) = read.mesh.features() else { panic!("{:?}", read.mesh.features()) };
+        tagged.names.clone()
+    };
+    let old = "<Array type=\"String\" Name=\"feature_names\" NumberOfTuples=\"2\" format=\"ascii\">105 110 0 111 117 116 0</Array>\
+               <DataArray type=\"Int64\" Name=\"feature_numbers\" NumberOfTuples=\"2\">3 7</DataArray>";
+    assert_eq!(names(old), [(7, "out".to_owned())]);
+    // Numbers of other kinds are no names.
+    let others = "<DataArray type=\"Float64\" Name=\"TimeValue\">7 2</DataArray><DataArray type=\"Int64\" Name=\"size\">7 3</DataArray>\
+                  <DataArray type=\"Int64\" Name=\"cycle\">7</DataArray>";
+    assert_eq!(names(others), []);
+    assert_eq!(
+        names(
+            "<DataArray type=\"Int32\" Name=\"in\">3 2</DataArray><DataArray type=\"Int32\" Name=\"out\">7 2 8 2</DataArray>"
+        ),
+        [(7, "out".to_owned())]
+    );
+}
+
 #[test]
 fn refusals_name_the_file_and_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
@@ -125,7 +158,11 @@ fn vtk(arguments: &[&Path]) -> Option<String> {
 }
 
 /// What `read_back.py` prints of a file: every number as its bits.
-fn described(points: &[Vector], cells: &[(u8, Vec<u32>)], arrays: &[(&str, &str, usize, Vec<f64>)]) -> String {
+pub(super) fn described(
+    points: &[Vector],
+    cells: &[(u8, Vec<u32>)],
+    arrays: &[(&str, &str, usize, Vec<f64>)],
+) -> String {
     use std::fmt::Write;
     let bits =
         |values: &[f64]| values.iter().fold(String::new(), |text, value| text + &format!(" {:016x}", value.to_bits()));
@@ -183,9 +220,10 @@ fn vtk_reads_what_is_written() {
                         ("cell", "features", 1, permuted(tags, 1)),
                         ("cell", "p", 1, permuted(pressure.values, 1)),
                         ("cell", "stress", 9, permuted(stress.values, 9)),
-                        ("field", "feature_numbers", 1, vec![0.0, 1.0]),
+                        ("field", "even", 1, vec![0.0, 2.0]),
+                        ("field", "odd", 1, vec![1.0, 2.0]),
                     ],
-                ) + "text \"feature_names\" [\"even\", \"odd\"]\n";
+                );
                 assert_eq!(read, expected, "dimension {dimension}, polygonal {polygonal}, {compression:?}");
             }
         }

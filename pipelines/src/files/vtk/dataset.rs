@@ -8,7 +8,8 @@ use super::super::MeshFile;
 use super::super::assemble::Parts;
 use super::super::error::{Flaw, Problem};
 use super::array::{Array, Numbers};
-use super::{FEATURE_NAMES, FEATURE_NUMBERS, FEATURES};
+use super::names::decoded;
+use super::{FACE_DIMENSION, FEATURE_NAMES, FEATURE_NUMBERS, FEATURES};
 use crate::extract::{Association, Field};
 
 /// Bits of `vtkGhostType` on cells: a copy of another rank's, or not to be shown.
@@ -108,7 +109,9 @@ impl Dataset {
     }
 
     fn feature_names(&mut self) -> Result<BTreeMap<i64, String>, Problem> {
-        let Some(names) = take(&mut self.field_arrays, FEATURE_NAMES) else { return Ok(BTreeMap::new()) };
+        let Some(names) = take(&mut self.field_arrays, FEATURE_NAMES) else {
+            return Ok(self.field_arrays.iter().flat_map(named_features).collect());
+        };
         let Numbers::Text(names) = names.numbers else {
             return Err(Problem::unexpected(b"numbers", format!("text in array '{FEATURE_NAMES}'")));
         };
@@ -160,6 +163,16 @@ fn append_arrays(first: &mut Vec<Array>, second: Vec<Array>, notes: &mut Vec<Str
         }
         true
     });
+}
+
+/// The features that a field-data array names by its own name: pairs of a number and the dimension of faces.
+fn named_features(array: &Array) -> impl Iterator<Item = (i64, String)> {
+    let (pairs, rest) = match &array.numbers {
+        Numbers::Integer(numbers) => numbers.as_chunks::<2>(),
+        Numbers::Float(_) | Numbers::Text(_) => (&[][..], &[][..]),
+    };
+    let all = rest.is_empty() && pairs.iter().all(|&[_, dimension]| dimension == FACE_DIMENSION);
+    pairs.iter().filter(move |_| all).map(|&[number, _]| (number, decoded(&array.name)))
 }
 
 fn take(arrays: &mut Vec<Array>, name: &str) -> Option<Array> {

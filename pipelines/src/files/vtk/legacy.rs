@@ -7,6 +7,7 @@ use super::super::error::{Flaw, Problem};
 use super::super::scanner::Scanner;
 use super::array::{Array, Numbers, Scalar};
 use super::dataset::{Dataset, points, push_cell, push_polyhedron, row};
+use super::names::decoded;
 use super::xml::Kind;
 
 /// Reads a .vtk file.
@@ -308,24 +309,4 @@ impl Legacy<'_> {
             Owner::Cells(_) => self.dataset.cell_arrays.push(array),
         }
     }
-}
-
-/// Names are written with spaces and other special characters as % and two hexadecimal digits.
-fn decoded(name: &str) -> String {
-    let mut bytes = Vec::with_capacity(name.len());
-    let mut rest = name.as_bytes();
-    while let Some((&byte, tail)) = rest.split_first() {
-        let code = tail.get(..2).filter(|_| byte == b'%').and_then(|code| std::str::from_utf8(code).ok());
-        match code.and_then(|code| u8::from_str_radix(code, 16).ok()) {
-            Some(code) => {
-                bytes.push(code);
-                rest = tail.get(2..).unwrap_or(&[]);
-            }
-            None => {
-                bytes.push(byte);
-                rest = tail;
-            }
-        }
-    }
-    String::from_utf8_lossy(&bytes).into_owned()
 }

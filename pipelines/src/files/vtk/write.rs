@@ -1,8 +1,8 @@
 //! Writes .vtu and .vtp: appended raw data, little endian, 64-bit headers, every number as it is.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
 use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
 use std::io::Write as _;
 
@@ -10,7 +10,8 @@ use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, Number, TaggedF
 
 use super::super::assemble::{owners_of_faces, sorted};
 use super::super::error::Problem;
-use super::{FEATURE_NAMES, FEATURE_NUMBERS, FEATURES};
+use super::names::encoded;
+use super::{FACE_DIMENSION, FEATURES};
 use crate::extract::{Association, Extract, Field};
 
 /// How arrays are compressed in the file.
@@ -136,6 +137,17 @@ fn check_length(name: &str, found: usize, expected: usize) -> Result<(), Problem
     Err(Problem::Count { what, found: found as u64, expected: expected as u64 })
 }
 
+/// Refuses cells that polygonal data cannot hold.
+pub(in super::super) fn check_polygonal(cells: &Cells) -> Result<(), Problem> {
+    if cells.dimension() <= 2 {
+        return Ok(());
+    }
+    Err(Problem::Unsupported {
+        what: "a volume cell in polygonal data (.vtp)".into(),
+        instead: "write it as .vtu, or take its surface",
+    })
+}
+
 enum Values<'a> {
     /// Values of a field, which are written as numbers of this type.
     Numbers(Cow<'a, [f64]>, Number),
@@ -192,11 +204,8 @@ impl<'a> Grid<'a> {
     }
 
     fn write(mut self, polygonal: bool, compression: Compression) -> Result<Vec<u8>, Problem> {
-        if polygonal && self.cells.dimension() > 2 {
-            return Err(Problem::Unsupported {
-                what: "a volume cell in polygonal data (.vtp)".into(),
-                instead: "write it as .vtu, or take its surface",
-            });
+        if polygonal {
+            check_polygonal(&self.cells)?;
         }
         let mut file = File { text: String::new(), appended: Vec::new(), compression };
         let kind = if polygonal { "PolyData" } else { "UnstructuredGrid" };
@@ -234,35 +243,30 @@ impl<'a> Grid<'a> {
     }
 
     fn write_field_data(&self, file: &mut File) -> Result<(), Problem> {
-        if self.names.is_empty() && self.field_arrays.is_empty() {
+        let names = self.names_by_text();
+        if names.is_empty() && self.field_arrays.is_empty() {
             return Ok(());
         }
         file.line(format_args!("<FieldData>"));
         for array in &self.field_arrays {
             file.array(array, Some(array.tuples()))?;
         }
-        if !self.names.is_empty() {
-            self.write_names(file)?;
+        for (name, numbers) in names {
+            let count = numbers.len();
+            file.array(&Array { name: &name, components: 1, values: Values::Integers(numbers) }, Some(count))?;
         }
         file.line(format_args!("</FieldData>"));
         Ok(())
     }
 
-    fn write_names(&self, file: &mut File) -> Result<(), Problem> {
-        let mut codes = String::new();
-        for (_, name) in &self.names {
-            for byte in name.bytes().filter(|&byte| byte != 0).chain([0]) {
-                let _ = write!(codes, "{byte} ");
-            }
+    /// For each name an array that is called so, of the feature's number and the dimension of its faces: what meshio takes for the
+    /// name of a physical group. An array of text would be refused there.
+    fn names_by_text(&self) -> BTreeMap<String, Vec<i64>> {
+        let mut numbers: BTreeMap<String, Vec<i64>> = BTreeMap::new();
+        for (number, name) in self.names.iter().filter(|(_, name)| !name.is_empty()) {
+            numbers.entry(encoded(name)).or_default().extend([*number, FACE_DIMENSION]);
         }
-        let count = self.names.len();
-        file.line(format_args!(
-            "<Array type=\"String\" Name=\"{FEATURE_NAMES}\" NumberOfTuples=\"{count}\" format=\"ascii\">"
-        ));
-        file.line(format_args!("{}", codes.trim_end()));
-        file.line(format_args!("</Array>"));
-        let numbers = self.names.iter().map(|(number, _)| *number).collect();
-        file.array(&Array { name: FEATURE_NUMBERS, components: 1, values: Values::Integers(numbers) }, Some(count))
+        numbers
     }
 }
 
@@ -398,7 +402,7 @@ pub(super) fn number_name(number: Number) -> &'static str {
     clippy::cast_sign_loss,
     reason = "the values are of the type that they are cast to"
 )]
-fn encoded(values: &[f64], number: Number) -> Vec<u8> {
+fn number_bytes(values: &[f64], number: Number) -> Vec<u8> {
     fn all<const N: usize>(values: &[f64], bytes: impl Fn(f64) -> [u8; N]) -> Vec<u8> {
         values.iter().flat_map(|&value| bytes(value)).collect()
     }
@@ -419,7 +423,8 @@ fn encoded(values: &[f64], number: Number) -> Vec<u8> {
 /// A file in the making: its elements, and the data that follow them.
 struct File {
     text: String,
-    appended: Vec<u8>,
+    /// The data of each array, with where in the text its offset goes.
+    appended: Vec<(usize, Vec<u8>)>,
     compression: Compression,
 }
 
@@ -439,51 +444,65 @@ impl File {
 
     fn array(&mut self, array: &Array, tuples: Option<usize>) -> Result<(), Problem> {
         let (kind, bytes): (_, Vec<u8>) = match &array.values {
-            Values::Numbers(values, number) => (number_name(*number), encoded(values, *number)),
+            Values::Numbers(values, number) => (number_name(*number), number_bytes(values, *number)),
             Values::Integers(values) => ("Int64", values.iter().flat_map(|value| value.to_le_bytes()).collect()),
             Values::Bytes(values) => ("UInt8", values.clone()),
         };
         // Control characters have no place in XML.
         let name: String = array.name.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect();
         let name = quick_xml::escape::escape(&name);
-        let components = array.components;
+        // One component goes without saying: meshio makes columns of arrays that say it.
+        let components = match array.components {
+            1 => String::new(),
+            count => format!(" NumberOfComponents=\"{count}\""),
+        };
         let tuples = tuples.map_or(String::new(), |count| format!(" NumberOfTuples=\"{count}\""));
-        let offset = self.appended.len();
-        self.line(format_args!(
-            "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\"{tuples} format=\"appended\" \
-             offset=\"{offset}\"/>"
-        ));
-        match self.compression {
-            Compression::None => {
-                self.appended.extend((bytes.len() as u64).to_le_bytes());
-                self.appended.extend(bytes);
-                Ok(())
-            }
-            Compression::Zlib => self.append_compressed(&bytes),
-        }
-    }
-
-    fn append_compressed(&mut self, bytes: &[u8]) -> Result<(), Problem> {
-        const BLOCK: usize = 1 << 20;
-        let mut packed = Vec::new();
-        let mut header = vec![bytes.len().div_ceil(BLOCK) as u64, BLOCK as u64, (bytes.len() % BLOCK) as u64];
-        for block in bytes.chunks(BLOCK) {
-            let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
-            encoder.write_all(block)?;
-            let block = encoder.finish()?;
-            header.push(block.len() as u64);
-            packed.extend(block);
-        }
-        self.appended.extend(header.iter().flat_map(|number| number.to_le_bytes()));
-        self.appended.extend(packed);
+        let _ = write!(
+            self.text,
+            "<DataArray type=\"{kind}\" Name=\"{name}\"{components}{tuples} format=\"appended\" offset=\""
+        );
+        let data = match self.compression {
+            Compression::None => [&(bytes.len() as u64).to_le_bytes()[..], &bytes].concat(),
+            Compression::Zlib => compressed(&bytes)?,
+        };
+        self.appended.push((self.text.len(), data));
+        self.line(format_args!("\"/>"));
         Ok(())
     }
 
-    fn finish(mut self) -> Vec<u8> {
-        self.text.push_str("<AppendedData encoding=\"raw\">\n_");
-        let mut bytes = self.text.into_bytes();
-        bytes.extend(self.appended);
+    /// The data stand in the opposite order of the elements: meshio renumbers the offsets one by one, and would take an array that it has
+    /// renumbered for a later one.
+    fn finish(self) -> Vec<u8> {
+        let mut offset = self.appended.iter().map(|(_, data)| data.len()).sum::<usize>();
+        let mut bytes = Vec::with_capacity(self.text.len() + offset + 32 * self.appended.len());
+        let mut written = 0;
+        for (place, data) in &self.appended {
+            offset -= data.len();
+            bytes.extend(self.text.as_bytes().get(written..*place).unwrap_or(&[]));
+            bytes.extend(offset.to_string().as_bytes());
+            written = *place;
+        }
+        bytes.extend(self.text.as_bytes().get(written..).unwrap_or(&[]));
+        bytes.extend(b"<AppendedData encoding=\"raw\">\n_");
+        self.appended.iter().rev().for_each(|(_, data)| bytes.extend(data));
         bytes.extend(b"\n</AppendedData>\n</VTKFile>\n");
         bytes
     }
+}
+
+/// The blocks of an array by zlib, behind the counts that say where each ends.
+fn compressed(bytes: &[u8]) -> Result<Vec<u8>, Problem> {
+    const BLOCK: usize = 1 << 20;
+    let mut packed = Vec::new();
+    let mut header = vec![bytes.len().div_ceil(BLOCK) as u64, BLOCK as u64, (bytes.len() % BLOCK) as u64];
+    for block in bytes.chunks(BLOCK) {
+        let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+        encoder.write_all(block)?;
+        let block = encoder.finish()?;
+        header.push(block.len() as u64);
+        packed.extend(block);
+    }
+    let mut data: Vec<u8> = header.iter().flat_map(|number| number.to_le_bytes()).collect();
+    data.extend(packed);
+    Ok(data)
 }
