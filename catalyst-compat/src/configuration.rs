@@ -407,7 +407,7 @@ mod tests {
             "the second file's steering holds"
         );
         assert_eq!(config.journal.as_deref(), Some("a.jsonl"));
-        assert!(config.stream.is_some_and(|stream| stream.listen.port() == 0));
+        assert!(config.stream.as_ref().is_some_and(|stream| stream.listen.port() == 0));
         assert_eq!(
             found.notes,
             [
