@@ -71,8 +71,8 @@ static void across(conduit_node* channels)
   conduit_node_set_path_int32(mesh, "state/level", rank);
   const float held[1] = { 0.5f };
   conduit_node_set_path_float32_ptr(mesh, "state/fields/held", (float*)held, 1);
-  uint8_t levels[8];
-  for (int cell = 0; cell < 8; ++cell) levels[cell] = (uint8_t)rank;
+  conduit_uint8 levels[8];
+  for (int cell = 0; cell < 8; ++cell) levels[cell] = (conduit_uint8)rank;
   conduit_node_set_path_char8_str(mesh, "fields/level/association", "element");
   conduit_node_set_path_char8_str(mesh, "fields/level/topology", "mesh");
   conduit_node_set_path_uint8_ptr(mesh, "fields/level/values", levels, rank ? 8 : 2);

@@ -145,7 +145,7 @@ impl Kept {
         let of_mesh: Vec<&Field<'_>> = of_mesh.collect();
         self.fields.resize_with(of_blocks.len() + of_mesh.len(), Copied::default);
         let mut copies = self.fields.iter_mut();
-        for (copied, first) in copies.by_ref().zip(of_blocks) {
+        for (first, copied) in of_blocks.into_iter().zip(copies.by_ref()) {
             copied.begin(first);
             for block in &channel.blocks {
                 let entities = match first.association {
@@ -171,7 +171,7 @@ impl Kept {
                 }
             }
         }
-        for (copied, field) in copies.zip(of_mesh) {
+        for (field, copied) in of_mesh.into_iter().zip(copies) {
             copied.begin(field);
             (0..field.components.first().map_or(0, Array::len)).for_each(|tuple| copied.append(field, tuple));
         }
