@@ -16,7 +16,7 @@ use description::features;
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Value, json};
 use tombolo_deform::{
-    mesh::Mesh,
+    mesh::{Cells, Mesh},
     surface::{FeatureSettings, Surface},
 };
 use tombolo_pipelines::{
@@ -452,9 +452,12 @@ impl Adaptor {
             };
             let taken = if self.communicator.size() > 1 {
                 let part = comm::agree_on(&*self.communicator, Part::of(&channel.mesh).map_err(of_channel))?;
+                self.tell_handedness(&part.cells);
                 self.take_over_part(&part)
             } else {
-                self.take_over(channel.mesh.to_mesh().map_err(of_channel)?)
+                let mesh = channel.mesh.to_mesh().map_err(of_channel)?;
+                self.tell_handedness(mesh.cells());
+                self.take_over(mesh)
             };
             match taken {
                 Ok(steerer) => {
@@ -491,6 +494,15 @@ impl Adaptor {
         self.describe();
         self.tell_conditions();
         Ok(())
+    }
+
+    /// Says in the log which types of cells any rank has left-handed. Collective.
+    fn tell_handedness(&self, cells: &Cells) {
+        let note = cells.handedness_note().unwrap_or_default();
+        let notes = self.communicator.gather(0, note.as_bytes()).unwrap_or_default();
+        if let Some(note) = notes.iter().find(|note| !note.is_empty()) {
+            eprintln!("tombolo: {}", String::from_utf8_lossy(note));
+        }
     }
 
     fn take_over(&self, mesh: Mesh) -> Result<Steerer, String> {

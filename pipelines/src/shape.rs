@@ -473,13 +473,7 @@ fn displaced(editor: Option<&mut Editor>, stack: &[Edit]) -> Result<Vec<Vector>,
 fn own_mesh(part: &Part) -> Result<(Mesh, Vec<usize>), tombolo_deform::mesh::MeshError> {
     let is_own = |cell: &usize| !part.is_ghost(*cell) && part.cells.cell_type(*cell).dimension() == 3;
     let own: Vec<usize> = (0..part.cells.len()).filter(is_own).collect();
-    let mut cells = Cells::new();
-    for &cell in &own {
-        match part.cells.polyhedron_faces(cell) {
-            [] => cells.push(part.cells.cell_type(cell), part.cells.vertices(cell))?,
-            faces => cells.push_polyhedron(faces)?,
-        }
-    }
+    let cells = part.cells.subset(own.iter().copied());
     Ok((Mesh::new(part.points.clone(), cells, FeatureSource::SharpEdges)?, own))
 }
 

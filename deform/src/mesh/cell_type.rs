@@ -31,7 +31,7 @@ pub enum CellType {
     Voxel = 11,
     /// Eight vertices: the bottom quadrilateral, then the top.
     Hexahedron = 12,
-    /// Six vertices: one triangle, then the other.
+    /// Six vertices: one triangle, then the other, at which the normal of the first points.
     Wedge = 13,
     /// Five vertices: the quadrilateral base, then the apex.
     Pyramid = 14,
@@ -122,8 +122,9 @@ impl CellType {
             CellType::Hexahedron => {
                 &[&[0, 4, 7, 3], &[1, 2, 6, 5], &[0, 1, 5, 4], &[3, 7, 6, 2], &[0, 3, 2, 1], &[4, 5, 6, 7]]
             }
-            // VTK orders a wedge so that its first triangle's normal points out of the cell.
-            CellType::Wedge => &[&[0, 1, 2], &[3, 5, 4], &[0, 3, 4, 1], &[1, 4, 5, 2], &[2, 5, 3, 0]],
+            // VTK's manual has wedges whose first triangle's normal points out of the cell, its measures and most mesh generators
+            // those whose first triangle's normal points in: a mesh turns the ones to be the others.
+            CellType::Wedge => &[&[0, 2, 1], &[3, 4, 5], &[0, 1, 4, 3], &[1, 2, 5, 4], &[2, 0, 3, 5]],
             CellType::Pyramid => &[&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]],
             CellType::PentagonalPrism => &[
                 &[0, 4, 3, 2, 1],

@@ -1,17 +1,39 @@
 //! Cells of any linear type, owned.
 
-use super::{CellType, MeshError};
+use std::borrow::Cow;
+
+use super::handedness::{Types, hands, mirror};
+use super::other_order::other_order;
+use super::{CellType, MeshError, Vector};
 
 /// Cells of any mix of linear types, as compressed rows of vertex numbers.
 ///
 /// A polyhedron's row lists its distinct vertices; its faces are kept beside it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+///
+/// The cells of a [`Mesh`](super::Mesh) are right-handed: types that were given left-handed, as in a mirrored mesh, are turned
+/// where the mesh is made. [`Cells::as_given`] has them as they came.
+#[derive(Debug, Clone)]
 pub struct Cells {
     types: Vec<CellType>,
     offsets: Vec<usize>,
     connectivity: Vec<u32>,
     polyhedra: Vec<PolyhedronFaces>,
+    /// The types whose cells were turned; `None` before any points have told.
+    turned: Option<Types>,
 }
+
+impl PartialEq for Cells {
+    fn eq(&self, other: &Self) -> bool {
+        let types = |cells: &Self| cells.turned.unwrap_or_default();
+        self.types == other.types
+            && self.offsets == other.offsets
+            && self.connectivity == other.connectivity
+            && self.polyhedra == other.polyhedra
+            && types(self) == types(other)
+    }
+}
+
+impl Eq for Cells {}
 
 /// The faces of one polyhedral cell.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -31,7 +53,7 @@ impl Cells {
     /// No cells.
     #[must_use]
     pub fn new() -> Self {
-        Self { types: Vec::new(), offsets: vec![0], connectivity: Vec::new(), polyhedra: Vec::new() }
+        Self { types: Vec::new(), offsets: vec![0], connectivity: Vec::new(), polyhedra: Vec::new(), turned: None }
     }
 
     /// Cells that are all of one type with a fixed number of vertices.
@@ -58,6 +80,7 @@ impl Cells {
             offsets: (0..=count).map(|cell| cell * size).collect(),
             connectivity,
             polyhedra: Vec::new(),
+            turned: None,
         })
     }
 
@@ -139,7 +162,8 @@ impl Cells {
         &self.types
     }
 
-    /// The vertices of a cell, in VTK's order.
+    /// The vertices of a cell, in VTK's order. The normal of a wedge's first triangle points at the second in a mesh, which is
+    /// one of the two orders that VTK's programs and pages have.
     ///
     /// # Panics
     /// Where `cell` is not below [`Cells::len`].
@@ -212,6 +236,7 @@ impl Cells {
             offsets: Vec::with_capacity(order.len() + 1),
             connectivity: Vec::with_capacity(self.connectivity.len()),
             polyhedra: Vec::new(),
+            turned: self.turned,
         };
         cells.offsets.push(0);
         let renumbered = |vertices: &[u32]| vertices.iter().map(|&vertex| number[vertex as usize]).collect();
@@ -226,6 +251,133 @@ impl Cells {
             }
         }
         cells
+    }
+
+    /// The cells with the numbers `cells`, in that order, turned as these are.
+    ///
+    /// # Panics
+    /// Where a number is not below [`Cells::len`].
+    #[must_use]
+    pub fn subset(&self, cells: impl IntoIterator<Item = usize>) -> Self {
+        let mut subset = Self { turned: self.turned, ..Self::new() };
+        for cell in cells {
+            if self.types[cell] == CellType::Polyhedron {
+                let faces = self.polyhedron_faces(cell).to_vec();
+                subset.polyhedra.push(PolyhedronFaces { cell: subset.len(), faces });
+            }
+            subset.types.push(self.types[cell]);
+            subset.connectivity.extend_from_slice(self.vertices(cell));
+            subset.offsets.push(subset.connectivity.len());
+        }
+        subset
+    }
+
+    /// The same cells with the number `numbers[vertex]` for each vertex.
+    ///
+    /// # Panics
+    /// Where a cell names a vertex beyond `numbers`.
+    #[must_use]
+    pub fn with_vertices(&self, numbers: &[u32]) -> Self {
+        let mut cells = self.clone();
+        let all = cells.polyhedra.iter_mut().flat_map(|polyhedron| &mut polyhedron.faces).flatten();
+        for vertex in cells.connectivity.iter_mut().chain(all) {
+            *vertex = numbers[*vertex as usize];
+        }
+        cells
+    }
+
+    /// The cells right-handed, as a mesh with these points has them: each type most of whose cells are left-handed is turned.
+    /// Cells that are a mesh's, or were taken from one, stay as they are whatever the points.
+    ///
+    /// # Panics
+    /// Where a cell names a vertex beyond `points`.
+    #[must_use]
+    pub fn right_handed(&self, points: &[Vector]) -> Cow<'_, Self> {
+        if self.turned.is_some() {
+            return Cow::Borrowed(self);
+        }
+        let (turned, _) = hands(self, points);
+        if turned.is_empty() {
+            return Cow::Borrowed(self);
+        }
+        let mut cells = self.clone();
+        cells.turn(turned);
+        cells.turned = Some(turned);
+        Cow::Owned(cells)
+    }
+
+    /// The cells of a mesh, right-handed.
+    ///
+    /// # Errors
+    /// [`MeshError::OtherOrder`].
+    pub(super) fn of_mesh(mut self, points: &[Vector]) -> Result<Self, MeshError> {
+        if self.turned.is_none() {
+            let (turned, neither) = hands(&self, points);
+            if let Some(other) = other_order(&self, points, neither) {
+                return Err(other);
+            }
+            self.turn(turned);
+            self.turned = Some(turned);
+        }
+        Ok(self)
+    }
+
+    /// The cells with their vertices in the order in which they were given, before a mesh turned those that were left-handed.
+    #[must_use]
+    pub fn as_given(&self) -> Cow<'_, Self> {
+        match self.turned {
+            Some(turned) if !turned.is_empty() => {
+                let mut cells = self.clone();
+                cells.turn(turned);
+                cells.turned = None;
+                Cow::Owned(cells)
+            }
+            _ => Cow::Borrowed(self),
+        }
+    }
+
+    /// What a person should know of the order in which the vertices were given: which types of cells were left-handed. Wedges are
+    /// not told of, which have no agreed order.
+    #[must_use]
+    pub fn handedness_note(&self) -> Option<String> {
+        let turned = self.turned.unwrap_or_default();
+        let types: Vec<&str> = CellType::ALL
+            .into_iter()
+            .filter(|&cell_type| cell_type != CellType::Wedge && turned.contains(cell_type))
+            .map(CellType::name)
+            .collect();
+        let types = match &types[..] {
+            [] => return None,
+            [one] => (*one).to_owned(),
+            [first @ .., last] => format!("{} and {last}", first.join(", ")),
+        };
+        Some(format!(
+            "left-handed cells: those of type {types} run the other way round than VTK's; they are read as mirrored, and keep \
+             their own order of vertices wherever they are written"
+        ))
+    }
+
+    /// Mirrors the order of vertices of the cells of some types; twice is not at all.
+    fn turn(&mut self, types: Types) {
+        if types.is_empty() {
+            return;
+        }
+        let mut row = Vec::new();
+        for (cell, &cell_type) in self.types.iter().enumerate() {
+            if types.contains(cell_type) && cell_type != CellType::Polyhedron {
+                let vertices = &mut self.connectivity[self.offsets[cell]..self.offsets[cell + 1]];
+                row.clear();
+                row.extend_from_slice(vertices);
+                for (vertex, &from) in vertices.iter_mut().zip(mirror(cell_type)) {
+                    *vertex = row[from];
+                }
+            }
+        }
+        if types.contains(CellType::Polyhedron) {
+            for face in self.polyhedra.iter_mut().flat_map(|polyhedron| &mut polyhedron.faces) {
+                face[1..].reverse();
+            }
+        }
     }
 
     /// Refuses a vertex number at or above `vertex_count`.

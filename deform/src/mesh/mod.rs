@@ -8,7 +8,9 @@ use std::sync::Arc;
 mod cell_type;
 mod cells;
 mod feature;
+mod handedness;
 mod ordered;
+mod other_order;
 mod view;
 mod view_check;
 
@@ -25,7 +27,9 @@ pub type Vector = [f64; 3];
 
 /// An unstructured mesh that owns its arrays.
 ///
-/// Invariants, kept by [`Mesh::new`]: every coordinate is finite, every vertex number is in range.
+/// Invariants, kept by [`Mesh::new`]: every coordinate is finite, every vertex number is in range, and of each type of volume cell
+/// no more are left-handed than right-handed. A mesh whose cells are left-handed throughout, because it was mirrored or its
+/// vertices stand in another order, is read as well: its cells are turned here, once, and [`Cells::as_given`] has them as they came.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
     points: Vec<Vector>,
@@ -39,11 +43,13 @@ impl Mesh {
     ///
     /// # Errors
     /// [`MeshError::NotFinite`] for a NaN or infinite coordinate, [`MeshError::VertexNumber`] for a vertex that does not exist,
-    /// [`MeshError::FeatureCount`] where the feature tags do not match the mesh.
+    /// [`MeshError::FeatureCount`] where the feature tags do not match the mesh, [`MeshError::OtherOrder`] where most cells of a type
+    /// have their vertices in an order that is not VTK's and can be told.
     pub fn new(points: Vec<Vector>, cells: Cells, features: FeatureSource) -> Result<Self, MeshError> {
         check_finite(&points)?;
         cells.validate(points.len())?;
         features.validate(points.len())?;
+        let cells = cells.of_mesh(&points)?;
         Ok(Self { points, cells: Arc::new(cells), features: Arc::new(features) })
     }
 
@@ -53,7 +59,7 @@ impl Mesh {
         &self.points
     }
 
-    /// The cells.
+    /// The cells, right-handed.
     #[must_use]
     pub fn cells(&self) -> &Cells {
         &self.cells
@@ -137,6 +143,25 @@ pub enum MeshError {
         found: CellType,
         /// What is needed.
         expected: &'static str,
+    },
+    /// The vertices of cells stand in another order than VTK's.
+    #[error(
+        "cell {cell} ({cell_type}) at ({:.6}, {:.6}, {:.6}) has its vertices in another order than VTK's, and so have most cells of \
+         its type: VTK's order is {}; this looks like {}: give the vertices {} of each cell, as they are counted now",
+        centroid[0], centroid[1], centroid[2], other_order::of_vtk(*cell_type), name.unwrap_or("that of another program"),
+        other_order::listed(order)
+    )]
+    OtherOrder {
+        /// The first such cell.
+        cell: usize,
+        /// Its type.
+        cell_type: CellType,
+        /// The mean of its vertices.
+        centroid: Vector,
+        /// Which of the vertices, as they stand, should come first, which next.
+        order: Vec<usize>,
+        /// The order that it looks like, where it is a known one.
+        name: Option<&'static str>,
     },
     /// A cell type number that is not a linear VTK cell.
     #[error("cell {cell}: VTK cell type {number} is not a linear cell; the linear ones are 1 to 16 and 42")]

@@ -25,7 +25,7 @@ pub(crate) const PYRAMID_CORNERS: [[usize; 4]; 4] = [[0, 1, 3, 4], [1, 2, 0, 4],
 /// (C. Stimpson et al., *The Verdict geometric quality library*, SAND2007-1751), to rounding. Two things differ: a cell shrunk
 /// to a point or an edge gets 0 here, not Verdict's largest number; and Verdict gives every pyramid turned inside out 0, which
 /// is kept, so look at [`Quality::inverted`](super::Quality::inverted) for those. Verdict takes a wedge to be positive where
-/// the normal of its first triangle points at the second.
+/// the normal of its first triangle points at the second; those of a mesh are, whichever way they were given.
 ///
 /// Types that VTK has no measure for:
 /// - pixels and voxels: the quadrilateral and hexahedron of the same vertices;

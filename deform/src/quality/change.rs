@@ -73,6 +73,7 @@ pub fn change(cells: &Cells, reference: &[Vector], points: &[Vector]) -> Change 
 /// As [`change`].
 #[must_use]
 pub fn change_in_parts(cells: &Cells, reference: &[Vector], points: &[Vector], partition: &dyn Partition) -> Change {
+    let cells = &*cells.right_handed(reference);
     let (before, after) = (volumes(cells, reference), volumes(cells, points));
     let ratios: Vec<f64> = before.iter().zip(after).map(|(&a, b)| if a == 0.0 { f64::NAN } else { b / a }).collect();
     Change {
@@ -85,13 +86,15 @@ pub fn change_in_parts(cells: &Cells, reference: &[Vector], points: &[Vector], p
 ///
 /// A face of more than three vertices is taken as the triangles that its edges make with the mean of its vertices: exact where it
 /// is flat, and for hexahedra the volume of the trilinear cell. So cells that share a face agree on it, and the volumes of
-/// neighbours add up. Cells turned inside out have a negative volume.
+/// neighbours add up. Cells turned inside out have a negative volume; cells that are no mesh's yet are taken as
+/// [`Cells::right_handed`] has them.
 ///
 /// # Panics
 /// Where a cell names a vertex beyond `points`.
 #[must_use]
 pub fn volumes(cells: &Cells, points: &[Vector]) -> Vec<f64> {
-    let measure = Measure::new(cells, points);
+    let cells = &*cells.right_handed(points);
+    let measure = Measure::new(cells);
     let mut values = vec![f64::NAN; cells.len()];
     parallel::for_each_chunk(&mut values, CHUNK, |chunk, part| {
         let mut scratch = Scratch::default();
@@ -127,13 +130,7 @@ fn volume(measure: &Measure<'_>, cell: usize, points: &[Vector], scratch: &mut S
             sum += dot(subtract(middle, centre), cross(a, b));
         }
     });
-    outwards(measure, cell) * sum / 6.0
-}
-
-/// 1 where the faces of a cell look outwards, -1 where they look inwards: those of a wedge look outwards where it is ordered
-/// against its corners.
-fn outwards(measure: &Measure<'_>, cell: usize) -> f64 {
-    if measure.cells.cell_type(cell) == CellType::Wedge { -measure.sign(cell) } else { 1.0 }
+    sum / 6.0
 }
 
 /// The volume that a face sweeps while its vertices go straight from `start` to `end`, positive where it moves along its normal
@@ -224,13 +221,12 @@ mod tests {
                     }).collect()
                 };
                 let (start, end) = (shift(0), shift(36));
-                let sign = outwards(&Measure::new(mesh.cells(), &start), 0);
                 let mut swept = 0.0;
                 mesh.cells().for_each_face(0, |face| {
                     let at = |points: &[Vector]| face.iter().map(|&vertex| points[vertex as usize]).collect::<Vec<_>>();
-                    swept += sign * swept_volume(&at(&start), &at(&end));
+                    swept += swept_volume(&at(&start), &at(&end));
                 });
-                let before = Measure::new(mesh.cells(), &start);
+                let before = Measure::new(mesh.cells());
                 let mut scratch = Scratch::default();
                 let grown = volume(&before, 0, &end, &mut scratch) - volume(&before, 0, &start, &mut scratch);
                 prop_assert!((swept - grown).abs() < 1e-13 * (1.0 + grown.abs()), "{cell_type}: {swept} {grown}");

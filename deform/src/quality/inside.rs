@@ -17,8 +17,8 @@ const CUTS: usize = 3;
 type Edge = [Vector; 2];
 
 /// The least Bernstein coefficient that is not positive on the way of a cell from `start` to `start + until (end - start)`,
-/// after the cuts; [`Least::NONE`] where there is none. `sign` is -1 for a wedge ordered the other way.
-pub(super) fn least_inside(cell_type: CellType, start: &[Vector], end: &[Vector], sign: f64, until: f64) -> Least {
+/// after the cuts; [`Least::NONE`] where there is none.
+pub(super) fn least_inside(cell_type: CellType, start: &[Vector], end: &[Vector], until: f64) -> Least {
     let edge = |from: usize, to: usize| -> Edge { [subtract(start[to], start[from]), subtract(end[to], end[from])] };
     match cell_type {
         CellType::Hexahedron => hexahedron(edge, |local| local, until),
@@ -30,7 +30,7 @@ pub(super) fn least_inside(cell_type: CellType, start: &[Vector], end: &[Vector]
                 let mut coefficients = [[0.0; 4]; 3];
                 for (k, u) in first.into_iter().enumerate() {
                     for (l, v) in second.into_iter().enumerate() {
-                        accumulate(&mut coefficients[k + l], u, v, height, sign / weight(k + l));
+                        accumulate(&mut coefficients[k + l], u, v, height, 1.0 / weight(k + l));
                     }
                 }
                 least(&coefficients, 1, until, CUTS)
@@ -45,7 +45,7 @@ pub(super) fn least_inside(cell_type: CellType, start: &[Vector], end: &[Vector]
                     for p in 0..2 {
                         for q in 0..2 {
                             let (i, j) = (r + p, s + q);
-                            let factor = sign / (weight(i) * weight(j));
+                            let factor = 1.0 / (weight(i) * weight(j));
                             accumulate(&mut coefficients[i + 3 * j], u, v, edge(base(p, q), 4), factor);
                         }
                     }
@@ -181,7 +181,7 @@ mod tests {
         fn hexahedra_are_judged_inside(moves in prop::collection::vec(prop::array::uniform3(-0.45..0.45f64), 8)) {
             let points: Vec<Vector> = CUBE.iter().zip(&moves).map(|(&a, &b)| add(a, b)).collect();
             let least = grid().map(|place| at(&points, place)).fold(f64::INFINITY, f64::min);
-            let found = least_inside(CellType::Hexahedron, &points, &points, 1.0, 1.0);
+            let found = least_inside(CellType::Hexahedron, &points, &points, 1.0);
             prop_assert!(!found.positive || least > 0.0, "{least}");
             prop_assert!(found.positive || least < 0.05, "{least} {found:?}");
         }
@@ -190,7 +190,7 @@ mod tests {
         #[test]
         fn ways_are_judged_inside(moves in prop::collection::vec(prop::array::uniform3(-0.9..0.9f64), 8)) {
             let points: Vec<Vector> = CUBE.iter().zip(&moves).map(|(&a, &b)| add(a, b)).collect();
-            let found = least_inside(CellType::Hexahedron, &CUBE, &points, 1.0, 1.0);
+            let found = least_inside(CellType::Hexahedron, &CUBE, &points, 1.0);
             if found.positive {
                 for step in 0..=10 {
                     let t = f64::from(step) / 10.0;
@@ -207,7 +207,7 @@ mod tests {
                     CUBE[..5].to_vec()
                 };
                 let end: Vec<Vector> = start.iter().zip(&moves).map(|(&a, &b)| add(a, b)).collect();
-                if least_inside(cell_type, &start, &end, 1.0, 1.0).positive {
+                if least_inside(cell_type, &start, &end, 1.0).positive {
                     let as_hexahedron: Vec<Vector> = merged.iter().map(|&local| end[local]).collect();
                     let inner = grid().filter(|p| p.iter().all(|&x| x < 0.95));
                     prop_assert!(inner.into_iter().all(|place| at(&as_hexahedron, place) > 0.0), "{cell_type}");
@@ -231,7 +231,7 @@ mod tests {
             let mut tets = Vec::new();
             corner_tets(&cells, 0, |vertex| points[vertex as usize], &mut tets);
             assert!(tets.iter().all(|&tet| tet_determinant(tet) > 0.5));
-            assert!(!least_inside(cell_type, &points, &points, 1.0, 1.0).positive);
+            assert!(!least_inside(cell_type, &points, &points, 1.0).positive);
             assert_eq!(quality(&cells, &points).inverted, 1);
         }
     }

@@ -439,7 +439,7 @@ impl<'a> Path<'a> {
         guard: &Guard,
         partition: &'a dyn Partition,
     ) -> (Self, f64) {
-        let measure = Measure::new(mesh.cells(), mesh.points());
+        let measure = Measure::new(mesh.cells());
         let mut least = [least_scaled_jacobian(&measure, mesh.points())];
         partition.reduce(Reduction::Minimum, &mut least);
         let floor = guard.min_scaled_jacobian.min(least[0]);

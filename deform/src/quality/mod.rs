@@ -73,9 +73,8 @@ pub struct WorstCell {
 
 /// The quality of `cells` at `points` (one for each vertex).
 ///
-/// A cell whose measure is NaN counts as inverted with the value -1. Wedges come in two orders in the wild (the first
-/// triangle's normal pointing out, as VTK's manual has it, or in, as VTK's Verdict and most mesh generators have it): the one
-/// that most of the mesh's wedges are in is taken for theirs.
+/// A cell whose measure is NaN counts as inverted with the value -1. Cells that are no mesh's yet are taken as
+/// [`Cells::right_handed`] has them at these points.
 ///
 /// Cost: one pass over the cells, on all threads; the same bits for any number of them.
 ///
@@ -92,7 +91,8 @@ pub fn quality(cells: &Cells, points: &[Vector]) -> Quality {
 /// As [`quality`].
 #[must_use]
 pub fn quality_in_parts(cells: &Cells, points: &[Vector], partition: &dyn Partition) -> Quality {
-    let measure = Measure::new(cells, points);
+    let cells = &*cells.right_handed(points);
+    let measure = Measure::new(cells);
     let mut parts = parallel::map_chunks(cells.len(), CHUNK, |range| {
         let mut part = Quality::empty();
         let mut scratch = Scratch::default();
@@ -123,20 +123,20 @@ pub fn quality_in_parts(cells: &Cells, points: &[Vector], partition: &dyn Partit
 }
 
 /// The scaled Jacobian of each cell, NaN for those that have none: vertices, lines, cells with a coordinate that is NaN.
-/// Wedges are taken as in [`quality`].
+/// Cells that are no mesh's yet are taken as in [`quality`].
 ///
 /// # Panics
 /// Where a cell names a vertex beyond `points`.
 #[must_use]
 pub fn scaled_jacobians(cells: &Cells, points: &[Vector]) -> Vec<f64> {
-    let wedges = wedge_sign(cells, points);
+    let cells = &*cells.right_handed(points);
     let mut values = vec![f64::NAN; cells.len()];
     parallel::for_each_chunk(&mut values, CHUNK, |chunk, part| {
         let mut scratch = Scratch::default();
         for (index, value) in part.iter_mut().enumerate() {
             let cell = chunk * CHUNK + index;
             if let Some(measured) = scaled_jacobian_of(cells, cell, |vertex| points[vertex as usize], &mut scratch) {
-                *value = if cells.cell_type(cell) == CellType::Wedge { wedges * measured } else { measured };
+                *value = measured;
             }
         }
     });
@@ -150,6 +150,7 @@ pub fn scaled_jacobians(cells: &Cells, points: &[Vector]) -> Vec<f64> {
 /// Where a cell names a vertex beyond `reference` or `points`.
 #[must_use]
 pub fn normalized_scaled_jacobians(cells: &Cells, reference: &[Vector], points: &[Vector]) -> Vec<f64> {
+    let cells = &*cells.right_handed(reference);
     let mut values = scaled_jacobians(cells, points);
     for (value, start) in values.iter_mut().zip(scaled_jacobians(cells, reference)) {
         *value = if start == 0.0 { f64::NAN } else { *value / start };
@@ -238,26 +239,20 @@ impl Quality {
     }
 }
 
-/// Which cells of a mesh are measured, and how its wedges are ordered.
+/// Which cells of a mesh are measured.
 pub(crate) struct Measure<'a> {
     pub(crate) cells: &'a Cells,
     dimension: usize,
-    wedges: f64,
 }
 
 impl<'a> Measure<'a> {
-    /// Wedges are taken to be ordered as most of them are at `points`.
-    pub(crate) fn new(cells: &'a Cells, points: &[Vector]) -> Self {
-        Self { cells, dimension: cells.dimension().max(2), wedges: wedge_sign(cells, points) }
+    /// The cells must be right-handed, as those of a mesh are.
+    pub(crate) fn new(cells: &'a Cells) -> Self {
+        Self { cells, dimension: cells.dimension().max(2) }
     }
 
     pub(crate) fn is_measured(&self, cell: usize) -> bool {
         self.cells.cell_type(cell).dimension() == self.dimension
-    }
-
-    /// -1 for a cell whose vertices are ordered against [`corner_tets`], else 1.
-    pub(crate) fn sign(&self, cell: usize) -> f64 {
-        if self.cells.cell_type(cell) == CellType::Wedge { self.wedges } else { 1.0 }
     }
 
     /// The scaled Jacobian (-1 for NaN) of a cell whose vertices lie `at`, and whether the cell is inverted.
@@ -270,8 +265,7 @@ impl<'a> Measure<'a> {
         if !self.is_measured(cell) {
             return None;
         }
-        let sign = self.sign(cell);
-        let value = sign * scaled_jacobian_of(self.cells, cell, at, scratch)?;
+        let value = scaled_jacobian_of(self.cells, cell, at, scratch)?;
         if !value.is_finite() {
             return Some((-1.0, true));
         }
@@ -282,30 +276,16 @@ impl<'a> Measure<'a> {
             cell_type if cell_type.dimension() == 2 => value > 0.0,
             _ => {
                 corner_tets(self.cells, cell, at, &mut scratch.tets);
-                scratch.tets.iter().all(|&tet| sign * tet_determinant(tet) > 0.0) && {
+                scratch.tets.iter().all(|&tet| tet_determinant(tet) > 0.0) && {
                     let Scratch { points, .. } = scratch;
                     points.clear();
                     points.extend(self.cells.vertices(cell).iter().map(|&vertex| at(vertex)));
-                    least_inside(self.cells.cell_type(cell), points, points, sign, 1.0).positive
+                    least_inside(self.cells.cell_type(cell), points, points, 1.0).positive
                 }
             }
         };
         Some((value, !valid))
     }
-}
-
-/// 1 where most wedges' first triangle has its normal pointing at the second, else -1.
-fn wedge_sign(cells: &Cells, points: &[Vector]) -> f64 {
-    let mut balance = 0i64;
-    let mut tets = Vec::new();
-    for cell in 0..cells.len() {
-        if cells.cell_type(cell) == CellType::Wedge {
-            corner_tets(cells, cell, |vertex| points[vertex as usize], &mut tets);
-            let sum: f64 = tets.iter().map(|&tet| tet_determinant(tet)).sum();
-            balance += if sum >= 0.0 { 1 } else { -1 };
-        }
-    }
-    if balance < 0 { -1.0 } else { 1.0 }
 }
 
 #[inline]

@@ -107,21 +107,20 @@ pub(super) fn least_on_path(
         gather(end, &mut last.points);
         return least_of_polygon(&first.points, &last.points, until);
     }
-    let sign = measure.sign(cell);
     corner_tets(cells, cell, |vertex| start[vertex as usize], &mut first.tets);
     corner_tets(cells, cell, |vertex| end[vertex as usize], &mut last.tets);
     let corners = first
         .tets
         .iter()
         .zip(&last.tets)
-        .map(|(&start, &end)| least_of_cubic(tet_cubic(start, end).map(|value| sign * value), until))
+        .map(|(&start, &end)| least_of_cubic(tet_cubic(start, end), until))
         .fold(Least::NONE, Least::worse);
     if !corners.positive || !has_inside(cells.cell_type(cell)) {
         return corners;
     }
     gather(start, &mut first.points);
     gather(end, &mut last.points);
-    corners.worse(least_inside(cells.cell_type(cell), &first.points, &last.points, sign, until))
+    corners.worse(least_inside(cells.cell_type(cell), &first.points, &last.points, until))
 }
 
 /// Whether the determinant of a cell can be least elsewhere than at the corners that are looked at.

@@ -4,7 +4,6 @@ use super::extraction::{check_parts, may_run_either_way, turn_alike};
 use super::faces::{self, FaceBuffer, TagLookup, most_frequent};
 use super::{FeatureSettings, Surface, SurfaceError};
 use crate::mesh::{CellType, Cells, FeatureSource, Vector};
-use crate::vector::{cross, dot, subtract};
 
 /// The faces of a part of a mesh that belong to one of its cells only: its boundary, and where it was cut off from other parts.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -55,6 +54,7 @@ impl BoundaryFaces {
         ghosts: Option<&[bool]>,
     ) -> Result<Self, SurfaceError> {
         cells.validate(points.len())?;
+        let cells = &*cells.right_handed(points);
         let found = faces::boundary_faces(cells, points.len(), dimension, ghosts)?;
         let mut boundary = Self {
             faces: Cells::new(),
@@ -63,11 +63,9 @@ impl BoundaryFaces {
             may_run_either_way: may_run_either_way(dimension, cells),
         };
         let mut buffer = FaceBuffer::default();
-        let mut reversed = Vec::new();
         for same_cell in found.chunk_by(|a, b| a.cell == b.cell) {
             let cell = same_cell[0].cell;
             let mut wanted = same_cell.iter().peekable();
-            let inside_first = is_right_handed_wedge(points, cells, cell as usize);
             buffer.for_each(cells, cell as usize, dimension, |place, vertices| {
                 if wanted.next_if(|face| face.face == place).is_none() {
                     return;
@@ -77,12 +75,6 @@ impl BoundaryFaces {
                     4 => CellType::Quad,
                     _ => CellType::Polygon,
                 };
-                let mut vertices = vertices;
-                if inside_first {
-                    reversed.clear();
-                    reversed.extend(vertices.iter().rev());
-                    vertices = &reversed;
-                }
                 // A face has three vertices at least, so that it is always taken.
                 if boundary.faces.push(cell_type, vertices).is_ok() {
                     boundary.cells.push(cell);
@@ -148,16 +140,4 @@ impl Surface {
         }
         Ok(Self::put_together(points, vertices, faces, owner_cells, tags, settings))
     }
-}
-
-/// Whether a cell is a wedge whose first triangle faces its second, as mesh generators number it, and not outwards, as VTK's
-/// manual has it: its faces then come out inside first.
-fn is_right_handed_wedge(points: &[Vector], cells: &Cells, cell: usize) -> bool {
-    if cells.cell_type(cell) != CellType::Wedge {
-        return false;
-    }
-    let point = |place: usize| points[cells.vertices(cell)[place] as usize];
-    let normal = cross(subtract(point(1), point(0)), subtract(point(2), point(0)));
-    let along: f64 = (0..3).map(|place| dot(normal, subtract(point(place + 3), point(place)))).sum();
-    along > 0.0
 }

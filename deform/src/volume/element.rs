@@ -1,7 +1,7 @@
 //! Gradients of the shape functions of volume cells at points of quadrature.
 
 use crate::mesh::{CellType, Mesh, Vector};
-use crate::quality::{Measure, corner_tets, tet_determinant};
+use crate::quality::{corner_tets, tet_determinant};
 use crate::vector::{add, cross, dot, mean, scale, subtract};
 
 /// Derivatives of the shape functions of one cell type, in its own coordinates, at the points of a quadrature rule.
@@ -17,7 +17,6 @@ type Rule = Vec<(f64, Vec<Vector>)>;
 ///   shared faces, linear fields are represented exactly).
 pub(super) struct Elements<'a> {
     mesh: &'a Mesh,
-    measure: Measure<'a>,
     hexahedron: Rule,
     voxel: Rule,
     wedge: Rule,
@@ -40,8 +39,7 @@ impl<'a> Elements<'a> {
                 (*weight, [0, 1, 3, 2, 4, 5, 7, 6].map(|local: usize| derivatives[local]).to_vec())
             })
             .collect();
-        let measure = Measure::new(mesh.cells(), mesh.points());
-        Self { mesh, measure, hexahedron, voxel, wedge: wedge_rule(), pyramid: pyramid_rule() }
+        Self { mesh, hexahedron, voxel, wedge: wedge_rule(), pyramid: pyramid_rule() }
     }
 
     /// The volume of a cell; `None` where it, or the determinant at a corner or point of quadrature, is not positive.
@@ -53,9 +51,8 @@ impl<'a> Elements<'a> {
         });
         if self.mesh.cells().cell_type(cell) != CellType::Tetra {
             let points = self.mesh.points();
-            let sign = self.measure.sign(cell);
             corner_tets(self.mesh.cells(), cell, |vertex| points[vertex as usize], &mut scratch.tets);
-            valid &= scratch.tets.iter().all(|&tet| sign * tet_determinant(tet) > 0.0);
+            valid &= scratch.tets.iter().all(|&tet| tet_determinant(tet) > 0.0);
         }
         (valid && volume.is_finite()).then_some(volume)
     }
@@ -81,7 +78,6 @@ impl<'a> Elements<'a> {
             CellType::Pyramid => &self.pyramid,
             _ => return self.for_each_part(cell, &mut scratch.gradients, visit),
         };
-        let sign = self.measure.sign(cell);
         for (weight, derivatives) in rule {
             // The columns of the Jacobian.
             let mut jacobian = [[0.0; 3]; 3];
@@ -101,7 +97,7 @@ impl<'a> Elements<'a> {
                 );
                 scale(sum, 1.0 / determinant)
             }));
-            visit(sign * weight * determinant, &scratch.gradients);
+            visit(weight * determinant, &scratch.gradients);
         }
     }
 

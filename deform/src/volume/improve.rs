@@ -8,7 +8,7 @@ use crate::mesh::{CellType, Mesh, Numbering, Ordered, Vector};
 use crate::parallel;
 use crate::partition::{Partition, Reduction, Shares, all, most, whole};
 use crate::quality::{
-    HEXAHEDRON_CORNERS, Measure, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, scaled_jacobians, tet_determinant,
+    HEXAHEDRON_CORNERS, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, scaled_jacobians, tet_determinant,
 };
 use crate::vector::{add, dot, scale};
 
@@ -269,10 +269,9 @@ impl Improver {
 /// The corners whose least is the quality of their cell. Vertices of cells that have none are taken out of `free`.
 fn pieces(mesh: &Mesh, free: &mut [bool]) -> Vec<Piece> {
     let (cells, points) = (mesh.cells(), mesh.points());
-    let measure = Measure::new(cells, points);
     let reference = scaled_jacobians(cells, points);
     let mut pieces = Vec::with_capacity(cells.len());
-    for ((cell, (cell_type, vertices)), &scaled) in cells.iter().enumerate().zip(&reference) {
+    for ((cell_type, vertices), &scaled) in cells.iter().zip(&reference) {
         let root = std::f64::consts::SQRT_2;
         let (corners, regular, whole): (&[[usize; 4]], f64, bool) = match cell_type {
             CellType::Tetra => (&[[0, 1, 2, 3]], root, true),
@@ -281,12 +280,11 @@ fn pieces(mesh: &Mesh, free: &mut [bool]) -> Vec<Piece> {
             CellType::Pyramid => (&PYRAMID_CORNERS, 2.0, true),
             _ => (&[], 0.0, false),
         };
-        let (from, sign) = (pieces.len(), measure.sign(cell));
+        let from = pieces.len();
         for corner in corners {
             let local =
                 if cell_type == CellType::Voxel { corner.map(|local| VOXEL_AS_HEXAHEDRON[local]) } else { *corner };
-            let [a, b, c, d] = local.map(|index| vertices[index]);
-            let vertices = if sign < 0.0 { [a, c, b, d] } else { [a, b, c, d] };
+            let vertices = local.map(|index| vertices[index]);
             if tet_determinant(vertices.map(|vertex| points[vertex as usize])) > 0.0 {
                 pieces.push(Piece { vertices, factor: regular / scaled, whole });
             }

@@ -8,7 +8,7 @@ use crate::mesh::{CellType, Mesh, Numbering, Ordered, Vector};
 use crate::parallel;
 use crate::partition::{Partition, Reduction, Shares, Solver, all, any, whole};
 use crate::quality::{
-    HEXAHEDRON_CORNERS, Measure, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, quality_in_parts, tet_determinant,
+    HEXAHEDRON_CORNERS, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, quality_in_parts, tet_determinant,
 };
 use crate::vector::{add, cross, dot, scale, subtract};
 
@@ -308,11 +308,8 @@ fn inner(a: &[Vector], b: &[Vector]) -> f64 {
 /// The corners of the cells, each right-handed in a valid mesh; those flat in the reference are left out.
 fn corners(mesh: &Mesh) -> Vec<Corner> {
     let (cells, points) = (mesh.cells(), mesh.points());
-    let measure = Measure::new(cells, points);
     let mut corners = Vec::with_capacity(cells.len());
-    let mut take = |vertices: [u32; 4], turned: bool| {
-        let [a, b, c, d] = vertices;
-        let vertices = if turned { [a, c, b, d] } else { vertices };
+    let mut take = |vertices: [u32; 4]| {
         let [p, q, r, s] = vertices.map(|vertex| points[vertex as usize]);
         let (u, v, w) = (subtract(q, p), subtract(r, p), subtract(s, p));
         let determinant = tet_determinant([p, q, r, s]);
@@ -321,10 +318,10 @@ fn corners(mesh: &Mesh) -> Vec<Corner> {
             corners.push(Corner { vertices, gradients: [scale(add(add(g, h), k), -1.0), g, h, k] });
         }
     };
-    for (cell, (cell_type, vertices)) in cells.iter().enumerate() {
+    for (cell_type, vertices) in cells.iter() {
         let mut take_all = |locals: &[[usize; 4]]| {
             for local in locals {
-                take(local.map(|index| vertices[index]), measure.sign(cell) < 0.0);
+                take(local.map(|index| vertices[index]));
             }
         };
         match cell_type {

@@ -88,7 +88,7 @@ impl Share {
             Some(seed) => shuffled(&part, seed + rank as u64),
             None => Ok(part),
         });
-        let made = cut.and_then(|part| Ok((part.view().to_mesh()?, part.own_cells()?, part)));
+        let made = cut.and_then(|part| Ok((part.view().to_mesh()?, part.own_cells(), part)));
         let (own_mesh, own, part) = agree(communicator, made)?;
         let shared = SharedVertices::find(communicator, &part)?;
         let patches = own_patches(&part, surface, mesh, patches);

@@ -40,13 +40,7 @@ impl Part {
         let mut numbers = vec![u32::MAX; points.len()];
         (0..).zip(&vertices).for_each(|(number, &vertex)| numbers[vertex] = number);
         let renumbered = |of: &[u32]| of.iter().map(|&vertex| numbers[vertex as usize]).collect::<Vec<u32>>();
-        let mut own = Cells::new();
-        for &cell in &taken {
-            match cells.polyhedron_faces(cell) {
-                [] => own.push(cells.cell_type(cell), &renumbered(cells.vertices(cell)))?,
-                faces => own.push_polyhedron(&faces.iter().map(|face| renumbered(face)).collect::<Vec<_>>())?,
-            }
-        }
+        let own = cells.subset(taken.iter().copied()).with_vertices(&numbers);
         let features = match mesh.features() {
             FeatureSource::SharpEdges => FeatureSource::SharpEdges,
             FeatureSource::Vertices(tags) => {

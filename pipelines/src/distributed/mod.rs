@@ -94,21 +94,9 @@ impl Part {
     }
 
     /// The cells that are this rank's own, with the vertices of the part.
-    ///
-    /// # Errors
-    /// None for a part that [`Part::of`] made.
-    pub fn own_cells(&self) -> Result<Cells, MeshError> {
-        if !self.ghosts.as_ref().is_some_and(|ghosts| ghosts.contains(&true)) {
-            return Ok(self.cells.clone());
-        }
-        let mut own = Cells::new();
-        for (cell, (cell_type, vertices)) in self.cells.iter().enumerate().filter(|(cell, _)| !self.is_ghost(*cell)) {
-            match self.cells.polyhedron_faces(cell) {
-                [] => own.push(cell_type, vertices)?,
-                faces => own.push_polyhedron(faces)?,
-            }
-        }
-        Ok(own)
+    #[must_use]
+    pub fn own_cells(&self) -> Cells {
+        self.cells.subset((0..self.cells.len()).filter(|&cell| !self.is_ghost(cell)))
     }
 }
 

@@ -1,8 +1,9 @@
 //! A channel's cells, and what is worked out of them once.
 
-use std::sync::Arc;
+use std::borrow::Cow;
+use std::sync::{Arc, OnceLock};
 
-use tombolo_deform::mesh::{Cells, Mesh, MeshView};
+use tombolo_deform::mesh::{Cells, Mesh, MeshView, Vector};
 use tombolo_deform::quality::{Quality, quality, scaled_jacobians};
 use tombolo_deform::surface::{FeatureSettings, Surface, SurfaceError};
 
@@ -56,7 +57,10 @@ impl Extracted {
 #[derive(Debug)]
 pub struct Source {
     key: MeshKey,
+    /// As the solver has them.
     cells: Arc<Cells>,
+    /// As they are measured, once they are.
+    right_handed: OnceLock<Arc<Cells>>,
     boundary: Option<Boundary>,
     whole: Option<Box<Whole>>,
 }
@@ -166,14 +170,7 @@ impl Whole {
         let vertices: Vec<u32> =
             (0..).zip(&places).filter(|(_, place)| **place == 0).map(|(vertex, _)| vertex).collect();
         (0..).zip(&vertices).for_each(|(place, &vertex)| places[vertex as usize] = place);
-        let renumbered = |of: &[u32]| of.iter().map(|&vertex| places[vertex as usize]).collect::<Vec<u32>>();
-        let mut own = Cells::new();
-        for (cell, (cell_type, of_cell)) in self.own.iter().enumerate() {
-            match self.own.polyhedron_faces(cell) {
-                [] => own.push(cell_type, &renumbered(of_cell))?,
-                faces => own.push_polyhedron(&faces.iter().map(|face| renumbered(face)).collect::<Vec<_>>())?,
-            }
-        }
+        let own = self.own.as_given().with_vertices(&places);
         let points = gather::points(&channel.mesh.points, &vertices, cycle)?;
         let from = Points::Vertices(&vertices);
         let (fields, errors) = gather::fields(channel, cycle, wanted, &from, &Owners::Cells(&owners));
@@ -190,7 +187,7 @@ impl Source {
     pub fn new(channel: &Channel) -> Result<Self, ExtractError> {
         let cells = channel.mesh.cells.to_cells()?;
         cells.validate(channel.mesh.points.len())?;
-        Ok(Self { key: MeshKey::of(&channel.mesh), cells: Arc::new(cells), boundary: None, whole: None })
+        Ok(Self::of(MeshKey::of(&channel.mesh), cells, OnceLock::new(), None))
     }
 
     /// The same of a channel of which each rank has a part. Extracts are then of the rank's part, its ghosts left out, and make
@@ -200,7 +197,7 @@ impl Source {
     /// [`ExtractError::Distributed`], the same on all ranks.
     pub fn distributed(channel: &Channel, communicator: &dyn Communicator) -> Result<Self, ExtractError> {
         let part = agree(communicator, Part::of(&channel.mesh)).map_err(DistributedError::from)?;
-        let own = agree(communicator, part.own_cells()).map_err(DistributedError::from)?;
+        let own = part.own_cells();
         let (shared, boundary, error) = PartBoundary::shown(communicator, &part)?;
         let mut is_shared = vec![false; part.points.len()];
         shared.shared().for_each(|vertex| is_shared[vertex as usize] = true);
@@ -208,8 +205,12 @@ impl Source {
         // Rank 0 tells it for all.
         let no_surface = error.filter(|_| communicator.rank() == 0);
         let whole = Whole { ghosts: part.ghosts, own, shared, is_shared, boundary, surface, no_surface };
-        let key = MeshKey::of(&channel.mesh);
-        Ok(Self { key, cells: Arc::new(part.cells), boundary: None, whole: Some(Box::new(whole)) })
+        let given = part.cells.as_given().into_owned();
+        Ok(Self::of(MeshKey::of(&channel.mesh), given, Arc::new(part.cells).into(), Some(Box::new(whole))))
+    }
+
+    fn of(key: MeshKey, cells: Cells, right_handed: OnceLock<Arc<Cells>>, whole: Option<Box<Whole>>) -> Self {
+        Self { key, cells: Arc::new(cells), right_handed, boundary: None, whole }
     }
 
     /// What is known of the whole mesh where this is a part of one.
@@ -232,7 +233,7 @@ impl Source {
         self.key == MeshKey::of(&channel.mesh)
     }
 
-    /// The cells.
+    /// The cells, as the solver has them.
     #[must_use]
     pub fn cells(&self) -> &Arc<Cells> {
         &self.cells
@@ -348,13 +349,25 @@ impl Source {
     /// The quality of the cells at the present coordinates.
     #[must_use]
     pub fn quality(&self, channel: &Channel) -> Quality {
-        let cells = self.whole.as_ref().map_or(&*self.cells, |whole| &whole.own);
-        quality(cells, &channel.mesh.points.to_vectors())
+        let points = channel.mesh.points.to_vectors();
+        match &self.whole {
+            Some(whole) => quality(&whole.own, &points),
+            None => quality(self.right_handed(&points), &points),
+        }
     }
 
     /// The scaled Jacobian of each cell at the present coordinates, NaN for those that have none.
     #[must_use]
     pub fn scaled_jacobians(&self, channel: &Channel) -> Vec<f64> {
-        scaled_jacobians(&self.cells, &channel.mesh.points.to_vectors())
+        let points = channel.mesh.points.to_vectors();
+        scaled_jacobians(self.right_handed(&points), &points)
+    }
+
+    /// The cells as they are measured: which of them were given left-handed the first points tell.
+    fn right_handed(&self, points: &[Vector]) -> &Cells {
+        self.right_handed.get_or_init(|| match self.cells.right_handed(points) {
+            Cow::Borrowed(_) => Arc::clone(&self.cells),
+            Cow::Owned(turned) => Arc::new(turned),
+        })
     }
 }

@@ -107,7 +107,9 @@ impl Parts {
             mesh_cells = cells;
         }
         let mesh_points = vertices.iter().filter_map(|&vertex| points.get(vertex).copied()).collect();
-        Ok(MeshFile { mesh: Mesh::new(mesh_points, mesh_cells, features)?, fields, notes })
+        let mesh = Mesh::new(mesh_points, mesh_cells, features)?;
+        notes.extend(mesh.cells().handedness_note());
+        Ok(MeshFile { mesh, fields, notes })
     }
 }
 

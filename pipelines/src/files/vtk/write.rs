@@ -47,7 +47,7 @@ pub(in super::super) fn from_mesh(
     polygonal: bool,
     compression: Compression,
 ) -> Result<Vec<u8>, Problem> {
-    let mut grid = Grid::new(mesh.points(), Cow::Borrowed(mesh.cells()));
+    let mut grid = Grid::new(mesh.points(), mesh.cells().as_given());
     let mut owners = Vec::new();
     match mesh.features() {
         FeatureSource::SharpEdges => {}
