@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use tombolo_deform::{mesh::Vector, partition::Partition};
+use tombolo_deform::{mesh::Vector, number::Number, partition::Partition};
 use tombolo_pipelines::{
     communicator::{Communicator, RankError, Solo},
     distributed::Ranks,
@@ -161,7 +161,7 @@ pub enum ExecuteError {
         reason: String,
     },
     /// A time that is none.
-    #[error("cycle {cycle}: {what} is {value}; it must be finite{}", if *what == "time_step" { " and not below 0" } else { "" })]
+    #[error("cycle {cycle}: {what} is {}; it must be finite{}", Number(*value), if *what == "time_step" { " and not below 0" } else { "" })]
     Time {
         /// The step.
         cycle: u64,

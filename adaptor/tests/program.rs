@@ -9,7 +9,7 @@ use serde_json::Value;
 use tombolo::{
     deform::{
         mesh::{CellType, Cells, FeatureSource, Mesh},
-        shapes::box_of_tets,
+        shapes::{self, box_of_tets},
     },
     pipelines::files::{Compression, read_mesh, write_mesh},
 };
@@ -253,4 +253,32 @@ fn surfaces_that_cannot_be_edited_are_named_to_the_user() {
     let held = r#"{"translate": {"features": ["feature-1"], "fixed": ["feature-1"], "by": [0, 0, 1]}}"#;
     let text = refused_on(&square, &[0, 1, 2, 0, 2, 3], &[0, 0, 1, 1], held);
     assert!(text.contains("feature-1"), "{text}");
+}
+
+/// A mesh in a mirror has left-handed cells: it is edited, and the file has the cells as they were in the file that was read.
+#[test]
+fn a_left_handed_mesh_keeps_its_order_of_vertices() {
+    let upper = [1.0, 1.0, 2.0];
+    for mesh in [
+        box_of_tets([3, 3, 3], [0.0; 3], upper),
+        shapes::box_of_hexahedra([3, 3, 3], [0.0; 3], upper),
+        shapes::box_of_mixed_cells([3, 3, 4], [0.0; 3], upper),
+    ] {
+        let directory = tempfile::tempdir().unwrap();
+        let mirrored = mesh.points().iter().map(|&[x, y, z]| [-x, y, z]).collect();
+        let given = mesh.cells().as_given().into_owned();
+        let image = Mesh::new(mirrored, given.clone(), mesh.features().clone()).unwrap();
+        write_mesh(directory.path().join("box.vtu"), &image, &[], Compression::None).unwrap();
+        let edits = r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.1, 0, -0.5]}}]"#;
+        std::fs::write(directory.path().join("edits.json"), edits).unwrap();
+        let output = tombolo(directory.path(), &EDIT);
+        let text = error_text(&output);
+        assert_eq!(output.status.code(), Some(0), "{text}");
+        assert_eq!(text.matches("left-handed cells").count(), 1, "said once: {text}");
+        assert_eq!(json(&output)["inverted"], 0);
+        let [before, after] = ["box.vtu", "out.vtu"].map(|name| read_mesh(directory.path().join(name)).unwrap());
+        assert_eq!(*before.mesh.cells().as_given(), given);
+        assert_eq!(*after.mesh.cells().as_given(), given);
+        assert!(before.notes.iter().any(|note| note.contains("left-handed")), "{:?}", before.notes);
+    }
 }

@@ -6,7 +6,11 @@ use common::{Solver, bits, config, squeeze};
 use serde_json::{Value, json};
 use tombolo::{
     Adaptor, ExecuteError, InitializeError, OrderStatus, Parameter, Settings, Step,
-    deform::{mesh::MeshView, quality::quality, shapes::box_of_tets},
+    deform::{
+        mesh::{ArrayView, CellType, CellsView, Indices, MeshView, Vector},
+        quality::quality,
+        shapes::box_of_tets,
+    },
     pipelines::{
         extract::Channel,
         language::{TimedCommand, parse_orders},
@@ -349,4 +353,61 @@ fn orders_change_the_channel_that_the_configuration_names() {
     let (motions, status, reason) = two_channels("fluids");
     assert_eq!((motions.len(), status), (0, OrderStatus::Rejected));
     assert!(reason.contains("no channel `fluids`") && reason.contains("did you mean `fluid`?"), "{reason}");
+}
+
+/// The last coordinates that an order leads to on a mesh of these arrays.
+fn squeezed(points: &[Vector], cell_type: CellType, connectivity: &[u32]) -> Result<Vec<Vector>, ExecuteError> {
+    let settings = Settings {
+        config: config(r#"{"version": 1, "pipelines": [{"name": "shape", "on": "order", "stages": []}]}"#),
+        orders: orders(&json!([at(
+            1,
+            json!({"edits": [{"translate": {"region": {"box": {"lower": [-9, -9, 0.99], "upper": [9, 9, 9]}},
+            "fixed_region": {"box": {"lower": [-9, -9, -9], "upper": [9, 9, 0.01]}}, "by": [0.0, 0.1, -0.3]}}]})
+        )])),
+        ..Settings::default()
+    };
+    let mut adaptor = Adaptor::initialize(settings).expect("initialize");
+    let mut reached = points.to_vec();
+    for cycle in 0..4 {
+        let cells = CellsView::Uniform { cell_type, connectivity: Indices::U32(connectivity) };
+        let channels =
+            [Channel { name: "solid", mesh: MeshView::new(ArrayView::vectors(&reached), cells), fields: &[] }];
+        let steering = adaptor.execute(&Step { cycle, time: cycle as f64, time_step: 1.0 }, &channels)?;
+        if let Some(motion) = steering.motion {
+            let motion = motion.coordinates.to_vec();
+            reached = motion;
+        }
+    }
+    let report = adaptor.finalize().expect("report");
+    assert_eq!(report.orders[0].status, OrderStatus::Applied, "{:?}", report.orders[0].reason);
+    Ok(reached)
+}
+
+/// A solver whose cells are left-handed, or whose mesh is mirrored, is steered as any other; one that has its cells in the order of
+/// another program hears of it.
+#[test]
+fn the_order_of_a_solvers_vertices_is_its_own() {
+    let tets = box_of_tets([3, 3, 3], [0.0; 3], [1.0; 3]);
+    let hexahedra = tombolo::deform::shapes::box_of_hexahedra([3, 3, 3], [0.0; 3], [1.0; 3]);
+    let mirror = |points: &[Vector]| points.iter().map(|&[x, y, z]| [-x, y, z]).collect::<Vec<Vector>>();
+    for mesh in [&tets, &hexahedra] {
+        let cell_type = mesh.cells().types()[0];
+        let connectivity = mesh.cells().connectivity();
+        let plain = squeezed(mesh.points(), cell_type, connectivity).expect("steered");
+        let image = squeezed(&mirror(mesh.points()), cell_type, connectivity).expect("steered");
+        assert!(plain != mesh.points());
+        for (a, b) in plain.iter().flatten().zip(mirror(&image).iter().flatten()) {
+            assert!((a - b).abs() < 1e-6, "{a} {b}");
+        }
+    }
+    // Tetrahedra with two vertices exchanged, and hexahedra along x, then y, then z.
+    let other = |rows: &[u32], order: &[usize]| -> Vec<u32> {
+        rows.chunks(order.len()).flat_map(|row| order.iter().map(|&local| row[local])).collect()
+    };
+    let turned = other(tets.cells().connectivity(), &[0, 2, 1, 3]);
+    let plain = squeezed(tets.points(), CellType::Tetra, tets.cells().connectivity()).expect("steered");
+    assert_eq!(squeezed(tets.points(), CellType::Tetra, &turned).expect("steered"), plain);
+    let lexicographic = other(hexahedra.cells().connectivity(), &[0, 1, 3, 2, 4, 5, 7, 6]);
+    let error = squeezed(hexahedra.points(), CellType::Hexahedron, &lexicographic).expect_err("refused").to_string();
+    assert!(error.contains("VTK's order is") && error.contains("lexicographic"), "{error}");
 }

@@ -6,6 +6,7 @@
 
 pub mod linear;
 pub mod mesh;
+pub mod number;
 pub mod partition;
 pub mod quality;
 pub mod schedule;

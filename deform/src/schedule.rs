@@ -5,6 +5,8 @@ use std::num::{NonZeroU32, NonZeroU64};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::number::Number;
+
 /// How a change of shape is spread over the run: in `steps` shapes, one `every` so many cycles or so much simulated time, at equal
 /// distances or eased.
 ///
@@ -58,7 +60,7 @@ pub struct Interval(f64);
 
 /// A length of time that is not above 0, or not a finite number.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("{0} is not a length of time; it must be a finite number above 0")]
+#[error("{} is not a length of time; it must be a finite number above 0", Number(*.0))]
 pub struct IntervalError(f64);
 
 impl Interval {

@@ -65,6 +65,23 @@ pub enum Refused {
         /// The name, and those that there are.
         source: UnknownFeature,
     },
+    /// Features that slide or are free leave nothing that holds a part of the mesh.
+    #[error(
+        "deform.{}: nothing holds the part of the mesh that {} {}, so that it could go anywhere; keep a feature of it off the list",
+        match (sliding.is_empty(), free.is_empty()) {
+            (false, true) => "sliding",
+            (true, _) => "free",
+            _ => "sliding and deform.free",
+        },
+        sliding.iter().chain(free).map(|name| format!("'{name}'")).collect::<Vec<_>>().join(", "),
+        if sliding.len() + free.len() == 1 { "bounds" } else { "bound" }
+    )]
+    LetGo {
+        /// Those of its features that slide.
+        sliding: Vec<String>,
+        /// Those that are free.
+        free: Vec<String>,
+    },
     /// The volume cannot follow.
     #[error(transparent)]
     Volume(#[from] VolumeError),
@@ -73,9 +90,10 @@ pub enum Refused {
     Guard(#[from] Refusal),
     /// An edit cannot be followed to its end, not in sub-steps and not by untangling.
     #[error(
-        "edit {edit} ({name}) can be done to {:.2} % of its amount; beyond that{} {refusal}",
+        "edit {edit} ({name}) can be done to {:.2} % of its amount; beyond that{} {}",
         (1e4 * fraction).floor() / 1e2,
-        if *folds { " the surface itself folds:" } else { "" }
+        if *folds { " the surface itself folds:" } else { "" },
+        refusal.flaw()
     )]
     Stalled {
         /// The place of the edit in the stack, counted from 0.

@@ -1,6 +1,7 @@
 //! Numbers of the solver that can be steered.
 
 use serde::Serialize;
+use tombolo_deform::number::Number;
 use tombolo_pipelines::language::nearest;
 
 /// A scalar that the solver lets itself be steered by.
@@ -31,7 +32,9 @@ pub enum ParameterError {
         known: Vec<String>,
     },
     /// A value out of its bounds, or none at all.
-    #[error("parameter '{name}' cannot be {value}; it must be a number from {minimum} to {maximum}")]
+    #[error("parameter '{name}' cannot be {}; it must be a number from {} to {}",
+        Number(*value), Number(*minimum), Number(*maximum)
+    )]
     Value {
         /// The name.
         name: String,

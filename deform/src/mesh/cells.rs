@@ -311,14 +311,14 @@ impl Cells {
     /// # Errors
     /// [`MeshError::OtherOrder`].
     pub(super) fn of_mesh(mut self, points: &[Vector]) -> Result<Self, MeshError> {
-        if self.turned.is_none() {
-            let (turned, neither) = hands(&self, points);
-            if let Some(other) = other_order(&self, points, neither) {
-                return Err(other);
-            }
-            self.turn(turned);
-            self.turned = Some(turned);
+        // Another mesh may have had them elsewhere.
+        self.turn(self.turned.unwrap_or_default());
+        let (turned, neither) = hands(&self, points);
+        if let Some(other) = other_order(&self, points, neither) {
+            return Err(other);
         }
+        self.turn(turned);
+        self.turned = Some(turned);
         Ok(self)
     }
 

@@ -47,6 +47,11 @@ pub(super) fn hand(cells: &Cells, cell: usize, points: &[Vector], tets: &mut Vec
     }
 }
 
+/// Whether every corner of a volume cell is left-handed.
+pub(crate) fn is_left_handed(cells: &Cells, cell: usize, points: &[Vector]) -> bool {
+    hand(cells, cell, points, &mut Vec::new()) == Hand::Left
+}
+
 /// The cells of one type by the way they run.
 #[derive(Debug, Clone, Copy, Default)]
 struct Count {

@@ -5,6 +5,8 @@
 
 use std::sync::Arc;
 
+use crate::number::Place;
+
 mod cell_type;
 mod cells;
 mod feature;
@@ -17,6 +19,7 @@ mod view_check;
 pub use cell_type::CellType;
 pub use cells::Cells;
 pub use feature::{FeatureSource, TaggedFaces};
+pub(crate) use handedness::is_left_handed;
 #[cfg(test)]
 pub(crate) use ordered::shuffled;
 pub(crate) use ordered::{Numbering, Ordered};
@@ -146,9 +149,9 @@ pub enum MeshError {
     },
     /// The vertices of cells stand in another order than VTK's.
     #[error(
-        "cell {cell} ({cell_type}) at ({:.6}, {:.6}, {:.6}) has its vertices in another order than VTK's, and so have most cells of \
+        "cell {cell} ({cell_type}) at {} has its vertices in another order than VTK's, and so have most cells of \
          its type: VTK's order is {}; this looks like {}: give the vertices {} of each cell, as they are counted now",
-        centroid[0], centroid[1], centroid[2], other_order::of_vtk(*cell_type), name.unwrap_or("that of another program"),
+        Place(*centroid), other_order::of_vtk(*cell_type), name.unwrap_or("that of another program"),
         other_order::listed(order)
     )]
     OtherOrder {

@@ -8,6 +8,7 @@ use super::fold::folded_faces;
 use super::path::least_on_path;
 use super::{CHUNK, Measure, WORST, centroid};
 use crate::mesh::{Mesh, Vector};
+use crate::number::{Number, Place};
 use crate::parallel;
 use crate::partition::{Partition, Reduction, Whole, all, any};
 
@@ -153,7 +154,7 @@ pub enum Refusal {
         point: Vector,
     },
     /// A fraction that is not on the path.
-    #[error("fraction {index} of the path is {value}; fractions are above 0, rise, and are at most 1")]
+    #[error("fraction {index} of the path is {}; fractions are above 0, rise, and are at most 1", Number(*value))]
     Fraction {
         /// Which of the fractions.
         index: usize,
@@ -164,33 +165,54 @@ pub enum Refusal {
     #[error("the shapes given on another rank make no sense")]
     OtherRank,
     /// A floor out of range.
-    #[error("guard.min_scaled_jacobian is {value}; it must be from 0 to 1")]
+    #[error("guard.min_scaled_jacobian is {}; it must be from 0 to 1", Number(*value))]
     Floor {
         /// What it is.
         value: f64,
     },
 }
 
-fn describe(path: &BrokenPath) -> String {
-    let mut text = match path.inverted {
-        0 => format!("{} cell(s) would fall under the scaled Jacobian of {:.4}", path.failing, path.floor),
-        inverted => format!("{inverted} cell(s) would be turned inside out"),
-    };
-    if let Some(worst) = path.worst.first() {
-        let [x, y, z] = worst.centroid;
-        text += &format!(
-            "; the worst is cell {} at ({x:.6}, {y:.6}, {z:.6}) with {:.4} at {:.1} % of the way",
-            worst.cell,
-            worst.scaled_jacobian,
-            100.0 * worst.fraction
-        );
+impl BrokenPath {
+    /// What is wrong, without the fractions of the path: for those who follow a longer way, of which it is a piece.
+    #[must_use]
+    pub fn flaw(&self) -> String {
+        self.described(|_| String::new())
     }
-    if path.folded_faces > 0 {
-        text += &format!("; the prescribed surface itself turns over at {} face(s)", path.folded_faces);
-        if let Some([x, y, z]) = path.folded_at {
-            text += &format!(", the first at ({x:.6}, {y:.6}, {z:.6})");
+
+    fn described(&self, way_of: impl Fn(&FailingCell) -> String) -> String {
+        let mut text = match self.inverted {
+            0 => {
+                format!("{} cell(s) would fall under the scaled Jacobian of {:.4}", self.failing, Number(self.floor))
+            }
+            inverted => format!("{inverted} cell(s) would be turned inside out"),
+        };
+        if let Some(worst) = self.worst.first() {
+            let (place, value) = (Place(worst.centroid), Number(worst.scaled_jacobian));
+            text += &format!("; the worst is cell {} at {place} with {value:.4}{}", worst.cell, way_of(worst));
+        }
+        if self.folded_faces > 0 {
+            text += &format!("; the prescribed surface itself turns over at {} face(s)", self.folded_faces);
+            if let Some(place) = self.folded_at {
+                text += &format!(", the first at {}", Place(place));
+            }
+        }
+        text
+    }
+}
+
+impl Refusal {
+    /// What is wrong, without the fractions of the path that was judged: see [`BrokenPath::flaw`].
+    #[must_use]
+    pub fn flaw(&self) -> String {
+        match self {
+            Refusal::Quality(path) => path.flaw(),
+            other => other.to_string(),
         }
     }
+}
+
+fn describe(path: &BrokenPath) -> String {
+    let text = path.described(|worst| format!(" at {:.1} % of the way", 100.0 * worst.fraction));
     // Rounded down, so that what is shown is feasible.
     text + &format!("; the largest feasible fraction is {:.4}", (path.feasible_fraction * 1e4).floor() / 1e4)
 }

@@ -70,18 +70,63 @@ fn every_mirrored_volume_cell_is_inverted() {
         assert!(whole.inverted == 0 && whole.min > 0.0, "{cell_type}: {whole:?}");
         let mirrored: Vec<Vector> = mesh.points().iter().map(|&[x, y, z]| [x, y, -z]).collect();
         let inverted = quality(mesh.cells(), &mirrored);
-        // A wedge by itself may be in either of two orders.
-        if cell_type == CellType::Wedge {
-            assert_eq!(inverted.inverted, 0);
-        } else {
-            assert!(inverted.inverted == 1 && inverted.min <= 0.0, "{cell_type}: {inverted:?}");
-        }
+        assert!(inverted.inverted == 1 && inverted.min <= 0.0, "{cell_type}: {inverted:?}");
         // Whatever its order, the guard sees it pass through itself.
         let refusal = judge(&mesh, mesh.points(), &mirrored, &[1.0], &Guard::default()).unwrap_err();
         let Refusal::Quality(path) = refusal else { panic!("{cell_type}: {refusal}") };
         assert_eq!((path.inverted, path.failing), (1, 1), "{cell_type}");
         assert!(path.feasible_fraction < 0.5 && path.feasible_fraction > 0.3, "{cell_type}: {path:?}");
         assert!(path.folded_faces > 0);
+    }
+}
+
+/// The least over the corners of a wedge of the determinant of its three edges by their lengths, 1 where the triangles are
+/// equilateral: a corner's neighbours are the other two of its triangle and the one across.
+fn worst_corner_of_wedge(points: &[Vector], sign: f64) -> f64 {
+    let corner = |at: usize| {
+        let top = at / 3 * 3;
+        let [a, b, c] = [top + (at + 1) % 3, top + (at + 2) % 3, (at + 3) % 6]
+            .map(|to| crate::vector::subtract(points[to], points[at]));
+        let upwards = if top == 0 { 1.0 } else { -1.0 };
+        let length = |v: Vector| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        sign * upwards * crate::vector::determinant(a, b, c) / (length(a) * length(b) * length(c))
+    };
+    2.0 / 3.0f64.sqrt() * (0..6).map(corner).fold(f64::INFINITY, f64::min)
+}
+
+proptest! {
+    /// A wedge has the quality of its worst corner in whichever of the two orders it is written, and no cell is better than ideal.
+    #[test]
+    fn wedges_of_either_order_have_their_worst_corner(moves in prop::collection::vec(prop::array::uniform3(-0.4..0.4f64), 6)) {
+        let unit = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 0.866, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.5, 0.866, 1.0]];
+        let points: Vec<Vector> =
+            unit.iter().zip(&moves).map(|(&a, &b)| crate::vector::add(a, b)).collect();
+        let mut found = Vec::new();
+        for order in [[0, 1, 2, 3, 4, 5], [0, 2, 1, 3, 5, 4], [3, 4, 5, 0, 1, 2]] {
+            let cells = Cells::uniform(CellType::Wedge, order.to_vec()).unwrap();
+            // The order is told by a mesh that is sound, and kept when it moves.
+            let mesh = Mesh::new(unit.to_vec(), cells.clone(), FeatureSource::SharpEdges).unwrap();
+            prop_assert!(mesh.cells().as_given().connectivity() == &order[..]);
+            let value = scaled_jacobians(mesh.cells(), &points)[0];
+            prop_assert!((value - worst_corner_of_wedge(&points, 1.0)).abs() < 1e-12, "{order:?}: {value}");
+            let whole = quality(mesh.cells(), &points);
+            prop_assert!(whole.max <= 1.0 + 1e-12 && whole.min == value);
+            prop_assert!(volumes(mesh.cells(), mesh.points())[0] > 0.4);
+            found.push((whole.inverted, (value * 1e9).round()));
+        }
+        prop_assert!(found.iter().all(|other| *other == found[0]), "{found:?}");
+    }
+
+    /// No scaled Jacobian exceeds 1, of no cell of any shape.
+    #[test]
+    fn no_cell_is_better_than_ideal(coordinates in prop::collection::vec(prop::array::uniform3(-1.0..1.0f64), 12)) {
+        for cell_type in CellType::ALL {
+            let Some(count) = cell_type.vertex_count() else { continue };
+            let value = scaled_jacobian(cell_type, &coordinates[..count]);
+            prop_assert!(value.is_none_or(|value| value <= 1.0 + 1e-12), "{cell_type}: {value:?}");
+            let cells = Cells::uniform(cell_type, (0..).take(count).collect()).unwrap();
+            prop_assert!(quality(&cells, &coordinates).max <= 1.0 + 1e-12, "{cell_type}");
+        }
     }
 }
 

@@ -4,6 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::{DragError, Skeleton, SkeletonDrag, SkeletonError, SkeletonSettings, Skin, SkinError};
 use crate::mesh::Vector;
+use crate::number::{Number, Place};
 use crate::surface::{Skeleton as SkeletonEdit, Skinning, Surface};
 use crate::vector::{dot, subtract};
 
@@ -164,9 +165,8 @@ pub enum SkeletonEditError {
     Extraction(#[from] SkeletonError),
     /// A place that is nowhere near the skeleton.
     #[error(
-        "{field}: [{}, {}, {}] is {distance:.4} away from the nearest node of the skeleton, at [{}, {}, {}]: expected a place \
-         within {within:.4} of a node",
-        at[0], at[1], at[2], nearest[0], nearest[1], nearest[2]
+        "{field}: {} is {:.5} away from the nearest node of the skeleton, at {}: expected a place within {:.5} of a node",
+        Place(*at), Number(*distance), Place(*nearest), Number(*within)
     )]
     Far {
         /// The field that gives the place.
@@ -181,7 +181,7 @@ pub enum SkeletonEditError {
         within: f64,
     },
     /// Two drags of one node.
-    #[error("{second}: means the same node of the skeleton as {first}, the one at [{}, {}, {}]", node[0], node[1], node[2])]
+    #[error("{second}: means the same node of the skeleton as {first}, the one at {}", Place(*node))]
     Same {
         /// The field of one drag.
         first: String,

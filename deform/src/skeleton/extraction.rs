@@ -4,6 +4,7 @@ use super::closing::closed_pieces;
 use super::curves::Curves;
 use super::medial::NearestPoints;
 use super::{InvalidSkeleton, Skeleton, flow, resolution, thinning};
+use crate::number::Number;
 use crate::surface::Surface;
 
 /// How a skeleton is extracted. Lengths are parts of the diagonal of the bounding box of each connected piece.
@@ -98,7 +99,8 @@ pub enum SkeletonError {
     },
     /// A setting is out of range.
     #[error(
-        "the skeleton's setting {name} is {value}: expected a finite number that is not negative, and `keep` above 0"
+        "the skeleton's setting {name} is {}: expected a finite number that is not negative, and `keep` above 0",
+        Number(*value)
     )]
     Setting {
         /// Its name.

@@ -2,6 +2,7 @@
 
 use super::{HarmonicOrder, RegionError, UnknownFeature};
 use crate::mesh::Vector;
+use crate::number::{Number, Place};
 use crate::skeleton::SkeletonEditError;
 
 /// What is wrong with an edit whatever the surface.
@@ -34,7 +35,7 @@ pub enum InvalidEdit {
         field: String,
     },
     /// A box whose lower corner is above its upper one.
-    #[error("{field}: {lower} is above the upper corner's {upper}")]
+    #[error("{field}: {} is above the upper corner's {}", Number(*lower), Number(*upper))]
     TurnedBox {
         /// The field, and the axis.
         field: String,
@@ -44,7 +45,7 @@ pub enum InvalidEdit {
         upper: f64,
     },
     /// A radius below 0.
-    #[error("{field}: {radius} is below 0")]
+    #[error("{field}: {} is below 0", Number(*radius))]
     NegativeRadius {
         /// The field.
         field: String,
@@ -216,6 +217,17 @@ pub enum EditError {
         /// The vertex, by mesh vertex number.
         vertex: u32,
     },
+    /// A displacement moves none of the vertices that it names.
+    #[error(
+        "edit {edit} (displacement): vertices: each of the {vertices} vertices is fixed, or outside of the features and the region, so that \
+         nothing can move"
+    )]
+    NothingMoves {
+        /// The place of the edit.
+        edit: usize,
+        /// How many vertices it names.
+        vertices: usize,
+    },
     /// A displacement is still in a file.
     #[error(
         "edit {edit} (displacement): file: {file:?} has not been read; only an edit in a file can name a file, expected vertices and values"
@@ -283,10 +295,11 @@ pub struct Surroundings {
 impl std::fmt::Display for Surroundings {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         if let Some((vertex, point, distance)) = self.nearest {
-            write!(f, "; the nearest, mesh vertex {vertex} at {point:?}, is {distance:.6} away")?;
+            let distance = Number(distance);
+            write!(f, "; the nearest, mesh vertex {vertex} at {}, is {distance:.7} away", Place(point))?;
         }
         let [lower, upper] = self.bounds;
-        write!(f, "; the surface reaches from {lower:?} to {upper:?}")
+        write!(f, "; the surface reaches from {} to {}", Place(lower), Place(upper))
     }
 }
 

@@ -5,6 +5,7 @@ use super::features::{FeatureSettings, FeatureSize, Features};
 use super::orientation::faces_to_turn;
 use super::part::{BoundaryFaces, FaceTags, face_tags};
 use crate::mesh::{CellType, Cells, Mesh, MeshError, Vector, check_finite};
+use crate::number::Number;
 use crate::vector::{cross, dot, subtract};
 
 /// The surface of a mesh: its boundary faces, their vertices and their features.
@@ -411,6 +412,6 @@ pub enum SurfaceError {
         vertex: u32,
     },
     /// A sharp angle that is no angle between faces.
-    #[error("sharp_angle_degrees is {0}; expected an angle from 0 to 180 degrees")]
+    #[error("sharp_angle_degrees is {}; expected an angle from 0 to 180 degrees", Number(*.0))]
     SharpAngle(f64),
 }

@@ -88,6 +88,11 @@ impl Handle {
         }
         if let Edit::Displacement(import) = edit {
             check_import(surface, import, place)?;
+            let moves =
+                |vertex: &u32| surface.vertices().binary_search(vertex).is_ok_and(|local| roles[local] == Role::Handle);
+            if !import.vertices.iter().any(moves) {
+                return Err(EditError::NothingMoves { edit: place, vertices: import.vertices.len() });
+            }
         }
         Ok(Self { roles, vertices, faces })
     }

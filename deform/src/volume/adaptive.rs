@@ -80,7 +80,7 @@ pub enum FollowError<E> {
     #[error(transparent)]
     Volume(VolumeError),
     /// No further sub-step keeps to the guard.
-    #[error("the volume can follow {:.1} % of the way: {}", 100.0 * .0.fraction(), .0.refusal)]
+    #[error("the volume can follow {:.1} % of the way: {}", 100.0 * .0.fraction(), .0.refusal.flaw())]
     Stalled(Box<Stalled>),
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::element::{Elements, Scratch};
 use super::{VolumeError, agreed};
 use crate::linear::{Block, SparseMatrix, reverse_cuthill_mckee};
-use crate::mesh::{Mesh, Ordered, Vector};
+use crate::mesh::{Mesh, Ordered, Vector, is_left_handed};
 use crate::parallel;
 use crate::partition::{Partition, Reduction, Shares, all, any};
 use crate::quality::centroid;
@@ -460,5 +460,6 @@ pub(super) fn stiffness(
         cell_type: cells.cell_type(cell),
         centroid: centroid(cells, cell, mesh.points()),
         count: broken.len(),
+        left_handed: broken.iter().filter(|&&cell| is_left_handed(cells, cell, mesh.points())).count(),
     })
 }

@@ -27,6 +27,7 @@ pub use sliding::Sliding;
 pub use untangle::Untangler;
 
 use crate::mesh::{CellType, Vector};
+use crate::number::{Number, Place};
 use crate::partition::{Partition, all};
 
 impl VolumeError {
@@ -46,12 +47,21 @@ fn agreed<T>(partition: &dyn Partition, mine: Result<T, VolumeError>) -> Result<
     }
 }
 
+fn of_them_left_handed(count: usize) -> String {
+    match count {
+        0 => String::new(),
+        _ => format!(
+            ", {count} of them left-handed where most of their type are not: give the vertices of all cells of a type the same way round"
+        ),
+    }
+}
+
 /// Why a volume could not be deformed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VolumeError {
     /// A setting is out of its range.
-    #[error("deform.{name} is {value}; it must be {expected}")]
+    #[error("deform.{name} is {}; it must be {expected}", Number(*value))]
     Setting {
         /// The setting.
         name: &'static str,
@@ -62,9 +72,9 @@ pub enum VolumeError {
     },
     /// A cell of the reference mesh is flat or turned inside out.
     #[error(
-        "cell {cell} ({cell_type}) at ({:.6}, {:.6}, {:.6}) has no positive volume in the reference mesh; {count} such \
-         cell(s) in all",
-        centroid[0], centroid[1], centroid[2]
+        "cell {cell} ({cell_type}) at {} has no positive volume in the reference mesh; {count} such \
+         cell(s) in all{}",
+        Place(*centroid), of_them_left_handed(*left_handed)
     )]
     InvertedCell {
         /// The first such cell.
@@ -75,6 +85,8 @@ pub enum VolumeError {
         centroid: Vector,
         /// How many there are.
         count: usize,
+        /// How many of them are left-handed at every corner, where the mesh is right-handed.
+        left_handed: usize,
     },
     /// More cells than 32-bit numbers can count.
     #[error("{cells} cells in one mesh; at most {} can be deformed as one", u32::MAX)]

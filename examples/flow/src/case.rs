@@ -7,6 +7,7 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use tombolo::Parameter;
+use tombolo_deform::number::Number;
 use tombolo_deform::surface::Surface;
 use tombolo_pipelines::expression::Expression;
 use tombolo_pipelines::language::{LanguageError, Problem, Validate, nearest, parse_valid};
@@ -295,8 +296,12 @@ impl Validate for Case {
             }
             Expression::parse(name, &[name]).map_err(|error| inside(Problem::new(format!("not a name: {error}"))))?;
             if !(range.minimum <= range.value && range.value <= range.maximum) {
-                let message =
-                    format!("found {}, expected a number from {} to {}", range.value, range.minimum, range.maximum);
+                let message = format!(
+                    "found {}, expected a number from {} to {}",
+                    Number(range.value),
+                    Number(range.minimum),
+                    Number(range.maximum)
+                );
                 return Err(inside(Problem::new(message).within("value")));
             }
         }
@@ -318,9 +323,8 @@ impl Validate for Case {
         self.check_vector(&self.initial.velocity).map_err(|problem| initial(problem, "velocity"))?;
         self.check_number(&self.initial.pressure).map_err(|problem| initial(problem, "pressure"))?;
         if self.time_step <= 0.0 {
-            return Err(
-                Problem::new(format!("found {}, expected a positive number", self.time_step)).within("time_step")
-            );
+            return Err(Problem::new(format!("found {}, expected a positive number", Number(self.time_step)))
+                .within("time_step"));
         }
         Ok(())
     }

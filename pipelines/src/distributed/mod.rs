@@ -23,6 +23,7 @@ pub(crate) mod tests;
 
 use tombolo_deform::{
     mesh::{Cells, FeatureSource, MeshError, MeshView, Vector},
+    number::{Number, Place},
     surface::SurfaceError,
 };
 
@@ -137,9 +138,9 @@ pub enum DistributedError {
     },
     /// A vertex of another rank could be one of two.
     #[error(
-        "vertices {vertices:?} both lie at ({}, {}, {}), where another rank has a vertex too; places do not tell which is meant: \
+        "vertices {vertices:?} both lie at {}, where another rank has a vertex too; places do not tell which is meant: \
          give global vertex numbers",
-        place[0], place[1], place[2]
+        Place(*place)
     )]
     Ambiguous {
         /// Where.
@@ -148,7 +149,7 @@ pub enum DistributedError {
         vertices: [u32; 2],
     },
     /// A tolerance that is none.
-    #[error("the tolerance is {0}; expected a small fraction of the mesh's diagonal, from 0 to 0.01")]
+    #[error("the tolerance is {}; expected a small fraction of the mesh's diagonal, from 0 to 0.01", Number(*.0))]
     Tolerance(f64),
     /// More than two cells have a face.
     #[error(

@@ -242,11 +242,11 @@ fn describe(node: &Node, text: &str) -> String {
 
 /// What serde expected, in the words of JSON.
 fn humane(expected: &str) -> String {
+    if let Some((least, most)) = whole_number(expected) {
+        return format!("a whole number from {least} to {most}");
+    }
     let plain = match expected {
         "f64" | "f32" => "a number",
-        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number of at least 0",
-        "a nonzero u8" | "a nonzero u16" | "a nonzero u32" | "a nonzero u64" => "a whole number of at least 1",
-        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number",
         "a boolean" => "true or false",
         "a string" | "a borrowed string" | "string or map" => "a string",
         "a sequence" => "an array",
@@ -262,6 +262,23 @@ fn humane(expected: &str) -> String {
         },
     };
     plain.to_owned()
+}
+
+/// The least and the greatest number of one of Rust's types of whole numbers.
+fn whole_number(name: &str) -> Option<(i64, u64)> {
+    let (nonzero, name) = name.strip_prefix("a nonzero ").map_or((0, name), |name| (1, name));
+    let bits = |of: &str| match of {
+        "8" => Some(8),
+        "16" => Some(16),
+        "32" => Some(32),
+        "64" | "size" => Some(64_u32),
+        _ => None,
+    };
+    match (name.strip_prefix('u').and_then(bits), name.strip_prefix('i').and_then(bits)) {
+        (Some(bits), _) => Some((nonzero, u64::MAX >> (64 - bits))),
+        (_, Some(bits)) => Some((i64::MIN >> (64 - bits), u64::MAX >> (65 - bits))),
+        _ => None,
+    }
 }
 
 /// The known name that a misspelt one is nearest to, if it is near at all.

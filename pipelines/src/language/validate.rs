@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 
+use tombolo_deform::number::Number;
 use tombolo_deform::quality::Guard;
 use tombolo_deform::schedule::Schedule;
 use tombolo_deform::surface::Edit;
@@ -252,7 +253,7 @@ fn check_guard(guard: &Guard) -> Result<(), Problem> {
     if (0.0..=1.0).contains(&guard.min_scaled_jacobian) {
         return Ok(());
     }
-    let message = format!("found {}, expected a number from 0 to 1", guard.min_scaled_jacobian);
+    let message = format!("found {}, expected a number from 0 to 1", Number(guard.min_scaled_jacobian));
     Err(Problem::new(message).within("min_scaled_jacobian"))
 }
 

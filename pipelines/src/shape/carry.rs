@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tombolo_deform::{
     mesh::{Mesh, Vector},
     surface::Surface,
-    volume::{Sliding, VolumeOperator, VolumeSolution},
+    volume::{Sliding, VolumeError, VolumeOperator, VolumeSolution},
 };
 
 use super::{Refused, boundary::Boundary};
@@ -37,7 +37,12 @@ impl Carrier {
             sliding.iter().map(|&(place, normal)| Sliding { vertex: vertices[place as usize], normal }).collect();
         let prescribed = prescribed.as_deref().unwrap_or(vertices);
         let operator = VolumeOperator::of_part(mesh, prescribed, &slides, &deform.equation, boundary.partition());
-        let operator = Arc::new(boundary.agree(operator.map_err(Refused::from))?);
+        let operator = if deform.lets_go() {
+            held_somewhere(mesh, boundary, deform, operator)?
+        } else {
+            operator.map_err(Refused::from)
+        };
+        let operator = Arc::new(boundary.agree(operator)?);
         let sliding = sliding.into_iter().map(|(place, _)| place).collect();
         Ok(Self { operator, boundary: Arc::clone(boundary), held, sliding })
     }
@@ -71,6 +76,61 @@ impl Carrier {
         self.boundary.take_from_owners(&mut volume)?;
         Ok(self.boundary.places(&volume))
     }
+}
+
+/// The operator; where there is none because nothing holds a part of the mesh, which features let go of it. Collective.
+fn held_somewhere(
+    mesh: &Mesh,
+    boundary: &Boundary,
+    deform: &DeformStage,
+    operator: Result<VolumeOperator, VolumeError>,
+) -> Result<Result<VolumeOperator, Refused>, Refused> {
+    let loose = match &operator {
+        Err(VolumeError::Unattached { vertex, .. }) => Some(*vertex),
+        _ => None,
+    };
+    if boundary.all(loose.is_none()) {
+        return Ok(operator.map_err(Refused::from));
+    }
+    // One process may have the vertices and another the features' names.
+    let body = loose.map_or_else(|| vec![false; mesh.points().len()], |vertex| connected(mesh, vertex));
+    let marks: Vec<Vector> = body.into_iter().map(|inside| [f64::from(u8::from(inside)), 0.0, 0.0]).collect();
+    let marks = boundary.gather(&marks)?;
+    let let_go = boundary.surface().map_or(Ok(()), |surface| {
+        let features = surface.features();
+        let touches = |name: &&String| {
+            let of_body = |vertices: &[u32]| vertices.iter().any(|&vertex| marks[vertex as usize][0] > 0.0);
+            features.index(name).is_ok_and(|feature| of_body(features.vertices(feature)))
+        };
+        let of = |names: &[String]| names.iter().filter(touches).cloned().collect::<Vec<_>>();
+        match (of(&deform.sliding), of(&deform.free)) {
+            (sliding, free) if sliding.is_empty() && free.is_empty() => Ok(()),
+            (sliding, free) => Err(Refused::LetGo { sliding, free }),
+        }
+    });
+    boundary.agree(let_go)?;
+    Ok(operator.map_err(Refused::from))
+}
+
+/// Which vertices of a mesh hang together with one by its cells.
+fn connected(mesh: &Mesh, vertex: usize) -> Vec<bool> {
+    let mut parents: Vec<u32> = (0..).take(mesh.points().len()).collect();
+    fn root(parents: &mut [u32], vertex: u32) -> u32 {
+        let mut at = vertex;
+        while parents[at as usize] != at {
+            parents[at as usize] = parents[parents[at as usize] as usize];
+            at = parents[at as usize];
+        }
+        at
+    }
+    for (_, vertices) in mesh.cells().iter() {
+        for pair in vertices.windows(2) {
+            let [a, b] = [pair[0], pair[1]].map(|vertex| root(&mut parents, vertex));
+            parents[a.max(b) as usize] = a.min(b);
+        }
+    }
+    let roots: Vec<u32> = (0..).take(mesh.points().len()).map(|vertex| root(&mut parents, vertex)).collect();
+    roots.iter().map(|of| *of == roots[vertex]).collect()
 }
 
 /// The places among a boundary's vertices that are held, and those that slide. Collective.

@@ -97,6 +97,9 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
     let (mut edits, order) = read_order(options)?;
     let mut seconds = Seconds::default();
     let mesh_file = timed(&mut seconds.read, || read_mesh(&options.mesh))?;
+    for note in &mesh_file.notes {
+        eprintln!("note: {note}");
+    }
     let mesh = Arc::new(mesh_file.mesh);
     let made = timed(&mut seconds.features, || {
         let surface = Arc::new(surface(&mesh, options.angle)?);
