@@ -211,6 +211,9 @@ fn what_cannot_be_mended_says_how_far_it_came() {
     assert_eq!(refused.feasible_fraction(), Some(fraction));
     let text = refused.to_string();
     assert!(text.contains("edit 0 (translate) can be done to") && text.contains("beyond that"), "{text}");
+    // The fractions of the sub-step that failed are not the order's: one is said.
+    assert!(!text.contains("feasible fraction") && !text.contains("of the way"), "{text}");
+    assert_eq!(text.matches(" % ").count(), 1, "{text}");
 }
 
 fn any_edit() -> impl Strategy<Value = Value> {

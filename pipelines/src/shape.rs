@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 use tombolo_deform::{
-    mesh::{Cells, FeatureSource, Mesh, Vector},
+    mesh::{FeatureSource, Mesh, Vector},
     partition::Partition,
     quality::{Guard, Refusal, SurfaceRule, keeps_in_parts},
     schedule::Schedule,

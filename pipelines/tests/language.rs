@@ -25,7 +25,7 @@ type Case = (&'static str, usize, usize, &'static str, &'static str, Option<&'st
 #[test]
 fn errors_point_at_the_token() {
     #[rustfmt::skip]
-    let cases: [Case; 41] = [
+    let cases: [Case; 42] = [
         ("", 1, 1, "", "found the end of the text, expected a value", None),
         ("{\"version\": 1,\n}", 2, 1, "", "expected a key in double quotes", None),
         (r#"{"version": 1} x"#, 1, 16, "", "after the end of the value", None),
@@ -37,6 +37,7 @@ fn errors_point_at_the_token() {
         (r#"{"version": "x}"#, 1, 13, "version", "does not end", None),
         (r#"{"version": 2}"#, 1, 13, "version", "found version 2, expected 1", None),
         (r#"{"version": "1"}"#, 1, 13, "version", "found \"1\", expected a whole number from 0 to 4294967295", None),
+        (r#"{"version": -1}"#, 1, 13, "version", "found -1, expected a whole number from 0 to 4294967295", None),
         (r#"{"version": 1.5}"#, 1, 13, "version", "found 1.5, expected a whole number", None),
         (r#"{"pipelines": []}"#, 1, 1, "", "the key `version` is missing", None),
         (r#"[1]"#, 1, 1, "", "found an array of 1, expected an object", None),
@@ -232,5 +233,33 @@ proptest! {
         let config = parse(&text, "a").unwrap();
         let again: Config = parse(&serde_json::to_string(&config).unwrap(), "b").unwrap();
         prop_assert_eq!(config, again);
+    }
+}
+
+/// Numbers that no list of faces, vertices or steps can hold are told their range; numbers far from 1 are told in a few characters.
+#[test]
+fn bounds_are_the_true_ones_and_numbers_are_short() {
+    let order = |faces: &str| {
+        let text = format!(r#"{{"edits": [{{"translate": {{"region": {{"faces": [{faces}]}}, "by": [0, 0, 1]}}}}]}}"#);
+        parse_valid::<Order>(&text, "order").unwrap_err().to_string()
+    };
+    for faces in ["4294967296", "-1", "1.5", "1e300"] {
+        let error = order(faces);
+        assert!(error.contains(&format!("found {faces}, expected a whole number from 0 to 4294967295")), "{error}");
+        assert!(error.contains("edits[0].translate.region.faces[0]"), "{error}");
+    }
+    for (setting, shown) in [
+        (r#""guard": {"min_scaled_jacobian": 1e308}"#, "found 1e308, expected a number from 0 to 1"),
+        (r#""deform": {"stiffening": 1e308}"#, "1e308"),
+        (r#""deform": {"tolerance": -1e-300}"#, "-1e-300"),
+        (
+            r#""edits": [{"translate": {"region": {"sphere": {"center": [0, 0, 0], "radius": -1e308}}, "by": [0, 0, 1]}}]"#,
+            "-1e308",
+        ),
+    ] {
+        let change = if setting.contains("edits") { "" } else { r#""undo": 1, "# };
+        let text = format!("{{{change}{setting}}}");
+        let error = parse_valid::<Order>(&text, "order").unwrap_err().to_string();
+        assert!(error.contains(shown) && error.len() < 200, "{error}");
     }
 }

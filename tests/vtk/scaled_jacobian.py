@@ -8,6 +8,7 @@ The table is deform/src/quality/scaled_jacobian.json; the tests of the crate rea
 """
 
 import json
+import math
 import pathlib
 import random
 import sys
@@ -50,6 +51,32 @@ def measure(number, name, points):
     return function(grid.GetCell(0))
 
 
+def worst_corner(cell_type, points):
+    """Of wedges and pyramids, for a VTK without a measure of theirs: the least over the corners, computed here."""
+
+    def less(to, at):
+        return [a - b for a, b in zip(points[to], points[at])]
+
+    def determinant(a, b, c):
+        return (
+            a[0] * (b[1] * c[2] - b[2] * c[1])
+            + a[1] * (b[2] * c[0] - b[0] * c[2])
+            + a[2] * (b[0] * c[1] - b[1] * c[0])
+        )
+
+    if cell_type == "wedge":
+        worst = math.inf
+        for at in range(6):
+            top = at // 3 * 3
+            rows = [less(to, at) for to in (top + (at + 1) % 3, top + (at + 2) % 3, (at + 3) % 6)]
+            lengths = math.prod(math.hypot(*row) for row in rows)
+            worst = min(worst, (1 if top == 0 else -1) * determinant(*rows) / lengths)
+        return 2 / math.sqrt(3) * worst
+    tets = ((at, (at + 1) % 4, (at + 3) % 4, 4) for at in range(4))
+    value = math.sqrt(2) * min(measure(10, "TetScaledJacobian", [points[at] for at in tet]) for tet in tets)
+    return max(value, 0.0) if value < 1 else 2 - value
+
+
 def write():
     generator = random.Random(20240607)
     rows = []
@@ -76,12 +103,12 @@ def check():
         value = measure(number, name, row["points"])
         if value is None:
             missing.add(row["cell_type"])
-            continue
+            value = worst_corner(row["cell_type"], row["points"])
         checked += 1
         worst = max(worst, abs(value - row["scaled_jacobian"]))
     print(f"VTK {vtk.vtkVersion().GetVTKVersion()}: {checked} cells checked, largest difference {worst:.1e}")
     if missing:
-        print(f"not measured by this VTK: {', '.join(sorted(missing))}")
+        print(f"not measured by this VTK, and so by their corners: {', '.join(sorted(missing))}")
     if checked == 0 or worst > 1e-10:
         sys.exit("the table is not what VTK computes")
 

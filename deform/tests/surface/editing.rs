@@ -462,6 +462,32 @@ fn every_mistake_is_named_and_changes_nothing() {
 
     let error = refused(translate(&["x-max"], &["x-max", "x-min"], [1.0; 3], order));
     assert!(matches!(&error, EditError::HandleFixed { edit: 1, .. }), "{error}");
+
+    // A displacement of vertices that are all fixed, or none of which lies in what may move.
+    let top = surface_vertices(&mesh, "x-max");
+    let values: Vec<[f64; 3]> = top.iter().map(|_| [0.1, 0.0, 0.0]).collect();
+    for (features, fixed, moves) in
+        [("[]", r#"["x-max"]"#, false), (r#"["x-min"]"#, "[]", false), ("[]", r#"["y-max"]"#, true)]
+    {
+        let edit = format!(
+            r#"{{"displacement": {{"features": {features}, "fixed": {fixed}, "vertices": {top:?}, "values": {values:?}}}}}"#
+        );
+        let edit: Edit = serde_json::from_str(&edit).unwrap();
+        if moves {
+            assert!(editor.displacement(&[edit]).is_ok());
+        } else {
+            let error = editor.displacement(&[edit]).unwrap_err();
+            let count = top.len();
+            assert_eq!(error, EditError::NothingMoves { edit: 0, vertices: count });
+            assert!(error.to_string().contains("so that nothing can move"), "{error}");
+        }
+    }
+}
+
+fn surface_vertices(mesh: &Mesh, feature: &str) -> Vec<u32> {
+    let surface = extract(mesh);
+    let feature = surface.features().index(feature).unwrap();
+    surface.features().vertices(feature).iter().map(|&vertex| surface.vertices()[vertex as usize]).collect()
 }
 
 #[test]

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use tombolo::Parameter;
-use tombolo_deform::number::Number;
+use tombolo_deform::number;
 use tombolo_deform::surface::Surface;
 use tombolo_pipelines::expression::Expression;
 use tombolo_pipelines::language::{LanguageError, Problem, Validate, nearest, parse_valid};
@@ -298,9 +298,9 @@ impl Validate for Case {
             if !(range.minimum <= range.value && range.value <= range.maximum) {
                 let message = format!(
                     "found {}, expected a number from {} to {}",
-                    Number(range.value),
-                    Number(range.minimum),
-                    Number(range.maximum)
+                    number::Number(range.value),
+                    number::Number(range.minimum),
+                    number::Number(range.maximum)
                 );
                 return Err(inside(Problem::new(message).within("value")));
             }
@@ -323,7 +323,7 @@ impl Validate for Case {
         self.check_vector(&self.initial.velocity).map_err(|problem| initial(problem, "velocity"))?;
         self.check_number(&self.initial.pressure).map_err(|problem| initial(problem, "pressure"))?;
         if self.time_step <= 0.0 {
-            return Err(Problem::new(format!("found {}, expected a positive number", Number(self.time_step)))
+            return Err(Problem::new(format!("found {}, expected a positive number", number::Number(self.time_step)))
                 .within("time_step"));
         }
         Ok(())
