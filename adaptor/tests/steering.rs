@@ -362,7 +362,7 @@ fn squeezed(points: &[Vector], cell_type: CellType, connectivity: &[u32]) -> Res
         orders: orders(&json!([at(
             1,
             json!({"edits": [{"translate": {"region": {"box": {"lower": [-9, -9, 0.99], "upper": [9, 9, 9]}},
-            "fixed_region": {"box": {"lower": [-9, -9, -9], "upper": [9, 9, 0.01]}}, "by": [0.0, 0.1, -0.3]}}]})
+            "fixed_region": {"box": {"lower": [-9, -9, -9], "upper": [9, 9, 0.01]}}, "by": [0.0, 0.1, -0.3]}}], "deform": {"improve": 0}})
         )])),
         ..Settings::default()
     };

@@ -138,7 +138,7 @@ fn an_order_is_exactly_one_change() {
     for (text, message) in [
         ("{}", "none of `edits`, `stack` and `undo`"),
         (r#"{"undo": 1, "stack": []}"#, "more than one"),
-        (r#"{"undo": 0}"#, "at least 1"),
+        (r#"{"undo": 0}"#, "a whole number from 1 to 4294967295"),
         (r#"{"edits": []}"#, "at least one edit"),
         (r#"{"edits": [{"translate": {"features": ["a"], "by": [1, 2]}}]}"#, "array of 3 values"),
         (r#"{"undo": 1, "guard": {"min_scaled_jacobian": -1}}"#, "from 0 to 1"),
