@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 use tombolo::Parameter;
 use tombolo::pipelines::language::{self, Config, TimedCommand};
+use tombolo::pipelines::limits::{DOCUMENT, Limit, WAITING_BYTES};
 
 use crate::error::CatalystError;
 use crate::node::{Kind, Node};
@@ -76,7 +77,7 @@ impl Configuration {
             found.files.extend(variable(PIPELINES).map(|file| (String::new(), file)));
         }
         if let Some(file) = variable(ORDERS) {
-            orders = language::parse_orders(&text(&file)?, &file).map_err(unreadable)?;
+            orders = language::parse_orders(&text(&file, WAITING_BYTES)?, &file).map_err(unreadable)?;
         }
         let is_default = found.files.is_empty() && found.pipelines.is_empty();
         let (config, groups) = if is_default {
@@ -106,9 +107,8 @@ pub(crate) fn report_file() -> Option<String> {
     variable(REPORT)
 }
 
-fn text(file: &str) -> Result<String, CatalystError> {
-    let bytes = std::fs::read(file).map_err(|error| CatalystError::Configuration(format!("{file}: {error}")))?;
-    Ok(language::text(&bytes, file).map_err(unreadable)?.to_owned())
+fn text(file: &str, limit: Limit) -> Result<String, CatalystError> {
+    language::read_text(file.as_ref(), limit).map_err(unreadable)
 }
 
 fn unreadable(error: impl ToString) -> CatalystError {
@@ -134,7 +134,7 @@ fn merged(found: &Found) -> Result<(Config, Groups), CatalystError> {
     let mut config: Option<Config> = None;
     let mut groups: Groups = found.others.iter().map(|name| (name.clone(), Vec::new())).collect();
     for (name, file) in &found.files {
-        let next = language::parse(&text(file)?, file).map_err(unreadable)?;
+        let next = language::parse(&text(file, DOCUMENT)?, file).map_err(unreadable)?;
         groups.push((name.clone(), next.pipelines.iter().map(|pipeline| pipeline.name.clone()).collect()));
         match &mut config {
             None => config = Some(next),

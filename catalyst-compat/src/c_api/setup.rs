@@ -3,7 +3,10 @@
 use std::ffi::{CString, c_char, c_int};
 use std::path::PathBuf;
 
-use tombolo::pipelines::language;
+use tombolo::pipelines::{
+    language,
+    limits::{DOCUMENT, Limit, WAITING_BYTES},
+};
 use tombolo::{Parameter, Settings};
 
 use super::{Fault, Handle, Stage, answer, c_string, give, handle, keep_message, shared, text};
@@ -15,9 +18,8 @@ fn unreadable(error: impl ToString) -> Fault {
     Fault::Error(CatalystError::Configuration(error.to_string()))
 }
 
-fn file_text(file: &str) -> Result<String, Fault> {
-    let bytes = std::fs::read(file).map_err(|error| unreadable(format!("{file}: {error}")))?;
-    Ok(language::text(&bytes, file).map_err(unreadable)?.to_owned())
+fn file_text(file: &str, limit: Limit) -> Result<String, Fault> {
+    language::read_text(file.as_ref(), limit).map_err(unreadable)
 }
 
 /// See `tombolo.h`.
@@ -68,7 +70,7 @@ pub unsafe extern "C" fn tombolo_configure_file(run: *mut Handle, file: *const c
     answer(|| {
         // SAFETY: as the module says.
         let (run, file) = unsafe { (handle(run)?, text(file, "file")?) };
-        run.setting_up()?.0.config = language::parse(&file_text(&file)?, &file).map_err(unreadable)?;
+        run.setting_up()?.0.config = language::parse(&file_text(&file, DOCUMENT)?, &file).map_err(unreadable)?;
         Ok(())
     })
 }
@@ -82,7 +84,8 @@ pub unsafe extern "C" fn tombolo_orders_file(run: *mut Handle, file: *const c_ch
     answer(|| {
         // SAFETY: as the module says.
         let (run, file) = unsafe { (handle(run)?, text(file, "file")?) };
-        run.setting_up()?.0.orders = language::parse_orders(&file_text(&file)?, &file).map_err(unreadable)?;
+        run.setting_up()?.0.orders =
+            language::parse_orders(&file_text(&file, WAITING_BYTES)?, &file).map_err(unreadable)?;
         Ok(())
     })
 }

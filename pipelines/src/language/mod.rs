@@ -36,9 +36,9 @@ pub use config::{
 pub use deform::DeformStage;
 pub use error::{LanguageError, Problem, nearest};
 pub use order::{Change, Command, JournalEntry, Order, OrderStatus, Parameter, Question, TimedCommand, parse_orders};
-pub use parse::{Validate, parse_json, parse_valid, text};
-pub use validate::file_pattern;
+pub use parse::{ReadError, Validate, parse_json, parse_valid, read_text, text};
 pub(crate) use validate::monitor_names;
+pub use validate::{check_stack, file_pattern};
 
 /// Reads and checks a configuration.
 ///

@@ -13,7 +13,7 @@ use std::{
 };
 
 use clap::{Parser, Subcommand};
-use tombolo::pipelines::language;
+use tombolo::pipelines::{language, limits};
 
 /// Checks configurations, looks at meshes, and gives them other shapes without a solver.
 #[derive(Debug, Parser)]
@@ -98,8 +98,7 @@ fn check(file: &Path) -> Result<(), Failure> {
 
 /// The text of a file; an error names the file.
 fn read(file: &Path) -> Result<String, Failure> {
-    let bytes = std::fs::read(file).map_err(|error| Failure::Wrong(format!("{}: {error}", file.display())))?;
-    Ok(language::text(&bytes, &file.to_string_lossy())?.to_owned())
+    Ok(language::read_text(file, limits::DOCUMENT)?)
 }
 
 /// Prints one line; a pipe that was closed early is an error, not a panic.
