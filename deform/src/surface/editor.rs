@@ -285,6 +285,11 @@ impl Editor {
         self.layers.take_all(stack)
     }
 
+    #[cfg(test)]
+    pub(super) fn kept_layers(&self) -> &KeptLayers {
+        &self.layers
+    }
+
     /// `displacement` becomes what the edits below and this one lead to. `handle` may be missing where the layer has been followed
     /// before.
     fn apply(

@@ -93,7 +93,11 @@ impl KeptLayers {
         for Layer { stack: own, .. } in &self.layers {
             let count = match compared {
                 Some((other, count)) if Arc::ptr_eq(other, own) => count,
-                _ => own.iter().zip(stack).take_while(|(a, b)| a == b).count(),
+                _ => {
+                    #[cfg(test)]
+                    tests::COMPARED.set(tests::COMPARED.get() + own.len().min(stack.len()));
+                    own.iter().zip(stack).take_while(|(a, b)| a == b).count()
+                }
             };
             compared = Some((own, count));
             counts.push(count);
@@ -229,4 +233,76 @@ pub(super) fn without_amount(edit: &Edit) -> Edit {
     };
     *name = None;
     edit
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use super::super::{Editor, FeatureSettings, Surface};
+    use super::*;
+    use crate::shapes::box_of_tets;
+
+    thread_local! {
+        /// Edits that were compared.
+        pub(super) static COMPARED: Cell<usize> = const { Cell::new(0) };
+    }
+
+    fn lifts(count: usize) -> Vec<Edit> {
+        let lift = |index: usize| {
+            let by = [0.0, 0.0, 1e-3 * (1 + index % 7) as f64];
+            serde_json::from_value(
+                serde_json::json!({"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": by}}),
+            )
+        };
+        (0..count).map(|index| lift(index).unwrap()).collect()
+    }
+
+    /// Comparisons of edits, and copies of edits that are kept.
+    fn cost(count: usize) -> (usize, usize) {
+        let surface =
+            Surface::extract(&box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]), &FeatureSettings::default()).unwrap();
+        let mut editor = Editor::new(Arc::new(surface)).unwrap();
+        COMPARED.set(0);
+        let mut stack = lifts(count);
+        let moved = editor.displacement(&stack).unwrap();
+        let layers = editor.layers(&stack).unwrap();
+        assert_eq!(layers.len(), count);
+        assert_eq!(editor.displacement(&stack).unwrap(), moved);
+        // Other amounts of the last edit, as when somebody drags.
+        for _ in 0..4 {
+            stack[count - 1] = lifts(3)[2].clone();
+            editor.displacement(&stack).unwrap();
+        }
+        let mut kept: Vec<&Arc<[Edit]>> = Vec::new();
+        for layer in &editor.kept_layers().layers {
+            if !kept.iter().any(|known| Arc::ptr_eq(known, &layer.stack)) {
+                kept.push(&layer.stack);
+            }
+        }
+        (COMPARED.get(), kept.iter().map(|stack| stack.len()).sum())
+    }
+
+    #[test]
+    fn a_stack_costs_as_much_as_it_is_long() {
+        let ((compared, kept), (compared_twice, kept_twice)) = (cost(100), cost(200));
+        assert!(compared <= 10 * 100 && kept <= 2 * 100, "{compared} comparisons, {kept} copies");
+        assert!(compared_twice <= 2 * compared && kept_twice <= 2 * kept, "{compared_twice}, {kept_twice}");
+    }
+
+    #[test]
+    fn layers_say_the_same_whether_or_not_they_were_evaluated_before() {
+        let surface = Arc::new(
+            Surface::extract(&box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]), &FeatureSettings::default()).unwrap(),
+        );
+        let stack = lifts(12);
+        let mut fresh = Editor::new(Arc::clone(&surface)).unwrap();
+        let layers = fresh.layers(&stack).unwrap();
+        let mut used = Editor::new(surface).unwrap();
+        let moved = used.displacement(&stack).unwrap();
+        used.displacement(&stack[..5]).unwrap();
+        assert_eq!(used.layers(&stack).unwrap(), layers);
+        assert_eq!(used.displacement(&stack).unwrap(), moved);
+        assert_eq!(fresh.displacement(&stack).unwrap(), moved);
+    }
 }

@@ -120,7 +120,7 @@ impl<'a> Document<'a> {
         Ok(Self { root, text, file })
     }
 
-    fn value<T: DeserializeOwned>(&self) -> Result<T, LanguageError> {
+    pub(super) fn value<T: DeserializeOwned>(&self) -> Result<T, LanguageError> {
         serde_path_to_error::deserialize(&self.root)
             .map_err(|failure| from_serde(&failure, &self.root, self.text, self.file))
     }
