@@ -390,7 +390,7 @@ export class Scene {
   /** A number made of all pixels (FNV-1a). They are there only in the task that has drawn them. */
   private pixels(): number {
     const [width, height] = this.canvas.getSize();
-    const context = this.canvas.get3DContext() as WebGL2RenderingContext;
+    const context = this.canvas.get3DContext({}) as WebGL2RenderingContext;
     const bytes = new Uint8Array(4 * width * height);
     context.readPixels(0, 0, width, height, context.RGBA, context.UNSIGNED_BYTE, bytes);
     return bytes.reduce((hash, byte) => Math.imul(hash ^ byte, 0x01000193), 0x811c9dc5) >>> 0;
