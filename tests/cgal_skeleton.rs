@@ -1,15 +1,12 @@
 //! Skeletons against those of CGAL: the same pieces, loops and branches, and within 2 % of the bounding box of each other.
 
-use std::time::Duration;
-
 use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, Vector};
 use tombolo_deform::shapes;
 use tombolo_deform::skeleton::{Skeleton, SkeletonSettings};
 use tombolo_deform::surface::{FeatureSettings, Surface};
 use tombolo_pipelines::files::read_mesh;
-use tombolo_tests::{CurveGraph, generated_surfaces};
+use tombolo_tests::{CurveGraph, PATIENCE, generated_surfaces};
 
-const LIMIT: Duration = Duration::from_secs(100);
 /// Branches shorter than this part of the diagonal are noise: CGAL has other ones in each run.
 const SPUR: f64 = 0.03;
 
@@ -17,7 +14,7 @@ const SPUR: f64 = 0.03;
 fn agree(name: &str, mesh: &Mesh, counts: [usize; 4]) {
     let surface = Surface::extract(mesh, &FeatureSettings::default()).expect("a surface");
     let ours = CurveGraph::of(&Skeleton::extract(&surface, &SkeletonSettings::default()).expect("a skeleton"));
-    let (_, theirs) = CurveGraph::of_cgal(&surface, LIMIT).expect("CGAL ends in time");
+    let (_, theirs) = CurveGraph::of_cgal(&surface, PATIENCE).expect("CGAL ends in time");
     let theirs = theirs.without_spurs(SPUR, &surface);
     assert_eq!(ours.without_spurs(SPUR, &surface), ours, "{name}: ours has no spurs");
     assert_eq!(ours.counts(), counts, "{name}: pieces, loops, branch nodes and ends");

@@ -6,9 +6,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 use tokio_tungstenite::tungstenite::Message as Wire;
-use tombolo_tests::{Link, Message, NOZZLE_FEATURES, Run, Small, Viewer, program, tombolo};
-
-const LIMIT: Duration = Duration::from_secs(120);
+use tombolo_tests::{Link, Message, NOZZLE_FEATURES, PATIENCE, Run, Small, Viewer, program, tombolo};
 
 /// A run that streams its surface, waits at its first step, and writes its mesh at its last.
 fn paused() -> Small {
@@ -48,7 +46,7 @@ fn start(small: &Small) -> (Run, Link) {
 /// Lets a paused run go on to its end: it must end well and say nothing of a panic.
 fn finish(run: Run, mut driver: Viewer) -> String {
     driver.resume();
-    let (status, text) = run.finish(LIMIT);
+    let (status, text) = run.finish(PATIENCE);
     assert!(status.success(), "{text}");
     assert!(!text.contains("panicked"), "{text}");
     text
@@ -57,7 +55,8 @@ fn finish(run: Run, mut driver: Viewer) -> String {
 /// What `last.vtu` holds when nobody interferes.
 fn undisturbed() -> Vec<u8> {
     let small = unpaused();
-    let (status, text) = Run::flow(&small.arguments(&["--pipelines", "@pipelines.json", "--headless"])).finish(LIMIT);
+    let (status, text) =
+        Run::flow(&small.arguments(&["--pipelines", "@pipelines.json", "--headless"])).finish(PATIENCE);
     assert!(status.success(), "{text}");
     small.bytes("out/last.vtu")
 }
@@ -131,7 +130,7 @@ fn an_unknown_feature_is_rejected_with_the_near_and_all_names() {
             {"scale_direction": {"features": ["thraot"], "fixed": ["inlet"], "factors": [1, 1, 0.5]}}]}}]),
     );
     let arguments = small.arguments(&["--pipelines", "@pipelines.json", "--orders", "@orders.json", "--headless"]);
-    let (status, text) = Run::flow(&arguments).finish(LIMIT);
+    let (status, text) = Run::flow(&arguments).finish(PATIENCE);
     assert!(status.success(), "{text}");
     let report = small.read("report.json");
     let order = &report["orders"][0];
@@ -315,7 +314,7 @@ fn an_order_that_would_break_the_mesh_is_refused_and_the_solver_runs_on() {
             {"scale_direction": {"features": ["throat"], "fixed": ["inlet", "outlet"], "factors": [1, 1, -0.5]}}]}}]),
     );
     let arguments = small.arguments(&["--pipelines", "@pipelines.json", "--orders", "@orders.json", "--headless"]);
-    let (status, text) = Run::flow(&arguments).finish(LIMIT);
+    let (status, text) = Run::flow(&arguments).finish(PATIENCE);
     assert!(status.success(), "{text}");
     let report = small.read("report.json");
     assert_eq!(report["orders"][0]["status"], "rejected", "{report}");
@@ -333,4 +332,24 @@ fn edits_offline_meet_the_same_errors() {
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(!output.status.success() && errors.contains("outlat") && errors.contains("outlet"), "{errors}");
     assert!(!small.path("new.vtu").exists(), "a refused edit wrote a mesh");
+}
+
+/// Orders of a file are held to what viewers are, and refused before the run begins.
+#[test]
+fn flow_refuses_orders_beyond_the_limits() {
+    let small = unpaused();
+    let edit = json!({"translate": {"features": ["throat"], "fixed": ["inlet"], "by": [0, 0, 1e-6]}});
+    for (order, named) in [
+        (
+            json!({"edits": [edit], "schedule": {"steps": 1_000_000_000}}),
+            "found 1000000000 shapes, expected at most 10000",
+        ),
+        (json!({"edits": [edit], "schedule": {"steps": u32::MAX}}), "found 4294967295 shapes, expected at most 10000"),
+        (json!({"edits": vec![edit.clone(); 20_000]}), "found 20000 edits, expected at most 16384"),
+    ] {
+        small.write("orders.json", &json!([{"order": order}]));
+        let arguments = small.arguments(&["--pipelines", "@pipelines.json", "--headless", "--orders", "@orders.json"]);
+        let (status, text) = Run::flow(&arguments).finish(PATIENCE);
+        assert!(!status.success() && text.contains(named) && !text.contains("panicked"), "{text}");
+    }
 }

@@ -1,12 +1,10 @@
 //! The main job, without a picture: the throat of a nozzle is pinched to half its height while the flow runs, on the schedules of
 //! the paper, and opened again.
 
-use std::time::Duration;
-
 use serde_json::{Value, json};
 use tombolo_deform::mesh::{Mesh, Vector};
 use tombolo_deform::quality::quality;
-use tombolo_tests::{Run, Small};
+use tombolo_tests::{PATIENCE, Run, Small};
 
 /// Vertices of the throat: on the wall, 0.1 to either side of the middle.
 fn throat(mesh: &Mesh) -> Vec<usize> {
@@ -25,7 +23,7 @@ fn pinch(order: &Value) -> (Small, Value) {
     );
     small.write("orders.json", &json!([order, {"at": {"cycle": 45}, "order": {"undo": 1}}]));
     let more = ["--pipelines", "@pipelines.json", "--orders", "@orders.json", "--headless", "--steps", "60"];
-    let (status, text) = Run::flow(&small.arguments(&more)).finish(Duration::from_secs(300));
+    let (status, text) = Run::flow(&small.arguments(&more)).finish(PATIENCE);
     assert!(status.success(), "{text}");
     let report = small.read("report.json");
     (small, report)

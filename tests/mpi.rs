@@ -1,18 +1,15 @@
 //! `flow` under mpirun: what one process computes, several do together.
 
 use std::collections::BTreeSet;
-use std::time::Duration;
 
 use serde_json::{Value, json};
 use tombolo_deform::mesh::{Mesh, Vector};
 use tombolo_pipelines::files::{MeshFile, read_mesh};
-use tombolo_tests::{Run, Small, Viewer, generated_mesh, project};
-
-const LIMIT: Duration = Duration::from_secs(240);
+use tombolo_tests::{PATIENCE, Run, Small, Viewer, generated_mesh, project};
 
 /// A run to its end on this many ranks; its report, with what it printed.
 fn run_on(ranks: usize, small: &Small, more: &[&str]) -> (Value, String) {
-    let (status, text) = Run::flow_on(ranks, &small.arguments(more)).finish(LIMIT);
+    let (status, text) = Run::flow_on(ranks, &small.arguments(more)).finish(PATIENCE);
     assert!(status.success(), "{ranks} ranks, {more:?}:\n{text}");
     (small.read("report.json"), text)
 }
@@ -68,7 +65,7 @@ type Dealing<'a> = (usize, &'a [&'a str]);
 
 /// The same case on one process and dealt out in each way: the orders take effect at the same cycles, the meshes and fields agree.
 fn agrees(small: &Small, common: &[&str], dealings: &[Dealing<'_>]) {
-    let (status, text) = Run::flow(&small.arguments(common)).finish(LIMIT);
+    let (status, text) = Run::flow(&small.arguments(common)).finish(PATIENCE);
     assert!(status.success(), "{text}");
     let alone = small.read("report.json");
     assert_eq!(alone["mesh"]["inverted"], 0);
@@ -193,7 +190,7 @@ fn viewers_steer_three_ranks() {
     );
     second.wait_for("order", |order| order["id"] == "nonsense" && order["status"] == "rejected");
     second.send(&json!({"id": "end", "stop": {}}));
-    let (status, text) = run.finish(Duration::from_secs(20));
+    let (status, text) = run.finish(PATIENCE);
     assert!(status.success(), "{text}");
     let report = small.read("report.json");
     let orders: Vec<_> = report["orders"].as_array().expect("orders").iter().map(|order| &order["status"]).collect();
@@ -208,14 +205,12 @@ fn ranks_give_up_together() {
     let mut case = small.read("case.json");
     case["boundary"]["inlet"]["velocity"][1] = json!("1 / max(0, 0.0101 - t)");
     small.write("case.json", &case);
-    let begun = std::time::Instant::now();
-    let (status, text) = Run::flow_on(3, &small.arguments(&["--headless"])).finish(LIMIT);
+    let (status, text) = Run::flow_on(3, &small.arguments(&["--headless"])).finish(PATIENCE);
     assert!(!status.success());
     assert_eq!(text.matches("flow: ").count(), 1, "{text}");
     assert!(text.contains("flow: rank ") && text.contains("diverged"), "{text}");
     case["mesh"] = json!("nowhere.msh");
     small.write("case.json", &case);
-    let (status, text) = Run::flow_on(3, &small.arguments(&["--headless"])).finish(LIMIT);
+    let (status, text) = Run::flow_on(3, &small.arguments(&["--headless"])).finish(PATIENCE);
     assert!(!status.success() && text.contains("nowhere.msh"), "{text}");
-    assert!(begun.elapsed() < Duration::from_secs(60));
 }

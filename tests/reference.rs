@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 
 use serde_json::Value;
 use tombolo_pipelines::language::{TimedCommand, config_schema, order_schema};
+use tombolo_pipelines::limits;
 use tombolo_tests::project;
 
 const PAGE: &str = "docs/json-reference.md";
@@ -23,6 +24,7 @@ is one that stands twice. Every number must be finite.
 #[test]
 fn the_reference_is_what_the_types_say() {
     let mut renderer = Renderer::default();
+    renderer.limits();
     renderer.render("Pipelines", &config_schema());
     renderer.render("Orders", &schemars::schema_for!(Vec<TimedCommand>).to_value());
     renderer.render("Cases of flow", &schemars::schema_for!(tombolo_flow::case::Case).to_value());
@@ -60,6 +62,18 @@ struct Renderer {
 }
 
 impl Renderer {
+    fn limits(&mut self) {
+        self.line(
+            "## Limits\n\nThe same in files, for programs, and over the network. What is beyond one is refused, and nothing has \
+             happened.\n",
+        );
+        self.line("| at most | of |\n|---|---|");
+        for limit in limits::ALL {
+            self.line(&format!("| {} {} | {} |", limit.most, limit.what, limit.of));
+        }
+        self.line("");
+    }
+
     /// Renders a schema and every definition it reaches that no schema before it did, in the order they are met.
     fn render(&mut self, title: &str, schema: &Value) {
         self.definition(title, schema);

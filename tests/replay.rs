@@ -3,9 +3,7 @@
 use std::time::Duration;
 
 use serde_json::{Value, json};
-use tombolo_tests::{Run, Small, Viewer};
-
-const LIMIT: Duration = Duration::from_secs(120);
+use tombolo_tests::{PATIENCE, Run, Small, Viewer};
 
 fn pipelines(hold: bool) -> Value {
     let mut list = vec![
@@ -48,7 +46,7 @@ fn watched(viewers: usize) -> Vec<u8> {
         all[0].resume();
         while all[0].next(Duration::from_secs(5)).is_some() {}
     }
-    let (status, text) = run.finish(LIMIT);
+    let (status, text) = run.finish(PATIENCE);
     assert!(status.success(), "{text}");
     assert_eq!(small.read("report.json")["orders"][0]["status"], "applied");
     last(&small)
@@ -71,7 +69,7 @@ fn a_journal_plays_back_to_the_same_bits() {
     driver.send(&json!({"id": "first", "order": pinch(0.8)}));
     driver.wait_for("order", |order| order["status"] == "accepted" || order["status"] == "computing");
     driver.resume();
-    let (status, text) = run.finish(LIMIT);
+    let (status, text) = run.finish(PATIENCE);
     assert!(status.success(), "{text}");
     let report = live.read("report.json");
     assert_eq!(report["orders"][0]["status"], "applied", "{report}");
@@ -88,7 +86,7 @@ fn a_journal_plays_back_to_the_same_bits() {
         "--steps",
         "40",
     ]);
-    let (status, text) = Run::flow(&arguments).finish(LIMIT);
+    let (status, text) = Run::flow(&arguments).finish(PATIENCE);
     assert!(status.success(), "{text}");
     let replayed = again.read("report.json");
     assert_eq!(replayed["orders"][0]["cycle_applied"], report["orders"][0]["cycle_applied"], "{replayed}");

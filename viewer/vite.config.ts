@@ -6,5 +6,5 @@ export default defineConfig({
   build: { target: "es2022", chunkSizeWarningLimit: 2000, assetsInlineLimit: 0 },
   worker: { format: "es" },
   server: { proxy: { "/ws": { target: "ws://127.0.0.1:7070", ws: true } } },
-  test: { include: ["test/**/*.test.ts"], environment: "node" },
+  test: { include: ["test/**/*.test.ts"], environment: "node", testTimeout: 300_000, hookTimeout: 300_000 },
 });

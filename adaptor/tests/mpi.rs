@@ -30,7 +30,7 @@ unsafe extern "C" {
     fn PetscFinalize() -> c_int;
 }
 
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_secs(900);
 /// Set where one of the ranks is to fail in itself.
 const FAILING: &str = "TOMBOLO_TEST_FAILING_RANK";
 

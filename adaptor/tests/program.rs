@@ -138,6 +138,28 @@ fn edit_tells_what_is_wrong_with_the_surface() {
     assert!((0.5..0.85).contains(&fraction), "{fraction}");
 }
 
+/// Not by a panic, not by asking for more memory than there is.
+#[test]
+fn edit_refuses_more_than_is_allowed() {
+    let edit = r#"{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -1e-6]}}"#;
+    let many = format!("[{}]", vec![edit; 20_000].join(","));
+    let steps = |steps: u32| format!(r#"{{"edits": [{edit}], "schedule": {{"steps": {steps}}}}}"#);
+    for (edits, more, code, named) in [
+        (many, &[][..], 1, "edits.json:1:1: found 20000 edits, expected at most 16384"),
+        (steps(1_000_000_000), &[], 1, "schedule.steps: found 1000000000 shapes, expected at most 10000"),
+        (steps(u32::MAX), &[], 1, "schedule.steps: found 4294967295 shapes, expected at most 10000"),
+        (steps(1), &["--steps", "1000000000"], 2, "found 1000000000 shapes, expected at most 10000"),
+    ] {
+        let (directory, _) = with_box(&edits);
+        let output = tombolo(directory.path(), &[&EDIT[..], more].concat());
+        assert_eq!(output.status.code(), Some(code), "{}", error_text(&output));
+        assert!(error_text(&output).contains(named), "{}", error_text(&output));
+    }
+    let (directory, _) = with_box(&steps(10_000));
+    let output = tombolo(directory.path(), &EDIT);
+    assert_eq!(output.status.code(), Some(0), "{}", error_text(&output));
+}
+
 #[test]
 fn edit_refuses_with_the_reason_and_writes_nothing() {
     let good = r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -1.5]}}]"#;

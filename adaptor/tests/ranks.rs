@@ -2,10 +2,7 @@
 
 mod common;
 
-use std::{
-    sync::Arc,
-    time::{Duration, Instant},
-};
+use std::{sync::Arc, time::Duration};
 
 use common::{LINK_TO_ALL, Viewer, config, squeeze};
 use serde_json::json;
@@ -124,7 +121,6 @@ fn what_viewers_ask_for_happens_at_the_same_cycle() {
 #[test]
 fn a_mistake_on_one_rank_is_the_same_error_on_all() {
     let mesh = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
-    let begun = Instant::now();
     let outcomes = threads::run(RANKS, |ranks| {
         let rank = ranks.rank();
         let part = part(&mesh, rank);
@@ -152,7 +148,6 @@ fn a_mistake_on_one_rank_is_the_same_error_on_all() {
     assert!(fault(3).starts_with("rank 1: cycle 3: no channel"), "{}", fault(3));
     assert!(fault(4).contains("cycles from 4 to 40"), "{}", fault(4));
     assert!([0, 1, 5].iter().all(|&cycle: &usize| outcomes[0][cycle].is_ok()), "{outcomes:?}");
-    assert!(begun.elapsed() < Duration::from_secs(20));
 }
 
 /// A fault between two meetings waits for the next, and what falls due between them too.
@@ -204,7 +199,6 @@ fn ranks_come_together_as_often_as_they_are_told() {
 #[test]
 fn a_bad_cell_on_one_rank_holds_nobody_up() {
     let mesh = box_of_tets([3, 3, 3], [0.0; 3], [1.0; 3]);
-    let begun = Instant::now();
     let faults = [
         |part: &mut Part| part.points[3][1] = f64::NAN,
         |part: &mut Part| {
@@ -241,7 +235,6 @@ fn a_bad_cell_on_one_rank_holds_nobody_up() {
         assert!(outcomes.iter().all(|outcome| *outcome == outcomes[0]), "{outcomes:?}");
         assert!(outcomes[0].iter().flat_map(|outcome| outcome.as_ref().err()).all(|text| text.contains("rank 1")));
     }
-    assert!(begun.elapsed() < Duration::from_secs(20));
 }
 
 /// An order falls into the schedule of another, and one cannot be done: at each cycle all ranks are handed the same shape, and vertices

@@ -16,6 +16,7 @@ use tombolo::{
     pipelines::{
         encode::{Decoded, decode},
         language::{self, parse_orders},
+        limits::{DOCUMENT, EDITS, SHAPES},
     },
     stream::StreamError,
 };
@@ -250,8 +251,8 @@ fn one_drives_and_the_others_watch() {
     solver
         .step_until_told(&mut watcher, "order", |order| order["id"] == "seen by both" && order["status"] == "applied");
 
-    drop(driver);
     let begun = Instant::now();
+    drop(driver);
     loop {
         watcher.send(&json!({"drive": {}}));
         if watcher.look_for("hello", Duration::from_millis(300), |hello| hello["role"] == "driver").is_some() {
@@ -294,8 +295,8 @@ fn a_paused_solver_waits_and_still_listens() {
         viewer.wait_for("status", |status| status["paused"] == false);
         viewer
     });
-    solver.step_until("the pause", |solver| solver.slowest > Duration::from_millis(200));
-    assert!(!solver.motions.is_empty(), "the order's motion starts at the cycle of the pause");
+    solver.step_until("the order's motion, at the cycle of the pause", |solver| !solver.motions.is_empty());
+    assert!(solver.slowest >= Duration::from_millis(200), "it did not wait");
     solver.step();
     let mut viewer = helper.join().unwrap();
     viewer.send(&json!({"pause": {}}));
@@ -363,9 +364,44 @@ fn a_message_that_is_too_long_ends_only_its_own_connection() {
     let mut viewer = Viewer::connect(&solver.adaptor);
     viewer.hello();
     let mut long = Viewer::connect(&solver.adaptor);
-    long.send_unwelcome(Message::text("x".repeat(2 << 20)));
+    long.send_unwelcome(Message::text(" ".repeat(DOCUMENT.most + (1 << 20))));
     long.wait_for_end();
     solver.step_until_told(&mut viewer, "status", |status| status["viewers"] == 1);
+}
+
+#[test]
+fn a_viewer_is_told_which_limit_its_message_is_beyond() {
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    solver.step();
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    let edit = json!({"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -1e-6]}});
+    let edits = vec![edit.clone(); EDITS.most + 1];
+    for (message, named) in [
+        (
+            json!({"id": "a", "order": {"edits": [edit], "schedule": {"steps": u32::MAX}}}),
+            SHAPES.check(u32::MAX as usize),
+        ),
+        (json!({"id": "b", "order": {"edits": edits}}), EDITS.check(EDITS.most + 1)),
+        (json!({"id": "c", "forecast": {"stack": edits}}), EDITS.check(EDITS.most + 1)),
+    ] {
+        viewer.send(&message);
+        let told = viewer.wait_for("error", |error| error["id"] == message["id"]);
+        assert!(told["message"].as_str().unwrap().ends_with(&named.unwrap_err().to_string()), "{told}");
+    }
+    viewer.send_text(&" ".repeat(DOCUMENT.most + 1));
+    let beyond = DOCUMENT.check(DOCUMENT.most + 1).unwrap_err().to_string();
+    viewer.wait_for("error", |error| error["message"].as_str().unwrap().ends_with(&beyond));
+    let mut watcher = Viewer::connect(&solver.adaptor);
+    watcher.send_text(&" ".repeat(2000));
+    watcher.wait_for("error", |error| error["message"].as_str().unwrap().contains("watches"));
+    // A stack is as long as it is, however it came to be so.
+    let stack = vec![edit; EDITS.most];
+    viewer.send(&json!({"id": "d", "forecast": {"stack": stack}}));
+    let told = viewer.wait_for("forecast", |forecast| forecast["id"] == "d");
+    assert_eq!(told["order"]["outcome"], "applied", "{told}");
+    solver.step();
+    assert!(solver.is_at_reference() && !solver.stopped);
 }
 
 #[test]
@@ -379,7 +415,8 @@ fn a_viewer_that_does_not_read_costs_the_solver_nothing() {
     while begun.elapsed() < Duration::from_secs(3) {
         solver.step();
     }
-    assert!(solver.slowest < Duration::from_secs(1), "{:?}", solver.slowest);
+    // Who waited for it would wait until it is let go, which is after ten seconds.
+    assert!(solver.slowest < Duration::from_secs(8), "{:?}", solver.slowest);
     assert!(solver.cycle > 20);
 }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 use tombolo::Parameter;
 use tombolo::pipelines::language::{self, Config, Pipeline, Steering, StreamServer, TimedCommand};
+use tombolo::pipelines::limits::{DOCUMENT, Limit, WAITING_BYTES};
 
 use crate::error::CatalystError;
 use crate::node::{Kind, Node};
@@ -82,7 +83,7 @@ impl Configuration {
             }
         }
         if let Some(file) = variable(ORDERS) {
-            orders = language::parse_orders(&text(&file)?, &file).map_err(unreadable)?;
+            orders = language::parse_orders(&text(&file, WAITING_BYTES)?, &file).map_err(unreadable)?;
         }
         let is_default = found.files.is_empty() && of_user.is_none();
         let (config, groups) = merged(&mut found, of_user.as_deref())?;
@@ -108,9 +109,8 @@ pub(crate) fn report_file() -> Option<String> {
     variable(REPORT)
 }
 
-fn text(file: &str) -> Result<String, CatalystError> {
-    let bytes = std::fs::read(file).map_err(|error| CatalystError::Configuration(format!("{file}: {error}")))?;
-    Ok(language::text(&bytes, file).map_err(unreadable)?.to_owned())
+fn text(file: &str, limit: Limit) -> Result<String, CatalystError> {
+    language::read_text(file.as_ref(), limit).map_err(unreadable)
 }
 
 fn unreadable(error: impl ToString) -> CatalystError {
@@ -205,7 +205,7 @@ impl Settings {
                 _ => {}
             }
         }
-        let config = language::parse(&text(file)?, file).map_err(unreadable)?;
+        let config = language::parse(&text(file, DOCUMENT)?, file).map_err(unreadable)?;
         // What a file does not say is what it would be by itself.
         let steering = Some(config.steering).filter(|steering| *steering != Steering::default());
         first(&mut self.stream, config.stream, "stream", file, notes);

@@ -4,10 +4,9 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
-use std::time::Duration;
 
 use serde_json::{Value, json};
-use tombolo_tests::{Run, Viewer, project};
+use tombolo_tests::{PATIENCE, Run, Viewer, project};
 
 const PROGRAMS: [&str; 5] =
     ["heat_catalyst", "heat_catalyst_cxx", "heat_catalyst_fortran", "heat_tombolo", "heat_tombolo_fortran"];
@@ -182,7 +181,7 @@ fn steer(name: &str, ranks: usize) {
     viewer.wait_for("status", |_| true);
     viewer.send(&json!({"parameter": {"name": "conductivity", "value": 0.75}}));
     viewer.send(&json!({"stop": {}}));
-    let (status, text) = run.finish(Duration::from_secs(60));
+    let (status, text) = run.finish(PATIENCE);
     assert!(status.success(), "{name}: {text}");
     let [volume, _, conductivity] = numbers(&text);
     assert_eq!(conductivity, 0.75, "{name}: {text}");
@@ -249,7 +248,7 @@ fn no_rank_waits_for_one_that_goes_wrong() {
     compile.arg(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/ranks.c")).arg("-o").arg(&program);
     succeed(compile.args(flags.split_whitespace()));
     let mut run = Command::new("timeout");
-    run.args(["60", "mpirun", "--oversubscribe", "--allow-run-as-root", "-n", "3"]).arg(&program);
+    run.args(["900", "mpirun", "--oversubscribe", "--allow-run-as-root", "-n", "3"]).arg(&program);
     run.current_dir(directory.path())
         .env("CATALYST_IMPLEMENTATION_NAME", "tombolo")
         .env("TOMBOLO_PIPELINES", &pipelines);

@@ -4,6 +4,7 @@
 //! as WebAssembly, in a browser.
 #![warn(missing_docs)]
 
+pub mod limits;
 pub mod linear;
 pub mod mesh;
 pub mod number;

@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::number::Number;
+use crate::limits::{Exceeded, SHAPES};
 
 /// How a change of shape is spread over the run: in `steps` shapes, one `every` so many cycles or so much simulated time, at equal
 /// distances or eased.
@@ -23,6 +24,7 @@ use crate::number::Number;
 #[serde(deny_unknown_fields, default)]
 pub struct Schedule {
     /// How many shapes lie between the present one (not counted) and the new one (counted). At least 1.
+    #[schemars(range(max = SHAPES.most))]
     pub steps: NonZeroU32,
     /// The distance between one shape and the next: solver steps, or simulated time.
     pub every: Every,
@@ -106,6 +108,14 @@ impl Schedule {
     #[must_use]
     pub fn fractions(&self) -> Vec<f64> {
         (1..=self.steps.get()).map(|step| self.fraction(step)).collect()
+    }
+
+    /// Whether it has as few shapes as are allowed.
+    ///
+    /// # Errors
+    /// [`Exceeded`] for more than [`SHAPES`].
+    pub fn check(&self) -> Result<(), Exceeded> {
+        SHAPES.check(usize::try_from(self.steps.get()).unwrap_or(usize::MAX))
     }
 
     /// How far along the way shape `step` lies (from 1; 0 is the present shape, and beyond the last is the last).

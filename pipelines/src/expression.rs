@@ -13,13 +13,10 @@
 //! makes a short program for a stack of fixed size, so that evaluating one allocates nothing.
 
 use crate::language::nearest;
+use crate::limits::{FORMULA, FORMULA_DEPTH};
 
 /// How many intermediate results a formula may need at once.
 const STACK: usize = 32;
-/// How deep parentheses may be nested.
-const DEEPEST: usize = 200;
-/// How many characters a formula may have.
-const LONGEST: usize = 10_000;
 
 /// A parsed formula.
 ///
@@ -121,9 +118,7 @@ impl Expression {
 
     fn parse_kind(text: &str, names: &[&str], expected: Kind) -> Result<Self, ExpressionError> {
         let mut parser = Parser { text, at: 0, names, program: Vec::new(), depth: 0, stack: 0 };
-        if text.len() > LONGEST {
-            return Err(parser.error(0, format!("the formula has more than {LONGEST} characters")));
-        }
+        FORMULA.check(text.len()).map_err(|exceeded| parser.error(0, exceeded.to_string()))?;
         parser.skip_space();
         let start = parser.at;
         let kind = parser.expression(0)?;
@@ -297,9 +292,7 @@ impl Parser<'_> {
     /// An operand and all operators after it that bind at least this tightly.
     fn expression(&mut self, tightness: u8) -> Result<Kind, ExpressionError> {
         self.depth += 1;
-        if self.depth > DEEPEST {
-            return Err(self.error(self.at, format!("nested more than {DEEPEST} deep")));
-        }
+        FORMULA_DEPTH.check(self.depth).map_err(|exceeded| self.error(self.at, exceeded.to_string()))?;
         self.skip_space();
         let start = self.at;
         let mut kind = self.operand()?;

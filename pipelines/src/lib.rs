@@ -15,3 +15,5 @@ pub mod files;
 pub mod language;
 pub mod run;
 pub mod shape;
+
+pub use tombolo_deform::limits;

@@ -25,7 +25,8 @@ use tombolo_deform::{
 
 use crate::communicator::{Communicator, agree};
 use crate::distributed::{DistributedError, Part, PartBoundary, Ranks};
-use crate::language::DeformStage;
+use crate::language::{DeformStage, check_stack};
+use crate::limits::Exceeded;
 pub use boundary::Elsewhere;
 use boundary::{Boundary, Parts};
 use carry::Carrier;
@@ -110,6 +111,9 @@ pub enum Refused {
     /// What ranks said to each other was not understood.
     #[error(transparent)]
     Distributed(#[from] DistributedError),
+    /// There are more edits or shapes than are allowed.
+    #[error(transparent)]
+    Limit(#[from] Exceeded),
     /// Another rank has the reason, in its own words.
     #[error("{0}")]
     Elsewhere(Elsewhere),
@@ -387,8 +391,9 @@ impl Shaper {
     /// volume is not judged yet.
     ///
     /// # Errors
-    /// [`Refused::Edit`], [`Refused::Surface`], [`Refused::Feature`], [`Refused::Volume`].
+    /// [`Refused::Edit`], [`Refused::Surface`], [`Refused::Feature`], [`Refused::Volume`], [`Refused::Limit`].
     pub fn target(&mut self, stack: &[Edit], deform: &DeformStage, rule: SurfaceRule) -> Result<Target, Refused> {
+        check_stack(stack)?;
         deform.equation.validate()?;
         let mut seconds = ShapeSeconds::default();
         let watch = Stopwatch::start();

@@ -18,6 +18,10 @@ pub use small::Small;
 pub use viewer::{Link, Message, Viewer};
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// How long a test waits for what should come: so long that only what never comes is missed, on however busy a machine.
+pub const PATIENCE: Duration = Duration::from_secs(900);
 
 /// The root of the project.
 ///

@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-use crate::{Link, project};
+use crate::{Link, PATIENCE, project};
 
 /// Where cargo puts the programs of this profile; they are built at the first call.
 ///
@@ -116,7 +116,7 @@ impl Run {
     /// # Panics
     /// Where the program ends or a minute passes before it prints one.
     pub fn link(&mut self) -> Link {
-        let until = Instant::now() + Duration::from_secs(60);
+        let until = Instant::now() + PATIENCE;
         loop {
             match self.lines.recv_timeout(until.saturating_duration_since(Instant::now())) {
                 Ok(line) => {

@@ -9,6 +9,8 @@ use tokio::runtime::{Builder, Runtime};
 use tokio_tungstenite::tungstenite;
 use tokio_tungstenite::{MaybeTlsStream, WebSocketStream};
 
+use crate::PATIENCE;
+
 /// The link a run prints: where it listens and the token.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Link {
@@ -48,7 +50,7 @@ impl Link {
     #[must_use]
     pub fn tcp(&self) -> TcpStream {
         let stream = TcpStream::connect(&self.address).expect("the run listens");
-        stream.set_read_timeout(Some(Duration::from_secs(10))).expect("a timeout can be set");
+        stream.set_read_timeout(Some(PATIENCE)).expect("a timeout can be set");
         stream
     }
 }
@@ -118,9 +120,9 @@ impl Viewer {
     /// Waits for the first JSON message of this name for which `wanted` holds, and returns its content.
     ///
     /// # Panics
-    /// Where none comes in half a minute.
+    /// Where none comes in a long time.
     pub fn wait_for(&mut self, name: &str, wanted: impl Fn(&Value) -> bool) -> Value {
-        let until = Instant::now() + Duration::from_secs(30);
+        let until = Instant::now() + PATIENCE;
         let mut last = Value::Null;
         while let Some(message) = self.next(until.saturating_duration_since(Instant::now())) {
             let Message::Text(message) = message else { continue };
@@ -137,7 +139,7 @@ impl Viewer {
     /// Waits until the run is paused, and lets it go on: a resume that comes before the pause would do nothing.
     ///
     /// # Panics
-    /// Where it is not paused in half a minute.
+    /// Where it is not paused in a long time.
     pub fn resume(&mut self) {
         self.wait_for("status", |status| status["paused"] == true);
         self.send(&serde_json::json!({"resume": {}}));
@@ -146,9 +148,9 @@ impl Viewer {
     /// Waits for the next frame.
     ///
     /// # Panics
-    /// Where none comes in half a minute.
+    /// Where none comes in a long time.
     pub fn frame(&mut self) -> Vec<u8> {
-        let until = Instant::now() + Duration::from_secs(30);
+        let until = Instant::now() + PATIENCE;
         while let Some(message) = self.next(until.saturating_duration_since(Instant::now())) {
             if let Message::Frame(bytes) = message {
                 return bytes;

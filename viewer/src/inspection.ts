@@ -6,6 +6,7 @@ import type { ConnectionState } from "./connection";
 import type { ForecastInspection } from "./forecast";
 import type { OrderRecord } from "./orders";
 import type { QualitySummary, Role, Status, Vector } from "./protocol";
+import type { Picture } from "./scene";
 
 export interface ViewInspection { bounds: [Vector, Vector] | null; points: number; triangles: number; topology: string | null }
 
@@ -50,6 +51,8 @@ export interface Inspection {
   readonly errors: readonly string[];
   /** The box around a feature as it is now; null when no view shows it. */
   featureBounds(name: string): [Vector, Vector] | null;
+  /** Draws all that has come, and says what was drawn. */
+  picture(): Promise<Picture>;
   /** A place of the page (clientX, clientY) at which a click would pick this feature; null when it cannot be seen. */
   featurePlace(name: string): [number, number] | null;
 }

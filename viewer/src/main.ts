@@ -311,6 +311,7 @@ publish({
     const bones = scene.shownBones;
     return bones && { nodes: bones.now.length / 3, segments: bones.segments.length / 2, places: scene.nodePlaces() };
   },
+  picture: () => scene.picture(),
   featureBounds: (name) => scene.featureBounds(name),
   featurePlace: (name) => scene.featurePlace(name),
 });

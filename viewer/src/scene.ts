@@ -30,6 +30,9 @@ export interface SceneEvents {
   trouble(message: string): void;
 }
 
+/** What was drawn: the newest cycle in it, and a number made of all its pixels. */
+export interface Picture { cycle: number | null; pixels: number }
+
 export class Scene {
   readonly layers = new Map<string, Layer>();
   private readonly window = vtkRenderWindow.newInstance();
@@ -374,6 +377,23 @@ export class Scene {
         this.rested += Math.min(LONGEST_REST, this.rested - start);
       }, 0);
     });
+  }
+
+  /** Draws all that has come, and says what was drawn. */
+  picture(): Promise<Picture> {
+    return new Promise((resolve) => this.request(() => {
+      const cycles = [...this.layers.values()].flatMap((layer) => (layer.frame ? [layer.frame.cycle] : []));
+      resolve({ cycle: cycles.length > 0 ? Math.max(...cycles) : null, pixels: this.pixels() });
+    }));
+  }
+
+  /** A number made of all pixels (FNV-1a). They are there only in the task that has drawn them. */
+  private pixels(): number {
+    const [width, height] = this.canvas.getSize();
+    const context = this.canvas.get3DContext({}) as WebGL2RenderingContext;
+    const bytes = new Uint8Array(4 * width * height);
+    context.readPixels(0, 0, width, height, context.RGBA, context.UNSIGNED_BYTE, bytes);
+    return bytes.reduce((hash, byte) => Math.imul(hash ^ byte, 0x01000193), 0x811c9dc5) >>> 0;
   }
 
   /** Draws new values, but leaves as much time between pictures as they take: messages and the person come first. */

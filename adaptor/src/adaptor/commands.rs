@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use tombolo_pipelines::{
     extract::Channel,
     files::{UnreadFile, read_displacements},
-    language::{self, Command, Question},
+    language::{Command, Message, Order, Question},
 };
 
 use super::{Adaptor, SteeredMesh};
@@ -175,9 +175,7 @@ pub(super) struct Intake {
 
 impl Intake {
     /// Has a viewer told what an order would come to.
-    fn forecast(&self, client: u64, id: Option<String>, question: &str) -> Result<(), String> {
-        let Question::Forecast(order) =
-            language::parse_valid(question, "message").map_err(|error| error.to_string())?;
+    fn forecast(&self, client: u64, id: Option<String>, order: Order) -> Result<(), String> {
         let command = Command::Order(order);
         check_files(&command)?;
         let Command::Order(order) = command else { return Ok(()) };
@@ -205,23 +203,21 @@ fn check_files(command: &Command) -> Result<(), String> {
     }
 }
 
-fn is_question(message: &str) -> bool {
-    matches!(serde_json::from_str::<Value>(message), Ok(Value::Object(members)) if members.contains_key("forecast"))
-}
-
 impl CommandSink for Intake {
-    fn receive(&self, client: u64, id: Option<String>, command: &str) -> Result<(), String> {
-        if is_question(command) {
-            return self.forecast(client, id, command);
-        }
-        let command: Command = language::parse_valid(command, "message").map_err(|error| error.to_string())?;
+    fn receive(&self, client: u64, id: Option<String>, message: Message, bytes: usize) -> Result<(), String> {
+        let command = match message {
+            Message::Question(Question::Forecast(order)) => return self.forecast(client, id, order),
+            Message::Command(command) => command,
+            // The session has answered it.
+            Message::Drive => return Ok(()),
+        };
         check_files(&command)?;
-        if !self.queue.has_room() {
-            return Err("the solver has not come to the commands before this one yet; try again later".into());
-        }
+        self.queue.check_room(bytes).map_err(|exceeded| {
+            format!("{exceeded}; the solver has not come to those before this one yet, try again later")
+        })?;
         let (cycle, time) = self.hub.clock.get();
         let id = self.log.accept(id, &Source::Viewer(client), &command, Moment { cycle, time })?;
-        self.queue.push(Received { client, id, command });
+        self.queue.push(Received { client, id, command, bytes });
         Ok(())
     }
 

@@ -7,7 +7,7 @@ use std::{
 
 use serde_json::{Value, json};
 use tombolo_pipelines::{
-    language::{Command, JournalEntry, OrderStatus as JournalStatus},
+    language::{Command, JournalEntry, Order, OrderStatus as JournalStatus},
     shape::ShapeSeconds,
 };
 
@@ -78,6 +78,10 @@ impl Log {
         command: &Command,
         moment: Moment,
     ) -> Result<String, String> {
+        let given = match command {
+            Command::Order(order) => told_whole(order),
+            _ => None,
+        };
         let id = {
             let mut state = self.lock();
             let id = match wanted {
@@ -85,14 +89,11 @@ impl Log {
                 Some(id) => id,
                 None => state.next_id(),
             };
-            if let Command::Order(order) = command {
+            if matches!(command, Command::Order(_)) {
                 if state.given.len() >= ORDERS_TOLD {
                     state.given.pop_front();
                 }
-                let given = json!(order);
-                if given.to_string().len() <= TOLD_WHOLE {
-                    state.given.push_back((id.clone(), given));
-                }
+                state.given.extend(given.map(|given| (id.clone(), given)));
                 if state.orders.len() >= ORDERS_KEPT {
                     state.orders.pop_front();
                 }
@@ -241,6 +242,15 @@ impl Log {
     pub(crate) fn reports(&self) -> Vec<OrderReport> {
         self.lock().orders.iter().cloned().collect()
     }
+}
+
+/// An order as JSON, unless it is long; of a long one no more is written than it takes to find that out.
+fn told_whole(order: &Order) -> Option<Value> {
+    let mut bytes = [0; TOLD_WHOLE];
+    let mut rest = &mut bytes[..];
+    serde_json::to_writer(&mut rest, order).ok()?;
+    let written = TOLD_WHOLE - rest.len();
+    serde_json::from_slice(&bytes[..written]).ok()
 }
 
 impl State {

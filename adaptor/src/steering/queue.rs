@@ -8,10 +8,10 @@ use std::{
     },
 };
 
-use tombolo_pipelines::language::{Command, Order};
-
-/// Commands that may wait for the solver; the next one is refused.
-const WAITING: usize = 256;
+use tombolo_pipelines::{
+    language::{Command, Order},
+    limits::{Exceeded, WAITING, WAITING_BYTES},
+};
 
 /// A command that was read, found valid and written to the journal.
 #[derive(Debug)]
@@ -19,6 +19,8 @@ pub(crate) struct Received {
     pub(crate) client: u64,
     pub(crate) id: String,
     pub(crate) command: Command,
+    /// How many bytes it came in.
+    pub(crate) bytes: usize,
 }
 
 /// A forecast that a viewer asks for where only all ranks together can answer.
@@ -43,9 +45,11 @@ impl Queue {
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether there is room for one more.
-    pub(crate) fn has_room(&self) -> bool {
-        self.lock().len() < WAITING
+    /// Refuses one more of so many bytes where there is no room for it.
+    pub(crate) fn check_room(&self, bytes: usize) -> Result<(), Exceeded> {
+        let waiting = self.lock();
+        WAITING.check(waiting.len() + 1)?;
+        WAITING_BYTES.check(waiting.iter().map(|received| received.bytes).sum::<usize>().saturating_add(bytes))
     }
 
     pub(crate) fn push(&self, received: Received) {

@@ -1,14 +1,12 @@
 //! The stack of edits, order by order, so that orders can be taken back.
 
-use std::num::NonZeroU32;
+use std::{num::NonZeroU32, sync::Arc};
 
 use tombolo_deform::{quality::Guard, surface::Edit};
-use tombolo_pipelines::language::{Change, DeformStage};
-
-/// Orders that a stack may hold.
-const ORDERS: usize = 4096;
-/// Edits that a shape may be made of.
-const EDITS: usize = 1024;
+use tombolo_pipelines::{
+    language::{Change, DeformStage, check_stack},
+    limits::{Exceeded, ORDERS},
+};
 
 /// What one order did to the stack.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,7 +26,7 @@ pub(crate) struct ShapeSettings {
 /// The edits that make the present shape, and how they came there.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct EditStack {
-    entries: Vec<Entry>,
+    entries: Vec<Arc<Entry>>,
 }
 
 /// Why an order makes no stack.
@@ -36,10 +34,8 @@ pub(crate) struct EditStack {
 pub(crate) enum StackError {
     #[error("undo {wanted}: {}", if *held == 0 { "there is no order to take back".into() } else { format!("only {held} order(s) can be taken back") })]
     Undo { wanted: u32, held: usize },
-    #[error(
-        "the stack would hold {edits} edits of {orders} orders; at most {EDITS} edits and {ORDERS} orders are kept"
-    )]
-    Full { edits: usize, orders: usize },
+    #[error("stack: {0}")]
+    Full(#[from] Exceeded),
 }
 
 impl EditStack {
@@ -58,11 +54,11 @@ impl EditStack {
             guard: guard.unwrap_or(before.guard),
         };
         match change {
-            Change::Edits(edits) | Change::Stack(edits) => entries.push(Entry {
+            Change::Edits(edits) | Change::Stack(edits) => entries.push(Arc::new(Entry {
                 replaces: matches!(change, Change::Stack(_)),
                 edits: edits.clone(),
                 settings: own(default),
-            }),
+            })),
             Change::Undo(count) => {
                 let kept = kept_after(entries.len(), *count)?;
                 entries.truncate(kept);
@@ -70,22 +66,20 @@ impl EditStack {
         }
         let settings = own(entries.last().map_or(default, |entry| &entry.settings));
         let stack = Self { entries };
-        let (orders, edits) = (stack.entries.len(), stack.edits().len());
-        if orders > ORDERS || edits > EDITS {
-            return Err(StackError::Full { edits, orders });
-        }
+        ORDERS.check(stack.entries.len())?;
+        check_stack(stack.present())?;
         Ok((stack, settings))
     }
 
     /// How many edits it begins with that `other` begins with too.
     pub(crate) fn shared(&self, other: &Self) -> usize {
-        self.edits().iter().zip(&other.edits()).take_while(|(a, b)| a == b).count()
+        self.present().zip(other.present()).take_while(|(a, b)| std::ptr::eq(*a, *b) || a == b).count()
     }
 
     /// The stack with a fraction of the last order's edits, those after the first `kept` edits of the stack.
     pub(crate) fn clamped(mut self, kept: usize, fraction: f64) -> Self {
-        let count = self.edits().len();
-        if let Some(last) = self.entries.last_mut() {
+        let count = self.present().count();
+        if let Some(last) = self.entries.last_mut().map(Arc::make_mut) {
             let before = count - last.edits.len();
             for (place, edit) in last.edits.iter_mut().enumerate() {
                 if before + place >= kept {
@@ -98,8 +92,12 @@ impl EditStack {
 
     /// The edits, the oldest first.
     pub(crate) fn edits(&self) -> Vec<Edit> {
+        self.present().cloned().collect()
+    }
+
+    fn present(&self) -> impl Iterator<Item = &Edit> {
         let from = self.entries.iter().rposition(|entry| entry.replaces).unwrap_or(0);
-        self.entries[from..].iter().flat_map(|entry| entry.edits.iter().cloned()).collect()
+        self.entries.iter().skip(from).flat_map(|entry| &entry.edits)
     }
 }
 
@@ -110,6 +108,7 @@ fn kept_after(held: usize, count: NonZeroU32) -> Result<usize, StackError> {
 #[cfg(test)]
 mod tests {
     use tombolo_deform::quality::Otherwise;
+    use tombolo_pipelines::limits::EDITS;
 
     use super::*;
 
@@ -165,7 +164,7 @@ mod tests {
 
     #[test]
     fn a_stack_does_not_grow_without_end() {
-        let edits = vec![edit(1.0); EDITS + 1];
+        let edits = vec![edit(1.0); EDITS.most + 1];
         assert!(EditStack::default().after(&Change::Edits(edits), None, None, &ShapeSettings::default()).is_err());
     }
 }

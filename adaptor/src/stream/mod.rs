@@ -5,7 +5,7 @@
 //!
 //! What it guarantees: it listens on the loopback address unless told otherwise; nothing of the run without the token; no page of
 //! another site can use a browser's connection (the `Origin` must be the server's own), nor reach it under another name (on
-//! loopback the `Host` must be loopback too); messages over 1 MiB, more than [`VIEWERS`] viewers, and floods of messages
+//! loopback the `Host` must be loopback too); messages over [`DOCUMENT`], more than [`VIEWERS`] viewers, and floods of messages
 //! are refused; a client that does not read for 10 seconds, or says nothing for 30, is let go.
 //!
 //! What it does not: it does not encrypt. Over an open network use an SSH tunnel to the loopback address.
@@ -34,7 +34,10 @@ use axum::{
 };
 use serde::{Deserialize, Serialize};
 use tokio::sync::oneshot;
-use tombolo_pipelines::language::StreamServer;
+use tombolo_pipelines::{
+    language::{Message, StreamServer},
+    limits::DOCUMENT,
+};
 
 pub(crate) use hub::{Frame, Hub};
 pub(crate) use surface::ReferenceSurface;
@@ -45,8 +48,8 @@ use viewer_files::ViewerFiles;
 
 /// Viewers at once; one more is told so.
 pub const VIEWERS: usize = 16;
-/// The largest message a viewer may send, in bytes.
-const MESSAGE_SIZE: usize = 1 << 20;
+/// The largest message that is read at all, in bytes: so much more than a document may have that one too long is told so.
+const MESSAGE_SIZE: usize = DOCUMENT.most + (1 << 16);
 /// How often a viewer is asked whether it is still there.
 const PING_PERIOD: Duration = Duration::from_secs(10);
 /// How often the status is told, where it changed.
@@ -54,11 +57,11 @@ const STATUS_PERIOD: Duration = Duration::from_millis(100);
 
 /// Takes the commands of viewers, already known to come from the one that drives.
 pub(crate) trait CommandSink: Send + Sync {
-    /// Takes one command as JSON text.
+    /// Takes one message, which had so many bytes.
     ///
     /// # Errors
     /// What is wrong with it, for the viewer to read; then nothing was taken.
-    fn receive(&self, client: u64, id: Option<String>, command: &str) -> Result<(), String>;
+    fn receive(&self, client: u64, id: Option<String>, message: Message, bytes: usize) -> Result<(), String>;
 
     /// The orders so far, for a viewer that connects.
     fn orders(&self) -> serde_json::Value;
@@ -279,9 +282,9 @@ async fn upgrade(
         match shared.hub.join(VIEWERS, credentials.client.as_deref()) {
             Some(client) => session::serve(socket, client, shared.hub, shared.commands).await,
             None => {
-                use axum::extract::ws::{CloseFrame, Message};
+                use axum::extract::ws::{CloseFrame, Message as Wire};
                 let reason = format!("{VIEWERS} viewers watch already");
-                let _ = socket.send(Message::Close(Some(CloseFrame { code: 1013, reason: reason.into() }))).await;
+                let _ = socket.send(Wire::Close(Some(CloseFrame { code: 1013, reason: reason.into() }))).await;
             }
         }
     })

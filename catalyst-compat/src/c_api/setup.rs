@@ -6,7 +6,10 @@ use std::path::PathBuf;
 use std::ptr;
 use std::sync::Arc;
 
-use tombolo::pipelines::language::{self, Config};
+use tombolo::pipelines::{
+    language::{self, Config},
+    limits::{DOCUMENT, Limit, WAITING_BYTES},
+};
 use tombolo::{Parameter, Settings};
 
 use super::{Fault, Handle, Opened, Stage, answer, c_string, find, hold, name, register, runs, text, value, with};
@@ -21,13 +24,12 @@ fn unreadable(error: impl ToString) -> CatalystError {
     CatalystError::Configuration(error.to_string())
 }
 
-fn file_text(file: &str) -> Result<String, CatalystError> {
-    let bytes = std::fs::read(file).map_err(|error| unreadable(format!("{file}: {error}")))?;
-    Ok(language::text(&bytes, file).map_err(unreadable)?.to_owned())
+fn file_text(file: &str, limit: Limit) -> Result<String, CatalystError> {
+    language::read_text(file.as_ref(), limit).map_err(unreadable)
 }
 
 fn read_configuration(file: &str) -> Result<Config, CatalystError> {
-    language::parse(&file_text(file)?, file).map_err(unreadable)
+    language::parse(&file_text(file, DOCUMENT)?, file).map_err(unreadable)
 }
 
 /// See `tombolo.h`.
@@ -107,7 +109,7 @@ pub unsafe extern "C" fn tombolo_orders_file(run: *mut Handle, file: *const c_ch
         // SAFETY: as the module says.
         let file = unsafe { text(file, "file") }?;
         with(run, |run| {
-            run.settings()?.orders = language::parse_orders(&file_text(&file)?, &file).map_err(unreadable)?;
+            run.settings()?.orders = language::parse_orders(&file_text(&file, WAITING_BYTES)?, &file).map_err(unreadable)?;
             Ok(())
         })
     })

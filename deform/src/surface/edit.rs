@@ -433,6 +433,21 @@ impl Edit {
         }
     }
 
+    /// How many vertices and faces it lists: what it takes to hold it.
+    #[must_use]
+    pub fn listed(&self) -> usize {
+        let faces = |region: Option<&Region>| match region {
+            Some(Region::Faces(faces)) => faces.len(),
+            _ => 0,
+        };
+        let own = match self {
+            Edit::Displacement(edit) => edit.vertices.len().max(edit.values.len()),
+            Edit::Skeleton(edit) => edit.moves.len(),
+            _ => 0,
+        };
+        own + faces(self.region()) + faces(self.fixed_region())
+    }
+
     /// Whether the edit acts on the whole surface where it names neither features nor a region.
     pub(super) fn may_take_all(&self) -> bool {
         matches!(self, Edit::Displacement(_) | Edit::Skeleton(_))

@@ -81,7 +81,7 @@ pub enum InvalidEdit {
         second: usize,
     },
     /// The name of a layer cannot be shown.
-    #[error("name: expected 1 to 200 visible characters")]
+    #[error("name: expected 1 to {} visible characters", crate::limits::NAME.most)]
     Name,
 }
 

@@ -2,6 +2,7 @@
 
 use super::edit_error::{InvalidEdit, finite};
 use super::{Displacement, Edit, Skeleton};
+use crate::limits::NAME;
 
 impl Edit {
     /// Checks what can be checked without a surface: that there is a handle, that every number is finite, that directions have a
@@ -17,7 +18,9 @@ impl Edit {
             region.map_or(Ok(()), |region| region.validate(field))?;
         }
         if let Some(name) = self.layer_name()
-            && (name.trim().is_empty() || name.chars().any(char::is_control) || name.chars().count() > 200)
+            && (name.trim().is_empty()
+                || name.chars().any(char::is_control)
+                || NAME.check(name.chars().count()).is_err())
         {
             return Err(InvalidEdit::Name);
         }

@@ -1,29 +1,23 @@
 //! The editor: from a stack of edits to the displacement of a surface.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::adjacency::Adjacency;
 use super::features::Parts;
 use super::handle::{Handle, Role};
+use super::kept_layers::{Followed, KeptLayers, Layer, without_amount};
 use super::laplacian::Laplacian;
 use super::motion::{self, Motion};
 use super::polyharmonic::{NotFactored, Polyharmonic};
 use super::{Edit, EditError, HarmonicOrder, Surface, SurfaceError};
 use crate::mesh::Vector;
-use crate::parallel;
 use crate::skeleton::{Skeleton, SkeletonEditor, SkeletonError, SkinError};
 use crate::vector::add;
 
 /// How many factored operators are kept, and how many numbers they may hold together (8 bytes each); the newest is always kept.
 const OPERATORS_KEPT: usize = 8;
 const NUMBERS_KEPT: usize = 1 << 26;
-
-/// How many numbers the kept layers may hold together; the newest is always kept.
-const FIELDS_KEPT: usize = 1 << 24;
-
-/// Vertices that one thread adds up in one go.
-const CHUNK: usize = 1 << 14;
 
 /// How much the two sides of a seam may part, in units of the largest motion.
 const SEAM: f64 = 1e-6;
@@ -97,134 +91,7 @@ pub struct Editor {
     skeletons: SkeletonEditor,
     /// Rim vertices at the same place.
     seams: Vec<[u32; 2]>,
-    /// The most recently used last.
-    layers: Vec<Layer>,
-}
-
-/// An edit as it was evaluated, with what is below it in its stack.
-struct Layer {
-    lower: Vec<Edit>,
-    /// The displacement that those lead to.
-    below: Vec<Vector>,
-    followed: Option<Followed>,
-}
-
-impl Layer {
-    /// How many numbers it holds for each vertex.
-    fn fields(&self) -> usize {
-        3 + self.followed.as_ref().map_or(0, |followed| followed.bases.iter().flatten().count())
-    }
-}
-
-/// What the whole surface makes of each base of a handle's motion.
-struct Followed {
-    /// The edit but for its amount.
-    setting: Edit,
-    /// That of its [`Motion`].
-    unit: f64,
-    /// For each base its value at each vertex, once it has been needed.
-    bases: Vec<Option<Vec<f64>>>,
-}
-
-impl Followed {
-    fn is_for(&self, edit: &Edit) -> bool {
-        !edit.muted() && edit.harmonic_order().is_some() && without_amount(edit) == self.setting
-    }
-
-    /// The bases that an edit has a part of and that have not been solved for.
-    fn missing(&self, edit: &Edit) -> impl Iterator<Item = usize> {
-        let coefficients = Motion::coefficients(edit, self.unit);
-        self.bases
-            .iter()
-            .zip(coefficients)
-            .enumerate()
-            .filter(|(_, (base, coefficient))| base.is_none() && *coefficient != [0.0; 3])
-            .map(|(base, _)| base)
-    }
-
-    fn has_bases_of(&self, edit: &Edit) -> bool {
-        self.missing(edit).next().is_none()
-    }
-
-    /// `displacement` becomes `below` and what an edit adds to it; whether it is everywhere at most `limit`.
-    fn add(&self, edit: &Edit, below: &[Vector], limit: f64, displacement: &mut [Vector]) -> bool {
-        let coefficients = Motion::coefficients(edit, self.unit);
-        let terms: Vec<(&[f64], Vector)> = self
-            .bases
-            .iter()
-            .zip(coefficients)
-            .filter(|(_, coefficient)| *coefficient != [0.0; 3])
-            .filter_map(|(base, coefficient)| Some((base.as_deref()?, coefficient)))
-            .collect();
-        match terms.as_slice() {
-            [a] => add_terms([a], below, limit, displacement),
-            [a, b] => add_terms([a, b], below, limit, displacement),
-            [a, b, c] => add_terms([a, b, c], below, limit, displacement),
-            [a, b, c, d] => add_terms([a, b, c, d], below, limit, displacement),
-            _ => add_terms([], below, limit, displacement),
-        }
-    }
-}
-
-/// Each base times its coefficient and what is below; whether all of it is at most `limit`.
-fn add_terms<const COUNT: usize>(
-    terms: [&(&[f64], Vector); COUNT],
-    below: &[Vector],
-    limit: f64,
-    displacement: &mut [Vector],
-) -> bool {
-    let all_within = AtomicBool::new(true);
-    parallel::for_each_chunk(displacement, CHUNK, |chunk, part| {
-        let range = CHUNK * chunk..CHUNK * chunk + part.len();
-        let terms = terms.map(|(base, coefficient)| (&base[range.clone()], *coefficient));
-        let mut within = true;
-        for (index, (moved, below)) in part.iter_mut().zip(&below[range.clone()]).enumerate() {
-            let mut sum = [0.0; 3];
-            for (base, coefficient) in terms {
-                for axis in 0..3 {
-                    sum[axis] += base[index] * coefficient[axis];
-                }
-            }
-            for axis in 0..3 {
-                moved[axis] = below[axis] + sum[axis];
-                within &= moved[axis].abs() <= limit;
-            }
-        }
-        if !within {
-            all_within.store(false, Ordering::Relaxed);
-        }
-    });
-    all_within.into_inner()
-}
-
-/// An edit but for what its coefficients ([`Motion::coefficients`]) depend on, and for its name.
-fn without_amount(edit: &Edit) -> Edit {
-    let mut edit = edit.clone();
-    let name = match &mut edit {
-        Edit::Translate(edit) => {
-            edit.by = [0.0; 3];
-            &mut edit.name
-        }
-        Edit::Rotate(edit) => {
-            (edit.axis, edit.degrees) = ([0.0; 3], 0.0);
-            &mut edit.name
-        }
-        Edit::ScaleDirection(edit) => {
-            edit.factors = [0.0; 3];
-            &mut edit.name
-        }
-        Edit::ScaleNormals(edit) => {
-            edit.distance = 0.0;
-            &mut edit.name
-        }
-        Edit::Affine(edit) => {
-            (edit.matrix, edit.translation) = ([[0.0; 3]; 3], [0.0; 3]);
-            &mut edit.name
-        }
-        Edit::Displacement(_) | Edit::Skeleton(_) => return edit,
-    };
-    *name = None;
-    edit
+    layers: KeptLayers,
 }
 
 impl Editor {
@@ -244,7 +111,16 @@ impl Editor {
             .as_flattened()
             .iter()
             .fold(0.0, |farthest, value| if value.abs() > farthest { value.abs() } else { farthest });
-        Ok(Self { surface, farthest, laplacians, parts, operators: Vec::new(), skeletons, seams, layers: Vec::new() })
+        Ok(Self {
+            surface,
+            farthest,
+            laplacians,
+            parts,
+            operators: Vec::new(),
+            skeletons,
+            seams,
+            layers: KeptLayers::default(),
+        })
     }
 
     /// The surface.
@@ -293,17 +169,18 @@ impl Editor {
     /// # Errors
     /// Those of [`Editor::displacement`].
     pub fn displacement_into(&mut self, stack: &[Edit], displacement: &mut Vec<Vector>) -> Result<(), EditError> {
-        let kept = self.kept_layer(stack);
-        let known = kept.map_or(0, |kept| self.layers[kept].lower.len());
-        let mut handles = Vec::with_capacity(stack.len() - known);
+        let kept = self.layers.best_for(stack);
+        let known = kept.map_or(0, |kept| self.layers.get(kept).place);
+        // Handles are as large as the surface: of several edits none is kept for the time when it is needed.
+        let mut handle = None;
         for (place, edit) in stack.iter().enumerate().skip(known) {
-            let followed = kept.and_then(|kept| self.layers[kept].followed.as_ref());
-            handles.push(if place == known && followed.is_some_and(|followed| followed.is_for(edit)) {
+            let followed = kept.and_then(|kept| self.layers.get(kept).followed.as_ref());
+            handle = if place == known && followed.is_some_and(|followed| followed.is_for(edit)) {
                 edit.validate().map_err(|source| EditError::Invalid { edit: place, name: edit.name(), source })?;
                 None
             } else {
                 Some(Handle::find(&self.surface, edit, place)?)
-            });
+            };
         }
         for (place, edit) in stack.iter().enumerate().skip(known) {
             if let Edit::Skeleton(drag) = edit
@@ -316,15 +193,32 @@ impl Editor {
         if kept.is_none() {
             displacement.fill([0.0; 3]);
         }
-        let mut layer = kept.map(|kept| self.layers.remove(kept));
-        for ((place, edit), handle) in stack.iter().enumerate().skip(known).zip(handles) {
-            let mut layer = layer.take().unwrap_or_else(|| Layer {
-                lower: stack[..place].to_vec(),
-                below: displacement.clone(),
-                followed: None,
+        let layers = kept.and_then(|kept| self.layers.take(kept)).map(|layer| (known, layer)).into_iter().collect();
+        self.evaluate(stack, known, layers, handle, displacement, |_, _, _| Ok(()))
+    }
+
+    /// Evaluates the edits from `from` on, on the `displacement` that those below lead to. `layers` are those of its edits that were
+    /// evaluated before, by their places; `handle` is that of the last edit, where it is at hand. `visit` is told of each edit by its
+    /// place, and the displacements below it and with it.
+    pub(super) fn evaluate(
+        &mut self,
+        stack: &[Edit],
+        from: usize,
+        mut layers: BTreeMap<usize, Layer>,
+        mut handle: Option<Handle>,
+        displacement: &mut [Vector],
+        mut visit: impl FnMut(usize, &[Vector], &[Vector]) -> Result<(), EditError>,
+    ) -> Result<(), EditError> {
+        let mut shared: Option<Arc<[Edit]>> = None;
+        for (place, edit) in stack.iter().enumerate().skip(from) {
+            let mut layer = layers.remove(&place).unwrap_or_else(|| {
+                let stack = Arc::clone(shared.get_or_insert_with(|| stack.into()));
+                Layer { stack, place, below: displacement.to_vec(), followed: None }
             });
+            let handle = handle.take_if(|_| place + 1 == stack.len());
             let result = self.apply(place, edit, handle, &mut layer, displacement);
-            self.keep_layer(layer);
+            let result = result.and_then(|()| visit(place, &layer.below, displacement));
+            self.layers.keep(layer, self.surface.points().len());
             result?;
         }
         Ok(())
@@ -386,27 +280,14 @@ impl Editor {
         Ok(if motion > 0.0 { wrong.iter().map(size).fold(0.0, f64::max) / motion } else { 0.0 })
     }
 
-    /// The kept layer that has the most of a stack below it, and best fits the edit above.
-    fn kept_layer(&self, stack: &[Edit]) -> Option<usize> {
-        let fit = |layer: &Layer| {
-            let edit = stack.get(layer.lower.len())?;
-            let fits = layer.followed.as_ref().is_some_and(|followed| followed.is_for(edit));
-            stack.starts_with(&layer.lower).then_some((layer.lower.len(), fits))
-        };
-        (0..self.layers.len()).filter_map(|kept| Some((fit(&self.layers[kept])?, kept))).max().map(|(_, kept)| kept)
+    /// Takes out the layers of a stack's edits that were evaluated before, by their places.
+    pub(super) fn take_layers(&mut self, stack: &[Edit]) -> BTreeMap<usize, Layer> {
+        self.layers.take_all(stack)
     }
 
-    fn keep_layer(&mut self, layer: Layer) {
-        let mut room = FIELDS_KEPT / self.surface.points().len().max(1);
-        room = room.saturating_sub(layer.fields());
-        let kept = self.layers.iter().rev().take_while(|layer| {
-            let fits = layer.fields() <= room;
-            room = room.saturating_sub(layer.fields());
-            fits
-        });
-        let dropped = self.layers.len() - kept.count();
-        self.layers.drain(..dropped);
-        self.layers.push(layer);
+    #[cfg(test)]
+    pub(super) fn kept_layers(&self) -> &KeptLayers {
+        &self.layers
     }
 
     /// `displacement` becomes what the edits below and this one lead to. `handle` may be missing where the layer has been followed

@@ -1,5 +1,7 @@
 //! What each layer of a stack does, for reports.
 
+use std::sync::Arc;
+
 use serde::Serialize;
 
 use super::handle::{Handle, Role};
@@ -46,12 +48,14 @@ impl Editor {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn layers(&mut self, stack: &[Edit]) -> Result<Vec<Layer>, EditError> {
+        let surface = Arc::clone(self.surface());
         let mut layers = Vec::with_capacity(stack.len());
-        let mut below = self.displacement(&[])?;
-        for (place, edit) in stack.iter().enumerate() {
-            let handle = Handle::find(self.surface(), edit, place)?;
-            let reached = self.displacement(&stack[..=place])?;
-            let lengths = reached.iter().zip(&below).map(|(reached, below)| {
+        let mut displacement = vec![[0.0; 3]; surface.points().len()];
+        let known = self.take_layers(stack);
+        self.evaluate(stack, 0, known, None, &mut displacement, |place, below, reached| {
+            let edit = &stack[place];
+            let handle = Handle::find(&surface, edit, place)?;
+            let lengths = reached.iter().zip(below).map(|(reached, below)| {
                 subtract(*reached, *below).iter().fold(0.0f64, |length, part| length.hypot(*part))
             });
             layers.push(Layer {
@@ -62,8 +66,8 @@ impl Editor {
                 fixed_vertices: handle.roles.iter().filter(|role| **role == Role::Fixed).count(),
                 largest_displacement: lengths.fold(0.0, f64::max),
             });
-            below = reached;
-        }
+            Ok(())
+        })?;
         Ok(layers)
     }
 }

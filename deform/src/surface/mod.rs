@@ -101,6 +101,7 @@ mod features;
 mod front;
 mod handle;
 mod inside_out;
+mod kept_layers;
 mod laplacian;
 mod layers;
 mod motion;

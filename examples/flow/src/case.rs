@@ -10,7 +10,8 @@ use tombolo::Parameter;
 use tombolo_deform::number;
 use tombolo_deform::surface::Surface;
 use tombolo_pipelines::expression::Expression;
-use tombolo_pipelines::language::{LanguageError, Problem, Validate, nearest, parse_valid};
+use tombolo_pipelines::language::{LanguageError, Problem, ReadError, Validate, nearest, parse_valid, read_text};
+use tombolo_pipelines::limits::DOCUMENT;
 
 use crate::boundary::{Condition, Patch, Place, Value};
 use crate::solver::Fluid;
@@ -119,13 +120,8 @@ pub struct Initial {
 #[non_exhaustive]
 pub enum CaseError {
     /// The file cannot be read.
-    #[error("{}: {source}", file.display())]
-    Read {
-        /// The file.
-        file: PathBuf,
-        /// Why not.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Read(#[from] ReadError),
     /// The file is not a case.
     #[error(transparent)]
     Language(#[from] LanguageError),
@@ -157,9 +153,7 @@ impl Case {
     /// # Errors
     /// [`CaseError::Read`], or [`CaseError::Language`] with line, column and path.
     pub fn read(file: &Path) -> Result<Self, CaseError> {
-        let bytes = std::fs::read(file).map_err(|source| CaseError::Read { file: file.into(), source })?;
-        let name = file.display().to_string();
-        let mut case: Case = parse_valid(tombolo_pipelines::language::text(&bytes, &name)?, &name)?;
+        let mut case: Case = parse_valid(&read_text(file, DOCUMENT)?, &file.display().to_string())?;
         let folder = file.parent().unwrap_or(Path::new(""));
         case.mesh = folder.join(&case.mesh);
         case.pipelines = case.pipelines.map(|path| folder.join(path));

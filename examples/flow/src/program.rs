@@ -12,7 +12,8 @@ use tombolo_deform::surface::{FeatureSettings, Surface, SurfaceError};
 use tombolo_pipelines::distributed::DistributedError;
 use tombolo_pipelines::extract::{Association, Channel, Field, FieldView};
 use tombolo_pipelines::files::{self, Compression, FileError};
-use tombolo_pipelines::language::{self, Config, LanguageError, StreamServer, TimedCommand};
+use tombolo_pipelines::language::{self, Config, LanguageError, ReadError, StreamServer, TimedCommand};
+use tombolo_pipelines::limits::{DOCUMENT, WAITING_BYTES};
 
 use crate::case::{Case, CaseError};
 use crate::history::{History, Through};
@@ -62,6 +63,9 @@ pub enum ProgramError {
     /// The pipelines or the orders make no sense.
     #[error(transparent)]
     Language(#[from] LanguageError),
+    /// A file of pipelines or orders cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
     /// The mesh cannot be read, or the result not written.
     #[error(transparent)]
     Mesh(#[from] FileError),
@@ -355,17 +359,10 @@ fn unwritten((file, source): (PathBuf, std::io::Error)) -> ProgramError {
     ProgramError::File { file, source }
 }
 
-fn read(file: &Path) -> Result<Vec<u8>, ProgramError> {
-    std::fs::read(file).map_err(|source| ProgramError::File { file: file.into(), source })
-}
-
 fn config(options: &Options, case: &Case) -> Result<Config, ProgramError> {
     let mut config = match options.pipelines.as_ref().or(case.pipelines.as_ref()) {
         None => Settings::default().config,
-        Some(file) => {
-            let name = file.display().to_string();
-            language::parse(language::text(&read(file)?, &name)?, &name)?
-        }
+        Some(file) => language::parse(&language::read_text(file, DOCUMENT)?, &file.display().to_string())?,
     };
     if options.headless {
         config.stream = None;
@@ -382,8 +379,7 @@ fn orders(options: &Options, case: &Case) -> Result<Vec<TimedCommand>, ProgramEr
     match options.orders.as_ref().or(case.orders.as_ref()) {
         None => Ok(Vec::new()),
         Some(file) => {
-            let name = file.display().to_string();
-            Ok(language::parse_orders(language::text(&read(file)?, &name)?, &name)?)
+            Ok(language::parse_orders(&language::read_text(file, WAITING_BYTES)?, &file.display().to_string())?)
         }
     }
 }

@@ -22,6 +22,7 @@ mod beside;
 mod config;
 mod deform;
 mod error;
+mod message;
 mod order;
 mod parse;
 mod scan;
@@ -35,10 +36,11 @@ pub use config::{
 };
 pub use deform::DeformStage;
 pub use error::{LanguageError, Problem, nearest};
+pub use message::{Message, parse_message};
 pub use order::{Change, Command, JournalEntry, Order, OrderStatus, Parameter, Question, TimedCommand, parse_orders};
-pub use parse::{Validate, parse_json, parse_valid, text};
-pub use validate::file_pattern;
+pub use parse::{ReadError, Validate, parse_json, parse_valid, read_text, text};
 pub(crate) use validate::monitor_names;
+pub use validate::{check_stack, file_pattern};
 
 /// Reads and checks a configuration.
 ///

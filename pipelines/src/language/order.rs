@@ -9,8 +9,9 @@ use tombolo_deform::quality::Guard;
 use tombolo_deform::schedule::Schedule;
 use tombolo_deform::surface::Edit;
 
-use super::parse::{Validate, parse_valid};
+use super::parse::{Document, Validate, check_length, parse_valid};
 use super::{At, DeformStage, LanguageError, Problem};
+use crate::limits::{Exceeded, WAITING, WAITING_BYTES};
 
 /// An order of a new shape: what becomes of the stack of edits, and how the mesh gets there.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -362,6 +363,7 @@ impl From<JournalEntry> for JournalFields {
 
 impl Validate for Vec<TimedCommand> {
     fn validate(&self) -> Result<(), Problem> {
+        WAITING.check(self.len())?;
         self.iter().enumerate().try_for_each(|(index, timed)| timed.validate().map_err(|problem| problem.at(index)))
     }
 }
@@ -394,6 +396,7 @@ impl Validate for JournalEntry {
 /// assert_eq!(orders[0].at, Some(At::Cycle(5)));
 /// ```
 pub fn parse_orders(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageError> {
+    check_length(text.len(), file, WAITING_BYTES)?;
     let mut commands = parse_commands(text, file)?;
     super::beside::place_orders(&mut commands, file);
     Ok(commands)
@@ -407,14 +410,14 @@ fn parse_commands(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageE
     if start.starts_with('[') {
         return parse_valid(text, file);
     }
-    if super::scan::scan(start).is_ok() && !is_journal_line(start) {
-        return parse_valid::<TimedCommand>(text, file).map(|timed| vec![timed]);
+    match Document::read(text, file) {
+        Ok(document) if !is_of_journal(&document) => document.valid::<TimedCommand>().map(|timed| vec![timed]),
+        _ => parse_lines(text, file),
     }
-    parse_lines(text, file)
 }
 
-fn is_journal_line(line: &str) -> bool {
-    super::scan::scan(line).is_ok_and(|node| node.member("status").is_some())
+fn is_of_journal(line: &Document<'_>) -> bool {
+    line.root.member("status").is_some()
 }
 
 fn parse_lines(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageError> {
@@ -423,20 +426,22 @@ fn parse_lines(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageErro
     let mut rejected = std::collections::HashSet::new();
     let ends_whole = text.ends_with('\n');
     let count = text.lines().count();
-    for (number, line) in text.lines().enumerate() {
-        let content = line.trim_start_matches('\u{feff}');
-        if content.trim().is_empty() {
+    for (number, content) in text.lines().enumerate() {
+        if content.trim_start_matches('\u{feff}').trim().is_empty() {
             continue;
         }
         let moved = |failure: LanguageError| LanguageError { line: failure.line + number, ..failure };
-        if super::scan::scan(content.trim()).is_err() && number + 1 == count && number > 0 && !ends_whole {
-            break;
-        }
-        if !is_journal_line(content.trim()) {
-            commands.push(parse_valid(content, file).map_err(moved)?);
+        let line = match Document::read(content, file) {
+            Err(_) if number + 1 == count && number > 0 && !ends_whole => break,
+            line => line.map_err(moved)?,
+        };
+        let too_many = |exceeded: Exceeded| moved(line.locate(exceeded.into()));
+        WAITING.check(commands.len() + 1).map_err(too_many)?;
+        if !is_of_journal(&line) {
+            commands.push(line.valid().map_err(moved)?);
             continue;
         }
-        let entry: JournalEntry = parse_valid(content, file).map_err(moved)?;
+        let entry: JournalEntry = line.valid().map_err(moved)?;
         let at = Some(At::Cycle(entry.cycle));
         match (entry.status, entry.command) {
             (OrderStatus::Accepted, Some(command)) => {

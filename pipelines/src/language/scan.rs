@@ -3,10 +3,13 @@
 //! serde_json tells at best where it stopped reading, which is past the token at fault, and lets a key stand twice where a type
 //! does not mind. This reader keeps the place of each key and value, so that an error of meaning can point at its token.
 
+use std::collections::HashSet;
 use std::ops::Range;
 
-/// How deep arrays and objects may be nested: far beyond any meaning, far below the stack.
-const DEEPEST: usize = 64;
+use crate::limits::{DEPTH, Exceeded, TEXT, VALUES};
+
+/// Keys of an object up to which a new one is compared with each.
+const FEW: usize = 16;
 
 /// A value and where it stands, in bytes.
 #[derive(Debug)]
@@ -64,9 +67,9 @@ pub(super) struct SyntaxError {
 
 /// Reads one JSON value that fills the text.
 pub(super) fn scan(text: &str) -> Result<Node, SyntaxError> {
-    let mut scanner = Scanner { text, at: 0, path: String::new() };
+    let mut scanner = Scanner { text, at: 0, values: 0, way: Vec::new() };
     scanner.skip_space();
-    let node = scanner.value(0)?;
+    let node = scanner.value()?;
     scanner.skip_space();
     if scanner.at < text.len() {
         return Err(scanner.error(format!("found {} after the end of the value", scanner.found())));
@@ -77,7 +80,16 @@ pub(super) fn scan(text: &str) -> Result<Node, SyntaxError> {
 struct Scanner<'a> {
     text: &'a str,
     at: usize,
-    path: String,
+    /// How many values have been begun.
+    values: usize,
+    /// The way to the value at hand.
+    way: Vec<Step>,
+}
+
+/// A step of the way: an item's index, or where a member's key stands.
+enum Step {
+    Item(usize),
+    Member(Range<usize>),
 }
 
 impl Scanner<'_> {
@@ -102,7 +114,33 @@ impl Scanner<'_> {
     }
 
     fn error(&self, message: String) -> SyntaxError {
-        SyntaxError { at: self.at, path: self.path.clone(), message }
+        self.error_at(self.at, message)
+    }
+
+    fn error_at(&self, at: usize, message: String) -> SyntaxError {
+        SyntaxError { at, path: self.path(), message }
+    }
+
+    fn exceeded(&self, exceeded: Exceeded) -> SyntaxError {
+        self.error(exceeded.to_string())
+    }
+
+    /// The way in words.
+    fn path(&self) -> String {
+        let mut path = String::new();
+        for step in &self.way {
+            match step {
+                Step::Item(index) => path.push_str(&format!("[{index}]")),
+                Step::Member(key) => {
+                    if !path.is_empty() {
+                        path.push('.');
+                    }
+                    let quoted = self.text.get(key.clone()).unwrap_or_default();
+                    path.push_str(&serde_json::from_str::<String>(quoted).unwrap_or_default());
+                }
+            }
+        }
+        path
     }
 
     fn expect(&mut self, byte: u8, expected: &str) -> Result<(), SyntaxError> {
@@ -113,14 +151,13 @@ impl Scanner<'_> {
         Err(self.error(format!("found {}, expected {expected}", self.found())))
     }
 
-    fn value(&mut self, depth: usize) -> Result<Node, SyntaxError> {
-        if depth > DEEPEST {
-            return Err(self.error(format!("nested more than {DEEPEST} deep")));
-        }
+    fn value(&mut self) -> Result<Node, SyntaxError> {
+        self.values += 1;
+        VALUES.check(self.values).map_err(|exceeded| self.exceeded(exceeded))?;
         let start = self.at;
         let value = match self.peek() {
-            Some(b'{') => self.object(depth)?,
-            Some(b'[') => self.array(depth)?,
+            Some(b'{') => self.object()?,
+            Some(b'[') => self.array()?,
             Some(b'"') => Value::String(self.string()?),
             Some(b'-' | b'0'..=b'9') => self.number()?,
             Some(b'a'..=b'z' | b'A'..=b'Z') => self.word()?,
@@ -179,13 +216,16 @@ impl Scanner<'_> {
             self.at = start;
             return Err(self.error("found a number that starts with 0".into()));
         }
+        let mut is_whole = true;
         if self.peek() == Some(b'.') {
+            is_whole = false;
             self.at += 1;
             if self.digits() == 0 {
                 return Err(not_a_number(self));
             }
         }
         if matches!(self.peek(), Some(b'e' | b'E')) {
+            is_whole = false;
             self.at += 1;
             if matches!(self.peek(), Some(b'+' | b'-')) {
                 self.at += 1;
@@ -195,12 +235,14 @@ impl Scanner<'_> {
             }
         }
         let token = &self.text[start..self.at];
-        if let Ok(value) = token.parse() {
-            return Ok(Value::Unsigned(value));
-        }
-        // "-0" has a sign that only a floating point number keeps.
-        if let Some(value) = token.parse().ok().filter(|&value: &i64| value != 0) {
-            return Ok(Value::Signed(value));
+        if is_whole {
+            if let Ok(value) = token.parse() {
+                return Ok(Value::Unsigned(value));
+            }
+            // "-0" has a sign that only a floating point number keeps.
+            if let Some(value) = token.parse().ok().filter(|&value: &i64| value != 0) {
+                return Ok(Value::Signed(value));
+            }
         }
         match token.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(Value::Float(value)),
@@ -212,9 +254,10 @@ impl Scanner<'_> {
         }
     }
 
-    /// The text between the quotes, its escapes resolved as far as names need it.
+    /// The text between the quotes, its escapes resolved.
     fn string(&mut self) -> Result<String, SyntaxError> {
         let start = self.at;
+        let mut is_plain = true;
         self.at += 1;
         loop {
             match self.peek() {
@@ -226,6 +269,7 @@ impl Scanner<'_> {
                 Some(b'\\') => {
                     // The byte after may be the first of several; the others are skipped one by one as any are.
                     self.at += 2;
+                    is_plain = false;
                 }
                 Some(0..=0x1f) => {
                     return Err(self.error(format!("found {} in a string, expected its escape", self.found())));
@@ -234,80 +278,112 @@ impl Scanner<'_> {
             }
         }
         self.at += 1;
-        let quoted = &self.text[start..self.at];
-        serde_json::from_str(quoted).map_err(|_| SyntaxError {
-            at: start,
-            path: self.path.clone(),
-            message: "found a string with an escape that JSON does not know".into(),
-        })
+        let inside = &self.text[start + 1..self.at - 1];
+        TEXT.check(inside.len()).map_err(|exceeded| self.error_at(start, exceeded.to_string()))?;
+        if is_plain {
+            return Ok(inside.to_owned());
+        }
+        serde_json::from_str(&self.text[start..self.at])
+            .map_err(|_| self.error_at(start, "found a string with an escape that JSON does not know".into()))
     }
 
-    fn array(&mut self, depth: usize) -> Result<Value, SyntaxError> {
+    /// Goes into an array or object.
+    fn enter(&mut self, step: Step) -> Result<(), SyntaxError> {
+        DEPTH.check(self.way.len() + 1).map_err(|exceeded| self.exceeded(exceeded))?;
         self.at += 1;
-        let mut items = Vec::new();
-        let parent = self.path.len();
+        self.way.push(step);
         self.skip_space();
+        Ok(())
+    }
+
+    /// What an array or object came to.
+    fn leave(&mut self, value: Value) -> Value {
+        self.at += 1;
+        self.way.pop();
+        value
+    }
+
+    fn array(&mut self) -> Result<Value, SyntaxError> {
+        let mut items = Vec::new();
+        self.enter(Step::Item(0))?;
         if self.peek() == Some(b']') {
-            self.at += 1;
-            return Ok(Value::Array(items));
+            return Ok(self.leave(Value::Array(items)));
         }
         loop {
             self.skip_space();
             if self.peek() == Some(b']') {
+                self.way.pop();
                 return Err(self.error("found ']' after a comma, expected a value".into()));
             }
-            self.path.push_str(&format!("[{}]", items.len()));
-            items.push(self.value(depth + 1)?);
-            self.path.truncate(parent);
+            items.push(self.value()?);
             self.skip_space();
-            if self.peek() == Some(b',') {
-                self.at += 1;
-                continue;
+            match self.peek() {
+                Some(b',') => self.at += 1,
+                Some(b']') => return Ok(self.leave(Value::Array(items))),
+                _ => {
+                    self.way.pop();
+                    return Err(self.error(format!("found {}, expected ',' or ']'", self.found())));
+                }
             }
-            self.expect(b']', "',' or ']'")?;
-            return Ok(Value::Array(items));
+            if let Some(step) = self.way.last_mut() {
+                *step = Step::Item(items.len());
+            }
         }
     }
 
-    fn object(&mut self, depth: usize) -> Result<Value, SyntaxError> {
-        self.at += 1;
+    fn object(&mut self) -> Result<Value, SyntaxError> {
         let mut members: Vec<Member> = Vec::new();
-        let mut keys = std::collections::HashSet::new();
-        let parent = self.path.len();
-        self.skip_space();
+        let mut keys: HashSet<String> = HashSet::new();
+        self.enter(Step::Member(0..0))?;
         if self.peek() == Some(b'}') {
-            self.at += 1;
-            return Ok(Value::Object(members));
+            return Ok(self.leave(Value::Object(members)));
         }
         loop {
-            self.skip_space();
-            if self.peek() != Some(b'"') {
-                return Err(self.error(format!("found {}, expected a key in double quotes", self.found())));
+            let (key, key_span) = self.outside(|scanner| {
+                scanner.skip_space();
+                if scanner.peek() != Some(b'"') {
+                    return Err(scanner.error(format!("found {}, expected a key in double quotes", scanner.found())));
+                }
+                let start = scanner.at;
+                let key = scanner.string()?;
+                let end = scanner.at;
+                if members.len() == FEW {
+                    keys.extend(members.iter().map(|member| member.key.clone()));
+                }
+                let is_known = match members.len() {
+                    0..FEW => members.iter().any(|member| member.key == key),
+                    _ => !keys.insert(key.clone()),
+                };
+                if is_known {
+                    return Err(scanner.error_at(start, format!("found the key `{key}` twice")));
+                }
+                scanner.skip_space();
+                scanner.expect(b':', "':'")?;
+                scanner.skip_space();
+                Ok((key, start..end))
+            })?;
+            if let Some(step) = self.way.last_mut() {
+                *step = Step::Member(key_span.clone());
             }
-            let key_start = self.at;
-            let key = self.string()?;
-            let key_span = key_start..self.at;
-            if !keys.insert(key.clone()) {
-                self.at = key_start;
-                return Err(self.error(format!("found the key `{key}` twice")));
-            }
-            self.skip_space();
-            self.expect(b':', "':'")?;
-            self.skip_space();
-            if parent > 0 {
-                self.path.push('.');
-            }
-            self.path.push_str(&key);
-            let node = self.value(depth + 1)?;
-            self.path.truncate(parent);
+            let node = self.value()?;
             members.push(Member { key, key_span, node });
             self.skip_space();
-            if self.peek() == Some(b',') {
-                self.at += 1;
-                continue;
+            match self.peek() {
+                Some(b',') => self.at += 1,
+                Some(b'}') => return Ok(self.leave(Value::Object(members))),
+                _ => {
+                    self.way.pop();
+                    return Err(self.error(format!("found {}, expected ',' or '}}'", self.found())));
+                }
             }
-            self.expect(b'}', "',' or '}'")?;
-            return Ok(Value::Object(members));
         }
+    }
+
+    /// Reads what belongs to an object itself: what is wrong there is wrong with the object.
+    fn outside<T>(&mut self, read: impl FnOnce(&mut Self) -> Result<T, SyntaxError>) -> Result<T, SyntaxError> {
+        let step = self.way.pop();
+        let done = read(self)?;
+        self.way.extend(step);
+        Ok(done)
     }
 }

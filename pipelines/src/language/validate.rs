@@ -12,6 +12,13 @@ use super::order::{Change, Command, Order, Question, TimedCommand};
 use super::parse::Validate;
 use super::{At, DeformStage, Problem, nearest};
 use crate::expression::Expression;
+use crate::limits::{EDITS, Exceeded, LISTED, NAME};
+
+impl From<Exceeded> for Problem {
+    fn from(exceeded: Exceeded) -> Self {
+        Problem::new(exceeded.to_string())
+    }
+}
 
 impl Validate for Config {
     fn validate(&self) -> Result<(), Problem> {
@@ -55,8 +62,12 @@ impl Validate for Config {
 
 impl Validate for Pipeline {
     fn validate(&self) -> Result<(), Problem> {
-        if self.name.trim().is_empty() || self.name.chars().any(char::is_control) || self.name.len() > 200 {
-            return Err(Problem::new("expected a name of 1 to 200 visible characters").within("name"));
+        if self.name.trim().is_empty()
+            || self.name.chars().any(char::is_control)
+            || NAME.check(self.name.chars().count()).is_err()
+        {
+            let message = format!("expected a name of 1 to {} visible characters", NAME.most);
+            return Err(Problem::new(message).within("name"));
         }
         if let Due::At(At::Time(time)) = self.due {
             finite(time).map_err(|problem| problem.within("time").within("at"))?;
@@ -161,9 +172,8 @@ impl State {
                 Ok(())
             }
             Stage::Select(select) => {
-                let twice =
-                    (1..select.fields.len()).find(|&index| select.fields[..index].contains(&select.fields[index]));
-                match twice {
+                let mut known = HashSet::new();
+                match select.fields.iter().position(|field| !known.insert(field)) {
                     Some(index) => Err(Problem::new("found the same field twice").at(index).within("fields")),
                     None => Ok(()),
                 }
@@ -182,6 +192,7 @@ impl State {
             Stage::Order(order) => self.order(order),
             Stage::Deform(deform) => deform.check(),
             Stage::Guard(guard) => check_guard(guard),
+            Stage::Schedule(schedule) => check_schedule(schedule),
             _ => Ok(()),
         }
     }
@@ -257,9 +268,39 @@ fn check_guard(guard: &Guard) -> Result<(), Problem> {
     Err(Problem::new(message).within("min_scaled_jacobian"))
 }
 
-fn check_settings(deform: Option<&DeformStage>, guard: Option<&Guard>, _: Option<&Schedule>) -> Result<(), Problem> {
+fn check_schedule(schedule: &Schedule) -> Result<(), Problem> {
+    schedule.check().map_err(|exceeded| Problem::from(exceeded).within("steps"))
+}
+
+fn check_settings(
+    deform: Option<&DeformStage>,
+    guard: Option<&Guard>,
+    schedule: Option<&Schedule>,
+) -> Result<(), Problem> {
     deform.map_or(Ok(()), DeformStage::check).map_err(|problem| problem.within("deform"))?;
-    guard.map_or(Ok(()), check_guard).map_err(|problem| problem.within("guard"))
+    guard.map_or(Ok(()), check_guard).map_err(|problem| problem.within("guard"))?;
+    schedule.map_or(Ok(()), check_schedule).map_err(|problem| problem.within("schedule"))
+}
+
+/// Checks edits one by one, and what all of them come to.
+fn check_edits(edits: &[Edit]) -> Result<(), Problem> {
+    check_stack(edits)?;
+    let located = |index: usize, edit: &Edit| check_edit(edit).map_err(|problem| problem.within(edit.name()).at(index));
+    edits.iter().enumerate().try_for_each(|(index, edit)| located(index, edit))
+}
+
+/// Whether a stack may hold all of these edits.
+///
+/// # Errors
+/// [`Exceeded`] for too many edits, or too many vertices and faces that they list.
+pub fn check_stack<'a>(edits: impl IntoIterator<Item = &'a Edit>) -> Result<(), Exceeded> {
+    let (mut count, mut listed) = (0, 0_usize);
+    for edit in edits {
+        count += 1;
+        listed = listed.saturating_add(edit.listed());
+    }
+    EDITS.check(count)?;
+    LISTED.check(listed)
 }
 
 fn check_file(pattern: &str) -> Result<(), Problem> {
@@ -329,9 +370,7 @@ fn file_digits(inside: &str, digits: &str) -> Result<usize, Problem> {
 
 impl Validate for Vec<Edit> {
     fn validate(&self) -> Result<(), Problem> {
-        let located =
-            |index: usize, edit: &Edit| check_edit(edit).map_err(|problem| problem.within(edit.name()).at(index));
-        self.iter().enumerate().try_for_each(|(index, edit)| located(index, edit))
+        check_edits(self)
     }
 }
 
@@ -345,10 +384,7 @@ impl Validate for Order {
             Change::Stack(edits) => ("stack", edits.as_slice()),
             Change::Undo(_) => ("undo", &[][..]),
         };
-        for (index, edit) in edits.iter().enumerate() {
-            let located = |problem: Problem| problem.within(edit.name()).at(index).within(key);
-            check_edit(edit).map_err(located)?;
-        }
+        check_edits(edits).map_err(|problem| problem.within(key))?;
         check_settings(self.deform.as_ref(), self.guard.as_ref(), self.schedule.as_ref())
     }
 }

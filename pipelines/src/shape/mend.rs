@@ -10,7 +10,7 @@ use tombolo_deform::{
     volume::{BoundaryMotion, Domain, FollowError, Route, Untangler, follow},
 };
 
-use crate::language::DeformStage;
+use crate::language::{DeformStage, check_stack};
 
 use super::boundary::Boundary;
 use super::carry::Carrier;
@@ -154,6 +154,8 @@ impl Shaper {
         guard: &Guard,
     ) -> Result<Plan, Refused> {
         self.spent = ShapeSeconds::default();
+        check_stack(stack)?;
+        schedule.check()?;
         match guard.otherwise {
             Otherwise::Untangle if !deform.surface_only => {
                 let target = self.settled(stack, deform, guard)?;
@@ -172,8 +174,9 @@ impl Shaper {
     /// The way from `start` to a target.
     ///
     /// # Errors
-    /// [`Refused::Guard`].
+    /// [`Refused::Guard`], [`Refused::Limit`].
     pub fn go(&mut self, start: &Place, target: &Target, schedule: &Schedule, guard: &Guard) -> Result<Plan, Refused> {
+        schedule.check()?;
         let watch = Stopwatch::start();
         if target.surface_only || start.surface_only {
             let plan = self.along_surface(start, target, schedule, guard);

@@ -13,7 +13,7 @@ use std::{
 };
 
 use clap::{Parser, Subcommand};
-use tombolo::pipelines::language;
+use tombolo::pipelines::{language, limits};
 
 const EXIT_CODES: &str =
     "Exit codes: 0 done; 1 something is wrong with what was given; 2 the shape that was asked for is refused.";
@@ -111,8 +111,7 @@ fn check(file: &Path) -> Result<(), Failure> {
 
 /// The text of a file; an error names the file.
 fn read(file: &Path) -> Result<String, Failure> {
-    let bytes = std::fs::read(file).map_err(|error| Failure::Wrong(format!("{}: {error}", file.display())))?;
-    Ok(language::text(&bytes, &file.to_string_lossy())?.to_owned())
+    Ok(language::read_text(file, limits::DOCUMENT)?)
 }
 
 /// Prints one line; a pipe that was closed early is an error, not a panic.

@@ -1,0 +1,94 @@
+//! Limits on what comes from outside: the same for files, programs and the network.
+//!
+//! They lie far beyond what is meant and below what a machine can hold. Whatever is beyond one is refused with an [`Exceeded`],
+//! which says what was found and what the limit is.
+//!
+//! ```
+//! use tombolo_deform::limits;
+//!
+//! let refused = limits::EDITS.check(20_000).unwrap_err();
+//! assert_eq!(refused.to_string(), "found 20000 edits, expected at most 16384");
+//! ```
+
+/// How much there may be of something.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limit {
+    /// What is counted, in the plural.
+    pub what: &'static str,
+    /// The most that is allowed.
+    pub most: usize,
+    /// Where it is counted.
+    pub of: &'static str,
+}
+
+/// There is more of something than is allowed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("found {found} {}, expected at most {}", limit.what, limit.most)]
+pub struct Exceeded {
+    /// The limit.
+    pub limit: Limit,
+    /// How much there is.
+    pub found: usize,
+}
+
+impl Limit {
+    /// Whether so much is allowed.
+    ///
+    /// # Errors
+    /// [`Exceeded`] where it is not.
+    pub fn check(self, found: usize) -> Result<(), Exceeded> {
+        if found <= self.most { Ok(()) } else { Err(Exceeded { limit: self, found }) }
+    }
+}
+
+const fn limit(what: &'static str, most: usize, of: &'static str) -> Limit {
+    Limit { what, most, of }
+}
+
+/// Bytes of one JSON document.
+pub const DOCUMENT: Limit =
+    limit("bytes", 64 << 20, "one JSON document: a configuration, a case, an order, a line of a journal, a message");
+/// Values in one JSON document.
+pub const VALUES: Limit = limit("values", 1 << 22, "the numbers, texts, lists and objects of one JSON document");
+/// How deep lists and objects may be nested.
+pub const DEPTH: Limit = limit("levels of nesting", 64, "lists and objects within each other");
+/// Bytes of a text.
+pub const TEXT: Limit = limit("bytes", 1 << 16, "a text or key in a JSON document");
+/// Characters of a name.
+pub const NAME: Limit = limit("characters", 200, "the name of a pipeline or an edit");
+/// Characters of a formula.
+pub const FORMULA: Limit = limit("characters", 10_000, "a formula or condition");
+/// How deep a formula may be nested.
+pub const FORMULA_DEPTH: Limit = limit("levels of nesting", 200, "the parentheses of a formula or condition");
+/// Edits of an order, and of the stack that it makes.
+pub const EDITS: Limit = limit("edits", 1 << 14, "an order, and the stack that it makes");
+/// Vertices and faces that edits list. So many displacements fit into a document.
+pub const LISTED: Limit =
+    limit("listed vertices and faces", 750_000, "all edits of an order, and of the stack that it makes");
+/// Shapes of a schedule.
+pub const SHAPES: Limit = limit("shapes", 10_000, "a schedule");
+/// Orders that the stack remembers.
+pub const ORDERS: Limit = limit("orders", 4096, "the stack: those that can be taken back");
+/// Commands that wait.
+pub const WAITING: Limit =
+    limit("commands", 1 << 16, "a file of orders; those of viewers that the solver has not come to");
+/// Bytes of the commands that wait.
+pub const WAITING_BYTES: Limit =
+    limit("bytes", 256 << 20, "a file of orders; the commands of viewers that the solver has not come to");
+
+/// All of them.
+pub const ALL: [Limit; 13] = [
+    DOCUMENT,
+    VALUES,
+    DEPTH,
+    TEXT,
+    NAME,
+    FORMULA,
+    FORMULA_DEPTH,
+    EDITS,
+    LISTED,
+    SHAPES,
+    ORDERS,
+    WAITING,
+    WAITING_BYTES,
+];

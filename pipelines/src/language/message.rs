@@ -1,0 +1,82 @@
+//! What a viewer says.
+
+use serde::Deserialize;
+
+use super::order::{Command, Question};
+use super::parse::Document;
+use super::scan::Value;
+use super::{LanguageError, Problem};
+
+/// Characters that the id of a message may have.
+const ID: usize = 64;
+
+/// A message of a viewer.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Message {
+    /// Steers the run.
+    Command(Command),
+    /// Asks something.
+    Question(Question),
+    /// Asks to become the one that steers.
+    Drive,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+enum Wheel {
+    Drive {},
+}
+
+/// Reads a message: an object with one key, and an `id` beside it at will.
+///
+/// The id is there also where the message says nothing that is understood, so that the answer can name it.
+///
+/// ```
+/// use tombolo_pipelines::language::{Command, Message, parse_message};
+///
+/// let (id, message) = parse_message(r#"{"id": "c1-7", "pause": {}}"#);
+/// assert_eq!((id.as_deref(), message), (Some("c1-7"), Ok(Message::Command(Command::Pause {}))));
+/// let (id, message) = parse_message(r#"{"id": "c1-8", "puase": {}}"#);
+/// assert!(id.is_some() && message.is_err_and(|error| error.suggestion.as_deref() == Some("pause")));
+/// ```
+#[must_use]
+pub fn parse_message(text: &str) -> (Option<String>, Result<Message, LanguageError>) {
+    let mut document = match Document::read(text, "message") {
+        Ok(document) => document,
+        Err(error) => return (None, Err(error)),
+    };
+    let id = match take_id(&mut document) {
+        Ok(id) => id,
+        Err(error) => return (None, Err(error)),
+    };
+    (id, message(&document))
+}
+
+fn take_id(document: &mut Document<'_>) -> Result<Option<String>, LanguageError> {
+    let Some(member) = document.root.member("id") else { return Ok(None) };
+    let id = match &member.node.value {
+        Value::String(id) if !id.is_empty() && id.chars().count() <= ID && !id.chars().any(char::is_control) => {
+            id.clone()
+        }
+        _ => {
+            let message = format!("expected a text of 1 to {ID} visible characters");
+            return Err(document.locate(Problem::new(message).within("id")));
+        }
+    };
+    if let Value::Object(members) = &mut document.root.value {
+        members.retain(|member| member.key != "id");
+    }
+    Ok(Some(id))
+}
+
+fn message(document: &Document<'_>) -> Result<Message, LanguageError> {
+    let key = match &document.root.value {
+        Value::Object(members) if members.len() == 1 => members.first().map_or("", |member| member.key.as_str()),
+        _ => "",
+    };
+    match key {
+        "forecast" => document.valid().map(Message::Question),
+        "drive" => document.value().map(|Wheel::Drive {}| Message::Drive),
+        _ => document.valid().map(Message::Command),
+    }
+}
