@@ -10,6 +10,7 @@ mod barrier;
 mod colours;
 mod element;
 mod foldover;
+mod impossible;
 mod improve;
 mod operator;
 mod rigid;
@@ -20,6 +21,7 @@ mod tests;
 mod untangle;
 
 pub use adaptive::{BoundaryMotion, Domain, FollowError, Route, Stalled, Waypoint, follow};
+pub use impossible::Impossible;
 pub use improve::Improver;
 pub use operator::{VolumeOperator, VolumeSolution};
 pub use settings::{Deform, Method};

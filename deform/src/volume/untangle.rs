@@ -1,9 +1,9 @@
 //! Moving the inside of a mesh so that no cell is turned inside out.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-use super::foldover;
-use crate::linear::{ConjugateGradients, DistributedMultigrid, SparseMatrix, Tolerance, reverse_cuthill_mckee};
+use super::{Improver, foldover};
+use crate::linear::{ConjugateGradients, DistributedMultigrid, LinearError, SparseMatrix, Tolerance, reverse_cuthill_mckee};
 use crate::mesh::{CellType, Mesh, Numbering, Ordered, Vector};
 use crate::parallel;
 use crate::partition::{Partition, Reduction, Shares, Solver, all, any, whole};
@@ -21,6 +21,21 @@ const STEPS: usize = 60;
 
 /// A mesh is settled once a Newton step takes less than this part of the energy off.
 const SETTLED: f64 = 1e-3;
+
+/// The least regularisation of a mesh with inverted corners, and what it is raised to where the mesh settles with some: this many
+/// steps in a row make it settled, so often it is raised, and by this factor it falls again from step to step.
+const LEAST_EPSILON: f64 = 1e-6;
+const RAISED_EPSILON: f64 = 0.1;
+const SETTLED_STEPS: usize = 3;
+const RAISES: usize = 2;
+const FALLING: f64 = 0.3;
+
+/// Iterations of the linear solver in a Newton step: a direction that is not exact is good enough.
+const ITERATIONS: usize = 400;
+
+/// Rounds of sweeps that lift the quality of a valid mesh to the floor, and the sweeps in each.
+const ROUNDS: usize = 10;
+const SWEEPS: u32 = 10;
 
 const NONE: u32 = u32::MAX;
 
@@ -54,12 +69,17 @@ pub struct Untangler {
     columns: Vec<u32>,
     partition: Arc<dyn Partition>,
     shares: Shares,
+    boundary: Vec<u32>,
+    /// The least scaled Jacobian of the reference mesh.
+    least: f64,
+    improver: OnceLock<Improver>,
 }
 
 /// A tetrahedron at a corner of a cell.
 #[derive(Debug, Clone, Copy)]
-struct Corner {
-    vertices: [u32; 4],
+pub(super) struct Corner {
+    pub(super) vertices: [u32; 4],
+    pub(super) cell: u32,
     /// The gradients of its linear shape functions in the reference.
     gradients: [Vector; 4],
 }
@@ -138,11 +158,25 @@ impl Untangler {
         }
         let vertices: Vec<u32> = unknowns.iter().map(|&place| numbering.vertex(place)).collect();
         let shares = Shares::new(&**partition, &vertices);
-        Self { numbering, corners, unknowns, slots, offsets, columns, partition: Arc::clone(partition), shares }
+        let least = quality_in_parts(mesh.cells(), mesh.points(), &**partition).min;
+        Self {
+            numbering,
+            corners,
+            unknowns,
+            slots,
+            offsets,
+            columns,
+            partition: Arc::clone(partition),
+            shares,
+            boundary: boundary.to_vec(),
+            least,
+            improver: OnceLock::new(),
+        }
     }
 
-    /// Moves the free vertices of `points` until every corner's determinant is positive and every scaled Jacobian at least
-    /// `floor`, and on until the energy has settled. Says whether all of them are.
+    /// Moves the free vertices of `points` until every corner's determinant is positive, and on until the energy has settled; where
+    /// a scaled Jacobian is then below `floor`, the worst cells are lifted (see [`Improver`]). Says whether all cells are valid and
+    /// none is below `floor`, or below the least of the reference mesh where that is lower.
     ///
     /// `mesh` is the reference mesh.
     pub fn untangle(&self, mesh: &Mesh, points: &mut [Vector], floor: f64) -> bool {
@@ -151,45 +185,68 @@ impl Untangler {
             return false;
         }
         let mut near = self.numbering.gather(points).into_owned();
-        let lowered = self.lower(&mut near);
+        self.lower(&mut near);
         self.numbering.scatter(&near, points);
-        if !lowered {
-            return false;
+        let floor = floor.min(self.least);
+        let mut quality = quality_in_parts(mesh.cells(), points, partition);
+        for _ in 0..ROUNDS {
+            let improver = || Improver::of_part(mesh, &self.boundary, &self.partition);
+            if quality.inverted > 0
+                || quality.min >= floor
+                || !self.improver.get_or_init(improver).improve(points, SWEEPS)
+            {
+                break;
+            }
+            quality = quality_in_parts(mesh.cells(), points, partition);
         }
-        let sum = quality_in_parts(mesh.cells(), points, partition);
-        sum.inverted == 0 && sum.min >= floor
+        quality.inverted == 0 && quality.min >= floor
     }
 
-    /// Brings the energy down until it settles. Whether the equations on the way could be solved.
-    fn lower(&self, points: &mut [Vector]) -> bool {
+    /// Brings the energy down until it settles.
+    fn lower(&self, points: &mut [Vector]) {
         let partition = &*self.partition;
-        let mut epsilon = 1.0;
+        let (mut epsilon, mut lower_bound) = (1.0, LEAST_EPSILON);
+        let (mut settled, mut raises) = (0, 0);
         let mut direction = vec![[0.0; 3]; self.unknowns.len()];
         for step in 0..STEPS {
             let least = self.state(points, 1.0).least;
             // As Garanzha et al.: the regularisation follows the worst determinant; a valid mesh has none.
-            epsilon = if least > 0.0 { (0.01 * least).min(epsilon) } else { (1e-12 + 0.04 * least * least).sqrt() };
+            epsilon = if least > 0.0 { (0.01 * least).min(epsilon) } else { lower_bound.hypot(0.2 * least) };
+            lower_bound = LEAST_EPSILON.max(FALLING * lower_bound);
             let before = self.state(points, epsilon).energy;
             let (matrix, right_side) = self.assemble(points, epsilon);
-            let slope = match self.solver(matrix).and_then(|solver| {
-                solver.solve(&right_side, &mut direction, Tolerance { relative: 1e-2, absolute: 0.0 })
-            }) {
-                // The right side is the sum of the ranks', the direction the same on all.
-                Ok(_) => -sum(partition, inner(&right_side, &direction)),
-                Err(_) => return false,
+            let solved = self
+                .solver(matrix)
+                .and_then(|solver| solver.solve(&right_side, &mut direction, Tolerance { relative: 1e-2, absolute: 0.0 }));
+            // The right side is the sum of the ranks', the direction the same on all.
+            let slope = -sum(partition, inner(&right_side, &direction));
+            // Conjugate gradients that were stopped early lead downwards too.
+            let downwards = match solved {
+                Ok(_) | Err(LinearError::NotConverged { .. }) => slope < 0.0,
+                Err(_) => false,
             };
-            let Some(after) = self.descend(points, &direction, epsilon, before, slope) else { break };
-            let settled = before - after < SETTLED * before.abs();
-            if settled && least > 0.0 && step > 2 {
+            if !all(partition, downwards && slope.is_finite()) {
                 break;
             }
+            let after = self.descend(points, &direction, epsilon, before, slope);
+            let falls = after.is_some_and(|after| before - after >= SETTLED * before.abs());
+            settled = if falls { 0 } else { settled + 1 };
+            if settled > 0 && least > 0.0 && (step > 2 || after.is_none()) {
+                break;
+            }
+            if settled >= SETTLED_STEPS || after.is_none() {
+                if raises == RAISES {
+                    break;
+                }
+                raises += 1;
+                (settled, lower_bound) = (0, RAISED_EPSILON);
+            }
         }
-        true
     }
 
     fn solver(&self, matrix: SparseMatrix<3>) -> Solver<3> {
         if self.partition.ranks() == 1 {
-            return Ok(Box::new(ConjugateGradients::new(matrix)?));
+            return Ok(Box::new(ConjugateGradients::new(matrix)?.with_max_iterations(ITERATIONS)));
         }
         let shares = self.shares.clone();
         Ok(Box::new(DistributedMultigrid::with_shares(Arc::clone(&self.partition), shares, Arc::new(matrix), None)?))
@@ -306,22 +363,23 @@ fn inner(a: &[Vector], b: &[Vector]) -> f64 {
 }
 
 /// The corners of the cells, each right-handed in a valid mesh; those flat in the reference are left out.
-fn corners(mesh: &Mesh) -> Vec<Corner> {
+pub(super) fn corners(mesh: &Mesh) -> Vec<Corner> {
     let (cells, points) = (mesh.cells(), mesh.points());
     let mut corners = Vec::with_capacity(cells.len());
-    let mut take = |vertices: [u32; 4]| {
+    let mut take = |cell: usize, vertices: [u32; 4]| {
         let [p, q, r, s] = vertices.map(|vertex| points[vertex as usize]);
         let (u, v, w) = (subtract(q, p), subtract(r, p), subtract(s, p));
         let determinant = tet_determinant([p, q, r, s]);
         if determinant > 0.0 {
             let [g, h, k] = [cross(v, w), cross(w, u), cross(u, v)].map(|face| scale(face, 1.0 / determinant));
-            corners.push(Corner { vertices, gradients: [scale(add(add(g, h), k), -1.0), g, h, k] });
+            #[expect(clippy::cast_possible_truncation, reason = "fewer cells than 2^32")]
+            corners.push(Corner { vertices, cell: cell as u32, gradients: [scale(add(add(g, h), k), -1.0), g, h, k] });
         }
     };
-    for (cell_type, vertices) in cells.iter() {
+    for (cell, (cell_type, vertices)) in cells.iter().enumerate() {
         let mut take_all = |locals: &[[usize; 4]]| {
             for local in locals {
-                take(local.map(|index| vertices[index]));
+                take(cell, local.map(|index| vertices[index]));
             }
         };
         match cell_type {
