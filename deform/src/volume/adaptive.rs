@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::spring::sprung;
 use super::{Deform, Impossible, Untangler, VolumeError, VolumeOperator, agreed};
 use crate::linear::LinearError;
 use crate::mesh::{Mesh, Vector};
@@ -39,7 +40,8 @@ const TOLERANCE: f64 = 1e-5;
 /// A shape on the way of [`follow`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Waypoint {
-    /// How far along the motion of the boundary it lies, from 0 to 1.
+    /// How far along the motion of the boundary it lies, from 0 to 1. Where that motion could not be followed, but a way to its end was
+    /// found on which the boundary goes elsewhere, how far along that.
     pub fraction: f64,
     /// The coordinates of every vertex of the mesh.
     pub points: Arc<[Vector]>,
@@ -141,7 +143,9 @@ pub struct Domain<'a> {
 ///
 /// Where untangling a small sub-step does not help either, the end of the way is gone for at once: the whole mesh is untangled with its
 /// boundary there. From the shape reached to the one found the way goes straight where it can, else over a shape half way between, which
-/// is untangled where need be, and so on. A boundary for which [`Impossible`] has a proof is told before anything is solved, and
+/// is untangled where need be, and so on. Where the boundary's own way is broken, the shape found is let go and springs back, and the way
+/// is that of its springing back, the other way round: vertices of the boundary that lie at the end where they do at the start stay there all
+/// the way, others are not where the motion has them until the end. A boundary for which [`Impossible`] has a proof is told before anything is solved, and
 /// followed as far as there is none. So what is found is a function of the arguments alone.
 ///
 /// `untangler`, called where it is needed, is of the reference mesh, which is what cells are drawn back to. Collective, where the
@@ -203,8 +207,11 @@ pub fn follow<M: BoundaryMotion>(
                 if !holds && end_is_valid.is_none() && follower.motion.is_stated() {
                     let found = follower.end(goal, current.as_deref())?;
                     end_is_valid = Some(found.is_some());
-                    if let Some(end) = found {
-                        follower.bridge(end).map_err(FollowError::Boundary)?;
+                    if let Some(end) = found
+                        && !follower.bridge(end.clone()).map_err(FollowError::Boundary)?
+                        && goal == 1.0
+                    {
+                        follower.spring(start, &end);
                     }
                 }
             }
@@ -277,8 +284,10 @@ impl<M: BoundaryMotion> Follower<'_, M> {
     }
 
     fn untangle(&self, points: &mut [Vector]) -> bool {
+        let Domain { mesh, boundary, partition, .. } = self.domain;
         let floor = self.guard.min_scaled_jacobian;
-        self.untangler.is_some_and(|untangler| untangler().untangle(self.domain.mesh, points, floor))
+        let possible = Impossible::find(mesh, boundary, points, 0.0, &**partition).is_none();
+        possible && self.untangler.is_some_and(|untangler| untangler().untangle(mesh, points, floor))
     }
 
     fn go(&mut self, fraction: f64, points: Arc<[Vector]>) {
@@ -291,7 +300,11 @@ impl<M: BoundaryMotion> Follower<'_, M> {
     }
 
     /// The valid mesh with its boundary where it is at `fraction`, if it is found.
-    fn end(&mut self, fraction: f64, operator: Option<&VolumeOperator>) -> Result<Option<Waypoint>, FollowError<M::Error>> {
+    fn end(
+        &mut self,
+        fraction: f64,
+        operator: Option<&VolumeOperator>,
+    ) -> Result<Option<Waypoint>, FollowError<M::Error>> {
         let shape = Arc::clone(&self.here.points);
         let places = self.motion.at(self.here.fraction, fraction, &shape).map_err(FollowError::Boundary)?;
         let solved = self.moved(operator, &shape, &places, None)?.map(|(_, candidate)| candidate);
@@ -331,6 +344,21 @@ impl<M: BoundaryMotion> Follower<'_, M> {
             ahead.push(Waypoint { fraction, points: middle.into() });
         }
         Ok(true)
+    }
+
+    /// Goes from `start` to a valid shape over shapes whose boundary is not where the motion has it, if there is such a way.
+    fn spring(&mut self, start: &Arc<[Vector]>, end: &Waypoint) {
+        let keeps = |from: &[Vector], to: &[Vector]| self.keeps(from, to);
+        let Some(way) = sprung(self.domain, start, &end.points, &keeps) else { return };
+        self.route.waypoints.clear();
+        let count = way.len();
+        for (index, points) in way.into_iter().enumerate() {
+            #[expect(clippy::cast_precision_loss, reason = "a few hundred shapes")]
+            let fraction =
+                if index + 1 == count { end.fraction } else { end.fraction * (index + 1) as f64 / count as f64 };
+            self.route.untangled += 1;
+            self.go(fraction, points);
+        }
     }
 
     /// The operator on another shape; `None` where its equations cannot be set up with any stiffening.
@@ -387,13 +415,9 @@ impl<M: BoundaryMotion> Follower<'_, M> {
     ) -> FollowError<M::Error> {
         let Domain { mesh, partition, .. } = self.domain;
         match judge_in_parts(mesh, &self.here.points, candidate, &[1.0], self.guard, &**partition) {
-            Err(refusal) => FollowError::Stalled(Box::new(Stalled {
-                route: self.route,
-                refusal,
-                folds,
-                impossible,
-                end_is_valid,
-            })),
+            Err(refusal) => {
+                FollowError::Stalled(Box::new(Stalled { route: self.route, refusal, folds, impossible, end_is_valid }))
+            }
             // `keeps` and `judge` are one test.
             Ok(_) => FollowError::Volume(overflow()),
         }

@@ -261,18 +261,23 @@ mod tests {
         }
     }
 
-    /// A cube of tetrahedra about one free vertex, two of whose opposite faces have changed places.
+    /// Four cells about one free vertex, in a tetrahedron that is turned inside out.
     #[test]
     fn a_vertex_without_a_place_is_named() {
-        let mesh = shapes::box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
-        let boundary = boundary(&mesh);
-        let swap = |points: &[Vector], by: f64| -> Vec<Vector> {
-            points.iter().map(|&[x, y, z]| [x, y, if x == 0.5 && y == 0.5 { z + by * (0.5 - z) } else { z }]).collect()
-        };
-        let near = swap(mesh.points(), 0.5);
-        assert_eq!(Impossible::find(&mesh, &boundary, &near, 0.0, &Whole), None);
-        let beyond = swap(mesh.points(), 1.5);
-        let proof = Impossible::find(&mesh, &boundary, &beyond, 0.0, &Whole);
-        assert!(proof.is_some(), "{proof:?}");
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let points: Vec<Vector> = corners.into_iter().chain([[0.2, 0.2, 0.2]]).collect();
+        let cells = vec![0, 1, 2, 4, 0, 3, 1, 4, 0, 2, 3, 4, 1, 3, 2, 4];
+        let cells = crate::mesh::Cells::uniform(CellType::Tetra, cells).unwrap();
+        let mesh = Mesh::new(points, cells, crate::mesh::FeatureSource::SharpEdges).unwrap();
+        let find = |points: &[Vector]| Impossible::find(&mesh, &[0, 1, 2, 3], points, 0.0, &Whole);
+        let mut outside = mesh.points().to_vec();
+        outside[4] = [3.0, -2.0, 1.0];
+        assert_eq!(find(&outside), None);
+        let mut mirrored = mesh.points().to_vec();
+        mirrored[3] = [0.3, 0.2, -1.0];
+        let Some(Impossible::Vertex { point, mut cells }) = find(&mirrored) else { panic!("no proof") };
+        cells.sort_unstable();
+        assert_eq!((point, cells), ([0.2, 0.2, 0.2], [0, 1, 2, 3]));
+        assert!(find(&mirrored).unwrap().to_string().contains("cells 0, 1, 2, 3"));
     }
 }

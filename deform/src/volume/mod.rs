@@ -16,6 +16,7 @@ mod operator;
 mod rigid;
 mod settings;
 mod sliding;
+mod spring;
 #[cfg(test)]
 mod tests;
 mod untangle;
