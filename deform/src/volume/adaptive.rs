@@ -26,7 +26,7 @@ const STIFFER: f64 = 1.0;
 
 /// Sub-steps tried before it is given up, and those of them that were untangled in vain.
 const TRIES: usize = 200;
-const UNTANGLED_IN_VAIN: usize = 8;
+const UNTANGLED_IN_VAIN: usize = 4;
 
 /// Shapes tried in between on the way from one valid shape to another.
 const BETWEEN: usize = 200;

@@ -4,7 +4,8 @@ use std::sync::{Arc, OnceLock};
 
 use super::{Improver, foldover};
 use crate::linear::{
-    ConjugateGradients, DistributedMultigrid, LinearError, SparseMatrix, Tolerance, reverse_cuthill_mckee,
+    ConjugateGradients, DistributedMultigrid, LinearError, Multigrid, MultigridSettings, SparseMatrix, Tolerance,
+    reverse_cuthill_mckee,
 };
 use crate::mesh::{CellType, Mesh, Numbering, Ordered, Vector};
 use crate::parallel;
@@ -34,16 +35,20 @@ const FALLING: f64 = 0.3;
 
 /// Newton steps in which a shape goes back to another at most; how stiff the springs to that are at first and at last, by the stiffness
 /// of the cells, and by how much they become stiffer where the shape has settled.
-const RETURNING_STEPS: usize = 200;
+const RETURNING_STEPS: usize = 300;
 const FIRST_PULL: f64 = 1e-5;
 const LAST_PULL: f64 = 1e3;
 const STIFFER_PULL: f64 = 10.0;
 
 /// A shape on its way back is settled once a Newton step takes less than this part of what energy it has more than at rest.
-const SETTLED_PULL: f64 = 0.05;
+const SETTLED_PULL: f64 = 0.01;
 
 /// Iterations of the linear solver in a Newton step: a direction that is not exact is good enough.
 const ITERATIONS: usize = 400;
+
+/// What a Newton step leaves of the right side: a body on its way back bends as a whole, which is little of it.
+const TOLERANCE: f64 = 1e-2;
+const RETURNING_TOLERANCE: f64 = 1e-4;
 
 /// Rounds of sweeps that lift the quality of a valid mesh to the floor, and the sweeps in each.
 const ROUNDS: usize = 10;
@@ -358,8 +363,11 @@ impl Untangler {
                 right_side[row] = add(right_side[row], scale(off, weight));
             }
         }
-        let tolerance = Tolerance { relative: 1e-2, absolute: 0.0 };
-        let solved = self.solver(matrix).and_then(|solver| solver.solve(&right_side, direction, tolerance));
+        let relative = if pull.is_some() { RETURNING_TOLERANCE } else { TOLERANCE };
+        let places = pull.map(|_| self.unknowns.iter().map(|&vertex| points[vertex as usize]).collect());
+        let solved = self
+            .solver(matrix, places)
+            .and_then(|solver| solver.solve(&right_side, direction, Tolerance { relative, absolute: 0.0 }));
         // The right side is the sum of the ranks', the direction the same on all.
         let slope = -sum(partition, inner(&right_side, direction));
         // Conjugate gradients that were stopped early lead downwards too.
@@ -367,9 +375,16 @@ impl Untangler {
         all(partition, solved && slope < 0.0 && slope.is_finite()).then_some(slope)
     }
 
-    fn solver(&self, matrix: SparseMatrix<3>) -> Solver<3> {
+    /// A body that is held at few places, or nowhere, bends and turns as a whole: its equations need aggregates that turn. `places` are
+    /// then those of the unknowns.
+    fn solver(&self, matrix: SparseMatrix<3>, places: Option<Vec<Vector>>) -> Solver<3> {
         if self.partition.ranks() == 1 {
-            return Ok(Box::new(ConjugateGradients::new(matrix)?.with_max_iterations(ITERATIONS)));
+            return match places {
+                Some(places) => {
+                    Ok(Box::new(Multigrid::with_rigid_bodies(matrix, places, MultigridSettings::default())?))
+                }
+                None => Ok(Box::new(ConjugateGradients::new(matrix)?.with_max_iterations(ITERATIONS))),
+            };
         }
         let shares = self.shares.clone();
         Ok(Box::new(DistributedMultigrid::with_shares(Arc::clone(&self.partition), shares, Arc::new(matrix), None)?))
