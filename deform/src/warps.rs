@@ -1,8 +1,8 @@
 //! Motions of a mesh's boundary that no straight way of the inside can follow, for tests and benchmarks.
 //!
 //! Each takes a mesh about the box from `[0, 0, 0]` to `[1, 1, height]`, such as those of [`shapes`](crate::shapes), and says where
-//! its boundary vertices lie at a fraction of the way. A valid mesh of the whole is known for all but [`Warp::Shake`]: the map is one of
-//! space, which is one-to-one on the box.
+//! its boundary vertices lie at a fraction of the way. A valid mesh at the end is known for all but [`Warp::Shake`] and [`Warp::Wobble`]: the
+//! map is one of space, which is one-to-one on the box.
 
 use crate::mesh::Vector;
 use crate::vector::{add, cross, dot, scale, subtract};
@@ -25,7 +25,8 @@ pub enum Warp {
         /// The factor; below 1 a waist.
         factor: f64,
     },
-    /// The box laid along an open trefoil knot, as thick as it is: a column of a height of 16 or more.
+    /// The box laid along an open trefoil knot, as thick as it is: a column of a height of 24 or more. Its boundary goes there in a
+    /// straight line, on which it cannot be followed.
     Knot,
     /// Each boundary vertex displaced at random, by at most this much in each direction.
     Shake {

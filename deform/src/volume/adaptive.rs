@@ -243,6 +243,9 @@ pub fn follow<M: BoundaryMotion>(
     Ok(follower.route)
 }
 
+/// A displacement of every vertex, and the shape after it.
+type Moved = (Vec<Vector>, Vec<Vector>);
+
 /// What goes along a way.
 struct Follower<'a, M> {
     domain: Domain<'a>,
@@ -397,7 +400,7 @@ impl<M: BoundaryMotion> Follower<'_, M> {
         shape: &[Vector],
         places: &[Vector],
         guess: Option<Vec<Vector>>,
-    ) -> Result<Option<(Vec<Vector>, Vec<Vector>)>, FollowError<M::Error>> {
+    ) -> Result<Option<Moved>, FollowError<M::Error>> {
         let Some(operator) = operator else { return Ok(None) };
         match moved(operator, shape, places, guess, &mut self.route.iterations) {
             Ok(found) => Ok(Some(found)),
@@ -443,7 +446,7 @@ fn moved(
     places: &[Vector],
     guess: Option<Vec<Vector>>,
     iterations: &mut usize,
-) -> Result<(Vec<Vector>, Vec<Vector>), VolumeError> {
+) -> Result<Moved, VolumeError> {
     let displacement: Vec<Vector> = operator
         .boundary()
         .iter()
