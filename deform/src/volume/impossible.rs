@@ -123,7 +123,7 @@ const LENGTH: usize = 8;
 /// The worst of the cells whose vertices are all prescribed, where it is inverted or below `floor`.
 fn broken_cell(mesh: &Mesh, prescribed: &[bool], points: &[Vector], floor: f64) -> Option<Impossible> {
     let cells = mesh.cells();
-    let measure = Measure::new(cells, mesh.points());
+    let measure = Measure::new(cells);
     let mut scratch = Scratch::default();
     let held = |cell: &usize| cells.vertices(*cell).iter().all(|&vertex| prescribed[vertex as usize]);
     let measured = (0..cells.len()).filter(held).filter_map(|cell| {
