@@ -216,6 +216,31 @@ fn what_cannot_be_mended_says_how_far_it_came() {
     assert_eq!(text.matches(" % ").count(), 1, "{text}");
 }
 
+/// Cells at an edge of the column have all their vertices on the surface, and would be inside out: that is said, and how far it can go.
+#[test]
+fn what_no_mesh_can_do_is_proved() {
+    let mut shaper = column();
+    let mesh = Arc::clone(shaper.mesh());
+    assert_eq!(mesh.points()[3], [1.0, 0.0, 0.0]);
+    let pushed = |fraction: f64| {
+        let by = [-0.9, 0.9, 0.9].map(|by| by * fraction);
+        edits(json!([{"displacement": {"vertices": [3], "values": [by]}}]))
+    };
+    let start = here(&shaper);
+    let allowing = Guard { surface: tombolo_deform::quality::SurfaceRule::Allow, ..guard(Otherwise::Untangle) };
+    let refused = reach(&mut shaper, &pushed(1.0), &start, 1, &allowing).unwrap_err();
+    let Refused::Stalled { impossible: Some(_), fraction, end_is_valid: false, .. } = &refused else {
+        panic!("{refused}")
+    };
+    assert!(*fraction > 0.1 && *fraction < 1.0 / 5.4, "{fraction}");
+    assert!(
+        refused.to_string().contains("no motion of the inside gives a valid mesh at its whole amount: "),
+        "{refused}"
+    );
+    let plan = reach(&mut shaper, &pushed(*fraction), &start, 1, &allowing).unwrap();
+    walk(&mesh, &plan, &allowing);
+}
+
 fn any_edit() -> impl Strategy<Value = Value> {
     let feature = prop::sample::select(shapes::BOX_FEATURES.to_vec());
     let amount = (-1.0..1.0f64, -1.0..3.0f64).prop_map(|(sign, power)| sign * 10f64.powf(power));

@@ -15,6 +15,7 @@ pub mod shapes;
 pub mod skeleton;
 pub mod surface;
 pub mod volume;
+pub mod warps;
 
 mod lanes;
 mod parallel;

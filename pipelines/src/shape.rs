@@ -20,7 +20,7 @@ use tombolo_deform::{
     surface::{
         BrokenSurface, Edit, EditError, Editor, FeatureSettings, Surface, SurfaceError, UnknownFeature, require_sound,
     },
-    volume::{Improver, Untangler, VolumeError},
+    volume::{Impossible, Improver, Untangler, VolumeError},
 };
 
 use crate::communicator::{Communicator, agree};
@@ -91,10 +91,11 @@ pub enum Refused {
     Guard(#[from] Refusal),
     /// An edit cannot be followed to its end, not in sub-steps and not by untangling.
     #[error(
-        "edit {edit} ({name}) can be done to {:.2} % of its amount; beyond that{} {}",
+        "edit {edit} ({name}) can be done to {:.2} % of its amount; beyond that{} {}{}",
         (1e4 * fraction).floor() / 1e2,
         if *folds { " the surface itself folds:" } else { "" },
-        refusal.flaw()
+        refusal.flaw(),
+        at_its_end(impossible.as_deref(), *end_is_valid)
     )]
     Stalled {
         /// The place of the edit in the stack, counted from 0.
@@ -107,6 +108,10 @@ pub enum Refused {
         folds: bool,
         /// What is wrong with going further.
         refusal: Refusal,
+        /// Why there is no valid mesh at the edit's whole amount, where that is proved.
+        impossible: Option<Box<Impossible>>,
+        /// Whether a valid mesh was found at the edit's whole amount, to which there was no way.
+        end_is_valid: bool,
     },
     /// What ranks said to each other was not understood.
     #[error(transparent)]
@@ -117,6 +122,17 @@ pub enum Refused {
     /// Another rank has the reason, in its own words.
     #[error("{0}")]
     Elsewhere(Elsewhere),
+}
+
+/// What is known of the end of an edit that cannot be followed to it.
+fn at_its_end(impossible: Option<&Impossible>, end_is_valid: bool) -> String {
+    match impossible {
+        Some(proof) => format!("; no motion of the inside gives a valid mesh at its whole amount: {proof}"),
+        None if end_is_valid => String::from(
+            "; there is a valid mesh at its whole amount, but no way to it was found: make the edit in parts",
+        ),
+        None => String::new(),
+    }
 }
 
 impl Refused {

@@ -28,7 +28,8 @@ use crate::mesh::{CellType, Cells, Vector};
 use crate::parallel;
 use crate::partition::{Partition, Whole};
 use crate::vector::{determinant, mean, subtract};
-use cell::{Scratch, scaled_jacobian_of};
+pub(crate) use cell::Scratch;
+use cell::scaled_jacobian_of;
 use inside::least_inside;
 
 /// How many cells are measured at a time.

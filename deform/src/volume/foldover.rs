@@ -7,6 +7,9 @@ use crate::vector::{add, cross, determinant, dot, scale, subtract};
 /// The weight of the term that resists a change of volume; the rest is that of the term that resists a change of shape.
 const VOLUME: f64 = 0.5;
 
+/// The energy of a corner that is as in the reference: the least there is.
+pub(super) const REST: f64 = 3.0 * (1.0 - VOLUME) + 2.0 * VOLUME;
+
 /// Eigenvalues of a Hessian are kept above this part of that of the shape term.
 const LEAST: f64 = 1e-3;
 
@@ -138,7 +141,7 @@ fn rotated(left: &Matrix, block: &Block<3>) -> Block<3> {
 }
 
 /// `J = Σ sigma[k] left[k] right[k]ᵀ` to rounding, with right-handed vectors and the sign of the determinant in the last value.
-fn singular(j: &Matrix) -> (Matrix, Vector, Matrix) {
+pub(super) fn singular(j: &Matrix) -> (Matrix, Vector, Matrix) {
     let mut square = [[0.0; 3]; 3];
     for (a, row) in square.iter_mut().enumerate() {
         for (b, value) in row.iter_mut().enumerate() {

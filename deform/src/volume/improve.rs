@@ -59,6 +59,8 @@ pub struct Improver {
     /// The pieces that have a free vertex.
     movable: Vec<u32>,
     parts: Option<Parts>,
+    /// Vertices none of whose cells is below this stay.
+    good: f64,
 }
 
 /// What is known of the other ranks.
@@ -113,7 +115,8 @@ impl Improver {
                 movable.push(number);
             }
         }
-        let mut improver = Self { numbering, pieces, colours: Vec::new(), incident, offsets, movable, parts: None };
+        let mut improver =
+            Self { numbering, pieces, colours: Vec::new(), incident, offsets, movable, parts: None, good: GOOD };
         let around = |vertex: u32, visit: &mut dyn FnMut(u32)| {
             for &code in improver.incident(vertex) {
                 improver.pieces[(code / 4) as usize].vertices.iter().for_each(|&other| visit(other));
@@ -142,6 +145,12 @@ impl Improver {
         improver
     }
 
+    /// The same where cells are lifted to `good` times the quality that they have in the reference, and above it.
+    #[must_use]
+    pub(super) fn lifting_to(self, good: f64) -> Self {
+        Self { good, ..self }
+    }
+
     /// Improves `points` (coordinates of each vertex) in at most `sweeps` sweeps. Says whether anything has moved; nothing does
     /// where a cell is turned inside out.
     pub fn improve(&self, points: &mut [Vector], sweeps: u32) -> bool {
@@ -151,7 +160,7 @@ impl Improver {
         }
         let mut near = self.numbering.gather(points).into_owned();
         let before = self.least(&near);
-        if sweeps == 0 || before.is_nan() || before <= 0.0 || before >= GOOD {
+        if sweeps == 0 || before.is_nan() || before <= 0.0 || before >= self.good {
             return false;
         }
         let mut least = before;
@@ -197,7 +206,7 @@ impl Improver {
                     .iter()
                     .map(|&vertex| {
                         self.gather(vertex, points, &mut star);
-                        barrier.improved(points[vertex as usize], &star, GOOD)
+                        barrier.improved(points[vertex as usize], &star, self.good)
                     })
                     .collect::<Vec<Vector>>()
             });
@@ -223,7 +232,7 @@ impl Improver {
             self.gather(vertex, points, &mut star);
             let (gradient, hessian) = barrier.derivatives(point, &star);
             let slope = &mut slopes[place as usize];
-            slope[0] = f64::from(u8::from(!star.is_above(point, GOOD)));
+            slope[0] = f64::from(u8::from(!star.is_above(point, self.good)));
             slope[1..4].copy_from_slice(&gradient);
             slope[4..].copy_from_slice(hessian.as_flattened());
         }

@@ -10,16 +10,19 @@ mod barrier;
 mod colours;
 mod element;
 mod foldover;
+mod impossible;
 mod improve;
 mod operator;
 mod rigid;
 mod settings;
 mod sliding;
+mod spring;
 #[cfg(test)]
 mod tests;
 mod untangle;
 
 pub use adaptive::{BoundaryMotion, Domain, FollowError, Route, Stalled, Waypoint, follow};
+pub use impossible::Impossible;
 pub use improve::Improver;
 pub use operator::{VolumeOperator, VolumeSolution};
 pub use settings::{Deform, Method};

@@ -1,9 +1,12 @@
 //! Moving the inside of a mesh so that no cell is turned inside out.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-use super::foldover;
-use crate::linear::{ConjugateGradients, DistributedMultigrid, SparseMatrix, Tolerance, reverse_cuthill_mckee};
+use super::{Improver, foldover};
+use crate::linear::{
+    ConjugateGradients, DistributedMultigrid, LinearError, Multigrid, MultigridSettings, SparseMatrix, Tolerance,
+    reverse_cuthill_mckee,
+};
 use crate::mesh::{CellType, Mesh, Numbering, Ordered, Vector};
 use crate::parallel;
 use crate::partition::{Partition, Reduction, Shares, Solver, all, any, whole};
@@ -21,6 +24,38 @@ const STEPS: usize = 60;
 
 /// A mesh is settled once a Newton step takes less than this part of the energy off.
 const SETTLED: f64 = 1e-3;
+
+/// The least regularisation of a mesh with inverted corners, and what it is raised to where the mesh settles with some: this many
+/// steps in a row make it settled, so often it is raised, and by this factor it falls again from step to step.
+const LEAST_EPSILON: f64 = 1e-6;
+const RAISED_EPSILON: f64 = 0.1;
+const SETTLED_STEPS: usize = 3;
+const RAISES: usize = 2;
+const FALLING: f64 = 0.3;
+
+/// Newton steps in which a shape goes back to another at most; how stiff the springs to that are at first and at last, by the stiffness
+/// of the cells, and by how much they become stiffer where the shape has settled.
+const RETURNING_STEPS: usize = 300;
+const FIRST_PULL: f64 = 1e-5;
+const LAST_PULL: f64 = 1e3;
+const STIFFER_PULL: f64 = 10.0;
+
+/// A shape on its way back is settled once a Newton step takes less than this part of what energy it has more than at rest.
+const SETTLED_PULL: f64 = 0.01;
+
+/// Iterations of the linear solver in a Newton step: a direction that is not exact is good enough.
+const ITERATIONS: usize = 400;
+
+/// What a Newton step leaves of the right side: a body on its way back bends as a whole, which is little of it.
+const TOLERANCE: f64 = 1e-2;
+const RETURNING_TOLERANCE: f64 = 1e-4;
+
+/// Rounds of sweeps that lift the quality of a valid mesh to the floor, and the sweeps in each.
+const ROUNDS: usize = 10;
+const SWEEPS: u32 = 10;
+
+/// Cells of a valid mesh that is below the floor are lifted to this times the quality that they have in the reference.
+const LIFTED: f64 = 1.5;
 
 const NONE: u32 = u32::MAX;
 
@@ -54,14 +89,25 @@ pub struct Untangler {
     columns: Vec<u32>,
     partition: Arc<dyn Partition>,
     shares: Shares,
+    boundary: Vec<u32>,
+    /// The least scaled Jacobian of the reference mesh.
+    least: f64,
+    improver: OnceLock<Improver>,
 }
 
 /// A tetrahedron at a corner of a cell.
 #[derive(Debug, Clone, Copy)]
-struct Corner {
-    vertices: [u32; 4],
+pub(super) struct Corner {
+    pub(super) vertices: [u32; 4],
+    pub(super) cell: u32,
     /// The gradients of its linear shape functions in the reference.
     gradients: [Vector; 4],
+}
+
+/// What draws each unknown to a place, as a spring does: the energy `½ weight |x - place|²`.
+struct Pull {
+    places: Vec<Vector>,
+    weights: Vec<f64>,
 }
 
 /// What is known of a shape.
@@ -138,11 +184,25 @@ impl Untangler {
         }
         let vertices: Vec<u32> = unknowns.iter().map(|&place| numbering.vertex(place)).collect();
         let shares = Shares::new(&**partition, &vertices);
-        Self { numbering, corners, unknowns, slots, offsets, columns, partition: Arc::clone(partition), shares }
+        let least = quality_in_parts(mesh.cells(), mesh.points(), &**partition).min;
+        Self {
+            numbering,
+            corners,
+            unknowns,
+            slots,
+            offsets,
+            columns,
+            partition: Arc::clone(partition),
+            shares,
+            boundary: boundary.to_vec(),
+            least,
+            improver: OnceLock::new(),
+        }
     }
 
-    /// Moves the free vertices of `points` until every corner's determinant is positive and every scaled Jacobian at least
-    /// `floor`, and on until the energy has settled. Says whether all of them are.
+    /// Moves the free vertices of `points` until every corner's determinant is positive, and on until the energy has settled; where
+    /// a scaled Jacobian is then below `floor`, the worst cells are lifted (see [`Improver`]). Says whether all cells are valid and
+    /// none is below `floor`, or below the least of the reference mesh where that is lower.
     ///
     /// `mesh` is the reference mesh.
     pub fn untangle(&self, mesh: &Mesh, points: &mut [Vector], floor: f64) -> bool {
@@ -151,45 +211,180 @@ impl Untangler {
             return false;
         }
         let mut near = self.numbering.gather(points).into_owned();
-        let lowered = self.lower(&mut near);
+        self.lower(&mut near);
         self.numbering.scatter(&near, points);
-        if !lowered {
-            return false;
+        let floor = floor.min(self.least);
+        let mut quality = quality_in_parts(mesh.cells(), points, partition);
+        for _ in 0..ROUNDS {
+            let improver = || Improver::of_part(mesh, &self.boundary, &self.partition).lifting_to(LIFTED);
+            if quality.inverted > 0
+                || quality.min >= floor
+                || !self.improver.get_or_init(improver).improve(points, SWEEPS)
+            {
+                break;
+            }
+            quality = quality_in_parts(mesh.cells(), points, partition);
         }
-        let sum = quality_in_parts(mesh.cells(), points, partition);
-        sum.inverted == 0 && sum.min >= floor
+        quality.inverted == 0 && quality.min >= floor
     }
 
-    /// Brings the energy down until it settles. Whether the equations on the way could be solved.
-    fn lower(&self, points: &mut [Vector]) -> bool {
-        let partition = &*self.partition;
-        let mut epsilon = 1.0;
+    /// Brings the energy down until it settles.
+    fn lower(&self, points: &mut [Vector]) {
+        let (mut epsilon, mut lower_bound) = (1.0, LEAST_EPSILON);
+        let (mut settled, mut raises) = (0, 0);
         let mut direction = vec![[0.0; 3]; self.unknowns.len()];
         for step in 0..STEPS {
             let least = self.state(points, 1.0).least;
             // As Garanzha et al.: the regularisation follows the worst determinant; a valid mesh has none.
-            epsilon = if least > 0.0 { (0.01 * least).min(epsilon) } else { (1e-12 + 0.04 * least * least).sqrt() };
+            epsilon = if least > 0.0 { (0.01 * least).min(epsilon) } else { lower_bound.hypot(0.2 * least) };
+            lower_bound = LEAST_EPSILON.max(FALLING * lower_bound);
             let before = self.state(points, epsilon).energy;
-            let (matrix, right_side) = self.assemble(points, epsilon);
-            let slope = match self.solver(matrix).and_then(|solver| {
-                solver.solve(&right_side, &mut direction, Tolerance { relative: 1e-2, absolute: 0.0 })
-            }) {
-                // The right side is the sum of the ranks', the direction the same on all.
-                Ok(_) => -sum(partition, inner(&right_side, &direction)),
-                Err(_) => return false,
-            };
-            let Some(after) = self.descend(points, &direction, epsilon, before, slope) else { break };
-            let settled = before - after < SETTLED * before.abs();
-            if settled && least > 0.0 && step > 2 {
+            let Some(slope) = self.direction(points, epsilon, None, &mut direction) else { break };
+            let energy = |points: &[Vector]| self.state(points, epsilon).energy;
+            let after = self.descend(points, &direction, &energy, before, slope);
+            let falls = after.is_some_and(|after| before - after >= SETTLED * before.abs());
+            settled = if falls { 0 } else { settled + 1 };
+            if settled > 0 && least > 0.0 && (step > 2 || after.is_none()) {
                 break;
             }
+            if settled >= SETTLED_STEPS || after.is_none() {
+                if raises == RAISES {
+                    break;
+                }
+                raises += 1;
+                (settled, lower_bound) = (0, RAISED_EPSILON);
+            }
         }
-        true
     }
 
-    fn solver(&self, matrix: SparseMatrix<3>) -> Solver<3> {
+    /// Takes a valid shape back towards the one that `towards` makes of it: the cells are drawn to those of the reference, and every
+    /// vertex that is free to its place in the other shape, the more the longer it takes. Each step is one that `goes` from a
+    /// shape to the next; it ends where `arrives` says so, and says whether it did.
+    ///
+    /// A body that is let go springs back: this is how a way is found between shapes whose boundaries a straight one breaks.
+    pub(super) fn take_back(
+        &self,
+        points: &[Vector],
+        towards: &dyn Fn(&[Vector]) -> Vec<Vector>,
+        goes: &dyn Fn(&[Vector], &[Vector]) -> bool,
+        arrives: &mut dyn FnMut(&[Vector]) -> bool,
+    ) -> bool {
+        let partition = &*self.partition;
+        if all(partition, self.unknowns.is_empty()) || any(partition, points.len() != self.slots.len()) {
+            return false;
+        }
+        let mut points = points.to_vec();
+        let mut near = self.numbering.gather(&points).into_owned();
+        #[expect(clippy::cast_precision_loss, reason = "fewer cells than 2^53")]
+        let rest = foldover::REST * sum(partition, self.corners.len() as f64);
+        let stiffnesses = self.stiffnesses();
+        let mut stiffness = FIRST_PULL;
+        let mut direction = vec![[0.0; 3]; self.unknowns.len()];
+        for _ in 0..RETURNING_STEPS {
+            let towards = towards(&points);
+            let towards = self.numbering.gather(&towards);
+            let pull = Pull {
+                places: self.unknowns.iter().map(|&vertex| towards[vertex as usize]).collect(),
+                weights: stiffnesses.iter().map(|value| stiffness * value).collect(),
+            };
+            let epsilon = 0.01 * self.state(&near, 1.0).least.max(0.0);
+            let valid = |next: &[Vector]| {
+                let mut moved = points.clone();
+                self.numbering.scatter(next, &mut moved);
+                goes(&points, &moved)
+            };
+            let energy = |points: &[Vector]| self.state(points, epsilon).energy + self.pulled(points, &pull);
+            let before = energy(&near);
+            let after = self.direction(&near, epsilon, Some(&pull), &mut direction).and_then(|slope| {
+                // Where the way to a shape would be broken, that is no shape to go to.
+                let energy = |next: &[Vector]| {
+                    let energy = energy(next);
+                    if all(partition, energy < before) && valid(next) { energy } else { f64::INFINITY }
+                };
+                self.descend(&mut near, &direction, &energy, before, slope)
+            });
+            if after.is_some() {
+                self.numbering.scatter(&near, &mut points);
+                if arrives(&points) {
+                    return true;
+                }
+            }
+            if after.is_none_or(|after| before - after < SETTLED_PULL * (before - rest)) {
+                stiffness *= STIFFER_PULL;
+                if stiffness > LAST_PULL {
+                    return false;
+                }
+            }
+        }
+        false
+    }
+
+    /// How stiff the cells about each unknown are in the reference; of several ranks the one that owns a vertex has all of it.
+    fn stiffnesses(&self) -> Vec<f64> {
+        let mut sums = vec![0.0; self.unknowns.len()];
+        for corner in &self.corners {
+            for (&vertex, &gradient) in corner.vertices.iter().zip(&corner.gradients) {
+                if let Some(sum) = sums.get_mut(self.slots[vertex as usize] as usize) {
+                    *sum += dot(gradient, gradient);
+                }
+            }
+        }
+        self.shares.sum(&*self.partition, 1, &mut sums);
+        for &place in self.shares.places() {
+            if !self.shares.owns(place as usize) {
+                sums[place as usize] = 0.0;
+            }
+        }
+        sums
+    }
+
+    /// The energy of the springs.
+    fn pulled(&self, points: &[Vector], pull: &Pull) -> f64 {
+        let springs = self.unknowns.iter().zip(&pull.places).zip(&pull.weights);
+        let mine = springs.map(|((&vertex, &place), weight)| {
+            let off = subtract(points[vertex as usize], place);
+            0.5 * weight * dot(off, off)
+        });
+        sum(&*self.partition, mine.sum())
+    }
+
+    /// Newton's direction, and the slope of the energy along it; `None` where there is none downwards.
+    fn direction(&self, points: &[Vector], epsilon: f64, pull: Option<&Pull>, direction: &mut [Vector]) -> Option<f64> {
+        let partition = &*self.partition;
+        let (mut matrix, mut right_side) = self.assemble(points, epsilon);
+        if let Some(pull) = pull {
+            let (offsets, columns, values) = matrix.offsets_and_values_mut();
+            for (row, &vertex) in self.unknowns.iter().enumerate() {
+                let weight = pull.weights[row];
+                let place =
+                    offsets[row] + columns[offsets[row]..offsets[row + 1]].partition_point(|&c| (c as usize) < row);
+                (0..3).for_each(|axis| values[place][axis][axis] += weight);
+                let off = subtract(pull.places[row], points[vertex as usize]);
+                right_side[row] = add(right_side[row], scale(off, weight));
+            }
+        }
+        let relative = if pull.is_some() { RETURNING_TOLERANCE } else { TOLERANCE };
+        let places = pull.map(|_| self.unknowns.iter().map(|&vertex| points[vertex as usize]).collect());
+        let solved = self
+            .solver(matrix, places)
+            .and_then(|solver| solver.solve(&right_side, direction, Tolerance { relative, absolute: 0.0 }));
+        // The right side is the sum of the ranks', the direction the same on all.
+        let slope = -sum(partition, inner(&right_side, direction));
+        // Conjugate gradients that were stopped early lead downwards too.
+        let solved = matches!(solved, Ok(_) | Err(LinearError::NotConverged { .. }));
+        all(partition, solved && slope < 0.0 && slope.is_finite()).then_some(slope)
+    }
+
+    /// A body that is held at few places, or nowhere, bends and turns as a whole: its equations need aggregates that turn. `places` are
+    /// then those of the unknowns.
+    fn solver(&self, matrix: SparseMatrix<3>, places: Option<Vec<Vector>>) -> Solver<3> {
         if self.partition.ranks() == 1 {
-            return Ok(Box::new(ConjugateGradients::new(matrix)?));
+            return match places {
+                Some(places) => {
+                    Ok(Box::new(Multigrid::with_rigid_bodies(matrix, places, MultigridSettings::default())?))
+                }
+                None => Ok(Box::new(ConjugateGradients::new(matrix)?.with_max_iterations(ITERATIONS))),
+            };
         }
         let shares = self.shares.clone();
         Ok(Box::new(DistributedMultigrid::with_shares(Arc::clone(&self.partition), shares, Arc::new(matrix), None)?))
@@ -200,7 +395,7 @@ impl Untangler {
         &self,
         points: &mut [Vector],
         direction: &[Vector],
-        epsilon: f64,
+        energy: &dyn Fn(&[Vector]) -> f64,
         before: f64,
         slope: f64,
     ) -> Option<f64> {
@@ -210,7 +405,7 @@ impl Untangler {
             for ((&vertex, &from), &by) in self.unknowns.iter().zip(&start).zip(direction) {
                 points[vertex as usize] = add(from, scale(by, length));
             }
-            let after = self.state(points, epsilon).energy;
+            let after = energy(points);
             if after <= before + 1e-4 * length * slope {
                 return Some(after);
             }
@@ -306,22 +501,23 @@ fn inner(a: &[Vector], b: &[Vector]) -> f64 {
 }
 
 /// The corners of the cells, each right-handed in a valid mesh; those flat in the reference are left out.
-fn corners(mesh: &Mesh) -> Vec<Corner> {
+pub(super) fn corners(mesh: &Mesh) -> Vec<Corner> {
     let (cells, points) = (mesh.cells(), mesh.points());
     let mut corners = Vec::with_capacity(cells.len());
-    let mut take = |vertices: [u32; 4]| {
+    let mut take = |cell: usize, vertices: [u32; 4]| {
         let [p, q, r, s] = vertices.map(|vertex| points[vertex as usize]);
         let (u, v, w) = (subtract(q, p), subtract(r, p), subtract(s, p));
         let determinant = tet_determinant([p, q, r, s]);
         if determinant > 0.0 {
             let [g, h, k] = [cross(v, w), cross(w, u), cross(u, v)].map(|face| scale(face, 1.0 / determinant));
-            corners.push(Corner { vertices, gradients: [scale(add(add(g, h), k), -1.0), g, h, k] });
+            #[expect(clippy::cast_possible_truncation, reason = "fewer cells than 2^32")]
+            corners.push(Corner { vertices, cell: cell as u32, gradients: [scale(add(add(g, h), k), -1.0), g, h, k] });
         }
     };
-    for (cell_type, vertices) in cells.iter() {
+    for (cell, (cell_type, vertices)) in cells.iter().enumerate() {
         let mut take_all = |locals: &[[usize; 4]]| {
             for local in locals {
-                take(local.map(|index| vertices[index]));
+                take(cell, local.map(|index| vertices[index]));
             }
         };
         match cell_type {
@@ -380,6 +576,23 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// What the reference has of poor cells is not what untangling is to mend.
+    #[test]
+    fn slivers_of_the_reference_are_no_failure() {
+        let whole = shapes::box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+        let boundary = boundary(&whole);
+        let mut points = whole.points().to_vec();
+        let middle = points.iter().position(|point| *point == [0.5; 3]).unwrap();
+        // Almost in the plane of one of its cells' faces.
+        points[middle] = [0.5, 0.5, 0.7495];
+        let mesh = whole.with_points(points).unwrap();
+        let least = quality(mesh.cells(), mesh.points()).min;
+        assert!(least > 0.0 && least < 0.01, "{least}");
+        let mut points = thrown(&mesh, &boundary);
+        assert!(quality(mesh.cells(), &points).inverted > 20);
+        assert!(Untangler::new(&mesh, &boundary).untangle(&mesh, &mut points, 0.02));
     }
 
     #[test]

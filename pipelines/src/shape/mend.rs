@@ -7,7 +7,7 @@ use tombolo_deform::{
     quality::{Guard, Otherwise, turns_over},
     schedule::Schedule,
     surface::{Advance, Edit, Editor},
-    volume::{BoundaryMotion, Domain, FollowError, Route, Untangler, follow},
+    volume::{BoundaryMotion, Domain, FollowError, Route, Untangler, VolumeError, follow},
 };
 
 use crate::language::{DeformStage, check_stack};
@@ -92,6 +92,10 @@ impl BoundaryMotion for OnShape<'_> {
             None => Ok(Vec::new()),
         };
         boundary.scatter(carried)
+    }
+
+    fn is_stated(&self) -> bool {
+        false
     }
 
     fn folds(&self, shape: &[Vector], places: &[Vector]) -> bool {
@@ -205,8 +209,8 @@ impl Shaper {
                 break Target { seconds: ShapeSeconds::default(), ..found.target.clone() };
             }
             let mut linear = match self.target(&stack[..lower], deform, guard.surface) {
-                // Followed in sub-steps, the surface may come out sound.
-                Err(refused) if refused.is_surface() && lower > 0 => {
+                // Followed in sub-steps, the surface may come out sound, and a solve that broke down may be smaller ones that do not.
+                Err(refused) if (refused.is_surface() || self.breaks_down(&refused)) && lower > 0 => {
                     lower -= 1;
                     continue;
                 }
@@ -231,6 +235,11 @@ impl Shaper {
             self.mended.push(Mended { stack, deform: deform.clone(), guard: *guard, target: target.clone() });
         }
         Ok(target)
+    }
+
+    /// Whether a linear system could not be solved. Of several ranks each may have another reason, and none can go on alone.
+    fn breaks_down(&self, refused: &Refused) -> bool {
+        self.boundary.partition().ranks() == 1 && matches!(refused, Refused::Volume(VolumeError::Linear(_)))
     }
 
     /// The shape of a stack whose edits below the last one make the shape `base`.
@@ -380,6 +389,8 @@ fn refused(error: FollowError<Refused>, edit: usize, what: &Edit) -> Refused {
             fraction: stalled.fraction(),
             folds: stalled.folds,
             refusal: stalled.refusal,
+            impossible: stalled.impossible.map(Box::new),
+            end_is_valid: stalled.end_is_valid,
         },
     }
 }
