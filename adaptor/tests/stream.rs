@@ -395,8 +395,7 @@ fn a_viewer_is_told_which_limit_its_message_is_beyond() {
     let mut watcher = Viewer::connect(&solver.adaptor);
     watcher.send_text(&" ".repeat(2000));
     watcher.wait_for("error", |error| error["message"].as_str().unwrap().contains("watches"));
-    // A stack is as long as it is, however it came to be so.
-    let stack = vec![edit; EDITS.most];
+    let stack = vec![edit; 1500];
     viewer.send(&json!({"id": "d", "forecast": {"stack": stack}}));
     let told = viewer.wait_for("forecast", |forecast| forecast["id"] == "d");
     assert_eq!(told["order"]["outcome"], "applied", "{told}");
