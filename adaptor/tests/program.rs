@@ -169,7 +169,7 @@ fn edit_refuses_with_the_reason_and_writes_nothing() {
         (r#"[{"translate": {"features": ["z-max"], "by": [0, 0]}}]"#, &[], 1, "edits.json:1:"),
         (r#"{"undo": 1}"#, &[], 1, "undo"),
         (r#"{"stack": [], "guard": {"min_scaled_jacobian": 7}}"#, &[], 1, "min_scaled_jacobian"),
-        (r#"{"stack": []}"#, &["--stiffening", "NaN"], 2, "stiffening"),
+        (r#"{"stack": []}"#, &["--stiffening", "NaN"], 1, "stiffening"),
     ] {
         let (directory, _) = with_box(edits);
         let output = tombolo(directory.path(), &[&EDIT[..], more].concat());
