@@ -314,10 +314,10 @@ fn the_floor_of_prisms_is_that_of_their_worst_corner() {
         let mut shaper = shaper(box_of_prisms([3, 3, 3], [1.0, 1.0, 1.0], manual));
         let mesh = Arc::clone(shaper.mesh());
         let start = here(&shaper);
-        let refused = reach(&mut shaper, &shear(1.2), &start, 2, &floor(0.5)).unwrap_err();
+        let refused = reach(&mut shaper, &shear(2.0), &start, 2, &floor(0.5)).unwrap_err();
         let fraction = refused.feasible_fraction().unwrap();
         assert!(fraction > 0.1 && fraction < 1.0, "{fraction}");
-        let plan = reach(&mut shaper, &shear(1.2 * fraction), &start, 2, &floor(0.5)).unwrap();
+        let plan = reach(&mut shaper, &shear(2.0 * fraction), &start, 2, &floor(0.5)).unwrap();
         let independent = least(plan.end(), &mesh.cells().as_given());
         assert!((0.5 - 1e-9..0.501).contains(&independent), "the floor is just kept: {independent}");
         assert!((plan.quality().min_scaled_jacobian - independent).abs() < 1e-12);

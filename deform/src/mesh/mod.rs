@@ -5,8 +5,6 @@
 
 use std::sync::Arc;
 
-use crate::number::Place;
-
 mod cell_type;
 mod cells;
 mod feature;
@@ -23,6 +21,7 @@ pub(crate) use handedness::is_left_handed;
 #[cfg(test)]
 pub(crate) use ordered::shuffled;
 pub(crate) use ordered::{Numbering, Ordered};
+pub use other_order::OtherOrder;
 pub use view::{ArrayView, CellsView, Indices, MeshView, Number, Values};
 
 /// A point or vector in space.
@@ -159,24 +158,8 @@ pub enum MeshError {
         expected: &'static str,
     },
     /// The vertices of cells stand in another order than VTK's.
-    #[error(
-        "cell {cell} ({cell_type}) at {} has its vertices in another order than VTK's, and so have most cells of \
-         its type: VTK's order is {}; this looks like {}: give the vertices {} of each cell, as they are counted now",
-        Place(*centroid), other_order::of_vtk(*cell_type), name.unwrap_or("that of another program"),
-        other_order::listed(order)
-    )]
-    OtherOrder {
-        /// The first such cell.
-        cell: usize,
-        /// Its type.
-        cell_type: CellType,
-        /// The mean of its vertices.
-        centroid: Vector,
-        /// Which of the vertices, as they stand, should come first, which next.
-        order: Vec<usize>,
-        /// The order that it looks like, where it is a known one.
-        name: Option<&'static str>,
-    },
+    #[error("{0}")]
+    OtherOrder(Box<OtherOrder>),
     /// A cell type number that is not a linear VTK cell.
     #[error("cell {cell}: VTK cell type {number} is not a linear cell; the linear ones are 1 to 16 and 42")]
     UnknownCellType {

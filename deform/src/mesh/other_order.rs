@@ -2,6 +2,7 @@
 
 use super::handedness::{Hand, Types, hand};
 use super::{CellType, Cells, MeshError, Vector};
+use crate::number::Place;
 use crate::quality::{centroid, scaled_jacobian};
 
 /// How many cells of a type are looked at.
@@ -26,6 +27,38 @@ const KNOWN: [(CellType, &[usize], &str); 6] = [
     (CellType::Wedge, &[0, 2, 4, 1, 3, 5], "one edge between the triangles after the other"),
     (CellType::Wedge, &[0, 1, 4, 3, 2, 5], "a quadrilateral before the edge across from it, as in Nektar++"),
 ];
+
+/// Cells whose vertices stand in another order than VTK's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OtherOrder {
+    /// The first such cell.
+    pub cell: usize,
+    /// Its type.
+    pub cell_type: CellType,
+    /// The mean of its vertices.
+    pub centroid: Vector,
+    /// Which of the vertices, as they stand, should come first, which next.
+    pub order: Vec<usize>,
+    /// The order that it looks like, where it is a known one.
+    pub name: Option<&'static str>,
+}
+
+impl std::fmt::Display for OtherOrder {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let order: Vec<String> = self.order.iter().map(ToString::to_string).collect();
+        write!(
+            formatter,
+            "cell {} ({}) at {} has its vertices in another order than VTK's, and so have most cells of its type: VTK's order is {}; \
+             this looks like {}: give the vertices {} of each cell, as they are counted now",
+            self.cell,
+            self.cell_type,
+            Place(self.centroid),
+            of_vtk(self.cell_type),
+            self.name.unwrap_or("that of another program"),
+            order.join(" ")
+        )
+    }
+}
 
 /// What to say of cells of the types `neither`, most of which are neither right- nor left-handed: the order in which all that are
 /// looked at would be valid, where there is one.
@@ -58,7 +91,8 @@ pub(super) fn other_order(cells: &Cells, points: &[Vector], neither: Types) -> O
         }
         let (_, order) = best?;
         let name = known().find(|(_, known, _)| *known == order).map(|&(_, _, name)| name);
-        Some(MeshError::OtherOrder { cell: wrong, cell_type, centroid: centroid(cells, wrong, points), order, name })
+        let centroid = centroid(cells, wrong, points);
+        Some(MeshError::OtherOrder(Box::new(OtherOrder { cell: wrong, cell_type, centroid, order, name })))
     })
 }
 
@@ -91,7 +125,7 @@ fn for_each_order(size: usize, visit: &mut impl FnMut(&[usize])) {
 }
 
 /// VTK's order of the vertices of a cell, in words.
-pub(super) fn of_vtk(cell_type: CellType) -> &'static str {
+fn of_vtk(cell_type: CellType) -> &'static str {
     match cell_type {
         CellType::Hexahedron => "the bottom quadrilateral around, then the top one above it",
         CellType::Voxel => "x fastest, then y, then z",
@@ -99,9 +133,4 @@ pub(super) fn of_vtk(cell_type: CellType) -> &'static str {
         CellType::Pyramid => "the base around, then the apex",
         _ => "that of its manual",
     }
-}
-
-/// Numbers in a row.
-pub(super) fn listed(order: &[usize]) -> String {
-    order.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
 }
