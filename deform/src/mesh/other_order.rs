@@ -11,6 +11,9 @@ const SAMPLE: usize = 32;
 /// An order that no program is known for is only named where it makes as many cells valid: few could be so by chance.
 const FEW: usize = 8;
 
+/// The least mean of scaled Jacobians by which an order is told: rounding makes flat cells valid in some order.
+const SOUND: f64 = 0.05;
+
 /// Scaled Jacobians that differ by less are of the same cell, read from another corner.
 const SAME: f64 = 1e-9;
 
@@ -109,7 +112,9 @@ fn worth(cell_type: CellType, samples: &[Vec<Vector>], order: &[usize]) -> Optio
         }
         sum += scaled_jacobian(cell_type, &points)?;
     }
-    Some(sum)
+    #[expect(clippy::cast_precision_loss, reason = "a few cells")]
+    let least = SOUND * samples.len() as f64;
+    (sum >= least).then_some(sum)
 }
 
 /// Calls `visit` with every order of `0..size`, the lexicographically first one first.

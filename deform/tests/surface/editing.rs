@@ -466,12 +466,10 @@ fn every_mistake_is_named_and_changes_nothing() {
     // A displacement of vertices that are all fixed, or none of which lies in what may move.
     let top = surface_vertices(&mesh, "x-max");
     let values: Vec<[f64; 3]> = top.iter().map(|_| [0.1, 0.0, 0.0]).collect();
-    for (features, fixed, moves) in
-        [("[]", r#"["x-max"]"#, false), (r#"["x-min"]"#, "[]", false), ("[]", r#"["y-max"]"#, true)]
+    for (parts, moves) in
+        [(r#""fixed": ["x-max"]"#, false), (r#""features": ["x-min"]"#, false), (r#""fixed": ["y-max"]"#, true)]
     {
-        let edit = format!(
-            r#"{{"displacement": {{"features": {features}, "fixed": {fixed}, "vertices": {top:?}, "values": {values:?}}}}}"#
-        );
+        let edit = format!(r#"{{"displacement": {{{parts}, "vertices": {top:?}, "values": {values:?}}}}}"#);
         let edit: Edit = serde_json::from_str(&edit).unwrap();
         if moves {
             assert!(editor.displacement(&[edit]).is_ok());
