@@ -5,8 +5,8 @@ use std::num::{NonZeroU32, NonZeroU64};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::number::Number;
 use crate::limits::{Exceeded, SHAPES};
+use crate::number::Number;
 
 /// How a change of shape is spread over the run: in `steps` shapes, one `every` so many cycles or so much simulated time, at equal
 /// distances or eased.

@@ -109,7 +109,8 @@ pub unsafe extern "C" fn tombolo_orders_file(run: *mut Handle, file: *const c_ch
         // SAFETY: as the module says.
         let file = unsafe { text(file, "file") }?;
         with(run, |run| {
-            run.settings()?.orders = language::parse_orders(&file_text(&file, WAITING_BYTES)?, &file).map_err(unreadable)?;
+            run.settings()?.orders =
+                language::parse_orders(&file_text(&file, WAITING_BYTES)?, &file).map_err(unreadable)?;
             Ok(())
         })
     })

@@ -14,7 +14,7 @@ pub struct FileError {
     pub place: Place,
     /// What is wrong.
     #[source]
-    pub problem: Problem,
+    pub problem: Box<Problem>,
 }
 
 /// A place in a file.
@@ -111,7 +111,7 @@ pub(super) struct Flaw {
 
 impl Flaw {
     pub fn in_file(self, file: &Path) -> FileError {
-        FileError { file: file.to_path_buf(), place: self.place, problem: self.problem }
+        FileError { file: file.to_path_buf(), place: self.place, problem: Box::new(self.problem) }
     }
 }
 

@@ -39,7 +39,6 @@ enum Wheel {
 /// let (id, message) = parse_message(r#"{"id": "c1-8", "puase": {}}"#);
 /// assert!(id.is_some() && message.is_err_and(|error| error.suggestion.as_deref() == Some("pause")));
 /// ```
-#[must_use]
 pub fn parse_message(text: &str) -> (Option<String>, Result<Message, LanguageError>) {
     let mut document = match Document::read(text, "message") {
         Ok(document) => document,
