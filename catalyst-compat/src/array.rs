@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-pub(crate) use tombolo::deform::mesh::Number;
+pub(crate) use tombolo::deform::mesh::NumberType;
 use tombolo::deform::mesh::{Indices, Values};
 
 /// Numbers of any type at any distance from each other, borrowed from the solver for the length of one call.
@@ -11,7 +11,7 @@ pub(crate) struct Array<'call> {
     first: *const u8,
     count: usize,
     stride: usize,
-    number: Number,
+    number: NumberType,
     swapped: bool,
     call: PhantomData<&'call [u8]>,
 }
@@ -20,7 +20,13 @@ impl<'call> Array<'call> {
     /// # Safety
     /// From `first` on there are `count` numbers of this type, `stride` bytes apart (not aligned, it may be), that live and do
     /// not change during `'call`; `count * stride` is at most `isize::MAX`.
-    pub(crate) unsafe fn new(first: *const u8, count: usize, stride: usize, number: Number, big_endian: bool) -> Self {
+    pub(crate) unsafe fn new(
+        first: *const u8,
+        count: usize,
+        stride: usize,
+        number: NumberType,
+        big_endian: bool,
+    ) -> Self {
         let swapped = big_endian && cfg!(target_endian = "little");
         Self { first, count, stride, number, swapped, call: PhantomData }
     }
@@ -29,7 +35,7 @@ impl<'call> Array<'call> {
         self.count
     }
 
-    pub(crate) fn number(&self) -> Number {
+    pub(crate) fn number(&self) -> NumberType {
         self.number
     }
 
@@ -50,16 +56,16 @@ impl<'call> Array<'call> {
     #[expect(clippy::cast_precision_loss, reason = "fields of large integers are shown, not computed with")]
     pub(crate) fn get(&self, index: usize) -> f64 {
         match self.number {
-            Number::I8 => f64::from(i8::from_ne_bytes(self.read(index))),
-            Number::I16 => f64::from(i16::from_ne_bytes(self.read(index))),
-            Number::I32 => f64::from(i32::from_ne_bytes(self.read(index))),
-            Number::I64 => i64::from_ne_bytes(self.read(index)) as f64,
-            Number::U8 => f64::from(u8::from_ne_bytes(self.read(index))),
-            Number::U16 => f64::from(u16::from_ne_bytes(self.read(index))),
-            Number::U32 => f64::from(u32::from_ne_bytes(self.read(index))),
-            Number::U64 => u64::from_ne_bytes(self.read(index)) as f64,
-            Number::F32 => f64::from(f32::from_ne_bytes(self.read(index))),
-            Number::F64 => f64::from_ne_bytes(self.read(index)),
+            NumberType::I8 => f64::from(i8::from_ne_bytes(self.read(index))),
+            NumberType::I16 => f64::from(i16::from_ne_bytes(self.read(index))),
+            NumberType::I32 => f64::from(i32::from_ne_bytes(self.read(index))),
+            NumberType::I64 => i64::from_ne_bytes(self.read(index)) as f64,
+            NumberType::U8 => f64::from(u8::from_ne_bytes(self.read(index))),
+            NumberType::U16 => f64::from(u16::from_ne_bytes(self.read(index))),
+            NumberType::U32 => f64::from(u32::from_ne_bytes(self.read(index))),
+            NumberType::U64 => u64::from_ne_bytes(self.read(index)) as f64,
+            NumberType::F32 => f64::from(f32::from_ne_bytes(self.read(index))),
+            NumberType::F64 => f64::from_ne_bytes(self.read(index)),
         }
     }
 
@@ -69,8 +75,8 @@ impl<'call> Array<'call> {
     /// Where `index` is out of range.
     pub(crate) fn integer(&self, index: usize) -> Option<i64> {
         match self.number {
-            Number::I64 => Some(i64::from_ne_bytes(self.read(index))),
-            Number::U64 => i64::try_from(u64::from_ne_bytes(self.read(index))).ok(),
+            NumberType::I64 => Some(i64::from_ne_bytes(self.read(index))),
+            NumberType::U64 => i64::try_from(u64::from_ne_bytes(self.read(index))).ok(),
             _ => {
                 let value = self.get(index);
                 #[expect(clippy::cast_possible_truncation, reason = "a whole number below 2^53")]
@@ -109,12 +115,12 @@ impl<'call> Array<'call> {
     /// The values as the adaptor borrows them, with the distance between two; `None` where they have to be copied.
     pub(crate) fn values(&self) -> Option<(Values<'call>, usize)> {
         match self.number {
-            Number::F32 => self.slice().map(|(values, stride)| (Values::F32(values), stride)),
-            Number::F64 => self.slice().map(|(values, stride)| (Values::F64(values), stride)),
-            Number::I32 => self.slice().map(|(values, stride)| (Values::I32(values), stride)),
-            Number::I64 => self.slice().map(|(values, stride)| (Values::I64(values), stride)),
-            Number::U8 => self.slice().map(|(values, stride)| (Values::U8(values), stride)),
-            Number::I8 | Number::I16 | Number::U16 | Number::U32 | Number::U64 => None,
+            NumberType::F32 => self.slice().map(|(values, stride)| (Values::F32(values), stride)),
+            NumberType::F64 => self.slice().map(|(values, stride)| (Values::F64(values), stride)),
+            NumberType::I32 => self.slice().map(|(values, stride)| (Values::I32(values), stride)),
+            NumberType::I64 => self.slice().map(|(values, stride)| (Values::I64(values), stride)),
+            NumberType::U8 => self.slice().map(|(values, stride)| (Values::U8(values), stride)),
+            NumberType::I8 | NumberType::I16 | NumberType::U16 | NumberType::U32 | NumberType::U64 => None,
         }
     }
 
@@ -124,10 +130,10 @@ impl<'call> Array<'call> {
             return None;
         }
         match self.number {
-            Number::I32 => self.slice().map(|(values, _)| Indices::I32(values)),
-            Number::I64 => self.slice().map(|(values, _)| Indices::I64(values)),
-            Number::U32 => self.slice().map(|(values, _)| Indices::U32(values)),
-            Number::U64 => self.slice().map(|(values, _)| Indices::U64(values)),
+            NumberType::I32 => self.slice().map(|(values, _)| Indices::I32(values)),
+            NumberType::I64 => self.slice().map(|(values, _)| Indices::I64(values)),
+            NumberType::U32 => self.slice().map(|(values, _)| Indices::U32(values)),
+            NumberType::U64 => self.slice().map(|(values, _)| Indices::U64(values)),
             _ => None,
         }
     }

@@ -6,7 +6,7 @@ use std::ffi::{CStr, CString, c_char};
 use std::marker::PhantomData;
 use std::ptr;
 
-use crate::array::{Array, Number};
+use crate::array::{Array, NumberType};
 use crate::error::CatalystError;
 use crate::host::{Host, RawNode};
 
@@ -217,16 +217,16 @@ impl<'call> Node<'_, 'call> {
     /// The numbers that it holds, borrowed for the length of the call.
     pub(crate) fn array(&self) -> Result<Array<'call>, CatalystError> {
         let number = match self.type_number {
-            3 => Number::I8,
-            4 => Number::I16,
-            5 => Number::I32,
-            6 => Number::I64,
-            7 => Number::U8,
-            8 => Number::U16,
-            9 => Number::U32,
-            10 => Number::U64,
-            11 => Number::F32,
-            12 => Number::F64,
+            3 => NumberType::I8,
+            4 => NumberType::I16,
+            5 => NumberType::I32,
+            6 => NumberType::I64,
+            7 => NumberType::U8,
+            8 => NumberType::U16,
+            9 => NumberType::U32,
+            10 => NumberType::U64,
+            11 => NumberType::F32,
+            12 => NumberType::F64,
             _ => return Err(self.wrong("an array of numbers".into())),
         };
         let (first, count, stride) = self.layout()?;

@@ -282,7 +282,7 @@ fn vtk_reads_back_types_ghosts_and_fields_of_the_mesh() {
     assert_eq!(blocks["element"]["small"][0], "short");
 
     let cells = |name: &str| read_mesh(written.join(name)).unwrap_or_else(|error| panic!("{error}")).mesh.cells().len();
-    assert_eq!((cells("skin.vtp"), cells("cut.vtp")), (12, 2));
+    assert_eq!((cells("skin.vtp"), cells("cut.vtp")), (10, 2));
     assert_eq!(cells("outside.vtp"), 4 * 4 + 2, "nothing between the grids is drawn");
 }
 

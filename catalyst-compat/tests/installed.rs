@@ -51,11 +51,12 @@ fn prefix() -> &'static Path {
 }
 
 /// A program in an environment that says nothing but that Tombolo is meant, and that nothing is watched.
-fn run(program: &Path, folder: &Path) -> String {
+fn run(program: &Path, folder: &Path, arguments: [&str; 2]) -> String {
     let pipelines = folder.join("pipelines.json");
     fs::write(&pipelines, "{\"version\": 1}").expect("a file");
     let mut command = Command::new(program);
-    command.args(["5", "3"]).env("TOMBOLO_PIPELINES", pipelines).env("CATALYST_IMPLEMENTATION_NAME", "tombolo");
+    command.args(arguments).current_dir(folder);
+    command.env("TOMBOLO_PIPELINES", pipelines).env("CATALYST_IMPLEMENTATION_NAME", "tombolo");
     for variable in ["TOMBOLO_ORDERS", "TOMBOLO_OUTPUT", "TOMBOLO_REPORT", "CATALYST_IMPLEMENTATION_PATHS"] {
         command.env_remove(variable);
     }
@@ -78,8 +79,10 @@ fn the_lines_of_the_book_compile_a_solver() {
         succeed(compile.env("PKG_CONFIG_PATH", prefix().join("lib/pkgconfig")));
         let words: Vec<&str> = line.split_whitespace().collect();
         let program = words.iter().position(|word| *word == "-o").and_then(|option| words.get(option + 1));
-        let told = run(&folder.path().join(program.expect("-o names the program")), folder.path());
-        assert!(told.contains("volume 1.000000000000"), "{line}: {told}");
+        let program = folder.path().join(program.expect("-o names the program"));
+        // The hottest corner has cooled from 308 towards 300 by a thousandth in each of 3 steps.
+        let told = run(&program, folder.path(), ["pipelines.json", "3"]);
+        assert!(told.contains("ended at 307.976024"), "{line}: {told}");
     }
 }
 
@@ -107,7 +110,7 @@ fn each_language_builds_by_itself_without_mpi() {
             let program = folder.path().join(program);
             let linked = succeed(Command::new("readelf").arg("-d").arg(&program));
             assert!(!linked.contains("libmpi"), "{linked}");
-            let said = run(&program, folder.path());
+            let said = run(&program, folder.path(), ["5", "3"]);
             let line = said.lines().find(|line| line.starts_with("volume ")).expect("a line of numbers");
             let numbers = line.split_whitespace().filter_map(|word| word.parse::<f64>().ok());
             told.insert(numbers.map(|number| format!("{number:.9}")).collect::<Vec<_>>());

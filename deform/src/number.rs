@@ -33,17 +33,17 @@ impl fmt::Display for Number {
     }
 }
 
-/// A place as a message shows it, to seven digits.
+/// A position as a message shows it, to seven digits.
 ///
 /// ```
-/// use tombolo_deform::number::Place;
+/// use tombolo_deform::number::Position;
 ///
-/// assert_eq!(Place([0.1, -1.0 / 3.0, 1e-9]).to_string(), "(0.1, -0.3333333, 1e-9)");
+/// assert_eq!(Position([0.1, -1.0 / 3.0, 1e-9]).to_string(), "(0.1, -0.3333333, 1e-9)");
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place(pub Vector);
+pub struct Position(pub Vector);
 
-impl fmt::Display for Place {
+impl fmt::Display for Position {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [x, y, z] = self.0.map(Number);
         write!(formatter, "({x:.7}, {y:.7}, {z:.7})")

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use proptest::prelude::*;
-use tombolo_deform::mesh::{CellType, Cells, MeshView, Number};
+use tombolo_deform::mesh::{CellType, Cells, MeshView, NumberType};
 use tombolo_deform::shapes;
 use tombolo_pipelines::encode::{DataFrame, Decoded, EncodeError, Encoder, TopologyFrame, decode, encode};
 use tombolo_pipelines::extract::{Association, Channel, Extract, Field, Source};
@@ -20,14 +20,14 @@ fn surface_frame(encoding: Encoding) -> Frame {
         name: "velocity".into(),
         association: Association::Vertex,
         components: 3,
-        number: Number::F64,
+        number: NumberType::F64,
         values: (0..3 * vertices).map(|i| f64::from(i).sin() * 7.0).collect(),
     });
     fields.push(Field {
         name: "rank".into(),
         association: Association::Element,
         components: 1,
-        number: Number::F64,
+        number: NumberType::F64,
         values: (0..cells).map(f64::from).collect(),
     });
     Frame { pipeline: "hull".into(), cycle: 12, time: 0.25, extract, encoding }
@@ -97,7 +97,7 @@ fn a_smooth_field_is_sent_in_less_than_a_fifth() {
     let points = mesh.points().to_vec();
     let values = points.iter().map(|p| p[0] * p[1]).collect();
     let field =
-        Field { name: "p".into(), association: Association::Vertex, components: 1, number: Number::F64, values };
+        Field { name: "p".into(), association: Association::Vertex, components: 1, number: NumberType::F64, values };
     let cells = Arc::new(mesh.cells().clone());
     let extract = Arc::new(Extract { points, vertices: None, cells, features: None, fields: vec![field] });
     let frame = Frame { pipeline: "v".into(), cycle: 0, time: 0.0, extract, encoding: Encoding::default() };

@@ -3,32 +3,32 @@
 use std::ffi::{c_int, c_void};
 
 use super::Fault;
-use crate::array::{Array, Number};
+use crate::array::{Array, NumberType};
 
 /// The type of a Rust number.
 pub(super) trait Typed {
-    const NUMBER: Number;
+    const NUMBER: NumberType;
 }
 
 macro_rules! typed {
-    ($($type:ty => $number:ident),*) => { $(impl Typed for $type { const NUMBER: Number = Number::$number; })* };
+    ($($type:ty => $number:ident),*) => { $(impl Typed for $type { const NUMBER: NumberType = NumberType::$number; })* };
 }
 
 typed!(u8 => U8, i32 => I32, i64 => I64, f32 => F32, f64 => F64);
 
 /// The type that the header gives this number, which is Conduit's.
-pub(super) fn number(what: &str, kind: c_int) -> Result<Number, Fault> {
+pub(super) fn number(what: &str, kind: c_int) -> Result<NumberType, Fault> {
     Ok(match kind {
-        3 => Number::I8,
-        4 => Number::I16,
-        5 => Number::I32,
-        6 => Number::I64,
-        7 => Number::U8,
-        8 => Number::U16,
-        9 => Number::U32,
-        10 => Number::U64,
-        11 => Number::F32,
-        12 => Number::F64,
+        3 => NumberType::I8,
+        4 => NumberType::I16,
+        5 => NumberType::I32,
+        6 => NumberType::I64,
+        7 => NumberType::U8,
+        8 => NumberType::U16,
+        9 => NumberType::U32,
+        10 => NumberType::U64,
+        11 => NumberType::F32,
+        12 => NumberType::F64,
         other => return Err(Fault::invalid(what, format!("the type {other}"), "one of enum tombolo_type")),
     })
 }
@@ -40,7 +40,7 @@ pub(super) struct Address {
     pub(super) count: usize,
     /// In bytes.
     stride: usize,
-    number: Number,
+    number: NumberType,
 }
 
 // SAFETY: an address is followed inside `tombolo_execute` alone, by the thread that calls it; the header says that the array is
@@ -56,7 +56,7 @@ impl Address {
     /// Values so many bytes apart.
     pub(super) fn apart(
         what: &str,
-        number: Number,
+        number: NumberType,
         first: *const c_void,
         count: usize,
         stride: isize,
@@ -95,7 +95,7 @@ impl Address {
     /// `components` is null or the address of as many addresses.
     pub(super) unsafe fn separate(
         what: &str,
-        number: Number,
+        number: NumberType,
         components: *const *const c_void,
         dimension: usize,
         count: usize,

@@ -9,7 +9,7 @@ use tombolo::pipelines::language::nearest;
 use super::lent::{Address, Typed, number};
 use super::named::{Cells, Named};
 use super::{Fault, Handle, answer, name, text, value, with};
-use crate::array::Number;
+use crate::array::NumberType;
 
 /// Names something of a channel that has points.
 ///
@@ -119,7 +119,7 @@ pub unsafe extern "C" fn tombolo_points_strided(
 ) -> c_int {
     let points = |what: &str| {
         let number = number(what, kind)?;
-        if !matches!(number, Number::F32 | Number::F64) {
+        if !matches!(number, NumberType::F32 | NumberType::F64) {
             return Err(Fault::invalid(what, format!("the type {}", number.name()), "float32 or float64"));
         }
         let dimension = component_count(what, dimension, 2, 3)?;

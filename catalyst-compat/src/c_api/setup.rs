@@ -17,9 +17,6 @@ use crate::error::CatalystError;
 use crate::ranks;
 use crate::run::Run;
 
-/// The communicator that stands for all ranks where MPI runs, and for this process where it does not.
-const WORLD: c_int = -1;
-
 fn unreadable(error: impl ToString) -> CatalystError {
     CatalystError::Configuration(error.to_string())
 }
@@ -42,7 +39,7 @@ pub unsafe extern "C" fn tombolo_open(file: *const c_char, communicator: c_int, 
         // SAFETY: as the module says.
         let run = unsafe { run.as_mut() }.ok_or_else(|| Fault::null("the address of the run"))?;
         *run = ptr::null_mut();
-        let communicator = ranks::communicator((communicator != WORLD).then_some(communicator))?;
+        let communicator = ranks::communicator(Some(communicator))?;
         let mut settings = Settings { communicator: Arc::clone(&communicator), ..Settings::default() };
         // SAFETY: as the module says.
         let file = if file.is_null() { Ok(None) } else { unsafe { text(file, "file") }.map(Some) };

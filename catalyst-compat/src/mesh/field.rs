@@ -5,7 +5,7 @@ use std::ffi::CStr;
 use tombolo::deform::mesh::{ArrayView, Values};
 use tombolo::pipelines::extract::{Association, GHOST_FIELD};
 
-use crate::array::{Array, Number};
+use crate::array::{Array, NumberType};
 use crate::error::CatalystError;
 use crate::node::{Kind, Node};
 
@@ -19,13 +19,13 @@ pub(crate) struct Field<'call> {
     pub(super) association: Association,
     pub(super) components: Vec<Array<'call>>,
     /// What files hold it as.
-    pub(super) number: Number,
+    pub(super) number: NumberType,
 }
 
 /// The type of all components; double precision where they differ.
-fn number(components: &[Array<'_>]) -> Number {
-    let first = components.first().map_or(Number::F64, Array::number);
-    if components.iter().all(|array| array.number() == first) { first } else { Number::F64 }
+fn number(components: &[Array<'_>]) -> NumberType {
+    let first = components.first().map_or(NumberType::F64, Array::number);
+    if components.iter().all(|array| array.number() == first) { first } else { NumberType::F64 }
 }
 
 /// Components as they lie in the solver's memory, where each can be lent.
@@ -115,6 +115,6 @@ impl<'call> Field<'call> {
 
     /// The field by VTK's name for what says which cells or vertices are ghosts, and of VTK's type.
     pub(super) fn of_ghosts(self) -> Self {
-        Self { name: GHOST_FIELD.to_owned(), number: Number::U8, ..self }
+        Self { name: GHOST_FIELD.to_owned(), number: NumberType::U8, ..self }
     }
 }

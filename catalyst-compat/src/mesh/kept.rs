@@ -10,7 +10,7 @@ use tombolo::pipelines::extract::{ABSENT, Association, FieldView, GHOST_FIELD};
 use super::channel::Channel;
 use super::domain::Domain;
 use super::field::{self, Field};
-use crate::array::{Array, Fingerprint, Number};
+use crate::array::{Array, Fingerprint, NumberType};
 use crate::error::CatalystError;
 
 /// The bit of a ghost array that says that a cell is a copy of another rank's.
@@ -22,7 +22,7 @@ struct Copied {
     name: String,
     association: Option<Association>,
     components: usize,
-    number: Number,
+    number: NumberType,
     values: Vec<f64>,
 }
 
@@ -155,7 +155,7 @@ impl Kept {
                 };
                 let of_block = block.domain.fields.iter().find(|field| copied.is_of(field));
                 if of_block.is_some_and(|field| field.number != copied.number) {
-                    copied.number = Number::F64;
+                    copied.number = NumberType::F64;
                 }
                 for entity in 0..entities {
                     if first.association == Association::Element && !block.mask.keeps(entity) {

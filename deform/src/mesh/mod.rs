@@ -22,7 +22,7 @@ pub(crate) use handedness::is_left_handed;
 pub(crate) use ordered::shuffled;
 pub(crate) use ordered::{Numbering, Ordered};
 pub use other_order::OtherOrder;
-pub use view::{ArrayView, CellsView, Indices, MeshView, Number, Values};
+pub use view::{ArrayView, CellsView, Indices, MeshView, NumberType, Values};
 
 /// A point or vector in space.
 pub type Vector = [f64; 3];

@@ -2,7 +2,7 @@
 
 use super::handedness::{Hand, Types, hand};
 use super::{CellType, Cells, MeshError, Vector};
-use crate::number::Place;
+use crate::number::Position;
 use crate::quality::{centroid, scaled_jacobian};
 
 /// How many cells of a type are looked at.
@@ -55,7 +55,7 @@ impl std::fmt::Display for OtherOrder {
              this looks like {}: give the vertices {} of each cell, as they are counted now",
             self.cell,
             self.cell_type,
-            Place(self.centroid),
+            Position(self.centroid),
             of_vtk(self.cell_type),
             self.name.unwrap_or("that of another program"),
             order.join(" ")

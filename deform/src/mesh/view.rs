@@ -4,7 +4,7 @@ use super::{CellType, Cells, FeatureSource, Mesh, MeshError, Vector};
 
 /// A type of number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Number {
+pub enum NumberType {
     /// 8-bit integers.
     I8,
     /// 16-bit integers.
@@ -28,29 +28,29 @@ pub enum Number {
     F64,
 }
 
-impl Number {
+impl NumberType {
     /// All of them.
-    pub const ALL: [Number; 10] = [
-        Number::I8,
-        Number::I16,
-        Number::I32,
-        Number::I64,
-        Number::U8,
-        Number::U16,
-        Number::U32,
-        Number::U64,
-        Number::F32,
-        Number::F64,
+    pub const ALL: [NumberType; 10] = [
+        NumberType::I8,
+        NumberType::I16,
+        NumberType::I32,
+        NumberType::I64,
+        NumberType::U8,
+        NumberType::U16,
+        NumberType::U32,
+        NumberType::U64,
+        NumberType::F32,
+        NumberType::F64,
     ];
 
     /// How many bytes one takes.
     #[must_use]
     pub fn bytes(self) -> usize {
         match self {
-            Number::I8 | Number::U8 => 1,
-            Number::I16 | Number::U16 => 2,
-            Number::I32 | Number::U32 | Number::F32 => 4,
-            Number::I64 | Number::U64 | Number::F64 => 8,
+            NumberType::I8 | NumberType::U8 => 1,
+            NumberType::I16 | NumberType::U16 => 2,
+            NumberType::I32 | NumberType::U32 | NumberType::F32 => 4,
+            NumberType::I64 | NumberType::U64 | NumberType::F64 => 8,
         }
     }
 
@@ -58,23 +58,23 @@ impl Number {
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
-            Number::I8 => "int8",
-            Number::I16 => "int16",
-            Number::I32 => "int32",
-            Number::I64 => "int64",
-            Number::U8 => "uint8",
-            Number::U16 => "uint16",
-            Number::U32 => "uint32",
-            Number::U64 => "uint64",
-            Number::F32 => "float32",
-            Number::F64 => "float64",
+            NumberType::I8 => "int8",
+            NumberType::I16 => "int16",
+            NumberType::I32 => "int32",
+            NumberType::I64 => "int64",
+            NumberType::U8 => "uint8",
+            NumberType::U16 => "uint16",
+            NumberType::U32 => "uint32",
+            NumberType::U64 => "uint64",
+            NumberType::F32 => "float32",
+            NumberType::F64 => "float64",
         }
     }
 
     /// Whether there are numbers between the whole ones.
     #[must_use]
     pub fn is_real(self) -> bool {
-        matches!(self, Number::F32 | Number::F64)
+        matches!(self, NumberType::F32 | NumberType::F64)
     }
 }
 
@@ -94,13 +94,13 @@ pub enum Values<'a> {
 }
 
 impl Values<'_> {
-    fn number(&self) -> Number {
+    fn number(&self) -> NumberType {
         match self {
-            Values::F32(_) => Number::F32,
-            Values::F64(_) => Number::F64,
-            Values::I32(_) => Number::I32,
-            Values::I64(_) => Number::I64,
-            Values::U8(_) => Number::U8,
+            Values::F32(_) => NumberType::F32,
+            Values::F64(_) => NumberType::F64,
+            Values::I32(_) => NumberType::I32,
+            Values::I64(_) => NumberType::I64,
+            Values::U8(_) => NumberType::U8,
         }
     }
 
@@ -141,7 +141,7 @@ pub struct ArrayView<'a> {
     columns: [Column<'a>; 9],
     components: usize,
     len: usize,
-    number: Number,
+    number: NumberType,
 }
 
 impl<'a> ArrayView<'a> {
@@ -168,7 +168,7 @@ impl<'a> ArrayView<'a> {
     #[must_use]
     pub fn scalars(values: &'a [f64]) -> Self {
         let column = Column { values: Values::F64(values), offset: 0, stride: 1 };
-        Self { columns: [column; 9], components: 1, len: values.len(), number: Number::F64 }
+        Self { columns: [column; 9], components: 1, len: values.len(), number: NumberType::F64 }
     }
 
     /// One vector for each entity.
@@ -178,7 +178,7 @@ impl<'a> ArrayView<'a> {
         let mut columns = [Column { values: flat, offset: 0, stride: 3 }; 9];
         columns[1].offset = 1;
         columns[2].offset = 2;
-        Self { columns, components: 3, len: values.len(), number: Number::F64 }
+        Self { columns, components: 3, len: values.len(), number: NumberType::F64 }
     }
 
     /// `len` tuples whose components each have their own values, offset and stride (in values, not bytes).
@@ -206,19 +206,19 @@ impl<'a> ArrayView<'a> {
         }
         let number = first.number();
         let is_of_one = components.iter().all(|(values, ..)| values.number() == number);
-        let number = if is_of_one { number } else { Number::F64 };
+        let number = if is_of_one { number } else { NumberType::F64 };
         Ok(Self { columns, components: components.len(), len, number })
     }
 
     /// The type of number that the values are, or are a copy of; double precision where the components differ in it.
     #[must_use]
-    pub fn number(&self) -> Number {
+    pub fn number(&self) -> NumberType {
         self.number
     }
 
     /// The same values as a copy of numbers of another type, which is what files hold then.
     #[must_use]
-    pub fn copied_from(self, number: Number) -> Self {
+    pub fn copied_from(self, number: NumberType) -> Self {
         Self { number, ..self }
     }
 

@@ -8,7 +8,7 @@ use super::fold::folded_faces;
 use super::path::least_on_path;
 use super::{CHUNK, Measure, WORST, centroid};
 use crate::mesh::{Mesh, Vector};
-use crate::number::{Number, Place};
+use crate::number::{Number, Position};
 use crate::parallel;
 use crate::partition::{Partition, Reduction, Whole, all, any};
 
@@ -187,13 +187,13 @@ impl BrokenPath {
             inverted => format!("{inverted} cell(s) would be turned inside out"),
         };
         if let Some(worst) = self.worst.first() {
-            let (place, value) = (Place(worst.centroid), Number(worst.scaled_jacobian));
+            let (place, value) = (Position(worst.centroid), Number(worst.scaled_jacobian));
             text += &format!("; the worst is cell {} at {place} with {value:.4}{}", worst.cell, way_of(worst));
         }
         if self.folded_faces > 0 {
             text += &format!("; the prescribed surface itself turns over at {} face(s)", self.folded_faces);
             if let Some(place) = self.folded_at {
-                text += &format!(", the first at {}", Place(place));
+                text += &format!(", the first at {}", Position(place));
             }
         }
         text

@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::{DragError, Skeleton, SkeletonDrag, SkeletonError, SkeletonSettings, Skin, SkinError};
 use crate::mesh::Vector;
-use crate::number::{Number, Place};
+use crate::number::{Number, Position};
 use crate::surface::{Skeleton as SkeletonEdit, Skinning, Surface};
 use crate::vector::{dot, subtract};
 
@@ -166,7 +166,7 @@ pub enum SkeletonEditError {
     /// A place that is nowhere near the skeleton.
     #[error(
         "{field}: {} is {:.5} away from the nearest node of the skeleton, at {}: expected a place within {:.5} of a node",
-        Place(*at), Number(*distance), Place(*nearest), Number(*within)
+        Position(*at), Number(*distance), Position(*nearest), Number(*within)
     )]
     Far {
         /// The field that gives the place.
@@ -181,7 +181,7 @@ pub enum SkeletonEditError {
         within: f64,
     },
     /// Two drags of one node.
-    #[error("{second}: means the same node of the skeleton as {first}, the one at {}", Place(*node))]
+    #[error("{second}: means the same node of the skeleton as {first}, the one at {}", Position(*node))]
     Same {
         /// The field of one drag.
         first: String,

@@ -8,7 +8,7 @@ use super::bounds::{Bounds, Hierarchy};
 use super::inside_out::turned_inside_out;
 use super::triangle_pair::{Shared, place};
 use crate::mesh::Vector;
-use crate::number::Place;
+use crate::number::Position;
 use crate::parallel;
 use crate::vector::{cross, dot, subtract};
 
@@ -96,7 +96,7 @@ impl SurfaceReport {
 impl std::fmt::Display for SurfaceReport {
     /// One line for people: what is wrong, how often, and where first.
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let at = Place;
+        let at = Position;
         let mut parts = Vec::new();
         for (flawed, what) in [
             (&self.degenerate, "lose their area"),

@@ -2,7 +2,7 @@
 
 use super::{HarmonicOrder, RegionError, UnknownFeature};
 use crate::mesh::Vector;
-use crate::number::{Number, Place};
+use crate::number::{Number, Position};
 use crate::skeleton::SkeletonEditError;
 
 /// What is wrong with an edit whatever the surface.
@@ -296,10 +296,10 @@ impl std::fmt::Display for Surroundings {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         if let Some((vertex, point, distance)) = self.nearest {
             let distance = Number(distance);
-            write!(f, "; the nearest, mesh vertex {vertex} at {}, is {distance:.7} away", Place(point))?;
+            write!(f, "; the nearest, mesh vertex {vertex} at {}, is {distance:.7} away", Position(point))?;
         }
         let [lower, upper] = self.bounds;
-        write!(f, "; the surface reaches from {} to {}", Place(lower), Place(upper))
+        write!(f, "; the surface reaches from {} to {}", Position(lower), Position(upper))
     }
 }
 

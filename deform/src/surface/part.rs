@@ -84,6 +84,18 @@ impl BoundaryFaces {
         }
         Ok(boundary)
     }
+
+    /// Those of the faces whose cell is `wanted`.
+    #[must_use]
+    pub fn of_cells(&self, wanted: impl Fn(usize) -> bool) -> Self {
+        let kept: Vec<usize> = (0..self.cells.len()).filter(|&face| wanted(self.cells[face] as usize)).collect();
+        Self {
+            faces: self.faces.subset(kept.iter().copied()),
+            cells: kept.iter().map(|&face| self.cells[face]).collect(),
+            places: kept.iter().map(|&face| self.places[face]).collect(),
+            may_run_either_way: self.may_run_either_way,
+        }
+    }
 }
 
 /// What the source of a mesh's features says of faces given by the vertex numbers of the mesh; `None` where features are to be

@@ -30,7 +30,7 @@ pub use sliding::Sliding;
 pub use untangle::Untangler;
 
 use crate::mesh::{CellType, Vector};
-use crate::number::{Number, Place};
+use crate::number::{Number, Position};
 use crate::partition::{Partition, all};
 
 impl VolumeError {
@@ -77,7 +77,7 @@ pub enum VolumeError {
     #[error(
         "cell {cell} ({cell_type}) at {} has no positive volume in the reference mesh; {count} such \
          cell(s) in all{}",
-        Place(*centroid), of_them_left_handed(*left_handed)
+        Position(*centroid), of_them_left_handed(*left_handed)
     )]
     InvertedCell {
         /// The first such cell.

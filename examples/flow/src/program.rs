@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use tombolo::comm::{Communicator, RankError, Solo, agree_on};
 use tombolo::{Adaptor, ExecuteError, FinalizeError, InitializeError, JournalError, Settings, Solvers, Step};
-use tombolo_deform::mesh::{ArrayView, Mesh, MeshError, Number, Vector};
+use tombolo_deform::mesh::{ArrayView, Mesh, MeshError, NumberType, Vector};
 use tombolo_deform::surface::{FeatureSettings, Surface, SurfaceError};
 use tombolo_pipelines::distributed::DistributedError;
 use tombolo_pipelines::extract::{Association, Channel, Field, FieldView};
@@ -335,14 +335,14 @@ impl Run {
             name: "velocity".into(),
             association: Association::Vertex,
             components: 3,
-            number: Number::F64,
+            number: NumberType::F64,
             values: velocity.into_flattened(),
         };
         let pressure = Field {
             name: "pressure".into(),
             association: Association::Vertex,
             components: 1,
-            number: Number::F64,
+            number: NumberType::F64,
             values: pressure.into_iter().map(|[value, ..]| value).collect(),
         };
         let mesh = whole.with_points(points)?;

@@ -58,6 +58,25 @@ pub(crate) struct Root {
 
 /// The faces of the part's own cells that belong to one of them only, in the dimension of the whole mesh. Collective.
 pub(super) fn outer_faces(communicator: &dyn Communicator, part: &Part) -> Result<BoundaryFaces, DistributedError> {
+    faces_of_one_cell(communicator, part, part.ghosts.as_deref())
+}
+
+/// The faces that are drawn of the part's own cells. On several ranks the owner of a ghost brings the face before it too, so that the
+/// ranks find it to lie inside; one process has to look at its ghosts for that. Collective.
+fn drawn_faces(communicator: &dyn Communicator, part: &Part) -> Result<BoundaryFaces, DistributedError> {
+    if communicator.size() > 1 {
+        return outer_faces(communicator, part);
+    }
+    let faces = faces_of_one_cell(communicator, part, None)?;
+    Ok(faces.of_cells(|cell| !part.is_ghost(cell)))
+}
+
+/// The faces that belong to one cell only of those that are no `ghosts`, in the dimension of the whole mesh. Collective.
+fn faces_of_one_cell(
+    communicator: &dyn Communicator,
+    part: &Part,
+    ghosts: Option<&[bool]>,
+) -> Result<BoundaryFaces, DistributedError> {
     #[expect(clippy::cast_precision_loss, reason = "at most 3")]
     let mut dimension = [part.cells.dimension() as f64];
     communicator.reduce(Reduction::Maximum, &mut dimension);
@@ -66,7 +85,7 @@ pub(super) fn outer_faces(communicator: &dyn Communicator, part: &Part) -> Resul
     if dimension < 2 {
         return Err(no_faces(communicator, part, dimension).into());
     }
-    let found = BoundaryFaces::find(&part.points, &part.cells, dimension, part.ghosts.as_deref());
+    let found = BoundaryFaces::find(&part.points, &part.cells, dimension, ghosts);
     Ok(agree(communicator, found)?)
 }
 
@@ -89,7 +108,7 @@ impl PartBoundary {
         communicator: &dyn Communicator,
         part: &Part,
     ) -> Result<(SharedVertices, Self, Option<SurfaceError>), DistributedError> {
-        let (outer, error) = match outer_faces(communicator, part) {
+        let (outer, error) = match drawn_faces(communicator, part) {
             Err(DistributedError::Surface(error @ SurfaceError::NoFaces { .. })) => {
                 (BoundaryFaces::default(), Some(error))
             }

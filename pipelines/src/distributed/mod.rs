@@ -23,7 +23,7 @@ pub(crate) mod tests;
 
 use tombolo_deform::{
     mesh::{Cells, FeatureSource, MeshError, MeshView, Vector},
-    number::{Number, Place},
+    number::{Number, Position},
     surface::SurfaceError,
 };
 
@@ -140,7 +140,7 @@ pub enum DistributedError {
     #[error(
         "vertices {vertices:?} both lie at {}, where another rank has a vertex too; places do not tell which is meant: \
          give global vertex numbers",
-        Place(*place)
+        Position(*place)
     )]
     Ambiguous {
         /// Where.

@@ -6,7 +6,7 @@ use std::{
 };
 
 use tombolo_deform::{
-    mesh::{ArrayView, CellType, Cells, FeatureSource, Mesh, Number, TaggedFaces, Vector},
+    mesh::{ArrayView, CellType, Cells, FeatureSource, Mesh, NumberType, TaggedFaces, Vector},
     partition::Partition,
     shapes::{box_of_hexahedra, box_of_tets},
     surface::{FeatureSettings, Surface},
@@ -393,7 +393,7 @@ fn points_alone_are_never_merged() {
             let fields = [FieldView {
                 name: "mass",
                 association: Association::Vertex,
-                values: ArrayView::scalars(&mass).copied_from(Number::F32),
+                values: ArrayView::scalars(&mass).copied_from(NumberType::F32),
             }];
             let channels = [Channel { name: "drops", mesh: part.view(), fields: &fields }];
             let text = r#"{"version": 1, "pipelines": [{"name": "all", "stages": [{"write": {"file": "a.vtu"}}]}]}"#;
@@ -408,7 +408,7 @@ fn points_alone_are_never_merged() {
         let extract = extracts[0].as_ref().unwrap();
         assert_eq!((extract.points.len(), extract.cells.len()), (4, 4));
         assert_eq!(extract.fields[0].values, [0.0, 2.0, 1.0, 2.0]);
-        assert_eq!(extract.fields[0].number, Number::F32);
+        assert_eq!(extract.fields[0].number, NumberType::F32);
     }
 }
 

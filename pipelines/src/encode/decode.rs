@@ -1,6 +1,6 @@
 //! From frames back to numbers.
 
-use tombolo_deform::mesh::{Number, Vector};
+use tombolo_deform::mesh::{NumberType, Vector};
 use tombolo_deform::surface::Surface;
 
 use super::blob::{MOST_BYTES, decompress};
@@ -173,7 +173,7 @@ fn data(header: DataHeader, blobs: &[u8]) -> Result<DataFrame, DecodeError> {
                 name: array.name,
                 association,
                 components: array.components,
-                number: Number::F64,
+                number: NumberType::F64,
                 values,
             });
         }

@@ -1,6 +1,6 @@
 //! Values from the solver's arrays to the points and cells of an extract.
 
-use tombolo_deform::mesh::{ArrayView, Number, Vector};
+use tombolo_deform::mesh::{ArrayView, NumberType, Vector};
 
 use super::slice::Crossing;
 use super::{ABSENT, Association, Channel, ExtractError, Field, FieldView, is_absent};
@@ -108,7 +108,7 @@ fn field(
         (Association::Vertex, Points::Crossings(crossings), _) => {
             values.reserve(crossings.len() * components);
             // Between whole numbers there are others.
-            number = if number.is_real() { number } else { Number::F64 };
+            number = if number.is_real() { number } else { NumberType::F64 };
             for crossing in *crossings {
                 for component in 0..components {
                     let [a, b] = crossing.edge.map(|vertex| read(vertex as usize, component));

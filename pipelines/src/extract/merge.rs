@@ -2,7 +2,7 @@
 
 use std::{collections::HashMap, sync::Arc};
 
-use tombolo_deform::mesh::{CellType, Cells, Number, Vector};
+use tombolo_deform::mesh::{CellType, Cells, NumberType, Vector};
 
 use super::source::{Origin, Whole};
 use super::{ABSENT, Association, Extract, Extracted, Field, is_absent};
@@ -231,8 +231,8 @@ fn association_code(association: Association) -> u8 {
     (0..).zip(ASSOCIATIONS).find(|(_, known)| *known == association).map_or(0, |(code, _)| code)
 }
 
-fn number_code(number: Number) -> u8 {
-    (0..).zip(Number::ALL).find(|(_, known)| *known == number).map_or(0, |(code, _)| code)
+fn number_code(number: NumberType) -> u8 {
+    (0..).zip(NumberType::ALL).find(|(_, known)| *known == number).map_or(0, |(code, _)| code)
 }
 
 fn read_fields(reader: &mut Reader, points: usize, cells: usize) -> Result<Vec<Field>, DistributedError> {
@@ -240,7 +240,7 @@ fn read_fields(reader: &mut Reader, points: usize, cells: usize) -> Result<Vec<F
         .map(|_| {
             let name = reader.text()?;
             let association = *ASSOCIATIONS.get(usize::from(reader.u8()?)).ok_or(reader.garbled())?;
-            let number = *Number::ALL.get(usize::from(reader.u8()?)).ok_or(reader.garbled())?;
+            let number = *NumberType::ALL.get(usize::from(reader.u8()?)).ok_or(reader.garbled())?;
             let components = usize::try_from(reader.u64()?).unwrap_or(usize::MAX);
             let count = match association {
                 Association::Vertex => points.saturating_mul(components),
@@ -299,7 +299,7 @@ impl Fields {
                 continue;
             }
             if known.number != field.number {
-                known.number = Number::F64;
+                known.number = NumberType::F64;
             }
             let components = known.components;
             for (place, values) in places.iter().zip(field.values.chunks(components.max(1))) {

@@ -21,7 +21,7 @@ pub use statistics::{FieldStatistics, statistics, statistics_of};
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use tombolo_deform::mesh::{ArrayView, Cells, MeshView, Number, Vector};
+use tombolo_deform::mesh::{ArrayView, Cells, MeshView, NumberType, Vector};
 
 use crate::language::nearest;
 
@@ -57,7 +57,7 @@ pub struct Field {
     /// Components of each value: 1 for a scalar, 3 for a vector, up to 9.
     pub components: usize,
     /// The type of number that files hold; the values are those of this type. Whole numbers beyond 2^53 are rounded.
-    pub number: Number,
+    pub number: NumberType,
     /// The values, tuple after tuple: `components` times as many as there are vertices or cells.
     pub values: Vec<f64>,
 }
@@ -66,7 +66,7 @@ impl Field {
     /// Keeps to a type of number that has what was put in: no whole numbers where a value is absent.
     pub(crate) fn settle(&mut self) {
         if !self.number.is_real() && self.values.iter().any(|&value| is_absent(value)) {
-            self.number = Number::F64;
+            self.number = NumberType::F64;
         }
     }
 }

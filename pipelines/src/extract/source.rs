@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
-use tombolo_deform::mesh::{Cells, Mesh, MeshView, Number, Vector};
+use tombolo_deform::mesh::{Cells, Mesh, MeshView, NumberType, Vector};
 use tombolo_deform::quality::{Quality, quality, scaled_jacobians};
 use tombolo_deform::surface::{FeatureSettings, Surface, SurfaceError};
 
@@ -49,7 +49,7 @@ impl Extracted {
             name: name.to_owned(),
             association: Association::Element,
             components: 1,
-            number: Number::F64,
+            number: NumberType::F64,
             values: self.owners.iter().map(value).collect(),
         });
     }
@@ -373,7 +373,7 @@ impl Source {
                 name: GHOST_FIELD.to_owned(),
                 association: Association::Element,
                 components: 1,
-                number: Number::U8,
+                number: NumberType::U8,
                 values: ghosts.iter().map(|&is_ghost| f64::from(u8::from(is_ghost))).collect(),
             });
         }

@@ -26,7 +26,7 @@ use std::io::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 
-use tombolo_deform::mesh::{Number, Vector};
+use tombolo_deform::mesh::{NumberType, Vector};
 use tombolo_deform::surface::{Edit, FeatureSettings, Surface};
 
 use super::error::{Flaw, Place};
@@ -516,14 +516,14 @@ fn to_extract(surface: &Surface, displacement: &[Vector]) -> Extract {
                 name: DISPLACEMENT.into(),
                 association: Association::Vertex,
                 components: 3,
-                number: Number::F64,
+                number: NumberType::F64,
                 values: displacement.as_flattened().to_vec(),
             },
             Field {
                 name: VERTEX.into(),
                 association: Association::Vertex,
                 components: 1,
-                number: Number::F64,
+                number: NumberType::F64,
                 values: surface.vertices().iter().map(|&vertex| f64::from(vertex)).collect(),
             },
         ],

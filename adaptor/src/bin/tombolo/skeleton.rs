@@ -95,7 +95,7 @@ fn polylines(skeleton: &Skeleton, surface: &Surface) -> Result<Extract, Failure>
         name: name.to_owned(),
         association,
         components: 1,
-        number: tombolo::deform::mesh::Number::F64,
+        number: tombolo::deform::mesh::NumberType::F64,
         values,
     };
     let fields = vec![

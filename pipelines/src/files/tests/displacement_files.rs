@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use proptest::prelude::*;
-use tombolo_deform::mesh::{Number, Vector};
+use tombolo_deform::mesh::{NumberType, Vector};
 use tombolo_deform::shapes::{box_of_hexahedra, box_of_tets, torus};
 use tombolo_deform::surface::{FeatureSettings, Surface};
 
@@ -69,7 +69,7 @@ fn a_volume_and_a_surface_in_single_precision_are_matched_by_coordinates() {
         name: "displacement".into(),
         association: Association::Vertex,
         components: 3,
-        number: Number::F64,
+        number: NumberType::F64,
         values,
     };
     let file = folder.path().join("volume.vtu");

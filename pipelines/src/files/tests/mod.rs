@@ -8,7 +8,7 @@ mod vtk_files;
 
 use std::sync::Arc;
 
-use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, Number, TaggedFaces, Vector};
+use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, NumberType, TaggedFaces, Vector};
 
 use super::{Compression, MeshFile, parse_mesh, read_mesh, write_mesh};
 use crate::extract::{Association, Extract, ExtractFeatures, Field};
@@ -69,21 +69,21 @@ fn fields(mesh: &Mesh) -> Vec<Field> {
             name: "velocity".into(),
             association: Association::Vertex,
             components: 3,
-            number: Number::F64,
+            number: NumberType::F64,
             values: values(3 * vertices),
         },
         Field {
             name: "p <rgh>".into(),
             association: Association::Element,
             components: 1,
-            number: Number::F64,
+            number: NumberType::F64,
             values: values(cells),
         },
         Field {
             name: "stress".into(),
             association: Association::Element,
             components: 9,
-            number: Number::F64,
+            number: NumberType::F64,
             values: values(9 * cells),
         },
     ]

@@ -30,13 +30,13 @@ fn numbers_keep_their_type() {
         (Association::Element, mesh.cells().len()),
         (Association::Mesh, 3),
     ];
-    let field = |number: Number, (association, count): (Association, usize)| {
+    let field = |number: NumberType, (association, count): (Association, usize)| {
         let least = if number.name().starts_with('u') { 0.0 } else { -3.0 };
         let step = if number.is_real() { 0.25 } else { 1.0 };
         let values = (0..2 * count).map(|k| least + step * k as f64).collect();
         Field { name: number.name().into(), association, components: 2, number, values }
     };
-    let all: Vec<Field> = counts.iter().flat_map(|count| Number::ALL.map(|number| field(number, *count))).collect();
+    let all: Vec<Field> = counts.iter().flat_map(|count| NumberType::ALL.map(|number| field(number, *count))).collect();
     for compression in [Compression::None, Compression::Zlib] {
         let path = folder.path().join("mesh.vtu");
         write_mesh(&path, &mesh, &all, compression).unwrap();

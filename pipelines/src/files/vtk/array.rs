@@ -1,6 +1,6 @@
 //! Arrays of VTK files: any number type, or text.
 
-use tombolo_deform::mesh::Number;
+use tombolo_deform::mesh::NumberType;
 
 use super::super::error::Problem;
 use super::super::scanner::Scanner;
@@ -50,18 +50,18 @@ impl Scalar {
     }
 
     /// The type that fields of it have.
-    pub fn number(self) -> Number {
+    pub fn number(self) -> NumberType {
         match self {
-            Scalar::Signed(1) => Number::I8,
-            Scalar::Signed(2) => Number::I16,
-            Scalar::Signed(4) => Number::I32,
-            Scalar::Signed(_) => Number::I64,
-            Scalar::Unsigned(1) => Number::U8,
-            Scalar::Unsigned(2) => Number::U16,
-            Scalar::Unsigned(4) => Number::U32,
-            Scalar::Unsigned(_) => Number::U64,
-            Scalar::Float(4) => Number::F32,
-            Scalar::Float(_) => Number::F64,
+            Scalar::Signed(1) => NumberType::I8,
+            Scalar::Signed(2) => NumberType::I16,
+            Scalar::Signed(4) => NumberType::I32,
+            Scalar::Signed(_) => NumberType::I64,
+            Scalar::Unsigned(1) => NumberType::U8,
+            Scalar::Unsigned(2) => NumberType::U16,
+            Scalar::Unsigned(4) => NumberType::U32,
+            Scalar::Unsigned(_) => NumberType::U64,
+            Scalar::Float(4) => NumberType::F32,
+            Scalar::Float(_) => NumberType::F64,
         }
     }
 
@@ -152,7 +152,7 @@ pub(super) struct Array {
     pub name: String,
     pub components: usize,
     /// The type that the file says; of no meaning for text.
-    pub number: Number,
+    pub number: NumberType,
     pub numbers: Numbers,
 }
 

@@ -1,6 +1,6 @@
 //! VTK's legacy files (.vtk): unstructured grids and polygonal data, text and binary, file versions 1 to 5.
 
-use tombolo_deform::mesh::Number;
+use tombolo_deform::mesh::NumberType;
 
 use super::super::MeshFile;
 use super::super::error::{Flaw, Problem};
@@ -272,7 +272,7 @@ impl Legacy<'_> {
             let (number, numbers) = if is_text {
                 self.scanner.word();
                 self.scanner.line();
-                (Number::default(), Numbers::Text(self.strings(values)?))
+                (NumberType::default(), Numbers::Text(self.strings(values)?))
             } else {
                 let kind = self.scalar()?;
                 (kind.number(), self.numbers(kind, values, &name)?)

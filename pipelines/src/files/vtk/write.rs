@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
 use std::io::Write as _;
 
-use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, Number, TaggedFaces, Vector};
+use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, NumberType, TaggedFaces, Vector};
 
 use super::super::assemble::{owners_of_faces, sorted};
 use super::super::error::Problem;
@@ -104,7 +104,7 @@ fn with_faces(field: &Field, cell_count: usize, owners: &[Option<usize>]) -> Res
         }
         // Whole numbers have none that says that there is nothing.
         if !field.number.is_real() && owners.contains(&None) {
-            field.number = Number::F64;
+            field.number = NumberType::F64;
         }
     }
     Ok(field)
@@ -150,7 +150,7 @@ pub(in super::super) fn check_polygonal(cells: &Cells) -> Result<(), Problem> {
 
 enum Values<'a> {
     /// Values of a field, which are written as numbers of this type.
-    Numbers(Cow<'a, [f64]>, Number),
+    Numbers(Cow<'a, [f64]>, NumberType),
     Integers(Vec<i64>),
     Bytes(Vec<u8>),
 }
@@ -228,7 +228,7 @@ impl<'a> Grid<'a> {
             self.cell_arrays.iter_mut().for_each(|array| array.permute(&order));
         }
         file.section("CellData", &self.cell_arrays)?;
-        let points = Values::Numbers(Cow::Borrowed(self.points.as_flattened()), Number::F64);
+        let points = Values::Numbers(Cow::Borrowed(self.points.as_flattened()), NumberType::F64);
         file.section("Points", &[Array { name: "Points", components: 3, values: points }])?;
         if polygonal {
             for (name, cells) in sections.named() {
@@ -381,18 +381,18 @@ fn integers(name: &'static str, values: Vec<i64>) -> Array<'static> {
 }
 
 /// What VTK calls a type of number.
-pub(super) fn number_name(number: Number) -> &'static str {
+pub(super) fn number_name(number: NumberType) -> &'static str {
     match number {
-        Number::I8 => "Int8",
-        Number::I16 => "Int16",
-        Number::I32 => "Int32",
-        Number::I64 => "Int64",
-        Number::U8 => "UInt8",
-        Number::U16 => "UInt16",
-        Number::U32 => "UInt32",
-        Number::U64 => "UInt64",
-        Number::F32 => "Float32",
-        Number::F64 => "Float64",
+        NumberType::I8 => "Int8",
+        NumberType::I16 => "Int16",
+        NumberType::I32 => "Int32",
+        NumberType::I64 => "Int64",
+        NumberType::U8 => "UInt8",
+        NumberType::U16 => "UInt16",
+        NumberType::U32 => "UInt32",
+        NumberType::U64 => "UInt64",
+        NumberType::F32 => "Float32",
+        NumberType::F64 => "Float64",
     }
 }
 
@@ -402,21 +402,21 @@ pub(super) fn number_name(number: Number) -> &'static str {
     clippy::cast_sign_loss,
     reason = "the values are of the type that they are cast to"
 )]
-fn number_bytes(values: &[f64], number: Number) -> Vec<u8> {
+fn number_bytes(values: &[f64], number: NumberType) -> Vec<u8> {
     fn all<const N: usize>(values: &[f64], bytes: impl Fn(f64) -> [u8; N]) -> Vec<u8> {
         values.iter().flat_map(|&value| bytes(value)).collect()
     }
     match number {
-        Number::I8 => all(values, |value| (value as i8).to_le_bytes()),
-        Number::I16 => all(values, |value| (value as i16).to_le_bytes()),
-        Number::I32 => all(values, |value| (value as i32).to_le_bytes()),
-        Number::I64 => all(values, |value| (value as i64).to_le_bytes()),
-        Number::U8 => all(values, |value| (value as u8).to_le_bytes()),
-        Number::U16 => all(values, |value| (value as u16).to_le_bytes()),
-        Number::U32 => all(values, |value| (value as u32).to_le_bytes()),
-        Number::U64 => all(values, |value| (value as u64).to_le_bytes()),
-        Number::F32 => all(values, |value| (value as f32).to_le_bytes()),
-        Number::F64 => all(values, f64::to_le_bytes),
+        NumberType::I8 => all(values, |value| (value as i8).to_le_bytes()),
+        NumberType::I16 => all(values, |value| (value as i16).to_le_bytes()),
+        NumberType::I32 => all(values, |value| (value as i32).to_le_bytes()),
+        NumberType::I64 => all(values, |value| (value as i64).to_le_bytes()),
+        NumberType::U8 => all(values, |value| (value as u8).to_le_bytes()),
+        NumberType::U16 => all(values, |value| (value as u16).to_le_bytes()),
+        NumberType::U32 => all(values, |value| (value as u32).to_le_bytes()),
+        NumberType::U64 => all(values, |value| (value as u64).to_le_bytes()),
+        NumberType::F32 => all(values, |value| (value as f32).to_le_bytes()),
+        NumberType::F64 => all(values, f64::to_le_bytes),
     }
 }
 
