@@ -144,15 +144,15 @@ fn edit_refuses_more_than_is_allowed() {
     let edit = r#"{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -1e-6]}}"#;
     let many = format!("[{}]", vec![edit; 20_000].join(","));
     let steps = |steps: u32| format!(r#"{{"edits": [{edit}], "schedule": {{"steps": {steps}}}}}"#);
-    for (edits, more, code, named) in [
-        (many, &[][..], 1, "edits.json:1:1: found 20000 edits, expected at most 16384"),
-        (steps(1_000_000_000), &[], 1, "schedule.steps: found 1000000000 shapes, expected at most 10000"),
-        (steps(u32::MAX), &[], 1, "schedule.steps: found 4294967295 shapes, expected at most 10000"),
-        (steps(1), &["--steps", "1000000000"], 2, "found 1000000000 shapes, expected at most 10000"),
+    for (edits, more, named) in [
+        (many, &[][..], "edits.json:1:1: found 20000 edits, expected at most 16384"),
+        (steps(1_000_000_000), &[], "schedule.steps: found 1000000000 shapes, expected at most 10000"),
+        (steps(u32::MAX), &[], "schedule.steps: found 4294967295 shapes, expected at most 10000"),
+        (steps(1), &["--steps", "1000000000"], "found 1000000000 shapes, expected at most 10000"),
     ] {
         let (directory, _) = with_box(&edits);
         let output = tombolo(directory.path(), &[&EDIT[..], more].concat());
-        assert_eq!(output.status.code(), Some(code), "{}", error_text(&output));
+        assert_eq!(output.status.code(), Some(1), "{}", error_text(&output));
         assert!(error_text(&output).contains(named), "{}", error_text(&output));
     }
     let (directory, _) = with_box(&steps(10_000));

@@ -247,7 +247,7 @@ fn vtk_reads_back_types_ghosts_and_fields_of_the_mesh() {
 
     let types = vtk(&written.join("types.vtu"));
     assert_eq!((&types["cells"], &types["own_cells"], &types["points"]), (&json!(3), &json!(2), &json!(16)));
-    // VTK hides the faces of ghosts and what lies against them; our surface is that of the own cells, which is closed.
+    // Faces of ghosts, and those that lie against them, are inside the mesh.
     assert_eq!(types["faces"], 10);
     for (name, kind, values) in [
         ("int8", "signed char", [-128.0, 127.0]),

@@ -1,10 +1,10 @@
 //! Whether the features that a solver names have faces, and those faces are the mesh's.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, collections::HashSet};
 
 use tombolo_deform::{
-    mesh::{CellsView, FeatureSource, MeshError},
-    surface::{check_feature_names, check_tagged_faces},
+    mesh::{CellsView, FeatureSource, MeshError, TaggedFaces, Vector},
+    surface::{MisplacedFaces, check_feature_names, misplaced_faces},
 };
 use tombolo_pipelines::{communicator::Reduction, extract::Channel};
 
@@ -17,22 +17,27 @@ impl Adaptor {
         let mut counts = [0.0; 2];
         let mut numbers: Vec<i64> = Vec::new();
         let mut own = Ok(());
-        if let FeatureSource::Faces(tagged) = channel.mesh.features {
+        let (mut found, none) = (MisplacedFaces::default(), TaggedFaces::default());
+        let tagged = if let FeatureSource::Faces(tagged) = channel.mesh.features { tagged } else { &none };
+        if !tagged.tags.is_empty() {
             numbers.extend(&tagged.tags);
             let cells = match channel.mesh.cells {
                 CellsView::Owned(cells) => Ok(Cow::Borrowed(cells)),
                 _ => channel.mesh.to_mesh().map(|mesh| Cow::Owned(mesh.cells().clone())),
             };
-            let inside = cells.and_then(|cells| check_tagged_faces(tagged, &cells));
-            #[expect(clippy::cast_precision_loss, reason = "counts below 2^53")]
-            match inside {
-                Ok(inside) => counts = [inside as f64, tagged.faces.len() as f64],
+            match cells {
+                Ok(cells) => found = misplaced_faces(tagged, &cells),
                 Err(error) => own = Err(error),
             }
+            #[expect(clippy::cast_precision_loss, reason = "counts below 2^53")]
+            let counted = [found.inside as f64, tagged.faces.len() as f64];
+            counts = counted;
         }
         self.unite(&mut numbers);
         self.communicator.reduce(Reduction::Sum, &mut counts);
+        self.forgive(&mut found, tagged, channel);
         own?;
+        found.check(tagged)?;
         if let FeatureSource::Faces(tagged) = channel.mesh.features {
             check_feature_names(&tagged.names, &numbers)?;
         }
@@ -44,6 +49,65 @@ impl Adaptor {
             ));
         }
         Ok(())
+    }
+
+    /// Takes the loose faces away that are faces of cells of another rank, which tags them too: a rank may name every face whose vertices
+    /// it has. Faces are matched by their centres, to a millionth of the size of the whole mesh. Collective.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_precision_loss,
+        reason = "counts, and millionths of the size"
+    )]
+    fn forgive(&self, misplaced: &mut MisplacedFaces, tagged: &TaggedFaces, channel: &Channel<'_>) {
+        let mut loose = [misplaced.loose.len() as f64];
+        self.communicator.reduce(Reduction::Sum, &mut loose);
+        if self.communicator.size() == 1 || loose[0] == 0.0 {
+            return;
+        }
+        let points = channel.mesh.points;
+        let centre = |face: usize| -> Vector {
+            let vertices = tagged.faces.vertices(face);
+            let there = vertices.iter().map(|&vertex| vertex as usize).filter(|&vertex| vertex < points.len());
+            let sum = |axis: usize| there.clone().map(|vertex| points.vector(vertex)[axis]).sum::<f64>();
+            [0, 1, 2].map(|axis: usize| sum(axis) / vertices.len().max(1) as f64)
+        };
+        let mut reach = [0.0_f64];
+        (0..tagged.faces.len()).flat_map(centre).for_each(|value| reach[0] = reach[0].max(value.abs()));
+        self.communicator.reduce(Reduction::Maximum, &mut reach);
+        let square = |value: f64| (value / reach[0].max(f64::MIN_POSITIVE) * 1e6).round() as i64;
+        let is_loose: HashSet<usize> = misplaced.loose.iter().copied().collect();
+        let own: HashSet<[i64; 3]> = (0..tagged.faces.len())
+            .filter(|face| !is_loose.contains(face))
+            .map(|face| centre(face).map(square))
+            .collect();
+        let mine: Vec<u8> = misplaced.loose.iter().flat_map(|&face| centre(face)).flat_map(f64::to_le_bytes).collect();
+        let gathered = self.communicator.gather(0, &mine);
+        let mut all = gathered.map(|parts| parts.concat()).unwrap_or_default();
+        self.communicator.broadcast(0, &mut all);
+        let all: Vec<f64> = all.as_chunks::<8>().0.iter().map(|value| f64::from_le_bytes(*value)).collect();
+        let near = [-1, 0, 1];
+        let mut known: Vec<f64> = all
+            .as_chunks::<3>()
+            .0
+            .iter()
+            .map(|centre| {
+                let [x, y, z] = centre.map(square);
+                let around = near
+                    .iter()
+                    .flat_map(|i| near.iter().flat_map(move |j| near.iter().map(move |k| [x + i, y + j, z + k])));
+                f64::from(u8::from(around.into_iter().any(|square| own.contains(&square))))
+            })
+            .collect();
+        self.communicator.reduce(Reduction::Maximum, &mut known);
+        let known: HashSet<[u64; 3]> = all
+            .as_chunks::<3>()
+            .0
+            .iter()
+            .zip(known)
+            .filter(|(_, known)| *known > 0.0)
+            .map(|(centre, _)| centre.map(f64::to_bits))
+            .collect();
+        misplaced.loose.retain(|&face| !known.contains(&centre(face).map(f64::to_bits)));
     }
 
     /// The numbers that any rank has, rising. Collective.

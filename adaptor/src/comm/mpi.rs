@@ -367,7 +367,13 @@ impl Communicator for Mpi {
     }
 
     fn abort(&self) {
-        log::error!("rank {} failed in itself; all ranks are ended, because the others would wait for it", self.rank);
+        let why =
+            format!("rank {} failed in itself; all ranks are ended, because the others would wait for it", self.rank);
+        // The last words of the process, also where nobody takes what is logged.
+        if log::max_level() == log::LevelFilter::Off {
+            eprintln!("tombolo: {why}");
+        }
+        log::error!("{why}");
         // SAFETY: the handle is alive while this is.
         unsafe { ffi::MPI_Abort(self.as_raw(), 1) };
     }

@@ -236,13 +236,13 @@ mod tests {
     fn what_cannot_be_dragged_is_named() {
         assert_eq!(
             refusal(json!({ "at": [0, 3, 5.1], "by": [1, 0, 0] })),
-            "edit 0 (skeleton): at: [0, 3, 5.1] is 3.0017 away from the nearest node of the skeleton, at [0, 0, 5]: expected a place \
-             within 1.0000 of a node"
+            "edit 0 (skeleton): at: (0, 3, 5.1) is 3.0017 away from the nearest node of the skeleton, at (0, 0, 5): expected a place \
+             within 1 of a node"
         );
         assert_eq!(
             refusal(json!({ "moves": [{ "at": [0, 0, 5], "by": [1, 0, 0] }, { "at": [0, 0, 9.9], "by": [1, 0, 0] }] })),
             "edit 0 (skeleton): moves[1].at: node 40 of the skeleton is the end of a curve and is pinned; the nearest node that can \
-             be dragged is node 39 at [0, 0, 9.75]"
+             be dragged is node 39 at (0, 0, 9.75)"
         );
         let same =
             refusal(json!({ "moves": [{ "at": [0, 0, 5], "by": [1, 0, 0] }, { "at": [0.1, 0, 5], "by": [0, 0, 0] }] }));

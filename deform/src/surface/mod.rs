@@ -130,4 +130,4 @@ pub use features::{FeatureSettings, FeatureSize, Features, UnknownFeature};
 pub use layers::Layer;
 pub use part::{BoundaryFaces, FaceTags, face_tags};
 pub use region::{BoxRegion, HalfSpaceRegion, Region, RegionError, SphereRegion};
-pub use tagged::{check_feature_names, check_tagged_faces};
+pub use tagged::{MisplacedFaces, check_feature_names, misplaced_faces};

@@ -5,20 +5,45 @@ use std::collections::HashMap;
 use super::faces::{FaceBuffer, key};
 use crate::mesh::{Cells, MeshError, TaggedFaces};
 
-/// Refuses a tagged face that is no face of any cell, and no triangle of one. Says how many are faces of two cells, which lie inside
-/// the mesh and make no feature. One pass over the cells.
-///
-/// # Errors
-/// [`MeshError::LooseFace`] with the first.
+/// Tagged faces that make no feature of the surface of some cells.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct MisplacedFaces {
+    /// The indices of those that are no face of any cell, and no triangle of one; rising.
+    pub loose: Vec<usize>,
+    /// How many are faces of two cells, which lie inside the mesh.
+    pub inside: usize,
+}
+
+impl MisplacedFaces {
+    /// Refuses the loose faces.
+    ///
+    /// # Errors
+    /// [`MeshError::LooseFace`] with the first.
+    pub fn check(&self, tagged: &TaggedFaces) -> Result<(), MeshError> {
+        let Some(&face) = self.loose.first() else { return Ok(()) };
+        let tag = tagged.tags.get(face).copied().unwrap_or_default();
+        let name = tagged.names.iter().find(|(number, _)| *number == tag).map(|(_, name)| name.clone());
+        Err(MeshError::LooseFace {
+            face,
+            feature: name.unwrap_or_else(|| tag.to_string()),
+            vertices: tagged.faces.vertices(face).to_vec(),
+            loose: self.loose.len(),
+            faces: tagged.faces.len(),
+        })
+    }
+}
+
+/// Finds the tagged faces that make no feature of the cells' surface. One pass over the cells.
 ///
 /// ```
-/// use tombolo_deform::{mesh::FeatureSource, shapes, surface::check_tagged_faces};
+/// use tombolo_deform::{mesh::FeatureSource, shapes, surface::{MisplacedFaces, misplaced_faces}};
 ///
 /// let mesh = shapes::box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
 /// let FeatureSource::Faces(tagged) = mesh.features() else { panic!("the box has its sides tagged") };
-/// assert_eq!(check_tagged_faces(tagged, mesh.cells()), Ok(0));
+/// assert_eq!(misplaced_faces(tagged, mesh.cells()), MisplacedFaces::default());
 /// ```
-pub fn check_tagged_faces(tagged: &TaggedFaces, cells: &Cells) -> Result<usize, MeshError> {
+#[must_use]
+pub fn misplaced_faces(tagged: &TaggedFaces, cells: &Cells) -> MisplacedFaces {
     let mut buffer = FaceBuffer::default();
     // The lowest four vertices stand for a face; of the faces of one mesh no two large ones have the same.
     let mut uses: HashMap<[u32; 4], u32> = HashMap::with_capacity(tagged.faces.len());
@@ -37,7 +62,7 @@ pub fn check_tagged_faces(tagged: &TaggedFaces, cells: &Cells) -> Result<usize, 
         });
     }
     if uses.is_empty() {
-        return Ok(0);
+        return MisplacedFaces::default();
     }
     let dimension = cells.dimension().max(2);
     for cell in 0..cells.len() {
@@ -64,29 +89,20 @@ pub fn check_tagged_faces(tagged: &TaggedFaces, cells: &Cells) -> Result<usize, 
             }
         });
     }
-    let (mut loose, mut inside) = (Vec::new(), 0);
+    let mut found = MisplacedFaces::default();
     for face in 0..tagged.faces.len() {
         let mut least = u32::MAX;
         buffer.for_each(&tagged.faces, face, 2, |_, vertices| {
             least = least.min(uses.get(&key(vertices)).copied().unwrap_or(0));
         });
         match least {
-            0 => loose.push(face),
+            0 => found.loose.push(face),
             // On the boundary; or collapsed to a line, as the faces of a collapsed cell are.
             1 | u32::MAX => {}
-            _ => inside += usize::from(dimension == 3),
+            _ => found.inside += usize::from(dimension == 3),
         }
     }
-    let Some(&face) = loose.first() else { return Ok(inside) };
-    let tag = tagged.tags.get(face).copied().unwrap_or_default();
-    let name = tagged.names.iter().find(|(number, _)| *number == tag).map(|(_, name)| name.clone());
-    Err(MeshError::LooseFace {
-        face,
-        feature: name.unwrap_or_else(|| tag.to_string()),
-        vertices: tagged.faces.vertices(face).to_vec(),
-        loose: loose.len(),
-        faces: tagged.faces.len(),
-    })
+    found
 }
 
 /// Refuses the name of a feature whose number no face has. `numbers` are those that the faces have, rising.
@@ -107,6 +123,11 @@ mod tests {
     use super::*;
     use crate::mesh::{CellType, FeatureSource};
     use crate::shapes::{box_of_hexahedra, box_of_tets};
+
+    fn check_tagged_faces(tagged: &TaggedFaces, cells: &Cells) -> Result<usize, MeshError> {
+        let found = misplaced_faces(tagged, cells);
+        found.check(tagged).map(|()| found.inside)
+    }
 
     fn tagged(cell_type: CellType, faces: Vec<u32>, tags: Vec<i64>) -> TaggedFaces {
         TaggedFaces {

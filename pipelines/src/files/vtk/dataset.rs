@@ -65,7 +65,8 @@ impl Dataset {
             Some(array) => Some(array.integers()?),
             None => None,
         };
-        let names = self.feature_names()?;
+        let has_tags = cell_tags.is_some() || point_tags.is_some();
+        let names = if has_tags { self.feature_names()? } else { BTreeMap::new() };
         let mut fields = Vec::new();
         for (arrays, association) in [
             (self.point_arrays, Association::Vertex),
@@ -110,7 +111,14 @@ impl Dataset {
 
     fn feature_names(&mut self) -> Result<BTreeMap<i64, String>, Problem> {
         let Some(names) = take(&mut self.field_arrays, FEATURE_NAMES) else {
-            return Ok(self.field_arrays.iter().flat_map(named_features).collect());
+            let mut names = BTreeMap::new();
+            self.field_arrays.retain(|array| {
+                let found: Vec<_> = named_features(array).collect();
+                let is_field = found.is_empty();
+                names.extend(found);
+                is_field
+            });
+            return Ok(names);
         };
         let Numbers::Text(names) = names.numbers else {
             return Err(Problem::unexpected(b"numbers", format!("text in array '{FEATURE_NAMES}'")));
