@@ -85,17 +85,15 @@ impl Adaptor {
         let mut all = gathered.map(|parts| parts.concat()).unwrap_or_default();
         self.communicator.broadcast(0, &mut all);
         let all: Vec<f64> = all.as_chunks::<8>().0.iter().map(|value| f64::from_le_bytes(*value)).collect();
-        let near = [-1, 0, 1];
         let mut known: Vec<f64> = all
             .as_chunks::<3>()
             .0
             .iter()
             .map(|centre| {
                 let [x, y, z] = centre.map(square);
-                let around = near
-                    .iter()
-                    .flat_map(|i| near.iter().flat_map(move |j| near.iter().map(move |k| [x + i, y + j, z + k])));
-                f64::from(u8::from(around.into_iter().any(|square| own.contains(&square))))
+                let mut around = (0..27)
+                    .map(|neighbour: i64| [x + neighbour % 3 - 1, y + neighbour / 3 % 3 - 1, z + neighbour / 9 - 1]);
+                f64::from(u8::from(around.any(|square| own.contains(&square))))
             })
             .collect();
         self.communicator.reduce(Reduction::Maximum, &mut known);
