@@ -285,7 +285,14 @@ fn marks(channel: &Channel<'_>) -> Result<Marks, CatalystError> {
 /// Which of the cells that are kept are copies of another rank's.
 fn ghosts(channel: &Channel<'_>) -> Option<Vec<bool>> {
     channel.blocks.iter().find(|block| block.domain.roles.ghosts.is_some())?;
-    let is_ghost = |array: &Array<'_>, cell: usize| array.integer(cell).is_some_and(|bits| bits & DUPLICATE != 0);
+    let is_ghost = |array: &Array<'_>, cell: usize| {
+        cell < array.len() && array.integer(cell).is_some_and(|bits| bits & DUPLICATE != 0)
+    };
+    if let Some(domain) = channel.single() {
+        // As many as there are: the adaptor refuses too few and too many.
+        let ghosts = domain.roles.ghosts.as_ref()?;
+        return Some((0..ghosts.len()).map(|cell| is_ghost(ghosts, cell)).collect());
+    }
     let of_blocks = channel.blocks.iter().flat_map(|block| {
         let (ghosts, cells) = (block.domain.roles.ghosts.as_ref(), block.domain.topology.len());
         let kept = (0..cells).filter(|&cell| block.mask.keeps(cell));

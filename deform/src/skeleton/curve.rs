@@ -2,6 +2,7 @@
 
 use super::Skeleton;
 use crate::mesh::Vector;
+use crate::number::Position;
 use crate::vector::{dot, scale, subtract};
 
 /// A polyline made ready for dragging some of its nodes, as if it were a metal wire.
@@ -419,7 +420,7 @@ pub enum DragError {
         "node {node} of the skeleton {} and is pinned; {}",
         match degree { 0 => "is on no curve", 1 | 2 => "is the end of a curve", _ => "is where three curves or more meet" },
         match nearest {
-            Some((node, [x, y, z])) => format!("the nearest node that can be dragged is node {node} at [{x}, {y}, {z}]"),
+            Some((node, at)) => format!("the nearest node that can be dragged is node {node} at {}", Position(*at)),
             None => "this skeleton has no node that can be dragged".to_string(),
         }
     )]

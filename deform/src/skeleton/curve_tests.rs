@@ -160,7 +160,7 @@ fn only_the_curves_of_the_dragged_nodes_move() {
     let error = SkeletonDrag::new(&skeleton, &[0]).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "node 0 of the skeleton is the end of a curve and is pinned; the nearest node that can be dragged is node 1 at [1, 0, 0]"
+        "node 0 of the skeleton is the end of a curve and is pinned; the nearest node that can be dragged is node 1 at (1, 0, 0)"
     );
     assert_eq!(SkeletonDrag::new(&skeleton, &[2, 2]).unwrap_err(), DragError::Twice { node: 2 });
     assert!(SkeletonDrag::new(&skeleton, &[99]).unwrap_err().to_string().contains("is on no curve"));
