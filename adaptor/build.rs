@@ -33,11 +33,18 @@ fn main() -> io::Result<()> {
 /// Links PETSc, where its numbers are those that its binding declares.
 #[cfg(feature = "distributed")]
 fn petsc() -> io::Result<()> {
-    let library = pkg_config::Config::new().atleast_version("3.18").probe("PETSc").map_err(io::Error::other)?;
+    let library = pkg_config::Config::new()
+        .atleast_version("3.18")
+        .probe("PETSc")
+        .map_err(io::Error::other)?;
     for folder in &library.include_paths {
         let Ok(settings) = fs::read_to_string(folder.join("petscconf.h")) else { continue };
-        let has = |name: &str| settings.lines().any(|line| line.starts_with(&format!("#define {name} ")));
-        if has("PETSC_USE_64BIT_INDICES") || has("PETSC_USE_COMPLEX") || !has("PETSC_USE_REAL_DOUBLE") {
+        let has =
+            |name: &str| settings.lines().any(|line| line.starts_with(&format!("#define {name} ")));
+        if has("PETSC_USE_64BIT_INDICES")
+            || has("PETSC_USE_COMPLEX")
+            || !has("PETSC_USE_REAL_DOUBLE")
+        {
             let folder = folder.display();
             return Err(io::Error::other(format!(
                 "PETSc in {folder}: expected real numbers of double precision and indices of 32 bits; `PKG_CONFIG_PATH` chooses another"

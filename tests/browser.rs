@@ -16,7 +16,8 @@ fn the_demo_in_a_browser() {
             .expect("gmsh is installed (scripts/setup)");
         assert!(made.success() && Path::new(&mesh).exists(), "scripts/meshes made no mesh");
     }
-    let mut run = Run::flow(&["--case", "examples/flow/cases/nozzle.json", "--listen", "127.0.0.1:0"]);
+    let mut run =
+        Run::flow(&["--case", "examples/flow/cases/nozzle.json", "--listen", "127.0.0.1:0"]);
     let link = run.link();
     let output = Command::new("node")
         .current_dir(project())

@@ -22,7 +22,8 @@ fn triangles(points: Vec<Vector>, triangles: &[[u32; 3]]) -> Mesh {
 }
 
 fn feature_of_each_face(mesh: &Mesh, sharp_angle_degrees: f64) -> Vec<u32> {
-    let surface = Surface::extract(mesh, &FeatureSettings { sharp_angle_degrees }).expect("a surface");
+    let surface =
+        Surface::extract(mesh, &FeatureSettings { sharp_angle_degrees }).expect("a surface");
     assert_eq!(surface.faces().len(), mesh.cells().len());
     surface.features().face_features().to_vec()
 }
@@ -40,7 +41,8 @@ fn partition(numbers: impl Iterator<Item = u32>) -> Vec<usize> {
 
 /// Compares a mesh of triangles at these angles; how many features there are at each.
 fn agree(name: &str, mesh: &Mesh, angles: &[f64]) -> Vec<usize> {
-    let corners: Vec<[u32; 3]> = mesh.cells().iter().map(|(_, face)| [face[0], face[1], face[2]]).collect();
+    let corners: Vec<[u32; 3]> =
+        mesh.cells().iter().map(|(_, face)| [face[0], face[1], face[2]]).collect();
     let words: Vec<String> = angles.iter().map(|angle| format!("{angle:?}")).collect();
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let text = cgal("features", &words, &off(mesh.points(), &corners));
@@ -53,7 +55,10 @@ fn agree(name: &str, mesh: &Mesh, angles: &[f64]) -> Vec<usize> {
         assert_eq!(ours.len(), theirs.len(), "{name}");
         let count = ours.iter().max().map_or(0, |last| last + 1);
         let expected = theirs.iter().max().map_or(0, |last| last + 1);
-        assert!(ours == theirs, "{name} at {angle} degrees: {count} features, CGAL finds {expected}");
+        assert!(
+            ours == theirs,
+            "{name} at {angle} degrees: {count} features, CGAL finds {expected}"
+        );
         counts.push(count);
     }
     counts
@@ -61,14 +66,28 @@ fn agree(name: &str, mesh: &Mesh, angles: &[f64]) -> Vec<usize> {
 
 #[test]
 fn on_the_generated_meshes() {
-    let names = ["channel", "channel-60k", "cylinder-coarse", "boundary-layer", "pipe-1", "bypass-0", "bypass-1"];
+    let names = [
+        "channel",
+        "channel-60k",
+        "cylinder-coarse",
+        "boundary-layer",
+        "pipe-1",
+        "bypass-0",
+        "bypass-1",
+    ];
     for (name, file) in names.into_iter().zip(generated_surfaces(&names)) {
         let mesh = triangulated(&read_mesh(&file).expect("a mesh").mesh);
         let counts = agree(name, &mesh, &ANGLES);
-        assert_eq!(counts.first(), Some(&mesh.cells().len()), "{name}: at 0 degrees each face is a feature");
+        assert_eq!(
+            counts.first(),
+            Some(&mesh.cells().len()),
+            "{name}: at 0 degrees each face is a feature"
+        );
         match name {
             // Flat sides; at 60 degrees six of them.
-            "channel" | "channel-60k" | "boundary-layer" => assert_eq!(counts[3..9], [6; 6], "{name}"),
+            "channel" | "channel-60k" | "boundary-layer" => {
+                assert_eq!(counts[3..9], [6; 6], "{name}")
+            }
             // Two ends and the side.
             "cylinder-coarse" | "pipe-1" => assert_eq!(counts[5..8], [3; 3], "{name}"),
             _ => assert!(counts[1] > counts[5], "{name}"),
@@ -79,13 +98,19 @@ fn on_the_generated_meshes() {
 #[test]
 fn on_shapes_of_known_angles() {
     agree("torus", &triangulated(&shapes::torus(1.0, 0.3, [48, 24])), &ANGLES);
-    agree("box of tetrahedra", &triangulated(&shapes::box_of_tets([4, 3, 2], [0.0; 3], [4.0, 3.0, 2.0])), &ANGLES);
+    agree(
+        "box of tetrahedra",
+        &triangulated(&shapes::box_of_tets([4, 3, 2], [0.0; 3], [4.0, 3.0, 2.0])),
+        &ANGLES,
+    );
     let hexahedra = shapes::box_of_hexahedra([4, 3, 2], [0.0; 3], [4.0, 3.0, 2.0]);
     let counts = agree("box of hexahedra", &triangulated(&hexahedra), &ANGLES);
     assert_eq!(counts[8..10], [6, 1]);
     agree("plate", &triangulated(&shapes::plate([6, 4], [0.0; 2], [3.0, 2.0])), &ANGLES);
     // A box whose inner corners are pushed about.
-    let bent = hexahedra.with_points(hexahedra.points().iter().map(|&point| wave(point)).collect()).expect("a mesh");
+    let bent = hexahedra
+        .with_points(hexahedra.points().iter().map(|&point| wave(point)).collect())
+        .expect("a mesh");
     agree("bent box", &triangulated(&bent), &ANGLES);
 }
 
@@ -99,7 +124,11 @@ fn where_edges_turn_by_exactly_the_angle() {
     for sides in [4, 6, 8, 9, 12, 18, 36, 72] {
         let angle = 360.0 / f64::from(sides);
         for [tilt, size] in [[0.0, 1.0], [0.3, 1.0], [1.1, 3e-5], [0.7, 2.5e4]] {
-            agree(&format!("prism of {sides} sides"), &prism(sides, tilt, size), &[angle, 90.0, 180.0 - angle]);
+            agree(
+                &format!("prism of {sides} sides"),
+                &prism(sides, tilt, size),
+                &[angle, 90.0, 180.0 - angle],
+            );
         }
     }
 }
@@ -111,8 +140,10 @@ fn prism(sides: u32, tilt: f64, size: f64) -> Mesh {
         for side in 0..sides {
             let turn = 2.0 * PI * f64::from(side) / f64::from(sides);
             let [x, y, z] = [turn.cos(), turn.sin(), f64::from(ring) * 0.37];
-            points
-                .push([x, y * tilt.cos() - z * tilt.sin(), y * tilt.sin() + z * tilt.cos()].map(|value| value * size));
+            points.push(
+                [x, y * tilt.cos() - z * tilt.sin(), y * tilt.sin() + z * tilt.cos()]
+                    .map(|value| value * size),
+            );
         }
     }
     let mut corners = Vec::new();
@@ -128,34 +159,50 @@ fn prism(sides: u32, tilt: f64, size: f64) -> Mesh {
 #[test]
 fn on_surfaces_that_are_open_or_no_manifold() {
     // Three half-planes at one edge: CGAL cuts them apart there, as we do, at whatever angle they meet.
-    let points =
-        vec![[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.5], [-1.0, 0.1, 0.5], [0.1, 1.0, 0.5], [2.0, 0.0, 0.5]];
+    let points = vec![
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [1.0, 0.0, 0.5],
+        [-1.0, 0.1, 0.5],
+        [0.1, 1.0, 0.5],
+        [2.0, 0.0, 0.5],
+    ];
     let fan = triangles(points, &[[0, 1, 2], [1, 0, 3], [1, 0, 4], [2, 1, 5]]);
     assert_eq!(agree("three half-planes", &fan, &[30.0, 120.0, 179.0]), [3, 3, 3]);
     // Two boxes that touch in one edge, and two that touch in one vertex.
     for shift in [[1.0, 1.0, 0.0], [1.0, 1.0, 1.0]] {
         let cube = triangulated(&shapes::box_of_tets([1, 1, 1], [0.0; 3], [1.0; 3]));
         let mut points = cube.points().to_vec();
-        let mut corners: Vec<[u32; 3]> = cube.cells().iter().map(|(_, face)| [face[0], face[1], face[2]]).collect();
+        let mut corners: Vec<[u32; 3]> =
+            cube.cells().iter().map(|(_, face)| [face[0], face[1], face[2]]).collect();
         let mut other = Vec::new();
         for &point in cube.points() {
             let moved: Vector = std::array::from_fn(|axis| point[axis] + shift[axis]);
-            other.push(points.iter().position(|known| *known == moved).unwrap_or(points.len()) as u32);
+            other.push(
+                points.iter().position(|known| *known == moved).unwrap_or(points.len()) as u32
+            );
             if other.last().is_some_and(|&vertex| vertex as usize == points.len()) {
                 points.push(moved);
             }
         }
-        corners.extend(corners.clone().into_iter().map(|face| face.map(|vertex| other[vertex as usize])));
-        assert_eq!(agree("two boxes", &triangles(points, &corners), &[30.0, 60.0, 89.0]), [12, 12, 12]);
+        corners.extend(
+            corners.clone().into_iter().map(|face| face.map(|vertex| other[vertex as usize])),
+        );
+        assert_eq!(
+            agree("two boxes", &triangles(points, &corners), &[30.0, 60.0, 89.0]),
+            [12, 12, 12]
+        );
     }
     // Neighbours that run opposite ways round.
     let sheet = triangulated(&shapes::plate([5, 5], [0.0; 2], [1.0, 1.0]));
     let bent: Vec<Vector> = sheet.points().iter().map(|&point| wave(point)).collect();
-    let mut corners: Vec<[u32; 3]> = sheet.cells().iter().map(|(_, face)| [face[0], face[1], face[2]]).collect();
+    let mut corners: Vec<[u32; 3]> =
+        sheet.cells().iter().map(|(_, face)| [face[0], face[1], face[2]]).collect();
     corners.iter_mut().step_by(3).for_each(|face| face.swap(1, 2));
     agree("mixed directions", &triangles(bent, &corners), &ANGLES);
     // A face without area is sharp to all its neighbours below a right angle.
-    let points = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, -1.0, 0.0]];
+    let points =
+        vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, -1.0, 0.0]];
     let flat = triangles(points, &[[0, 1, 3], [1, 2, 3], [0, 2, 1], [2, 0, 4]]);
     assert_eq!(agree("a face without area", &flat, &[30.0, 120.0]), [3, 1]);
 }

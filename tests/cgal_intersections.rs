@@ -8,8 +8,10 @@ use tombolo_tests::{cgal, off};
 /// The triangles of a mesh's surface, far apart from each other in the reference: so that every intersection is new.
 fn triangles_of(mesh: &Mesh) -> Surface {
     let surface = Surface::extract(mesh, &FeatureSettings::default()).expect("a surface");
-    let cells = Cells::uniform(CellType::Triangle, surface.triangles().concat()).expect("triangles");
-    let mesh = Mesh::new(surface.points().to_vec(), cells, FeatureSource::SharpEdges).expect("a mesh");
+    let cells =
+        Cells::uniform(CellType::Triangle, surface.triangles().concat()).expect("triangles");
+    let mesh =
+        Mesh::new(surface.points().to_vec(), cells, FeatureSource::SharpEdges).expect("a mesh");
     Surface::extract(&mesh, &FeatureSettings::default()).expect("a surface")
 }
 
@@ -17,7 +19,8 @@ fn theirs(surface: &Surface, shape: &[Vector]) -> Vec<[u32; 2]> {
     cgal("intersections", &[], &off(shape, surface.triangles()))
         .lines()
         .map(|line| {
-            let pair: Vec<u32> = line.split(' ').map(|word| word.parse().expect("a face")).collect();
+            let pair: Vec<u32> =
+                line.split(' ').map(|word| word.parse().expect("a face")).collect();
             [pair[0], pair[1]]
         })
         .collect()
@@ -55,8 +58,11 @@ fn on_surfaces_pushed_about_at_random() {
         for seed in 0..12 {
             let mut random = noise(seed + 1);
             let size = 0.02 * f64::from(1 << (seed % 6)) * 0.25;
-            let shape: Vec<Vector> =
-                surface.points().iter().map(|point| point.map(|value| value + size * random())).collect();
+            let shape: Vec<Vector> = surface
+                .points()
+                .iter()
+                .map(|point| point.map(|value| value + size * random()))
+                .collect();
             met += agree(&format!("{name} with noise {seed}"), surface, &shape);
         }
     }
@@ -72,8 +78,11 @@ fn on_smooth_deformations() {
     };
     assert_eq!(agree("a pinch that leaves room", &torus, &pinched(0.9)), 0);
     assert!(agree("a pinch through itself", &torus, &pinched(1.4)) > 0);
-    let twisted: Vec<Vector> =
-        torus.points().iter().map(|&[x, y, z]| [x, y * (1.0 - 1.3 * (-4.0 * x * x).exp()), z]).collect();
+    let twisted: Vec<Vector> = torus
+        .points()
+        .iter()
+        .map(|&[x, y, z]| [x, y * (1.0 - 1.3 * (-4.0 * x * x).exp()), z])
+        .collect();
     assert!(agree("a ring pressed through itself", &torus, &twisted) > 0);
 }
 
@@ -89,12 +98,14 @@ fn on_contacts_and_overlaps_in_one_plane() {
             .iter()
             .map(|point| {
                 let moves = random() > 0.6;
-                point.map(|value| if moves { value + (1.5 * random()).round() * 0.5 } else { value })
+                point
+                    .map(|value| if moves { value + (1.5 * random()).round() * 0.5 } else { value })
             })
             .collect();
         met += agree(&format!("a grid pushed about {seed}"), &block, &shape);
     }
     assert!(met > 100, "{met}");
-    let flat: Vec<Vector> = block.points().iter().map(|&[x, y, z]| [x, y, if z > 0.0 { 0.25 } else { 0.0 }]).collect();
+    let flat: Vec<Vector> =
+        block.points().iter().map(|&[x, y, z]| [x, y, if z > 0.0 { 0.25 } else { 0.0 }]).collect();
     agree("a box pressed flat", &block, &flat);
 }

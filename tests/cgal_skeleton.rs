@@ -13,7 +13,9 @@ const SPUR: f64 = 0.03;
 /// Asserts that both skeletons of a surface have these pieces, loops, branch nodes and ends, and lie close together.
 fn agree(name: &str, mesh: &Mesh, counts: [usize; 4]) {
     let surface = Surface::extract(mesh, &FeatureSettings::default()).expect("a surface");
-    let ours = CurveGraph::of(&Skeleton::extract(&surface, &SkeletonSettings::default()).expect("a skeleton"));
+    let ours = CurveGraph::of(
+        &Skeleton::extract(&surface, &SkeletonSettings::default()).expect("a skeleton"),
+    );
     let (_, theirs) = CurveGraph::of_cgal(&surface, PATIENCE).expect("CGAL ends in time");
     let theirs = theirs.without_spurs(SPUR, &surface);
     assert_eq!(ours.without_spurs(SPUR, &surface), ours, "{name}: ours has no spurs");
@@ -48,7 +50,9 @@ fn windows(count: i32, fine: i32, rounds: usize) -> Mesh {
     let mut numbers = std::collections::HashMap::new();
     let mut points: Vec<Vector> = Vec::new();
     let mut triangles: Vec<[u32; 3]> = Vec::new();
-    for cube in (0..=3 * count).flat_map(|x| (0..=3).map(move |y| [x, y, 0])).filter(|&cube| has(cube)) {
+    for cube in
+        (0..=3 * count).flat_map(|x| (0..=3).map(move |y| [x, y, 0])).filter(|&cube| has(cube))
+    {
         for (axis, side) in (0..3).flat_map(|axis| [(axis, 0), (axis, 1)]) {
             let mut beyond = cube;
             beyond[axis] += 2 * side - 1;
@@ -67,7 +71,11 @@ fn windows(count: i32, fine: i32, rounds: usize) -> Mesh {
                         points.len() as u32 - 1
                     })
                 });
-                triangles.extend(if side == 1 { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] });
+                triangles.extend(if side == 1 {
+                    [[a, b, c], [a, c, d]]
+                } else {
+                    [[a, c, b], [a, d, c]]
+                });
             }
         }
     }
@@ -102,6 +110,7 @@ fn the_generated_meshes() {
 /// The triangles of a surface mesh alone.
 fn triangles_of(mesh: &Mesh) -> Mesh {
     let surface = Surface::extract(mesh, &FeatureSettings::default()).expect("a surface");
-    let cells = Cells::uniform(CellType::Triangle, surface.triangles().concat()).expect("triangles");
+    let cells =
+        Cells::uniform(CellType::Triangle, surface.triangles().concat()).expect("triangles");
     Mesh::new(surface.points().to_vec(), cells, FeatureSource::SharpEdges).expect("a mesh")
 }

@@ -9,7 +9,9 @@ use serde_json::Value;
 use tombolo_deform::shapes::box_of_tets;
 use tombolo_deform::surface::{Edit, Editor, FeatureSettings, Surface};
 use tombolo_pipelines::files::read_displacements;
-use tombolo_pipelines::language::{Command, LanguageError, Validate, parse, parse_json, parse_orders, place_beside};
+use tombolo_pipelines::language::{
+    Command, LanguageError, Validate, parse, parse_json, parse_orders, place_beside,
+};
 use tombolo_tests::project;
 
 fn pages() -> Vec<PathBuf> {
@@ -83,13 +85,18 @@ fn edits_of_the_book_are_carried_out() {
     let list = folder.path().join("edits.json").to_string_lossy().into_owned();
 
     let mesh = box_of_tets([16, 4, 4], [0.0; 3], [4.0, 1.0, 1.0]);
-    let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).expect("a surface"));
+    let surface =
+        Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).expect("a surface"));
     let mut editor = Editor::new(Arc::clone(&surface)).expect("an editor");
     let mut kinds = BTreeSet::new();
     for (line, block) in blocks(&text, "json") {
         let mut edits = match parse_json::<Vec<Edit>>(&block, "snippet") {
             Ok(edits) => edits,
-            Err(_) => match parse_orders(&block, "snippet").expect("edits or orders").swap_remove(0).command {
+            Err(_) => match parse_orders(&block, "snippet")
+                .expect("edits or orders")
+                .swap_remove(0)
+                .command
+            {
                 Command::Order(order) => order.edits().to_vec(),
                 other => panic!("docs/edits.md:{line}: {other:?} brings no edits"),
             },
@@ -101,9 +108,13 @@ fn edits_of_the_book_are_carried_out() {
             continue;
         }
         place_beside(&mut edits, &list);
-        read_displacements(&mut edits, &surface).unwrap_or_else(|error| panic!("docs/edits.md:{line}: {error}"));
-        let displacement = editor.displacement(&edits).unwrap_or_else(|error| panic!("docs/edits.md:{line}: {error}"));
-        let largest = displacement.iter().flatten().fold(0.0_f64, |largest, part| largest.max(part.abs()));
+        read_displacements(&mut edits, &surface)
+            .unwrap_or_else(|error| panic!("docs/edits.md:{line}: {error}"));
+        let displacement = editor
+            .displacement(&edits)
+            .unwrap_or_else(|error| panic!("docs/edits.md:{line}: {error}"));
+        let largest =
+            displacement.iter().flatten().fold(0.0_f64, |largest, part| largest.max(part.abs()));
         assert!(largest > 0.03 && largest < 2.0, "docs/edits.md:{line}: {largest}");
     }
     assert_eq!(kinds.len(), 7, "{kinds:?}");
@@ -118,8 +129,11 @@ fn dense(text: &str) -> Vec<&str> {
 #[test]
 fn snippets_of_other_languages_are_of_the_examples() {
     let read = |folder: &str| -> Vec<String> {
-        let files = fs::read_dir(project().join("examples").join(folder)).expect("the examples are there");
-        files.map(|file| fs::read_to_string(file.expect("a file").path()).expect("a text")).collect()
+        let files =
+            fs::read_dir(project().join("examples").join(folder)).expect("the examples are there");
+        files
+            .map(|file| fs::read_to_string(file.expect("a file").path()).expect("a text"))
+            .collect()
     };
     let mut checked = 0;
     for (language, folder) in [("c", "c"), ("cpp", "cxx"), ("fortran", "fortran")] {
@@ -128,9 +142,14 @@ fn snippets_of_other_languages_are_of_the_examples() {
             let text = fs::read_to_string(&page).expect("a page can be read");
             for (line, block) in blocks(&text, language) {
                 let wanted = dense(&block);
-                let found =
-                    programs.iter().any(|program| dense(program).windows(wanted.len()).any(|lines| lines == wanted));
-                assert!(found, "{}:{line}: no example in {folder} has these lines:\n{block}", page.display());
+                let found = programs.iter().any(|program| {
+                    dense(program).windows(wanted.len()).any(|lines| lines == wanted)
+                });
+                assert!(
+                    found,
+                    "{}:{line}: no example in {folder} has these lines:\n{block}",
+                    page.display()
+                );
                 checked += 1;
             }
         }
@@ -140,9 +159,11 @@ fn snippets_of_other_languages_are_of_the_examples() {
 
 #[test]
 fn what_is_wrong_in_a_snippet_is_found() {
-    for wrong in
-        [r#"{"version": 1, "pipelnes": []}"#, r#"[{"translate": {"by": [1, 0]}}]"#, r#"[{"order": {"undo": "all"}}]"#]
-    {
+    for wrong in [
+        r#"{"version": 1, "pipelnes": []}"#,
+        r#"[{"translate": {"by": [1, 0]}}]"#,
+        r#"[{"order": {"undo": "all"}}]"#,
+    ] {
         assert!(accept(wrong, "snippet").is_err(), "{wrong}");
     }
 }

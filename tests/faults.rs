@@ -6,7 +6,9 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 use tokio_tungstenite::tungstenite::Message as Wire;
-use tombolo_tests::{Link, Message, NOZZLE_FEATURES, PATIENCE, Run, Small, Viewer, program, tombolo};
+use tombolo_tests::{
+    Link, Message, NOZZLE_FEATURES, PATIENCE, Run, Small, Viewer, program, tombolo,
+};
 
 /// A run that streams its surface, waits at its first step, and writes its mesh at its last.
 fn paused() -> Small {
@@ -56,7 +58,8 @@ fn finish(run: Run, mut driver: Viewer) -> String {
 fn undisturbed() -> Vec<u8> {
     let small = unpaused();
     let (status, text) =
-        Run::flow(&small.arguments(&["--pipelines", "@pipelines.json", "--headless"])).finish(PATIENCE);
+        Run::flow(&small.arguments(&["--pipelines", "@pipelines.json", "--headless"]))
+            .finish(PATIENCE);
     assert!(status.success(), "{text}");
     small.bytes("out/last.vtu")
 }
@@ -82,11 +85,24 @@ fn bad_json_is_answered_with_its_place() {
     .expect("a file can be written");
     let path = small.path("bad.json").display().to_string();
     let place = "bad.json:4:";
-    refused("tombolo", &["check".into(), path], &[place, "pipelines[0].stages[0]", "slcie", "slice"]);
-    refused("flow", &small.arguments(&["--pipelines", "@bad.json", "--headless"]), &[place, "slcie", "slice"]);
+    refused(
+        "tombolo",
+        &["check".into(), path],
+        &[place, "pipelines[0].stages[0]", "slcie", "slice"],
+    );
+    refused(
+        "flow",
+        &small.arguments(&["--pipelines", "@bad.json", "--headless"]),
+        &[place, "slcie", "slice"],
+    );
 
-    std::fs::write(small.path("cut.json"), "{\"version\": 1, \"pipelines\": [").expect("a file can be written");
-    refused("flow", &small.arguments(&["--pipelines", "@cut.json", "--headless"]), &["cut.json:1:"]);
+    std::fs::write(small.path("cut.json"), "{\"version\": 1, \"pipelines\": [")
+        .expect("a file can be written");
+    refused(
+        "flow",
+        &small.arguments(&["--pipelines", "@cut.json", "--headless"]),
+        &["cut.json:1:"],
+    );
     std::fs::write(small.path("case.json"), "{\"mesh\": \"nozzle.msh\", \"densty\": 1}")
         .expect("a file can be written");
     refused("flow", &small.arguments(&["--headless"]), &["case.json:1:", "densty", "density"]);
@@ -95,8 +111,16 @@ fn bad_json_is_answered_with_its_place() {
 #[test]
 fn a_missing_file_is_named() {
     let small = Small::new();
-    refused("flow", &small.arguments(&["--pipelines", "@nowhere.json", "--headless"]), &["nowhere.json"]);
-    refused("tombolo", &["mesh".into(), "info".into(), "/nowhere/mesh.vtu".into()], &["/nowhere/mesh.vtu"]);
+    refused(
+        "flow",
+        &small.arguments(&["--pipelines", "@nowhere.json", "--headless"]),
+        &["nowhere.json"],
+    );
+    refused(
+        "tombolo",
+        &["mesh".into(), "info".into(), "/nowhere/mesh.vtu".into()],
+        &["/nowhere/mesh.vtu"],
+    );
 }
 
 #[test]
@@ -105,7 +129,10 @@ fn a_mesh_that_cannot_be_read_is_refused() {
     let whole = small.bytes("nozzle.msh");
     for (name, bytes) in [
         ("cut.msh", &whole[..whole.len() / 2]),
-        ("cut.vtu", b"<VTKFile type=\"UnstructuredGrid\" version=\"1.0\"><UnstructuredGrid>".as_slice()),
+        (
+            "cut.vtu",
+            b"<VTKFile type=\"UnstructuredGrid\" version=\"1.0\"><UnstructuredGrid>".as_slice(),
+        ),
         ("noise.msh", &[0xff, 0x00, 0x17, 0x80, 0x0a, 0x24]),
         ("noise.vtu", &[0xff, 0x00, 0x17, 0x80, 0x0a, 0x3c]),
         ("noise.vtk", &[0xff, 0x00, 0x17, 0x80, 0x0a, 0x23]),
@@ -113,7 +140,11 @@ fn a_mesh_that_cannot_be_read_is_refused() {
         ("mesh.stl", b"solid"),
     ] {
         std::fs::write(small.path(name), bytes).expect("a file can be written");
-        refused("tombolo", &["mesh".into(), "info".into(), small.path(name).display().to_string()], &[name]);
+        refused(
+            "tombolo",
+            &["mesh".into(), "info".into(), small.path(name).display().to_string()],
+            &[name],
+        );
     }
     let mut case = small.read("case.json");
     case["mesh"] = "cut.msh".into();
@@ -129,7 +160,13 @@ fn an_unknown_feature_is_rejected_with_the_near_and_all_names() {
         &json!([{"at": {"cycle": 3}, "order": {"edits": [
             {"scale_direction": {"features": ["thraot"], "fixed": ["inlet"], "factors": [1, 1, 0.5]}}]}}]),
     );
-    let arguments = small.arguments(&["--pipelines", "@pipelines.json", "--orders", "@orders.json", "--headless"]);
+    let arguments = small.arguments(&[
+        "--pipelines",
+        "@pipelines.json",
+        "--orders",
+        "@orders.json",
+        "--headless",
+    ]);
     let (status, text) = Run::flow(&arguments).finish(PATIENCE);
     assert!(status.success(), "{text}");
     let report = small.read("report.json");
@@ -148,9 +185,18 @@ fn an_unknown_feature_is_rejected_with_the_near_and_all_names() {
 fn numbers_that_are_none_are_refused_by_name() {
     let small = Small::new();
     for (text, says) in [
-        (r#"[{"order": {"edits": [{"translate": {"features": ["throat"], "by": [0, NaN, 0]}}]}}]"#, "orders.json:1:"),
-        (r#"[{"order": {"edits": [{"translate": {"features": ["throat"], "by": [0, 1e999, 0]}}]}}]"#, "by[1]"),
-        (r#"[{"order": {"edits": [{"translate": {"features": ["throat"], "by": [0, null, 0]}}]}}]"#, "by[1]"),
+        (
+            r#"[{"order": {"edits": [{"translate": {"features": ["throat"], "by": [0, NaN, 0]}}]}}]"#,
+            "orders.json:1:",
+        ),
+        (
+            r#"[{"order": {"edits": [{"translate": {"features": ["throat"], "by": [0, 1e999, 0]}}]}}]"#,
+            "by[1]",
+        ),
+        (
+            r#"[{"order": {"edits": [{"translate": {"features": ["throat"], "by": [0, null, 0]}}]}}]"#,
+            "by[1]",
+        ),
     ] {
         std::fs::write(small.path("orders.json"), text).expect("a file can be written");
         refused("flow", &small.arguments(&["--orders", "@orders.json", "--headless"]), &[says]);
@@ -177,12 +223,18 @@ fn a_wrong_token_lets_nobody_in() {
     let small = paused();
     let (run, link) = start(&small);
     for token in ["", "0", "00000000000000000000000000000000", "%00", &link.token[1..]] {
-        let refusal = Viewer::connect(&link.with_token(token)).err().unwrap_or_else(|| panic!("'{token}' lets in"));
+        let refusal = Viewer::connect(&link.with_token(token))
+            .err()
+            .unwrap_or_else(|| panic!("'{token}' lets in"));
         assert!(refusal.contains("401"), "{refusal}");
     }
     let mut stream = link.tcp();
-    write!(stream, "GET /ws?token=wrong HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n", link.address)
-        .expect("the run listens");
+    write!(
+        stream,
+        "GET /ws?token=wrong HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n",
+        link.address
+    )
+    .expect("the run listens");
     let mut answer = String::new();
     let _ = stream.read_to_string(&mut answer);
     assert!(answer.starts_with("HTTP/1.1 401"), "{answer}");
@@ -272,7 +324,10 @@ fn garbage_on_the_port_changes_nothing() {
         let _ = stream.shutdown(std::net::Shutdown::Write);
         let mut answer = Vec::new();
         let _ = stream.read_to_end(&mut answer);
-        assert!(!String::from_utf8_lossy(&answer).contains("root:"), "a file of the machine was served");
+        assert!(
+            !String::from_utf8_lossy(&answer).contains("root:"),
+            "a file of the machine was served"
+        );
     }
 
     let mut driver = Viewer::connect(&link).expect("the run lets in");
@@ -283,9 +338,15 @@ fn garbage_on_the_port_changes_nothing() {
         ("[]", ""),
         ("{", ""),
         (r#"{"oder": {}}"#, "order"),
-        (r#"{"order": {"edits": [{"translate": {"features": ["throat"], "by": [0, 1e999, 0]}}]}}"#, "by[1]"),
+        (
+            r#"{"order": {"edits": [{"translate": {"features": ["throat"], "by": [0, 1e999, 0]}}]}}"#,
+            "by[1]",
+        ),
         (r#"{"order": {"edits": [{"translate": {"features": ["throat"], "by": [0, 0]}}]}}"#, "by"),
-        (r#"{"order": {"edits": [{"translat": {"features": ["throat"], "by": [0, 0, 0]}}]}}"#, "translate"),
+        (
+            r#"{"order": {"edits": [{"translat": {"features": ["throat"], "by": [0, 0, 0]}}]}}"#,
+            "translate",
+        ),
         (r#"{"order": {"undo": -1}}"#, "undo"),
         (r#"{"pause": {}, "stop": {}}"#, ""),
         (r#"{"parameter": {"name": "no such", "value": 1}}"#, "no such"),
@@ -313,7 +374,13 @@ fn an_order_that_would_break_the_mesh_is_refused_and_the_solver_runs_on() {
         &json!([{"at": {"cycle": 3}, "order": {"edits": [
             {"scale_direction": {"features": ["throat"], "fixed": ["inlet", "outlet"], "factors": [1, 1, -0.5]}}]}}]),
     );
-    let arguments = small.arguments(&["--pipelines", "@pipelines.json", "--orders", "@orders.json", "--headless"]);
+    let arguments = small.arguments(&[
+        "--pipelines",
+        "@pipelines.json",
+        "--orders",
+        "@orders.json",
+        "--headless",
+    ]);
     let (status, text) = Run::flow(&arguments).finish(PATIENCE);
     assert!(status.success(), "{text}");
     let report = small.read("report.json");
@@ -325,12 +392,25 @@ fn an_order_that_would_break_the_mesh_is_refused_and_the_solver_runs_on() {
 #[test]
 fn edits_offline_meet_the_same_errors() {
     let small = Small::new();
-    small.write("edits.json", &json!([{"translate": {"features": ["outlat"], "fixed": ["inlet"], "by": [0, 0, 0.1]}}]));
+    small.write(
+        "edits.json",
+        &json!([{"translate": {"features": ["outlat"], "fixed": ["inlet"], "by": [0, 0, 0.1]}}]),
+    );
     let path = |name: &str| small.path(name).display().to_string();
-    let output =
-        tombolo(&["edit", "--mesh", &path("nozzle.msh"), "--edits", &path("edits.json"), "--out", &path("new.vtu")]);
+    let output = tombolo(&[
+        "edit",
+        "--mesh",
+        &path("nozzle.msh"),
+        "--edits",
+        &path("edits.json"),
+        "--out",
+        &path("new.vtu"),
+    ]);
     let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(!output.status.success() && errors.contains("outlat") && errors.contains("outlet"), "{errors}");
+    assert!(
+        !output.status.success() && errors.contains("outlat") && errors.contains("outlet"),
+        "{errors}"
+    );
     assert!(!small.path("new.vtu").exists(), "a refused edit wrote a mesh");
 }
 
@@ -338,17 +418,27 @@ fn edits_offline_meet_the_same_errors() {
 #[test]
 fn flow_refuses_orders_beyond_the_limits() {
     let small = unpaused();
-    let edit = json!({"translate": {"features": ["throat"], "fixed": ["inlet"], "by": [0, 0, 1e-6]}});
+    let edit =
+        json!({"translate": {"features": ["throat"], "fixed": ["inlet"], "by": [0, 0, 1e-6]}});
     for (order, named) in [
         (
             json!({"edits": [edit], "schedule": {"steps": 1_000_000_000}}),
             "found 1000000000 shapes, expected at most 10000",
         ),
-        (json!({"edits": [edit], "schedule": {"steps": u32::MAX}}), "found 4294967295 shapes, expected at most 10000"),
+        (
+            json!({"edits": [edit], "schedule": {"steps": u32::MAX}}),
+            "found 4294967295 shapes, expected at most 10000",
+        ),
         (json!({"edits": vec![edit.clone(); 20_000]}), "found 20000 edits, expected at most 16384"),
     ] {
         small.write("orders.json", &json!([{"order": order}]));
-        let arguments = small.arguments(&["--pipelines", "@pipelines.json", "--headless", "--orders", "@orders.json"]);
+        let arguments = small.arguments(&[
+            "--pipelines",
+            "@pipelines.json",
+            "--headless",
+            "--orders",
+            "@orders.json",
+        ]);
         let (status, text) = Run::flow(&arguments).finish(PATIENCE);
         assert!(!status.success() && text.contains(named) && !text.contains("panicked"), "{text}");
     }

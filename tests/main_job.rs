@@ -10,7 +10,10 @@ use tombolo_tests::{PATIENCE, Run, Small};
 fn throat(mesh: &Mesh) -> Vec<usize> {
     let on_wall = |p: &Vector| p[0].abs() > 0.025 - 1e-9 || p[2].abs() > 0.05 - 1e-9;
     let points = mesh.points().iter().enumerate();
-    points.filter(|(_, p)| p[1].abs() < 0.1 + 1e-9 && on_wall(p)).map(|(vertex, _)| vertex).collect()
+    points
+        .filter(|(_, p)| p[1].abs() < 0.1 + 1e-9 && on_wall(p))
+        .map(|(vertex, _)| vertex)
+        .collect()
 }
 
 /// Runs 60 steps with an order at its schedule and an undo at cycle 45; the mesh is written at every cycle.
@@ -22,7 +25,15 @@ fn pinch(order: &Value) -> (Small, Value) {
             {"name": "mesh", "every": {"steps": 1}, "stages": [{"write": {"file": "mesh-{cycle}.vtu"}}]}]}),
     );
     small.write("orders.json", &json!([order, {"at": {"cycle": 45}, "order": {"undo": 1}}]));
-    let more = ["--pipelines", "@pipelines.json", "--orders", "@orders.json", "--headless", "--steps", "60"];
+    let more = [
+        "--pipelines",
+        "@pipelines.json",
+        "--orders",
+        "@orders.json",
+        "--headless",
+        "--steps",
+        "60",
+    ];
     let (status, text) = Run::flow(&small.arguments(&more)).finish(PATIENCE);
     assert!(status.success(), "{text}");
     let report = small.read("report.json");
@@ -44,7 +55,8 @@ fn check(small: &Small, report: &Value, shapes: usize) {
         let measured = quality(mesh.cells(), mesh.points());
         assert_eq!(measured.inverted, 0, "cycle {cycle}");
         assert!(measured.min > 0.0, "cycle {cycle}: {}", measured.min);
-        let height = throat.iter().map(|&vertex| mesh.points()[vertex][2].abs()).fold(0.0, f64::max);
+        let height =
+            throat.iter().map(|&vertex| mesh.points()[vertex][2].abs()).fold(0.0, f64::max);
         if heights.last() != Some(&height) {
             heights.push(height);
         }
@@ -53,7 +65,10 @@ fn check(small: &Small, report: &Value, shapes: usize) {
                 let (was, is) = (reference.points()[vertex], mesh.points()[vertex]);
                 for axis in 0..3 {
                     let wanted = was[axis] * if axis == 2 { 0.5 } else { 1.0 };
-                    assert!((is[axis] - wanted).abs() <= 1e-6 * 0.1, "vertex {vertex}: {was:?} became {is:?}");
+                    assert!(
+                        (is[axis] - wanted).abs() <= 1e-6 * 0.1,
+                        "vertex {vertex}: {was:?} became {is:?}"
+                    );
                 }
             }
         }
@@ -67,7 +82,11 @@ fn check(small: &Small, report: &Value, shapes: usize) {
 
     let undone = small.mesh("out/mesh-000059.vtu");
     for (vertex, (was, is)) in reference.points().iter().zip(undone.points()).enumerate() {
-        assert_eq!(was.map(f64::to_bits), is.map(f64::to_bits), "vertex {vertex}: {was:?} came back as {is:?}");
+        assert_eq!(
+            was.map(f64::to_bits),
+            is.map(f64::to_bits),
+            "vertex {vertex}: {was:?} came back as {is:?}"
+        );
     }
 }
 
@@ -95,6 +114,7 @@ fn in_one_step_of_a_running_flow() {
 
 #[test]
 fn in_ten_steps_of_a_running_flow() {
-    let (small, report) = pinch(&order(json!({"time": 0.02}), json!({"steps": 10, "every": {"steps": 3}})));
+    let (small, report) =
+        pinch(&order(json!({"time": 0.02}), json!({"steps": 10, "every": {"steps": 3}})));
     check(&small, &report, 10);
 }

@@ -33,7 +33,9 @@ fn edits(value: Value) -> Vec<Edit> {
 }
 
 fn half_turn() -> Vec<Edit> {
-    edits(json!([{"rotate": {"features": ["z-max"], "fixed": ["z-min"], "axis": [0, 0, 1], "degrees": 170}}]))
+    edits(
+        json!([{"rotate": {"features": ["z-max"], "fixed": ["z-min"], "axis": [0, 0, 1], "degrees": 170}}]),
+    )
 }
 
 fn guard(otherwise: Otherwise) -> Guard {
@@ -44,7 +46,13 @@ fn schedule(steps: u32) -> Schedule {
     serde_json::from_value(json!({"steps": steps})).unwrap()
 }
 
-fn reach(shaper: &mut Shaper, stack: &[Edit], start: &Place, steps: u32, guard: &Guard) -> Result<Plan, Refused> {
+fn reach(
+    shaper: &mut Shaper,
+    stack: &[Edit],
+    start: &Place,
+    steps: u32,
+    guard: &Guard,
+) -> Result<Plan, Refused> {
     shaper.reach(stack, 0, start, &DeformStage::default(), &schedule(steps), guard)
 }
 
@@ -79,11 +87,18 @@ fn a_half_turn_is_mended_and_taken_back_exactly() {
     let start = here(&shaper);
     let (rejecting, mending) = (guard(Otherwise::Reject), guard(Otherwise::Untangle));
     let refused = reach(&mut shaper, &half_turn(), &start, 1, &rejecting).unwrap_err();
-    assert!(matches!(refused, Refused::Guard(Refusal::Quality(_)) | Refused::Surface(_)), "{refused}");
+    assert!(
+        matches!(refused, Refused::Guard(Refusal::Quality(_)) | Refused::Surface(_)),
+        "{refused}"
+    );
 
     for steps in [1, 3, 40] {
         let plan = reach(&mut shaper, &half_turn(), &start, steps, &mending).unwrap();
-        assert!(plan.target().sub_steps > 1 && plan.shapes() >= steps.max(2), "{} shapes", plan.shapes());
+        assert!(
+            plan.target().sub_steps > 1 && plan.shapes() >= steps.max(2),
+            "{} shapes",
+            plan.shapes()
+        );
         assert_eq!(plan.asked().steps.get(), steps);
         let there = walk(&mesh, &plan, &mending);
         // The handle has made the motion that the edit states, and what is fixed has not moved.
@@ -114,7 +129,9 @@ fn the_shape_does_not_depend_on_where_the_mesh_is() {
     let first = reach(&mut shaper, &half_turn(), &start, 1, &mending).unwrap();
 
     let mut other = column();
-    let lift = edits(json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.1, 0.0, 0.6]}}]));
+    let lift = edits(
+        json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.1, 0.0, 0.6]}}]),
+    );
     let ground = here(&other);
     let lifted = reach(&mut other, &lift, &ground, 1, &mending).unwrap();
     let place = walk(&mesh, &lifted, &mending);
@@ -142,7 +159,9 @@ fn edits_pile_up_on_a_mended_shape() {
     let turned = reach(&mut shaper, &half_turn(), &start, 1, &mending).unwrap();
     let place = walk(&mesh, &turned, &mending);
     let mut stack = half_turn();
-    stack.extend(edits(json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.3, 0.0, 0.2]}}])));
+    stack.extend(edits(
+        json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.3, 0.0, 0.2]}}]),
+    ));
     let plan = reach(&mut shaper, &stack, &place, 2, &mending).unwrap();
     let there = walk(&mesh, &plan, &mending);
     let fresh = {
@@ -159,7 +178,9 @@ fn edits_pile_up_on_a_mended_shape() {
 fn the_largest_feasible_fraction_is_done_and_reported() {
     let clamping = guard(Otherwise::Clamp);
     for stack in [
-        edits(json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -3.0]}}])),
+        edits(
+            json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -3.0]}}]),
+        ),
         half_turn(),
     ] {
         let mut shaper = column();
@@ -169,11 +190,17 @@ fn the_largest_feasible_fraction_is_done_and_reported() {
         let fraction = plan.target().fraction;
         assert!(fraction > 0.05 && fraction < 0.95, "{fraction}");
         walk(&mesh, &plan, &clamping);
-        let scaled = |fraction: f64| stack.iter().map(|edit| edit.scaled(fraction)).collect::<Vec<_>>();
-        let again = reach(&mut shaper, &scaled(fraction), &start, 3, &guard(Otherwise::Reject)).unwrap();
+        let scaled =
+            |fraction: f64| stack.iter().map(|edit| edit.scaled(fraction)).collect::<Vec<_>>();
+        let again =
+            reach(&mut shaper, &scaled(fraction), &start, 3, &guard(Otherwise::Reject)).unwrap();
         assert_eq!(again.end(), plan.end());
-        assert!(reach(&mut shaper, &scaled(fraction + 0.02), &start, 3, &guard(Otherwise::Reject)).is_err());
-        let forecast = shaper.forecast(&stack, 0, &start, &DeformStage::default(), &schedule(3), &clamping);
+        assert!(
+            reach(&mut shaper, &scaled(fraction + 0.02), &start, 3, &guard(Otherwise::Reject))
+                .is_err()
+        );
+        let forecast =
+            shaper.forecast(&stack, 0, &start, &DeformStage::default(), &schedule(3), &clamping);
         assert_eq!((forecast.outcome, forecast.fraction), (Outcome::Clamped, Some(fraction)));
         assert_eq!(forecast.quality.unwrap().inverted, 0);
     }
@@ -188,29 +215,47 @@ fn edits_that_are_there_already_are_not_clamped() {
         {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -4.0]}}
     ]));
     let clamping = guard(Otherwise::Clamp);
-    let first =
-        shaper.plan(&stack[..1], Arc::clone(&start.points), &DeformStage::default(), &schedule(1), &clamping).unwrap();
+    let first = shaper
+        .plan(
+            &stack[..1],
+            Arc::clone(&start.points),
+            &DeformStage::default(),
+            &schedule(1),
+            &clamping,
+        )
+        .unwrap();
     let place = first.place(1, Arc::clone(first.end()));
-    let plan = shaper.reach(&stack, 1, &place, &DeformStage::default(), &schedule(1), &clamping).unwrap();
+    let plan =
+        shaper.reach(&stack, 1, &place, &DeformStage::default(), &schedule(1), &clamping).unwrap();
     let fraction = plan.target().fraction;
     let top = plan.end().iter().map(|point| point[2]).fold(0.0, f64::max);
     assert!((top - (2.5 - 4.0 * fraction)).abs() < 1e-9 && fraction < 0.6, "{top} {fraction}");
     let whole = shaper.reach(&stack, 2, &place, &DeformStage::default(), &schedule(1), &clamping);
-    assert!(matches!(whole, Err(Refused::Guard(_) | Refused::Surface(_))), "nothing is left to clamp");
+    assert!(
+        matches!(whole, Err(Refused::Guard(_) | Refused::Surface(_))),
+        "nothing is left to clamp"
+    );
 }
 
 #[test]
 fn what_cannot_be_mended_says_how_far_it_came() {
     let mut shaper = column();
     let start = here(&shaper);
-    let stack = edits(json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -3.0],
-        "harmonic_order": 1}}]));
+    let stack = edits(
+        json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -3.0],
+        "harmonic_order": 1}}]),
+    );
     let refused = reach(&mut shaper, &stack, &start, 1, &guard(Otherwise::Untangle)).unwrap_err();
-    let Refused::Stalled { edit: 0, name: "translate", fraction, .. } = refused else { panic!("{refused}") };
+    let Refused::Stalled { edit: 0, name: "translate", fraction, .. } = refused else {
+        panic!("{refused}")
+    };
     assert!((0.3..0.67).contains(&fraction), "the column is flat at two thirds: {fraction}");
     assert_eq!(refused.feasible_fraction(), Some(fraction));
     let text = refused.to_string();
-    assert!(text.contains("edit 0 (translate) can be done to") && text.contains("beyond that"), "{text}");
+    assert!(
+        text.contains("edit 0 (translate) can be done to") && text.contains("beyond that"),
+        "{text}"
+    );
     // The fractions of the sub-step that failed are not the order's: one is said.
     assert!(!text.contains("feasible fraction") && !text.contains("of the way"), "{text}");
     assert_eq!(text.matches(" % ").count(), 1, "{text}");
@@ -227,14 +272,20 @@ fn what_no_mesh_can_do_is_proved() {
         edits(json!([{"displacement": {"vertices": [3], "values": [by]}}]))
     };
     let start = here(&shaper);
-    let allowing = Guard { surface: tombolo_deform::quality::SurfaceRule::Allow, ..guard(Otherwise::Untangle) };
+    let allowing = Guard {
+        surface: tombolo_deform::quality::SurfaceRule::Allow,
+        ..guard(Otherwise::Untangle)
+    };
     let refused = reach(&mut shaper, &pushed(1.0), &start, 1, &allowing).unwrap_err();
-    let Refused::Stalled { impossible: Some(_), fraction, end_is_valid: false, .. } = &refused else {
+    let Refused::Stalled { impossible: Some(_), fraction, end_is_valid: false, .. } = &refused
+    else {
         panic!("{refused}")
     };
     assert!(*fraction > 0.1 && *fraction < 1.0 / 5.4, "{fraction}");
     assert!(
-        refused.to_string().contains("no motion of the inside gives a valid mesh at its whole amount: "),
+        refused
+            .to_string()
+            .contains("no motion of the inside gives a valid mesh at its whole amount: "),
         "{refused}"
     );
     let plan = reach(&mut shaper, &pushed(*fraction), &start, 1, &allowing).unwrap();
@@ -275,7 +326,9 @@ fn box_of_prisms(counts: [usize; 3], upper: Vector, manual: bool) -> Mesh {
         }
     }
     // The halves of the squares are tagged as these are, along whichever diagonal.
-    let FeatureSource::Faces(squares) = hexahedra.features() else { panic!("a box names its faces") };
+    let FeatureSource::Faces(squares) = hexahedra.features() else {
+        panic!("a box names its faces")
+    };
     let mut tagged = squares.clone();
     for ((_, v), &tag) in squares.faces.iter().zip(&squares.tags) {
         for half in [[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]] {
@@ -299,15 +352,23 @@ fn the_floor_of_prisms_is_that_of_their_worst_corner() {
         let corner = |v: &[u32], at: usize| {
             let top = at / 3 * 3;
             let [a, b, c]: [Vector; 3] = [top + (at + 1) % 3, top + (at + 2) % 3, (at + 3) % 6]
-                .map(|to| std::array::from_fn(|k| points[v[to] as usize][k] - points[v[at] as usize][k]));
-            let product = [a, b, c].iter().map(|x| x.iter().map(|x| x * x).sum::<f64>().sqrt()).product::<f64>();
+                .map(|to| {
+                    std::array::from_fn(|k| points[v[to] as usize][k] - points[v[at] as usize][k])
+                });
+            let product = [a, b, c]
+                .iter()
+                .map(|x| x.iter().map(|x| x * x).sum::<f64>().sqrt())
+                .product::<f64>();
             let volume = a[0] * (b[1] * c[2] - b[2] * c[1])
                 + a[1] * (b[2] * c[0] - b[0] * c[2])
                 + a[2] * (b[0] * c[1] - b[1] * c[0]);
             // Sound cells: each corner has the sign of its order.
             2.0 / 3.0f64.sqrt() * volume.abs() / product
         };
-        cells.iter().flat_map(|(_, v)| (0..6).map(move |at| corner(v, at))).fold(f64::INFINITY, f64::min)
+        cells
+            .iter()
+            .flat_map(|(_, v)| (0..6).map(move |at| corner(v, at)))
+            .fold(f64::INFINITY, f64::min)
     };
     let mut reached = Vec::new();
     for manual in [true, false] {
@@ -319,7 +380,10 @@ fn the_floor_of_prisms_is_that_of_their_worst_corner() {
         assert!(fraction > 0.1 && fraction < 1.0, "{fraction}");
         let plan = reach(&mut shaper, &shear(2.0 * fraction), &start, 2, &floor(0.5)).unwrap();
         let independent = least(plan.end(), &mesh.cells().as_given());
-        assert!((0.5 - 1e-9..0.501).contains(&independent), "the floor is just kept: {independent}");
+        assert!(
+            (0.5 - 1e-9..0.501).contains(&independent),
+            "the floor is just kept: {independent}"
+        );
         assert!((plan.quality().min_scaled_jacobian - independent).abs() < 1e-12);
         reached.push(fraction);
     }
@@ -329,7 +393,8 @@ fn the_floor_of_prisms_is_that_of_their_worst_corner() {
 /// One of the meshes, two orders one after the other, what is to be done where they go too far, and in how many steps.
 fn any_run() -> impl Strategy<Value = (usize, [Vec<Value>; 2], Otherwise, u32)> {
     let order = || prop::collection::vec(any_edit(), 1..3);
-    let otherwise = prop::sample::select(vec![Otherwise::Reject, Otherwise::Untangle, Otherwise::Clamp]);
+    let otherwise =
+        prop::sample::select(vec![Otherwise::Reject, Otherwise::Untangle, Otherwise::Clamp]);
     (0..MESHES, [order(), order()], otherwise, 1..4u32)
 }
 
@@ -345,7 +410,8 @@ fn mesh(kind: usize) -> Mesh {
         _ => {
             let mesh = shapes::box_of_mixed_cells([3, 2, 3], [0.0; 3], upper);
             let mirrored = mesh.points().iter().map(|&[x, y, z]| [-x, y, z]).collect();
-            Mesh::new(mirrored, mesh.cells().as_given().into_owned(), mesh.features().clone()).unwrap()
+            Mesh::new(mirrored, mesh.cells().as_given().into_owned(), mesh.features().clone())
+                .unwrap()
         }
     }
 }
@@ -355,8 +421,12 @@ fn mesh(kind: usize) -> Mesh {
 #[test]
 fn nothing_broken_is_ever_handed_out() {
     let seen: RefCell<[Vec<Vec<Vector>>; MESHES]> = RefCell::default();
-    let settings =
-        ProptestConfig { cases: 80, max_shrink_iters: 20, failure_persistence: None, ..ProptestConfig::default() };
+    let settings = ProptestConfig {
+        cases: 80,
+        max_shrink_iters: 20,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    };
     let mut runner = TestRunner::new(settings);
     let outcome = runner.run(&any_run(), |(kind, orders, otherwise, steps)| {
         let mut shaper = shaper(mesh(kind));
@@ -368,7 +438,14 @@ fn nothing_broken_is_ever_handed_out() {
             let kept = stack.len();
             let mut wanted = stack.clone();
             wanted.extend(edits(Value::Array(order)));
-            match shaper.reach(&wanted, kept, &place, &DeformStage::default(), &schedule(steps), &guard) {
+            match shaper.reach(
+                &wanted,
+                kept,
+                &place,
+                &DeformStage::default(),
+                &schedule(steps),
+                &guard,
+            ) {
                 Ok(plan) => {
                     prop_assert_eq!(&plan.start()[..], &place.points[..]);
                     place = walk(&mesh, &plan, &guard);
@@ -392,7 +469,10 @@ fn nothing_broken_is_ever_handed_out() {
             let home = walk(&mesh, &plan, &guard);
             prop_assert_eq!(&*home.points, mesh.points());
         } else {
-            prop_assert!(otherwise != Otherwise::Untangle, "a shape that was mended has a way back");
+            prop_assert!(
+                otherwise != Otherwise::Untangle,
+                "a shape that was mended has a way back"
+            );
         }
         Ok(())
     });
@@ -418,9 +498,16 @@ fn valid_to_vtk(mesh: &Mesh, shapes: &[Vec<Vector>]) {
     for (number, points) in shapes.iter().enumerate() {
         write(&format!("shape-{number:04}.vtu"), points);
     }
-    let read = Command::new("/usr/bin/python3").arg(project().join("tests/vtk/path.py")).arg(folder.path()).output();
+    let read = Command::new("/usr/bin/python3")
+        .arg(project().join("tests/vtk/path.py"))
+        .arg(folder.path())
+        .output();
     let read = read.expect("python3 starts");
-    assert!(read.status.success(), "VTK (apt-get install python3-vtk9): {}", String::from_utf8_lossy(&read.stderr));
+    assert!(
+        read.status.success(),
+        "VTK (apt-get install python3-vtk9): {}",
+        String::from_utf8_lossy(&read.stderr)
+    );
     let text = String::from_utf8(read.stdout).unwrap();
     assert_eq!(text.lines().count(), shapes.len());
     for (line, points) in text.lines().zip(shapes) {

@@ -30,7 +30,8 @@ fn triangles(mesh: &Mesh) -> BTreeSet<[[i64; 3]; 3]> {
     let diagonal = 1.0;
     let place = |point: Vector| point.map(|value| (value / (1e-7 * diagonal)).round() as i64);
     let corners = |vertices: &[u32]| {
-        let mut corners: Vec<[i64; 3]> = vertices.iter().map(|&vertex| place(mesh.points()[vertex as usize])).collect();
+        let mut corners: Vec<[i64; 3]> =
+            vertices.iter().map(|&vertex| place(mesh.points()[vertex as usize])).collect();
         corners.sort_unstable();
         [corners[0], corners[1], corners[2]]
     };
@@ -83,13 +84,21 @@ fn agrees(small: &Small, common: &[&str], dealings: &[Dealing<'_>]) {
         for key in ["vertices", "cells", "inverted"] {
             assert_eq!(report["mesh"][key], alone["mesh"][key], "{said}");
         }
-        assert_eq!((&report["cycles"], &report["flow"]["unconverged"]), (&alone["cycles"], &json!(0)), "{said}");
+        assert_eq!(
+            (&report["cycles"], &report["flow"]["unconverged"]),
+            (&alone["cycles"], &json!(0)),
+            "{said}"
+        );
         let found = read(small, "out/final.vtu");
         assert_eq!(found.mesh.cells(), last.mesh.cells());
         let moved = apart(last.mesh.points().as_flattened(), found.mesh.points().as_flattened());
         assert!(moved <= 1e-8, "{said}: coordinates {moved:e} apart");
         for field in &last.fields {
-            let other = found.fields.iter().find(|other| other.name == field.name).expect("the same fields");
+            let other = found
+                .fields
+                .iter()
+                .find(|other| other.name == field.name)
+                .expect("the same fields");
             let apart = apart(&field.values, &other.values);
             // The residuals at which the solves stop are 1e-6 and 1e-7 of their right-hand sides.
             assert!(apart < 2e-4, "{said}: {} {apart:e} apart", field.name);
@@ -127,7 +136,15 @@ fn a_nozzle_is_pinched_alike_on_any_ranks() {
             {"at": {"cycle": 12}, "order": {"undo": 1}}
         ]),
     );
-    let common = ["--pipelines", "@pipelines.json", "--orders", "@orders.json", "--headless", "--steps", "16"];
+    let common = [
+        "--pipelines",
+        "@pipelines.json",
+        "--orders",
+        "@orders.json",
+        "--headless",
+        "--steps",
+        "16",
+    ];
     agrees(&small, &common, &dealings());
 }
 
@@ -135,7 +152,8 @@ fn a_nozzle_is_pinched_alike_on_any_ranks() {
 fn a_bypass_is_bent_alike_on_any_ranks() {
     let mesh = generated_mesh("bypass-0");
     let small = Small::new();
-    let text = std::fs::read_to_string(project().join("examples/flow/cases/bypass.json")).expect("the case");
+    let text = std::fs::read_to_string(project().join("examples/flow/cases/bypass.json"))
+        .expect("the case");
     let mut case: Value = serde_json::from_str(&text).expect("JSON");
     case["mesh"] = json!(mesh);
     if let Some(case) = case.as_object_mut() {
@@ -143,7 +161,15 @@ fn a_bypass_is_bent_alike_on_any_ranks() {
     }
     small.write("case.json", &case);
     small.write("pipelines.json", &surface_at(4));
-    let common = ["--pipelines", "@pipelines.json", "--orders", "@orders.json", "--headless", "--steps", "5"];
+    let common = [
+        "--pipelines",
+        "@pipelines.json",
+        "--orders",
+        "@orders.json",
+        "--headless",
+        "--steps",
+        "5",
+    ];
     // A skeleton depends on how the surface is numbered, if little: where the ranks do not say which vertices are the same, one that is
     // not dragged.
     let runs: [(&str, &[Dealing<'_>]); 2] = [
@@ -152,7 +178,8 @@ fn a_bypass_is_bent_alike_on_any_ranks() {
     ];
     for (name, dealings) in runs {
         let orders = project().join(format!("examples/flow/orders/{name}.json"));
-        let mut orders: Value = serde_json::from_slice(&std::fs::read(orders).expect("the order")).expect("JSON");
+        let mut orders: Value =
+            serde_json::from_slice(&std::fs::read(orders).expect("the order")).expect("JSON");
         orders[0]["at"] = json!({"cycle": 1});
         orders[0]["order"]["schedule"] = json!({"steps": 2});
         small.write("orders.json", &orders);
@@ -169,7 +196,10 @@ fn viewers_steer_three_ranks() {
         &json!({"version": 1, "stream": {"listen": "127.0.0.1:0"}, "pipelines": [
             {"name": "surface", "every": {"steps": 2}, "stages": [{"surface": {}}, {"stream": {"error": {"relative": 1e-3}}}]}]}),
     );
-    let mut run = Run::flow_on(3, &small.arguments(&["--pipelines", "@pipelines.json", "--listen", "127.0.0.1:0"]));
+    let mut run = Run::flow_on(
+        3,
+        &small.arguments(&["--pipelines", "@pipelines.json", "--listen", "127.0.0.1:0"]),
+    );
     let link = run.link();
     let mut first = Viewer::connect(&link).expect("a viewer connects");
     assert!(!first.frame().is_empty());
@@ -193,7 +223,8 @@ fn viewers_steer_three_ranks() {
     let (status, text) = run.finish(PATIENCE);
     assert!(status.success(), "{text}");
     let report = small.read("report.json");
-    let orders: Vec<_> = report["orders"].as_array().expect("orders").iter().map(|order| &order["status"]).collect();
+    let orders: Vec<_> =
+        report["orders"].as_array().expect("orders").iter().map(|order| &order["status"]).collect();
     assert_eq!(orders, ["applied", "applied", "rejected"], "{report}");
     assert_eq!(report["mesh"]["inverted"], 0);
 }

@@ -44,7 +44,8 @@ fn the_reference_is_what_the_types_say() {
 #[test]
 fn the_viewer_has_the_schema_of_an_order() {
     let path = project().join("viewer/test/order-schema.json");
-    let schema = serde_json::to_string_pretty(&order_schema()).expect("a schema can be written") + "\n";
+    let schema =
+        serde_json::to_string_pretty(&order_schema()).expect("a schema can be written") + "\n";
     if std::env::var_os("TOMBOLO_UPDATE").is_some() {
         std::fs::write(&path, &schema).expect("the schema can be written");
     }
@@ -93,7 +94,9 @@ impl Renderer {
             // A variant without a type says only which keys go together; the description says it better.
             let variants: Vec<&Value> = variants
                 .iter()
-                .filter(|variant| variant.get("required").is_none() || variant.get("type").is_some())
+                .filter(|variant| {
+                    variant.get("required").is_none() || variant.get("type").is_some()
+                })
                 .collect();
             for variant in &variants {
                 self.variant(variant);
@@ -123,7 +126,9 @@ impl Renderer {
         }
         let tagged = variant["properties"].as_object().filter(|properties| properties.len() == 1);
         match tagged.and_then(|properties| properties.iter().next()) {
-            Some((tag, content)) if variant["required"].as_array().is_some_and(|required| required.len() == 1) => {
+            Some((tag, content))
+                if variant["required"].as_array().is_some_and(|required| required.len() == 1) =>
+            {
                 let kind = self.kind(content);
                 self.line(&format!("- `{tag}`: {kind}. {}", sentence(variant)));
             }
@@ -145,8 +150,12 @@ impl Renderer {
             return;
         }
         self.line("| key | value | default | meaning |\n|---|---|---|---|");
-        let required: Vec<&str> =
-            definition["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
+        let required: Vec<&str> = definition["required"]
+            .as_array()
+            .into_iter()
+            .flatten()
+            .filter_map(Value::as_str)
+            .collect();
         for (key, value) in properties {
             let default = match &value["default"] {
                 Value::Null if required.contains(&key.as_str()) => "required".to_owned(),
@@ -154,7 +163,10 @@ impl Renderer {
                 default => format!("`{default}`"),
             };
             let kind = self.kind(value);
-            self.line(&format!("| `{key}` | {kind} | {default} | {} |", sentence(value).replace('|', "\\|")));
+            self.line(&format!(
+                "| `{key}` | {kind} | {default} | {} |",
+                sentence(value).replace('|', "\\|")
+            ));
         }
         self.line("");
     }
@@ -178,15 +190,18 @@ impl Renderer {
             return self.kind(&all[0]);
         }
         if let Some(any) = value["anyOf"].as_array().or(value["oneOf"].as_array()) {
-            let kinds: Vec<String> = any.iter().filter(|one| one["type"] != "null").map(|one| self.kind(one)).collect();
+            let kinds: Vec<String> =
+                any.iter().filter(|one| one["type"] != "null").map(|one| self.kind(one)).collect();
             return kinds.join(" or ");
         }
         let range = range(value);
         match &value["type"] {
             Value::String(kind) => self.simple(kind, value) + &range,
             Value::Array(kinds) => {
-                let kinds: Vec<&str> = kinds.iter().filter_map(Value::as_str).filter(|kind| *kind != "null").collect();
-                kinds.iter().map(|kind| self.simple(kind, value)).collect::<Vec<_>>().join(" or ") + &range
+                let kinds: Vec<&str> =
+                    kinds.iter().filter_map(Value::as_str).filter(|kind| *kind != "null").collect();
+                kinds.iter().map(|kind| self.simple(kind, value)).collect::<Vec<_>>().join(" or ")
+                    + &range
             }
             _ => "any value".to_owned(),
         }
@@ -195,8 +210,11 @@ impl Renderer {
     fn simple(&mut self, kind: &str, value: &Value) -> String {
         match kind {
             "array" => {
-                let items =
-                    if value["items"].is_object() { self.kind(&value["items"]) } else { "any value".to_owned() };
+                let items = if value["items"].is_object() {
+                    self.kind(&value["items"])
+                } else {
+                    "any value".to_owned()
+                };
                 match (value["minItems"].as_u64(), value["maxItems"].as_u64()) {
                     (Some(least), Some(most)) if least == most => format!("{least} × {items}"),
                     (Some(least), _) if least > 0 => format!("list of {items}, at least {least}"),
@@ -206,7 +224,9 @@ impl Renderer {
             "object" if value["additionalProperties"].is_object() => {
                 format!("object of {}", self.kind(&value["additionalProperties"]))
             }
-            "object" if value["properties"].as_object().is_none_or(serde_json::Map::is_empty) => "`{}`".to_owned(),
+            "object" if value["properties"].as_object().is_none_or(serde_json::Map::is_empty) => {
+                "`{}`".to_owned()
+            }
             other => other.to_owned(),
         }
     }
@@ -225,9 +245,12 @@ impl Renderer {
 
 fn range(value: &Value) -> String {
     let mut bounds = Vec::new();
-    for (key, word) in
-        [("minimum", "at least"), ("exclusiveMinimum", "above"), ("maximum", "at most"), ("exclusiveMaximum", "below")]
-    {
+    for (key, word) in [
+        ("minimum", "at least"),
+        ("exclusiveMinimum", "above"),
+        ("maximum", "at most"),
+        ("exclusiveMaximum", "below"),
+    ] {
         if let Some(bound) = value[key].as_f64() {
             bounds.push(format!("{word} {bound}"));
         }
@@ -236,17 +259,29 @@ fn range(value: &Value) -> String {
 }
 
 fn sentence(value: &Value) -> String {
-    prose(value["description"].as_str().unwrap_or_default()).split_whitespace().collect::<Vec<_>>().join(" ")
+    prose(value["description"].as_str().unwrap_or_default())
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 /// A description up to its first example in Rust, without links into the Rust documentation.
 fn prose(text: &str) -> String {
     let end = ["```", "\n# "].iter().filter_map(|mark| text.find(mark)).min().unwrap_or(text.len());
-    let paragraphs = text[..end].trim_end().split("\n\n").filter(|paragraph| !paragraph.ends_with(':'));
-    paragraphs.collect::<Vec<_>>().join("\n\n").replace("[`", "`").replace("`]", "`").trim().to_owned()
+    let paragraphs =
+        text[..end].trim_end().split("\n\n").filter(|paragraph| !paragraph.ends_with(':'));
+    paragraphs
+        .collect::<Vec<_>>()
+        .join("\n\n")
+        .replace("[`", "`")
+        .replace("`]", "`")
+        .trim()
+        .to_owned()
 }
 
 fn capital(text: &str) -> String {
     let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().collect::<String>() + letters.as_str())
+    letters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().collect::<String>() + letters.as_str()
+    })
 }

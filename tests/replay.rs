@@ -33,14 +33,16 @@ fn watched(viewers: usize) -> Vec<u8> {
     let small = Small::new();
     small.write("pipelines.json", &pipelines(viewers > 0));
     small.write("orders.json", &json!([{"at": {"cycle": 5}, "order": pinch(0.8)}]));
-    let mut more = vec!["--pipelines", "@pipelines.json", "--orders", "@orders.json", "--steps", "40"];
+    let mut more =
+        vec!["--pipelines", "@pipelines.json", "--orders", "@orders.json", "--steps", "40"];
     if viewers == 0 {
         more.push("--headless");
     }
     let mut run = Run::flow(&small.arguments(&more));
     if viewers > 0 {
         let link = run.link();
-        let mut all: Vec<Viewer> = (0..viewers).map(|_| Viewer::connect(&link).expect("the run lets in")).collect();
+        let mut all: Vec<Viewer> =
+            (0..viewers).map(|_| Viewer::connect(&link).expect("the run lets in")).collect();
         all[0].wait_for("hello", |hello| hello["role"] == "driver");
         assert!(all[0].frame().starts_with(b"TMBL"));
         all[0].resume();
@@ -67,7 +69,8 @@ fn a_journal_plays_back_to_the_same_bits() {
     let mut driver = Viewer::connect(&run.link()).expect("the run lets in");
     driver.wait_for("hello", |hello| hello["role"] == "driver");
     driver.send(&json!({"id": "first", "order": pinch(0.8)}));
-    driver.wait_for("order", |order| order["status"] == "accepted" || order["status"] == "computing");
+    driver
+        .wait_for("order", |order| order["status"] == "accepted" || order["status"] == "computing");
     driver.resume();
     let (status, text) = run.finish(PATIENCE);
     assert!(status.success(), "{text}");
@@ -76,7 +79,8 @@ fn a_journal_plays_back_to_the_same_bits() {
 
     let again = Small::new();
     again.write("pipelines.json", &pipelines(false));
-    std::fs::copy(live.path("out/journal.jsonl"), again.path("orders.jsonl")).expect("the run wrote its journal");
+    std::fs::copy(live.path("out/journal.jsonl"), again.path("orders.jsonl"))
+        .expect("the run wrote its journal");
     let arguments = again.arguments(&[
         "--pipelines",
         "@pipelines.json",
@@ -89,6 +93,9 @@ fn a_journal_plays_back_to_the_same_bits() {
     let (status, text) = Run::flow(&arguments).finish(PATIENCE);
     assert!(status.success(), "{text}");
     let replayed = again.read("report.json");
-    assert_eq!(replayed["orders"][0]["cycle_applied"], report["orders"][0]["cycle_applied"], "{replayed}");
+    assert_eq!(
+        replayed["orders"][0]["cycle_applied"], report["orders"][0]["cycle_applied"],
+        "{replayed}"
+    );
     assert!(last(&again) == last(&live), "the journal gives another flow");
 }

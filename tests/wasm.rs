@@ -17,7 +17,10 @@ const AGREEMENT: f64 = 1e-12;
 /// A closed tube, bent into a ring, in three features along it: curved everywhere, with no symmetry that would hide a fault.
 fn ring() -> Mesh {
     let mesh = shapes::torus(1.0, 0.35, [48, 18]);
-    let points = mesh.points().iter().map(|[x, y, z]| [x * 1.3 + 0.1 * y * y, y - 0.05 * x * z, z * 0.8 + 0.1 * x]);
+    let points = mesh
+        .points()
+        .iter()
+        .map(|[x, y, z]| [x * 1.3 + 0.1 * y * y, y - 0.05 * x * z, z * 0.8 + 0.1 * x]);
     let points: Vec<Vector> = points.collect();
     let faces = mesh.cells().clone();
     let tags = (0..faces.len()).map(|face| (face * 8 / faces.len()) as i64).collect();
@@ -53,7 +56,8 @@ fn sheet() -> Mesh {
             [x, y, height(x, y)]
         })
     });
-    let names = vec![(0, "fixed".to_string()), (1, "middle".to_string()), (2, "handle".to_string())];
+    let names =
+        vec![(0, "fixed".to_string()), (1, "middle".to_string()), (2, "handle".to_string())];
     let features = FeatureSource::Faces(TaggedFaces { faces: cells.clone(), tags, names });
     Mesh::new(points.collect(), cells, features).expect("a mesh")
 }
@@ -71,8 +75,14 @@ fn stacks(handle: &str, fixed: &str) -> Vec<Value> {
         ("scale_direction", json!({"factors": [1.1, 0.6, 1.4]})),
         ("scale_direction", json!({"factors": [0.9, 1.2, 0.8], "center": [0.3, 0.1, -0.2]})),
         ("scale_normals", json!({"distance": 0.07})),
-        ("affine", json!({"matrix": [[1, 0.2, 0], [0, 1.1, 0.1], [-0.1, 0, 0.9]], "translation": [0, 0.1, 0]})),
-        ("translate", json!({"by": [0, 0.1, 0], "region": {"sphere": {"center": [1, 0, 0], "radius": 3.2}}})),
+        (
+            "affine",
+            json!({"matrix": [[1, 0.2, 0], [0, 1.1, 0.1], [-0.1, 0, 0.9]], "translation": [0, 0.1, 0]}),
+        ),
+        (
+            "translate",
+            json!({"by": [0, 0.1, 0], "region": {"sphere": {"center": [1, 0, 0], "radius": 3.2}}}),
+        ),
         ("translate", json!({"by": [0, 9, 0], "muted": true, "name": "not this one"})),
     ];
     let mut stacks = vec![json!([])];
@@ -106,7 +116,8 @@ fn the_module_computes_what_the_native_kernel_computes() {
         ("duct", duct(), "x-max", "x-min"),
     ];
     for (name, mesh, handle, fixed) in cases {
-        let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).expect("a surface"));
+        let surface =
+            Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).expect("a surface"));
         let stacks = stacks(handle, fixed);
         let [frame, input, output] =
             ["surface", "json", "bin"].map(|kind| directory.path().join(format!("{name}.{kind}")));
@@ -119,7 +130,8 @@ fn the_module_computes_what_the_native_kernel_computes() {
             .expect("node is installed (scripts/setup)");
         assert!(ran.status.success(), "{name}: {}", String::from_utf8_lossy(&ran.stderr));
         let bytes = fs::read(&output).expect("displacements");
-        let values: Vec<f64> = bytes.as_chunks().0.iter().map(|&value| f64::from_le_bytes(value)).collect();
+        let values: Vec<f64> =
+            bytes.as_chunks().0.iter().map(|&value| f64::from_le_bytes(value)).collect();
         let mut values = values.as_chunks::<3>().0.chunks_exact(surface.points().len());
 
         let mut editor = Editor::new(surface).expect("an editor");
@@ -128,10 +140,17 @@ fn the_module_computes_what_the_native_kernel_computes() {
             let edits: Vec<Edit> = serde_json::from_value(stack.clone()).expect("edits");
             let native = editor.displacement(&edits).expect("a displacement");
             let module = values.next().expect("a displacement of the module");
-            let largest = native.as_flattened().iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+            let largest = native
+                .as_flattened()
+                .iter()
+                .fold(0.0_f64, |largest, value| largest.max(value.abs()));
             let apart = native.as_flattened().iter().zip(module.as_flattened());
-            let apart = apart.fold(0.0_f64, |apart, (ours, theirs)| apart.max((ours - theirs).abs()));
-            assert!(apart <= AGREEMENT * largest, "{name}, {stack}: {apart:e} apart, of {largest:e}");
+            let apart =
+                apart.fold(0.0_f64, |apart, (ours, theirs)| apart.max((ours - theirs).abs()));
+            assert!(
+                apart <= AGREEMENT * largest,
+                "{name}, {stack}: {apart:e} apart, of {largest:e}"
+            );
             worst = worst.max(apart / largest.max(f64::MIN_POSITIVE));
         }
         assert!(values.next().is_none(), "{name}: more displacements than stacks");

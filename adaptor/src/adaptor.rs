@@ -32,7 +32,8 @@ use crate::{
     journal::Journal,
     report::{Durations, Report},
     settings::{
-        ExecuteError, FinalizeError, InitializeError, MeshMotion, Settings, Solvers, Steering, Step, SurfaceMotion,
+        ExecuteError, FinalizeError, InitializeError, MeshMotion, Settings, Solvers, Steering,
+        Step, SurfaceMotion,
     },
     stages::Pipelines,
     steering::{Defaults, Forecaster, Log, Moment, Parameters, Queue, Source, Steerer, Timed},
@@ -129,7 +130,11 @@ impl Adaptor {
         let own = own.unwrap_or_default();
         let mut first = own.clone();
         communicator.broadcast(0, &mut first);
-        let same = if own == first { Ok(()) } else { Err("its configuration or its orders are not those of rank 0") };
+        let same = if own == first {
+            Ok(())
+        } else {
+            Err("its configuration or its orders are not those of rank 0")
+        };
         comm::agree_on(&*communicator, same)?;
         Ok(adaptor)
     }
@@ -191,7 +196,9 @@ impl Adaptor {
     /// The link that a viewer opens, with its token; `None` without a server.
     #[must_use]
     pub fn link(&self) -> Option<String> {
-        self.server.as_ref().map(|server| format!("http://{}/?token={}", server.address(), server.token().as_str()))
+        self.server
+            .as_ref()
+            .map(|server| format!("http://{}/?token={}", server.address(), server.token().as_str()))
     }
 
     /// The address that viewers connect to; `None` without a server.
@@ -219,7 +226,11 @@ impl Adaptor {
     ///
     /// Lengths, associations and counts are compared in every call; the numbers of vertices and the coordinates are looked at
     /// when a mesh is lent first or replaced, and the coordinates once more where a pipeline is due or an order is planned.
-    pub fn execute(&mut self, step: &Step, channels: &[Channel<'_>]) -> Result<Steering<'_>, ExecuteError> {
+    pub fn execute(
+        &mut self,
+        step: &Step,
+        channels: &[Channel<'_>],
+    ) -> Result<Steering<'_>, ExecuteError> {
         let entered = Instant::now();
         let _alarm = comm::Alarm::among(&self.communicator);
         if let Some(left) = self.timing.left.take() {
@@ -232,7 +243,9 @@ impl Adaptor {
         }
         let fault = self.check(step, moment, channels).err();
         let moved = match self.meet(moment, fault)? {
-            Some(called) if !self.is_calm(moment, called) => self.act(step, moment, called, channels)?,
+            Some(called) if !self.is_calm(moment, called) => {
+                self.act(step, moment, called, channels)?
+            }
             _ => false,
         };
         let left = Instant::now();
@@ -271,7 +284,9 @@ impl Adaptor {
         let by_orders = match &self.mesh {
             SteeredMesh::Unknown => true,
             SteeredMesh::Unsteered | SteeredMesh::Refused(_) => false,
-            SteeredMesh::Steered(steerer, _) => is_called || steerer.looks_at_mesh() || self.timed.is_due(moment),
+            SteeredMesh::Steered(steerer, _) => {
+                is_called || steerer.looks_at_mesh() || self.timed.is_due(moment)
+            }
         };
         by_orders || self.pipelines.is_due(moment)
     }
@@ -336,30 +351,41 @@ impl Adaptor {
             cycles: self.timing.cycles,
             orders: self.log.reports(),
             step_seconds: self.timing.steps.spread(),
-            adaptor_seconds: parts.into_iter().map(|(name, durations)| (name, durations.spread())).collect(),
+            adaptor_seconds: parts
+                .into_iter()
+                .map(|(name, durations)| (name, durations.spread()))
+                .collect(),
             stream: self.hub.as_ref().map(|hub| hub.counts()).unwrap_or_default(),
         };
         match faults.first() {
             None => Ok(report),
-            Some(first) => {
-                Err(FinalizeError::Files { count: faults.len(), first: first.clone(), report: Box::new(report) })
-            }
+            Some(first) => Err(FinalizeError::Files {
+                count: faults.len(),
+                first: first.clone(),
+                report: Box::new(report),
+            }),
         }
     }
 
     /// Whether rank 0 was called to look at something; an error where any rank has one. `None` between two meetings of the ranks:
     /// then nothing is done, and a fault waits for the next, so that all ranks have it at the same call.
     #[inline]
-    fn meet(&mut self, moment: Moment, fault: Option<ExecuteError>) -> Result<Option<bool>, ExecuteError> {
+    fn meet(
+        &mut self,
+        moment: Moment,
+        fault: Option<ExecuteError>,
+    ) -> Result<Option<bool>, ExecuteError> {
         let called = self.queue.has_called();
         if self.communicator.size() == 1 {
             return fault.map_or(Ok(Some(called)), Err);
         }
-        let due = self.meetings.calls.is_multiple_of(u64::from(self.config.steering.poll_steps.get()));
+        let due =
+            self.meetings.calls.is_multiple_of(u64::from(self.config.steering.poll_steps.get()));
         self.meetings.calls += 1;
         let fault = self.meetings.fault.take().or(fault);
         // All ranks know alike of a motion under way; what only the step's own numbers could tell is left for the next meeting.
-        let under_way = self.paused || matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if !steerer.is_at_rest());
+        let under_way = self.paused
+            || matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if !steerer.is_at_rest());
         if !due && !under_way {
             self.meetings.fault = fault;
             return Ok(None);
@@ -375,7 +401,11 @@ impl Adaptor {
             SteeredMesh::Unsteered | SteeredMesh::Refused(_) => true,
             SteeredMesh::Steered(steerer, _) => steerer.is_at_rest(),
         };
-        at_rest && !self.paused && !called && !self.timed.is_due(moment) && !self.pipelines.is_due(moment)
+        at_rest
+            && !self.paused
+            && !called
+            && !self.timed.is_due(moment)
+            && !self.pipelines.is_due(moment)
     }
 
     /// Does what there is to do; says whether the mesh moves over the coming step.
@@ -436,9 +466,16 @@ impl Adaptor {
     }
 
     /// Copies the mesh as it is now as the reference of all shapes, if anybody could ask for one.
-    fn take_reference(&mut self, step: &Step, channels: &[Channel<'_>]) -> Result<(), ExecuteError> {
+    fn take_reference(
+        &mut self,
+        step: &Step,
+        channels: &[Channel<'_>],
+    ) -> Result<(), ExecuteError> {
         let cycle = step.cycle;
-        let channel = match comm::agree_on(&*self.communicator, Channel::find(channels, self.steered_channel())) {
+        let channel = match comm::agree_on(
+            &*self.communicator,
+            Channel::find(channels, self.steered_channel()),
+        ) {
             Ok(channel) => channel,
             // The configuration's mistake, not the solver's.
             Err(comm::RankError { message, .. }) => {
@@ -456,11 +493,17 @@ impl Adaptor {
         } else {
             comm::agree_on(&*self.communicator, checked)?;
         }
-        self.mesh = if self.config.stream.is_none() && self.timed.is_empty() && !self.pipelines.can_order() {
+        self.mesh = if self.config.stream.is_none()
+            && self.timed.is_empty()
+            && !self.pipelines.can_order()
+        {
             SteeredMesh::Unsteered
         } else {
             let taken = if self.communicator.size() > 1 {
-                let part = comm::agree_on(&*self.communicator, Part::of(&channel.mesh).map_err(of_channel))?;
+                let part = comm::agree_on(
+                    &*self.communicator,
+                    Part::of(&channel.mesh).map_err(of_channel),
+                )?;
                 self.tell_handedness(&part.cells);
                 self.take_over_part(&part)
             } else {
@@ -472,7 +515,9 @@ impl Adaptor {
                 Ok(steerer) => {
                     self.lent.take_reference(channel);
                     let surface = steerer.surface();
-                    if let Some(surface) = surface.as_ref().filter(|_| self.communicator.size() == 1) {
+                    if let Some(surface) =
+                        surface.as_ref().filter(|_| self.communicator.size() == 1)
+                    {
                         self.pipelines.share_surface(channels, channel.name, Arc::clone(surface));
                     }
                     SteeredMesh::Steered(Box::new(steerer), surface)
@@ -516,7 +561,8 @@ impl Adaptor {
 
     fn take_over(&self, mesh: Mesh) -> Result<Steerer, String> {
         let mesh = Arc::new(mesh);
-        let surface = Surface::extract(&mesh, &FeatureSettings::default()).map_err(|error| error.to_string())?;
+        let surface = Surface::extract(&mesh, &FeatureSettings::default())
+            .map_err(|error| error.to_string())?;
         let shaper = Shaper::new(mesh, Arc::new(surface)).map_err(|error| error.to_string())?;
         let steerer = Steerer::new(
             shaper,
@@ -524,7 +570,9 @@ impl Adaptor {
             Arc::clone(&self.log),
             Arc::clone(&self.queue),
             // Whoever drives can drag it at any time.
-            self.config.stream.is_some() || self.timed.drags_skeleton() || self.pipelines.drags_skeleton(),
+            self.config.stream.is_some()
+                || self.timed.drags_skeleton()
+                || self.pipelines.drags_skeleton(),
         );
         steerer.map_err(|error| format!("a thread could not be started: {error}"))
     }
@@ -535,14 +583,22 @@ impl Adaptor {
             Some(solvers) => solvers(ranks, &part.points),
             None => Arc::new(ranks),
         };
-        let shaper = Shaper::of_part(Arc::clone(&self.communicator), part, &FeatureSettings::default(), partition)
-            .map_err(|error| error.to_string())?;
+        let shaper = Shaper::of_part(
+            Arc::clone(&self.communicator),
+            part,
+            &FeatureSettings::default(),
+            partition,
+        )
+        .map_err(|error| error.to_string())?;
         Ok(Steerer::of_part(shaper, self.defaults.clone(), Arc::clone(&self.log)))
     }
 }
 
 /// Reads what was built by hand as if it had stood in a file, so that the same rules hold.
-fn checked<T: Serialize + DeserializeOwned + Validate>(value: &T, name: &str) -> Result<T, InitializeError> {
+fn checked<T: Serialize + DeserializeOwned + Validate>(
+    value: &T,
+    name: &str,
+) -> Result<T, InitializeError> {
     let text = serde_json::to_string(value).map_err(InitializeError::Unwritable)?;
     Ok(language::parse_valid(&text, name)?)
 }
@@ -550,7 +606,11 @@ fn checked<T: Serialize + DeserializeOwned + Validate>(value: &T, name: &str) ->
 /// The settings of orders that bring none: those of the pipeline that waits for orders, else the kernel's.
 fn defaults(config: &Config) -> Defaults {
     let mut defaults = Defaults::default();
-    let stages = config.pipelines.iter().filter(|pipeline| pipeline.due == Due::OnOrder).flat_map(|it| &it.stages);
+    let stages = config
+        .pipelines
+        .iter()
+        .filter(|pipeline| pipeline.due == Due::OnOrder)
+        .flat_map(|it| &it.stages);
     for stage in stages {
         match stage {
             Stage::Deform(deform) => defaults.deform.clone_from(deform),

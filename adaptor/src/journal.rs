@@ -34,9 +34,11 @@ impl Journal {
     /// Starts a journal, and the directory for it where there is none; one of the same name is replaced.
     pub(crate) fn create(path: &Path) -> Result<Self, JournalError> {
         let directory = path.parent().unwrap_or(Path::new(""));
-        let made = if directory == Path::new("") { Ok(()) } else { std::fs::create_dir_all(directory) };
-        let file =
-            made.and_then(|()| File::create(path)).map_err(|source| JournalError { path: path.into(), source })?;
+        let made =
+            if directory == Path::new("") { Ok(()) } else { std::fs::create_dir_all(directory) };
+        let file = made
+            .and_then(|()| File::create(path))
+            .map_err(|source| JournalError { path: path.into(), source })?;
         Ok(Self { file: Mutex::new(Some((path.into(), file))) })
     }
 

@@ -49,7 +49,8 @@ pub use adaptor::Adaptor;
 pub use journal::JournalError;
 pub use report::{ORDERS_KEPT, OrderReport, OrderStatus, Report, Spread};
 pub use settings::{
-    ExecuteError, FinalizeError, InitializeError, MeshMotion, Settings, Solvers, Steering, Step, SurfaceMotion,
+    ExecuteError, FinalizeError, InitializeError, MeshMotion, Settings, Solvers, Steering, Step,
+    SurfaceMotion,
 };
 pub use steering::{NotFollowed, Parameter, ParameterError};
 pub use tombolo_deform as deform;

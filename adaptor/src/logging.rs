@@ -86,7 +86,8 @@ pub fn send_to(level: LevelFilter, sink: Option<Sink>) -> Result<(), LoggingErro
     if !std::ptr::addr_eq(log::logger(), &raw const LOGGER) {
         return Err(LoggingError::OtherLogger);
     }
-    let before = std::mem::replace(&mut *LOGGER.sink.lock().unwrap_or_else(PoisonError::into_inner), sink);
+    let before =
+        std::mem::replace(&mut *LOGGER.sink.lock().unwrap_or_else(PoisonError::into_inner), sink);
     log::set_max_level(level);
     drop(before);
     Ok(())

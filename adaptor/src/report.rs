@@ -112,8 +112,13 @@ impl Default for Durations {
 impl Durations {
     pub(crate) fn add(&mut self, duration: Duration) {
         let seconds = duration.as_secs_f64();
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the classes")]
-        let class = ((seconds * 1e9).max(1.0).log2() * PER_OCTAVE).clamp(0.0, (CLASSES - 1) as f64) as usize;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "clamped to the classes"
+        )]
+        let class = ((seconds * 1e9).max(1.0).log2() * PER_OCTAVE).clamp(0.0, (CLASSES - 1) as f64)
+            as usize;
         self.classes[class] += 1;
         self.count += 1;
         self.total += seconds;
@@ -121,7 +126,11 @@ impl Durations {
 
     /// The middle of the class that holds this fraction of the durations.
     fn quantile(&self, fraction: f64) -> f64 {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most the count")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "at most the count"
+        )]
         #[expect(clippy::cast_precision_loss, reason = "fewer steps than 2^53")]
         let rank = ((self.count as f64 * fraction).ceil() as u64).max(1);
         let mut below = 0;
@@ -140,7 +149,12 @@ impl Durations {
     }
 
     pub(crate) fn spread(&self) -> Spread {
-        Spread { count: self.count, median: self.quantile(0.5), p95: self.quantile(0.95), total: self.total }
+        Spread {
+            count: self.count,
+            median: self.quantile(0.5),
+            p95: self.quantile(0.95),
+            total: self.total,
+        }
     }
 }
 

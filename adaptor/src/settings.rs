@@ -43,8 +43,13 @@ pub struct Settings {
 impl Default for Settings {
     /// One process, nothing to watch, nothing to steer, files in the current directory.
     fn default() -> Self {
-        let config =
-            Config { version: 1, stream: None, journal: None, steering: Default::default(), pipelines: Vec::new() };
+        let config = Config {
+            version: 1,
+            stream: None,
+            journal: None,
+            steering: Default::default(),
+            pipelines: Vec::new(),
+        };
         Self {
             config,
             communicator: Arc::new(Solo),
@@ -197,7 +202,9 @@ pub enum ExecuteError {
     #[error(transparent)]
     Rank(#[from] RankError),
     /// The ranks have come to different cycles.
-    #[error("the ranks call execute for cycles from {lowest} to {highest}; expected the same cycle on all of them")]
+    #[error(
+        "the ranks call execute for cycles from {lowest} to {highest}; expected the same cycle on all of them"
+    )]
     Cycles {
         /// The lowest.
         lowest: u64,

@@ -85,7 +85,12 @@ impl Pipelines {
     }
 
     /// Lets the views use a surface of a channel that is known already.
-    pub(crate) fn share_surface(&mut self, channels: &[Channel<'_>], channel: &str, surface: Arc<Surface>) {
+    pub(crate) fn share_surface(
+        &mut self,
+        channels: &[Channel<'_>],
+        channel: &str,
+        surface: Arc<Surface>,
+    ) {
         // Where it does not fit, the pipelines work out their own and say what is wrong.
         let _ = self.runner.set_surface(channels, Some(channel), surface);
     }
@@ -106,7 +111,12 @@ impl Pipelines {
     }
 
     /// Runs what is due.
-    pub(crate) fn run(&mut self, moment: Moment, channels: &[Channel<'_>], hub: Option<&Arc<Hub>>) -> Asked {
+    pub(crate) fn run(
+        &mut self,
+        moment: Moment,
+        channels: &[Channel<'_>],
+        hub: Option<&Arc<Hub>>,
+    ) -> Asked {
         let Moment { cycle, time } = moment;
         let mut asked = Asked::default();
         for output in self.runner.run(&Snapshot { cycle, time, channels }) {
@@ -124,8 +134,12 @@ impl Pipelines {
                         hub.monitor(&monitor(&values));
                     }
                 }
-                Output::Pause { pipeline, .. } => asked.commands.push((pipeline.to_string(), Command::Pause {})),
-                Output::Stop { pipeline, .. } => asked.commands.push((pipeline.to_string(), Command::Stop {})),
+                Output::Pause { pipeline, .. } => {
+                    asked.commands.push((pipeline.to_string(), Command::Pause {}))
+                }
+                Output::Stop { pipeline, .. } => {
+                    asked.commands.push((pipeline.to_string(), Command::Stop {}))
+                }
                 Output::Order { pipeline, order } => {
                     asked.commands.push((pipeline.to_string(), Command::Order(order)));
                 }
@@ -141,7 +155,9 @@ impl Pipelines {
 
     /// Hands a frame to the encoder's thread.
     fn send(&self, frame: Frame, hub: &Hub) {
-        let Some(view) = self.views.iter().position(|(name, _)| **name == *frame.pipeline) else { return };
+        let Some(view) = self.views.iter().position(|(name, _)| **name == *frame.pipeline) else {
+            return;
+        };
         let encoder = Arc::clone(&self.views[view].1);
         let encode = move || {
             let mut encoder = encoder.lock().unwrap_or_else(PoisonError::into_inner);
@@ -164,6 +180,7 @@ impl Pipelines {
 
 /// The message about the values of monitors; what could not be measured is null.
 fn monitor(values: &MonitorValues) -> Value {
-    let by_name: Map<String, Value> = values.values.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
+    let by_name: Map<String, Value> =
+        values.values.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
     json!({"monitor": {"pipeline": &*values.pipeline, "cycle": values.cycle, "values": by_name}})
 }

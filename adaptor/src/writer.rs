@@ -37,21 +37,35 @@ pub(crate) struct Writer {
 }
 
 impl Writer {
-    pub(crate) fn write(&mut self, pipeline: &Arc<str>, path: PathBuf, time: f64, extract: Arc<Extract>) {
+    pub(crate) fn write(
+        &mut self,
+        pipeline: &Arc<str>,
+        path: PathBuf,
+        time: f64,
+        extract: Arc<Extract>,
+    ) {
         let job = Job { pipeline: Arc::clone(pipeline), path, time, extract };
         if self.jobs.is_none() {
             let (jobs, next) = sync_channel(WAITING);
             let faults = Arc::clone(&self.faults);
-            let spawned = std::thread::Builder::new().name("tombolo-write".into()).spawn(move || work(&next, &faults));
+            let spawned = std::thread::Builder::new()
+                .name("tombolo-write".into())
+                .spawn(move || work(&next, &faults));
             match spawned {
                 Ok(thread) => (self.jobs, self.thread) = (Some(jobs), Some(thread)),
                 Err(error) => {
-                    return note(&self.faults, format!("{}: no thread to write it: {error}", job.path.display()));
+                    return note(
+                        &self.faults,
+                        format!("{}: no thread to write it: {error}", job.path.display()),
+                    );
                 }
             }
         }
         if let Some(Err(lost)) = self.jobs.as_ref().map(|jobs| jobs.send(job)) {
-            note(&self.faults, format!("{}: the thread that writes has ended", lost.0.path.display()));
+            note(
+                &self.faults,
+                format!("{}: the thread that writes has ended", lost.0.path.display()),
+            );
         }
     }
 
@@ -97,7 +111,8 @@ fn work(jobs: &Receiver<Job>, faults: &Mutex<Vec<String>>) {
 
 fn write(job: &Job, written: &mut HashMap<Arc<str>, Written>) -> Result<(), String> {
     if let Some(directory) = job.path.parent() {
-        std::fs::create_dir_all(directory).map_err(|error| format!("{}: {error}", directory.display()))?;
+        std::fs::create_dir_all(directory)
+            .map_err(|error| format!("{}: {error}", directory.display()))?;
     }
     files::write(&job.path, &job.extract).map_err(|error| error.to_string())?;
     let told = |error: files::FileError| error.to_string();
@@ -108,7 +123,8 @@ fn write(job: &Job, written: &mut HashMap<Arc<str>, Written>) -> Result<(), Stri
         Some(Written::One(path, _)) if *path == job.path => {}
         Some(Written::One(path, time)) => {
             let directory = path.parent().unwrap_or(Path::new("."));
-            let mut series = Series::create(&directory.join(format!("{}.pvd", job.pipeline))).map_err(told)?;
+            let mut series =
+                Series::create(&directory.join(format!("{}.pvd", job.pipeline))).map_err(told)?;
             series.push(*time, path).map_err(told)?;
             series.push(job.time, &job.path).map_err(told)?;
             written.insert(Arc::clone(&job.pipeline), Written::Many(series));

@@ -45,7 +45,8 @@ impl Lent {
     /// A box, on each rank that at another place.
     fn new(rank: usize) -> Self {
         let mesh = box_of_tets([3, 3, 3], [rank as f64, 0.0, 0.0], [rank as f64 + 1.0, 1.0, 1.0]);
-        let connectivity: Vec<i32> = mesh.cells().connectivity().iter().map(|&vertex| vertex as i32).collect();
+        let connectivity: Vec<i32> =
+            mesh.cells().connectivity().iter().map(|&vertex| vertex as i32).collect();
         let (vertices, cells) = (mesh.points().len(), mesh.cells().len());
         Self {
             points: mesh.points().as_flattened().to_vec(),
@@ -58,7 +59,9 @@ impl Lent {
             numbers: mesh
                 .points()
                 .iter()
-                .map(|point| point.iter().fold(0, |number, x| 100 * number + (x * 3.0).round() as i64))
+                .map(|point| {
+                    point.iter().fold(0, |number, x| 100 * number + (x * 3.0).round() as i64)
+                })
                 .collect(),
             cell_numbers: (0..cells as i64).map(|cell| cell + (rank * cells) as i64).collect(),
             features: mesh.features().clone(),
@@ -88,7 +91,8 @@ impl Lent {
             offsets: Indices::I32(&self.offsets),
             connectivity: Indices::I32(&self.connectivity),
         };
-        let points = ArrayView::interleaved(Values::F64(&self.points), self.components).expect("whole tuples");
+        let points = ArrayView::interleaved(Values::F64(&self.points), self.components)
+            .expect("whole tuples");
         let mesh = MeshView {
             generation: self.generation,
             ghost_cells: Some(&self.ghosts),
@@ -127,9 +131,21 @@ const MISTAKES: &[Mistake] = {
         Mistake { make, says, cost }
     }
     &[
-        of(Lengths, |lent| lent.temperature.truncate(63), &["'solid'", "'temperature'", "63", "64", "each vertex"]),
-        of(Lengths, |lent| lent.temperature.push(1.0), &["'temperature'", "65", "64", "each vertex"]),
-        of(Lengths, |lent| lent.stress.truncate(6 * 161), &["'stress'", "161", "162", "each element"]),
+        of(
+            Lengths,
+            |lent| lent.temperature.truncate(63),
+            &["'solid'", "'temperature'", "63", "64", "each vertex"],
+        ),
+        of(
+            Lengths,
+            |lent| lent.temperature.push(1.0),
+            &["'temperature'", "65", "64", "each vertex"],
+        ),
+        of(
+            Lengths,
+            |lent| lent.stress.truncate(6 * 161),
+            &["'stress'", "161", "162", "each element"],
+        ),
         of(
             Lengths,
             |lent| lent.temperature_on = Association::Element,
@@ -141,9 +157,17 @@ const MISTAKES: &[Mistake] = {
         of(Lengths, |lent| lent.offsets.truncate(162), &["'offsets'", "162", "163"]),
         of(Lengths, |lent| lent.connectivity.truncate(600), &["648", "600"]),
         of(Lengths, |lent| lent.components = 4, &["4 components", "1 to 3"]),
-        of(Lengths, |lent| lent.features = FeatureSource::Vertices(vec![1; 63]), &["63", "64", "vertices"]),
+        of(
+            Lengths,
+            |lent| lent.features = FeatureSource::Vertices(vec![1; 63]),
+            &["63", "64", "vertices"],
+        ),
         of(Lengths, |lent| lent.second_name = "solid", &["'solid'", "twice"]),
-        of(Replaced, |lent| lent.connectivity[9] = 64, &["'solid'", "cell 2", "vertex 64", "64 vertices"]),
+        of(
+            Replaced,
+            |lent| lent.connectivity[9] = 64,
+            &["'solid'", "cell 2", "vertex 64", "64 vertices"],
+        ),
         of(Replaced, |lent| lent.connectivity[9] = -1, &["cell 2"]),
         of(Replaced, |lent| lent.types[5] = 99, &["cell 5", "99"]),
         of(Replaced, |lent| lent.types[5] = 12, &["cell 5", "4 vertices", "8"]),
@@ -192,7 +216,13 @@ fn settings(is_watched: bool) -> Settings {
 }
 
 /// Runs with a mistake at one place, mended at once; what is said of it.
-fn run(settings: Settings, rank: usize, mistaken: bool, mistake: &Mistake, place: (Place, u64)) -> Result<(), String> {
+fn run(
+    settings: Settings,
+    rank: usize,
+    mistaken: bool,
+    mistake: &Mistake,
+    place: (Place, u64),
+) -> Result<(), String> {
     let mut adaptor = Adaptor::initialize(settings).expect("initialize");
     let mut lent = Lent::new(rank);
     let reference = lent.points.clone();
@@ -211,7 +241,9 @@ fn run(settings: Settings, rank: usize, mistaken: bool, mistake: &Mistake, place
                 }
             }
             outcome = wrong.with(|channels| match adaptor.execute(&step, channels) {
-                Err(error @ (ExecuteError::Channel { .. } | ExecuteError::Rank(_))) => Err(error.to_string()),
+                Err(error @ (ExecuteError::Channel { .. } | ExecuteError::Rank(_))) => {
+                    Err(error.to_string())
+                }
                 Err(error) => panic!("{error}"),
                 Ok(_) => Ok(()),
             });
@@ -222,7 +254,10 @@ fn run(settings: Settings, rank: usize, mistaken: bool, mistake: &Mistake, place
         lent.points = lent.with(|channels| {
             let steering = adaptor.execute(&step, channels).expect("mended");
             motions += u32::from(steering.motion.is_some());
-            steering.motion.map_or_else(|| lent.points.clone(), |motion| motion.coordinates.as_flattened().to_vec())
+            steering.motion.map_or_else(
+                || lent.points.clone(),
+                |motion| motion.coordinates.as_flattened().to_vec(),
+            )
         });
     }
     assert!(lent.points != reference);
@@ -250,7 +285,11 @@ fn each_mistake_is_told_wherever_it_is_made() {
                 Err(said) => {
                     assert!(is_found, "{said} at {place:?}");
                     assert!(said.starts_with(&format!("cycle {}: ", place.1)), "{said}");
-                    assert!(mistake.says.iter().all(|part| said.contains(part)), "{said}: {:?}", mistake.says);
+                    assert!(
+                        mistake.says.iter().all(|part| said.contains(part)),
+                        "{said}: {:?}",
+                        mistake.says
+                    );
                 }
             }
         }
@@ -265,7 +304,8 @@ fn a_run_that_nobody_watches_is_held_to_the_same() {
         let mut adaptor = Adaptor::initialize(Settings::default()).expect("initialize");
         (mistake.make)(&mut lent);
         let step = Step { cycle: 0, time: 0.0, time_step: 0.1 };
-        let said = lent.with(|channels| adaptor.execute(&step, channels).map(|_| ()).unwrap_err().to_string());
+        let said = lent
+            .with(|channels| adaptor.execute(&step, channels).map(|_| ()).unwrap_err().to_string());
         assert!(mistake.says.iter().all(|part| said.contains(part)), "{said}: {:?}", mistake.says);
         lent = Lent::new(0);
         lent.with(|channels| adaptor.execute(&step, channels).map(|_| ()).expect("mended"));
@@ -276,9 +316,13 @@ fn a_run_that_nobody_watches_is_held_to_the_same() {
 fn a_mistake_on_one_rank_is_the_same_error_on_all() {
     for poll_steps in [1, 4] {
         for mistake in MISTAKES {
-            for place in PLACES.into_iter().filter(|place| place.0 != Place::Idle || mistake.cost == Cost::Lengths) {
+            for place in PLACES
+                .into_iter()
+                .filter(|place| place.0 != Place::Idle || mistake.cost == Cost::Lengths)
+            {
                 // Between two meetings an error waits for the next.
-                if (mistake.cost == Cost::Replaced && !matches!(place.0, Place::First | Place::Replaced))
+                if (mistake.cost == Cost::Replaced
+                    && !matches!(place.0, Place::First | Place::Replaced))
                     || (poll_steps > 1 && !matches!(place.0, Place::First | Place::Moving))
                 {
                     continue;
@@ -286,13 +330,18 @@ fn a_mistake_on_one_rank_is_the_same_error_on_all() {
                 let said = threads::run(3, |ranks| {
                     let rank = ranks.rank();
                     let mut settings = Settings { communicator: Arc::new(ranks), ..settings(true) };
-                    settings.config.steering.poll_steps = NonZeroU32::new(poll_steps).expect("above 0");
+                    settings.config.steering.poll_steps =
+                        NonZeroU32::new(poll_steps).expect("above 0");
                     run(settings, rank, rank == 1, mistake, place)
                 });
                 let text = said[0].clone().expect_err("an error");
                 assert!(said.iter().all(|other| other.as_ref() == Err(&text)), "{said:?}");
                 assert!(text.starts_with("rank 1: "), "{text}");
-                assert!(mistake.says.iter().all(|part| text.contains(part)), "{text}: {:?}", mistake.says);
+                assert!(
+                    mistake.says.iter().all(|part| text.contains(part)),
+                    "{text}: {:?}",
+                    mistake.says
+                );
             }
         }
     }
@@ -312,7 +361,9 @@ fn other_cells_are_not_taken_for_those_of_the_reference() {
     assert!(matches!(said, ExecuteError::OtherCells { found: 162, expected: 162, .. }), "{said}");
     lent.connectivity = good;
     lent.generation = 2;
-    lent.with(|channels| adaptor.execute(&step(1), channels).map(|_| ()).expect("the same cells, elsewhere"));
+    lent.with(|channels| {
+        adaptor.execute(&step(1), channels).map(|_| ()).expect("the same cells, elsewhere")
+    });
 }
 
 #[test]
@@ -321,7 +372,8 @@ fn values_that_are_not_finite_are_the_runs_state_and_no_mistake() {
         {"name": "watch", "every": {"steps": 1}, "stages": [{"statistics": {"field": "temperature"}}],
          "when": "temperature.non_finite > 0", "then": [{"stop": {}}]}]}"#;
     let config: Config = config(pipelines);
-    let mut adaptor = Adaptor::initialize(Settings { config, ..Settings::default() }).expect("initialize");
+    let mut adaptor =
+        Adaptor::initialize(Settings { config, ..Settings::default() }).expect("initialize");
     let mut lent = Lent::new(0);
     lent.temperature[3] = NAN;
     let step = Step { cycle: 0, time: 0.0, time_step: 0.1 };

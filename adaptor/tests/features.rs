@@ -10,9 +10,15 @@ use tombolo::pipelines::extract::Channel;
 use tombolo::{Adaptor, Settings, Step};
 
 /// What the call says on a rank whose box, one beside the other, has these faces with features besides its own.
-fn call(settings: Settings, rank: usize, change: impl Fn(&mut TaggedFaces, &Cells)) -> Result<(), String> {
+fn call(
+    settings: Settings,
+    rank: usize,
+    change: impl Fn(&mut TaggedFaces, &Cells),
+) -> Result<(), String> {
     let mesh = box_of_tets([2, 2, 2], [rank as f64, 0.0, 0.0], [rank as f64 + 1.0, 1.0, 1.0]);
-    let FeatureSource::Faces(mut tagged) = mesh.features().clone() else { panic!("the sides of a box") };
+    let FeatureSource::Faces(mut tagged) = mesh.features().clone() else {
+        panic!("the sides of a box")
+    };
     change(&mut tagged, mesh.cells());
     let features = FeatureSource::Faces(tagged);
     let mesh = MeshView::from(&mesh).with_features(&features);
@@ -82,7 +88,11 @@ fn a_name_whose_faces_are_on_another_rank_is_none_of_it() {
         call(settings, rank, |tagged, _| {
             tagged.names.push((9, "lid".into()));
             if rank == 2 {
-                tagged.tags.iter_mut().filter(|number| **number == 6).for_each(|number| *number = 9);
+                tagged
+                    .tags
+                    .iter_mut()
+                    .filter(|number| **number == 6)
+                    .for_each(|number| *number = 9);
             }
         })
     });
@@ -97,9 +107,15 @@ fn faces_inside_the_mesh_are_told_once() {
     logging::send_to(LevelFilter::Warn, Some(Box::new(sink))).expect("no other logger");
     let inner = |tagged: &mut TaggedFaces, cells: &Cells| {
         let shared = |other: usize| -> Vec<u32> {
-            cells.vertices(0).iter().copied().filter(|it| cells.vertices(other).contains(it)).collect()
+            cells
+                .vertices(0)
+                .iter()
+                .copied()
+                .filter(|it| cells.vertices(other).contains(it))
+                .collect()
         };
-        let shared = (1..cells.len()).map(shared).find(|shared| shared.len() == 3).expect("a neighbour");
+        let shared =
+            (1..cells.len()).map(shared).find(|shared| shared.len() == 3).expect("a neighbour");
         add(tagged, &shared, 5);
     };
     assert_eq!(on_ranks(inner), [Ok(()), Ok(())]);

@@ -67,7 +67,10 @@ fn starts_where_it_was_lent(motion: &MeshMotion<'_>, lent: &[Vector], time_step:
     for (vertex, point) in lent.iter().enumerate() {
         for (axis, from) in point.iter().enumerate() {
             assert_eq!(motion.displacement[vertex][axis], motion.coordinates[vertex][axis] - from);
-            assert_eq!(motion.velocity[vertex][axis], motion.displacement[vertex][axis] / time_step);
+            assert_eq!(
+                motion.velocity[vertex][axis],
+                motion.displacement[vertex][axis] / time_step
+            );
         }
     }
     let surface = &motion.surface;
@@ -90,7 +93,9 @@ fn a_solver_that_ignores_its_motion_is_found_out() {
     let orders = json!([at(2, &squeeze(0.4), 4), at(10, &json!({"undo": 1}), 2)]);
     let mut asked = Vec::new();
     let (_, orders) = run(settings(&orders, "elasticity"), &mut |_, cycle, motion| {
-        asked.extend(motion.map(|motion| (cycle, largest(motion.displacement, &vec![[0.0; 3]; 125]))));
+        asked.extend(
+            motion.map(|motion| (cycle, largest(motion.displacement, &vec![[0.0; 3]; 125]))),
+        );
     });
     let not = orders[0].not_followed.expect("not followed");
     assert_eq!((orders[0].status, not.cycle, not.shape), (OrderStatus::Applied, 2, 1));
@@ -129,8 +134,12 @@ fn follow(points: &mut Vec<Vector>, _: u64, motion: Option<&MeshMotion<'_>>) {
 fn a_solver_that_follows_gets_the_shapes_bit_for_bit() {
     let orders = json!([at(2, &squeeze(0.4), 4), at(10, &json!({"undo": 1}), 3)]);
     let (before, orders) = run(settings(&orders, "elasticity"), &mut follow);
-    assert!(orders.iter().all(|order| order.not_followed.is_none() && order.deviation.is_none()), "{orders:?}");
-    let bits = |points: &[Vector]| points.iter().map(|point| point.map(f64::to_bits)).collect::<Vec<_>>();
+    assert!(
+        orders.iter().all(|order| order.not_followed.is_none() && order.deviation.is_none()),
+        "{orders:?}"
+    );
+    let bits =
+        |points: &[Vector]| points.iter().map(|point| point.map(f64::to_bits)).collect::<Vec<_>>();
     assert_eq!(bits(&before[15]), bits(&before[0]));
     // Adding the displacement, or a velocity, rounds: that is following too, and what is rounded does not add up.
     for by_velocity in [false, true] {
@@ -150,7 +159,10 @@ fn a_solver_that_follows_gets_the_shapes_bit_for_bit() {
                 }
             }
         });
-        assert!(orders.iter().all(|order| order.not_followed.is_none() && order.deviation.is_none()), "{orders:?}");
+        assert!(
+            orders.iter().all(|order| order.not_followed.is_none() && order.deviation.is_none()),
+            "{orders:?}"
+        );
         assert_eq!(bits(&handed), bits(&before[0]));
     }
 }
@@ -168,11 +180,15 @@ fn single_precision_is_rounding_and_no_motion() {
         let channels = [Channel { name: "fluid", mesh: view, fields: &[] }];
         let step = Step { cycle, time: 0.1 * cycle as f64, time_step: 0.1 };
         let motion = adaptor.execute(&step, &channels).expect("execute").motion;
-        let moved = motion.map(|motion| motion.coordinates.as_flattened().iter().map(|x| *x as f32).collect());
+        let moved = motion
+            .map(|motion| motion.coordinates.as_flattened().iter().map(|x| *x as f32).collect());
         points = moved.unwrap_or(points);
     }
     let orders = adaptor.finalize().expect("finalize").orders;
-    assert!(orders.iter().all(|order| order.not_followed.is_none() && order.deviation.is_none()), "{orders:?}");
+    assert!(
+        orders.iter().all(|order| order.not_followed.is_none() && order.deviation.is_none()),
+        "{orders:?}"
+    );
     assert_eq!(points, reference);
 }
 
@@ -220,11 +236,16 @@ fn the_guard_judges_the_mesh_that_will_be_there() {
     let (before, reports) = run(settings(&orders, "elasticity"), &mut |points, cycle, motion| {
         follow(points, cycle, motion);
         if cycle < 5 {
-            points.iter_mut().for_each(|point| point[2] -= 0.12 * point[2] / (1.0 - 0.12 * cycle as f64));
+            points
+                .iter_mut()
+                .for_each(|point| point[2] -= 0.12 * point[2] / (1.0 - 0.12 * cycle as f64));
         }
     });
     assert_eq!(reports[0].status, OrderStatus::Rejected, "{reports:?}");
-    assert!(reports[0].reason.as_ref().is_some_and(|reason| reason.contains("own motion")), "{reports:?}");
+    assert!(
+        reports[0].reason.as_ref().is_some_and(|reason| reason.contains("own motion")),
+        "{reports:?}"
+    );
     assert_eq!(reports[1].status, OrderStatus::Applied, "{reports:?}");
     let cells = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]).cells().clone();
     assert!(before.iter().all(|points| quality(&cells, points).inverted == 0));
@@ -236,9 +257,11 @@ fn elastic(points: &mut [Vector], reference: &[Vector], boundary: &[u32], surfac
     for (&vertex, &place) in boundary.iter().zip(surface) {
         points[vertex as usize] = place;
     }
-    let top = boundary.iter().zip(surface).filter(|(vertex, _)| reference[**vertex as usize][2] == 1.0);
+    let top =
+        boundary.iter().zip(surface).filter(|(vertex, _)| reference[**vertex as usize][2] == 1.0);
     let height = top.map(|(_, place)| place[2]).fold(f64::NEG_INFINITY, f64::max);
-    let is_boundary = |vertex: usize| boundary.iter().any(|&of_boundary| of_boundary as usize == vertex);
+    let is_boundary =
+        |vertex: usize| boundary.iter().any(|&of_boundary| of_boundary as usize == vertex);
     for (vertex, point) in points.iter_mut().enumerate() {
         if !is_boundary(vertex) && height.is_finite() {
             point[2] = reference[vertex][2] * height;
@@ -249,7 +272,8 @@ fn elastic(points: &mut [Vector], reference: &[Vector], boundary: &[u32], surfac
 #[test]
 fn the_surface_moves_and_the_volume_is_the_solvers() {
     let reference = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]).points().to_vec();
-    let orders = json!([at(2, &squeeze(0.4), 4), at(8, &squeeze(3.0), 1), at(10, &json!({"undo": 1}), 3)]);
+    let orders =
+        json!([at(2, &squeeze(0.4), 4), at(8, &squeeze(3.0), 1), at(10, &json!({"undo": 1}), 3)]);
     let mut inside = 0.0_f64;
     let (before, reports) = run(settings(&orders, "surface"), &mut |points, _, motion| {
         let Some(motion) = motion else { return };
@@ -264,11 +288,22 @@ fn the_surface_moves_and_the_volume_is_the_solvers() {
     assert_eq!(inside, 0.0, "what is inside is handed back as it was lent");
     let order = &reports[0];
     assert_eq!(order.status, OrderStatus::Applied, "{order:?}");
-    assert_eq!((order.min_scaled_jacobian, order.seconds.volume, order.not_followed), (None, 0.0, None));
+    assert_eq!(
+        (order.min_scaled_jacobian, order.seconds.volume, order.not_followed),
+        (None, 0.0, None)
+    );
     assert_eq!(serde_json::to_value(order).unwrap()["judged"], "surface");
-    assert_eq!((reports[1].status, reports[2].status), (OrderStatus::Rejected, OrderStatus::Applied), "{reports:?}");
-    let bottom_and_top = |z: f64| before[7].iter().zip(&reference).filter(move |(_, at)| at[2] == z);
-    assert!(bottom_and_top(1.0).all(|(point, _)| point[2] == 1.0 + -0.4), "the top is where it was asked to be");
+    assert_eq!(
+        (reports[1].status, reports[2].status),
+        (OrderStatus::Rejected, OrderStatus::Applied),
+        "{reports:?}"
+    );
+    let bottom_and_top =
+        |z: f64| before[7].iter().zip(&reference).filter(move |(_, at)| at[2] == z);
+    assert!(
+        bottom_and_top(1.0).all(|(point, _)| point[2] == 1.0 + -0.4),
+        "the top is where it was asked to be"
+    );
     assert!(bottom_and_top(0.0).all(|(point, at)| point == at));
     for (point, at) in before[15].iter().zip(&reference) {
         let is_inside = at.iter().all(|x| *x > 0.0 && *x < 1.0);
@@ -313,7 +348,10 @@ fn three_ranks_find_out_what_one_does() {
                         assert_eq!(*at, cycle);
                         motions += 1;
                         for (point, &number) in motion.coordinates.iter().zip(&numbers) {
-                            assert!(largest(&[*point], &[whole[number as usize]]) < 1e-6, "{method}, cycle {cycle}");
+                            assert!(
+                                largest(&[*point], &[whole[number as usize]]) < 1e-6,
+                                "{method}, cycle {cycle}"
+                            );
                         }
                     }
                     motion.map(|motion| motion.coordinates.to_vec())
@@ -327,8 +365,8 @@ fn three_ranks_find_out_what_one_does() {
         });
         for (order, expected) in all[0].iter().zip(&expected.1) {
             assert_eq!((order.status, order.judged), (expected.status, expected.judged));
-            let [not, expected] =
-                [order.not_followed, expected.not_followed].map(|not| not.map(|it| (it.cycle, it.shape)));
+            let [not, expected] = [order.not_followed, expected.not_followed]
+                .map(|not| not.map(|it| (it.cycle, it.shape)));
             assert_eq!(not, expected);
             assert_eq!(not.is_some(), !does_follow && order.shapes == 4, "{method}");
         }

@@ -56,7 +56,8 @@ fn on(ranks: usize) -> Command {
 /// Runs it to its end, which is waited for with patience.
 fn finish(command: &mut Command) -> Option<ExitStatus> {
     let begun = Instant::now();
-    let mut child = command.spawn().expect("mpirun: install openmpi-bin, or run scripts/setup --distributed");
+    let mut child =
+        command.spawn().expect("mpirun: install openmpi-bin, or run scripts/setup --distributed");
     loop {
         if let Some(status) = child.try_wait().unwrap() {
             return Some(status);
@@ -72,20 +73,29 @@ fn finish(command: &mut Command) -> Option<ExitStatus> {
 /// Runs this program on several ranks.
 fn launch() -> ExitCode {
     let mut outcomes: Vec<(String, bool)> = (1..=4)
-        .map(|ranks| (format!("ranks_{ranks}"), finish(&mut on(ranks)).is_some_and(|status| status.success())))
+        .map(|ranks| {
+            (
+                format!("ranks_{ranks}"),
+                finish(&mut on(ranks)).is_some_and(|status| status.success()),
+            )
+        })
         .collect();
     // All ranks are ended where one has a defect: none waits for it.
     let said = tempfile::NamedTempFile::new().unwrap();
     let status = finish(on(3).env(FAILING, "1").stderr(Stdio::from(said.reopen().unwrap())));
     let said = std::fs::read_to_string(said.path()).unwrap();
-    let ended = status.is_some_and(|status| !status.success()) && said.contains("rank 1 failed in itself");
+    let ended =
+        status.is_some_and(|status| !status.success()) && said.contains("rank 1 failed in itself");
     outcomes.push(("a_defect_on_one_rank_ends_all".into(), ended));
     let failed = outcomes.iter().filter(|(_, passed)| !passed).count();
     for (name, passed) in &outcomes {
         println!("test {name} ... {}", if *passed { "ok" } else { "FAILED" });
     }
     let outcome = if failed == 0 { "ok" } else { "FAILED" };
-    println!("\ntest result: {outcome}. {} passed; {failed} failed; 0 ignored", outcomes.len() - failed);
+    println!(
+        "\ntest result: {outcome}. {} passed; {failed} failed; 0 ignored",
+        outcomes.len() - failed
+    );
     if failed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
@@ -108,14 +118,19 @@ fn as_failing_ranks() -> ExitCode {
 }
 
 fn as_rank() {
-    assert_eq!(Mpi::new(&rsmpi::topology::SimpleCommunicator::world()).err(), Some(MpiError::NotInitialized));
+    assert_eq!(
+        Mpi::new(&rsmpi::topology::SimpleCommunicator::world()).err(),
+        Some(MpiError::NotInitialized)
+    );
     let (universe, _) = rsmpi::initialize_with_threading(rsmpi::Threading::Funneled).unwrap();
     let world = Mpi::new(&universe.world()).unwrap();
     everything(&world);
     // Half of the ranks, in the other order.
     use rsmpi::topology::{Color, Communicator as _};
-    let half =
-        universe.world().split_by_color_with_key(Color::with_value(world.rank() as i32 % 2), -(world.rank() as i32));
+    let half = universe.world().split_by_color_with_key(
+        Color::with_value(world.rank() as i32 % 2),
+        -(world.rank() as i32),
+    );
     let half = half.unwrap();
     everything(&Mpi::new(&half).unwrap());
     // PETSc on these ranks alone: one half is at it while the other has not begun, or is through.
@@ -159,9 +174,14 @@ fn everything(ranks: &dyn Communicator) {
         ranks.broadcast(root, &mut bytes);
         assert_eq!(bytes, vec![root as u8; 100_000]);
         let gathered = ranks.gather(root, &vec![rank as u8; 1000 * rank]);
-        assert_eq!(gathered, (rank == root).then(|| (0..size).map(|rank| vec![rank as u8; 1000 * rank]).collect()));
+        assert_eq!(
+            gathered,
+            (rank == root).then(|| (0..size).map(|rank| vec![rank as u8; 1000 * rank]).collect())
+        );
     }
-    let values = |rank: usize| [1.0 / (rank as f64 + 3.0), -(rank as f64), if rank == 1 { f64::NAN } else { 1e16 }];
+    let values = |rank: usize| {
+        [1.0 / (rank as f64 + 3.0), -(rank as f64), if rank == 1 { f64::NAN } else { 1e16 }]
+    };
     for reduction in [Reduction::Sum, Reduction::Minimum, Reduction::Maximum] {
         let mut sum = values(rank);
         ranks.reduce(reduction, &mut sum);
@@ -175,12 +195,16 @@ fn everything(ranks: &dyn Communicator) {
     for round in 0..200_u8 {
         // To all ranks but those that `round` leaves out, twice to the next one.
         let wanted = |from: usize, to: usize| !(from + to + round as usize).is_multiple_of(3);
-        let mut messages: Vec<(usize, Vec<u8>)> =
-            (0..size).filter(|&to| wanted(rank, to)).map(|to| (to, vec![round; 10 * rank])).collect();
+        let mut messages: Vec<(usize, Vec<u8>)> = (0..size)
+            .filter(|&to| wanted(rank, to))
+            .map(|to| (to, vec![round; 10 * rank]))
+            .collect();
         messages.push(((rank + 1) % size, vec![rank as u8, round]));
         let before = (rank + size - 1) % size;
-        let mut expected: Vec<(usize, Vec<u8>)> =
-            (0..size).filter(|&from| wanted(from, rank)).map(|from| (from, vec![round; 10 * from])).collect();
+        let mut expected: Vec<(usize, Vec<u8>)> = (0..size)
+            .filter(|&from| wanted(from, rank))
+            .map(|from| (from, vec![round; 10 * from]))
+            .collect();
         expected.push((before, vec![before as u8, round]));
         expected.sort_by_key(|(from, _)| *from);
         assert_eq!(ranks.exchange(messages), expected);
@@ -189,9 +213,11 @@ fn everything(ranks: &dyn Communicator) {
         // As neighbours do, each of whom knows the others; now and then something else comes between.
         let hears = |to: usize, from: usize| !(from + to + round as usize).is_multiple_of(3);
         let message = |from: usize, to: usize| vec![round; 7 * from + to];
-        let messages = (0..size).filter(|&to| hears(to, rank)).map(|to| (to, message(rank, to))).collect();
+        let messages =
+            (0..size).filter(|&to| hears(to, rank)).map(|to| (to, message(rank, to))).collect();
         let from: Vec<usize> = (0..size).filter(|&from| hears(rank, from)).collect();
-        let expected: Vec<(usize, Vec<u8>)> = from.iter().map(|&from| (from, message(from, rank))).collect();
+        let expected: Vec<(usize, Vec<u8>)> =
+            from.iter().map(|&from| (from, message(from, rank))).collect();
         assert_eq!(ranks.exchange_with(messages, &from), expected);
         if round.is_multiple_of(50) {
             let heard = ranks.exchange(vec![((rank + 1) % size, vec![round])]);
@@ -214,7 +240,11 @@ const PRECONDITIONINGS: [Option<Preconditioning>; 5] = [
 ];
 
 /// PETSc moves the volume as one process does, again on cells that have moved, and says why it cannot.
-fn solved(world: &rsmpi::topology::SimpleCommunicator, preconditioning: Option<Preconditioning>, cells: [usize; 3]) {
+fn solved(
+    world: &rsmpi::topology::SimpleCommunicator,
+    preconditioning: Option<Preconditioning>,
+    cells: [usize; 3],
+) {
     let ranks: Arc<dyn Communicator> = Arc::new(Mpi::new(world).unwrap());
     let solvers = Petsc::solvers(world, preconditioning).unwrap();
     let mesh = box_of_tets(cells, [0.0; 3], [1.0; 3]);
@@ -222,11 +252,15 @@ fn solved(world: &rsmpi::topology::SimpleCommunicator, preconditioning: Option<P
     let (count, parts) = (mesh.cells().len(), (ranks.size() - 1).max(1));
     let of_cells: Vec<usize> = (0..count).map(|cell| cell * parts / count).collect();
     let part = Part::cut(&mesh, &of_cells, ranks.rank(), false).unwrap();
-    let (shared, boundary) = PartBoundary::find(&*ranks, &part, &FeatureSettings::default()).unwrap();
-    let partition = solvers(Ranks::new(ranks, Arc::new(shared), &boundary, Vec::new()), &part.points);
+    let (shared, boundary) =
+        PartBoundary::find(&*ranks, &part, &FeatureSettings::default()).unwrap();
+    let partition =
+        solvers(Ranks::new(ranks, Arc::new(shared), &boundary, Vec::new()), &part.points);
     drop(solvers);
-    let own = Mesh::new(part.points.clone(), part.cells.clone(), FeatureSource::SharpEdges).unwrap();
-    let numbers: Vec<usize> = part.global_vertices.iter().flatten().map(|&number| number as usize).collect();
+    let own =
+        Mesh::new(part.points.clone(), part.cells.clone(), FeatureSource::SharpEdges).unwrap();
+    let numbers: Vec<usize> =
+        part.global_vertices.iter().flatten().map(|&number| number as usize).collect();
     let wave = |[x, y, z]: Vector| [0.1 * (3.0 * y).sin(), 0.2 * x * z, -0.1 * (4.0 * x).cos()];
     let on = |mesh: &Mesh, vertices: &[u32]| -> Vec<Vector> {
         vertices.iter().map(|&vertex| wave(mesh.points()[vertex as usize])).collect()
@@ -236,13 +270,20 @@ fn solved(world: &rsmpi::topology::SimpleCommunicator, preconditioning: Option<P
         let settings = Deform { method, tolerance: 1e-10, ..Deform::default() };
         let serial = VolumeOperator::new(&mesh, surface.vertices(), &settings).unwrap();
         let expected = serial.solve(&on(&mesh, surface.vertices())).unwrap().displacement;
-        let operator = VolumeOperator::of_part(&own, boundary.vertices(), &[], &settings, &partition).unwrap();
+        let operator =
+            VolumeOperator::of_part(&own, boundary.vertices(), &[], &settings, &partition).unwrap();
         let again = operator.updated(&own).unwrap();
         for operator in [&operator, &again] {
             let found = operator.solve(&on(&own, boundary.vertices())).unwrap();
             for (value, &number) in found.displacement.iter().zip(&numbers) {
-                let off = (0..3).map(|axis| (value[axis] - expected[number][axis]).abs()).fold(0.0, f64::max);
-                assert!(off < 1e-8, "{preconditioning:?} {method:?}: {off:e} in {} iterations", found.iterations);
+                let off = (0..3)
+                    .map(|axis| (value[axis] - expected[number][axis]).abs())
+                    .fold(0.0, f64::max);
+                assert!(
+                    off < 1e-8,
+                    "{preconditioning:?} {method:?}: {off:e} in {} iterations",
+                    found.iterations
+                );
             }
         }
         let still = operator.solve(&vec![[0.0; 3]; boundary.vertices().len()]).unwrap();
@@ -259,7 +300,8 @@ fn solved(world: &rsmpi::topology::SimpleCommunicator, preconditioning: Option<P
 fn partitioned(ranks: &Mpi) {
     let ranks = Counted::new(ranks);
     let mesh = box_of_tets([6, 5, 4], [0.0; 3], [1.0; 3]);
-    let of_cells: Vec<usize> = (0..mesh.cells().len()).map(|cell| cell * ranks.size() / mesh.cells().len()).collect();
+    let of_cells: Vec<usize> =
+        (0..mesh.cells().len()).map(|cell| cell * ranks.size() / mesh.cells().len()).collect();
     let part = Part::cut(&mesh, &of_cells, ranks.rank(), true).unwrap();
     let (_, boundary) = PartBoundary::find(&ranks, &part, &FeatureSettings::default()).unwrap();
     if let Some(surface) = boundary.surface() {

@@ -15,7 +15,11 @@ use tombolo::{
 };
 
 fn tombolo(directory: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_tombolo")).args(arguments).current_dir(directory).output().expect("runs")
+    Command::new(env!("CARGO_BIN_EXE_tombolo"))
+        .args(arguments)
+        .current_dir(directory)
+        .output()
+        .expect("runs")
 }
 
 fn error_text(output: &Output) -> String {
@@ -24,7 +28,8 @@ fn error_text(output: &Output) -> String {
 
 fn json(output: &Output) -> Value {
     assert!(output.status.code().is_some());
-    serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}: {}", error_text(output)))
+    serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|error| panic!("{error}: {}", error_text(output)))
 }
 
 fn with_box(edits: &str) -> (tempfile::TempDir, Mesh) {
@@ -35,12 +40,14 @@ fn with_box(edits: &str) -> (tempfile::TempDir, Mesh) {
     (directory, mesh)
 }
 
-const EDIT: [&str; 8] = ["edit", "--mesh", "box.vtu", "--edits", "edits.json", "--out", "out.vtu", "--json"];
+const EDIT: [&str; 8] =
+    ["edit", "--mesh", "box.vtu", "--edits", "edits.json", "--out", "out.vtu", "--json"];
 
 #[test]
 fn check_points_at_what_is_wrong() {
     let directory = tempfile::tempdir().unwrap();
-    std::fs::write(directory.path().join("bad.json"), "{\"version\": 1,\n \"pipelnes\": []}").unwrap();
+    std::fs::write(directory.path().join("bad.json"), "{\"version\": 1,\n \"pipelnes\": []}")
+        .unwrap();
     std::fs::write(directory.path().join("good.json"), "{\"version\": 1}").unwrap();
     let bad = tombolo(directory.path(), &["check", "bad.json"]);
     assert_eq!(bad.status.code(), Some(1));
@@ -67,8 +74,9 @@ fn info_counts_what_is_there() {
 
 #[test]
 fn edit_moves_the_mesh_as_asked() {
-    let (directory, mesh) =
-        with_box(r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -0.5]}}]"#);
+    let (directory, mesh) = with_box(
+        r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -0.5]}}]"#,
+    );
     for more in [&[][..], &["--method", "harmonic"], &["--stiffening", "0.5", "--steps", "3"]] {
         let output = tombolo(directory.path(), &[&EDIT[..], more].concat());
         assert_eq!(output.status.code(), Some(0), "{}", error_text(&output));
@@ -92,21 +100,30 @@ fn edit_moves_the_mesh_as_asked() {
 
 #[test]
 fn features_are_listed_written_and_named_by_edits() {
-    let (directory, mesh) =
-        with_box(r#"[{"translate": {"features": ["feature-2"], "fixed": ["feature-1"], "by": [0, 0, 0.02]}}]"#);
-    let at = |more: &[&str]| tombolo(directory.path(), &[&["features", "--mesh", "box.vtu"], more].concat());
+    let (directory, mesh) = with_box(
+        r#"[{"translate": {"features": ["feature-2"], "fixed": ["feature-1"], "by": [0, 0, 0.02]}}]"#,
+    );
+    let at = |more: &[&str]| {
+        tombolo(directory.path(), &[&["features", "--mesh", "box.vtu"], more].concat())
+    };
     let own = json(&at(&["--json"]));
     assert_eq!((&own["source"], &own["features"][0]["name"]), (&"mesh".into(), &"x-min".into()));
-    let found = json(&at(&["--angle", "45", "--out", "parts.vtp", "--faces", "feature-3", "--json"]));
-    assert_eq!((&found["source"], found["features"].as_array().unwrap().len()), (&"sharp edges".into(), 6));
+    let found =
+        json(&at(&["--angle", "45", "--out", "parts.vtp", "--faces", "feature-3", "--json"]));
+    assert_eq!(
+        (&found["source"], found["features"].as_array().unwrap().len()),
+        (&"sharp edges".into(), 6)
+    );
     for feature in found["features"].as_array().unwrap() {
         assert_eq!((&feature["faces"], &feature["vertices"]), (&32.into(), &25.into()));
         assert!((feature["area"].as_f64().unwrap() - 1.0).abs() < 1e-12);
     }
     assert_eq!(found["faces"].as_array().unwrap().len(), 32);
     // Our own reader takes the file back with the same features.
-    let parts =
-        json(&tombolo(directory.path(), &["features", "--mesh", "parts.vtp", "--faces", "feature-3", "--json"]));
+    let parts = json(&tombolo(
+        directory.path(),
+        &["features", "--mesh", "parts.vtp", "--faces", "feature-3", "--json"],
+    ));
     assert_eq!(
         (&parts["source"], &parts["features"], &parts["faces"]),
         (&"mesh".into(), &found["features"], &found["faces"])
@@ -117,19 +134,27 @@ fn features_are_listed_written_and_named_by_edits() {
     let shaped = read_mesh(directory.path().join("out.vtu")).unwrap().mesh;
     assert_eq!(shaped.features(), mesh.features(), "the file keeps its own features");
     let named = at(&["--angle", "200"]);
-    assert!(named.status.code() == Some(1) && error_text(&named).contains("from 0 to 180"), "{}", error_text(&named));
+    assert!(
+        named.status.code() == Some(1) && error_text(&named).contains("from 0 to 180"),
+        "{}",
+        error_text(&named)
+    );
     let none = at(&["--faces", "x-mon"]);
     assert!(error_text(&none).contains("did you mean 'x-min'"), "{}", error_text(&none));
 }
 
 #[test]
 fn edit_tells_what_is_wrong_with_the_surface() {
-    let (directory, _) =
-        with_box(r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -1.2]}}]"#);
+    let (directory, _) = with_box(
+        r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -1.2]}}]"#,
+    );
     let output = tombolo(directory.path(), &EDIT);
     assert_eq!(output.status.code(), Some(2));
     let outcome = json(&output);
-    assert!(outcome["reason"].as_str().unwrap().contains("the surface itself would be broken"), "{outcome}");
+    assert!(
+        outcome["reason"].as_str().unwrap().contains("the surface itself would be broken"),
+        "{outcome}"
+    );
     let broken = &outcome["surface"];
     assert!(broken["report"]["intersections"]["count"].as_u64() > Some(0), "{outcome}");
     assert_eq!(broken["report"]["intersections"]["first"][0]["place"].as_array().unwrap().len(), 3);
@@ -146,7 +171,11 @@ fn edit_refuses_more_than_is_allowed() {
     let steps = |steps: u32| format!(r#"{{"edits": [{edit}], "schedule": {{"steps": {steps}}}}}"#);
     for (edits, more, named) in [
         (many, &[][..], "edits.json:1:1: found 20000 edits, expected at most 16384"),
-        (steps(1_000_000_000), &[], "schedule.steps: found 1000000000 shapes, expected at most 10000"),
+        (
+            steps(1_000_000_000),
+            &[],
+            "schedule.steps: found 1000000000 shapes, expected at most 10000",
+        ),
         (steps(u32::MAX), &[], "schedule.steps: found 4294967295 shapes, expected at most 10000"),
         (steps(1), &["--steps", "1000000000"], "found 1000000000 shapes, expected at most 10000"),
     ] {
@@ -162,7 +191,8 @@ fn edit_refuses_more_than_is_allowed() {
 
 #[test]
 fn edit_refuses_with_the_reason_and_writes_nothing() {
-    let good = r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -1.5]}}]"#;
+    let good =
+        r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -1.5]}}]"#;
     for (edits, more, code, named) in [
         (good, &[][..], 2, "feasible fraction"),
         (r#"[{"translate": {"features": ["z-mux"], "by": [0, 0, 1]}}]"#, &[], 2, "z-max"),
@@ -196,7 +226,10 @@ fn a_saved_stack_and_its_displacement_replay_to_the_same_bits() {
         let layers = &json(&output)["layers"];
         assert_eq!((&layers[0]["edit"], &layers[0]["name"]), (&"rotate".into(), &"tilt".into()));
         assert_eq!(layers[0]["handle_vertices"], 25);
-        assert_eq!((&layers[1]["muted"], &layers[1]["largest_displacement"]), (&true.into(), &0.0.into()));
+        assert_eq!(
+            (&layers[1]["muted"], &layers[1]["largest_displacement"]),
+            (&true.into(), &0.0.into())
+        );
         assert_eq!(layers[2]["handle_vertices"], 5);
         assert!((layers[2]["largest_displacement"].as_f64().unwrap() - 0.05).abs() < 1e-15);
     }
@@ -205,20 +238,29 @@ fn a_saved_stack_and_its_displacement_replay_to_the_same_bits() {
 
     // The same stack again; then the surface displacement in its place, from each kind of file.
     assert_eq!(
-        tombolo(directory.path(), &[&EDIT[..], &["--displacement", "again.vtp"]].concat()).status.code(),
+        tombolo(directory.path(), &[&EDIT[..], &["--displacement", "again.vtp"]].concat())
+            .status
+            .code(),
         Some(0)
     );
-    assert!(std::fs::read(path("out.vtu")).unwrap() == bytes && std::fs::read(path("again.vtp")).unwrap() == surface);
+    assert!(
+        std::fs::read(path("out.vtu")).unwrap() == bytes
+            && std::fs::read(path("again.vtp")).unwrap() == surface
+    );
     std::fs::create_dir(path("orders")).unwrap();
     for file in ["first.txt", "first.vtp", "first.csv"] {
         let order = format!(r#"[{{"displacement": {{"file": "../{file}"}}}}]"#);
         std::fs::write(path("orders/edits.json"), order).unwrap();
-        let arguments = ["edit", "--mesh", "box.vtu", "--edits", "orders/edits.json", "--out", "new.vtu"];
-        let output = tombolo(directory.path(), &[&arguments[..], &["--displacement", "new.vtp"]].concat());
+        let arguments =
+            ["edit", "--mesh", "box.vtu", "--edits", "orders/edits.json", "--out", "new.vtu"];
+        let output =
+            tombolo(directory.path(), &[&arguments[..], &["--displacement", "new.vtp"]].concat());
         assert_eq!(output.status.code(), Some(0), "{}", error_text(&output));
         let text = String::from_utf8_lossy(&output.stdout).into_owned();
         assert!(
-            text.contains("edit 0 (displacement): 98 vertices in the handle, moves the surface by at most 0."),
+            text.contains(
+                "edit 0 (displacement): 98 vertices in the handle, moves the surface by at most 0."
+            ),
             "{text}"
         );
         assert!(std::fs::read(path("new.vtu")).unwrap() == bytes, "{file}");
@@ -230,12 +272,19 @@ fn a_saved_stack_and_its_displacement_replay_to_the_same_bits() {
 fn a_displacement_file_that_is_wrong_is_named_by_line_and_column() {
     let (directory, _) = with_box(r#"[{"displacement": {"file": "lift.txt"}}]"#);
     let output = tombolo(directory.path(), &EDIT);
-    assert!(output.status.code() == Some(1) && error_text(&output).contains("lift.txt"), "{}", error_text(&output));
+    assert!(
+        output.status.code() == Some(1) && error_text(&output).contains("lift.txt"),
+        "{}",
+        error_text(&output)
+    );
     std::fs::write(directory.path().join("lift.txt"), "0 0 0 0 0 0\n0 0 1 0 zero 0\n").unwrap();
     let output = tombolo(directory.path(), &EDIT);
     assert_eq!(output.status.code(), Some(1));
     let text = error_text(&output);
-    assert!(text.contains("edit 0 (displacement): file: lift.txt, line 2, column 9: found \"zero\""), "{text}");
+    assert!(
+        text.contains("edit 0 (displacement): file: lift.txt, line 2, column 9: found \"zero\""),
+        "{text}"
+    );
     assert!(!directory.path().join("out.vtu").exists());
 }
 
@@ -255,7 +304,8 @@ fn refused_on(points: &[[f64; 3]], corners: &[u32], tags: &[i64], edit: &str) ->
 #[test]
 fn surfaces_that_cannot_be_edited_are_named_to_the_user() {
     let square = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
-    let lift = r#"{"translate": {"features": ["feature-1"], "fixed": ["feature-0"], "by": [0, 0, 1]}}"#;
+    let lift =
+        r#"{"translate": {"features": ["feature-1"], "fixed": ["feature-0"], "by": [0, 0, 1]}}"#;
     // Three faces at one edge.
     let book = [&square[..], &[[0.5, 0.5, 1.0]]].concat();
     let text = refused_on(&book, &[0, 1, 2, 0, 2, 3, 0, 2, 4], &[0, 0, 0, 0, 1], lift);
@@ -269,10 +319,12 @@ fn surfaces_that_cannot_be_edited_are_named_to_the_user() {
     assert!(text.contains("cells 0 and 2"), "{text}");
     // Two vertices at one place, which the edit would part.
     let seam = [&square[..], &[square[1], square[2], [2.0, 0.0, 0.0], [2.0, 1.0, 0.0]]].concat();
-    let text = refused_on(&seam, &[0, 1, 2, 0, 2, 3, 4, 6, 7, 4, 7, 5], &[0, 0, 0, 0, 1, 1, 1, 1], lift);
+    let text =
+        refused_on(&seam, &[0, 1, 2, 0, 2, 3, 4, 6, 7, 4, 7, 5], &[0, 0, 0, 0, 1, 1, 1, 1], lift);
     assert!(text.contains("seam") && text.contains("mesh vertices"), "{text}");
     // All that should move is held.
-    let held = r#"{"translate": {"features": ["feature-1"], "fixed": ["feature-1"], "by": [0, 0, 1]}}"#;
+    let held =
+        r#"{"translate": {"features": ["feature-1"], "fixed": ["feature-1"], "by": [0, 0, 1]}}"#;
     let text = refused_on(&square, &[0, 1, 2, 0, 2, 3], &[0, 0, 1, 1], held);
     assert!(text.contains("feature-1"), "{text}");
 }
@@ -291,14 +343,16 @@ fn a_left_handed_mesh_keeps_its_order_of_vertices() {
         let given = mesh.cells().as_given().into_owned();
         let image = Mesh::new(mirrored, given.clone(), mesh.features().clone()).unwrap();
         write_mesh(directory.path().join("box.vtu"), &image, &[], Compression::None).unwrap();
-        let edits = r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.1, 0, -0.5]}}]"#;
+        let edits =
+            r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.1, 0, -0.5]}}]"#;
         std::fs::write(directory.path().join("edits.json"), edits).unwrap();
         let output = tombolo(directory.path(), &EDIT);
         let text = error_text(&output);
         assert_eq!(output.status.code(), Some(0), "{text}");
         assert_eq!(text.matches("left-handed cells").count(), 1, "said once: {text}");
         assert_eq!(json(&output)["inverted"], 0);
-        let [before, after] = ["box.vtu", "out.vtu"].map(|name| read_mesh(directory.path().join(name)).unwrap());
+        let [before, after] =
+            ["box.vtu", "out.vtu"].map(|name| read_mesh(directory.path().join(name)).unwrap());
         assert_eq!(*before.mesh.cells().as_given(), given);
         assert_eq!(*after.mesh.cells().as_given(), given);
         assert!(before.notes.iter().any(|note| note.contains("left-handed")), "{:?}", before.notes);
@@ -308,7 +362,9 @@ fn a_left_handed_mesh_keeps_its_order_of_vertices() {
 /// Where nothing is refused but something is wrong, scripts must not take it for a refusal.
 #[test]
 fn wrong_arguments_are_no_refusal() {
-    let (directory, _) = with_box(r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, 0.1]}}]"#);
+    let (directory, _) = with_box(
+        r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, 0.1]}}]"#,
+    );
     let edit = ["edit", "--mesh", "box.vtu", "--edits", "edits.json"];
     let wrong = |more: &[&str], why: &str| {
         let output = tombolo(directory.path(), &[&edit[..], more].concat());
@@ -329,22 +385,48 @@ fn wrong_arguments_are_no_refusal() {
     wrong(&["--out", "same.vtu", "--displacement", "same.vtu"], ".txt, .csv and .vtp");
     let surface = ["features", "--mesh", "box.vtu", "--out", "box.vtp"];
     assert!(tombolo(directory.path(), &surface).status.success());
-    let same = ["edit", "--mesh", "box.vtp", "--edits", "edits.json", "--out", "a.vtp", "--displacement", "a.vtp"];
+    let same = [
+        "edit",
+        "--mesh",
+        "box.vtp",
+        "--edits",
+        "edits.json",
+        "--out",
+        "a.vtp",
+        "--displacement",
+        "a.vtp",
+    ];
     assert!(error_text(&tombolo(directory.path(), &same)).contains("the same file"));
     for usage in [&[][..], &["mesh"], &["nonsense"]] {
         assert_eq!(tombolo(directory.path(), usage).status.code(), Some(1), "{usage:?}");
     }
     let help = tombolo(directory.path(), &["--help"]);
-    assert!(help.status.success() && String::from_utf8_lossy(&help.stdout).contains("Exit codes: 0"));
+    assert!(
+        help.status.success() && String::from_utf8_lossy(&help.stdout).contains("Exit codes: 0")
+    );
     let version = tombolo(directory.path(), &["--version"]);
-    assert_eq!(String::from_utf8_lossy(&version.stdout), concat!("tombolo ", env!("CARGO_PKG_VERSION"), "\n"));
+    assert_eq!(
+        String::from_utf8_lossy(&version.stdout),
+        concat!("tombolo ", env!("CARGO_PKG_VERSION"), "\n")
+    );
 }
 
 /// The displacement is enough to ask for; so are the numbers of a skeleton.
 #[test]
 fn one_result_is_enough() {
-    let (directory, _) = with_box(r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, 0.1]}}]"#);
-    let edit = ["edit", "--mesh", "box.vtu", "--edits", "edits.json", "--displacement", "lift.txt", "--json"];
+    let (directory, _) = with_box(
+        r#"[{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, 0.1]}}]"#,
+    );
+    let edit = [
+        "edit",
+        "--mesh",
+        "box.vtu",
+        "--edits",
+        "edits.json",
+        "--displacement",
+        "lift.txt",
+        "--json",
+    ];
     let outcome = json(&tombolo(directory.path(), &edit));
     assert_eq!(outcome["status"], "applied");
     let both = [&edit[..5], &["--out", "out.vtu", "--displacement", "both.txt"]].concat();

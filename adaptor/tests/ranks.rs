@@ -53,8 +53,11 @@ fn what_viewers_ask_for_happens_at_the_same_cycle() {
         .expect("initialize");
         assert_eq!(adaptor.link().is_some(), rank == 0);
         let speed = speed(&part);
-        let fields =
-            [FieldView { name: "speed", association: Association::Vertex, values: ArrayView::scalars(&speed) }];
+        let fields = [FieldView {
+            name: "speed",
+            association: Association::Vertex,
+            values: ArrayView::scalars(&speed),
+        }];
         let channels = [Channel { name: "fluid", mesh: part.view(), fields: &fields }];
         let (mut first, mut second) = (None::<Viewer>, None::<Viewer>);
         let (mut cycle, mut changes) = (0, Vec::new());
@@ -65,7 +68,9 @@ fn what_viewers_ask_for_happens_at_the_same_cycle() {
                 moved.get_or_insert(cycle);
                 assert_eq!(motion.coordinates.len(), part.points.len());
             }
-            changes.extend(steering.parameters.iter().map(|(name, value)| (cycle, name.clone(), *value)));
+            changes.extend(
+                steering.parameters.iter().map(|(name, value)| (cycle, name.clone(), *value)),
+            );
             if steering.stop {
                 break;
             }
@@ -82,7 +87,9 @@ fn what_viewers_ask_for_happens_at_the_same_cycle() {
                             _ => None,
                         });
                         assert!(whole.count() > 0, "no frame came");
-                        viewer.send(&json!({"id": "more", "parameter": {"name": "inflow", "value": 2.0}}));
+                        viewer.send(
+                            &json!({"id": "more", "parameter": {"name": "inflow", "value": 2.0}}),
+                        );
                     }
                     20 => drop(first.take()),
                     25 => {
@@ -115,7 +122,10 @@ fn what_viewers_ask_for_happens_at_the_same_cycle() {
     });
     assert!(outcomes.iter().all(|outcome| *outcome == outcomes[0]), "{outcomes:?}");
     assert!(outcomes[0].2.is_some(), "the order was not carried out");
-    assert!(outcomes[0].0 >= 40 && outcomes[0].1.iter().any(|(_, name, value)| name == "inflow" && *value == 2.0));
+    assert!(
+        outcomes[0].0 >= 40
+            && outcomes[0].1.iter().any(|(_, name, value)| name == "inflow" && *value == 2.0)
+    );
 }
 
 #[test]
@@ -125,7 +135,8 @@ fn a_mistake_on_one_rank_is_the_same_error_on_all() {
         let rank = ranks.rank();
         let part = part(&mesh, rank);
         let mut adaptor =
-            Adaptor::initialize(Settings { communicator: Arc::new(ranks), ..Settings::default() }).expect("initialize");
+            Adaptor::initialize(Settings { communicator: Arc::new(ranks), ..Settings::default() })
+                .expect("initialize");
         let channels = [Channel { name: "fluid", mesh: part.view(), fields: &[] }];
         let mut said = Vec::new();
         for cycle in 0..6 {
@@ -161,8 +172,12 @@ fn ranks_come_together_as_often_as_they_are_told() {
         let ranks = Counted::new(ranks);
         let counted = Arc::new(ranks);
         let communicator: Arc<dyn Communicator> = Arc::clone(&counted) as Arc<dyn Communicator>;
-        let mut adaptor = Adaptor::initialize(Settings { config: config(&text), communicator, ..Settings::default() })
-            .expect("set up");
+        let mut adaptor = Adaptor::initialize(Settings {
+            config: config(&text),
+            communicator,
+            ..Settings::default()
+        })
+        .expect("set up");
         let channels = [Channel { name: "fluid", mesh: part.view(), fields: &[] }];
         let mut said = Vec::new();
         for cycle in 0..13 {
@@ -175,7 +190,8 @@ fn ranks_come_together_as_often_as_they_are_told() {
                 step.cycle = 11;
             }
             let before = counted.traffic();
-            let outcome = adaptor.execute(&step, &channels).map(|_| ()).map_err(|error| error.to_string());
+            let outcome =
+                adaptor.execute(&step, &channels).map(|_| ()).map_err(|error| error.to_string());
             said.push((outcome, counted.traffic() == before));
         }
         adaptor.finalize().expect("finalize");
@@ -186,7 +202,9 @@ fn ranks_come_together_as_often_as_they_are_told() {
             assert_eq!(*silent, cycle % 4 != 0, "cycle {cycle}");
             match cycle {
                 8 => assert!(
-                    outcome.clone().is_err_and(|text| text.starts_with("rank 2: cycle 5: time is NaN")),
+                    outcome
+                        .clone()
+                        .is_err_and(|text| text.starts_with("rank 2: cycle 5: time is NaN")),
                     "{outcome:?}"
                 ),
                 _ => assert_eq!(*outcome, Ok(()), "cycle {cycle}"),
@@ -210,7 +228,9 @@ fn a_bad_cell_on_one_rank_holds_nobody_up() {
                 part.ghosts.iter_mut().for_each(|ghosts| ghosts.push(false));
             }
         },
-        |part: &mut Part| part.global_vertices.iter_mut().for_each(|numbers| numbers[1] = numbers[0]),
+        |part: &mut Part| {
+            part.global_vertices.iter_mut().for_each(|numbers| numbers[1] = numbers[0])
+        },
     ];
     for fault in faults {
         let outcomes = threads::run(RANKS, |ranks| {
@@ -219,21 +239,37 @@ fn a_bad_cell_on_one_rank_holds_nobody_up() {
             if rank == 1 {
                 fault(&mut part);
             }
-            let settings =
-                Settings { config: config(LINK_TO_ALL), communicator: Arc::new(ranks), ..Settings::default() };
+            let settings = Settings {
+                config: config(LINK_TO_ALL),
+                communicator: Arc::new(ranks),
+                ..Settings::default()
+            };
             let mut adaptor = Adaptor::initialize(settings).expect("initialize");
             let speed = speed(&part);
-            let fields =
-                [FieldView { name: "speed", association: Association::Vertex, values: ArrayView::scalars(&speed) }];
+            let fields = [FieldView {
+                name: "speed",
+                association: Association::Vertex,
+                values: ArrayView::scalars(&speed),
+            }];
             let channels = [Channel { name: "fluid", mesh: part.view(), fields: &fields }];
             let said: Vec<_> = (0..4)
-                .map(|cycle| adaptor.execute(&step(cycle), &channels).map(|_| ()).map_err(|error| error.to_string()))
+                .map(|cycle| {
+                    adaptor
+                        .execute(&step(cycle), &channels)
+                        .map(|_| ())
+                        .map_err(|error| error.to_string())
+                })
                 .collect();
             adaptor.finalize().expect("finalize");
             said
         });
         assert!(outcomes.iter().all(|outcome| *outcome == outcomes[0]), "{outcomes:?}");
-        assert!(outcomes[0].iter().flat_map(|outcome| outcome.as_ref().err()).all(|text| text.contains("rank 1")));
+        assert!(
+            outcomes[0]
+                .iter()
+                .flat_map(|outcome| outcome.as_ref().err())
+                .all(|text| text.contains("rank 1"))
+        );
     }
 }
 
@@ -257,12 +293,16 @@ fn orders_take_effect_on_all_ranks_at_the_same_cycle() {
         threads::run(ranks, |communicator| {
             let rank = communicator.rank();
             let part = if ranks == 1 {
-                Part { global_vertices: Some((0..mesh.points().len() as u64).collect()), ..whole(&mesh) }
+                Part {
+                    global_vertices: Some((0..mesh.points().len() as u64).collect()),
+                    ..whole(&mesh)
+                }
             } else {
                 part(&mesh, rank)
             };
             let orders = parse_orders(ORDERS, "orders.json").expect("orders");
-            let settings = Settings { orders, communicator: Arc::new(communicator), ..Settings::default() };
+            let settings =
+                Settings { orders, communicator: Arc::new(communicator), ..Settings::default() };
             let mut adaptor = Adaptor::initialize(settings).expect("initialize");
             let mut present = part.clone();
             let mut shapes = Vec::new();
@@ -270,10 +310,17 @@ fn orders_take_effect_on_all_ranks_at_the_same_cycle() {
                 let moved = {
                     let channels = [Channel { name: "fluid", mesh: present.view(), fields: &[] }];
                     let steering = adaptor.execute(&step(cycle), &channels).expect("execute");
-                    steering.motion.map(|motion| (motion.coordinates.to_vec(), motion.order.to_owned(), motion.shape))
+                    steering.motion.map(|motion| {
+                        (motion.coordinates.to_vec(), motion.order.to_owned(), motion.shape)
+                    })
                 };
                 if let Some((coordinates, order, shape)) = moved {
-                    let placed = part.global_vertices.iter().flatten().copied().zip(coordinates.iter().copied());
+                    let placed = part
+                        .global_vertices
+                        .iter()
+                        .flatten()
+                        .copied()
+                        .zip(coordinates.iter().copied());
                     shapes.push((cycle, order, shape, placed.collect::<Vec<_>>()));
                     present.points = coordinates;
                 }
@@ -282,26 +329,46 @@ fn orders_take_effect_on_all_ranks_at_the_same_cycle() {
         })
     };
     let alone = run(1).remove(0);
-    let statuses: Vec<_> =
-        alone.1.orders.iter().map(|order| (order.id.clone(), order.status, order.cycle_applied)).collect();
+    let statuses: Vec<_> = alone
+        .1
+        .orders
+        .iter()
+        .map(|order| (order.id.clone(), order.status, order.cycle_applied))
+        .collect();
     assert!(alone.0.len() >= 6, "{statuses:?}");
     let many = run(RANKS);
-    let told: Vec<_> =
-        many[0].1.orders.iter().map(|order| (order.id.clone(), order.status, order.cycle_applied)).collect();
+    let told: Vec<_> = many[0]
+        .1
+        .orders
+        .iter()
+        .map(|order| (order.id.clone(), order.status, order.cycle_applied))
+        .collect();
     assert_eq!(told, statuses);
     for (rank, (shapes, _)) in many.iter().enumerate() {
         assert_eq!(shapes.len(), alone.0.len());
         for (found, expected) in shapes.iter().zip(&alone.0) {
-            assert_eq!((found.0, &found.1, found.2), (expected.0, &expected.1, expected.2), "rank {rank}");
+            assert_eq!(
+                (found.0, &found.1, found.2),
+                (expected.0, &expected.1, expected.2),
+                "rank {rank}"
+            );
             for (number, place) in &found.3 {
                 let there = expected.3[*number as usize].1;
-                let apart = (0..3).map(|axis| (place[axis] - there[axis]).abs()).fold(0.0, f64::max);
-                assert!(apart < 1e-8, "rank {rank}, cycle {}, vertex {number}: {place:?} and {there:?}", found.0);
+                let apart =
+                    (0..3).map(|axis| (place[axis] - there[axis]).abs()).fold(0.0, f64::max);
+                assert!(
+                    apart < 1e-8,
+                    "rank {rank}, cycle {}, vertex {number}: {place:?} and {there:?}",
+                    found.0
+                );
             }
         }
         // Back to the bits of the beginning.
         let last = &shapes.last().expect("shapes").3;
-        assert!(last.iter().all(|(number, place)| *place == mesh.points()[*number as usize]), "rank {rank}");
+        assert!(
+            last.iter().all(|(number, place)| *place == mesh.points()[*number as usize]),
+            "rank {rank}"
+        );
     }
 }
 
@@ -311,7 +378,8 @@ fn named_box() -> Mesh {
     let FeatureSource::Faces(tagged) = mesh.features() else { panic!("a box has tagged faces") };
     let mut tagged = tagged.clone();
     tagged.names = (1..).zip(BOX_FEATURES.map(str::to_owned)).collect();
-    Mesh::new(mesh.points().to_vec(), mesh.cells().clone(), FeatureSource::Faces(tagged)).expect("a mesh")
+    Mesh::new(mesh.points().to_vec(), mesh.cells().clone(), FeatureSource::Faces(tagged))
+        .expect("a mesh")
 }
 
 fn whole(mesh: &Mesh) -> Part {
@@ -321,11 +389,20 @@ fn whole(mesh: &Mesh) -> Part {
 #[test]
 fn a_run_does_not_begin_with_different_configurations() {
     let outcomes = threads::run(2, |ranks| {
-        let text = if ranks.rank() == 0 { LINK_TO_ALL.to_owned() } else { LINK_TO_ALL.replace("boundary", "border") };
-        let settings = Settings { config: config(&text), communicator: Arc::new(ranks), ..Settings::default() };
+        let text = if ranks.rank() == 0 {
+            LINK_TO_ALL.to_owned()
+        } else {
+            LINK_TO_ALL.replace("boundary", "border")
+        };
+        let settings = Settings {
+            config: config(&text),
+            communicator: Arc::new(ranks),
+            ..Settings::default()
+        };
         Adaptor::initialize(settings).map(drop).map_err(|error| error.to_string())
     });
-    let expected = Err("rank 1: its configuration or its orders are not those of rank 0".to_owned());
+    let expected =
+        Err("rank 1: its configuration or its orders are not those of rank 0".to_owned());
     assert_eq!(outcomes, [expected.clone(), expected]);
 }
 
@@ -343,16 +420,19 @@ fn orders_move_all_parts_at_the_same_cycle() {
             {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -5.0]}}]}},
         {"at": {"cycle": 10}, "order": {"undo": 2}}]"#;
     let run = |communicator: Arc<dyn Communicator>, part: &Part| {
-        let numbers: Vec<usize> = part.global_vertices.iter().flatten().map(|&number| number as usize).collect();
+        let numbers: Vec<usize> =
+            part.global_vertices.iter().flatten().map(|&number| number as usize).collect();
         let mut points = part.points.clone();
         let orders = tombolo::pipelines::language::parse_orders(orders, "orders").expect("orders");
         let mut adaptor =
-            Adaptor::initialize(Settings { communicator, orders, ..Settings::default() }).expect("initialize");
+            Adaptor::initialize(Settings { communicator, orders, ..Settings::default() })
+                .expect("initialize");
         let mut shapes = Vec::new();
         for cycle in 0..14 {
             let moving = Part { points: points.clone(), ..part.clone() };
             let channels = [Channel { name: "fluid", mesh: moving.view(), fields: &[] }];
-            if let Some(motion) = adaptor.execute(&step(cycle), &channels).expect("execute").motion {
+            if let Some(motion) = adaptor.execute(&step(cycle), &channels).expect("execute").motion
+            {
                 points.copy_from_slice(motion.coordinates);
                 shapes.push((cycle, motion.shape, points.clone()));
             }
@@ -362,23 +442,34 @@ fn orders_move_all_parts_at_the_same_cycle() {
     };
     let whole = Part::cut(&mesh, &vec![0; mesh.cells().len()], 0, false).expect("a part");
     let (_, serial, told) = run(Arc::new(tombolo::comm::Solo), &whole);
-    assert_eq!(serial.len(), 2 + 3 + 1, "two shapes of the first order, three of the second, the way back");
+    assert_eq!(
+        serial.len(),
+        2 + 3 + 1,
+        "two shapes of the first order, three of the second, the way back"
+    );
     let outcomes = threads::run(RANKS, |ranks| {
         let part = part(&mesh, ranks.rank());
         run(Arc::new(ranks), &part)
     });
     for (rank, (numbers, shapes, orders)) in outcomes.iter().enumerate() {
         assert_eq!(shapes.len(), serial.len());
-        for ((cycle, shape, points), (expected_cycle, expected_shape, expected)) in shapes.iter().zip(&serial) {
+        for ((cycle, shape, points), (expected_cycle, expected_shape, expected)) in
+            shapes.iter().zip(&serial)
+        {
             assert_eq!((cycle, shape), (expected_cycle, expected_shape));
             for (point, &number) in points.iter().zip(numbers) {
-                let off = (0..3).map(|axis| (point[axis] - expected[number][axis]).abs()).fold(0.0, f64::max);
+                let off = (0..3)
+                    .map(|axis| (point[axis] - expected[number][axis]).abs())
+                    .fold(0.0, f64::max);
                 assert!(off < 1e-7, "cycle {cycle}: vertex {number} is {off:e} off");
             }
         }
         if rank == 0 {
             for (order, expected) in orders.iter().zip(&told) {
-                assert_eq!((order.status, order.cycle_applied), (expected.status, expected.cycle_applied));
+                assert_eq!(
+                    (order.status, order.cycle_applied),
+                    (expected.status, expected.cycle_applied)
+                );
                 assert_eq!(order.reason.is_some(), expected.reason.is_some());
             }
         }

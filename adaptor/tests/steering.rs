@@ -51,7 +51,10 @@ fn a_schedule_is_kept_and_ends_exactly() {
     }
     let report = solver.finish();
     let order = &report.orders[0];
-    assert_eq!((order.status, order.cycle_applied, order.shape, order.shapes), (OrderStatus::Applied, Some(3), 4, 4));
+    assert_eq!(
+        (order.status, order.cycle_applied, order.shape, order.shapes),
+        (OrderStatus::Applied, Some(3), 4, 4)
+    );
     assert!(order.min_scaled_jacobian.is_some_and(|min| min > 0.02), "{order:?}");
     assert!(order.seconds.surface > 0.0 && order.seconds.volume > 0.0 && order.seconds.guard > 0.0);
     assert!(order.added_steps.is_some());
@@ -60,8 +63,10 @@ fn a_schedule_is_kept_and_ends_exactly() {
 
 #[test]
 fn every_mesh_on_the_way_is_sound() {
-    let mut solver =
-        with_orders(&json!([at(0, scheduled(squeeze(0.5), 5, 1)), at(7, scheduled(json!({"undo": 1}), 3, 1))]));
+    let mut solver = with_orders(&json!([
+        at(0, scheduled(squeeze(0.5), 5, 1)),
+        at(7, scheduled(json!({"undo": 1}), 3, 1))
+    ]));
     for _ in 0..12 {
         solver.step();
         assert_eq!(quality(solver.mesh.cells(), solver.mesh.points()).inverted, 0);
@@ -74,7 +79,10 @@ fn every_mesh_on_the_way_is_sound() {
 fn taking_orders_back_restores_each_shape_bit_for_bit() {
     let mut solver = with_orders(&json!([
         at(1, squeeze(0.2)),
-        at(2, json!({"edits": [{"scale_normals": {"features": ["x-max"], "fixed": ["x-min"], "distance": 0.1}}]})),
+        at(
+            2,
+            json!({"edits": [{"scale_normals": {"features": ["x-max"], "fixed": ["x-min"], "distance": 0.1}}]})
+        ),
         at(3, json!({"undo": 1})),
         at(4, json!({"undo": 1})),
         at(5, squeeze(0.2)),
@@ -109,20 +117,32 @@ impl Rejected for Solver {
         let report = self.finish();
         let last = report.orders.last().expect("orders");
         let reason = last.reason.clone().unwrap_or_default();
-        vec![(report.orders.len() as u64, last.status == OrderStatus::Rejected && reason.contains("only 1 order"))]
+        vec![(
+            report.orders.len() as u64,
+            last.status == OrderStatus::Rejected && reason.contains("only 1 order"),
+        )]
     }
 }
 
 #[test]
 fn an_order_in_the_middle_of_another_starts_where_the_mesh_is() {
-    let mut solver =
-        with_orders(&json!([at(0, scheduled(squeeze(0.4), 10, 1)), at(4, scheduled(json!({"undo": 1}), 2, 1))]));
+    let mut solver = with_orders(&json!([
+        at(0, scheduled(squeeze(0.4), 10, 1)),
+        at(4, scheduled(json!({"undo": 1}), 2, 1))
+    ]));
     solver.steps(4);
     assert_eq!(solver.motions.len(), 4);
     let there = solver.mesh.clone();
     solver.step();
-    let half: Vec<_> = there.points().iter().zip(solver.reference.points()).map(|(a, b)| 0.5 * (a[2] + b[2])).collect();
-    assert!(solver.mesh.points().iter().zip(half).all(|(point, half)| (point[2] - half).abs() < 1e-14));
+    let half: Vec<_> = there
+        .points()
+        .iter()
+        .zip(solver.reference.points())
+        .map(|(a, b)| 0.5 * (a[2] + b[2]))
+        .collect();
+    assert!(
+        solver.mesh.points().iter().zip(half).all(|(point, half)| (point[2] - half).abs() < 1e-14)
+    );
     solver.steps(10);
     assert_eq!(solver.motions.len(), 6);
     assert!(solver.is_at_reference());
@@ -156,12 +176,30 @@ fn a_refused_order_leaves_the_schedule_under_way_alone() {
     let report = solver.finish();
     let reason = |index: usize| report.orders[index].reason.clone().unwrap_or_default();
     assert_eq!(report.orders[1].status, OrderStatus::Rejected);
-    assert!(report.orders[1].min_scaled_jacobian.is_some_and(|reached| reached < 0.0), "what it would have come to");
-    assert!(report.orders[1].seconds.volume > 0.0 && report.orders[1].seconds.guard > 0.0, "what it took to find out");
-    assert!(reason(1).contains("inside out") && reason(1).contains("largest feasible fraction"), "{}", reason(1));
+    assert!(
+        report.orders[1].min_scaled_jacobian.is_some_and(|reached| reached < 0.0),
+        "what it would have come to"
+    );
+    assert!(
+        report.orders[1].seconds.volume > 0.0 && report.orders[1].seconds.guard > 0.0,
+        "what it took to find out"
+    );
+    assert!(
+        reason(1).contains("inside out") && reason(1).contains("largest feasible fraction"),
+        "{}",
+        reason(1)
+    );
     assert_eq!(report.orders[2].status, OrderStatus::Rejected);
-    assert!(reason(2).contains("intersect") && reason(2).contains("largest feasible fraction"), "{}", reason(2));
-    assert!(reason(3).contains("z-mx") && reason(3).contains("z-max") && reason(3).contains("x-min"), "{}", reason(3));
+    assert!(
+        reason(2).contains("intersect") && reason(2).contains("largest feasible fraction"),
+        "{}",
+        reason(2)
+    );
+    assert!(
+        reason(3).contains("z-mx") && reason(3).contains("z-max") && reason(3).contains("x-min"),
+        "{}",
+        reason(3)
+    );
 }
 
 #[test]
@@ -172,8 +210,11 @@ fn parameters_are_steered_within_their_bounds() {
         {"at": {"cycle": 3}, "parameter": {"name": "inflo", "value": 1.0}},
         {"at": {"cycle": 5}, "stop": {}}]);
     let parameter = Parameter { name: "inflow".into(), value: 1.0, minimum: 0.0, maximum: 10.0 };
-    let mut solver =
-        Solver::new(Settings { orders: orders(&list), parameters: vec![parameter], ..Settings::default() });
+    let mut solver = Solver::new(Settings {
+        orders: orders(&list),
+        parameters: vec![parameter],
+        ..Settings::default()
+    });
     solver.steps(5);
     assert!(!solver.stopped);
     solver.step();
@@ -205,7 +246,8 @@ fn the_solvers_own_mistakes_are_told_and_change_nothing() {
     let mesh = box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
     let other = box_of_tets([3, 2, 2], [0.0; 3], [1.0; 3]);
     let list = orders(&json!([at(3, squeeze(0.2))]));
-    let mut adaptor = Adaptor::initialize(Settings { orders: list, ..Settings::default() }).unwrap();
+    let mut adaptor =
+        Adaptor::initialize(Settings { orders: list, ..Settings::default() }).unwrap();
     let step = |cycle| Step { cycle, time: 0.0, time_step: 0.1 };
     let channel = |mesh| [Channel { name: "fluid", mesh: MeshView::from(mesh), fields: &[] }];
     assert!(matches!(adaptor.execute(&step(0), &[]), Err(ExecuteError::NoChannel { .. })));
@@ -231,7 +273,10 @@ fn what_makes_no_sense_is_refused_before_the_run() {
     assert!(matches!(Adaptor::initialize(settings).err(), Some(InitializeError::Parameter(_))));
     let mut nan = orders(&json!([at(0, squeeze(0.1))]));
     let tombolo::pipelines::language::Command::Order(order) = &mut nan[0].command else { panic!() };
-    order.guard = Some(tombolo::deform::quality::Guard { min_scaled_jacobian: f64::NAN, ..Default::default() });
+    order.guard = Some(tombolo::deform::quality::Guard {
+        min_scaled_jacobian: f64::NAN,
+        ..Default::default()
+    });
     let settings = Settings { orders: nan, ..Settings::default() };
     let error = Adaptor::initialize(settings).err().expect("refused").to_string();
     assert!(error.contains("min_scaled_jacobian"), "{error}");
@@ -288,7 +333,8 @@ fn a_journal_holds_what_a_displacement_file_held() {
     let run = |name: &str, orders: Vec<TimedCommand>| {
         let text = format!(r#"{{"version": 1, "journal": "{name}"}}"#);
         let output = directory.path().into();
-        let mut solver = Solver::new(Settings { config: config(&text), orders, output, ..Settings::default() });
+        let mut solver =
+            Solver::new(Settings { config: config(&text), orders, output, ..Settings::default() });
         for _ in 0..6 {
             solver.step();
         }
@@ -299,15 +345,20 @@ fn a_journal_holds_what_a_displacement_file_held() {
         at(3, json!({"edits": [{"displacement": {"file": "missing.txt"}}]}))
     ]);
     let beside = directory.path().join("orders.json");
-    let (shape, journal) = run("first.jsonl", parse_orders(&list.to_string(), &beside.to_string_lossy()).unwrap());
+    let (shape, journal) =
+        run("first.jsonl", parse_orders(&list.to_string(), &beside.to_string_lossy()).unwrap());
     let (still, _) = run("none.jsonl", Vec::new());
     assert!(shape != still);
     let lines: Vec<&str> = journal.lines().collect();
     assert!(
-        lines[0].contains("\"values\":[[0.0,0.0,0.1],[0.0,0.0,0.0625]]") && !lines[0].contains("lift.txt"),
+        lines[0].contains("\"values\":[[0.0,0.0,0.1],[0.0,0.0,0.0625]]")
+            && !lines[0].contains("lift.txt"),
         "{journal}"
     );
-    assert!(lines.iter().any(|line| line.contains("rejected") && line.contains("missing.txt")), "{journal}");
+    assert!(
+        lines.iter().any(|line| line.contains("rejected") && line.contains("missing.txt")),
+        "{journal}"
+    );
     std::fs::remove_file(file).unwrap();
     let (again, _) = run("second.jsonl", parse_orders(&journal, "first.jsonl").unwrap());
     assert!(shape == again);
@@ -323,7 +374,8 @@ fn two_channels(named: &str) -> (Vec<(u64, usize)>, OrderStatus, String) {
     };
     let mut adaptor = Adaptor::initialize(settings).expect("initialize");
     assert_eq!(adaptor.steered_channel(), Some(named));
-    let boxes = [box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]), box_of_tets([3, 3, 3], [2.0; 3], [3.0; 3])];
+    let boxes =
+        [box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]), box_of_tets([3, 3, 3], [2.0; 3], [3.0; 3])];
     let mut motions = Vec::new();
     for cycle in 0..4 {
         let [first, second] = &boxes;
@@ -335,9 +387,15 @@ fn two_channels(named: &str) -> (Vec<(u64, usize)>, OrderStatus, String) {
         let steering = adaptor.execute(&step, &channels).expect("execute");
         motions.extend(steering.motion.map(|motion| (cycle, motion.coordinates.len())));
         if cycle == 3 && named == "fluid" {
-            let error = adaptor.execute(&Step { cycle: 4, ..step }, &channels[..1]).map(|_| ()).unwrap_err();
+            let error = adaptor
+                .execute(&Step { cycle: 4, ..step }, &channels[..1])
+                .map(|_| ())
+                .unwrap_err();
             assert!(matches!(&error, ExecuteError::SteeredChannel { cycle: 4, .. }), "{error}");
-            assert!(error.to_string().contains("no channel `fluid`; its channels are particles"), "{error}");
+            assert!(
+                error.to_string().contains("no channel `fluid`; its channels are particles"),
+                "{error}"
+            );
         }
     }
     let report = adaptor.finalize().expect("report");
@@ -352,13 +410,22 @@ fn orders_change_the_channel_that_the_configuration_names() {
     // A channel that is not there is no mistake of the solver's: it goes on, and orders are told why they are rejected.
     let (motions, status, reason) = two_channels("fluids");
     assert_eq!((motions.len(), status), (0, OrderStatus::Rejected));
-    assert!(reason.contains("no channel `fluids`") && reason.contains("did you mean `fluid`?"), "{reason}");
+    assert!(
+        reason.contains("no channel `fluids`") && reason.contains("did you mean `fluid`?"),
+        "{reason}"
+    );
 }
 
 /// The last coordinates that an order leads to on a mesh of these arrays.
-fn squeezed(points: &[Vector], cell_type: CellType, connectivity: &[u32]) -> Result<Vec<Vector>, ExecuteError> {
+fn squeezed(
+    points: &[Vector],
+    cell_type: CellType,
+    connectivity: &[u32],
+) -> Result<Vec<Vector>, ExecuteError> {
     let settings = Settings {
-        config: config(r#"{"version": 1, "pipelines": [{"name": "shape", "on": "order", "stages": []}]}"#),
+        config: config(
+            r#"{"version": 1, "pipelines": [{"name": "shape", "on": "order", "stages": []}]}"#,
+        ),
         orders: orders(&json!([at(
             1,
             json!({"edits": [{"translate": {"region": {"box": {"lower": [-9, -9, 0.99], "upper": [9, 9, 9]}},
@@ -370,9 +437,13 @@ fn squeezed(points: &[Vector], cell_type: CellType, connectivity: &[u32]) -> Res
     let mut reached = points.to_vec();
     for cycle in 0..4 {
         let cells = CellsView::Uniform { cell_type, connectivity: Indices::U32(connectivity) };
-        let channels =
-            [Channel { name: "solid", mesh: MeshView::new(ArrayView::vectors(&reached), cells), fields: &[] }];
-        let steering = adaptor.execute(&Step { cycle, time: cycle as f64, time_step: 1.0 }, &channels)?;
+        let channels = [Channel {
+            name: "solid",
+            mesh: MeshView::new(ArrayView::vectors(&reached), cells),
+            fields: &[],
+        }];
+        let steering =
+            adaptor.execute(&Step { cycle, time: cycle as f64, time_step: 1.0 }, &channels)?;
         if let Some(motion) = steering.motion {
             let motion = motion.coordinates.to_vec();
             reached = motion;
@@ -389,7 +460,8 @@ fn squeezed(points: &[Vector], cell_type: CellType, connectivity: &[u32]) -> Res
 fn the_order_of_a_solvers_vertices_is_its_own() {
     let tets = box_of_tets([3, 3, 3], [0.0; 3], [1.0; 3]);
     let hexahedra = tombolo::deform::shapes::box_of_hexahedra([3, 3, 3], [0.0; 3], [1.0; 3]);
-    let mirror = |points: &[Vector]| points.iter().map(|&[x, y, z]| [-x, y, z]).collect::<Vec<Vector>>();
+    let mirror =
+        |points: &[Vector]| points.iter().map(|&[x, y, z]| [-x, y, z]).collect::<Vec<Vector>>();
     for mesh in [&tets, &hexahedra] {
         let cell_type = mesh.cells().types()[0];
         let connectivity = mesh.cells().connectivity();
@@ -405,9 +477,12 @@ fn the_order_of_a_solvers_vertices_is_its_own() {
         rows.chunks(order.len()).flat_map(|row| order.iter().map(|&local| row[local])).collect()
     };
     let turned = other(tets.cells().connectivity(), &[0, 2, 1, 3]);
-    let plain = squeezed(tets.points(), CellType::Tetra, tets.cells().connectivity()).expect("steered");
+    let plain =
+        squeezed(tets.points(), CellType::Tetra, tets.cells().connectivity()).expect("steered");
     assert_eq!(squeezed(tets.points(), CellType::Tetra, &turned).expect("steered"), plain);
     let lexicographic = other(hexahedra.cells().connectivity(), &[0, 1, 3, 2, 4, 5, 7, 6]);
-    let error = squeezed(hexahedra.points(), CellType::Hexahedron, &lexicographic).expect_err("refused").to_string();
+    let error = squeezed(hexahedra.points(), CellType::Hexahedron, &lexicographic)
+        .expect_err("refused")
+        .to_string();
     assert!(error.contains("VTK's order is") && error.contains("lexicographic"), "{error}");
 }

@@ -36,7 +36,11 @@ fn answer(adaptor: &Adaptor, bytes: &[u8]) -> Vec<u8> {
 }
 
 fn get(adaptor: &Adaptor, path: &str, headers: &str) -> String {
-    raw(adaptor, format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n{headers}\r\n").as_bytes())
+    raw(
+        adaptor,
+        format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n{headers}\r\n")
+            .as_bytes(),
+    )
 }
 
 fn status_of(error: &Error) -> Option<u16> {
@@ -49,14 +53,20 @@ fn status_of(error: &Error) -> Option<u16> {
 #[test]
 fn a_viewer_sees_the_run_and_changes_its_shape() {
     let parameter = Parameter { name: "inflow".into(), value: 1.0, minimum: 0.0, maximum: 10.0 };
-    let mut solver =
-        Solver::new(Settings { config: config(LINK_TO_ALL), parameters: vec![parameter], ..Settings::default() });
+    let mut solver = Solver::new(Settings {
+        config: config(LINK_TO_ALL),
+        parameters: vec![parameter],
+        ..Settings::default()
+    });
     solver.step();
     let mut viewer = Viewer::connect(&solver.adaptor);
     let hello = viewer.hello();
     assert_eq!((&hello["protocol"], &hello["role"]), (&json!(1), &json!("driver")));
     assert_eq!(hello["views"], json!([{"name": "boundary", "kind": "surface"}]));
-    assert_eq!(hello["fields"], json!([{"name": "speed", "association": "vertex", "components": 1}]));
+    assert_eq!(
+        hello["fields"],
+        json!([{"name": "speed", "association": "vertex", "components": 1}])
+    );
     assert_eq!(hello["features"][5]["name"], "z-max");
     assert_eq!(hello["features"][5]["faces"], 32);
     assert_eq!(hello["features"][5]["vertices"], 25);
@@ -68,9 +78,15 @@ fn a_viewer_sees_the_run_and_changes_its_shape() {
 
     viewer.send(&json!({"id": "squeeze", "order": squeeze(0.3)}));
     assert_eq!(viewer.wait_for("order", |order| order["id"] == "squeeze")["status"], "accepted");
-    let applied = solver.step_until_told(&mut viewer, "order", |order| order["status"] == "applied");
-    assert_eq!((&applied["shape"], &applied["shapes"], &applied["reason"]), (&json!(1), &json!(1), &Value::Null));
-    assert!(applied["cycle_applied"].is_u64() && applied["min_scaled_jacobian"].as_f64() > Some(0.02));
+    let applied =
+        solver.step_until_told(&mut viewer, "order", |order| order["status"] == "applied");
+    assert_eq!(
+        (&applied["shape"], &applied["shapes"], &applied["reason"]),
+        (&json!(1), &json!(1), &Value::Null)
+    );
+    assert!(
+        applied["cycle_applied"].is_u64() && applied["min_scaled_jacobian"].as_f64() > Some(0.02)
+    );
     assert!(solver.mesh.points().contains(&[0.0, 0.0, 0.7]), "the lid has come down");
     let stack = viewer.wait_for("hello", |hello| hello["stack"] != json!([]));
     assert_eq!(stack["orders"][0]["order"]["edits"][0]["translate"]["by"], json!([0.0, 0.0, -0.3]));
@@ -78,10 +94,13 @@ fn a_viewer_sees_the_run_and_changes_its_shape() {
 
     viewer.send(&json!({"parameter": {"name": "inflow", "value": 2.0}}));
     viewer.send(&json!({"id": "back", "order": {"undo": 1}}));
-    solver.step_until_told(&mut viewer, "order", |order| order["id"] == "back" && order["status"] == "applied");
+    solver.step_until_told(&mut viewer, "order", |order| {
+        order["id"] == "back" && order["status"] == "applied"
+    });
     assert!(solver.is_at_reference());
     assert_eq!(solver.parameters, [("inflow".to_owned(), 2.0)]);
-    let status = solver.step_until_told(&mut viewer, "status", |status| !status["quality"].is_null());
+    let status =
+        solver.step_until_told(&mut viewer, "status", |status| !status["quality"].is_null());
     assert_eq!(status["quality"]["inverted"], 0);
     assert_eq!(
         (&status["viewers"], &status["driver"], &status["paused"]),
@@ -89,7 +108,9 @@ fn a_viewer_sees_the_run_and_changes_its_shape() {
     );
 
     assert!(viewer.frames.len() >= 2);
-    let Ok(Decoded::Topology(topology)) = decode(&viewer.frames[0]) else { panic!("the topology comes first") };
+    let Ok(Decoded::Topology(topology)) = decode(&viewer.frames[0]) else {
+        panic!("the topology comes first")
+    };
     assert_eq!(topology.view, "boundary");
     let mut squeezed = 0;
     for frame in &viewer.frames[1..] {
@@ -102,7 +123,11 @@ fn a_viewer_sees_the_run_and_changes_its_shape() {
     assert!(squeezed > 0, "the new shape was seen");
     let report = solver.finish();
     assert_eq!(report.orders.len(), 2);
-    assert!(report.stream.frames > 0 && report.stream.bytes > 0 && report.stream.raw_bytes > report.stream.bytes);
+    assert!(
+        report.stream.frames > 0
+            && report.stream.bytes > 0
+            && report.stream.raw_bytes > report.stream.bytes
+    );
     viewer.wait_for_end();
 }
 
@@ -120,22 +145,30 @@ fn a_forecast_is_told_while_the_solver_is_busy_and_changes_nothing() {
     viewer.send(&json!({"id": "f2", "forecast": squeeze(1.5)}));
     let refused = viewer.wait_for("forecast", |forecast| forecast["id"] == "f2");
     assert_eq!(refused["order"]["outcome"], "rejected");
-    assert!(refused["order"]["fraction"].as_f64().is_some_and(|fraction| fraction < 0.7), "{refused}");
+    assert!(
+        refused["order"]["fraction"].as_f64().is_some_and(|fraction| fraction < 0.7),
+        "{refused}"
+    );
     viewer.send(&json!({"id": "f3", "forecast": {"undo": 1}}));
     let nothing = viewer.wait_for("forecast", |forecast| forecast["id"] == "f3");
-    assert!(nothing["order"]["reason"].as_str().is_some_and(|reason| reason.contains("undo")), "{nothing}");
+    assert!(
+        nothing["order"]["reason"].as_str().is_some_and(|reason| reason.contains("undo")),
+        "{nothing}"
+    );
     viewer.send(&json!({"id": "f4", "forecast": {"edits": []}}));
     assert!(viewer.wait_for("error", |error| error["id"] == "f4")["message"].as_str().is_some());
     solver.step();
     assert!(solver.is_at_reference());
 
     viewer.send(&json!({"id": "squeeze", "order": squeeze(0.3)}));
-    let applied = solver.step_until_told(&mut viewer, "order", |order| order["status"] == "applied");
+    let applied =
+        solver.step_until_told(&mut viewer, "order", |order| order["status"] == "applied");
     for key in ["min_scaled_jacobian", "largest_displacement", "shapes"] {
         assert_eq!(applied[key], told["order"][key], "{key}");
     }
     let mut other = Solver::new(Settings {
-        orders: parse_orders(&json!([{"order": squeeze(0.3)}]).to_string(), "orders.json").expect("orders"),
+        orders: parse_orders(&json!([{"order": squeeze(0.3)}]).to_string(), "orders.json")
+            .expect("orders"),
         ..Settings::default()
     });
     other.step();
@@ -154,26 +187,47 @@ fn what_a_viewer_gets_wrong_is_told_and_changes_nothing() {
         ("", "message:1:1"),
         ("[]", "message"),
         (r#"{"ordr": {"undo": 1}}"#, "order"),
-        (r#"{"order": {"edits": [{"translate": {"features": ["z-max"], "by": [NaN, 0, 0]}}]}}"#, "NaN"),
-        (r#"{"order": {"edits": [{"translate": {"features": ["z-max"], "by": [1e999, 0, 0]}}]}}"#, "1e999"),
-        (r#"{"order": {"edits": [{"translate": {"feature": ["z-max"], "by": [0, 0, 0]}}]}}"#, "features"),
-        (r#"{"order": {"edits": [{"rotate": {"features": ["z-max"], "axis": [0, 0, 0], "degrees": 1}}]}}"#, "axis"),
-        (r#"{"order": {"edits": [{"displacement": {"file": "/etc/hostname"}}]}}"#, "names no files of this machine"),
+        (
+            r#"{"order": {"edits": [{"translate": {"features": ["z-max"], "by": [NaN, 0, 0]}}]}}"#,
+            "NaN",
+        ),
+        (
+            r#"{"order": {"edits": [{"translate": {"features": ["z-max"], "by": [1e999, 0, 0]}}]}}"#,
+            "1e999",
+        ),
+        (
+            r#"{"order": {"edits": [{"translate": {"feature": ["z-max"], "by": [0, 0, 0]}}]}}"#,
+            "features",
+        ),
+        (
+            r#"{"order": {"edits": [{"rotate": {"features": ["z-max"], "axis": [0, 0, 0], "degrees": 1}}]}}"#,
+            "axis",
+        ),
+        (
+            r#"{"order": {"edits": [{"displacement": {"file": "/etc/hostname"}}]}}"#,
+            "names no files of this machine",
+        ),
         (r#"{"order": {"undo": 1}, "stop": {}}"#, "message"),
         (r#"{"id": 3, "pause": {}}"#, "id"),
         (r#"{"parameter": {"name": "nothing", "value": 1}}"#, "nothing"),
     ] {
         viewer.send_text(message);
-        solver.step_until_told(&mut viewer, "error", |error| error["message"].as_str().unwrap().contains(named));
+        solver.step_until_told(&mut viewer, "error", |error| {
+            error["message"].as_str().unwrap().contains(named)
+        });
     }
     viewer.send_message(Message::binary(vec![0, 1, 2]));
     viewer.wait_for("error", |error| error["message"].as_str().unwrap().contains("binary"));
     for (edit, named) in [
         (json!({"translate": {"features": ["z-mox"], "by": [0.0, 0.0, 0.1]}}), "z-max"),
-        (json!({"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -1.2]}}), "feasible"),
+        (
+            json!({"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -1.2]}}),
+            "feasible",
+        ),
     ] {
         viewer.send(&json!({"order": {"edits": [edit]}}));
-        let order = solver.step_until_told(&mut viewer, "order", |order| order["status"] == "rejected");
+        let order =
+            solver.step_until_told(&mut viewer, "order", |order| order["status"] == "rejected");
         assert!(order["reason"].as_str().unwrap().contains(named), "{order}");
     }
     viewer.send(&json!({"id": "same", "order": {"stack": []}}));
@@ -189,24 +243,36 @@ fn the_reference_surface_is_there_for_those_with_the_token_bit_for_bit() {
     let link = solver.adaptor.link().expect("a link");
     let token = link.split_once('?').expect("a token").1;
     let path = format!("/surface?{token}");
-    assert!(get(&solver.adaptor, &path, "").starts_with("HTTP/1.1 404"), "there is no mesh before the first step");
+    assert!(
+        get(&solver.adaptor, &path, "").starts_with("HTTP/1.1 404"),
+        "there is no mesh before the first step"
+    );
     solver.step();
     for wrong in ["/surface", "/surface?token=", "/surface?token=0123", &format!("{path}0")] {
         assert!(get(&solver.adaptor, wrong, "").starts_with("HTTP/1.1 401"), "{wrong}");
     }
     for _ in 0..2 {
-        let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
+        let request =
+            format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
         let answer = answer(&solver.adaptor, request.as_bytes());
         let body = answer.windows(4).position(|four| four == b"\r\n\r\n").expect("a body") + 4;
         assert!(answer.starts_with(b"HTTP/1.1 200"));
-        let Decoded::Surface(surface) = decode(&answer[body..]).expect("a frame") else { panic!("another frame") };
-        let points: Vec<_> =
-            surface.vertices().iter().map(|&vertex| solver.reference.points()[vertex as usize]).collect();
+        let Decoded::Surface(surface) = decode(&answer[body..]).expect("a frame") else {
+            panic!("another frame")
+        };
+        let points: Vec<_> = surface
+            .vertices()
+            .iter()
+            .map(|&vertex| solver.reference.points()[vertex as usize])
+            .collect();
         assert_eq!(surface.points(), points);
         assert_eq!(surface.features().names()[5], "z-max");
     }
     let hello = Viewer::connect(&solver.adaptor).hello();
-    assert_eq!((&hello["surface"]["vertices"], &hello["surface"]["faces"]), (&json!(98), &json!(192)));
+    assert_eq!(
+        (&hello["surface"]["vertices"], &hello["surface"]["faces"]),
+        (&json!(98), &json!(192))
+    );
 }
 
 #[test]
@@ -228,8 +294,11 @@ fn only_the_token_lets_anybody_in() {
     assert!(get(&solver.adaptor, "/no/such/file", "").starts_with("HTTP/1.1 404"));
     assert!(get(&solver.adaptor, "/../Cargo.toml", "").starts_with("HTTP/1.1 4"));
     let path = right.split_once("/ws").map(|(_, query)| format!("/ws{query}")).unwrap();
-    assert!(get(&solver.adaptor, &path, "Origin: http://evil.example\r\n").starts_with("HTTP/1.1 403"));
-    let rebound = raw(&solver.adaptor, b"GET / HTTP/1.1\r\nHost: evil.example\r\nConnection: close\r\n\r\n");
+    assert!(
+        get(&solver.adaptor, &path, "Origin: http://evil.example\r\n").starts_with("HTTP/1.1 403")
+    );
+    let rebound =
+        raw(&solver.adaptor, b"GET / HTTP/1.1\r\nHost: evil.example\r\nConnection: close\r\n\r\n");
     assert!(rebound.starts_with("HTTP/1.1 403"), "{rebound}");
     solver.steps(3);
 }
@@ -243,26 +312,37 @@ fn one_drives_and_the_others_watch() {
     let mut watcher = Viewer::connect(&solver.adaptor);
     assert_eq!(watcher.hello()["role"], "watcher");
     watcher.send(&json!({"id": "w", "order": squeeze(0.2)}));
-    assert!(watcher.wait_for("error", |error| error["id"] == "w")["message"].as_str().unwrap().contains("watches"));
+    assert!(
+        watcher.wait_for("error", |error| error["id"] == "w")["message"]
+            .as_str()
+            .unwrap()
+            .contains("watches")
+    );
     watcher.send(&json!({"id": "d", "drive": {}}));
     let refused = watcher.wait_for("error", |error| error["id"] == "d");
     assert!(refused["message"].as_str().unwrap().contains(name.as_str().unwrap()));
     driver.send(&json!({"id": "seen by both", "order": squeeze(0.2)}));
-    solver
-        .step_until_told(&mut watcher, "order", |order| order["id"] == "seen by both" && order["status"] == "applied");
+    solver.step_until_told(&mut watcher, "order", |order| {
+        order["id"] == "seen by both" && order["status"] == "applied"
+    });
 
     let begun = Instant::now();
     drop(driver);
     loop {
         watcher.send(&json!({"drive": {}}));
-        if watcher.look_for("hello", Duration::from_millis(300), |hello| hello["role"] == "driver").is_some() {
+        if watcher
+            .look_for("hello", Duration::from_millis(300), |hello| hello["role"] == "driver")
+            .is_some()
+        {
             break;
         }
         assert!(begun.elapsed() < PATIENCE, "the wheel never came free");
     }
     assert!(begun.elapsed() > Duration::from_secs(2), "the wheel is kept for a moment");
     watcher.send(&json!({"id": "mine", "order": {"undo": 1}}));
-    solver.step_until_told(&mut watcher, "order", |order| order["id"] == "mine" && order["status"] == "applied");
+    solver.step_until_told(&mut watcher, "order", |order| {
+        order["id"] == "mine" && order["status"] == "applied"
+    });
     assert!(solver.is_at_reference());
 }
 
@@ -275,7 +355,8 @@ fn a_driver_that_comes_back_has_the_wheel() {
     watcher.hello();
     drop(driver);
     watcher.wait_for("status", |status| status["viewers"] == 1);
-    let mut again = Viewer::try_connect(&format!("{}&client={name}", socket_url(&solver.adaptor))).unwrap();
+    let mut again =
+        Viewer::try_connect(&format!("{}&client={name}", socket_url(&solver.adaptor))).unwrap();
     assert_eq!(again.hello()["role"], "driver");
 }
 
@@ -289,13 +370,16 @@ fn a_paused_solver_waits_and_still_listens() {
     let helper = std::thread::spawn(move || {
         viewer.wait_for("status", |status| status["paused"] == true);
         viewer.send(&json!({"id": "meanwhile", "order": squeeze(0.2)}));
-        viewer.wait_for("order", |order| order["id"] == "meanwhile" && order["status"] == "applying");
+        viewer
+            .wait_for("order", |order| order["id"] == "meanwhile" && order["status"] == "applying");
         std::thread::sleep(Duration::from_millis(200));
         viewer.send(&json!({"resume": {}}));
         viewer.wait_for("status", |status| status["paused"] == false);
         viewer
     });
-    solver.step_until("the order's motion, at the cycle of the pause", |solver| !solver.motions.is_empty());
+    solver.step_until("the order's motion, at the cycle of the pause", |solver| {
+        !solver.motions.is_empty()
+    });
     assert!(solver.slowest >= Duration::from_millis(200), "it did not wait");
     solver.step();
     let mut viewer = helper.join().unwrap();
@@ -307,7 +391,8 @@ fn a_paused_solver_waits_and_still_listens() {
 
 #[test]
 fn a_solver_may_wait_for_its_first_viewer() {
-    let waiting = LINK_TO_ALL.replace(r#""pipelines""#, r#""steering": {"wait_for_viewer": true}, "pipelines""#);
+    let waiting = LINK_TO_ALL
+        .replace(r#""pipelines""#, r#""steering": {"wait_for_viewer": true}, "pipelines""#);
     let mut solver = Solver::with_config(&waiting);
     let address = socket_url(&solver.adaptor);
     let late = std::thread::spawn(move || {
@@ -321,7 +406,8 @@ fn a_solver_may_wait_for_its_first_viewer() {
     viewer.hello();
     drop(viewer);
     solver.steps(3);
-    let alone = language::parse(r#"{"version": 1, "steering": {"wait_for_viewer": true}}"#, "alone.json");
+    let alone =
+        language::parse(r#"{"version": 1, "steering": {"wait_for_viewer": true}}"#, "alone.json");
     assert!(alone.unwrap_err().to_string().contains("wait_for_viewer"));
 }
 
@@ -330,7 +416,8 @@ fn garbage_on_the_port_is_no_trouble() {
     let mut solver = Solver::with_config(LINK_TO_ALL);
     let url = socket_url(&solver.adaptor);
     let path = url.split_once("/ws").map(|(_, query)| format!("/ws{query}")).unwrap();
-    let noise: Vec<u8> = (0..70_000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
+    let noise: Vec<u8> =
+        (0..70_000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
     raw(&solver.adaptor, b"\0\0\0\0\r\n\r\n");
     raw(&solver.adaptor, &noise);
     raw(&solver.adaptor, b"GET / HTTP/9.9\r\n\r\n");
@@ -375,7 +462,8 @@ fn a_viewer_is_told_which_limit_its_message_is_beyond() {
     solver.step();
     let mut viewer = Viewer::connect(&solver.adaptor);
     viewer.hello();
-    let edit = json!({"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -1e-6]}});
+    let edit =
+        json!({"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -1e-6]}});
     let edits = vec![edit.clone(); EDITS.most + 1];
     for (message, named) in [
         (
@@ -387,7 +475,10 @@ fn a_viewer_is_told_which_limit_its_message_is_beyond() {
     ] {
         viewer.send(&message);
         let told = viewer.wait_for("error", |error| error["id"] == message["id"]);
-        assert!(told["message"].as_str().unwrap().ends_with(&named.unwrap_err().to_string()), "{told}");
+        assert!(
+            told["message"].as_str().unwrap().ends_with(&named.unwrap_err().to_string()),
+            "{told}"
+        );
     }
     let mut watcher = Viewer::connect(&solver.adaptor);
     watcher.send_text(&" ".repeat(2000));
@@ -425,7 +516,9 @@ fn a_port_in_use_is_told_by_name() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap();
     let text = LINK_TO_ALL.replace("127.0.0.1:0", &address.to_string());
-    let error = Adaptor::initialize(Settings { config: config(&text), ..Settings::default() }).err().expect("refused");
+    let error = Adaptor::initialize(Settings { config: config(&text), ..Settings::default() })
+        .err()
+        .expect("refused");
     assert!(matches!(error, InitializeError::Stream(StreamError::InUse { .. })));
     let message = error.to_string();
     assert!(message.contains(&address.to_string()) && message.contains("port 0"), "{message}");
@@ -457,20 +550,28 @@ fn a_viewer_changes_no_bit_of_the_run() {
 #[test]
 fn orders_of_viewers_replay_from_the_journal() {
     let directory = tempfile::tempdir().unwrap();
-    let text = LINK_TO_ALL.replacen("\"version\": 1,", "\"version\": 1, \"journal\": \"run.jsonl\",", 1);
-    let settings = Settings { config: config(&text), output: directory.path().into(), ..Settings::default() };
+    let text =
+        LINK_TO_ALL.replacen("\"version\": 1,", "\"version\": 1, \"journal\": \"run.jsonl\",", 1);
+    let settings =
+        Settings { config: config(&text), output: directory.path().into(), ..Settings::default() };
     let mut solver = Solver::new(settings);
     solver.step();
     let mut viewer = Viewer::connect(&solver.adaptor);
     viewer.hello();
     let schedule = json!({"steps": 8, "every": {"steps": 3}});
-    viewer.send(&json!({"id": "a", "order": {"edits": squeeze(0.3)["edits"], "schedule": schedule}}));
+    viewer
+        .send(&json!({"id": "a", "order": {"edits": squeeze(0.3)["edits"], "schedule": schedule}}));
     solver.step_until_told(&mut viewer, "order", |order| order["id"] == "a" && order["shape"] == 3);
-    viewer.send(&json!({"id": "b", "order": {"edits": squeeze(0.1)["edits"], "schedule": schedule}}));
-    solver.step_until_told(&mut viewer, "order", |order| order["id"] == "b" && order["status"] == "applied");
+    viewer
+        .send(&json!({"id": "b", "order": {"edits": squeeze(0.1)["edits"], "schedule": schedule}}));
+    solver.step_until_told(&mut viewer, "order", |order| {
+        order["id"] == "b" && order["status"] == "applied"
+    });
     let journal = std::fs::read_to_string(directory.path().join("run.jsonl")).unwrap();
-    let mut replay =
-        Solver::new(Settings { orders: parse_orders(&journal, "run.jsonl").unwrap(), ..Settings::default() });
+    let mut replay = Solver::new(Settings {
+        orders: parse_orders(&journal, "run.jsonl").unwrap(),
+        ..Settings::default()
+    });
     replay.steps(solver.cycle);
     assert_eq!(replay.motions, solver.motions);
     assert!(bits(&replay.mesh) == bits(&solver.mesh));
@@ -506,7 +607,10 @@ mod any_bytes {
             "\"\\ud800\"",
             "\u{0}",
         ]);
-        prop_oneof![any::<String>(), prop::collection::vec(word, 0..20).prop_map(|words| words.concat())]
+        prop_oneof![
+            any::<String>(),
+            prop::collection::vec(word, 0..20).prop_map(|words| words.concat())
+        ]
     }
 
     #[test]
@@ -515,8 +619,10 @@ mod any_bytes {
         solver.step();
         let mut viewer = Viewer::connect(&solver.adaptor);
         viewer.hello();
-        let mut runner =
-            proptest::test_runner::TestRunner::new(ProptestConfig { cases: 30, ..ProptestConfig::default() });
+        let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
+            cases: 30,
+            ..ProptestConfig::default()
+        });
         let mut texts = Vec::new();
         for _ in 0..30 {
             texts.push(message().new_tree(&mut runner).unwrap().current());

@@ -82,15 +82,23 @@ pub fn run() -> Result<Catalyst, Box<dyn Error>> {
     });
     let targets = vec![
         Target::at_most("catalyst_execute with nothing due [s]", slowest, 10e-6),
-        Target::at_most("bytes it allocates more for a larger mesh", growth.fold(0.0, f64::max), 0.0),
+        Target::at_most(
+            "bytes it allocates more for a larger mesh",
+            growth.fold(0.0, f64::max),
+            0.0,
+        ),
     ];
     Ok(Catalyst { rows, targets })
 }
 
 fn measure(program: &Path, config: &Path, size: u32) -> Result<Measured, Box<dyn Error>> {
     let mut command = Command::new(program);
-    command.args([size.to_string(), CALLS.to_string()]).env("CATALYST_IMPLEMENTATION_NAME", "tombolo");
-    for name in ["TOMBOLO_ORDERS", "TOMBOLO_OUTPUT", "TOMBOLO_REPORT", "CATALYST_IMPLEMENTATION_PATHS"] {
+    command
+        .args([size.to_string(), CALLS.to_string()])
+        .env("CATALYST_IMPLEMENTATION_NAME", "tombolo");
+    for name in
+        ["TOMBOLO_ORDERS", "TOMBOLO_OUTPUT", "TOMBOLO_REPORT", "CATALYST_IMPLEMENTATION_PATHS"]
+    {
         command.env_remove(name);
     }
     Ok(serde_json::from_str(&succeed(command.env("TOMBOLO_PIPELINES", config))?)?)
@@ -130,7 +138,11 @@ impl fmt::Display for Catalyst {
         writeln!(f, "\n{:<44} {:>12} {:>14}", "target", "value", "at most")?;
         for target in &self.targets {
             let verdict = if target.holds { "holds" } else { "does not hold" };
-            writeln!(f, "{:<44} {:>12.3e} {:>14.3e}  {verdict}", target.name, target.value, target.target)?;
+            writeln!(
+                f,
+                "{:<44} {:>12.3e} {:>14.3e}  {verdict}",
+                target.name, target.value, target.target
+            )?;
         }
         Ok(())
     }

@@ -80,24 +80,24 @@ fn main() -> ExitCode {
     }
     let result: Result<Report, Box<dyn std::error::Error>> = match arguments.name {
         Name::Paper => {
-            return said(
-                paper::run().map(|report| if arguments.json { report.json() + "\n" } else { report.to_string() }),
-            );
+            return said(paper::run().map(|report| {
+                if arguments.json { report.json() + "\n" } else { report.to_string() }
+            }));
         }
         Name::Stiffening => {
-            return said(
-                stiffening::run().map(|report| if arguments.json { report.json() + "\n" } else { report.to_string() }),
-            );
+            return said(stiffening::run().map(|report| {
+                if arguments.json { report.json() + "\n" } else { report.to_string() }
+            }));
         }
         Name::Scaling => {
-            return said(
-                scaling::run().map(|report| if arguments.json { report.json() + "\n" } else { report.to_string() }),
-            );
+            return said(scaling::run().map(|report| {
+                if arguments.json { report.json() + "\n" } else { report.to_string() }
+            }));
         }
         Name::Catalyst => {
-            return said(
-                catalyst::run().map(|report| if arguments.json { report.json() + "\n" } else { report.to_string() }),
-            );
+            return said(catalyst::run().map(|report| {
+                if arguments.json { report.json() + "\n" } else { report.to_string() }
+            }));
         }
         Name::Overhead => overhead::run(),
         Name::Surface => surface::run(),
@@ -105,7 +105,9 @@ fn main() -> ExitCode {
         Name::Skeleton => skeleton::run(),
         Name::Volume => volume::run(),
     };
-    said(result.map(|report| if arguments.json { report.json() + "\n" } else { report.to_string() }))
+    said(
+        result.map(|report| if arguments.json { report.json() + "\n" } else { report.to_string() }),
+    )
 }
 
 fn said(result: Result<String, Box<dyn std::error::Error>>) -> ExitCode {

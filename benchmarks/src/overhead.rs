@@ -43,13 +43,24 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
     let velocity = solver.velocity();
     let pressure = solver.pressure();
     let fields = [
-        FieldView { name: "velocity", association: Association::Vertex, values: ArrayView::vectors(&velocity) },
-        FieldView { name: "pressure", association: Association::Vertex, values: ArrayView::scalars(&pressure) },
+        FieldView {
+            name: "velocity",
+            association: Association::Vertex,
+            values: ArrayView::vectors(&velocity),
+        },
+        FieldView {
+            name: "pressure",
+            association: Association::Vertex,
+            values: ArrayView::scalars(&pressure),
+        },
     ];
     let channels = [Channel { name: "fluid", mesh: MeshView::from(&mesh), fields: &fields }];
 
-    let mut rows =
-        vec![Row { case: format!("solver step, {} tets", mesh.cells().len()), seconds: step, steps: Some(1.0) }];
+    let mut rows = vec![Row {
+        case: format!("solver step, {} tets", mesh.cells().len()),
+        seconds: step,
+        steps: Some(1.0),
+    }];
     let mut push = |case: &str, seconds: f64| {
         rows.push(Row { case: case.to_owned(), seconds, steps: Some(seconds / step) });
         seconds
@@ -101,7 +112,9 @@ const FEATURES: [&str; 5] = ["inlet", "upstream", "throat", "downstream", "outle
 /// The channel with the features of the demo.
 fn channel() -> Result<Mesh, Box<dyn Error>> {
     let mesh = box_of_tets(COUNTS, LOWER, UPPER);
-    let FeatureSource::Faces(tagged) = mesh.features() else { return Err("a box has tagged faces".into()) };
+    let FeatureSource::Faces(tagged) = mesh.features() else {
+        return Err("a box has tagged faces".into());
+    };
     let tag = |vertices: &[u32]| {
         let along = |vertex: &u32| mesh.points()[*vertex as usize][1];
         let centre = vertices.iter().map(along).sum::<f64>() / vertices.len() as f64;
@@ -121,7 +134,9 @@ fn channel() -> Result<Mesh, Box<dyn Error>> {
 }
 
 fn solver(mesh: &Mesh) -> Result<Solver, Box<dyn Error>> {
-    let FeatureSource::Faces(tagged) = mesh.features() else { return Err("a box has tagged faces".into()) };
+    let FeatureSource::Faces(tagged) = mesh.features() else {
+        return Err("a box has tagged faces".into());
+    };
     let mut patches: Vec<Patch> = tagged
         .names
         .iter()
@@ -129,14 +144,22 @@ fn solver(mesh: &Mesh) -> Result<Solver, Box<dyn Error>> {
             name: name.clone(),
             triangles: Vec::new(),
             condition: match name.as_str() {
-                "inlet" => Condition::Velocity([Given::Uniform(0.0), Given::Uniform(10.0), Given::Uniform(0.0)]),
+                "inlet" => Condition::Velocity([
+                    Given::Uniform(0.0),
+                    Given::Uniform(10.0),
+                    Given::Uniform(0.0),
+                ]),
                 "outlet" => Condition::Pressure(Given::Uniform(0.0)),
                 _ => Condition::NoSlip,
             },
         })
         .collect();
     for ((_, vertices), tag) in tagged.faces.iter().zip(&tagged.tags) {
-        let patch = tagged.names.iter().position(|(number, _)| number == tag).ok_or("every tag has a name")?;
+        let patch = tagged
+            .names
+            .iter()
+            .position(|(number, _)| number == tag)
+            .ok_or("every tag has a name")?;
         patches[patch].triangles.push(vertices.try_into()?);
     }
     let fluid = Fluid { density: 1.0, viscosity: 1e-2 };
@@ -193,12 +216,15 @@ fn runner(stages: &[Value]) -> Result<Runner, Box<dyn Error>> {
 }
 
 /// Runs a pipeline once.
-fn once(runner: &mut Runner, cycle: u64, channels: &[Channel]) -> Result<Vec<Output>, Box<dyn Error>> {
+fn once(
+    runner: &mut Runner,
+    cycle: u64,
+    channels: &[Channel],
+) -> Result<Vec<Output>, Box<dyn Error>> {
     let outputs = runner.run(&Snapshot { cycle, time: 1e-3 * cycle as f64, channels });
-    match outputs
-        .iter()
-        .find_map(|output| if let Output::Error { message, .. } = output { Some(message) } else { None })
-    {
+    match outputs.iter().find_map(|output| {
+        if let Output::Error { message, .. } = output { Some(message) } else { None }
+    }) {
         Some(message) => Err(message.clone().into()),
         None => Ok(outputs),
     }
@@ -235,7 +261,8 @@ fn encoding(view: &[Value], channels: &[Channel]) -> Result<(f64, usize), Box<dy
 fn writing(name: &str, extract: &[Value], channels: &[Channel]) -> Result<f64, Box<dyn Error>> {
     let directory = tempfile::tempdir()?;
     let path = directory.path().join(name);
-    let stages: Vec<Value> = extract.iter().cloned().chain([json!({"write": {"file": name}})]).collect();
+    let stages: Vec<Value> =
+        extract.iter().cloned().chain([json!({"write": {"file": name}})]).collect();
     let mut runner = runner(&stages)?;
     let mut cycle = 0;
     median(|| {

@@ -117,17 +117,27 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
         body["fixed"] = json!(["walls"]);
         json!([{ name: body }])
     };
-    rows.extend(measured("sphere-layer", "sphere, gap of 3 radii closed by %", &[80.0, 95.0], None, |percent| {
-        sphere(json!({"translate": {"by": [0, 0.03 * percent, 0]}}))
-    })?);
+    rows.extend(measured(
+        "sphere-layer",
+        "sphere, gap of 3 radii closed by %",
+        &[80.0, 95.0],
+        None,
+        |percent| sphere(json!({"translate": {"by": [0, 0.03 * percent, 0]}})),
+    )?);
     for mesh in ["sphere-layer", "sphere-layer-fine"] {
         rows.extend(measured(mesh, "sphere, moved by radii", &[10.0], None, |radii| {
             sphere(json!({"translate": {"by": [radii, 0, 0]}}))
         })?);
     }
-    rows.extend(measured("sphere-layer", "sphere, turned by degrees", &[180.0], None, |degrees| {
-        sphere(json!({"rotate": {"axis": [0, 0, 1], "degrees": degrees, "center": [0, 0, 0]}}))
-    })?);
+    rows.extend(measured(
+        "sphere-layer",
+        "sphere, turned by degrees",
+        &[180.0],
+        None,
+        |degrees| {
+            sphere(json!({"rotate": {"axis": [0, 0, 1], "degrees": degrees, "center": [0, 0, 0]}}))
+        },
+    )?);
     let targets = targets(&rows);
     Ok(Report { rows, targets })
 }
@@ -135,7 +145,12 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
 fn targets(rows: &[Row]) -> Vec<Target> {
     #[expect(clippy::cast_precision_loss, reason = "few")]
     let count = |test: &dyn Fn(&&Row) -> bool| rows.iter().filter(test).count() as f64;
-    let none = |name: &str, value: f64| Target { name: name.into(), value, target: 0.0, holds: value == 0.0 };
+    let none = |name: &str, value: f64| Target {
+        name: name.into(),
+        value,
+        target: 0.0,
+        holds: value == 0.0,
+    };
     let below = |part: fn(&Figures, &Paper) -> bool| {
         count(&move |row| row.paper.as_ref().is_some_and(|paper| part(&row.ours, paper)))
     };
@@ -143,11 +158,19 @@ fn targets(rows: &[Row]) -> Vec<Target> {
         none("rows with inverted cells", count(&|row| row.ours.inverted > 0)),
         none("rows rejected", count(&|row| row.rejected.is_some())),
         none("rows with a mean below the paper's", below(|ours, paper| ours.mean < paper.mean)),
-        none("rows with a least value below the paper's", below(|ours, paper| ours.min < paper.min)),
+        none(
+            "rows with a least value below the paper's",
+            below(|ours, paper| ours.min < paper.min),
+        ),
     ];
     if let Some(large) = rows.iter().find(|row| row.tets > 600_000) {
         let name = "sphere, moved by 10 radii, fine [s]".into();
-        targets.push(Target { name, value: large.seconds, target: 15.0, holds: large.seconds <= 15.0 });
+        targets.push(Target {
+            name,
+            value: large.seconds,
+            target: 15.0,
+            holds: large.seconds <= 15.0,
+        });
     }
     targets
 }
@@ -162,7 +185,8 @@ fn measured(
 ) -> Result<Vec<Row>, Box<dyn Error>> {
     let mesh = Arc::new(read_mesh(&mesh_file(name)?)?.mesh);
     let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default())?);
-    let guard = Guard { min_scaled_jacobian: 0.0, otherwise: Otherwise::Untangle, ..Guard::default() };
+    let guard =
+        Guard { min_scaled_jacobian: 0.0, otherwise: Otherwise::Untangle, ..Guard::default() };
     let mut rows = Vec::new();
     for &amount in amounts {
         let stack: Vec<Edit> = serde_json::from_value(edits(amount))?;
@@ -172,7 +196,8 @@ fn measured(
         let mut shaper = Shaper::new(Arc::clone(&mesh), Arc::clone(&surface))?;
         let reference = Arc::clone(shaper.reference());
         let start = Instant::now();
-        let plan = shaper.plan(&stack, reference, &DeformStage::default(), &Schedule::default(), &guard);
+        let plan =
+            shaper.plan(&stack, reference, &DeformStage::default(), &Schedule::default(), &guard);
         let seconds = start.elapsed().as_secs_f64();
         let (ours, sub_steps, rejected) = match &plan {
             Ok(plan) => (figures(&mesh, plan.end()), plan.target().sub_steps, None),
@@ -204,8 +229,10 @@ pub fn figures(mesh: &Mesh, points: &[Vector]) -> Figures {
 
 /// A mesh of `scripts/meshes`, made where it is not there yet.
 pub fn mesh_file(name: &str) -> Result<PathBuf, Box<dyn Error>> {
-    let project = Path::new(env!("CARGO_MANIFEST_DIR")).parent().ok_or("the project is not there")?;
-    let directory = std::env::var_os("TOMBOLO_MESHES").map_or_else(|| project.join("meshes"), PathBuf::from);
+    let project =
+        Path::new(env!("CARGO_MANIFEST_DIR")).parent().ok_or("the project is not there")?;
+    let directory =
+        std::env::var_os("TOMBOLO_MESHES").map_or_else(|| project.join("meshes"), PathBuf::from);
     let file = directory.join(format!("{name}.msh"));
     if !file.exists() {
         let python = project.join(".venv/bin/python");
@@ -268,7 +295,11 @@ impl fmt::Display for Report {
         writeln!(f, "\n{:<44} {:>12} {:>14}", "target", "value", "at most")?;
         for target in &self.targets {
             let verdict = if target.holds { "holds" } else { "does not hold" };
-            writeln!(f, "{:<44} {:>12.3e} {:>14.3e}  {verdict}", target.name, target.value, target.target)?;
+            writeln!(
+                f,
+                "{:<44} {:>12.3e} {:>14.3e}  {verdict}",
+                target.name, target.value, target.target
+            )?;
         }
         Ok(())
     }

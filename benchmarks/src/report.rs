@@ -62,7 +62,11 @@ impl fmt::Display for Report {
         writeln!(f, "\n{:<44} {:>12} {:>14}", "target", "value", "at most")?;
         for target in &self.targets {
             let verdict = if target.holds { "holds" } else { "does not hold" };
-            writeln!(f, "{:<44} {:>12.3e} {:>14.3e}  {verdict}", target.name, target.value, target.target)?;
+            writeln!(
+                f,
+                "{:<44} {:>12.3e} {:>14.3e}  {verdict}",
+                target.name, target.value, target.target
+            )?;
         }
         Ok(())
     }

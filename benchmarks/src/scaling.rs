@@ -64,8 +64,11 @@ pub fn run() -> Result<Scaling, Box<dyn std::error::Error>> {
             rows.push(measured(&mesh, along)?);
         }
     }
-    let seconds = |ranks: usize| rows.iter().rev().find(|row| row.ranks == ranks).map_or(f64::NAN, |row| row.seconds);
-    let targets = vec![Target::at_most("surface of 1.29 M tets on 2 ranks, seconds", seconds(2), 0.150)];
+    let seconds = |ranks: usize| {
+        rows.iter().rev().find(|row| row.ranks == ranks).map_or(f64::NAN, |row| row.seconds)
+    };
+    let targets =
+        vec![Target::at_most("surface of 1.29 M tets on 2 ranks, seconds", seconds(2), 0.150)];
     Ok(Scaling { rows, targets })
 }
 
@@ -84,13 +87,15 @@ fn measured(mesh: &Mesh, along: [usize; 3]) -> Result<Row, Box<dyn std::error::E
         .iter()
         .map(|(_, vertices)| {
             let place = |axis: usize| {
-                let sum: f64 = vertices.iter().map(|&vertex| mesh.points()[vertex as usize][axis]).sum();
+                let sum: f64 =
+                    vertices.iter().map(|&vertex| mesh.points()[vertex as usize][axis]).sum();
                 ((sum / vertices.len() as f64 * along[axis] as f64) as usize).min(along[axis] - 1)
             };
             place(0) + along[0] * (place(1) + along[1] * place(2))
         })
         .collect();
-    let parts: Vec<Part> = (0..count).map(|rank| Part::cut(mesh, &of_cells, rank, false)).collect::<Result<_, _>>()?;
+    let parts: Vec<Part> =
+        (0..count).map(|rank| Part::cut(mesh, &of_cells, rank, false)).collect::<Result<_, _>>()?;
     let outcomes = threads::run(count, |ranks| {
         let ranks = Arc::new(Counted::new(ranks));
         let part = &parts[ranks.rank()];
@@ -114,12 +119,21 @@ fn measured(mesh: &Mesh, along: [usize; 3]) -> Result<Row, Box<dyn std::error::E
         let surface = places.map_or(0, |places| places.len());
         let shares = shared.shared().count();
         let communicator: Arc<dyn Communicator> = Arc::<Counted<threads::Threads>>::clone(&ranks);
-        let partition: Arc<dyn Partition> = Arc::new(Ranks::new(communicator, Arc::new(shared), &boundary, Vec::new()));
+        let partition: Arc<dyn Partition> =
+            Arc::new(Ranks::new(communicator, Arc::new(shared), &boundary, Vec::new()));
         let own = Mesh::new(part.points.clone(), part.cells.clone(), FeatureSource::SharpEdges)?;
         let before = ranks.traffic();
-        let operator = VolumeOperator::of_part(&own, boundary.vertices(), &[], &Deform::default(), &partition)?;
+        let operator = VolumeOperator::of_part(
+            &own,
+            boundary.vertices(),
+            &[],
+            &Deform::default(),
+            &partition,
+        )?;
         let set_up = ranks.traffic() - before;
-        let wave = |[x, y, z]: Vector| [0.02 * (9.0 * y).sin(), 0.02 * (8.0 * z).sin(), 0.02 * (7.0 * x).sin()];
+        let wave = |[x, y, z]: Vector| {
+            [0.02 * (9.0 * y).sin(), 0.02 * (8.0 * z).sin(), 0.02 * (7.0 * x).sin()]
+        };
         let motion: Vec<Vector> =
             boundary.vertices().iter().map(|&vertex| wave(part.points[vertex as usize])).collect();
         let before = ranks.traffic();
@@ -133,11 +147,15 @@ fn measured(mesh: &Mesh, along: [usize; 3]) -> Result<Row, Box<dyn std::error::E
             iterations,
         }))
     });
-    let outcomes = outcomes.into_iter().collect::<Result<Vec<_>, _>>().map_err(|error| error.to_string())?;
+    let outcomes =
+        outcomes.into_iter().collect::<Result<Vec<_>, _>>().map_err(|error| error.to_string())?;
     let outcomes: Vec<Measured> = outcomes.into_iter().flatten().collect();
     let traffic = |part: usize| {
         let of = |measured: &Measured| measured.traffic[part];
-        let others = outcomes[1..].iter().map(of).max_by_key(|traffic| traffic.bytes_sent + traffic.bytes_heard);
+        let others = outcomes[1..]
+            .iter()
+            .map(of)
+            .max_by_key(|traffic| traffic.bytes_sent + traffic.bytes_heard);
         [others.unwrap_or_default(), of(&outcomes[0])]
     };
     // Rank 0 has the surface last.
@@ -184,8 +202,10 @@ impl fmt::Display for Scaling {
             "iterations"
         )?;
         let said = |traffic: &Traffic| {
-            let (bytes, messages) =
-                (traffic.bytes_sent + traffic.bytes_heard, traffic.messages_sent + traffic.messages_heard);
+            let (bytes, messages) = (
+                traffic.bytes_sent + traffic.bytes_heard,
+                traffic.messages_sent + traffic.messages_heard,
+            );
             format!("{bytes} B / {messages}")
         };
         for row in &self.rows {
@@ -208,7 +228,11 @@ impl fmt::Display for Scaling {
         }
         for target in &self.targets {
             let verdict = if target.holds { "holds" } else { "does not hold" };
-            writeln!(f, "\n{}: {:.4}, at most {}: {verdict}", target.name, target.value, target.target)?;
+            writeln!(
+                f,
+                "\n{}: {:.4}, at most {}: {verdict}",
+                target.name, target.value, target.target
+            )?;
         }
         Ok(())
     }

@@ -32,7 +32,13 @@ const LIMIT: Duration = Duration::from_secs(300);
 pub fn run() -> Result<Report, Box<dyn Error>> {
     let mut report = Report { rows: Vec::new(), targets: Vec::new() };
     for (count, name, peer_runs, most) in SIZES {
-        compare(&mut report, &format!("torus, {name}"), &torus(project(), count)?, peer_runs, most)?;
+        compare(
+            &mut report,
+            &format!("torus, {name}"),
+            &torus(project(), count)?,
+            peer_runs,
+            most,
+        )?;
     }
     for file in generated_surfaces(&["bypass-0"]) {
         let surface = Surface::extract(&read_mesh(&file)?.mesh, &FeatureSettings::default())?;
@@ -70,14 +76,16 @@ fn compare(
     for (what, seconds) in [(format!("{vertices} vertices"), ours), ("CGAL".to_owned(), theirs)] {
         report.rows.push(Row { case: case(&what), seconds, steps: None });
     }
-    let mut at_most =
-        |what: &str, value: f64, most: f64| report.targets.push(Target::at_most(&case(what), value, most));
+    let mut at_most = |what: &str, value: f64, most: f64| {
+        report.targets.push(Target::at_most(&case(what), value, most))
+    };
     if let Some(most) = most {
         at_most("[s]", ours, most);
     }
     at_most("ours / CGAL", ours / theirs, 1.0);
     let [skeleton, peer] = [skeleton, peer].map(|graph| graph.without_spurs(SPUR, surface));
-    let differences: usize = skeleton.counts().iter().zip(peer.counts()).map(|(&a, b)| a.abs_diff(b)).sum();
+    let differences: usize =
+        skeleton.counts().iter().zip(peer.counts()).map(|(&a, b)| a.abs_diff(b)).sum();
     at_most("pieces, loops, branches, ends unlike CGAL's", differences as f64, 0.0);
     let [there, back] = skeleton.apart(&peer, surface);
     at_most("Hausdorff distance from CGAL's [% of diagonal]", 100.0 * there.max(back), 2.0);

@@ -42,7 +42,8 @@ struct Row {
 
 /// Each case with each exponent, on the meshes of `scripts/meshes`: some minutes.
 pub fn run() -> Result<Report, Box<dyn Error>> {
-    let sphere = |by: Value| json!([{"translate": {"features": ["sphere"], "fixed": ["walls"], "by": by}}]);
+    let sphere =
+        |by: Value| json!([{"translate": {"features": ["sphere"], "fixed": ["walls"], "by": by}}]);
     let press = |by: f64| json!([{"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, by]}}]);
     let shear = |by: f64| json!([{"translate": {"features": ["moved"], "fixed": ["fixed"], "by": [by, 0, 0]}}]);
     let cases = [
@@ -71,11 +72,17 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
         let mesh = Arc::new(read_mesh(&mesh_file(mesh)?)?.mesh);
         let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default())?);
         let stack: Vec<Edit> = serde_json::from_value(edits)?;
-        let guard = Guard { min_scaled_jacobian: 0.0, otherwise: Otherwise::Untangle, ..Guard::default() };
+        let guard =
+            Guard { min_scaled_jacobian: 0.0, otherwise: Otherwise::Untangle, ..Guard::default() };
         for exponent in EXPONENTS {
-            let deform = DeformStage::from(Deform { stiffening: exponent, tolerance: 1e-6, ..Deform::default() });
+            let deform = DeformStage::from(Deform {
+                stiffening: exponent,
+                tolerance: 1e-6,
+                ..Deform::default()
+            });
             let mut shaper = Shaper::new(Arc::clone(&mesh), Arc::clone(&surface))?;
-            let one_solve = figures(&mesh, &shaper.target(&stack, &deform, SurfaceRule::Allow)?.points);
+            let one_solve =
+                figures(&mesh, &shaper.target(&stack, &deform, SurfaceRule::Allow)?.points);
             let (mut followed, mut sub_steps, mut rejected) = (None, 0, None);
             if one_solve.inverted > 0 {
                 let start = Arc::clone(shaper.reference());

@@ -16,7 +16,8 @@ use crate::measure::middle;
 use crate::report::{Report, Row, Target};
 
 /// Vertices of each torus, and runs of libigl on it: the largest takes it half a minute.
-const SIZES: [(usize, &str, usize); 3] = [(2_000, "2 k", 7), (20_000, "20 k", 5), (200_000, "200 k", 1)];
+const SIZES: [(usize, &str, usize); 3] =
+    [(2_000, "2 k", 7), (20_000, "20 k", 5), (200_000, "200 k", 1)];
 /// Cold runs of ours.
 const RUNS: usize = 5;
 /// Drags after the first displacement.
@@ -29,7 +30,8 @@ const BEYOND: f64 = 1.7;
 /// # Errors
 /// Whatever the parts fail with; a peer that is missing is an error.
 pub fn run() -> Result<Report, Box<dyn Error>> {
-    let project = Path::new(env!("CARGO_MANIFEST_DIR")).parent().ok_or("the project is not there")?;
+    let project =
+        Path::new(env!("CARGO_MANIFEST_DIR")).parent().ok_or("the project is not there")?;
     let mut report = Report { rows: Vec::new(), targets: Vec::new() };
     for (count, name, peer_runs) in SIZES {
         let surface = Arc::new(torus(project, count)?);
@@ -37,15 +39,23 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
             let ours = measure(&surface, order)?;
             let peer = libigl(project, &surface, &ours, order, peer_runs)?;
             let case = |what: &str| format!("{name}, order {order}, {what}");
-            let rows =
-                [("cold", ours.cold), ("cold, libigl", peer.0), ("drag", ours.drag), ("surface check", ours.check)];
+            let rows = [
+                ("cold", ours.cold),
+                ("cold, libigl", peer.0),
+                ("drag", ours.drag),
+                ("surface check", ours.check),
+            ];
             for (what, seconds) in rows {
                 report.rows.push(Row { case: case(what), seconds, steps: None });
             }
             let mut at_most = |what: &str, value: f64, most: f64| {
                 report.targets.push(Target::at_most(&case(what), value, most));
             };
-            at_most("cold: ours / libigl", ours.cold / peer.0, if count == 200_000 { 0.125 } else { 1.0 / 3.0 });
+            at_most(
+                "cold: ours / libigl",
+                ours.cold / peer.0,
+                if count == 200_000 { 0.125 } else { 1.0 / 3.0 },
+            );
             if count == 200_000 {
                 at_most("drag [s]", ours.drag, 0.002);
                 if order == 2 {
@@ -133,24 +143,38 @@ fn libigl(
 ) -> Result<(f64, f64), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     let file = |name: &str| -> PathBuf { folder.path().join(name) };
-    let floats = |values: &[f64]| -> Vec<u8> { values.iter().flat_map(|value| value.to_le_bytes()).collect() };
-    let numbers = |values: &[u32]| -> Vec<u8> { values.iter().flat_map(|value| value.to_le_bytes()).collect() };
+    let floats = |values: &[f64]| -> Vec<u8> {
+        values.iter().flat_map(|value| value.to_le_bytes()).collect()
+    };
+    let numbers = |values: &[u32]| -> Vec<u8> {
+        values.iter().flat_map(|value| value.to_le_bytes()).collect()
+    };
     let prescribed: Vec<u32> = (0..surface.points().len())
         .filter(|&vertex| surface.points()[vertex][0].abs() >= BEYOND)
         .map(|vertex| vertex as u32)
         .collect();
-    let motion: Vec<f64> = prescribed.iter().flat_map(|&vertex| ours.displacement[vertex as usize]).collect();
+    let motion: Vec<f64> =
+        prescribed.iter().flat_map(|&vertex| ours.displacement[vertex as usize]).collect();
     fs::write(file("points"), floats(surface.points().as_flattened()))?;
     fs::write(file("triangles"), numbers(surface.triangles().as_flattened()))?;
     fs::write(file("prescribed"), numbers(&prescribed))?;
     fs::write(file("motion"), floats(&motion))?;
     let printed = python(
         project,
-        &["harmonic".as_ref(), folder.path().as_os_str(), order.to_string().as_ref(), runs.to_string().as_ref()],
+        &[
+            "harmonic".as_ref(),
+            folder.path().as_os_str(),
+            order.to_string().as_ref(),
+            runs.to_string().as_ref(),
+        ],
     )?;
     let mut seconds = printed.lines().map(str::parse).collect::<Result<Vec<f64>, _>>()?;
-    let theirs: Vec<f64> =
-        fs::read(file("libigl"))?.as_chunks().0.iter().map(|&value| f64::from_le_bytes(value)).collect();
+    let theirs: Vec<f64> = fs::read(file("libigl"))?
+        .as_chunks()
+        .0
+        .iter()
+        .map(|&value| f64::from_le_bytes(value))
+        .collect();
     let largest = motion.iter().fold(f64::MIN_POSITIVE, |largest, value| largest.max(value.abs()));
     let apart = ours.displacement.as_flattened().iter().zip(&theirs).map(|(a, b)| (a - b).abs());
     Ok((middle(&mut seconds), apart.fold(0.0, f64::max) / largest))
@@ -158,7 +182,8 @@ fn libigl(
 
 fn python(project: &Path, arguments: &[&std::ffi::OsStr]) -> Result<String, Box<dyn Error>> {
     let script = project.join("benchmarks/peers/surface.py");
-    let ran = Command::new(project.join(".venv/bin/python")).arg(script).args(arguments).output()?;
+    let ran =
+        Command::new(project.join(".venv/bin/python")).arg(script).args(arguments).output()?;
     if !ran.status.success() {
         let said = String::from_utf8_lossy(&ran.stderr);
         return Err(format!(

@@ -51,14 +51,16 @@ fn cold_of(ran: &Ran) -> f64 {
 
 /// Measures one torus at every order.
 pub fn run() -> Result<Report, Box<dyn Error>> {
-    let project = Path::new(env!("CARGO_MANIFEST_DIR")).parent().ok_or("the project is not there")?;
+    let project =
+        Path::new(env!("CARGO_MANIFEST_DIR")).parent().ok_or("the project is not there")?;
     let directory = tempfile::tempdir()?;
     let surface = Arc::new(torus(project, directory.path())?);
     let module = project.join("viewer/wasm/pkg/kernel.wasm");
     if !module.exists() {
         return Err(format!("{} is not there; run scripts/setup", module.display()).into());
     }
-    let [frame, input, output] = ["surface", "json", "bin"].map(|kind| directory.path().join(format!("torus.{kind}")));
+    let [frame, input, output] =
+        ["surface", "json", "bin"].map(|kind| directory.path().join(format!("torus.{kind}")));
     fs::write(&frame, encode_surface(&surface)?)?;
     let free = free(&surface);
     let size = surface.points().len();
@@ -87,25 +89,31 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
                 } else {
                     native_drag.push(begun.elapsed())
                 };
-                apart = apart.max(distance(&ours, theirs.next().ok_or("the module stopped early")?));
+                apart =
+                    apart.max(distance(&ours, theirs.next().ok_or("the module stopped early")?));
             }
         }
         let seconds = |times: Vec<std::time::Duration>| {
             middle(&mut times.iter().map(std::time::Duration::as_secs_f64).collect::<Vec<_>>())
         };
-        let of_module = |value: &dyn Fn(&Ran) -> f64| middle(&mut ran.iter().map(value).collect::<Vec<_>>());
+        let of_module =
+            |value: &dyn Fn(&Ran) -> f64| middle(&mut ran.iter().map(value).collect::<Vec<_>>());
         let compile = of_module(&|ran| ran.compile);
         let cold = of_module(&cold_of);
         let mut at_once = Vec::new();
         for _ in 0..RUNS {
             at_once.push(cold_of(&in_node(project, [&module, &frame, &input, &output], false)?));
         }
-        let drag = of_module(&|ran| middle(&mut ran.stacks.iter().skip(1).copied().collect::<Vec<_>>()));
+        let drag =
+            of_module(&|ran| middle(&mut ran.stacks.iter().skip(1).copied().collect::<Vec<_>>()));
         most_memory = most_memory.max(ran.iter().map(|ran| ran.memory).max().unwrap_or(0));
         let (native_cold, native_drag) = (seconds(native_cold), seconds(native_drag));
         if order == 1 {
             rows.push(row(format!("{name}: compile the module"), compile));
-            rows.push(row("rehearse, once, while nobody waits".into(), of_module(&|ran| ran.rehearse)));
+            rows.push(row(
+                "rehearse, once, while nobody waits".into(),
+                of_module(&|ran| ran.rehearse),
+            ));
         }
         rows.push(row(format!("order {order}, cold, module, not rehearsed"), middle(&mut at_once)));
         for (what, module, native) in [("cold", cold, native_cold), ("drag", drag, native_drag)] {
@@ -117,7 +125,11 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
             targets.push(Target::at_most("order 2, drag [s]", drag, 0.016));
         }
         for (what, module, native) in [("cold", cold, native_cold), ("drag", drag, native_drag)] {
-            targets.push(Target::at_most(&format!("order {order}, {what}: module / native"), module / native, 4.0));
+            targets.push(Target::at_most(
+                &format!("order {order}, {what}: module / native"),
+                module / native,
+                4.0,
+            ));
         }
         targets.push(Target::at_most(
             &format!("order {order}: apart, of the motion"),
@@ -125,13 +137,21 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
             [1e-12, 1e-10, 1e-8][order - 1],
         ));
     }
-    targets.push(Target::at_most("memory of the module [MiB]", most_memory as f64 / f64::from(1 << 20), 256.0));
+    targets.push(Target::at_most(
+        "memory of the module [MiB]",
+        most_memory as f64 / f64::from(1 << 20),
+        256.0,
+    ));
     Ok(Report { rows, targets })
 }
 
 fn torus(project: &Path, directory: &Path) -> Result<Surface, Box<dyn Error>> {
     let file = directory.join("torus.msh");
-    let made = Command::new(project.join(".venv/bin/python")).args(["-c", TORUS]).arg(&file).arg(SIZE).status()?;
+    let made = Command::new(project.join(".venv/bin/python"))
+        .args(["-c", TORUS])
+        .arg(&file)
+        .arg(SIZE)
+        .status()?;
     if !made.success() {
         return Err("gmsh made no torus; scripts/setup installs it".into());
     }
@@ -159,7 +179,11 @@ fn in_node(
 ) -> Result<Ran, Box<dyn Error>> {
     let run = project.join("viewer/wasm/run.mjs");
     let rehearse = if rehearsed { "1" } else { "0" };
-    let ran = Command::new("node").env("REHEARSE", rehearse).arg(run).args([module, frame, input, output]).output()?;
+    let ran = Command::new("node")
+        .env("REHEARSE", rehearse)
+        .arg(run)
+        .args([module, frame, input, output])
+        .output()?;
     if !ran.status.success() {
         return Err(format!("the module failed: {}", String::from_utf8_lossy(&ran.stderr)).into());
     }
@@ -167,13 +191,17 @@ fn in_node(
 }
 
 fn read(path: &Path) -> Result<Vec<Vector>, Box<dyn Error>> {
-    let values: Vec<f64> = fs::read(path)?.as_chunks().0.iter().map(|&value| f64::from_le_bytes(value)).collect();
+    let values: Vec<f64> =
+        fs::read(path)?.as_chunks().0.iter().map(|&value| f64::from_le_bytes(value)).collect();
     Ok(values.as_chunks().0.to_vec())
 }
 
 /// The largest difference of a component, in parts of the largest component.
 fn distance(ours: &[Vector], theirs: &[Vector]) -> f64 {
-    let largest = ours.as_flattened().iter().fold(f64::MIN_POSITIVE, |largest, value| largest.max(value.abs()));
+    let largest = ours
+        .as_flattened()
+        .iter()
+        .fold(f64::MIN_POSITIVE, |largest, value| largest.max(value.abs()));
     let apart = ours.as_flattened().iter().zip(theirs.as_flattened()).map(|(a, b)| (a - b).abs());
     apart.fold(0.0, f64::max) / largest
 }

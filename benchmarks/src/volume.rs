@@ -8,7 +8,9 @@ use std::process::Command;
 use std::sync::Arc;
 use std::time::Instant;
 
-use tombolo::deform::linear::{Cholesky, LinearSolver, Multigrid, MultigridSettings, SparseMatrix, Tolerance};
+use tombolo::deform::linear::{
+    Cholesky, LinearSolver, Multigrid, MultigridSettings, SparseMatrix, Tolerance,
+};
 use tombolo::deform::mesh::{Mesh, Vector};
 use tombolo::deform::shapes::box_of_tets;
 use tombolo::deform::surface::{FeatureSettings, Surface};
@@ -57,7 +59,10 @@ fn measured() -> Result<Report, Box<dyn Error>> {
         let mut push = |what: &str, seconds: f64| {
             report.rows.push(Row { case: case(what), seconds, steps: None });
         };
-        push(&format!("paper on {processes} processes, allocate and assemble"), 1e-3 * allocate_and_assemble);
+        push(
+            &format!("paper on {processes} processes, allocate and assemble"),
+            1e-3 * allocate_and_assemble,
+        );
         push(&format!("paper on {processes} processes, solve"), 1e-3 * solve);
 
         let ours = elasticity(&mesh, surface.vertices(), &motion)?;
@@ -82,13 +87,20 @@ fn measured() -> Result<Report, Box<dyn Error>> {
         for solver in ["icc", "gamg"] {
             let peer = petsc(&file, solver)?;
             push(&format!("PETSc {solver} on 2 ranks, set-up"), peer.set_up);
-            push(&format!("PETSc {solver} on 2 ranks, solve, {} iterations", peer.iterations), peer.solve);
+            push(
+                &format!("PETSc {solver} on 2 ranks, solve, {} iterations", peer.iterations),
+                peer.solve,
+            );
             worst = worst.max(difference(&ours.solution, &peer.solution));
             quickest = quickest.min(peer.set_up + peer.solve);
         }
         report.targets.push(Target::at_most(&case("difference from PETSc"), worst, 1e-5));
         let ratio = (ours.set_up + ours.solve) / quickest;
-        report.targets.push(Target::at_most(&case("set-up and solve by PETSc's quickest"), ratio, 1.0));
+        report.targets.push(Target::at_most(
+            &case("set-up and solve by PETSc's quickest"),
+            ratio,
+            1.0,
+        ));
         #[cfg(feature = "distributed")]
         on_ranks(number, &case, folder.path(), &mut report)?;
         if number + 1 == PAPER.len() {
@@ -104,13 +116,29 @@ fn measured() -> Result<Report, Box<dyn Error>> {
                 ours.set_up + ours.solve,
                 1.3,
             ));
-            report.targets.push(Target::at_most(&case("elasticity, later order [s]"), ours.later, 0.5));
+            report.targets.push(Target::at_most(
+                &case("elasticity, later order [s]"),
+                ours.later,
+                0.5,
+            ));
             let later = harmonic.three;
-            report.targets.push(Target::at_most(&case("harmonic, later order, three components [s]"), later, 0.4));
+            report.targets.push(Target::at_most(
+                &case("harmonic, later order, three components [s]"),
+                later,
+                0.4,
+            ));
             let cold = harmonic.set_up + harmonic.one;
-            report.targets.push(Target::at_most(&case("harmonic, set-up and solve [s]"), cold, 0.4));
+            report.targets.push(Target::at_most(
+                &case("harmonic, set-up and solve [s]"),
+                cold,
+                0.4,
+            ));
             let cold = harmonic.assembly + cold;
-            report.targets.push(Target::at_most(&case("harmonic, cold, with assembly [s]"), cold, 0.4));
+            report.targets.push(Target::at_most(
+                &case("harmonic, cold, with assembly [s]"),
+                cold,
+                0.4,
+            ));
             report.targets.push(Target::at_most("peak memory [GB]", memory_peak()? / 1e9, 3.0));
         }
     }
@@ -139,7 +167,11 @@ fn on_ranks(
                 ("later order".to_owned(), later),
             ];
             for (what, &seconds) in stages {
-                report.rows.push(Row { case: case(&format!("{on}, {what}")), seconds, steps: None });
+                report.rows.push(Row {
+                    case: case(&format!("{on}, {what}")),
+                    seconds,
+                    steps: None,
+                });
             }
         }
         let worst = found.iter().map(|solver| solver.difference).fold(0.0, f64::max);
@@ -170,9 +202,14 @@ struct Elasticity {
     solution: Vec<Vector>,
 }
 
-fn elasticity(mesh: &Mesh, boundary: &[u32], motion: &[Vector]) -> Result<Elasticity, Box<dyn Error>> {
+fn elasticity(
+    mesh: &Mesh,
+    boundary: &[u32],
+    motion: &[Vector],
+) -> Result<Elasticity, Box<dyn Error>> {
     let settings = Deform { tolerance: TOLERANCE, ..Deform::default() };
-    let (mut whole, mut set_up, mut first, mut later, mut updated) = (vec![], vec![], vec![], vec![], vec![]);
+    let (mut whole, mut set_up, mut first, mut later, mut updated) =
+        (vec![], vec![], vec![], vec![], vec![]);
     let mut processor = vec![];
     let mut kept = None;
     for _ in 0..RUNS {
@@ -192,7 +229,8 @@ fn elasticity(mesh: &Mesh, boundary: &[u32], motion: &[Vector]) -> Result<Elasti
         operator.updated(mesh)?;
         updated.push(start.elapsed().as_secs_f64());
         // The solver once more, by itself, to tell its set-up from the assembly.
-        let (matrix, _) = operator.coupled_equations(motion).ok_or("the operator is not elastic")?;
+        let (matrix, _) =
+            operator.coupled_equations(motion).ok_or("the operator is not elastic")?;
         let matrix = Arc::new(matrix.clone());
         let start = Instant::now();
         Multigrid::<3>::new(matrix, MultigridSettings::default())?;
@@ -200,10 +238,15 @@ fn elasticity(mesh: &Mesh, boundary: &[u32], motion: &[Vector]) -> Result<Elasti
         kept = Some(operator);
     }
     let operator = kept.ok_or("nothing was run")?;
-    let (matrix, right_side) = operator.coupled_equations(motion).ok_or("the operator is not elastic")?;
+    let (matrix, right_side) =
+        operator.coupled_equations(motion).ok_or("the operator is not elastic")?;
     let mut solution = vec![[0.0; 3]; right_side.len()];
     let tolerance = Tolerance { relative: TOLERANCE, absolute: 0.0 };
-    Multigrid::<3>::new(matrix.clone(), MultigridSettings::default())?.solve(&right_side, &mut solution, tolerance)?;
+    Multigrid::<3>::new(matrix.clone(), MultigridSettings::default())?.solve(
+        &right_side,
+        &mut solution,
+        tolerance,
+    )?;
     let set_up = middle(&mut set_up);
     Ok(Elasticity {
         assembly: middle(&mut whole) - set_up,
@@ -233,7 +276,8 @@ struct Harmonic {
 fn harmonic(mesh: &Mesh, boundary: &[u32], motion: &[Vector]) -> Result<Harmonic, Box<dyn Error>> {
     let settings = Deform { method: Method::Harmonic, tolerance: TOLERANCE, ..Deform::default() };
     let along: Vec<Vector> = motion.iter().map(|value| [0.0, 0.0, value[2]]).collect();
-    let (mut whole, mut set_up, mut one, mut three, mut processor) = (vec![], vec![], vec![], vec![], vec![]);
+    let (mut whole, mut set_up, mut one, mut three, mut processor) =
+        (vec![], vec![], vec![], vec![], vec![]);
     for _ in 0..RUNS {
         let (start, before) = (Instant::now(), processor_seconds()?);
         let operator = VolumeOperator::new(mesh, boundary, &settings)?;
@@ -270,7 +314,8 @@ fn small_systems(report: &mut Report) -> Result<(), Box<dyn Error>> {
         let surface = Surface::extract(&mesh, &FeatureSettings::default())?;
         let operator = VolumeOperator::new(&mesh, surface.vertices(), &Deform::default())?;
         let motion = motion(&mesh, surface.vertices());
-        let (matrix, right_side) = operator.coupled_equations(&motion).ok_or("the operator is not elastic")?;
+        let (matrix, right_side) =
+            operator.coupled_equations(&motion).ok_or("the operator is not elastic")?;
         let matrix = Arc::new(matrix.clone());
         let mut solution = vec![[0.0; 3]; right_side.len()];
         let tolerance = Tolerance { relative: 1e-8, absolute: 0.0 };
@@ -308,7 +353,8 @@ fn sliding_sides(report: &mut Report) -> Result<(), Box<dyn Error>> {
             held.push(vertex);
             continue;
         }
-        for (axis, &x) in point.iter().enumerate().take(2).filter(|(_, x)| **x == 0.0 || **x == 1.0) {
+        for (axis, &x) in point.iter().enumerate().take(2).filter(|(_, x)| **x == 0.0 || **x == 1.0)
+        {
             let mut normal = [0.0; 3];
             normal[axis] = 2.0 * x - 1.0;
             sliding.push(Sliding { vertex, normal });
@@ -316,7 +362,8 @@ fn sliding_sides(report: &mut Report) -> Result<(), Box<dyn Error>> {
     }
     let operator = VolumeOperator::with_sliding(&mesh, &held, &sliding, &Deform::default())?;
     let motion = motion(&mesh, &held);
-    let (matrix, right_side) = operator.coupled_equations(&motion).ok_or("the operator is not elastic")?;
+    let (matrix, right_side) =
+        operator.coupled_equations(&motion).ok_or("the operator is not elastic")?;
     let (matrix, tets) = (Arc::new(matrix.clone()), mesh.cells().len());
     let tolerance = Tolerance { relative: TOLERANCE, absolute: 0.0 };
     for bodies in [false, true] {
@@ -325,7 +372,11 @@ fn sliding_sides(report: &mut Report) -> Result<(), Box<dyn Error>> {
             let settings = MultigridSettings::default();
             let start = Instant::now();
             let solver = if bodies {
-                Multigrid::with_rigid_bodies(Arc::clone(&matrix), operator.unknown_points(), settings)?
+                Multigrid::with_rigid_bodies(
+                    Arc::clone(&matrix),
+                    operator.unknown_points(),
+                    settings,
+                )?
             } else {
                 Multigrid::new(Arc::clone(&matrix), settings)?
             };
@@ -336,7 +387,9 @@ fn sliding_sides(report: &mut Report) -> Result<(), Box<dyn Error>> {
             solve.push(start.elapsed().as_secs_f64());
         }
         let name = if bodies { "with rigid bodies" } else { "without rigid bodies" };
-        for (what, mut times) in [("set-up".into(), set_up), (format!("solve, {iterations} iterations"), solve)] {
+        for (what, mut times) in
+            [("set-up".into(), set_up), (format!("solve, {iterations} iterations"), solve)]
+        {
             let case = format!("sliding sides, {tets} tets, {name}, {what}");
             report.rows.push(Row { case, seconds: middle(&mut times), steps: None });
         }
@@ -364,12 +417,15 @@ fn jiggled_box(count: usize) -> Result<Mesh, Box<dyn Error>> {
     let mut state = 1u64;
     #[expect(clippy::cast_precision_loss, reason = "31 bits")]
     let mut noise = move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         0.3 / count as f64 * ((state >> 33) as f64 / (1u64 << 31) as f64 - 0.5)
     };
     let inside = |point: &Vector| point.iter().all(|&x| x > 0.0 && x < 1.0);
     let points = mesh.points().iter();
-    let points = points.map(|point| if inside(point) { point.map(|x| x + noise()) } else { *point }).collect();
+    let points = points
+        .map(|point| if inside(point) { point.map(|x| x + noise()) } else { *point })
+        .collect();
     Ok(mesh.with_points(points)?)
 }
 
@@ -446,12 +502,20 @@ fn petsc(system: &Path, solver: &str) -> Result<Peer, Box<dyn Error>> {
     let line = text.lines().find_map(|line| line.strip_prefix("tombolo ")).unwrap_or_default();
     let [set_up, solve, iterations] = line.split(' ').collect::<Vec<_>>()[..] else {
         let message = String::from_utf8_lossy(&output.stderr);
-        return Err(format!("PETSc failed; `scripts/setup --benchmarks` installs it: {text}{message}").into());
+        return Err(format!(
+            "PETSc failed; `scripts/setup --benchmarks` installs it: {text}{message}"
+        )
+        .into());
     };
     let bytes = std::fs::read(system.with_extension(solver))?;
     let values = bytes.get(8..).ok_or("PETSc wrote no solution")?.as_chunks::<8>().0;
     let solution = values.iter().map(|&bytes| f64::from_be_bytes(bytes)).collect();
-    Ok(Peer { set_up: set_up.parse()?, solve: solve.parse()?, iterations: iterations.parse()?, solution })
+    Ok(Peer {
+        set_up: set_up.parse()?,
+        solve: solve.parse()?,
+        iterations: iterations.parse()?,
+        solution,
+    })
 }
 
 /// The largest difference of any component, by the largest component.

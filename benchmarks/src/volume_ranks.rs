@@ -46,12 +46,17 @@ pub fn write_displacement(file: &Path, number: usize) -> Result<(), Box<dyn Erro
     let surface = tombolo::deform::surface::Surface::extract(&mesh, &FeatureSettings::default())?;
     let operator = VolumeOperator::new(&mesh, surface.vertices(), &Deform::default())?;
     let displacement = operator.solve(&motion(&mesh, surface.vertices()))?.displacement;
-    let bytes: Vec<u8> = displacement.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect();
+    let bytes: Vec<u8> =
+        displacement.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect();
     Ok(std::fs::write(file, bytes)?)
 }
 
 /// Runs the solvers on `ranks` ranks of MPI.
-pub fn started(number: usize, ranks: usize, displacement: &Path) -> Result<Vec<OnRanks>, Box<dyn Error>> {
+pub fn started(
+    number: usize,
+    ranks: usize,
+    displacement: &Path,
+) -> Result<Vec<OnRanks>, Box<dyn Error>> {
     let output = Command::new("mpirun")
         .args(["--allow-run-as-root", "--oversubscribe", "-n", &ranks.to_string()])
         .arg(std::env::current_exe()?)
@@ -76,10 +81,12 @@ pub fn run(number: usize, displacement: &Path) -> Result<(), Box<dyn Error>> {
     let threads = rayon::ThreadPoolBuilder::new().num_threads((THREADS / ranks).max(1)).build()?;
     let read = prepared(number, rank, ranks, displacement).map_err(|error| error.to_string());
     let (part, motion, expected) = agree_on(&*communicator, read)?;
-    let (shared, boundary) = PartBoundary::find(&*communicator, &part, &FeatureSettings::default())?;
+    let (shared, boundary) =
+        PartBoundary::find(&*communicator, &part, &FeatureSettings::default())?;
     let shared = Arc::new(shared);
     let own = Mesh::new(part.points.clone(), part.cells.clone(), FeatureSource::SharpEdges)?;
-    let motion: Vec<Vector> = boundary.vertices().iter().map(|&vertex| motion[vertex as usize]).collect();
+    let motion: Vec<Vector> =
+        boundary.vertices().iter().map(|&vertex| motion[vertex as usize]).collect();
     // Those whose displacement is not prescribed.
     let mut prescribed = vec![false; part.points.len()];
     boundary.vertices().iter().for_each(|&vertex| prescribed[vertex as usize] = true);
@@ -92,11 +99,15 @@ pub fn run(number: usize, displacement: &Path) -> Result<(), Box<dyn Error>> {
     ];
     let mut found = Vec::new();
     for (solver, preconditioning) in solvers {
-        let petsc: Option<Solvers> =
-            preconditioning.map(|preconditioning| Petsc::solvers(&world, Some(preconditioning))).transpose()?;
-        let ranks = Ranks::new(Arc::clone(&communicator), Arc::clone(&shared), &boundary, Vec::new());
-        let mut unknown =
-            [(0..).zip(&prescribed).filter(|&(vertex, &known)| !known && ranks.owns(vertex)).count() as f64];
+        let petsc: Option<Solvers> = preconditioning
+            .map(|preconditioning| Petsc::solvers(&world, Some(preconditioning)))
+            .transpose()?;
+        let ranks =
+            Ranks::new(Arc::clone(&communicator), Arc::clone(&shared), &boundary, Vec::new());
+        let mut unknown = [(0..)
+            .zip(&prescribed)
+            .filter(|&(vertex, &known)| !known && ranks.owns(vertex))
+            .count() as f64];
         communicator.reduce(Reduction::Sum, &mut unknown);
         let default = Preconditioning::quickest(unknown[0] as usize, communicator.size());
         let partition = match &petsc {
@@ -109,7 +120,8 @@ pub fn run(number: usize, displacement: &Path) -> Result<(), Box<dyn Error>> {
             for _ in 0..RUNS {
                 communicator.barrier();
                 let start = Instant::now();
-                let operator = VolumeOperator::of_part(&own, boundary.vertices(), &[], &settings, &partition)?;
+                let operator =
+                    VolumeOperator::of_part(&own, boundary.vertices(), &[], &settings, &partition)?;
                 communicator.barrier();
                 set_up.push(start.elapsed().as_secs_f64());
                 for times in [&mut first, &mut later] {
@@ -119,12 +131,25 @@ pub fn run(number: usize, displacement: &Path) -> Result<(), Box<dyn Error>> {
                     times.push(start.elapsed().as_secs_f64());
                 }
             }
-            let operator = VolumeOperator::of_part(&own, boundary.vertices(), &[], &Deform::default(), &partition)?;
+            let operator = VolumeOperator::of_part(
+                &own,
+                boundary.vertices(),
+                &[],
+                &Deform::default(),
+                &partition,
+            )?;
             let solution = operator.solve(&motion)?.displacement;
-            let largest =
-                |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, |most: f64, value| most.max(value.abs()));
+            let largest = |values: &mut dyn Iterator<Item = f64>| {
+                values.fold(0.0, |most: f64, value| most.max(value.abs()))
+            };
             let mut sizes = [
-                largest(&mut solution.as_flattened().iter().zip(expected.as_flattened()).map(|(a, b)| a - b)),
+                largest(
+                    &mut solution
+                        .as_flattened()
+                        .iter()
+                        .zip(expected.as_flattened())
+                        .map(|(a, b)| a - b),
+                ),
                 largest(&mut expected.as_flattened().iter().copied()),
             ];
             communicator.reduce(Reduction::Maximum, &mut sizes);
@@ -151,7 +176,12 @@ pub fn run(number: usize, displacement: &Path) -> Result<(), Box<dyn Error>> {
 /// process.
 type Prepared = (Part, Vec<Vector>, Vec<Vector>);
 
-fn prepared(number: usize, rank: usize, ranks: usize, displacement: &Path) -> Result<Prepared, Box<dyn Error>> {
+fn prepared(
+    number: usize,
+    rank: usize,
+    ranks: usize,
+    displacement: &Path,
+) -> Result<Prepared, Box<dyn Error>> {
     let (_, mesh) = mesh(number)?;
     let all: Vec<u32> = (0..).take(mesh.points().len()).collect();
     let motion = motion(&mesh, &all);
@@ -172,12 +202,14 @@ fn prepared(number: usize, rank: usize, ranks: usize, displacement: &Path) -> Re
     }
     let part = Part::cut(&mesh, &of_cells, rank, false)?;
     let bytes = std::fs::read(displacement)?;
-    let values: Vec<f64> = bytes.as_chunks().0.iter().map(|value| f64::from_le_bytes(*value)).collect();
+    let values: Vec<f64> =
+        bytes.as_chunks().0.iter().map(|value| f64::from_le_bytes(*value)).collect();
     let values = values.as_chunks::<3>().0;
     if values.len() != mesh.points().len() {
         return Err("the displacement is not that of this mesh".into());
     }
     let numbers = || part.global_vertices.iter().flatten().map(|&number| number as usize);
-    let (motion, expected) = (numbers().map(|number| motion[number]).collect(), numbers().map(|n| values[n]).collect());
+    let (motion, expected) =
+        (numbers().map(|number| motion[number]).collect(), numbers().map(|n| values[n]).collect());
     Ok((part, motion, expected))
 }

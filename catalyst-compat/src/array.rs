@@ -42,7 +42,8 @@ impl<'call> Array<'call> {
     fn read<const N: usize>(&self, index: usize) -> [u8; N] {
         assert!(index < self.count && N == self.number.bytes(), "element {index}");
         // SAFETY: the element is there (`new`), and bytes need no alignment.
-        let mut bytes: [u8; N] = unsafe { self.first.add(index * self.stride).cast::<[u8; N]>().read_unaligned() };
+        let mut bytes: [u8; N] =
+            unsafe { self.first.add(index * self.stride).cast::<[u8; N]>().read_unaligned() };
         if self.swapped {
             bytes.reverse();
         }
@@ -53,7 +54,10 @@ impl<'call> Array<'call> {
     ///
     /// # Panics
     /// Where `index` is out of range.
-    #[expect(clippy::cast_precision_loss, reason = "fields of large integers are shown, not computed with")]
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "fields of large integers are shown, not computed with"
+    )]
     pub(crate) fn get(&self, index: usize) -> f64 {
         match self.number {
             NumberType::I8 => f64::from(i8::from_ne_bytes(self.read(index))),
@@ -103,7 +107,10 @@ impl<'call> Array<'call> {
             return Some((&[], 1));
         }
         let stride = if self.count == 1 { size } else { self.stride };
-        if !stride.is_multiple_of(size) || stride == 0 || !self.first.addr().is_multiple_of(align_of::<T>()) {
+        if !stride.is_multiple_of(size)
+            || stride == 0
+            || !self.first.addr().is_multiple_of(align_of::<T>())
+        {
             return None;
         }
         let length = (self.count - 1) * (stride / size) + 1;
@@ -120,7 +127,11 @@ impl<'call> Array<'call> {
             NumberType::I32 => self.slice().map(|(values, stride)| (Values::I32(values), stride)),
             NumberType::I64 => self.slice().map(|(values, stride)| (Values::I64(values), stride)),
             NumberType::U8 => self.slice().map(|(values, stride)| (Values::U8(values), stride)),
-            NumberType::I8 | NumberType::I16 | NumberType::U16 | NumberType::U32 | NumberType::U64 => None,
+            NumberType::I8
+            | NumberType::I16
+            | NumberType::U16
+            | NumberType::U32
+            | NumberType::U64 => None,
         }
     }
 
@@ -172,7 +183,12 @@ pub(crate) struct Fingerprint([u64; 4]);
 
 impl Default for Fingerprint {
     fn default() -> Self {
-        Self([0x9e37_79b9_7f4a_7c15, 0xbf58_476d_1ce4_e5b9, 0x94d0_49bb_1331_11eb, 0x2545_f491_4f6c_dd1d])
+        Self([
+            0x9e37_79b9_7f4a_7c15,
+            0xbf58_476d_1ce4_e5b9,
+            0x94d0_49bb_1331_11eb,
+            0x2545_f491_4f6c_dd1d,
+        ])
     }
 }
 

@@ -69,9 +69,16 @@ impl Configuration {
                 each(&node, |child| parameter(child, &mut parameters))?;
             }
             if let Some(handle) = catalyst.child(c"mpi_comm") {
-                let value = handle.array().ok().filter(|array| array.len() == 1).and_then(|array| array.integer(0));
+                let value = handle
+                    .array()
+                    .ok()
+                    .filter(|array| array.len() == 1)
+                    .and_then(|array| array.integer(0));
                 let value = value.and_then(|value| i32::try_from(value).ok());
-                communicator = Some(value.ok_or_else(|| handle.wrong("the Fortran handle of a communicator".into()))?);
+                communicator =
+                    Some(value.ok_or_else(|| {
+                        handle.wrong("the Fortran handle of a communicator".into())
+                    })?);
             }
         }
         let mut of_user = None;
@@ -79,11 +86,14 @@ impl Configuration {
             if found.files.is_empty() {
                 of_user = Some(file);
             } else {
-                found.notes.push(format!("{PIPELINES}={file} is passed over: the solver names a configuration itself"));
+                found.notes.push(format!(
+                    "{PIPELINES}={file} is passed over: the solver names a configuration itself"
+                ));
             }
         }
         if let Some(file) = variable(ORDERS) {
-            orders = language::parse_orders(&text(&file, WAITING_BYTES)?, &file).map_err(unreadable)?;
+            orders =
+                language::parse_orders(&text(&file, WAITING_BYTES)?, &file).map_err(unreadable)?;
         }
         let is_default = found.files.is_empty() && of_user.is_none();
         let (config, groups) = merged(&mut found, of_user.as_deref())?;
@@ -118,7 +128,10 @@ fn unreadable(error: impl ToString) -> CatalystError {
 }
 
 /// The surface of each channel, for whoever opens the link, beside the pipelines of a configuration.
-pub(crate) fn with_default_views(config: &Config, channels: &[String]) -> Result<Config, CatalystError> {
+pub(crate) fn with_default_views(
+    config: &Config,
+    channels: &[String],
+) -> Result<Config, CatalystError> {
     let mut views = default_config(channels)?;
     for view in &mut views.pipelines {
         while config.pipelines.iter().any(|pipeline| pipeline.name == view.name) {
@@ -148,7 +161,8 @@ fn merged(found: &mut Found, of_user: Option<&str>) -> Result<(Config, Groups), 
     let own = json!({"version": 1, "pipelines": found.pipelines});
     let mut config = language::parse(&own.to_string(), "catalyst/pipelines").map_err(unreadable)?;
     let mut groups: Groups = found.others.iter().map(|name| (name.clone(), Vec::new())).collect();
-    let mut of_solver: Vec<String> = config.pipelines.iter().map(|pipeline| pipeline.name.clone()).collect();
+    let mut of_solver: Vec<String> =
+        config.pipelines.iter().map(|pipeline| pipeline.name.clone()).collect();
     let mut settings = Settings::default();
     let mut pipelines = Vec::new();
     for (name, file) in &found.files {
@@ -189,7 +203,11 @@ struct Settings {
 
 impl Settings {
     /// Takes in what a file says that none has said before, and gives its pipelines. What it says otherwise is told.
-    fn take(&mut self, file: &str, notes: &mut Vec<String>) -> Result<Vec<Pipeline>, CatalystError> {
+    fn take(
+        &mut self,
+        file: &str,
+        notes: &mut Vec<String>,
+    ) -> Result<Vec<Pipeline>, CatalystError> {
         fn first<T: PartialEq>(
             known: &mut Option<(T, String)>,
             said: Option<T>,
@@ -200,7 +218,8 @@ impl Settings {
             match (&known, said) {
                 (None, Some(said)) => *known = Some((said, file.to_owned())),
                 (Some((held, before)), Some(said)) if *held != said => {
-                    notes.push(format!("'{what}' of {file} is passed over: that of {before} holds"));
+                    notes
+                        .push(format!("'{what}' of {file} is passed over: that of {before} holds"));
                 }
                 _ => {}
             }
@@ -245,7 +264,9 @@ fn script(node: &Node<'_, '_>, found: &mut Found) -> Result<(), CatalystError> {
     } else {
         let path = node.path();
         found.others.push(node.name().into_owned());
-        found.notes.push(format!("'{path}': {file} is not run: a configuration is a file that ends in .json"));
+        found.notes.push(format!(
+            "'{path}': {file} is not run: a configuration is a file that ends in .json"
+        ));
     }
     Ok(())
 }
@@ -271,13 +292,14 @@ fn pipeline(node: &Node<'_, '_>, found: &mut Found) -> Result<(), CatalystError>
             Ok(())
         }
         _ if is_json(&file) => script(node, found),
-        "" => {
-            Err(file_node
-                .wrong_found(format!("'{file}'"), "a file that ends in .json, or the type 'io' beside it".into()))
-        }
+        "" => Err(file_node.wrong_found(
+            format!("'{file}'"),
+            "a file that ends in .json, or the type 'io' beside it".into(),
+        )),
         other => {
             let kind = node.need(c"type", "'io'")?;
-            Err(kind.wrong_found(format!("'{other}'"), "'io', or a filename that ends in .json".into()))
+            Err(kind
+                .wrong_found(format!("'{other}'"), "'io', or a filename that ends in .json".into()))
         }
     }
 }
@@ -295,7 +317,8 @@ fn written_file(file: &str) -> (String, Option<String>) {
             let (name, format) = inside.split_once(':').unwrap_or((inside, ""));
             (name, format, (inside.len() + 1).min(behind.len()))
         } else {
-            let digits = behind.len() - behind.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.').len();
+            let digits = behind.len()
+                - behind.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.').len();
             let (name, letters) = match &behind[digits..] {
                 text if text.starts_with("ts") => ("timestep", 2),
                 text if text.starts_with('t') => ("time", 1),
@@ -304,10 +327,14 @@ fn written_file(file: &str) -> (String, Option<String>) {
             (name, &behind[..digits], digits + letters)
         };
         match name {
-            "timestep" | "cycle" => pattern.push_str(&format!("{{cycle:{}}}", digits(format).max(1))),
+            "timestep" | "cycle" => {
+                pattern.push_str(&format!("{{cycle:{}}}", digits(format).max(1)))
+            }
             "time" if format.contains('.') => {
-                pattern
-                    .push_str(&format!("{{time:{}}}", digits(format.split_once('.').map_or("", |(_, after)| after))));
+                pattern.push_str(&format!(
+                    "{{time:{}}}",
+                    digits(format.split_once('.').map_or("", |(_, after)| after))
+                ));
             }
             "time" => pattern.push_str("{time}"),
             // Not one of ParaView's: what checks the configuration tells what may stand in braces.
@@ -316,7 +343,8 @@ fn written_file(file: &str) -> (String, Option<String>) {
         rest = &behind[length..];
     }
     pattern.push_str(rest);
-    let extension = Path::new(&pattern).extension().map(|extension| extension.to_string_lossy().into_owned());
+    let extension =
+        Path::new(&pattern).extension().map(|extension| extension.to_string_lossy().into_owned());
     match extension.as_deref() {
         Some("vtu" | "vtp" | "vtpd" | "pvtu" | "pvtp") => (pattern, None),
         Some(other) if other.starts_with("vt") || other.starts_with("pvt") => {
@@ -339,11 +367,14 @@ fn digits(format: &str) -> usize {
 fn parameter(node: &Node<'_, '_>, parameters: &mut Vec<Parameter>) -> Result<(), CatalystError> {
     let name = node.name().into_owned();
     if RESERVED.contains(&name.as_str()) {
-        return Err(
-            node.wrong_found(format!("the name '{name}'"), format!("a name that is none of {}", RESERVED.join(", ")))
-        );
+        return Err(node.wrong_found(
+            format!("the name '{name}'"),
+            format!("a name that is none of {}", RESERVED.join(", ")),
+        ));
     }
-    let bound = |child: &std::ffi::CStr, default: f64| node.child(child).map_or(Ok(default), |child| child.number());
+    let bound = |child: &std::ffi::CStr, default: f64| {
+        node.child(child).map_or(Ok(default), |child| child.number())
+    };
     let (value, minimum, maximum) = match node.kind() {
         Kind::Numbers => (node.number()?, -f64::MAX, f64::MAX),
         Kind::Object => (
@@ -384,8 +415,13 @@ mod tests {
             std::fs::write(&path, text).expect("can be written");
             path.to_string_lossy().into_owned()
         };
-        let pipeline = |name: &str| format!(r#""pipelines": [{{"name": "{name}", "stages": [{{"quality": {{}}}}]}}]"#);
-        let one = file("one.json", &format!(r#"{{"version": 1, "journal": "a.jsonl", {}}}"#, pipeline("one")));
+        let pipeline = |name: &str| {
+            format!(r#""pipelines": [{{"name": "{name}", "stages": [{{"quality": {{}}}}]}}]"#)
+        };
+        let one = file(
+            "one.json",
+            &format!(r#"{{"version": 1, "journal": "a.jsonl", {}}}"#, pipeline("one")),
+        );
         let two = file(
             "two.json",
             &format!(
@@ -393,14 +429,16 @@ mod tests {
                 pipeline("two")
             ),
         );
-        let three =
-            file("three.json", &format!(r#"{{"version": 1, "steering": {{"poll_steps": 4}}, {}}}"#, pipeline("three")));
+        let three = file(
+            "three.json",
+            &format!(r#"{{"version": 1, "steering": {{"poll_steps": 4}}, {}}}"#, pipeline("three")),
+        );
         let files = [("a", &one), ("b", &two)].map(|(name, file)| (name.to_owned(), file.clone()));
-        let io =
-            json!({"name": "io", "channel": "grid", "every": {"steps": 1}, "stages": [{"write": {"file": "a.vtu"}}]});
+        let io = json!({"name": "io", "channel": "grid", "every": {"steps": 1}, "stages": [{"write": {"file": "a.vtu"}}]});
         let mut found = Found { files: files.to_vec(), pipelines: vec![io], ..Found::default() };
         let (config, groups) = merged(&mut found, Some(&three)).expect("a configuration");
-        let names: Vec<&str> = config.pipelines.iter().map(|pipeline| pipeline.name.as_str()).collect();
+        let names: Vec<&str> =
+            config.pipelines.iter().map(|pipeline| pipeline.name.as_str()).collect();
         assert_eq!(names, ["one", "two", "three", "io"]);
         assert!(
             !config.steering.background && config.steering.poll_steps.get() == 1,
@@ -418,8 +456,10 @@ mod tests {
         // No solver chooses among what the user asks for.
         let known: Vec<&str> = groups.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(known, ["a", "b", "io", "one", "two"]);
-        let views = with_default_views(&config, &["one".to_owned(), "grid".to_owned()]).expect("a configuration");
-        let names: Vec<&str> = views.pipelines.iter().map(|pipeline| pipeline.name.as_str()).collect();
+        let views = with_default_views(&config, &["one".to_owned(), "grid".to_owned()])
+            .expect("a configuration");
+        let names: Vec<&str> =
+            views.pipelines.iter().map(|pipeline| pipeline.name.as_str()).collect();
         assert_eq!(names, ["view of one", "grid", "one", "two", "three", "io"]);
     }
 

@@ -34,7 +34,9 @@ pub enum CatalystError {
     #[error("called outside of catalyst_initialize ... catalyst_finalize")]
     NotInitialized,
     /// The host exports no usable Conduit.
-    #[error("this process does not export '{symbol}'; the solver must be linked with libcatalyst (2.0 or newer)")]
+    #[error(
+        "this process does not export '{symbol}'; the solver must be linked with libcatalyst (2.0 or newer)"
+    )]
     MissingSymbol {
         /// The first function that was not found.
         symbol: &'static str,
@@ -81,7 +83,9 @@ pub enum CatalystError {
         status: Status,
     },
     /// Ranks let different pipelines run.
-    #[error("'catalyst/state/pipelines': found other names on other ranks; expected the same on all")]
+    #[error(
+        "'catalyst/state/pipelines': found other names on other ranks; expected the same on all"
+    )]
     Choices,
     /// The adaptor could not be set up.
     #[error(transparent)]

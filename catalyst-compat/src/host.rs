@@ -76,7 +76,9 @@ impl Host {
     /// [`CatalystError::MissingSymbol`] with the first function that the process does not export.
     pub(crate) fn get() -> Result<&'static Host, CatalystError> {
         static HOST: OnceLock<Result<Host, &'static str>> = OnceLock::new();
-        HOST.get_or_init(Host::look_up).as_ref().map_err(|symbol| CatalystError::MissingSymbol { symbol })
+        HOST.get_or_init(Host::look_up)
+            .as_ref()
+            .map_err(|symbol| CatalystError::MissingSymbol { symbol })
     }
 }
 
@@ -89,7 +91,8 @@ fn symbol(name: &'static str) -> Option<*mut c_void> {
         return Some(found);
     }
     // SAFETY: the file name is a C string; with `RTLD_NOLOAD` nothing is loaded and no foreign code runs.
-    let library = unsafe { libc::dlopen(c"libcatalyst.so.3".as_ptr(), libc::RTLD_LAZY | libc::RTLD_NOLOAD) };
+    let library =
+        unsafe { libc::dlopen(c"libcatalyst.so.3".as_ptr(), libc::RTLD_LAZY | libc::RTLD_NOLOAD) };
     if library.is_null() {
         return None;
     }

@@ -165,7 +165,9 @@ fn answer(call: &str, run: impl FnOnce() -> Result<(), CatalystError>) -> c_int 
             error.status()
         }
         Err(_) => {
-            eprintln!("tombolo: {call}: a defect of tombolo stopped this call; the solver may go on");
+            eprintln!(
+                "tombolo: {call}: a defect of tombolo stopped this call; the solver may go on"
+            );
             Status::Failed
         }
     };

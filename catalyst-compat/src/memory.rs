@@ -7,10 +7,13 @@ use crate::array::Array;
 fn is_readable(address: *const u8, bytes: usize) -> bool {
     let mut copy = [0_u8; 8];
     let local = libc::iovec { iov_base: copy.as_mut_ptr().cast(), iov_len: bytes.min(copy.len()) };
-    let remote = libc::iovec { iov_base: address.cast_mut().cast(), iov_len: bytes.min(copy.len()) };
+    let remote =
+        libc::iovec { iov_base: address.cast_mut().cast(), iov_len: bytes.min(copy.len()) };
     // SAFETY: the system copies from this process into `copy`, which is as long as is said; what cannot be read is answered
     // with EFAULT, not with a signal.
-    let read = unsafe { libc::process_vm_readv(libc::getpid(), &raw const local, 1, &raw const remote, 1, 0) };
+    let read = unsafe {
+        libc::process_vm_readv(libc::getpid(), &raw const local, 1, &raw const remote, 1, 0)
+    };
     if read >= 0 {
         return read as usize == bytes.min(8);
     }
@@ -36,7 +39,14 @@ mod tests {
         // A page that may not be read, as a driver maps a card's memory.
         // SAFETY: a new mapping that nothing else uses; it is unmapped below.
         let page = unsafe {
-            libc::mmap(std::ptr::null_mut(), 4096, libc::PROT_NONE, libc::MAP_PRIVATE | libc::MAP_ANONYMOUS, -1, 0)
+            libc::mmap(
+                std::ptr::null_mut(),
+                4096,
+                libc::PROT_NONE,
+                libc::MAP_PRIVATE | libc::MAP_ANONYMOUS,
+                -1,
+                0,
+            )
         };
         assert_ne!(page, libc::MAP_FAILED);
         assert!(!is_readable(page.cast(), 8));

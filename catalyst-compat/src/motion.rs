@@ -39,7 +39,8 @@ pub(crate) struct Asked {
 impl Asked {
     /// Nothing but what the parameters are.
     pub(crate) fn of(parameters: &[Parameter]) -> Self {
-        let parameters = parameters.iter().map(|parameter| (parameter.name.clone(), parameter.value)).collect();
+        let parameters =
+            parameters.iter().map(|parameter| (parameter.name.clone(), parameter.value)).collect();
         Self { parameters, ..Self::default() }
     }
 

@@ -47,7 +47,10 @@ impl<'call> Node<'_, 'call> {
     /// # Safety
     /// `pointer` is null or a node of the host's Conduit that lives, with all that it borrows, unchanged by others until the call
     /// returns.
-    pub(crate) unsafe fn root(host: &'static Host, pointer: *const RawNode) -> Result<Self, CatalystError> {
+    pub(crate) unsafe fn root(
+        host: &'static Host,
+        pointer: *const RawNode,
+    ) -> Result<Self, CatalystError> {
         if pointer.is_null() {
             return Err(CatalystError::NullNode);
         }
@@ -123,9 +126,10 @@ impl<'call> Node<'_, 'call> {
         expected: &'static str,
     ) -> Result<Node<'next, 'call>, CatalystError> {
         self.child(name).ok_or_else(|| match self.kind() {
-            Kind::Object | Kind::Empty => {
-                CatalystError::Missing { path: Node { name, parent: Some(self), ..*self }.path(), expected }
-            }
+            Kind::Object | Kind::Empty => CatalystError::Missing {
+                path: Node { name, parent: Some(self), ..*self }.path(),
+                expected,
+            },
             _ => self.wrong(format!("an object with '{}'", name.to_string_lossy())),
         })
     }
@@ -151,7 +155,8 @@ impl<'call> Node<'_, 'call> {
                 // is freed here once it has been copied.
                 unsafe {
                     let child = (self.host.child)(self.pointer, index as i64);
-                    let name: *mut c_char = if child.is_null() { ptr::null_mut() } else { (self.host.name)(child) };
+                    let name: *mut c_char =
+                        if child.is_null() { ptr::null_mut() } else { (self.host.name)(child) };
                     if name.is_null() {
                         return CString::default();
                     }
@@ -164,7 +169,11 @@ impl<'call> Node<'_, 'call> {
     }
 
     /// The child number `index`, which `name` names in errors.
-    pub(crate) fn at<'next>(&'next self, index: usize, name: &'next CStr) -> Option<Node<'next, 'call>> {
+    pub(crate) fn at<'next>(
+        &'next self,
+        index: usize,
+        name: &'next CStr,
+    ) -> Option<Node<'next, 'call>> {
         if index >= self.len() {
             return None;
         }
@@ -188,8 +197,11 @@ impl<'call> Node<'_, 'call> {
             return std::str::from_utf8(&bytes[..end]).map(Cow::Borrowed).map_err(|_| no_text());
         }
         // SAFETY: Conduit says that the node holds `count` bytes, `stride` apart.
-        let bytes = (0..count).map(|index| unsafe { first.offset((index * stride) as isize).read() });
-        String::from_utf8(bytes.take_while(|byte| *byte != 0).collect()).map(Cow::Owned).map_err(|_| no_text())
+        let bytes =
+            (0..count).map(|index| unsafe { first.offset((index * stride) as isize).read() });
+        String::from_utf8(bytes.take_while(|byte| *byte != 0).collect())
+            .map(Cow::Owned)
+            .map_err(|_| no_text())
     }
 
     /// Address of the first element, number of elements, and bytes from one to the next.
@@ -205,11 +217,17 @@ impl<'call> Node<'_, 'call> {
         // SAFETY: the node has a first element.
         let first: *const u8 = unsafe { (self.host.element)(self.pointer, 0) }.cast::<u8>();
         if first.is_null() {
-            return Err(self.wrong_found("a null pointer".into(), format!("the address of {count} values")));
+            return Err(
+                self.wrong_found("a null pointer".into(), format!("the address of {count} values"))
+            );
         }
-        if stride < 0 || count.checked_mul(stride.max(1)).is_none_or(|bytes| bytes > isize::MAX as i64) {
-            return Err(self
-                .wrong_found(format!("{count} values {stride} bytes apart"), "a length that memory can have".into()));
+        if stride < 0
+            || count.checked_mul(stride.max(1)).is_none_or(|bytes| bytes > isize::MAX as i64)
+        {
+            return Err(self.wrong_found(
+                format!("{count} values {stride} bytes apart"),
+                "a length that memory can have".into(),
+            ));
         }
         Ok((first, count, stride))
     }
@@ -234,7 +252,9 @@ impl<'call> Node<'_, 'call> {
         let endianness = unsafe { (self.host.endianness)((self.host.dtype)(self.pointer)) };
         // SAFETY: Conduit says that the node holds `count` numbers of this type, `stride` bytes apart, and by the contract of
         // `root` they live until the call returns.
-        Ok(unsafe { Array::new(first, count as usize, stride as usize, number, endianness == BIG_ENDIAN) })
+        Ok(unsafe {
+            Array::new(first, count as usize, stride as usize, number, endianness == BIG_ENDIAN)
+        })
     }
 
     /// The one number that it holds.
@@ -258,9 +278,17 @@ impl<'call> Node<'_, 'call> {
         match self.kind() {
             Kind::Empty => "nothing".into(),
             Kind::Object => {
-                let names: Vec<String> =
-                    self.names().iter().take(8).map(|name| name.to_string_lossy().into_owned()).collect();
-                if names.is_empty() { "an empty object".into() } else { format!("an object of {}", names.join(", ")) }
+                let names: Vec<String> = self
+                    .names()
+                    .iter()
+                    .take(8)
+                    .map(|name| name.to_string_lossy().into_owned())
+                    .collect();
+                if names.is_empty() {
+                    "an empty object".into()
+                } else {
+                    format!("an object of {}", names.join(", "))
+                }
             }
             Kind::List => format!("a list of {}", self.len()),
             Kind::Text => match self.text() {
@@ -295,8 +323,15 @@ pub(crate) struct NodeMut<'call> {
 impl NodeMut<'_> {
     /// # Safety
     /// `pointer` is null or a node of the host's Conduit that lives, and is used by nobody else, until the call returns.
-    pub(crate) unsafe fn new(host: &'static Host, pointer: *mut RawNode) -> Result<Self, CatalystError> {
-        if pointer.is_null() { Err(CatalystError::NullNode) } else { Ok(Self { host, pointer, call: PhantomData }) }
+    pub(crate) unsafe fn new(
+        host: &'static Host,
+        pointer: *mut RawNode,
+    ) -> Result<Self, CatalystError> {
+        if pointer.is_null() {
+            Err(CatalystError::NullNode)
+        } else {
+            Ok(Self { host, pointer, call: PhantomData })
+        }
     }
 
     pub(crate) fn set_text(&mut self, path: &str, value: &str) {
@@ -314,7 +349,12 @@ impl NodeMut<'_> {
         // SAFETY: as in `set_text`; the values are copied, not written to.
         unsafe {
             let data = values.as_ptr().cast_mut();
-            (self.host.set_int64s)(self.pointer, c_string(path).as_ptr(), data, values.len() as i64);
+            (self.host.set_int64s)(
+                self.pointer,
+                c_string(path).as_ptr(),
+                data,
+                values.len() as i64,
+            );
         }
     }
 
@@ -329,7 +369,16 @@ impl NodeMut<'_> {
         unsafe {
             let data = vectors.as_ptr().cast::<f64>().cast_mut();
             let (count, offset) = (vectors.len() as i64, 8 * axis.min(2) as i64);
-            (self.host.set_float64s)(self.pointer, c_string(path).as_ptr(), data, count, offset, 24, 8, 0);
+            (self.host.set_float64s)(
+                self.pointer,
+                c_string(path).as_ptr(),
+                data,
+                count,
+                offset,
+                24,
+                8,
+                0,
+            );
         }
     }
 
@@ -376,7 +425,9 @@ mod tests {
 
     #[test]
     fn names_are_those_that_were_given() {
-        for (told, given) in [(c"{a/b}", c"a/b"), (c"a", c"a"), (c"{a}", c"{a}"), (c"{", c"{"), (c"", c"")] {
+        for (told, given) in
+            [(c"{a/b}", c"a/b"), (c"a", c"a"), (c"{a}", c"{a}"), (c"{", c"{"), (c"", c"")]
+        {
             assert_eq!(bare(told.to_owned()).as_c_str(), given);
         }
     }

@@ -17,7 +17,8 @@ const WORLD: i32 = -1;
 #[cfg(feature = "distributed")]
 pub(crate) fn communicator(handle: Option<i32>) -> Result<Arc<dyn Communicator>, CatalystError> {
     use tombolo::comm::{Solo, mpi};
-    let unusable = |error: mpi::MpiError| CatalystError::Configuration(format!("the communicator: {error}"));
+    let unusable =
+        |error: mpi::MpiError| CatalystError::Configuration(format!("the communicator: {error}"));
     match handle.filter(|&handle| handle != WORLD) {
         // SAFETY: Catalyst's blueprint says that `catalyst/mpi_comm` is the handle of a live communicator; a null one is told.
         Some(handle) => Ok(Arc::new(unsafe { mpi::Mpi::from_fortran(handle) }.map_err(unusable)?)),
@@ -48,7 +49,10 @@ pub(crate) fn communicator(_: Option<i32>) -> Result<Arc<dyn Communicator>, Cata
 }
 
 /// Goes on where all ranks can; where one cannot, all get its error with its status. Collective.
-pub(crate) fn agree<T>(ranks: &dyn Communicator, mine: Result<T, CatalystError>) -> Result<T, CatalystError> {
+pub(crate) fn agree<T>(
+    ranks: &dyn Communicator,
+    mine: Result<T, CatalystError>,
+) -> Result<T, CatalystError> {
     agree_and_ask(ranks, mine, false, 0).map(|(mine, _)| mine)
 }
 
@@ -65,7 +69,8 @@ pub(crate) fn agree_and_ask<T>(
     #[expect(clippy::cast_precision_loss, reason = "ranks below 2^53")]
     let (own, none) = (ranks.rank() as f64, ranks.size() as f64);
     let choice = f64::from(choice);
-    let mut first = [if mine.is_err() { own } else { none }, if yes { -1.0 } else { 0.0 }, choice, -choice];
+    let mut first =
+        [if mine.is_err() { own } else { none }, if yes { -1.0 } else { 0.0 }, choice, -choice];
     ranks.reduce(Reduction::Minimum, &mut first);
     if first[0] >= none {
         if first[2] != -first[3] {
@@ -104,11 +109,15 @@ pub(crate) fn ask<T, E>(
 }
 
 /// What all ranks have, in their order. Collective.
-pub(crate) fn gathered<O: DeserializeOwned>(ranks: &dyn Communicator, own: &impl Serialize) -> Vec<O> {
+pub(crate) fn gathered<O: DeserializeOwned>(
+    ranks: &dyn Communicator,
+    own: &impl Serialize,
+) -> Vec<O> {
     let mut bytes = Vec::new();
     if let Some(parts) = ranks.gather(0, &serde_json::to_vec(own).unwrap_or_default()) {
         let lists = parts.iter().map(|part| serde_json::from_slice(part).unwrap_or_default());
-        let all: Vec<serde_json::Value> = lists.flat_map(|list: Vec<serde_json::Value>| list).collect();
+        let all: Vec<serde_json::Value> =
+            lists.flat_map(|list: Vec<serde_json::Value>| list).collect();
         bytes = serde_json::to_vec(&all).unwrap_or_default();
     }
     ranks.broadcast(0, &mut bytes);
@@ -119,8 +128,9 @@ pub(crate) fn gathered<O: DeserializeOwned>(ranks: &dyn Communicator, own: &impl
 pub(crate) fn union(ranks: &dyn Communicator, own: &[&str]) -> Vec<String> {
     let mut bytes = own.join("\n").into_bytes();
     // Most often all have the same.
-    let hash =
-        bytes.iter().fold(bytes.len() as u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3));
+    let hash = bytes.iter().fold(bytes.len() as u64, |hash, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
+    });
     let mut spread = [f64::from((hash >> 32) as u32 ^ hash as u32), 0.0];
     spread[1] = -spread[0];
     ranks.reduce(Reduction::Minimum, &mut spread);

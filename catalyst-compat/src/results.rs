@@ -21,7 +21,12 @@ const MESH: Names = ("mesh", "coords");
 const SURFACE: Names = ("surface", "surface");
 
 /// Fills in what was asked. `blocks` are the names of the steered channel's meshes and how many vertices each has.
-pub(crate) fn fill(node: &mut NodeMut<'_>, asked: &Asked, channel: &str, blocks: &[(String, usize)]) {
+pub(crate) fn fill(
+    node: &mut NodeMut<'_>,
+    asked: &Asked,
+    channel: &str,
+    blocks: &[(String, usize)],
+) {
     // What an earlier call left would be taken for new.
     node.remove(&format!("catalyst/{STEERING}"));
     if !channel.is_empty() {
@@ -76,7 +81,8 @@ fn settings(node: &mut NodeMut<'_>, asked: &Asked) {
 fn points(node: &mut NodeMut<'_>, root: &str, motion: &Motion, range: std::ops::Range<usize>) {
     let part = |vectors: &'_ [[f64; 3]]| vectors.get(range.clone()).unwrap_or_default().to_vec();
     coordinates(node, root, MESH, &part(&motion.coordinates));
-    for (name, vectors) in [("displacement", &motion.displacement), ("velocity", &motion.velocity)] {
+    for (name, vectors) in [("displacement", &motion.displacement), ("velocity", &motion.velocity)]
+    {
         let field = field(node, root, MESH, name);
         axes(node, &field, &part(vectors));
     }
@@ -86,23 +92,33 @@ fn points(node: &mut NodeMut<'_>, root: &str, motion: &Motion, range: std::ops::
 /// The boundary's vertices among those of `range`, by their numbers in it.
 fn surface(node: &mut NodeMut<'_>, root: &str, motion: &Motion, range: &std::ops::Range<usize>) {
     let surface = &motion.surface;
-    let places: Vec<usize> =
-        (0..surface.vertices.len()).filter(|&place| range.contains(&(surface.vertices[place] as usize))).collect();
+    let places: Vec<usize> = (0..surface.vertices.len())
+        .filter(|&place| range.contains(&(surface.vertices[place] as usize)))
+        .collect();
     let part = |vectors: &[[f64; 3]]| -> Vec<[f64; 3]> {
         places.iter().map(|&place| vectors.get(place).copied().unwrap_or_default()).collect()
     };
     coordinates(node, root, SURFACE, &part(&surface.coordinates));
-    for (name, vectors) in [("surface_displacement", &surface.displacement), ("surface_velocity", &surface.velocity)] {
+    for (name, vectors) in
+        [("surface_displacement", &surface.displacement), ("surface_velocity", &surface.velocity)]
+    {
         let field = field(node, root, SURFACE, name);
         axes(node, &field, &part(vectors));
     }
-    let number = |&place: &usize| i64::from(surface.vertices[place]) - i64::try_from(range.start).unwrap_or_default();
+    let number = |&place: &usize| {
+        i64::from(surface.vertices[place]) - i64::try_from(range.start).unwrap_or_default()
+    };
     let numbers: Vec<i64> = places.iter().map(number).collect();
     let field = field(node, root, SURFACE, "surface_vertices");
     node.set_integers(&format!("{field}/values"), &numbers);
 }
 
-fn coordinates(node: &mut NodeMut<'_>, root: &str, (topology, coordset): Names, points: &[[f64; 3]]) {
+fn coordinates(
+    node: &mut NodeMut<'_>,
+    root: &str,
+    (topology, coordset): Names,
+    points: &[[f64; 3]],
+) {
     let values = format!("{root}/coordsets/{coordset}");
     node.set_text(&format!("{values}/type"), "explicit");
     axes(node, &values, points);

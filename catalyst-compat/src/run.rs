@@ -65,11 +65,17 @@ impl Run {
         let choice = names.map_or(0, |names| {
             let bytes = names.iter().flat_map(|name| name.bytes().chain([b'\n']));
             // Not 0, which is all of them.
-            bytes.fold(0x811c_9dc5, |hash: u32, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)).max(1)
+            bytes
+                .fold(0x811c_9dc5, |hash: u32, byte| {
+                    (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
+                })
+                .max(1)
         });
         if choice != self.choice {
             self.choice = choice;
-            self.adaptor.choose_pipelines(|name| !of_solver(name) || names.is_none_or(|names| names.contains(&name)));
+            self.adaptor.choose_pipelines(|name| {
+                !of_solver(name) || names.is_none_or(|names| names.contains(&name))
+            });
         }
     }
 
@@ -145,7 +151,12 @@ impl Run {
         self.blocks.clear();
         if let Some(channel) = steered {
             self.steered.push_str(&channel.name);
-            self.blocks.extend(channel.blocks.iter().map(|block: &Block| (block.name.clone(), block.vertex_count())));
+            self.blocks.extend(
+                channel
+                    .blocks
+                    .iter()
+                    .map(|block: &Block| (block.name.clone(), block.vertex_count())),
+            );
         }
         let Self { adaptor, kept, asked, .. } = self;
         let mut fields: Vec<Vec<FieldView<'_>>> = channels.iter().map(|_| Vec::new()).collect();
@@ -157,8 +168,9 @@ impl Run {
             }
         }
         let parts = channels.iter().zip(meshes).zip(&fields);
-        let views: Vec<extract::Channel<'_>> =
-            parts.map(|((channel, mesh), fields)| extract::Channel { name: &channel.name, mesh, fields }).collect();
+        let views: Vec<extract::Channel<'_>> = parts
+            .map(|((channel, mesh), fields)| extract::Channel { name: &channel.name, mesh, fields })
+            .collect();
         // What an earlier step asked for is not asked again.
         asked.rest();
         asked.take(&adaptor.execute(&step, &views)?);
@@ -181,7 +193,9 @@ impl Run {
         if self.communicator.size() == 1 {
             return given;
         }
-        let has_grids = |channels: &[Channel<'_>]| channels.iter().any(|channel| channel.grids().next().is_some());
+        let has_grids = |channels: &[Channel<'_>]| {
+            channels.iter().any(|channel| channel.grids().next().is_some())
+        };
         let (mut given, any) = ranks::ask(&*self.communicator, given, |(step, channels)| {
             self.adaptor.looks_at(step) && has_grids(channels)
         });
@@ -194,7 +208,8 @@ impl Run {
             let all: Vec<(String, Vec<Grid>)> = ranks::gathered(&*self.communicator, &own);
             for channel in given.iter_mut().flat_map(|(_, channels)| channels) {
                 let of_channel = all.iter().filter(|(name, _)| *name == channel.name);
-                let grids: Vec<Grid> = of_channel.flat_map(|(_, grids)| grids.iter().copied()).collect();
+                let grids: Vec<Grid> =
+                    of_channel.flat_map(|(_, grids)| grids.iter().copied()).collect();
                 channel.cover(&grids);
             }
         }

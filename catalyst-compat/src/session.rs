@@ -35,12 +35,19 @@ impl Session {
     /// Sets a run up. Collective.
     pub(crate) fn new(node: &Node<'_, '_>) -> Result<Self, CatalystError> {
         let configuration = Configuration::read(node);
-        let handle = configuration.as_ref().ok().and_then(|configuration| configuration.communicator);
+        let handle =
+            configuration.as_ref().ok().and_then(|configuration| configuration.communicator);
         let communicator = ranks::communicator(handle)?;
         let Configuration { config, is_default, groups, parameters, orders, output, notes, .. } =
             ranks::agree(&*communicator, configuration)?;
-        let settings =
-            Settings { config, communicator: Arc::clone(&communicator), solvers: None, parameters, orders, output };
+        let settings = Settings {
+            config,
+            communicator: Arc::clone(&communicator),
+            solvers: None,
+            parameters,
+            orders,
+            output,
+        };
         let stage = if is_default {
             let asked = Asked::of(&settings.parameters);
             Stage::Waiting { settings: Box::new(settings), asked }
@@ -78,7 +85,9 @@ impl Session {
             settings.config = with_default_views(&settings.config, &names)?;
             let run = match Run::new((**settings).clone()) {
                 // Nobody asked for that very port. On several ranks all have the error of the one that could not have it.
-                Err(CatalystError::Initialize(InitializeError::Stream(_) | InitializeError::Rank(_))) => {
+                Err(CatalystError::Initialize(
+                    InitializeError::Stream(_) | InitializeError::Rank(_),
+                )) => {
                     if let Some(stream) = &mut settings.config.stream {
                         stream.listen.set_port(0);
                     }
@@ -97,7 +106,10 @@ impl Session {
         }
     }
 
-    fn read<'call>(&mut self, node: &Node<'_, 'call>) -> Result<(Step, Vec<Channel<'call>>), CatalystError> {
+    fn read<'call>(
+        &mut self,
+        node: &Node<'_, 'call>,
+    ) -> Result<(Step, Vec<Channel<'call>>), CatalystError> {
         let catalyst = node.need(c"catalyst", "an object with 'state' and 'channels'")?;
         let state = catalyst.need(c"state", "an object with 'timestep' (or 'cycle') and 'time'")?;
         let cycle = match state.child(c"timestep") {
@@ -112,7 +124,9 @@ impl Session {
         let time_step = match state.child(c"time_step") {
             Some(length) => match finite(&length)? {
                 value if value >= 0.0 => value,
-                value => return Err(length.wrong_found(format!("{value}"), "a number from 0 on".into())),
+                value => {
+                    return Err(length.wrong_found(format!("{value}"), "a number from 0 on".into()));
+                }
             },
             None => self.under_way().map_or(0.0, |run| run.likely_time_step(time)),
         };
@@ -127,8 +141,11 @@ impl Session {
             for (index, name) in all.names().iter().enumerate() {
                 let Some(channel) = all.at(index, name) else { continue };
                 if channel.name() == STEERING {
-                    let expected = format!("another name: the results bring a mesh called '{STEERING}'");
-                    return Err(channel.wrong_found(format!("a channel called '{STEERING}'"), expected));
+                    let expected =
+                        format!("another name: the results bring a mesh called '{STEERING}'");
+                    return Err(
+                        channel.wrong_found(format!("a channel called '{STEERING}'"), expected)
+                    );
                 }
                 channels.push(Channel::read(&channel, looked_at)?);
             }
@@ -147,8 +164,9 @@ impl Session {
     fn choose(&mut self, node: Option<&Node<'_, '_>>) -> Result<(), CatalystError> {
         let Stage::UnderWay(run) = &mut self.stage else { return Ok(()) };
         // The names are those of another implementation's scripts where the configuration does not come from the solver.
-        let of_solver =
-            |name: &str| self.groups.iter().any(|(_, pipelines)| pipelines.iter().any(|known| known == name));
+        let of_solver = |name: &str| {
+            self.groups.iter().any(|(_, pipelines)| pipelines.iter().any(|known| known == name))
+        };
         let Some(node) = node.filter(|_| !self.groups.is_empty()) else {
             run.choose(None, &of_solver);
             return Ok(());
@@ -158,8 +176,10 @@ impl Session {
             for (index, name) in node.names().iter().enumerate() {
                 let Some(child) = node.at(index, name) else { continue };
                 let wanted = child.text()?;
-                let Some((_, pipelines)) = self.groups.iter().find(|(name, _)| *name == *wanted) else {
-                    let known: Vec<&str> = self.groups.iter().map(|(name, _)| name.as_str()).collect();
+                let Some((_, pipelines)) = self.groups.iter().find(|(name, _)| *name == *wanted)
+                else {
+                    let known: Vec<&str> =
+                        self.groups.iter().map(|(name, _)| name.as_str()).collect();
                     let hint = nearest(&wanted, known.iter().copied())
                         .map_or_else(String::new, |name| format!("; did you mean '{name}'?"));
                     let expected = format!("one of {}{hint}", known.join(", "));
@@ -191,8 +211,8 @@ impl Session {
         let mut told = Ok(());
         if let (Some(report), Some(file)) = (report, configuration::report_file()) {
             let text = serde_json::to_string_pretty(&report).unwrap_or_default();
-            told =
-                std::fs::write(&file, text).map_err(|error| CatalystError::Configuration(format!("{file}: {error}")));
+            told = std::fs::write(&file, text)
+                .map_err(|error| CatalystError::Configuration(format!("{file}: {error}")));
         }
         // No rank goes on before the files are there.
         ranks::agree(&*self.communicator, ended.and(told))

@@ -22,13 +22,19 @@ fn installed() -> tempfile::TempDir {
 
 #[track_caller]
 fn output(command: &mut Command) -> Output {
-    command.output().unwrap_or_else(|error| panic!("{command:?} does not run ({error}); scripts/setup installs it"))
+    command.output().unwrap_or_else(|error| {
+        panic!("{command:?} does not run ({error}); scripts/setup installs it")
+    })
 }
 
 #[track_caller]
 fn succeed(command: &mut Command) -> String {
     let output = output(command);
-    let told = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    let told = format!(
+        "{}{}",
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
     assert!(output.status.success(), "{command:?}\n{told}");
     told
 }
@@ -37,16 +43,24 @@ fn succeed(command: &mut Command) -> String {
 fn compile(directory: &Path, standard: &str, source: &Path) -> PathBuf {
     let program = directory.join("program");
     let mut compiler = Command::new(if standard.starts_with("c++") { "g++" } else { "cc" });
-    compiler.args([&format!("-std={standard}"), "-Wall", "-Wextra", "-pedantic", "-Werror", "-g"]).arg(source);
+    compiler
+        .args([&format!("-std={standard}"), "-Wall", "-Wextra", "-pedantic", "-Werror", "-g"])
+        .arg(source);
     compiler.arg("-o").arg(&program).arg("-I").arg(project("catalyst-compat/include"));
-    compiler.arg("-L").arg(directory).arg(format!("-Wl,-rpath,{}", directory.display())).args(["-ltombolo", "-lm"]);
+    compiler
+        .arg("-L")
+        .arg(directory)
+        .arg(format!("-Wl,-rpath,{}", directory.display()))
+        .args(["-ltombolo", "-lm"]);
     succeed(&mut compiler);
     program
 }
 
 fn under_valgrind(program: &Path) -> Command {
     let mut command = Command::new("valgrind");
-    command.args(["-q", "--error-exitcode=9", "--leak-check=full", "--errors-for-leak-kinds=definite"]).arg(program);
+    command
+        .args(["-q", "--error-exitcode=9", "--leak-check=full", "--errors-for-leak-kinds=definite"])
+        .arg(program);
     command
 }
 
@@ -61,31 +75,49 @@ fn the_header_is_c_and_cpp_and_of_this_version() {
     for (standard, ending) in [("c99", "c"), ("c11", "c"), ("c++11", "cpp"), ("c++17", "cpp")] {
         succeed(&mut Command::new(compile(directory.path(), standard, &source(ending))));
     }
-    let header = std::fs::read_to_string(project("catalyst-compat/include/tombolo.h")).expect("the header");
+    let header =
+        std::fs::read_to_string(project("catalyst-compat/include/tombolo.h")).expect("the header");
     let version = env!("CARGO_PKG_VERSION");
     assert!(header.contains(&format!("#define TOMBOLO_VERSION \"{version}\"")), "{version}");
     let parts = ["MAJOR", "MINOR", "PATCH"].into_iter().zip(version.split(['.', '-']));
     for (part, number) in parts {
-        assert!(header.contains(&format!("#define TOMBOLO_VERSION_{part} {number}\n")), "{part} of {version}");
+        assert!(
+            header.contains(&format!("#define TOMBOLO_VERSION_{part} {number}\n")),
+            "{part} of {version}"
+        );
     }
 }
 
 #[test]
 fn every_function_of_the_header_is_exported_and_the_other_way_round() {
-    let header = std::fs::read_to_string(project("catalyst-compat/include/tombolo.h")).expect("the header");
+    let header =
+        std::fs::read_to_string(project("catalyst-compat/include/tombolo.h")).expect("the header");
     let directory = installed();
-    let symbols =
-        succeed(Command::new("nm").args(["-D", "--defined-only"]).arg(directory.path().join("libtombolo.so")));
-    let exported: Vec<&str> =
-        symbols.lines().filter_map(|line| line.split(' ').nth(2)).filter(|name| name.starts_with("tombolo_")).collect();
+    let symbols = succeed(
+        Command::new("nm")
+            .args(["-D", "--defined-only"])
+            .arg(directory.path().join("libtombolo.so")),
+    );
+    let exported: Vec<&str> = symbols
+        .lines()
+        .filter_map(|line| line.split(' ').nth(2))
+        .filter(|name| name.starts_with("tombolo_"))
+        .collect();
     for name in &exported {
         // Of the Fortran module alone.
         let is_own = matches!(*name, "tombolo_refuse" | "tombolo_vertices_of_cell");
-        assert_eq!(header.contains(&format!(" {name}(")) || header.contains(&format!("* {name}(")), !is_own, "{name}");
+        assert_eq!(
+            header.contains(&format!(" {name}(")) || header.contains(&format!("* {name}(")),
+            !is_own,
+            "{name}"
+        );
     }
-    let declared = header.lines().filter(|line| ["int ", "const ", "size_t "].iter().any(|it| line.starts_with(it)));
+    let declared = header
+        .lines()
+        .filter(|line| ["int ", "const ", "size_t "].iter().any(|it| line.starts_with(it)));
     for line in declared {
-        let name = line.split('(').next().and_then(|before| before.rsplit(' ').next()).unwrap_or_default();
+        let name =
+            line.split('(').next().and_then(|before| before.rsplit(' ').next()).unwrap_or_default();
         assert!(exported.contains(&name), "{name}");
     }
 }
@@ -130,9 +162,19 @@ fn a_solver_can_take_the_motion_of_the_boundary_alone() {
 fn fortran(directory: &Path, source: &Path) -> Result<PathBuf, String> {
     let program = directory.join("program");
     let mut compiler = Command::new("gfortran");
-    compiler.args(["-std=f2018", "-Wall", "-Wno-uninitialized", "-ffree-line-length-none", "-g", "-J"]).arg(directory);
-    compiler.arg(project("catalyst-compat/fortran/tombolo.f90")).arg(source).arg("-o").arg(&program);
-    compiler.arg("-L").arg(directory).arg(format!("-Wl,-rpath,{}", directory.display())).arg("-ltombolo");
+    compiler
+        .args(["-std=f2018", "-Wall", "-Wno-uninitialized", "-ffree-line-length-none", "-g", "-J"])
+        .arg(directory);
+    compiler
+        .arg(project("catalyst-compat/fortran/tombolo.f90"))
+        .arg(source)
+        .arg("-o")
+        .arg(&program);
+    compiler
+        .arg("-L")
+        .arg(directory)
+        .arg(format!("-Wl,-rpath,{}", directory.display()))
+        .arg("-ltombolo");
     let output = output(&mut compiler);
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     if output.status.success() { Ok(program) } else { Err(told) }
@@ -146,21 +188,30 @@ fn field<'a>(file: &'a MeshFile, name: &str) -> &'a [f64] {
 #[test]
 fn fortran_sections_are_lent_as_they_are() {
     let directory = installed();
-    let program = fortran(directory.path(), &project("catalyst-compat/tests/sections.f90")).expect("compiles");
+    let program = fortran(directory.path(), &project("catalyst-compat/tests/sections.f90"))
+        .expect("compiles");
     succeed(under_valgrind(&program).current_dir(directory.path()));
     for cycle in 0..2 {
-        let file = read_mesh(directory.path().join(format!("all-{cycle}.vtu"))).expect("was written");
+        let file =
+            read_mesh(directory.path().join(format!("all-{cycle}.vtu"))).expect("was written");
         let base = 1000.0 * f64::from(cycle);
         assert_eq!(file.mesh.points()[4], [1.0, 1.0, 1.0]);
         // A value of the array `store`, at a row and a column.
         let store = |row: u32, column: u32| base + f64::from(100 * row + column);
-        let expected = |values: &dyn Fn(u32) -> Vec<f64>| (1..=5).flat_map(values).collect::<Vec<f64>>();
+        let expected =
+            |values: &dyn Fn(u32) -> Vec<f64>| (1..=5).flat_map(values).collect::<Vec<f64>>();
         let every = |column: u32| 2 * column - 1;
         assert_eq!(field(&file, "row"), expected(&|i| vec![store(1, i)]));
         assert_eq!(field(&file, "every"), expected(&|i| vec![store(1, 2 * i)]));
         assert_eq!(field(&file, "rows"), expected(&|i| (1..=3).map(|row| store(row, i)).collect()));
-        assert_eq!(field(&file, "apart"), expected(&|i| [2, 4, 6].map(|row| store(row, every(i))).to_vec()));
-        assert_eq!(field(&file, "assumed"), expected(&|i| (1..=3).map(|row| store(row, every(i))).collect()));
+        assert_eq!(
+            field(&file, "apart"),
+            expected(&|i| [2, 4, 6].map(|row| store(row, every(i))).to_vec())
+        );
+        assert_eq!(
+            field(&file, "assumed"),
+            expected(&|i| (1..=3).map(|row| store(row, every(i))).collect())
+        );
         assert_eq!(field(&file, "of cells"), [store(7, 1), store(7, 2)]);
         let count = |i: u32| base + f64::from(i);
         assert_eq!(field(&file, "columns"), expected(&|i| [i, i + 5, i + 10].map(count).to_vec()));
@@ -188,7 +239,8 @@ fn fortran_lends_nothing_that_ends_with_the_call() {
     };
     assert!(attempt("real, target", "x").is_ok());
     assert!(attempt("double precision, target", "x(1:5:2)").is_ok());
-    for (declaration, actual) in [("real", "x"), ("real, target", "2 * x"), ("real, target", "(x)")] {
+    for (declaration, actual) in [("real", "x"), ("real, target", "2 * x"), ("real, target", "(x)")]
+    {
         let told = attempt(declaration, actual).expect_err(actual);
         assert!(told.contains("Error"), "{actual}: {told}");
     }

@@ -18,7 +18,9 @@ fn compile(directory: &Path, name: &str, exporting: bool) -> PathBuf {
     let program = directory.join(name);
     let source = format!("{}/tests/{name}.c", env!("CARGO_MANIFEST_DIR"));
     let mut compiler = Command::new("cc");
-    compiler.args(["-Wall", "-Wno-unused-function", "-Werror", "-O1", "-g", &source, "-o"]).arg(&program);
+    compiler
+        .args(["-Wall", "-Wno-unused-function", "-Werror", "-O1", "-g", &source, "-o"])
+        .arg(&program);
     if exporting {
         compiler.arg("-rdynamic");
     }
@@ -43,7 +45,8 @@ fn run(program: &Path, script: Option<&Path>, environment: &[(&str, &str)]) -> (
 }
 
 /// A configuration that looks at everything, and is watched by nobody.
-const QUALITY: &str = r#"{"version": 1, "pipelines": [{"name": "health", "stages": [{"quality": {}}]}]}"#;
+const QUALITY: &str =
+    r#"{"version": 1, "pipelines": [{"name": "health", "stages": [{"quality": {}}]}]}"#;
 
 /// A configuration with a server.
 const STREAM: &str = r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"}, "pipelines": [
@@ -99,7 +102,10 @@ fn a_host_without_conduit_is_told_so() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let (output, errors) = run(&compile(directory.path(), "host", false), None, &[]);
     assert!(!output.status.success());
-    assert!(errors.contains("does not export 'catalyst_conduit_node_number_of_children'"), "{errors}");
+    assert!(
+        errors.contains("does not export 'catalyst_conduit_node_number_of_children'"),
+        "{errors}"
+    );
     assert!(errors.contains("about before initialize: 7 where 0 is expected"), "{errors}");
 }
 
@@ -132,7 +138,8 @@ impl Written {
                 cells.for_each_face(cell, |face| {
                     let [a, rest @ ..] = face else { return };
                     for pair in rest.windows(2) {
-                        let [a, b, c] = [*a, pair[0], pair[1]].map(|vertex| points[vertex as usize]);
+                        let [a, b, c] =
+                            [*a, pair[0], pair[1]].map(|vertex| points[vertex as usize]);
                         sum += a[0] * (b[1] * c[2] - b[2] * c[1])
                             + a[1] * (b[2] * c[0] - b[0] * c[2])
                             + a[2] * (b[0] * c[1] - b[1] * c[0]);
@@ -146,7 +153,9 @@ impl Written {
 
 #[test]
 fn every_mesh_of_the_blueprint_arrives() {
-    use CellType::{Hexahedron, Line, Polygon, Polyhedron, Pyramid, Quad, Tetra, Triangle, Vertex, Wedge};
+    use CellType::{
+        Hexahedron, Line, Polygon, Polyhedron, Pyramid, Quad, Tetra, Triangle, Vertex, Wedge,
+    };
 
     let directory = tempfile::tempdir().expect("a temporary directory");
     let pipelines = directory.path().join("pipelines.json");
@@ -192,7 +201,10 @@ fn every_mesh_of_the_blueprint_arrives() {
             let is_stretched = !matches!(channel, "uniform" | "blocks" | "hex");
             let stretch = if is_stretched { f64::from(1 << cycle) } else { 1.0 };
             for (found, expected) in found.volumes().iter().zip(volumes) {
-                assert!((found - stretch * expected).abs() < 1e-12, "{channel} at {cycle}: {found}, not {expected}");
+                assert!(
+                    (found - stretch * expected).abs() < 1e-12,
+                    "{channel} at {cycle}: {found}, not {expected}"
+                );
             }
         }
     }
@@ -204,7 +216,11 @@ fn every_mesh_of_the_blueprint_arrives() {
     let uniform = Written::read(&written, "uniform", 2);
     assert_eq!(uniform.field("single"), [1.5, 2.5]);
     assert_eq!(uniform.field("small"), [-1.0, 7.0]);
-    assert_eq!(uniform.field("along")[..3], [2.0, 12.0, 22.0], "what the solver changes in place is seen");
+    assert_eq!(
+        uniform.field("along")[..3],
+        [2.0, 12.0, 22.0],
+        "what the solver changes in place is seen"
+    );
     let hex = Written::read(&written, "hex", 0);
     assert_eq!(hex.field("place").len(), 36);
     assert_eq!(hex.field("place")[33..], [2.0, 1.0, 1.0]);
@@ -212,13 +228,20 @@ fn every_mesh_of_the_blueprint_arrives() {
     assert_eq!(Written::read(&written, "mixed", 0).field("each"), [1.0, 2.0, 3.0, 4.0]);
     let blocks = Written::read(&written, "blocks", 0);
     assert_eq!(blocks.field("which"), [1.0, 2.0]);
-    assert!(blocks.field("alone")[0] == 1.0 && blocks.field("alone")[1].is_nan(), "one block has no such field");
+    assert!(
+        blocks.field("alone")[0] == 1.0 && blocks.field("alone")[1].is_nan(),
+        "one block has no such field"
+    );
 }
 
 /// What VTK finds in a file (`tests/vtk/arrays.py`).
 fn vtk(file: &Path) -> serde_json::Value {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/vtk/arrays.py");
-    let output = Command::new("/usr/bin/python3").arg(script).arg(file).output().expect("scripts/setup installs VTK");
+    let output = Command::new("/usr/bin/python3")
+        .arg(script)
+        .arg(file)
+        .output()
+        .expect("scripts/setup installs VTK");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).expect("JSON")
 }
@@ -239,14 +262,17 @@ fn vtk_reads_back_types_ghosts_and_fields_of_the_mesh() {
     std::fs::write(&watch, surfaces).expect("a file");
     let program = compile(directory.path(), "arrays", true);
     let written = directory.path().join("out");
-    let (output, errors) = run(&program, Some(&watch), &[("TOMBOLO_OUTPUT", &written.to_string_lossy())]);
+    let (output, errors) =
+        run(&program, Some(&watch), &[("TOMBOLO_OUTPUT", &written.to_string_lossy())]);
     assert!(output.status.success(), "{errors}");
-    let told =
-        "tombolo: 'catalyst/channels/types/data/state/fields/title' is passed over: fields hold numbers, not texts\n";
+    let told = "tombolo: 'catalyst/channels/types/data/state/fields/title' is passed over: fields hold numbers, not texts\n";
     assert_eq!(errors, told, "what is passed over is told once");
 
     let types = vtk(&written.join("types.vtu"));
-    assert_eq!((&types["cells"], &types["own_cells"], &types["points"]), (&json!(3), &json!(2), &json!(16)));
+    assert_eq!(
+        (&types["cells"], &types["own_cells"], &types["points"]),
+        (&json!(3), &json!(2), &json!(16))
+    );
     // Faces of ghosts, and those that lie against them, are inside the mesh.
     assert_eq!(types["faces"], 10);
     for (name, kind, values) in [
@@ -264,7 +290,8 @@ fn vtk_reads_back_types_ghosts_and_fields_of_the_mesh() {
         let found = &types["element"][name];
         let plain = found[0].as_str().map(|kind| kind.replace("vtktypeint64", "long long"));
         let plain = plain.as_deref().map(|found| if found == "long" { "long long" } else { found });
-        let plain = plain.map(|found| if found == "unsigned long" { "unsigned long long" } else { found });
+        let plain =
+            plain.map(|found| if found == "unsigned long" { "unsigned long long" } else { found });
         assert_eq!((plain, &found[1]), (Some(kind), &json!(1)), "{name}");
         assert_eq!(found[2], json!([values[0], values[1], 3.0]), "{name}");
     }
@@ -278,10 +305,15 @@ fn vtk_reads_back_types_ghosts_and_fields_of_the_mesh() {
 
     let blocks = vtk(&written.join("blocks.vtu"));
     assert_eq!((&blocks["cells"], &blocks["own_cells"]), (&json!(5), &json!(4)));
-    assert_eq!(blocks["element"]["vtkGhostType"], json!(["unsigned char", 1, [0.0, 0.0, 0.0, 1.0, 0.0]]));
+    assert_eq!(
+        blocks["element"]["vtkGhostType"],
+        json!(["unsigned char", 1, [0.0, 0.0, 0.0, 1.0, 0.0]])
+    );
     assert_eq!(blocks["element"]["small"][0], "short");
 
-    let cells = |name: &str| read_mesh(written.join(name)).unwrap_or_else(|error| panic!("{error}")).mesh.cells().len();
+    let cells = |name: &str| {
+        read_mesh(written.join(name)).unwrap_or_else(|error| panic!("{error}")).mesh.cells().len()
+    };
     assert_eq!((cells("skin.vtp"), cells("cut.vtp")), (10, 2));
     assert_eq!(cells("outside.vtp"), 4 * 4 + 2, "nothing between the grids is drawn");
 }
@@ -301,7 +333,8 @@ fn pipelines_of_the_solver_and_of_the_user_run_together() {
     let written = |name: &str| directory.path().join("out").join(name).exists();
     let output_of = |script: Option<&Path>, user: Option<&Path>| {
         let _ = std::fs::remove_dir_all(directory.path().join("out"));
-        let (out, user) = (directory.path().join("out"), user.map(|user| user.to_string_lossy().into_owned()));
+        let (out, user) =
+            (directory.path().join("out"), user.map(|user| user.to_string_lossy().into_owned()));
         let mut environment = vec![("TOMBOLO_OUTPUT", out.to_str().expect("a plain path"))];
         environment.extend(user.as_deref().map(|user| ("TOMBOLO_PIPELINES", user)));
         let (output, errors) = run(&program, script, &environment);
@@ -313,7 +346,10 @@ fn pipelines_of_the_solver_and_of_the_user_run_together() {
     assert!(errors.contains("tombolo: open http://127.0.0.1:") && written("types.vtu"), "{errors}");
     // Files of the solver's, and what the user asks for.
     let errors = output_of(None, Some(&user));
-    assert!(!errors.contains("open http") && written("types.vtu") && written("user.vtu"), "{errors}");
+    assert!(
+        !errors.contains("open http") && written("types.vtu") && written("user.vtu"),
+        "{errors}"
+    );
     // The solver names a configuration: the variable is passed over, and that is told.
     let errors = output_of(Some(&solver), Some(&user));
     assert!(written("types.vtu") && written("solver.vtu") && !written("user.vtu"), "{errors}");
@@ -334,9 +370,13 @@ fn a_step_says_which_pipelines_run() {
     std::fs::write(&pipelines, write).expect("a file");
     let written = directory.path().join("out");
     let program = compile(directory.path(), "choice", true);
-    let (output, errors) = run(&program, Some(&pipelines), &[("TOMBOLO_OUTPUT", &written.to_string_lossy())]);
+    let (output, errors) =
+        run(&program, Some(&pipelines), &[("TOMBOLO_OUTPUT", &written.to_string_lossy())]);
     assert!(output.status.success(), "{errors}");
-    assert!(errors.contains("'catalyst/state/pipelines/[0]': found 'bothh'; expected one of"), "{errors}");
+    assert!(
+        errors.contains("'catalyst/state/pipelines/[0]': found 'bothh'; expected one of"),
+        "{errors}"
+    );
     assert!(errors.contains("did you mean 'both'?"), "{errors}");
     let mut files: Vec<String> = std::fs::read_dir(&written)
         .expect("files were written")
@@ -347,7 +387,9 @@ fn a_step_says_which_pipelines_run() {
     let all = |cycle: u32| ["a", "b", "inner", "outer"].map(|name| format!("{name}-{cycle}"));
     let mut expected: Vec<String> = all(0).into_iter().chain(all(6)).collect();
     expected.extend(["a-1", "inner-3", "outer-3", "b-4", "inner-4"].map(str::to_owned));
-    expected.iter_mut().for_each(|name| name.push_str(if name.starts_with("outer") { ".vtp" } else { ".vtu" }));
+    expected
+        .iter_mut()
+        .for_each(|name| name.push_str(if name.starts_with("outer") { ".vtp" } else { ".vtu" }));
     expected.sort_unstable();
     assert_eq!(files, expected);
 }
@@ -359,7 +401,10 @@ fn every_channel_is_watched_where_nobody_says_what_is() {
     let program = compile(directory.path(), "choice", true);
     let (output, errors) = run(&program, None, &[("TOMBOLO_REPORT", &report.to_string_lossy())]);
     assert!(output.status.success(), "{errors}");
-    assert!(errors.starts_with("tombolo: open http://127.0.0.1:") && errors.lines().count() == 1, "{errors}");
+    assert!(
+        errors.starts_with("tombolo: open http://127.0.0.1:") && errors.lines().count() == 1,
+        "{errors}"
+    );
     let report = std::fs::read_to_string(report).expect("a report");
     assert!(report.contains("\"cycles\": 3"), "{report}");
 }
@@ -372,7 +417,8 @@ fn rubbish_is_answered() {
     let (output, errors) = run(&compile(directory.path(), "rubbish", true), Some(&stream), &[]);
     assert!(output.status.success(), "{errors}");
     let told = String::from_utf8_lossy(&output.stdout);
-    let refused: u32 = told.split(' ').next().and_then(|count| count.parse().ok()).expect("a count");
+    let refused: u32 =
+        told.split(' ').next().and_then(|count| count.parse().ok()).expect("a count");
     assert!((1000..3000).contains(&refused), "{told}");
     assert!(!errors.contains("defect"), "{errors}");
 }
@@ -385,10 +431,17 @@ fn valgrind_finds_nothing() {
     for name in ["host", "meshes"] {
         let program = compile(directory.path(), name, true);
         let mut command = Command::new("valgrind");
-        command.args(["-q", "--error-exitcode=9", "--leak-check=full", "--errors-for-leak-kinds=definite"]);
+        command.args([
+            "-q",
+            "--error-exitcode=9",
+            "--leak-check=full",
+            "--errors-for-leak-kinds=definite",
+        ]);
         command.arg(&program).arg(library()).arg(&pipelines).env("TOMBOLO_PIPELINES", &pipelines);
-        let output =
-            command.env("TOMBOLO_OUTPUT", directory.path()).output().expect("valgrind is installed (scripts/setup)");
+        let output = command
+            .env("TOMBOLO_OUTPUT", directory.path())
+            .output()
+            .expect("valgrind is installed (scripts/setup)");
         assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
     }
 }
@@ -405,14 +458,18 @@ const ORDERS: &str = r#"[
 #[test]
 fn results_hold_the_motion_while_there_is_one() {
     let directory = tempfile::tempdir().expect("a temporary directory");
-    let (pipelines, orders) = (directory.path().join("pipelines.json"), directory.path().join("orders.json"));
+    let (pipelines, orders) =
+        (directory.path().join("pipelines.json"), directory.path().join("orders.json"));
     let config = r#"{"version": 1, "pipelines": [{"name": "shape", "on": "order", "channel": "box", "stages": []}]}"#;
     std::fs::write(&pipelines, config).expect("a file");
     std::fs::write(&orders, ORDERS).expect("a file");
     let program = compile(directory.path(), "motion", true);
-    let (output, errors) = run(&program, Some(&pipelines), &[("TOMBOLO_ORDERS", &orders.to_string_lossy())]);
+    let (output, errors) =
+        run(&program, Some(&pipelines), &[("TOMBOLO_ORDERS", &orders.to_string_lossy())]);
     assert!(output.status.success(), "{errors}");
     // Grids cannot move; it is said once for each run.
-    let said = |line: &str| line.contains("order 'press': applied, not followed: shape 1 of 2, handed out at cycle 2");
+    let said = |line: &str| {
+        line.contains("order 'press': applied, not followed: shape 1 of 2, handed out at cycle 2")
+    };
     assert!(errors.lines().count() == 3 && errors.lines().all(said), "{errors}");
 }

@@ -18,13 +18,19 @@ fn library(name: &str) -> PathBuf {
 }
 
 fn output(command: &mut Command) -> Output {
-    command.output().unwrap_or_else(|error| panic!("{command:?} does not run ({error}); scripts/setup installs it"))
+    command.output().unwrap_or_else(|error| {
+        panic!("{command:?} does not run ({error}); scripts/setup installs it")
+    })
 }
 
 #[track_caller]
 fn succeed(command: &mut Command) -> String {
     let output = output(command);
-    let told = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    let told = format!(
+        "{}{}",
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
     assert!(output.status.success(), "{command:?}\n{told}");
     told
 }
@@ -57,7 +63,9 @@ fn run(program: &Path, folder: &Path, arguments: [&str; 2]) -> String {
     let mut command = Command::new(program);
     command.args(arguments).current_dir(folder);
     command.env("TOMBOLO_PIPELINES", pipelines).env("CATALYST_IMPLEMENTATION_NAME", "tombolo");
-    for variable in ["TOMBOLO_ORDERS", "TOMBOLO_OUTPUT", "TOMBOLO_REPORT", "CATALYST_IMPLEMENTATION_PATHS"] {
+    for variable in
+        ["TOMBOLO_ORDERS", "TOMBOLO_OUTPUT", "TOMBOLO_REPORT", "CATALYST_IMPLEMENTATION_PATHS"]
+    {
         command.env_remove(variable);
     }
     succeed(&mut command)
@@ -66,7 +74,8 @@ fn run(program: &Path, folder: &Path, arguments: [&str; 2]) -> String {
 /// Each line of the page on solvers that calls the C compiler, as it stands there but for the prefix.
 #[test]
 fn the_lines_of_the_book_compile_a_solver() {
-    let page = fs::read_to_string(project().join("docs/instrument-your-solver.md")).expect("the page is there");
+    let page = fs::read_to_string(project().join("docs/instrument-your-solver.md"))
+        .expect("the page is there");
     let lines: Vec<&str> = page.lines().filter(|line| line.starts_with("cc ")).collect();
     assert!(lines.iter().any(|line| line.contains("pkg-config")), "{lines:?}");
     assert!(lines.iter().any(|line| line.contains("-Wl,-rpath")), "{lines:?}");
@@ -78,7 +87,8 @@ fn the_lines_of_the_book_compile_a_solver() {
         compile.args(["-e", "-c", &line]).current_dir(folder.path());
         succeed(compile.env("PKG_CONFIG_PATH", prefix().join("lib/pkgconfig")));
         let words: Vec<&str> = line.split_whitespace().collect();
-        let program = words.iter().position(|word| *word == "-o").and_then(|option| words.get(option + 1));
+        let program =
+            words.iter().position(|word| *word == "-o").and_then(|option| words.get(option + 1));
         let program = folder.path().join(program.expect("-o names the program"));
         // The hottest corner has cooled from 308 towards 300 by a thousandth in each of 3 steps.
         let told = run(&program, folder.path(), ["pipelines.json", "3"]);
@@ -97,8 +107,14 @@ fn each_language_builds_by_itself_without_mpi() {
     ] {
         let folder = tempfile::tempdir().expect("a folder");
         let mut configure = Command::new("cmake");
-        configure.arg("-S").arg(project().join("examples").join(language)).arg("-B").arg(folder.path());
-        configure.arg("-DEXAMPLES_MPI=OFF").arg(format!("-DCMAKE_PREFIX_PATH={}", prefix().display()));
+        configure
+            .arg("-S")
+            .arg(project().join("examples").join(language))
+            .arg("-B")
+            .arg(folder.path());
+        configure
+            .arg("-DEXAMPLES_MPI=OFF")
+            .arg(format!("-DCMAKE_PREFIX_PATH={}", prefix().display()));
         for (name, variable) in [("c", "CC"), ("cxx", "CXX"), ("fortran", "FC")] {
             if name != language {
                 configure.env(variable, "/bin/false");
@@ -111,7 +127,8 @@ fn each_language_builds_by_itself_without_mpi() {
             let linked = succeed(Command::new("readelf").arg("-d").arg(&program));
             assert!(!linked.contains("libmpi"), "{linked}");
             let said = run(&program, folder.path(), ["5", "3"]);
-            let line = said.lines().find(|line| line.starts_with("volume ")).expect("a line of numbers");
+            let line =
+                said.lines().find(|line| line.starts_with("volume ")).expect("a line of numbers");
             let numbers = line.split_whitespace().filter_map(|word| word.parse::<f64>().ok());
             told.insert(numbers.map(|number| format!("{number:.9}")).collect::<Vec<_>>());
         }
@@ -124,8 +141,15 @@ fn each_language_builds_by_itself_without_mpi() {
 fn a_missing_compiler_leaves_the_others() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut configure = Command::new("cmake");
-    configure.arg("-S").arg(project().join("examples")).arg("-B").arg(folder.path()).arg("-DEXAMPLES_MPI=OFF");
-    configure.arg(format!("-DCMAKE_PREFIX_PATH={}", prefix().display())).arg("-DCMAKE_Fortran_COMPILER=NOTFOUND");
+    configure
+        .arg("-S")
+        .arg(project().join("examples"))
+        .arg("-B")
+        .arg(folder.path())
+        .arg("-DEXAMPLES_MPI=OFF");
+    configure
+        .arg(format!("-DCMAKE_PREFIX_PATH={}", prefix().display()))
+        .arg("-DCMAKE_Fortran_COMPILER=NOTFOUND");
     succeed(&mut configure);
     succeed(Command::new("cmake").arg("--build").arg(folder.path()));
     let built = |name| folder.path().join(name).is_file();
@@ -134,7 +158,11 @@ fn a_missing_compiler_leaves_the_others() {
 
 /// Every file of the prefix, relative to it.
 fn files(folder: &Path) -> BTreeSet<String> {
-    let told = succeed(Command::new("find").args([".", "-not", "-type", "d", "-printf", "%P\\n"]).current_dir(folder));
+    let told = succeed(
+        Command::new("find")
+            .args([".", "-not", "-type", "d", "-printf", "%P\\n"])
+            .current_dir(folder),
+    );
     told.lines().map(str::to_owned).collect()
 }
 
@@ -156,7 +184,12 @@ fn what_is_installed_is_listed_and_goes_again() {
     succeed(install(&prefix).args(["--program", "/bin/true"]));
     let first = listed();
     assert_eq!(ours(), first);
-    for file in ["bin/tombolo", "lib/libtombolo.so", "include/tombolo.h", "lib/catalyst/libcatalyst-tombolo.so"] {
+    for file in [
+        "bin/tombolo",
+        "lib/libtombolo.so",
+        "include/tombolo.h",
+        "lib/catalyst/libcatalyst-tombolo.so",
+    ] {
         assert!(first.contains(file), "{file}: {first:?}");
     }
     let version = succeed(
@@ -167,7 +200,11 @@ fn what_is_installed_is_listed_and_goes_again() {
     assert_eq!(version.trim(), env!("CARGO_PKG_VERSION"));
 
     succeed(install(&prefix).args(["--program", "/bin/true"]));
-    assert_eq!((listed(), ours()), (first.clone(), first.clone()), "the second time changes nothing");
+    assert_eq!(
+        (listed(), ours()),
+        (first.clone(), first.clone()),
+        "the second time changes nothing"
+    );
 
     // What this installation has not, of the one before, goes.
     succeed(install(&prefix).env("FC", "no-such-compiler"));
@@ -194,7 +231,10 @@ fn what_is_wrong_or_missing_is_named() {
     refused(&mut script(), "where to?");
     refused(script().arg(&prefix).arg("--verbose"), "there is no option '--verbose'");
     refused(script().arg(&prefix).arg("--library"), "--library needs a file");
-    refused(script().arg(&prefix).args(["--library", "/no/such.so"]), "there is no file '/no/such.so'");
+    refused(
+        script().arg(&prefix).args(["--library", "/no/such.so"]),
+        "there is no file '/no/such.so'",
+    );
     refused(script().arg("/proc/prefix"), "'/proc/prefix' cannot be written");
 
     // A machine with nothing but what every machine has.

@@ -8,8 +8,13 @@ use std::sync::OnceLock;
 use serde_json::{Value, json};
 use tombolo_tests::{PATIENCE, Run, Viewer, project};
 
-const PROGRAMS: [&str; 5] =
-    ["heat_catalyst", "heat_catalyst_cxx", "heat_catalyst_fortran", "heat_tombolo", "heat_tombolo_fortran"];
+const PROGRAMS: [&str; 5] = [
+    "heat_catalyst",
+    "heat_catalyst_cxx",
+    "heat_catalyst_fortran",
+    "heat_tombolo",
+    "heat_tombolo_fortran",
+];
 
 /// What cargo built beside this test.
 fn library(name: &str) -> PathBuf {
@@ -19,13 +24,19 @@ fn library(name: &str) -> PathBuf {
 }
 
 fn output(command: &mut Command) -> Output {
-    command.output().unwrap_or_else(|error| panic!("{command:?} does not run ({error}); scripts/setup installs it"))
+    command.output().unwrap_or_else(|error| {
+        panic!("{command:?} does not run ({error}); scripts/setup installs it")
+    })
 }
 
 #[track_caller]
 fn succeed(command: &mut Command) -> String {
     let output = output(command);
-    let told = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    let told = format!(
+        "{}{}",
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
     assert!(output.status.success(), "{command:?}\n{told}");
     told
 }
@@ -56,11 +67,14 @@ impl Built {
     /// A program on so many ranks, in an environment that says nothing but that Tombolo is meant.
     fn program(&self, name: &str, ranks: usize) -> Command {
         let program = self.build.join(name);
-        let mut command = if ranks == 1 { Command::new(&program) } else { on_ranks(ranks, &program) };
+        let mut command =
+            if ranks == 1 { Command::new(&program) } else { on_ranks(ranks, &program) };
         for variable in ["PIPELINES", "ORDERS", "OUTPUT", "REPORT"] {
             command.env_remove(format!("TOMBOLO_{variable}"));
         }
-        command.env_remove("CATALYST_IMPLEMENTATION_PATHS").env("CATALYST_IMPLEMENTATION_NAME", "tombolo");
+        command
+            .env_remove("CATALYST_IMPLEMENTATION_PATHS")
+            .env("CATALYST_IMPLEMENTATION_NAME", "tombolo");
         command
     }
 }
@@ -75,7 +89,8 @@ fn on_ranks(ranks: usize, program: &Path) -> Command {
 /// A directory with a configuration and orders.
 fn inputs(config: &Value, orders: &Value) -> (tempfile::TempDir, PathBuf, PathBuf) {
     let directory = tempfile::tempdir().expect("a temporary directory");
-    let (pipelines, file) = (directory.path().join("pipelines.json"), directory.path().join("orders.json"));
+    let (pipelines, file) =
+        (directory.path().join("pipelines.json"), directory.path().join("orders.json"));
     std::fs::write(&pipelines, config.to_string()).expect("a file");
     std::fs::write(&file, orders.to_string()).expect("a file");
     (directory, pipelines, file)
@@ -83,7 +98,10 @@ fn inputs(config: &Value, orders: &Value) -> (tempfile::TempDir, PathBuf, PathBu
 
 /// The numbers of the line that the examples print in the end: volume, mean temperature, conductivity.
 fn numbers(told: &str) -> [f64; 3] {
-    let line = told.lines().find(|line| line.starts_with("volume ")).unwrap_or_else(|| panic!("no volume in:\n{told}"));
+    let line = told
+        .lines()
+        .find(|line| line.starts_with("volume "))
+        .unwrap_or_else(|| panic!("no volume in:\n{told}"));
     let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
     numbers.try_into().unwrap_or_else(|_| panic!("not three numbers: {line}"))
 }
@@ -101,15 +119,23 @@ fn every_language_obeys_the_same_orders_alike() {
     let (_directory, pipelines, orders) = inputs(&json!({"version": 1}), &orders);
     let mut first: Option<[f64; 3]> = None;
     for name in PROGRAMS {
-        let rest = numbers(&succeed(built.program(name, 1).args(["40", "4"]).env("TOMBOLO_PIPELINES", &pipelines)));
+        let rest = numbers(&succeed(
+            built.program(name, 1).args(["40", "4"]).env("TOMBOLO_PIPELINES", &pipelines),
+        ));
         assert!((rest[0] - 1.0).abs() < 1e-12, "{name}: {rest:?}");
         let mut program = built.program(name, 1);
-        program.args(["40", "4"]).env("TOMBOLO_PIPELINES", &pipelines).env("TOMBOLO_ORDERS", &orders);
+        program
+            .args(["40", "4"])
+            .env("TOMBOLO_PIPELINES", &pipelines)
+            .env("TOMBOLO_ORDERS", &orders);
         let moved = numbers(&succeed(&mut program));
         assert!((moved[0] - 0.8).abs() < 1e-9 && moved[2] == 0.25, "{name}: {moved:?}");
         // The heat flows along x, and the box is pressed along z: the temperature is that of the box at rest until the
         // conductivity changes.
-        assert!(moved[1] < rest[1] && moved[1] > 0.7 * rest[1], "{name}: {moved:?}, at rest {rest:?}");
+        assert!(
+            moved[1] < rest[1] && moved[1] > 0.7 * rest[1],
+            "{name}: {moved:?}, at rest {rest:?}"
+        );
         let first = *first.get_or_insert(moved);
         assert!(
             first.iter().zip(moved).all(|(one, other)| (one - other).abs() < 1e-9),
@@ -121,7 +147,8 @@ fn every_language_obeys_the_same_orders_alike() {
 #[test]
 fn three_ranks_and_ranks_without_cells_compute_what_one_does() {
     let built = Built::get();
-    let change = json!([{"at": {"cycle": 3}, "parameter": {"name": "conductivity", "value": 0.125}}]);
+    let change =
+        json!([{"at": {"cycle": 3}, "parameter": {"name": "conductivity", "value": 0.125}}]);
     let watch = json!({"version": 1, "pipelines": [{"name": "surface", "every": {"steps": 10},
         "stages": [{"surface": {}}, {"write": {"file": "surface-{cycle}.vtp"}}]}]});
     let (directory, pipelines, change) = inputs(&watch, &change);
@@ -129,7 +156,9 @@ fn three_ranks_and_ranks_without_cells_compute_what_one_does() {
         let run = |ranks: usize, cells: &str| {
             let mut program = built.program(name, ranks);
             program.current_dir(directory.path()).args(["20", cells]);
-            numbers(&succeed(program.env("TOMBOLO_PIPELINES", &pipelines).env("TOMBOLO_ORDERS", &change)))
+            numbers(&succeed(
+                program.env("TOMBOLO_PIPELINES", &pipelines).env("TOMBOLO_ORDERS", &change),
+            ))
         };
         let (one, three) = (run(1, "4"), run(3, "4"));
         assert!(
@@ -151,7 +180,10 @@ fn ranks_without_a_configuration_find_a_port() {
     for ranks in [1, 3] {
         let told = succeed(built.program("heat_catalyst", ranks).args(["5", "4"]));
         assert!((numbers(&told)[0] - 1.0).abs() < 1e-12, "{told}");
-        assert!(told.contains("tombolo: open http://127.0.0.1:") && !told.contains("127.0.0.1:7070"), "{told}");
+        assert!(
+            told.contains("tombolo: open http://127.0.0.1:") && !told.contains("127.0.0.1:7070"),
+            "{told}"
+        );
     }
 }
 
@@ -166,8 +198,12 @@ fn steer(name: &str, ranks: usize) {
     let link = run.link();
     let mut viewer = Viewer::connect(&link).expect("the run lets in");
     let hello = viewer.wait_for("hello", |hello| hello["channel"] == "solid");
-    let features: Vec<&str> =
-        hello["features"].as_array().into_iter().flatten().filter_map(|it| it["name"].as_str()).collect();
+    let features: Vec<&str> = hello["features"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(|it| it["name"].as_str())
+        .collect();
     assert!(viewer.frame().starts_with(b"TMBL"), "{name}");
     for side in ["x-min", "x-max", "y-min", "y-max", "z-min", "z-max"] {
         assert!(features.contains(&side), "{name}: {features:?}");
@@ -202,18 +238,31 @@ fn three_ranks_stream_and_obey_a_viewer() {
 fn pkg_config_builds_the_same_programs() {
     let built = Built::get();
     let directory = tempfile::tempdir().expect("a temporary directory");
-    let (pipelines, program) = (directory.path().join("nothing.json"), directory.path().join("program"));
+    let (pipelines, program) =
+        (directory.path().join("nothing.json"), directory.path().join("program"));
     std::fs::write(&pipelines, json!({"version": 1}).to_string()).expect("a file");
     let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
     for (compiler, sources, packages, mpi) in [
         ("gcc", "c/heat.c c/heat_catalyst.c", "catalyst", "mpicc"),
         ("gcc", "c/heat.c c/heat_tombolo.c", "tombolo", "mpicc"),
         ("g++", "cxx/heat_catalyst.cpp", "catalyst", "mpicxx"),
-        ("gfortran", "fortran/heat.f90 fortran/pace.f90 fortran/heat_catalyst.f90", "catalyst_fortran", "mpifort"),
-        ("gfortran", "fortran/heat.f90 fortran/pace.f90 fortran/heat_tombolo.f90", "tombolo_fortran", "mpifort"),
+        (
+            "gfortran",
+            "fortran/heat.f90 fortran/pace.f90 fortran/heat_catalyst.f90",
+            "catalyst_fortran",
+            "mpifort",
+        ),
+        (
+            "gfortran",
+            "fortran/heat.f90 fortran/pace.f90 fortran/heat_tombolo.f90",
+            "tombolo_fortran",
+            "mpifort",
+        ),
     ] {
         let mut query = Command::new("pkg-config");
-        query.env("PKG_CONFIG_PATH", built.prefix.join("lib/pkgconfig")).args(["--cflags", "--libs", packages]);
+        query
+            .env("PKG_CONFIG_PATH", built.prefix.join("lib/pkgconfig"))
+            .args(["--cflags", "--libs", packages]);
         let flags = succeed(&mut query);
         let compile = succeed(Command::new(mpi).arg("--showme:compile"));
         let link = succeed(Command::new(mpi).arg("--showme:link"));
@@ -222,7 +271,9 @@ fn pkg_config_builds_the_same_programs() {
         command.args(words(sources).iter().map(|source| project().join("examples").join(source)));
         succeed(command.arg("-o").arg(&program).args(words(&flags)).args(words(&link)));
         let mut run = Command::new(&program);
-        run.args(["5", "3"]).env("CATALYST_IMPLEMENTATION_NAME", "tombolo").env("TOMBOLO_PIPELINES", &pipelines);
+        run.args(["5", "3"])
+            .env("CATALYST_IMPLEMENTATION_NAME", "tombolo")
+            .env("TOMBOLO_PIPELINES", &pipelines);
         assert!((numbers(&succeed(&mut run))[0] - 1.0).abs() < 1e-12);
     }
 }
@@ -231,7 +282,8 @@ fn pkg_config_builds_the_same_programs() {
 fn no_rank_waits_for_one_that_goes_wrong() {
     let built = Built::get();
     let directory = tempfile::tempdir().expect("a temporary directory");
-    let (pipelines, program) = (directory.path().join("surface.json"), directory.path().join("ranks"));
+    let (pipelines, program) =
+        (directory.path().join("surface.json"), directory.path().join("ranks"));
     let watch = json!({"version": 1, "pipelines": [
         {"name": "surface", "stages": [{"surface": {}}, {"write": {"file": "surface-{cycle}.vtp"}}]},
         {"name": "touching", "channel": "touching", "stages": [{"write": {"file": "touching-{cycle}.vtu"}}]},
@@ -242,7 +294,9 @@ fn no_rank_waits_for_one_that_goes_wrong() {
         {"name": "last", "channel": "touching", "stages": [{"write": {"file": "last-{cycle}.vtu"}}]}]});
     std::fs::write(&pipelines, watch.to_string()).expect("a file");
     let mut query = Command::new("pkg-config");
-    query.env("PKG_CONFIG_PATH", built.prefix.join("lib/pkgconfig")).args(["--cflags", "--libs", "catalyst"]);
+    query
+        .env("PKG_CONFIG_PATH", built.prefix.join("lib/pkgconfig"))
+        .args(["--cflags", "--libs", "catalyst"]);
     let flags = succeed(&mut query);
     let mut compile = Command::new("mpicc");
     compile.arg(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/ranks.c")).arg("-o").arg(&program);
@@ -254,16 +308,20 @@ fn no_rank_waits_for_one_that_goes_wrong() {
         .env("TOMBOLO_PIPELINES", &pipelines);
     let told = succeed(&mut run);
     assert!(
-        told.contains("rank 1: 'catalyst/channels/solid/data/topologies/mesh/elements/shape': found 'cube'"),
+        told.contains(
+            "rank 1: 'catalyst/channels/solid/data/topologies/mesh/elements/shape': found 'cube'"
+        ),
         "{told}"
     );
     assert!(told.contains("rank 2: 'catalyst/state/time' is missing"), "{told}");
-    let surface =
-        tombolo::pipelines::files::read_mesh(directory.path().join("surface-000002.vtp")).expect("was written");
+    let surface = tombolo::pipelines::files::read_mesh(directory.path().join("surface-000002.vtp"))
+        .expect("was written");
     // Two cubes side by side, without the face between them.
     assert_eq!(surface.mesh.cells().len(), 10);
     // Two blocks on each of two ranks: only what is matched beyond doubt is one vertex.
-    let written = |name: &str| tombolo::pipelines::files::read_mesh(directory.path().join(name)).expect("was written");
+    let written = |name: &str| {
+        tombolo::pipelines::files::read_mesh(directory.path().join(name)).expect("was written")
+    };
     let touching = written("touching-000002.vtu").mesh;
     assert_eq!((touching.cells().len(), touching.points().len()), (4, 28));
     // All faces of a coarse cell and eight fine ones on each rank, but where those of the ranks lie against each other.
@@ -271,9 +329,16 @@ fn no_rank_waits_for_one_that_goes_wrong() {
     // Finer cells of another rank cover a coarse one; types and fields of the mesh come along.
     let across = written("across-000002.vtu");
     assert_eq!(across.mesh.cells().len(), 1 + 8);
-    let field = |name: &str| across.fields.iter().find(|field| field.name == name).expect("was written");
-    assert_eq!((field("level").number.name(), field("level").values.iter().sum::<f64>()), ("uint8", 8.0));
-    assert_eq!((field("held").number.name(), field("held").values.as_slice()), ("float32", &[0.5][..]));
+    let field =
+        |name: &str| across.fields.iter().find(|field| field.name == name).expect("was written");
+    assert_eq!(
+        (field("level").number.name(), field("level").values.iter().sum::<f64>()),
+        ("uint8", 8.0)
+    );
+    assert_eq!(
+        (field("held").number.name(), field("held").values.as_slice()),
+        ("float32", &[0.5][..])
+    );
     let drops = written("drops-000002.vtu").mesh;
     assert_eq!((drops.cells().len(), drops.points().len()), (4, 4), "points are never merged");
     let skin = "pipeline 'skin': the mesh has no surface: none of its 4 cells has dimension 2 or 3";
@@ -286,13 +351,21 @@ fn no_rank_of_tombolo_h_waits_for_one_that_goes_wrong() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let program = directory.path().join("ranks");
     let mut query = Command::new("pkg-config");
-    query.env("PKG_CONFIG_PATH", built.prefix.join("lib/pkgconfig")).args(["--cflags", "--libs", "tombolo"]);
+    query
+        .env("PKG_CONFIG_PATH", built.prefix.join("lib/pkgconfig"))
+        .args(["--cflags", "--libs", "tombolo"]);
     let flags = succeed(&mut query);
     let mut compile = Command::new("mpicc");
-    compile.arg(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/ranks_tombolo.c")).arg("-o").arg(&program);
+    compile
+        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/ranks_tombolo.c"))
+        .arg("-o")
+        .arg(&program);
     succeed(compile.args(["-Wall", "-Wextra", "-Werror"]).args(flags.split_whitespace()));
     let mut run = Command::new("timeout");
-    succeed(run.args(["60", "mpirun", "--oversubscribe", "--allow-run-as-root", "-n", "3"]).arg(&program));
+    succeed(
+        run.args(["60", "mpirun", "--oversubscribe", "--allow-run-as-root", "-n", "3"])
+            .arg(&program),
+    );
 }
 
 #[test]
@@ -303,9 +376,17 @@ fn valgrind_finds_nothing_in_the_examples() {
     for name in ["heat_catalyst", "heat_tombolo"] {
         let mut command = Command::new("valgrind");
         // What MPI leaks is its own; what it does to memory that it maps is listed in its suppressions.
-        command.args(["-q", "--error-exitcode=9", "--suppressions=/usr/share/openmpi/openmpi-valgrind.supp"]);
-        command.arg(built.build.join(name)).args(["4", "2"]).env("CATALYST_IMPLEMENTATION_NAME", "tombolo");
-        let told = succeed(command.env("TOMBOLO_PIPELINES", &pipelines).env("TOMBOLO_ORDERS", &orders));
+        command.args([
+            "-q",
+            "--error-exitcode=9",
+            "--suppressions=/usr/share/openmpi/openmpi-valgrind.supp",
+        ]);
+        command
+            .arg(built.build.join(name))
+            .args(["4", "2"])
+            .env("CATALYST_IMPLEMENTATION_NAME", "tombolo");
+        let told =
+            succeed(command.env("TOMBOLO_PIPELINES", &pipelines).env("TOMBOLO_ORDERS", &orders));
         assert!(numbers(&told)[0] < 1.0, "{told}");
     }
 }

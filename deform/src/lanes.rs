@@ -1,7 +1,10 @@
 //! Four numbers side by side, which processors with wide registers compute at once.
 //!
 //! Every operation is that of its numbers one by one, so that the bits do not depend on the processor.
-#![expect(clippy::needless_range_loop, reason = "loops over lanes and axes read like the formulas, and vectorise")]
+#![expect(
+    clippy::needless_range_loop,
+    reason = "loops over lanes and axes read like the formulas, and vectorise"
+)]
 
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Sub, SubAssign};
 
@@ -41,7 +44,8 @@ impl Lanes {
     pub(crate) fn where_finite(self, test: Self, other: Self) -> Self {
         let mut result = [0.0; LANES];
         for lane in 0..LANES {
-            result[lane] = if test.0[lane].abs() < f64::INFINITY { self.0[lane] } else { other.0[lane] };
+            result[lane] =
+                if test.0[lane].abs() < f64::INFINITY { self.0[lane] } else { other.0[lane] };
         }
         Self(result)
     }

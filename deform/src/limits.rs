@@ -46,10 +46,14 @@ const fn limit(what: &'static str, most: usize, of: &'static str) -> Limit {
 }
 
 /// Bytes of one JSON document.
-pub const DOCUMENT: Limit =
-    limit("bytes", 64 << 20, "one JSON document: a configuration, a case, an order, a line of a journal, a message");
+pub const DOCUMENT: Limit = limit(
+    "bytes",
+    64 << 20,
+    "one JSON document: a configuration, a case, an order, a line of a journal, a message",
+);
 /// Values in one JSON document.
-pub const VALUES: Limit = limit("values", 1 << 22, "the numbers, texts, lists and objects of one JSON document");
+pub const VALUES: Limit =
+    limit("values", 1 << 22, "the numbers, texts, lists and objects of one JSON document");
 /// How deep lists and objects may be nested.
 pub const DEPTH: Limit = limit("levels of nesting", 64, "lists and objects within each other");
 /// Bytes of a text.
@@ -59,22 +63,32 @@ pub const NAME: Limit = limit("characters", 200, "the name of a pipeline or an e
 /// Characters of a formula.
 pub const FORMULA: Limit = limit("characters", 10_000, "a formula or condition");
 /// How deep a formula may be nested.
-pub const FORMULA_DEPTH: Limit = limit("levels of nesting", 200, "the parentheses of a formula or condition");
+pub const FORMULA_DEPTH: Limit =
+    limit("levels of nesting", 200, "the parentheses of a formula or condition");
 /// Edits of an order, and of the stack that it makes.
 pub const EDITS: Limit = limit("edits", 1 << 14, "an order, and the stack that it makes");
 /// Vertices and faces that edits list. So many displacements fit into a document.
-pub const LISTED: Limit =
-    limit("listed vertices and faces", 750_000, "all edits of an order, and of the stack that it makes");
+pub const LISTED: Limit = limit(
+    "listed vertices and faces",
+    750_000,
+    "all edits of an order, and of the stack that it makes",
+);
 /// Shapes of a schedule.
 pub const SHAPES: Limit = limit("shapes", 10_000, "a schedule");
 /// Orders that the stack remembers.
 pub const ORDERS: Limit = limit("orders", 4096, "the stack: those that can be taken back");
 /// Commands that wait.
-pub const WAITING: Limit =
-    limit("commands", 1 << 16, "a file of orders; those of viewers that the solver has not come to");
+pub const WAITING: Limit = limit(
+    "commands",
+    1 << 16,
+    "a file of orders; those of viewers that the solver has not come to",
+);
 /// Bytes of the commands that wait.
-pub const WAITING_BYTES: Limit =
-    limit("bytes", 256 << 20, "a file of orders; the commands of viewers that the solver has not come to");
+pub const WAITING_BYTES: Limit = limit(
+    "bytes",
+    256 << 20,
+    "a file of orders; the commands of viewers that the solver has not come to",
+);
 
 /// All of them.
 pub const ALL: [Limit; 13] = [

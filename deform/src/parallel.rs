@@ -7,7 +7,11 @@
 use rayon::prelude::*;
 
 /// Calls `work` with the number of each chunk of `out` and the chunk.
-pub(crate) fn for_each_chunk<T: Send>(out: &mut [T], chunk: usize, work: impl Fn(usize, &mut [T]) + Sync) {
+pub(crate) fn for_each_chunk<T: Send>(
+    out: &mut [T],
+    chunk: usize,
+    work: impl Fn(usize, &mut [T]) + Sync,
+) {
     #[cfg(feature = "parallel")]
     if out.len() > chunk {
         out.par_chunks_mut(chunk).enumerate().for_each(|(index, part)| work(index, part));
@@ -46,7 +50,8 @@ pub(crate) fn for_each_rows<T: Send, U: Send>(
     for start in (0..rows).step_by(chunk) {
         let end = (start + chunk).min(rows);
         let (part, after) = rest.split_at_mut(offsets[end] - offsets[start]);
-        let (other_part, other_after) = other_rest.split_at_mut(other_offsets[end] - other_offsets[start]);
+        let (other_part, other_after) =
+            other_rest.split_at_mut(other_offsets[end] - other_offsets[start]);
         parts.push((start..end, part, other_part));
         (rest, other_rest) = (after, other_after);
     }
@@ -69,7 +74,10 @@ pub(crate) fn sort<T: Ord + Send>(values: &mut [T]) {
 }
 
 /// Does two things, at the same time where there are threads.
-pub(crate) fn join<A: Send, B: Send>(first: impl FnOnce() -> A + Send, second: impl FnOnce() -> B + Send) -> (A, B) {
+pub(crate) fn join<A: Send, B: Send>(
+    first: impl FnOnce() -> A + Send,
+    second: impl FnOnce() -> B + Send,
+) -> (A, B) {
     #[cfg(feature = "parallel")]
     {
         rayon::join(first, second)
@@ -81,7 +89,11 @@ pub(crate) fn join<A: Send, B: Send>(first: impl FnOnce() -> A + Send, second: i
 }
 
 /// Whether `test` holds for any chunk of `0..count`.
-pub(crate) fn any_chunk(count: usize, chunk: usize, test: impl Fn(std::ops::Range<usize>) -> bool + Sync) -> bool {
+pub(crate) fn any_chunk(
+    count: usize,
+    chunk: usize,
+    test: impl Fn(std::ops::Range<usize>) -> bool + Sync,
+) -> bool {
     let range = |index: usize| index * chunk..((index + 1) * chunk).min(count);
     #[cfg(feature = "parallel")]
     {

@@ -80,7 +80,11 @@ pub trait Partition: Debug + Send + Sync {
     }
 
     /// The same where every rank knows whom it hears: each of the ranks `from`, rising, sends one message here, and no other does.
-    fn exchange_with(&self, messages: Vec<(usize, Vec<f64>)>, from: &[usize]) -> Vec<(usize, Vec<f64>)> {
+    fn exchange_with(
+        &self,
+        messages: Vec<(usize, Vec<f64>)>,
+        from: &[usize],
+    ) -> Vec<(usize, Vec<f64>)> {
         let _ = from;
         self.exchange(messages)
     }
@@ -141,7 +145,11 @@ pub fn whole() -> Arc<dyn Partition> {
 ///
 /// # Errors
 /// [`LinearError`], on all ranks.
-pub fn scalar_solver(partition: &Arc<dyn Partition>, matrix: Arc<SparseMatrix<1>>, vertices: &[u32]) -> Solver<1> {
+pub fn scalar_solver(
+    partition: &Arc<dyn Partition>,
+    matrix: Arc<SparseMatrix<1>>,
+    vertices: &[u32],
+) -> Solver<1> {
     match partition.scalar_solver(&matrix, vertices) {
         Some(solver) => solver,
         None if partition.ranks() == 1 => crate::linear::solver(matrix),
@@ -153,7 +161,11 @@ pub fn scalar_solver(partition: &Arc<dyn Partition>, matrix: Arc<SparseMatrix<1>
 ///
 /// # Errors
 /// [`LinearError`], on all ranks.
-pub fn vector_solver(partition: &Arc<dyn Partition>, matrix: Arc<SparseMatrix<3>>, vertices: &[u32]) -> Solver<3> {
+pub fn vector_solver(
+    partition: &Arc<dyn Partition>,
+    matrix: Arc<SparseMatrix<3>>,
+    vertices: &[u32],
+) -> Solver<3> {
     match partition.vector_solver(&matrix, vertices) {
         Some(solver) => solver,
         None if partition.ranks() == 1 => crate::linear::solver(matrix),
@@ -174,7 +186,12 @@ pub(crate) fn any(partition: &dyn Partition, mine: bool) -> bool {
 }
 
 /// The sum of counts.
-#[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below 2^53")]
+#[expect(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "below 2^53"
+)]
 pub(crate) fn count(partition: &dyn Partition, mine: usize) -> usize {
     let mut sum = [mine as f64];
     partition.reduce(Reduction::Sum, &mut sum);
@@ -182,7 +199,12 @@ pub(crate) fn count(partition: &dyn Partition, mine: usize) -> usize {
 }
 
 /// The largest of counts.
-#[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below 2^53")]
+#[expect(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "below 2^53"
+)]
 pub(crate) fn most(partition: &dyn Partition, mine: usize) -> usize {
     let mut most = [mine as f64];
     partition.reduce(Reduction::Maximum, &mut most);

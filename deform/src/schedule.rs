@@ -159,10 +159,12 @@ mod tests {
 
     #[test]
     fn the_last_fraction_is_exactly_one() {
-        for (steps, ease) in
-            [1, 3, 7, 10, 49, 100, 1013].into_iter().flat_map(|n| [(n, Ease::Linear), (n, Ease::Smooth)])
+        for (steps, ease) in [1, 3, 7, 10, 49, 100, 1013]
+            .into_iter()
+            .flat_map(|n| [(n, Ease::Linear), (n, Ease::Smooth)])
         {
-            let schedule = Schedule { steps: NonZeroU32::new(steps).unwrap(), ease, ..Schedule::default() };
+            let schedule =
+                Schedule { steps: NonZeroU32::new(steps).unwrap(), ease, ..Schedule::default() };
             let fractions = schedule.fractions();
             assert_eq!(fractions.len(), steps as usize);
             assert!(fractions.windows(2).all(|pair| pair[0] < pair[1]));

@@ -91,9 +91,14 @@ pub fn box_of_mixed_cells(counts: [usize; 3], lower: Vector, upper: Vector) -> M
     let mut points = grid.points(lower, upper);
     let mut cells = Cells::new();
     let [columns, rows, layers] = grid.counts;
-    for (k, j, i) in (0..layers).flat_map(|k| (0..rows).flat_map(move |j| (0..columns).map(move |i| (k, j, i)))) {
-        let corner = |corner: usize| grid.vertex([i + (corner & 1), j + (corner >> 1 & 1), k + (corner >> 2 & 1)]);
-        let mut push = |cell_type: CellType, vertices: &[u32]| valid(cells.push(cell_type, vertices));
+    for (k, j, i) in
+        (0..layers).flat_map(|k| (0..rows).flat_map(move |j| (0..columns).map(move |i| (k, j, i))))
+    {
+        let corner = |corner: usize| {
+            grid.vertex([i + (corner & 1), j + (corner >> 1 & 1), k + (corner >> 2 & 1)])
+        };
+        let mut push =
+            |cell_type: CellType, vertices: &[u32]| valid(cells.push(cell_type, vertices));
         match (kind(i, j), k % 2) {
             (0, _) => push(CellType::Hexahedron, &[0, 1, 3, 2, 4, 5, 7, 6].map(corner)),
             (2, 0) => {
@@ -155,7 +160,8 @@ pub fn torus(major: f64, minor: f64, counts: [usize; 2]) -> Mesh {
     let mut connectivity = Vec::with_capacity(6 * points.len());
     for i in 0..around {
         for j in 0..about {
-            let [a, b, c, d] = [vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)];
+            let [a, b, c, d] =
+                [vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)];
             connectivity.extend([a, b, c, a, c, d]);
         }
     }
@@ -186,14 +192,16 @@ pub fn tube(axis: &[Vector], radius: f64, around: usize) -> Mesh {
         let side = cross(along, across);
         for j in 0..around {
             let (sine, cosine) = (std::f64::consts::TAU * j as f64 / around as f64).sin_cos();
-            points.push(add(center, add(scale(across, radius * cosine), scale(side, radius * sine))));
+            points
+                .push(add(center, add(scale(across, radius * cosine), scale(side, radius * sine))));
         }
     }
     let mut connectivity = Vec::with_capacity(6 * points.len());
     for i in 1..axis.len() {
         for j in 0..around {
             let vertex = |i: usize, j: usize| number(j % around + around * i);
-            let [a, b, c, d] = [vertex(i - 1, j), vertex(i - 1, j + 1), vertex(i, j + 1), vertex(i, j)];
+            let [a, b, c, d] =
+                [vertex(i - 1, j), vertex(i - 1, j + 1), vertex(i, j + 1), vertex(i, j)];
             connectivity.extend([a, b, c, a, c, d]);
         }
     }
@@ -211,14 +219,19 @@ pub fn plate(counts: [usize; 2], lower: [f64; 2], upper: [f64; 2]) -> Mesh {
     let mut points = Vec::with_capacity((columns + 1) * (rows + 1));
     for j in 0..=rows {
         for i in 0..=columns {
-            points.push([between(lower[0], upper[0], i, columns), between(lower[1], upper[1], j, rows), 0.0]);
+            points.push([
+                between(lower[0], upper[0], i, columns),
+                between(lower[1], upper[1], j, rows),
+                0.0,
+            ]);
         }
     }
     let mut connectivity = Vec::with_capacity(6 * columns * rows);
     for j in 0..rows {
         for i in 0..columns {
             let vertex = |i: usize, j: usize| number(i + (columns + 1) * j);
-            let [a, b, c, d] = [vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)];
+            let [a, b, c, d] =
+                [vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)];
             connectivity.extend([a, b, c, a, c, d]);
         }
     }
@@ -233,8 +246,11 @@ pub fn single_cell(cell_type: CellType) -> Mesh {
     let mut cells = Cells::new();
     let points = single_cell_points(cell_type);
     if cell_type == CellType::Polyhedron {
-        let faces: Vec<Vec<u32>> =
-            CellType::Hexahedron.faces().iter().map(|face| face.iter().map(|&v| number(v)).collect()).collect();
+        let faces: Vec<Vec<u32>> = CellType::Hexahedron
+            .faces()
+            .iter()
+            .map(|face| face.iter().map(|&v| number(v)).collect())
+            .collect();
         valid(cells.push_polyhedron(&faces));
     } else {
         let vertices: Vec<u32> = (0..points.len()).map(number).collect();
@@ -279,7 +295,8 @@ fn ring(sides: usize, height: f64) -> Vec<Vector> {
 }
 
 fn box_features(faces: Cells, tags: Vec<i64>) -> FeatureSource {
-    let names = BOX_FEATURES.iter().zip(1..).map(|(name, tag)| (tag, (*name).to_string())).collect();
+    let names =
+        BOX_FEATURES.iter().zip(1..).map(|(name, tag)| (tag, (*name).to_string())).collect();
     FeatureSource::Faces(TaggedFaces { faces, tags, names })
 }
 
@@ -323,7 +340,13 @@ impl Grid {
         for k in 0..self.counts[2] {
             for j in 0..self.counts[1] {
                 for i in 0..self.counts[0] {
-                    visit(&|corner| self.vertex([i + (corner & 1), j + (corner >> 1 & 1), k + (corner >> 2 & 1)]));
+                    visit(&|corner| {
+                        self.vertex([
+                            i + (corner & 1),
+                            j + (corner >> 1 & 1),
+                            k + (corner >> 2 & 1),
+                        ])
+                    });
                 }
             }
         }
@@ -380,7 +403,8 @@ mod tests {
         let mut total = 0.0;
         mesh.cells().for_each_face(cell, |face| {
             for i in 1..face.len() - 1 {
-                let [a, b, c] = [face[0], face[i], face[i + 1]].map(|vertex| mesh.points()[vertex as usize]);
+                let [a, b, c] =
+                    [face[0], face[i], face[i + 1]].map(|vertex| mesh.points()[vertex as usize]);
                 total += a[0] * (b[1] * c[2] - b[2] * c[1])
                     + a[1] * (b[2] * c[0] - b[0] * c[2])
                     + a[2] * (b[0] * c[1] - b[1] * c[0]);
@@ -392,7 +416,8 @@ mod tests {
     #[test]
     fn a_box_of_tets_fills_the_box_with_right_handed_tets() {
         let mesh = box_of_tets([3, 2, 1], [-1.0, 0.0, 2.0], [2.0, 1.0, 4.0]);
-        let volumes: Vec<f64> = (0..mesh.cells().len()).map(|cell| six_volumes(&mesh, cell) / 6.0).collect();
+        let volumes: Vec<f64> =
+            (0..mesh.cells().len()).map(|cell| six_volumes(&mesh, cell) / 6.0).collect();
         assert!(volumes.iter().all(|&volume| volume > 0.0));
         assert!((volumes.iter().sum::<f64>() - 6.0).abs() < 1e-12);
         let FeatureSource::Faces(tagged) = mesh.features() else { panic!("tagged faces") };
@@ -402,10 +427,12 @@ mod tests {
     #[test]
     fn a_box_of_mixed_cells_fills_the_box_with_right_handed_cells_that_fit() {
         let mesh = box_of_mixed_cells([4, 3, 3], [-1.0, 0.0, 2.0], [2.0, 1.0, 4.0]);
-        let volumes: Vec<f64> = (0..mesh.cells().len()).map(|cell| six_volumes(&mesh, cell) / 6.0).collect();
+        let volumes: Vec<f64> =
+            (0..mesh.cells().len()).map(|cell| six_volumes(&mesh, cell) / 6.0).collect();
         assert!(volumes.iter().all(|&volume| volume > 0.0));
         assert!((volumes.iter().sum::<f64>() - 6.0).abs() < 1e-12);
-        for cell_type in [CellType::Tetra, CellType::Hexahedron, CellType::Wedge, CellType::Pyramid] {
+        for cell_type in [CellType::Tetra, CellType::Hexahedron, CellType::Wedge, CellType::Pyramid]
+        {
             assert!(mesh.cells().iter().any(|(found, _)| found == cell_type), "{cell_type}");
         }
         // Faces that do not fit would be boundary faces without a tag.

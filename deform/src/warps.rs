@@ -73,7 +73,8 @@ impl Warp {
                 add(scale(point, 1.0 - fraction), scale(knotted, fraction))
             }
             Self::Shake { amount, seed } => {
-                let axis = |axis: u64| amount * fraction * random(seed, u64::from(number) * 3 + axis);
+                let axis =
+                    |axis: u64| amount * fraction * random(seed, u64::from(number) * 3 + axis);
                 [point[0] + axis(0), point[1] + axis(1), point[2] + axis(2)]
             }
             Self::Wobble { amount, seed } => {
@@ -94,14 +95,19 @@ impl Warp {
     #[must_use]
     pub fn places(self, points: &[Vector], boundary: &[u32], fraction: f64) -> Vec<Vector> {
         let height = points.iter().map(|point| point[2]).fold(0.0, f64::max);
-        boundary.iter().map(|&vertex| self.place(points[vertex as usize], vertex, height, fraction)).collect()
+        boundary
+            .iter()
+            .map(|&vertex| self.place(points[vertex as usize], vertex, height, fraction))
+            .collect()
     }
 }
 
 /// A number from -1 to 1.
 fn random(seed: u64, number: u64) -> f64 {
     // SplitMix64 (Steele, Lea, Flood 2014).
-    let mut value = seed.wrapping_mul(0xd134_2543_de82_ef95).wrapping_add(number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let mut value = seed
+        .wrapping_mul(0xd134_2543_de82_ef95)
+        .wrapping_add(number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     value = (value ^ (value >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     value = (value ^ (value >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     #[expect(clippy::cast_precision_loss, reason = "53 bits")]
@@ -114,7 +120,14 @@ fn knot([x, y, z]: Vector, height: f64) -> Vector {
     // The curve is 29.8 long for a size of 1; its strands come no nearer to each other than 1.7.
     let size = height / 29.8;
     let curve = |t: f64| {
-        scale([t.sin() + 2.0 * (2.0 * t).sin(), t.cos() - 2.0 * (2.0 * t).cos(), -1.5 * (3.0 * t).sin()], size)
+        scale(
+            [
+                t.sin() + 2.0 * (2.0 * t).sin(),
+                t.cos() - 2.0 * (2.0 * t).cos(),
+                -1.5 * (3.0 * t).sin(),
+            ],
+            size,
+        )
     };
     let t = 0.3 + 5.7 * z / height;
     let step = 1e-4;

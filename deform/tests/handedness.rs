@@ -11,7 +11,10 @@ use tombolo_deform::{
 
 /// A mesh of each type of volume cell, tetrahedra to polyhedra.
 fn meshes() -> Vec<Mesh> {
-    let singles = CellType::ALL.into_iter().filter(|cell_type| cell_type.dimension() == 3).map(shapes::single_cell);
+    let singles = CellType::ALL
+        .into_iter()
+        .filter(|cell_type| cell_type.dimension() == 3)
+        .map(shapes::single_cell);
     let boxes = [
         shapes::box_of_tets([3, 3, 3], [0.0; 3], [1.0; 3]),
         shapes::box_of_hexahedra([3, 3, 3], [0.0; 3], [1.0; 3]),
@@ -26,13 +29,20 @@ fn mirrored(points: &[Vector]) -> Vec<Vector> {
 
 /// The mesh in a mirror, with the cells as they were given.
 fn mirror_image(mesh: &Mesh) -> Mesh {
-    Mesh::new(mirrored(mesh.points()), mesh.cells().as_given().into_owned(), FeatureSource::SharpEdges).unwrap()
+    Mesh::new(
+        mirrored(mesh.points()),
+        mesh.cells().as_given().into_owned(),
+        FeatureSource::SharpEdges,
+    )
+    .unwrap()
 }
 
 fn enclosed(surface: &Surface) -> f64 {
     let volume = |triangle: &[u32; 3]| {
         let [a, b, c] = triangle.map(|vertex| surface.points()[vertex as usize]);
-        (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]))
+        (a[0] * (b[1] * c[2] - b[2] * c[1])
+            + a[1] * (b[2] * c[0] - b[0] * c[2])
+            + a[2] * (b[0] * c[1] - b[1] * c[0]))
             / 6.0
     };
     surface.triangles().iter().map(volume).sum()
@@ -43,21 +53,39 @@ fn a_mirrored_mesh_is_like_the_mesh_and_keeps_its_order() {
     for mesh in meshes() {
         let image = mirror_image(&mesh);
         let name = format!("{:?}", mesh.cells().types()[0]);
-        assert_eq!(*image.cells().as_given(), *mesh.cells().as_given(), "{name}: what was given is given back");
-        let (ours, theirs) = (quality(mesh.cells(), mesh.points()), quality(image.cells(), image.points()));
+        assert_eq!(
+            *image.cells().as_given(),
+            *mesh.cells().as_given(),
+            "{name}: what was given is given back"
+        );
+        let (ours, theirs) =
+            (quality(mesh.cells(), mesh.points()), quality(image.cells(), image.points()));
         assert_eq!((ours.inverted, theirs.inverted), (0, 0), "{name}");
-        assert!((ours.min - theirs.min).abs() < 1e-12 && (ours.mean - theirs.mean).abs() < 1e-12, "{name}");
-        for (a, b) in volumes(mesh.cells(), mesh.points()).iter().zip(volumes(image.cells(), image.points())) {
+        assert!(
+            (ours.min - theirs.min).abs() < 1e-12 && (ours.mean - theirs.mean).abs() < 1e-12,
+            "{name}"
+        );
+        for (a, b) in
+            volumes(mesh.cells(), mesh.points()).iter().zip(volumes(image.cells(), image.points()))
+        {
             assert!(*a > 0.0 && (a - b).abs() < 1e-12, "{name}: {a} {b}");
         }
-        let surfaces = [&mesh, &image].map(|mesh| Surface::extract(mesh, &FeatureSettings::default()).unwrap());
+        let surfaces = [&mesh, &image]
+            .map(|mesh| Surface::extract(mesh, &FeatureSettings::default()).unwrap());
         let [ours, theirs] = surfaces.each_ref().map(enclosed);
         assert!(ours > 0.0 && (ours - theirs).abs() < 1e-12, "{name}: outside stays outside");
         // What was a sound cell in the mirror is an inverted one out of it.
-        assert!(judge(&image, image.points(), mesh.points(), &[1.0], &Guard::default()).is_err(), "{name}");
+        assert!(
+            judge(&image, image.points(), mesh.points(), &[1.0], &Guard::default()).is_err(),
+            "{name}"
+        );
         assert_eq!(quality(image.cells(), mesh.points()).inverted, mesh.cells().len(), "{name}");
         let told = image.cells().handedness_note();
-        assert_eq!(told.is_some(), mesh.cells().uniform_type() != Some(CellType::Wedge), "{name}: {told:?}");
+        assert_eq!(
+            told.is_some(),
+            mesh.cells().uniform_type() != Some(CellType::Wedge),
+            "{name}: {told:?}"
+        );
         assert_eq!(mesh.cells().handedness_note(), None, "{name}");
     }
 }
@@ -74,7 +102,11 @@ fn the_volume_of_a_mirrored_mesh_follows_in_the_mirror() {
         };
         let motion: Vec<Vector> = surface.vertices().iter().map(bend).collect();
         let moved = |mesh: &Mesh, motion: &[Vector]| {
-            VolumeOperator::new(mesh, surface.vertices(), &settings).unwrap().solve(motion).unwrap().displacement
+            VolumeOperator::new(mesh, surface.vertices(), &settings)
+                .unwrap()
+                .solve(motion)
+                .unwrap()
+                .displacement
         };
         let (ours, theirs) = (moved(&mesh, &motion), mirrored(&moved(&image, &mirrored(&motion))));
         for (a, b) in ours.iter().flatten().zip(theirs.iter().flatten()) {
@@ -89,7 +121,8 @@ fn a_mesh_of_both_hands_is_refused_with_the_count_and_a_place() {
     for wrong in [1, 5, mesh.cells().len() / 2 - 1] {
         let mut cells = Cells::new();
         for (cell, (cell_type, v)) in mesh.cells().iter().enumerate() {
-            let row = if cell < wrong { [v[1], v[0], v[2], v[3]] } else { [v[0], v[1], v[2], v[3]] };
+            let row =
+                if cell < wrong { [v[1], v[0], v[2], v[3]] } else { [v[0], v[1], v[2], v[3]] };
             cells.push(cell_type, &row).unwrap();
         }
         let mixed = Mesh::new(mesh.points().to_vec(), cells, FeatureSource::SharpEdges).unwrap();
@@ -101,7 +134,8 @@ fn a_mesh_of_both_hands_is_refused_with_the_count_and_a_place() {
         );
         let text = error.to_string();
         assert!(
-            text.contains("cell 0 (tetra) at (") && text.contains(&format!("{wrong} of them left-handed")),
+            text.contains("cell 0 (tetra) at (")
+                && text.contains(&format!("{wrong} of them left-handed")),
             "{text}"
         );
     }
@@ -111,8 +145,11 @@ fn a_mesh_of_both_hands_is_refused_with_the_count_and_a_place() {
 fn reordered(mesh: &Mesh, of: CellType, order: &[usize]) -> Cells {
     let mut cells = Cells::new();
     for (cell_type, vertices) in mesh.cells().iter() {
-        let row: Vec<u32> =
-            if cell_type == of { order.iter().map(|&local| vertices[local]).collect() } else { vertices.to_vec() };
+        let row: Vec<u32> = if cell_type == of {
+            order.iter().map(|&local| vertices[local]).collect()
+        } else {
+            vertices.to_vec()
+        };
         cells.push(cell_type, &row).unwrap();
     }
     cells
@@ -132,15 +169,21 @@ fn orders_of_other_programs_are_recognised() {
         (&mixed, CellType::Wedge, &[0, 1, 4, 3, 2, 5][..], "Nektar++"),
     ] {
         let cells = reordered(mesh, cell_type, order);
-        let error = Mesh::new(mesh.points().to_vec(), cells, FeatureSource::SharpEdges).unwrap_err();
+        let error =
+            Mesh::new(mesh.points().to_vec(), cells, FeatureSource::SharpEdges).unwrap_err();
         let text = error.to_string();
-        assert!(text.contains("VTK's order is") && text.contains(who), "{cell_type} {order:?}: {text}");
+        assert!(
+            text.contains("VTK's order is") && text.contains(who),
+            "{cell_type} {order:?}: {text}"
+        );
         let MeshError::OtherOrder(other) = error else { panic!("{text}") };
         assert_eq!(other.cell_type, cell_type);
     }
     // A hexahedron's order in cells that are said to be voxels.
     let cells = Cells::uniform(CellType::Voxel, hexahedra.cells().connectivity().to_vec()).unwrap();
-    let error = Mesh::new(hexahedra.points().to_vec(), cells, FeatureSource::SharpEdges).unwrap_err().to_string();
+    let error = Mesh::new(hexahedra.points().to_vec(), cells, FeatureSource::SharpEdges)
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("hexahedron: give the cells that type"), "{error}");
 }
 

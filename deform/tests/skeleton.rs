@@ -9,8 +9,11 @@ use tombolo_deform::surface::{FeatureSettings, Surface};
 
 fn surface_of(points: Vec<Vector>, triangles: &[[u32; 3]]) -> Surface {
     let cells = Cells::uniform(CellType::Triangle, triangles.concat()).unwrap();
-    Surface::extract(&Mesh::new(points, cells, FeatureSource::SharpEdges).unwrap(), &FeatureSettings::default())
-        .unwrap()
+    Surface::extract(
+        &Mesh::new(points, cells, FeatureSource::SharpEdges).unwrap(),
+        &FeatureSettings::default(),
+    )
+    .unwrap()
 }
 
 fn extract(surface: &Surface) -> Result<Skeleton, SkeletonError> {
@@ -21,7 +24,12 @@ fn extract(surface: &Surface) -> Result<Skeleton, SkeletonError> {
 
 /// Pieces, loops, branch nodes and ends.
 fn counts(skeleton: &Skeleton) -> [usize; 4] {
-    [skeleton.component_count(), skeleton.loop_count(), skeleton.branch_count(), skeleton.end_count()]
+    [
+        skeleton.component_count(),
+        skeleton.loop_count(),
+        skeleton.branch_count(),
+        skeleton.end_count(),
+    ]
 }
 
 /// A tube about the z axis without its ends: `rings` rings of `about` vertices from z = 0 to `height`.
@@ -69,8 +77,11 @@ fn cubes(wanted: &[[i32; 3]], fine: i32) -> (Vec<Vector>, Vec<[u32; 3]>) {
                                 points.len() as u32 - 1
                             })
                         });
-                        let [a, b, c, d] =
-                            if side == 1 { corners } else { [corners[0], corners[3], corners[2], corners[1]] };
+                        let [a, b, c, d] = if side == 1 {
+                            corners
+                        } else {
+                            [corners[0], corners[3], corners[2], corners[1]]
+                        };
                         triangles.extend([[a, b, c], [a, c, d]]);
                     }
                 }
@@ -83,7 +94,10 @@ fn cubes(wanted: &[[i32; 3]], fine: i32) -> (Vec<Vector>, Vec<[u32; 3]>) {
 /// A ladder of cubes with `holes` holes.
 fn ladder(holes: i32) -> Vec<[i32; 3]> {
     let width = 2 * holes + 1;
-    (0..width).flat_map(|x| (0..3).map(move |y| [x, y, 0])).filter(|[x, y, _]| x % 2 == 0 || *y != 1).collect()
+    (0..width)
+        .flat_map(|x| (0..3).map(move |y| [x, y, 0]))
+        .filter(|[x, y, _]| x % 2 == 0 || *y != 1)
+        .collect()
 }
 
 #[test]
@@ -97,7 +111,9 @@ fn a_torus_has_its_core() {
     }
     for (&point, &node) in surface.points().iter().zip(skeleton.node_of_vertex()) {
         let carrier = skeleton.nodes()[node as usize];
-        assert!((0..3).map(|axis| (point[axis] - carrier[axis]).powi(2)).sum::<f64>().sqrt() < 0.45);
+        assert!(
+            (0..3).map(|axis| (point[axis] - carrier[axis]).powi(2)).sum::<f64>().sqrt() < 0.45
+        );
     }
     assert_eq!(extract(&surface).unwrap(), skeleton, "the same input gives the same bits");
 }
@@ -124,7 +140,8 @@ fn curves_end_in_the_middle_of_caps_round_or_flat() {
             let size = if y == 0.0 && z == 0.0 { 1.0 } else { y.abs().max(z.abs()) / y.hypot(z) };
             [x, size * y, squeeze * size * z]
         };
-        let skeleton = extract(&surface_of(points.into_iter().map(round).collect(), &triangles)).unwrap();
+        let skeleton =
+            extract(&surface_of(points.into_iter().map(round).collect(), &triangles)).unwrap();
         assert_eq!(counts(&skeleton), [1, 0, 0, 2]);
         for &[x, y, z] in skeleton.nodes() {
             assert!(y.hypot(z) < 0.1, "{x} {y} {z}");
@@ -138,23 +155,30 @@ fn curves_end_in_the_middle_of_caps_round_or_flat() {
 
 #[test]
 fn numbers_of_vertices_and_triangles_do_not_matter() {
-    let tee: Vec<[i32; 3]> = (-4..=4).map(|x| [x, 0, 0]).chain((1..=4).map(|y| [0, y, 0])).collect();
+    let tee: Vec<[i32; 3]> =
+        (-4..=4).map(|x| [x, 0, 0]).chain((1..=4).map(|y| [0, y, 0])).collect();
     let (points, triangles) = cubes(&tee, 3);
-    let points: Vec<Vector> =
-        points.into_iter().enumerate().map(|(vertex, point)| noisy(point, vertex, 5, 0.1)).collect();
+    let points: Vec<Vector> = points
+        .into_iter()
+        .enumerate()
+        .map(|(vertex, point)| noisy(point, vertex, 5, 0.1))
+        .collect();
     let skeleton = extract(&surface_of(points.clone(), &triangles)).unwrap();
     for stride in [7, 1001] {
         // A number without a factor in common with the counts visits all of them.
         let number = |place: usize, count: usize| {
             let stride = (stride..)
                 .find(|stride| {
-                    (2..=*stride).all(|by| !usize::is_multiple_of(*stride, by) || !usize::is_multiple_of(count, by))
+                    (2..=*stride).all(|by| {
+                        !usize::is_multiple_of(*stride, by) || !usize::is_multiple_of(count, by)
+                    })
                 })
                 .unwrap();
             place * stride % count
         };
         let mut shuffled = vec![[0.0; 3]; points.len()];
-        (0..points.len()).for_each(|vertex| shuffled[number(vertex, points.len())] = points[vertex]);
+        (0..points.len())
+            .for_each(|vertex| shuffled[number(vertex, points.len())] = points[vertex]);
         let mut turned = vec![[0; 3]; triangles.len()];
         for (place, triangle) in triangles.iter().enumerate() {
             let mut triangle = triangle.map(|vertex| number(vertex as usize, points.len()) as u32);
@@ -179,7 +203,8 @@ fn holes_become_loops_and_a_crossing_becomes_a_branch_node() {
             assert_eq!(found[2], 2 * (holes as usize - 1), "{holes} holes: {found:?}");
         }
     }
-    let tee: Vec<[i32; 3]> = (-4..=4).map(|x| [x, 0, 0]).chain((1..=4).map(|y| [0, y, 0])).collect();
+    let tee: Vec<[i32; 3]> =
+        (-4..=4).map(|x| [x, 0, 0]).chain((1..=4).map(|y| [0, y, 0])).collect();
     let (points, triangles) = cubes(&tee, 3);
     assert_eq!(counts(&extract(&surface_of(points, &triangles)).unwrap()), [1, 0, 1, 3]);
 }
@@ -206,7 +231,10 @@ fn the_last_digits_add_no_branches() {
         let (points, triangles) = cubes(&shape, fine);
         for turn in [1e-9f64, 0.3] {
             let (sine, cosine) = turn.sin_cos();
-            let turned = points.iter().map(|&[x, y, z]| [cosine * x - sine * y, sine * x + cosine * y, z]).collect();
+            let turned = points
+                .iter()
+                .map(|&[x, y, z]| [cosine * x - sine * y, sine * x + cosine * y, z])
+                .collect();
             let surface = surface_of(turned, &triangles);
             // Neither as they are nor refined.
             for least_vertices in [2000, SkeletonSettings::default().least_vertices] {
@@ -225,10 +253,15 @@ fn a_cube_is_one_node_at_any_size_and_a_tetrahedron_too() {
         let scaled = points.iter().map(|point| point.map(|value| value * size)).collect();
         let skeleton = extract(&surface_of(scaled, &triangles)).unwrap();
         assert_eq!((counts(&skeleton), skeleton.nodes().len()), ([1, 0, 0, 0], 1));
-        assert!(skeleton.nodes()[0].iter().all(|value| (value / size - 0.5).abs() < 0.1), "{:?}", skeleton.nodes());
+        assert!(
+            skeleton.nodes()[0].iter().all(|value| (value / size - 0.5).abs() < 0.1),
+            "{:?}",
+            skeleton.nodes()
+        );
     }
     let corners = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let skeleton = extract(&surface_of(corners, &[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])).unwrap();
+    let skeleton =
+        extract(&surface_of(corners, &[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])).unwrap();
     assert_eq!((skeleton.component_count(), skeleton.loop_count()), (1, 0));
 }
 
@@ -251,7 +284,8 @@ fn a_thin_shell_is_answered() {
 #[test]
 fn open_edges_that_lie_on_each_other_are_joined() {
     let (points, triangles) = cubes(&ladder(1), 3);
-    let apart: Vec<Vector> = triangles.iter().flatten().map(|&vertex| points[vertex as usize]).collect();
+    let apart: Vec<Vector> =
+        triangles.iter().flatten().map(|&vertex| points[vertex as usize]).collect();
     let numbered: Vec<[u32; 3]> =
         (0..triangles.len() as u32).map(|face| [3 * face, 3 * face + 1, 3 * face + 2]).collect();
     assert_eq!(counts(&extract(&surface_of(apart, &numbered)).unwrap()), [1, 1, 0, 0]);
@@ -263,7 +297,8 @@ fn what_has_no_inside_is_named() {
     let plate = Surface::extract(&plate, &FeatureSettings::default()).unwrap();
     assert_eq!(extract(&plate), Err(SkeletonError::Flat { vertex: 0, triangles: 48 }));
 
-    let points = vec![[0.0; 3], [0.0, 0.0, 1.0], [1.0, 0.0, 0.5], [-1.0, 0.1, 0.5], [0.1, 1.0, 0.5]];
+    let points =
+        vec![[0.0; 3], [0.0, 0.0, 1.0], [1.0, 0.0, 0.5], [-1.0, 0.1, 0.5], [0.1, 1.0, 0.5]];
     let fan = extract(&surface_of(points, &[[0, 1, 2], [1, 0, 3], [1, 0, 4]]));
     assert_eq!(fan, Err(SkeletonError::NonManifoldEdge { edge: [0, 1], faces: 3 }));
 
@@ -278,10 +313,16 @@ fn what_has_no_inside_is_named() {
         let [c, d] = if place == 23 { [1, 0] } else { [a + 2, b + 2] };
         triangles.extend([[a, b, c], [b, d, c]]);
     }
-    assert!(matches!(extract(&surface_of(points, &triangles)), Err(SkeletonError::OneSided { .. })));
+    assert!(matches!(
+        extract(&surface_of(points, &triangles)),
+        Err(SkeletonError::OneSided { .. })
+    ));
 
     let settings = SkeletonSettings { keep: 0.0, ..SkeletonSettings::default() };
-    assert_eq!(Skeleton::extract(&plate, &settings), Err(SkeletonError::Setting { name: "keep", value: 0.0 }));
+    assert_eq!(
+        Skeleton::extract(&plate, &settings),
+        Err(SkeletonError::Setting { name: "keep", value: 0.0 })
+    );
 }
 
 #[test]
@@ -329,7 +370,8 @@ proptest! {
 }
 
 fn noisy(point: Vector, vertex: usize, seed: u64, size: f64) -> Vector {
-    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ (vertex as u64 + 1).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15)
+        ^ (vertex as u64 + 1).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     point.map(|value| {
         state ^= state << 13;
         state ^= state >> 7;

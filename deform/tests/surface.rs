@@ -24,7 +24,8 @@ use tombolo_deform::surface::{
     Edit, Editor, FeatureSettings, HarmonicOrder, ScaleDirection, ScaleNormals, Surface, Translate,
 };
 
-const ORDERS: [HarmonicOrder; 3] = [HarmonicOrder::Harmonic, HarmonicOrder::Biharmonic, HarmonicOrder::Triharmonic];
+const ORDERS: [HarmonicOrder; 3] =
+    [HarmonicOrder::Harmonic, HarmonicOrder::Biharmonic, HarmonicOrder::Triharmonic];
 
 fn extract(mesh: &Mesh) -> Surface {
     Surface::extract(mesh, &FeatureSettings::default()).expect("a surface")
@@ -37,7 +38,8 @@ fn editor(mesh: &Mesh) -> Editor {
 /// The same mesh with a feature number for each vertex.
 fn tagged(mesh: &Mesh, tag: impl Fn(Vector) -> i64) -> Mesh {
     let tags = mesh.points().iter().map(|&point| tag(point)).collect();
-    Mesh::new(mesh.points().to_vec(), mesh.cells().clone(), FeatureSource::Vertices(tags)).expect("a mesh")
+    Mesh::new(mesh.points().to_vec(), mesh.cells().clone(), FeatureSource::Vertices(tags))
+        .expect("a mesh")
 }
 
 fn names(list: &[&str]) -> Vec<String> {
@@ -54,7 +56,12 @@ fn translate(features: &[&str], fixed: &[&str], by: Vector, harmonic_order: Harm
     })
 }
 
-fn scale(features: &[&str], fixed: &[&str], factors: Vector, harmonic_order: HarmonicOrder) -> Edit {
+fn scale(
+    features: &[&str],
+    fixed: &[&str],
+    factors: Vector,
+    harmonic_order: HarmonicOrder,
+) -> Edit {
     Edit::ScaleDirection(ScaleDirection {
         features: names(features),
         fixed: names(fixed),
@@ -86,7 +93,8 @@ fn enclosed_volume(surface: &Surface, points: &[Vector]) -> f64 {
 }
 
 fn moved(surface: &Surface, displacement: &[Vector]) -> Vec<Vector> {
-    let add = |(point, by): (&Vector, &Vector)| [point[0] + by[0], point[1] + by[1], point[2] + by[2]];
+    let add =
+        |(point, by): (&Vector, &Vector)| [point[0] + by[0], point[1] + by[1], point[2] + by[2]];
     surface.points().iter().zip(displacement).map(add).collect()
 }
 

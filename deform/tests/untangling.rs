@@ -8,12 +8,15 @@ use tombolo_deform::mesh::{Mesh, Vector};
 use tombolo_deform::partition::whole;
 use tombolo_deform::quality::{Guard, keeps, quality};
 use tombolo_deform::shapes;
-use tombolo_deform::volume::{BoundaryMotion, Deform, Domain, FollowError, Route, Stalled, Untangler, follow};
+use tombolo_deform::volume::{
+    BoundaryMotion, Deform, Domain, FollowError, Route, Stalled, Untangler, follow,
+};
 use tombolo_deform::warps::Warp;
 
 fn boundary(mesh: &Mesh) -> Vec<u32> {
     let height = mesh.points().iter().map(|p| p[2]).fold(0.0, f64::max);
-    let on = |p: &Vector| p[..2].iter().any(|&x| x == 0.0 || x == 1.0) || p[2] == 0.0 || p[2] == height;
+    let on =
+        |p: &Vector| p[..2].iter().any(|&x| x == 0.0 || x == 1.0) || p[2] == 0.0 || p[2] == height;
     (0..).zip(mesh.points()).filter(|(_, p)| on(p)).map(|(v, _)| v).collect()
 }
 
@@ -49,7 +52,11 @@ fn followed(mesh: &Mesh, warp: Warp, guard: &Guard) -> Result<Route, Box<Stalled
     let route = result.as_ref().unwrap_or_else(|stalled| &stalled.route);
     let (mut before, mut fraction) = (&start, 0.0);
     for waypoint in &route.waypoints {
-        assert!(keeps(mesh, before, &waypoint.points, guard), "{warp:?}: from {fraction} to {}", waypoint.fraction);
+        assert!(
+            keeps(mesh, before, &waypoint.points, guard),
+            "{warp:?}: from {fraction} to {}",
+            waypoint.fraction
+        );
         assert!(waypoint.fraction > fraction && waypoint.fraction <= 1.0);
         (before, fraction) = (&waypoint.points, waypoint.fraction);
     }
@@ -117,9 +124,10 @@ fn every_problem_is_solved_or_proved_to_have_no_solution() {
 #[test]
 fn hexahedra_wedges_and_pyramids_are_followed_too() {
     let upper = [1.0, 1.0, 2.0];
-    for mesh in
-        [shapes::box_of_hexahedra([4, 4, 8], [0.0; 3], upper), shapes::box_of_mixed_cells([4, 4, 8], [0.0; 3], upper)]
-    {
+    for mesh in [
+        shapes::box_of_hexahedra([4, 4, 8], [0.0; 3], upper),
+        shapes::box_of_mixed_cells([4, 4, 8], [0.0; 3], upper),
+    ] {
         for warp in [Warp::Twist { degrees: 270.0 }, Warp::Bulge { factor: 3.0 }] {
             followed(&mesh, warp, &Guard { min_scaled_jacobian: 0.0, ..Guard::default() }).unwrap();
         }
@@ -132,14 +140,19 @@ fn slivers(least: f64, seed: u64) -> Mesh {
     let inside = |p: &Vector| p.iter().all(|&x| x > 0.0 && x < 1.0);
     let shaken = |amount: f64| -> Vec<Vector> {
         let warp = Warp::Shake { amount, seed };
-        let place =
-            |(vertex, &point): (u32, &Vector)| if inside(&point) { warp.place(point, vertex, 1.0, 1.0) } else { point };
+        let place = |(vertex, &point): (u32, &Vector)| {
+            if inside(&point) { warp.place(point, vertex, 1.0, 1.0) } else { point }
+        };
         (0..).zip(mesh.points()).map(place).collect()
     };
     let (mut low, mut high) = (0.0, 0.25);
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
-        if quality(mesh.cells(), &shaken(middle)).min > least { low = middle } else { high = middle }
+        if quality(mesh.cells(), &shaken(middle)).min > least {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     mesh.with_points(shaken(low)).unwrap()
 }
@@ -181,15 +194,22 @@ fn figures() {
             continue;
         }
         let now = Instant::now();
-        let result = followed(&mesh, warp, &Guard { min_scaled_jacobian: GUARD, ..Guard::default() });
+        let result =
+            followed(&mesh, warp, &Guard { min_scaled_jacobian: GUARD, ..Guard::default() });
         let (route, proof) = match &result {
             Ok(route) => (route, String::from("reached")),
             Err(stalled) => (
                 &stalled.route,
-                format!("{:.3}, valid end: {}, {:?}", stalled.fraction(), stalled.end_is_valid, stalled.impossible),
+                format!(
+                    "{:.3}, valid end: {}, {:?}",
+                    stalled.fraction(),
+                    stalled.end_is_valid,
+                    stalled.impossible
+                ),
             ),
         };
-        let least = route.waypoints.last().map_or(f64::NAN, |last| quality(mesh.cells(), &last.points).min);
+        let least =
+            route.waypoints.last().map_or(f64::NAN, |last| quality(mesh.cells(), &last.points).min);
         println!(
             "{:7} cells {warp:?}: {proof}; {} shapes, {} untangled, least {least:.4}, {:.2} s",
             mesh.cells().len(),

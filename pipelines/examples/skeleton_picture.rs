@@ -27,12 +27,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut editor = Editor::new(Arc::new(surface))?;
     let displacement = editor.displacement(&edits)?;
     let skeleton = editor.skeleton()?;
-    let nodes: Vec<usize> = edit.moves().iter().map(|drag| skeleton.nearest_node(drag.at)).collect();
+    let nodes: Vec<usize> =
+        edit.moves().iter().map(|drag| skeleton.nearest_node(drag.at)).collect();
     let by: Vec<Vector> = edit.moves().iter().map(|drag| drag.by).collect();
     let moved = SkeletonDrag::new(&skeleton, &nodes)?.displacement(&by);
 
     let shape = |points: &[Vector], moved: &[Vector]| -> Vec<Vector> {
-        points.iter().zip(moved).map(|(point, moved)| [0, 1, 2].map(|axis| point[axis] + moved[axis])).collect()
+        points
+            .iter()
+            .zip(moved)
+            .map(|(point, moved)| [0, 1, 2].map(|axis| point[axis] + moved[axis]))
+            .collect()
     };
     let picture = json!({
         "triangles": editor.surface().triangles(),

@@ -35,7 +35,11 @@ pub trait Communicator: Send + Sync {
     fn exchange(&self, messages: Vec<(usize, Vec<u8>)>) -> Vec<(usize, Vec<u8>)>;
     /// The same where every rank knows whom it hears: each of the ranks `from`, none twice, sends one message here, and no other does.
     /// No rank waits for others than those.
-    fn exchange_with(&self, messages: Vec<(usize, Vec<u8>)>, from: &[usize]) -> Vec<(usize, Vec<u8>)> {
+    fn exchange_with(
+        &self,
+        messages: Vec<(usize, Vec<u8>)>,
+        from: &[usize],
+    ) -> Vec<(usize, Vec<u8>)> {
         let _ = from;
         self.exchange(messages)
     }
@@ -60,7 +64,8 @@ pub fn tree(rank: usize, size: usize) -> (Vec<usize>, Option<usize>) {
         if !rank.is_multiple_of(group) {
             return (children, Some(rank - rank % group));
         }
-        children.extend((1..FAN).map(|place| rank + place * step).take_while(|&child| child < size));
+        children
+            .extend((1..FAN).map(|place| rank + place * step).take_while(|&child| child < size));
         step = group;
     }
     (children, None)
@@ -73,7 +78,9 @@ pub fn combine(reduction: Reduction, mut parts: Vec<Vec<f64>>) -> Vec<f64> {
     let mut step = 1;
     while step < size {
         for parent in (0..size).step_by(step * FAN) {
-            for child in (1..FAN).map(|place| parent + place * step).take_while(|&child| child < size) {
+            for child in
+                (1..FAN).map(|place| parent + place * step).take_while(|&child| child < size)
+            {
                 let more = std::mem::take(&mut parts[child]);
                 reduction.take_in(&mut parts[parent], &more);
             }
@@ -110,7 +117,10 @@ pub struct RankError {
 ///
 /// # Errors
 /// The error of the lowest rank that has one.
-pub fn agree<T, E: ToString>(communicator: &dyn Communicator, mine: Result<T, E>) -> Result<T, RankError> {
+pub fn agree<T, E: ToString>(
+    communicator: &dyn Communicator,
+    mine: Result<T, E>,
+) -> Result<T, RankError> {
     let (rank, size) = (communicator.rank(), communicator.size());
     #[expect(clippy::cast_precision_loss, reason = "ranks below 2^53")]
     let mut failing = [if mine.is_err() { rank } else { size } as f64];
@@ -123,7 +133,10 @@ pub fn agree<T, E: ToString>(communicator: &dyn Communicator, mine: Result<T, E>
             let message = mine.err().map(|error| error.to_string()).unwrap_or_default();
             let mut bytes = if rank == failing { message.into_bytes() } else { Vec::new() };
             communicator.broadcast(failing.min(size - 1), &mut bytes);
-            Err(RankError { rank: failing.min(size - 1), message: String::from_utf8_lossy(&bytes).into_owned() })
+            Err(RankError {
+                rank: failing.min(size - 1),
+                message: String::from_utf8_lossy(&bytes).into_owned(),
+            })
         }
     }
 }
@@ -211,8 +224,9 @@ mod tests {
 
     #[test]
     fn sums_do_not_depend_on_chance() {
-        let parts =
-            |size: usize| (0..size).map(|rank| vec![1.0 / (rank as f64 + 3.0), 1e16 * (-1f64).powi(rank as i32)]);
+        let parts = |size: usize| {
+            (0..size).map(|rank| vec![1.0 / (rank as f64 + 3.0), 1e16 * (-1f64).powi(rank as i32)])
+        };
         let few: Vec<Vec<f64>> = parts(7).collect();
         let mut in_order = few[0].clone();
         few[1..].iter().for_each(|more| Reduction::Sum.take_in(&mut in_order, more));
@@ -227,6 +241,9 @@ mod tests {
             }
         }
         assert_eq!(combine(Reduction::Sum, many), held[0]);
-        assert_eq!(combine(Reduction::Maximum, vec![vec![f64::NAN, 1.0], vec![2.0, f64::NAN]]), [2.0, 1.0]);
+        assert_eq!(
+            combine(Reduction::Maximum, vec![vec![f64::NAN, 1.0], vec![2.0, f64::NAN]]),
+            [2.0, 1.0]
+        );
     }
 }

@@ -123,7 +123,10 @@ impl Expression {
         let start = parser.at;
         let kind = parser.expression(0)?;
         if parser.at < text.len() {
-            return Err(parser.error(parser.at, format!("found {}, expected an operator or the end", parser.found())));
+            return Err(parser.error(
+                parser.at,
+                format!("found {}, expected an operator or the end", parser.found()),
+            ));
         }
         parser.require(kind, expected, start)?;
         Ok(Self { program: parser.program })
@@ -174,7 +177,8 @@ impl Expression {
                 Operation::Atan2 => binary!(|a, b| a.atan2(b)),
                 Operation::Choose => {
                     top -= 2;
-                    stack[top - 1] = if stack[top - 1] != 0.0 { stack[top] } else { stack[top + 1] };
+                    stack[top - 1] =
+                        if stack[top - 1] != 0.0 { stack[top] } else { stack[top + 1] };
                 }
             }
         }
@@ -270,10 +274,18 @@ impl Parser<'_> {
     }
 
     /// Appends an operation that takes and gives so many values.
-    fn push(&mut self, operation: Operation, takes: usize, at: usize) -> Result<(), ExpressionError> {
+    fn push(
+        &mut self,
+        operation: Operation,
+        takes: usize,
+        at: usize,
+    ) -> Result<(), ExpressionError> {
         self.stack = self.stack + 1 - takes;
         if self.stack > STACK {
-            return Err(self.error(at, format!("the formula needs more than {STACK} intermediate results at once")));
+            return Err(self.error(
+                at,
+                format!("the formula needs more than {STACK} intermediate results at once"),
+            ));
         }
         self.program.push(operation);
         Ok(())
@@ -292,14 +304,17 @@ impl Parser<'_> {
     /// An operand and all operators after it that bind at least this tightly.
     fn expression(&mut self, tightness: u8) -> Result<Kind, ExpressionError> {
         self.depth += 1;
-        FORMULA_DEPTH.check(self.depth).map_err(|exceeded| self.error(self.at, exceeded.to_string()))?;
+        FORMULA_DEPTH
+            .check(self.depth)
+            .map_err(|exceeded| self.error(self.at, exceeded.to_string()))?;
         self.skip_space();
         let start = self.at;
         let mut kind = self.operand()?;
         loop {
             self.skip_space();
             let operator = self.at;
-            let Some(&(token, binds, takes, gives)) = BINARY.iter().find(|entry| self.rest().starts_with(entry.0))
+            let Some(&(token, binds, takes, gives)) =
+                BINARY.iter().find(|entry| self.rest().starts_with(entry.0))
             else {
                 break;
             };
@@ -372,7 +387,8 @@ impl Parser<'_> {
             }
             Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
             Some(c) if c.is_alphabetic() || c == '_' => self.name(),
-            _ => Err(self.error(start, format!("found {}, expected a number, a name or '('", self.found()))),
+            _ => Err(self
+                .error(start, format!("found {}, expected a number, a name or '('", self.found()))),
         }
     }
 
@@ -402,7 +418,10 @@ impl Parser<'_> {
                 self.push(Operation::Constant(value), 0, start)?;
                 Ok(Kind::Number)
             }
-            Ok(_) => Err(self.error(start, format!("{token:.40} is beyond the range of double precision"))),
+            Ok(_) => {
+                Err(self
+                    .error(start, format!("{token:.40} is beyond the range of double precision")))
+            }
             Err(_) => Err(self.error(start, format!("found {token:?}, expected a number"))),
         }
     }
@@ -429,8 +448,12 @@ impl Parser<'_> {
         } else if name == "pi" {
             self.push(Operation::Constant(std::f64::consts::PI), 0, start)?;
         } else {
-            let known = if self.names.is_empty() { "no names".to_owned() } else { self.names.join(", ") };
-            let mut error = self.error(start, format!("found the unknown name `{name:.60}`, expected one of: {known}"));
+            let known =
+                if self.names.is_empty() { "no names".to_owned() } else { self.names.join(", ") };
+            let mut error = self.error(
+                start,
+                format!("found the unknown name `{name:.60}`, expected one of: {known}"),
+            );
             error.suggestion = nearest(name, self.names.iter().copied()).map(str::to_owned);
             return Err(error);
         }
@@ -461,7 +484,8 @@ impl Parser<'_> {
             }
             _ => {
                 let known = UNARY.iter().map(|entry| entry.0).chain(OTHER_FUNCTIONS);
-                let mut error = self.error(start, format!("found the unknown function `{name:.60}`"));
+                let mut error =
+                    self.error(start, format!("found the unknown function `{name:.60}`"));
                 error.suggestion = nearest(name, known).map(str::to_owned);
                 return Err(error);
             }
@@ -495,7 +519,9 @@ mod tests {
     use super::*;
 
     fn number(text: &str) -> f64 {
-        Expression::parse(text, &["x", "y"]).unwrap_or_else(|error| panic!("{text}: {error}")).evaluate(&[3.0, 5.0])
+        Expression::parse(text, &["x", "y"])
+            .unwrap_or_else(|error| panic!("{text}: {error}"))
+            .evaluate(&[3.0, 5.0])
     }
 
     #[test]
@@ -509,13 +535,17 @@ mod tests {
         assert_eq!(number("1e-3 * 1E+3 + .5 + 2."), 3.5);
         assert_eq!(number("max(1, x, min(y, 4)) + if(x < y && !(y < x), 10, 20)"), 14.0);
         assert_eq!(number("--x - -y"), 8.0);
-        assert!((number("sin(pi / 2) + sqrt(pow(x, 2)) + abs(-y) + atan2(0, 1)") - 9.0).abs() < 1e-15);
+        assert!(
+            (number("sin(pi / 2) + sqrt(pow(x, 2)) + abs(-y) + atan2(0, 1)") - 9.0).abs() < 1e-15
+        );
     }
 
     #[test]
     fn conditions_bind_as_in_c() {
         let names = ["quality.min", "wall shear.max", "n"];
-        let holds = |text: &str| Expression::parse_condition(text, &names).unwrap().holds(&[0.5, 7.0, f64::NAN]);
+        let holds = |text: &str| {
+            Expression::parse_condition(text, &names).unwrap().holds(&[0.5, 7.0, f64::NAN])
+        };
         assert!(holds("quality.min < 0.05 || {wall shear.max} > 6 && quality.min == 0.5"));
         assert!(!holds("(quality.min < 0.05 || {wall shear.max} > 6) && quality.min != 0.5"));
         assert!(!holds("n < 1 || n >= 1 || n == n"), "nothing holds of NaN");
@@ -524,7 +554,9 @@ mod tests {
 
     #[test]
     fn errors_have_a_place_and_a_near_name() {
-        let fails = |text: &str| Expression::parse_condition(text, &["quality.min", "velocity.max"]).unwrap_err();
+        let fails = |text: &str| {
+            Expression::parse_condition(text, &["quality.min", "velocity.max"]).unwrap_err()
+        };
         let error = fails("quality.min < 0.05 || velocty.max > 1");
         assert_eq!((error.column, error.suggestion.as_deref()), (23, Some("velocity.max")));
         for (text, column, message) in [

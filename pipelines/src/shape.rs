@@ -18,7 +18,8 @@ use tombolo_deform::{
     quality::{Guard, Refusal, SurfaceRule, keeps_in_parts},
     schedule::Schedule,
     surface::{
-        BrokenSurface, Edit, EditError, Editor, FeatureSettings, Surface, SurfaceError, UnknownFeature, require_sound,
+        BrokenSurface, Edit, EditError, Editor, FeatureSettings, Surface, SurfaceError,
+        UnknownFeature, require_sound,
     },
     volume::{Impossible, Improver, Untangler, VolumeError},
 };
@@ -127,7 +128,9 @@ pub enum Refused {
 /// What is known of the end of an edit that cannot be followed to it.
 fn at_its_end(impossible: Option<&Impossible>, end_is_valid: bool) -> String {
     match impossible {
-        Some(proof) => format!("; no motion of the inside gives a valid mesh at its whole amount: {proof}"),
+        Some(proof) => {
+            format!("; no motion of the inside gives a valid mesh at its whole amount: {proof}")
+        }
         None if end_is_valid => String::from(
             "; there is a valid mesh at its whole amount, but no way to it was found: make the edit in parts",
         ),
@@ -143,14 +146,19 @@ impl Refused {
 
     /// Whether a mesh on a straight way would be broken.
     fn is_quality(&self) -> bool {
-        matches!(self, Refused::Guard(Refusal::Quality(_)) | Refused::Elsewhere(Elsewhere { is_quality: true, .. }))
+        matches!(
+            self,
+            Refused::Guard(Refusal::Quality(_))
+                | Refused::Elsewhere(Elsewhere { is_quality: true, .. })
+        )
     }
 
     /// The least scaled Jacobian on the way, where that is what was wrong.
     #[must_use]
     pub fn min_scaled_jacobian(&self) -> Option<f64> {
         match self {
-            Refused::Guard(Refusal::Quality(path)) | Refused::Stalled { refusal: Refusal::Quality(path), .. } => {
+            Refused::Guard(Refusal::Quality(path))
+            | Refused::Stalled { refusal: Refusal::Quality(path), .. } => {
                 Some(path.min_scaled_jacobian)
             }
             Refused::Elsewhere(elsewhere) => elsewhere.min_scaled_jacobian,
@@ -301,7 +309,12 @@ impl Shaper {
         let editor = agree(&*communicator, editor)?;
         let own = agree(&*communicator, own_mesh(part))?;
         let numbers = cell_numbers(&*communicator, part, &own.1);
-        let partition = partition(Ranks::new(Arc::clone(&communicator), Arc::clone(&shared), &boundary, numbers));
+        let partition = partition(Ranks::new(
+            Arc::clone(&communicator),
+            Arc::clone(&shared),
+            &boundary,
+            numbers,
+        ));
         let parts = Parts { communicator, shared, boundary };
         Ok(Self::with_boundary(Arc::new(own.0), Boundary::of_parts(parts, partition), editor))
     }
@@ -382,7 +395,9 @@ impl Shaper {
     fn require_sound(&self, shape: &[Vector], rule: SurfaceRule) -> Result<(), Refused> {
         let sound = match (rule, self.boundary.surface()) {
             (SurfaceRule::Allow, _) | (_, None) => Ok(()),
-            (_, Some(surface)) => require_sound(surface, surface.points(), shape).map_err(Refused::from),
+            (_, Some(surface)) => {
+                require_sound(surface, surface.points(), shape).map_err(Refused::from)
+            }
         };
         self.boundary.agree(sound)
     }
@@ -408,7 +423,12 @@ impl Shaper {
     ///
     /// # Errors
     /// [`Refused::Edit`], [`Refused::Surface`], [`Refused::Feature`], [`Refused::Volume`], [`Refused::Limit`].
-    pub fn target(&mut self, stack: &[Edit], deform: &DeformStage, rule: SurfaceRule) -> Result<Target, Refused> {
+    pub fn target(
+        &mut self,
+        stack: &[Edit],
+        deform: &DeformStage,
+        rule: SurfaceRule,
+    ) -> Result<Target, Refused> {
         check_stack(stack)?;
         deform.equation.validate()?;
         let mut seconds = ShapeSeconds::default();
@@ -416,8 +436,14 @@ impl Shaper {
         let boundary = Arc::clone(&self.boundary);
         let displaced = displaced(self.editor.as_mut(), stack).and_then(|displacement| {
             // Where a part of the surface is let go, it is looked at where it ends.
-            if let (Some(surface), false, SurfaceRule::Reject) = (boundary.surface(), deform.lets_go(), rule) {
-                let moved = surface.points().iter().zip(&displacement).map(|(&point, &by)| moved(point, by));
+            if let (Some(surface), false, SurfaceRule::Reject) =
+                (boundary.surface(), deform.lets_go(), rule)
+            {
+                let moved = surface
+                    .points()
+                    .iter()
+                    .zip(&displacement)
+                    .map(|(&point, &by)| moved(point, by));
                 require_sound(surface, surface.points(), &moved.collect::<Vec<Vector>>())?;
             }
             Ok(displacement)
@@ -432,17 +458,28 @@ impl Shaper {
             let points = Arc::clone(&reference);
             let (way, fraction, iterations, sub_steps) = (Vec::new(), 1.0, 0, 0);
             let surface_only = deform.surface_only;
-            return Ok(Target { points, reference, way, fraction, seconds, iterations, sub_steps, surface_only });
+            return Ok(Target {
+                points,
+                reference,
+                way,
+                fraction,
+                seconds,
+                iterations,
+                sub_steps,
+                surface_only,
+            });
         }
         if deform.surface_only {
             return self.of_surface(&surface, seconds);
         }
         let watch = Stopwatch::start();
         let solution = self.operator(deform)?.solve(&surface).and_then(|solution| {
-            let moved = reference.iter().zip(&solution.displacement).map(|(&point, &by)| moved(point, by));
+            let moved =
+                reference.iter().zip(&solution.displacement).map(|(&point, &by)| moved(point, by));
             let mut points: Vec<Vector> = moved.collect();
             boundary.take_from_owners(&mut points)?;
-            let improved = self.improved(&points, deform)?.filter(|improved| self.straight(improved));
+            let improved =
+                self.improved(&points, deform)?.filter(|improved| self.straight(improved));
             Ok((improved.unwrap_or_else(|| points.into()), solution.iterations))
         });
         seconds.volume = watch.seconds();
@@ -456,18 +493,31 @@ impl Shaper {
             sound?;
         }
         let (way, fraction, sub_steps) = (Vec::new(), 1.0, 0);
-        Ok(Target { points, reference, way, fraction, seconds, iterations, sub_steps, surface_only: false })
+        Ok(Target {
+            points,
+            reference,
+            way,
+            fraction,
+            seconds,
+            iterations,
+            sub_steps,
+            surface_only: false,
+        })
     }
 
     /// The shape with its worst cells lifted, where that could be done.
-    fn improved(&mut self, points: &[Vector], deform: &DeformStage) -> Result<Option<Arc<[Vector]>>, Refused> {
+    fn improved(
+        &mut self,
+        points: &[Vector],
+        deform: &DeformStage,
+    ) -> Result<Option<Arc<[Vector]>>, Refused> {
         if deform.equation.improve == 0 {
             return Ok(None);
         }
         let (mesh, boundary) = (&self.mesh, &self.boundary);
-        let improver = self
-            .improver
-            .get_or_insert_with(|| Arc::new(Improver::of_part(mesh, boundary.vertices(), boundary.partition())));
+        let improver = self.improver.get_or_insert_with(|| {
+            Arc::new(Improver::of_part(mesh, boundary.vertices(), boundary.partition()))
+        });
         let mut points = points.to_vec();
         if !improver.improve(&mut points, deform.equation.improve) {
             return Ok(None);
@@ -510,7 +560,8 @@ fn displaced(editor: Option<&mut Editor>, stack: &[Edit]) -> Result<Vec<Vector>,
 
 /// The cells of a part that are its own and of volume, with all its vertices, and where they stand among the part's cells.
 fn own_mesh(part: &Part) -> Result<(Mesh, Vec<usize>), tombolo_deform::mesh::MeshError> {
-    let is_own = |cell: &usize| !part.is_ghost(*cell) && part.cells.cell_type(*cell).dimension() == 3;
+    let is_own =
+        |cell: &usize| !part.is_ghost(*cell) && part.cells.cell_type(*cell).dimension() == 3;
     let own: Vec<usize> = (0..part.cells.len()).filter(is_own).collect();
     let cells = part.cells.subset(own.iter().copied());
     Ok((Mesh::new(part.points.clone(), cells, FeatureSource::SharpEdges)?, own))

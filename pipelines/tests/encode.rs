@@ -5,7 +5,9 @@ use std::sync::Arc;
 use proptest::prelude::*;
 use tombolo_deform::mesh::{CellType, Cells, MeshView, NumberType};
 use tombolo_deform::shapes;
-use tombolo_pipelines::encode::{DataFrame, Decoded, EncodeError, Encoder, TopologyFrame, decode, encode};
+use tombolo_pipelines::encode::{
+    DataFrame, Decoded, EncodeError, Encoder, TopologyFrame, decode, encode,
+};
 use tombolo_pipelines::extract::{Association, Channel, Extract, Field, Source};
 use tombolo_pipelines::language::ErrorBound;
 use tombolo_pipelines::run::{Encoding, Frame};
@@ -13,7 +15,8 @@ use tombolo_pipelines::run::{Encoding, Frame};
 fn surface_frame(encoding: Encoding) -> Frame {
     let mesh = shapes::box_of_hexahedra([5, 4, 3], [0.0; 3], [5.0, 4.0, 3.0]);
     let channel = Channel { name: "fluid", mesh: MeshView::from(&mesh), fields: &[] };
-    let mut extract = Source::new(&channel).unwrap().surface(&channel, 0, &|_| true).unwrap().extract;
+    let mut extract =
+        Source::new(&channel).unwrap().surface(&channel, 0, &|_| true).unwrap().extract;
     let fields = &mut Arc::make_mut(&mut extract).fields;
     let (vertices, cells) = (6 * 5 * 4 - 4 * 3 * 2, 2 * (5 * 4 + 5 * 3 + 4 * 3));
     fields.push(Field {
@@ -47,7 +50,11 @@ fn a_surface_comes_back_within_its_bounds() {
     let extract = &frame.extract;
     let (topology, data) = decoded(&frame);
     assert_eq!((topology.view.as_str(), topology.points), ("hull", extract.points.len()));
-    assert_eq!(topology.triangles.len(), 2 * extract.cells.len(), "each quadrilateral is two triangles");
+    assert_eq!(
+        topology.triangles.len(),
+        2 * extract.cells.len(),
+        "each quadrilateral is two triangles"
+    );
     assert_eq!((data.cycle, data.time, &data.topology), (12, 0.25, &topology.topology));
     let diagonal = 50f64.sqrt();
     for (sent, received) in extract.points.as_flattened().iter().zip(data.points.as_flattened()) {
@@ -96,15 +103,27 @@ fn a_smooth_field_is_sent_in_less_than_a_fifth() {
     let mesh = shapes::torus(2.0, 0.5, [200, 100]);
     let points = mesh.points().to_vec();
     let values = points.iter().map(|p| p[0] * p[1]).collect();
-    let field =
-        Field { name: "p".into(), association: Association::Vertex, components: 1, number: NumberType::F64, values };
+    let field = Field {
+        name: "p".into(),
+        association: Association::Vertex,
+        components: 1,
+        number: NumberType::F64,
+        values,
+    };
     let cells = Arc::new(mesh.cells().clone());
-    let extract = Arc::new(Extract { points, vertices: None, cells, features: None, fields: vec![field] });
-    let frame = Frame { pipeline: "v".into(), cycle: 0, time: 0.0, extract, encoding: Encoding::default() };
+    let extract =
+        Arc::new(Extract { points, vertices: None, cells, features: None, fields: vec![field] });
+    let frame =
+        Frame { pipeline: "v".into(), cycle: 0, time: 0.0, extract, encoding: Encoding::default() };
     let encoded = encode(&frame).unwrap();
     assert_eq!(encoded.raw_bytes, 20_000 * 4 * 8);
     if cfg!(feature = "compression") {
-        assert!(encoded.data.len() * 5 < encoded.raw_bytes, "{} of {}", encoded.data.len(), encoded.raw_bytes);
+        assert!(
+            encoded.data.len() * 5 < encoded.raw_bytes,
+            "{} of {}",
+            encoded.data.len(),
+            encoded.raw_bytes
+        );
     }
 }
 
@@ -117,9 +136,15 @@ fn what_cannot_be_sent_is_named() {
         encode(&Frame { extract: Arc::new(extract), ..frame.clone() }).unwrap_err()
     };
     let error = broken(&|extract| extract.fields[0].values[7] = f64::NAN);
-    assert!(matches!(error, EncodeError::NotFinite { ref array, entity: 2, .. } if array == "velocity"), "{error}");
+    assert!(
+        matches!(error, EncodeError::NotFinite { ref array, entity: 2, .. } if array == "velocity"),
+        "{error}"
+    );
     let error = broken(&|extract| extract.points[4][1] = f64::INFINITY);
-    assert!(matches!(error, EncodeError::NotFinite { ref array, entity: 4, .. } if array == "points"), "{error}");
+    assert!(
+        matches!(error, EncodeError::NotFinite { ref array, entity: 4, .. } if array == "points"),
+        "{error}"
+    );
     let error = broken(&|extract| extract.fields[1].values.truncate(93));
     assert!(matches!(error, EncodeError::Length { found: 93, expected: 94, .. }), "{error}");
     let error = broken(&|extract| {

@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 use tombolo_pipelines::language::{
-    At, Change, Command, Config, Due, Order, Stage, config_schema, order_schema, parse, parse_json, parse_orders,
-    parse_valid, text,
+    At, Change, Command, Config, Due, Order, Stage, config_schema, order_schema, parse, parse_json,
+    parse_orders, parse_valid, text,
 };
 
 const DESIGN: &str = include_str!("design.json");
@@ -14,7 +14,9 @@ fn the_example_of_the_design_is_read_and_written_back() {
     assert_eq!(config.pipelines.len(), 4);
     assert_eq!(config.pipelines[2].due, Due::OnOrder);
     assert_eq!(config.pipelines[3].due, Due::At(At::Time(0.1)));
-    assert!(matches!(config.pipelines[0].stages[0], Stage::Slice(slice) if slice.normal == [1.0, 0.0, 0.0]));
+    assert!(
+        matches!(config.pipelines[0].stages[0], Stage::Slice(slice) if slice.normal == [1.0, 0.0, 0.0])
+    );
     let again = parse(&serde_json::to_string_pretty(&config).unwrap(), "again.json").unwrap();
     assert_eq!(config, again);
 }
@@ -76,7 +78,9 @@ fn errors_point_at_the_token() {
             && error.message.contains(message)
             && error.suggestion.as_deref() == suggestion;
         if !same {
-            wrong.push(format!("{text}\n  {error}\n  expected {line}:{column}: {path}: {message} {suggestion:?}"));
+            wrong.push(format!(
+                "{text}\n  {error}\n  expected {line}:{column}: {path}: {message} {suggestion:?}"
+            ));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
@@ -96,7 +100,11 @@ fn edits_are_checked_at_the_token() {
     ];
     for (text, column, path, message) in cases {
         let error = parse_orders(text, "orders.json").expect_err(text);
-        assert_eq!((error.line, error.column, error.path.as_str()), (1, column, path), "{text}: {error}");
+        assert_eq!(
+            (error.line, error.column, error.path.as_str()),
+            (1, column, path),
+            "{text}: {error}"
+        );
         assert!(error.message.contains(message), "{error}");
     }
 }
@@ -112,7 +120,9 @@ fn files_lie_beside_the_json_that_names_them() {
     assert_eq!(files(order, "cases/one/orders.json"), expected("cases/one/a.txt"));
     assert_eq!(files(order, "orders.json"), expected("a.txt"));
     let config = r#"{"version": 1, "pipelines": [{"name": "a", "at": {"cycle": 1}, "stages": [{"displacement": {"file": "a.txt"}}, {"order": {}}]}]}"#;
-    let Stage::Displacement(import) = &parse(config, "cases/views.json").unwrap().pipelines[0].stages[0] else {
+    let Stage::Displacement(import) =
+        &parse(config, "cases/views.json").unwrap().pipelines[0].stages[0]
+    else {
         panic!()
     };
     assert_eq!(import.file.as_deref(), Some("cases/a.txt"));
@@ -168,21 +178,37 @@ fn orders_are_read_from_arrays_and_journals() {
         "\n",
     );
     let orders = parse_orders(journal, "journal.jsonl").unwrap();
-    let places: Vec<_> = orders.iter().map(|timed| (timed.id.as_deref().unwrap(), timed.at.unwrap())).collect();
+    let places: Vec<_> =
+        orders.iter().map(|timed| (timed.id.as_deref().unwrap(), timed.at.unwrap())).collect();
     assert_eq!(places, [("a", At::Cycle(7)), ("c", At::Cycle(9))]);
 
     let error = parse_orders("{\"pause\": {}}\n{\"puase\": {}}\n", "o.jsonl").unwrap_err();
     assert_eq!((error.line, error.column, error.suggestion.as_deref()), (2, 2, Some("pause")));
-    assert!(parse_orders(r#"[{"order": {"undo": 1}, "pause": {}}]"#, "o").unwrap_err().message.contains("exactly one"));
+    assert!(
+        parse_orders(r#"[{"order": {"undo": 1}, "pause": {}}]"#, "o")
+            .unwrap_err()
+            .message
+            .contains("exactly one")
+    );
     assert!(parse_orders(" \n", "o").unwrap().is_empty());
-    assert_eq!(parse_orders("{\n \"at\": {\"cycle\": 1},\n \"pause\": {}\n}", "o").unwrap().len(), 1);
+    assert_eq!(
+        parse_orders("{\n \"at\": {\"cycle\": 1},\n \"pause\": {}\n}", "o").unwrap().len(),
+        1
+    );
     assert!(parse_orders(r#"{"pause": {}"#, "o").is_err(), "one broken line is not a torn journal");
 }
 
 #[test]
 fn schemas_name_what_the_parser_reads() {
     let schema = config_schema().to_string();
-    for name in ["scale_direction", "harmonic_order", "min_scaled_jacobian", "listen", "background", "at most one of"] {
+    for name in [
+        "scale_direction",
+        "harmonic_order",
+        "min_scaled_jacobian",
+        "listen",
+        "background",
+        "at most one of",
+    ] {
         let lower = schema.to_lowercase();
         assert!(lower.contains(name), "{name} is not in the schema");
     }
@@ -240,16 +266,24 @@ proptest! {
 #[test]
 fn bounds_are_the_true_ones_and_numbers_are_short() {
     let order = |faces: &str| {
-        let text = format!(r#"{{"edits": [{{"translate": {{"region": {{"faces": [{faces}]}}, "by": [0, 0, 1]}}}}]}}"#);
+        let text = format!(
+            r#"{{"edits": [{{"translate": {{"region": {{"faces": [{faces}]}}, "by": [0, 0, 1]}}}}]}}"#
+        );
         parse_valid::<Order>(&text, "order").unwrap_err().to_string()
     };
     for faces in ["4294967296", "-1", "1.5", "1e300"] {
         let error = order(faces);
-        assert!(error.contains(&format!("found {faces}, expected a whole number from 0 to 4294967295")), "{error}");
+        assert!(
+            error.contains(&format!("found {faces}, expected a whole number from 0 to 4294967295")),
+            "{error}"
+        );
         assert!(error.contains("edits[0].translate.region.faces[0]"), "{error}");
     }
     for (setting, shown) in [
-        (r#""guard": {"min_scaled_jacobian": 1e308}"#, "found 1e308, expected a number from 0 to 1"),
+        (
+            r#""guard": {"min_scaled_jacobian": 1e308}"#,
+            "found 1e308, expected a number from 0 to 1",
+        ),
         (r#""deform": {"stiffening": 1e308}"#, "1e308"),
         (r#""deform": {"tolerance": -1e-300}"#, "-1e-300"),
         (

@@ -4,10 +4,12 @@ use proptest::prelude::*;
 use serde_json::{Value, json};
 use tombolo_deform::surface::Edit;
 use tombolo_pipelines::language::{
-    Change, Config, LanguageError, Message, Order, parse, parse_json, parse_message, parse_orders, parse_valid,
+    Change, Config, LanguageError, Message, Order, parse, parse_json, parse_message, parse_orders,
+    parse_valid,
 };
 use tombolo_pipelines::limits::{
-    ALL, DEPTH, DOCUMENT, EDITS, FORMULA, LISTED, Limit, SHAPES, TEXT, VALUES, WAITING, WAITING_BYTES,
+    ALL, DEPTH, DOCUMENT, EDITS, FORMULA, LISTED, Limit, SHAPES, TEXT, VALUES, WAITING,
+    WAITING_BYTES,
 };
 
 fn words(limit: Limit, found: usize) -> String {
@@ -43,7 +45,9 @@ fn read_everywhere(order: &str) -> Vec<Result<Order, LanguageError>> {
         parse_valid(order, "edits.json"),
         of_file(format!(r#"[{{"order":{order}}}]"#)),
         of_file(format!(r#"{{"order":{order}}}"#)),
-        of_file(format!(r#"{{"id":"a","status":"accepted","cycle":3,"time":0.3,"order":{order}}}"#)),
+        of_file(format!(
+            r#"{{"id":"a","status":"accepted","cycle":3,"time":0.3,"order":{order}}}"#
+        )),
         message,
     ]
 }
@@ -78,10 +82,16 @@ fn an_order_may_hold_so_much() {
     }
     for key in ["edits", "stack"] {
         all_take(&format!(r#"{{"{key}":{}}}"#, list(EDIT, EDITS.most)));
-        all_say(&format!(r#"{{"{key}":{}}}"#, list(EDIT, EDITS.most + 1)), &words(EDITS, EDITS.most + 1));
+        all_say(
+            &format!(r#"{{"{key}":{}}}"#, list(EDIT, EDITS.most + 1)),
+            &words(EDITS, EDITS.most + 1),
+        );
     }
     let faces = |count: usize| {
-        let region = format!(r#"{{"translate":{{"region":{{"faces":{}}},"by":[0,0,1]}}}}"#, list("7", count));
+        let region = format!(
+            r#"{{"translate":{{"region":{{"faces":{}}},"by":[0,0,1]}}}}"#,
+            list("7", count)
+        );
         format!(r#"{{"edits":[{region},{region}]}}"#)
     };
     all_take(&faces(LISTED.most / 2));
@@ -92,7 +102,8 @@ fn an_order_may_hold_so_much() {
 fn a_displacement_of_as_many_vertices_as_are_allowed_is_a_document() {
     let count = LISTED.most;
     let value = [-1.0 / 3.0e200; 3];
-    let edits: Vec<Edit> = serde_json::from_value(json!([{"displacement": {"vertices": [], "file": "x"}}])).unwrap();
+    let edits: Vec<Edit> =
+        serde_json::from_value(json!([{"displacement": {"vertices": [], "file": "x"}}])).unwrap();
     let Edit::Displacement(mut import) = edits[0].clone() else { unreachable!() };
     (import.file, import.values) = (None, vec![value; count]);
     import.vertices = (4_000_000_000_u32..).take(count).collect();
@@ -108,7 +119,10 @@ fn a_document_may_be_so_long_and_deep() {
     parse_valid::<Order>(&padded(DOCUMENT.most), "a").unwrap();
     let long = padded(DOCUMENT.most + 1);
     let error = parse_valid::<Order>(&long, "a").unwrap_err();
-    assert_eq!((error.message, error.line, error.column), (words(DOCUMENT, DOCUMENT.most + 1), 1, 1));
+    assert_eq!(
+        (error.message, error.line, error.column),
+        (words(DOCUMENT, DOCUMENT.most + 1), 1, 1)
+    );
     assert_eq!(parse_message(&long).1.unwrap_err().message, words(DOCUMENT, DOCUMENT.most + 1));
     assert_eq!(parse(&long, "a").unwrap_err().message, words(DOCUMENT, DOCUMENT.most + 1));
 
@@ -126,11 +140,13 @@ fn a_document_may_be_so_long_and_deep() {
 
     let text = |bytes: usize| format!("{:?}", "x".repeat(bytes));
     parse_json::<String>(&text(TEXT.most), "a").unwrap();
-    assert_eq!(parse_json::<String>(&text(TEXT.most + 1), "a").unwrap_err().message, words(TEXT, TEXT.most + 1));
+    assert_eq!(
+        parse_json::<String>(&text(TEXT.most + 1), "a").unwrap_err().message,
+        words(TEXT, TEXT.most + 1)
+    );
     let formula = |length: usize| -> Result<Config, LanguageError> {
         let when = format!("cycle > 1{}", " ".repeat(length - 9));
-        let config =
-            json!({"version": 1, "pipelines": [{"name": "a", "stages": [], "when": when, "then": [{"stop": {}}]}]});
+        let config = json!({"version": 1, "pipelines": [{"name": "a", "stages": [], "when": when, "then": [{"stop": {}}]}]});
         parse(&config.to_string(), "a")
     };
     formula(FORMULA.most).unwrap();
@@ -149,7 +165,10 @@ fn so_many_commands_may_wait() {
         assert_eq!(parse_orders(&text, "a").unwrap_err().message, words(WAITING, WAITING.most + 1));
     }
     let long = " ".repeat(WAITING_BYTES.most + 1);
-    assert_eq!(parse_orders(&long, "a").unwrap_err().message, words(WAITING_BYTES, WAITING_BYTES.most + 1));
+    assert_eq!(
+        parse_orders(&long, "a").unwrap_err().message,
+        words(WAITING_BYTES, WAITING_BYTES.most + 1)
+    );
 }
 
 #[test]
@@ -166,7 +185,9 @@ fn no_more_of_a_file_is_read_than_may_be_in_it() {
         let error = read_text("/dev/zero".as_ref(), TEXT).unwrap_err().to_string();
         assert!(error.ends_with(&words(TEXT, TEXT.most + 1)), "{error}");
     }
-    assert!(read_text(&folder.path().join("none"), DOCUMENT).unwrap_err().to_string().contains("none"));
+    assert!(
+        read_text(&folder.path().join("none"), DOCUMENT).unwrap_err().to_string().contains("none")
+    );
 }
 
 #[test]

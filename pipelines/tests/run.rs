@@ -23,7 +23,8 @@ fn area(extract: &Extract, normal: Vector) -> f64 {
         for index in 1..points.len() - 1 {
             let (a, b, c) = (at(0), at(index), at(index + 1));
             let [u, v]: [Vector; 2] = [b, c].map(|p| std::array::from_fn(|axis| p[axis] - a[axis]));
-            let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+            let cross =
+                [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
             let turn: f64 = (0..3).map(|axis| cross[axis] * normal[axis]).sum();
             assert!(turn > 0.0, "polygons turn counter-clockwise about the normal");
             sum += turn / 2.0;
@@ -35,7 +36,10 @@ fn area(extract: &Extract, normal: Vector) -> f64 {
 fn cut(mesh: &Mesh, fields: &[FieldView], origin: Vector, normal: Vector) -> Arc<Extract> {
     let channel = Channel { name: "fluid", mesh: MeshView::from(mesh), fields };
     let source = Source::new(&channel).unwrap();
-    source.slice(&channel, &Slice { origin, normal }, 0, &|_| true, &|furthest| furthest).unwrap().extract
+    source
+        .slice(&channel, &Slice { origin, normal }, 0, &|_| true, &|furthest| furthest)
+        .unwrap()
+        .extract
 }
 
 #[test]
@@ -51,14 +55,27 @@ fn a_slice_of_a_box_is_exact() {
             ([s, s, 0.0], 2f64.sqrt()),
             ([1.0 / 3f64.sqrt(); 3], 3f64.sqrt() * 0.75),
         ] {
-            let values: Vec<f64> = mesh.points().iter().map(|p| 1.0 + 2.0 * p[0] - 3.0 * p[1] + 0.5 * p[2]).collect();
+            let values: Vec<f64> =
+                mesh.points().iter().map(|p| 1.0 + 2.0 * p[0] - 3.0 * p[1] + 0.5 * p[2]).collect();
             let numbers: Vec<f64> = (0..mesh.cells().len()).map(|cell| cell as f64).collect();
             let fields = [
-                FieldView { name: "linear", association: Association::Vertex, values: ArrayView::scalars(&values) },
-                FieldView { name: "cell", association: Association::Element, values: ArrayView::scalars(&numbers) },
+                FieldView {
+                    name: "linear",
+                    association: Association::Vertex,
+                    values: ArrayView::scalars(&values),
+                },
+                FieldView {
+                    name: "cell",
+                    association: Association::Element,
+                    values: ArrayView::scalars(&numbers),
+                },
             ];
             let slice = cut(&mesh, &fields, [0.5; 3], normal);
-            assert!((area(&slice, normal) - expected).abs() < 1e-12, "{normal:?}: {}", area(&slice, normal));
+            assert!(
+                (area(&slice, normal) - expected).abs() < 1e-12,
+                "{normal:?}: {}",
+                area(&slice, normal)
+            );
             for (point, value) in slice.points.iter().zip(&slice.fields[0].values) {
                 let distance: f64 = (0..3).map(|axis| (point[axis] - 0.5) * normal[axis]).sum();
                 assert!(distance.abs() < 1e-14, "{point:?} is not in the plane");
@@ -69,11 +86,16 @@ fn a_slice_of_a_box_is_exact() {
             for ((_, points), &number) in slice.cells.iter().zip(&slice.fields[1].values) {
                 let vertices = mesh.cells().vertices(number as usize);
                 for axis in 0..3 {
-                    let [low, high] = [f64::min, f64::max]
-                        .map(|pick| vertices.iter().map(|&v| mesh.points()[v as usize][axis]).reduce(pick).unwrap());
-                    assert!(
-                        points.iter().all(|&p| (low - 1e-14..=high + 1e-14).contains(&slice.points[p as usize][axis]))
-                    );
+                    let [low, high] = [f64::min, f64::max].map(|pick| {
+                        vertices
+                            .iter()
+                            .map(|&v| mesh.points()[v as usize][axis])
+                            .reduce(pick)
+                            .unwrap()
+                    });
+                    assert!(points.iter().all(|&p| {
+                        (low - 1e-14..=high + 1e-14).contains(&slice.points[p as usize][axis])
+                    }));
                 }
             }
         }
@@ -86,11 +108,22 @@ fn a_slice_closes_in_every_cell_type() {
     for cell_type in CellType::ALL.into_iter().filter(|cell| cell.dimension() == 3) {
         let mesh = shapes::single_cell(cell_type);
         let count = mesh.points().len() as f64;
-        let centre: Vector = std::array::from_fn(|axis| mesh.points().iter().map(|p| p[axis]).sum::<f64>() / count);
-        for normal in [[1.0, 0.1, 0.2], [-0.3, 1.0, 0.05], [0.2, -0.1, 1.0], [1.0, 1.0, 1.0], [-1.0, 2.0, -0.7]] {
+        let centre: Vector =
+            std::array::from_fn(|axis| mesh.points().iter().map(|p| p[axis]).sum::<f64>() / count);
+        for normal in [
+            [1.0, 0.1, 0.2],
+            [-0.3, 1.0, 0.05],
+            [0.2, -0.1, 1.0],
+            [1.0, 1.0, 1.0],
+            [-1.0, 2.0, -0.7],
+        ] {
             let slice = cut(&mesh, &[], centre, normal);
             assert_eq!(slice.cells.len(), 1, "{cell_type} along {normal:?}");
-            assert_eq!(slice.cells.vertices(0).len(), slice.points.len(), "{cell_type}: each point once");
+            assert_eq!(
+                slice.cells.vertices(0).len(),
+                slice.points.len(),
+                "{cell_type}: each point once"
+            );
             assert!(area(&slice, normal) > 0.0);
         }
     }
@@ -125,7 +158,8 @@ fn a_slice_beside_the_mesh_is_empty() {
 fn a_surface_follows_borrowed_arrays() {
     let mesh = shapes::box_of_tets([3, 3, 3], [0.0; 3], [1.0; 3]);
     let coordinates: Vec<f32> = mesh.points().as_flattened().iter().map(|&x| x as f32).collect();
-    let connectivity: Vec<i64> = mesh.cells().connectivity().iter().map(|&vertex| i64::from(vertex)).collect();
+    let connectivity: Vec<i64> =
+        mesh.cells().connectivity().iter().map(|&vertex| i64::from(vertex)).collect();
     let velocity: Vec<f32> = (0..3 * mesh.points().len()).map(|i| i as f32).collect();
     let fields = [FieldView {
         name: "velocity",
@@ -133,7 +167,10 @@ fn a_surface_follows_borrowed_arrays() {
         values: ArrayView::interleaved(Values::F32(&velocity), 3).unwrap(),
     }];
     let points = ArrayView::interleaved(Values::F32(&coordinates), 3).unwrap();
-    let cells = CellsView::Uniform { cell_type: CellType::Tetra, connectivity: Indices::I64(&connectivity) };
+    let cells = CellsView::Uniform {
+        cell_type: CellType::Tetra,
+        connectivity: Indices::I64(&connectivity),
+    };
     let channel = Channel { name: "fluid", mesh: MeshView::new(points, cells), fields: &fields };
     let channels = [channel];
     let mut runner = runner(
@@ -196,8 +233,11 @@ fn monitors_conditions_and_orders() {
     let mut seen = Vec::new();
     for cycle in 0..7u64 {
         let speed: Vec<f64> = (0..27).map(|vertex| f64::from(vertex % 2) * cycle as f64).collect();
-        let fields =
-            [FieldView { name: "speed", association: Association::Vertex, values: ArrayView::scalars(&speed) }];
+        let fields = [FieldView {
+            name: "speed",
+            association: Association::Vertex,
+            values: ArrayView::scalars(&speed),
+        }];
         let channels = [Channel { name: "fluid", mesh: MeshView::from(&mesh), fields: &fields }];
         let time = cycle as f64 * 0.1;
         assert_eq!(runner.is_due(cycle, time), cycle % 2 == 0 || cycle == 3);
@@ -205,12 +245,18 @@ fn monitors_conditions_and_orders() {
         for output in outputs {
             seen.push(match output {
                 Output::Monitor(monitor) => {
-                    let value = |name: &str| monitor.values.iter().find(|value| value.0 == name).unwrap().1;
+                    let value =
+                        |name: &str| monitor.values.iter().find(|value| value.0 == name).unwrap().1;
                     assert_eq!(value("speed.max"), cycle as f64);
                     assert!((value("speed.mean") - cycle as f64 * 13.0 / 27.0).abs() < 1e-14);
-                    assert!((value("speed.l2") - cycle as f64 * (13f64 / 27.0).sqrt()).abs() < 1e-14);
+                    assert!(
+                        (value("speed.l2") - cycle as f64 * (13f64 / 27.0).sqrt()).abs() < 1e-14
+                    );
                     assert_eq!((value("speed.min"), value("speed.non_finite")), (0.0, 0.0));
-                    assert!(value("quality.min") > 0.3 && value("quality.mean") <= value("quality.max") + 1e-12);
+                    assert!(
+                        value("quality.min") > 0.3
+                            && value("quality.mean") <= value("quality.max") + 1e-12
+                    );
                     format!("{cycle} monitor")
                 }
                 Output::Pause { reason, .. } => {
@@ -221,7 +267,9 @@ fn monitors_conditions_and_orders() {
                     assert_eq!(extract.cells.len(), mesh.cells().len(), "the whole mesh");
                     format!("{cycle} {path}")
                 }
-                Output::Order { order, .. } => format!("{cycle} order {}", serde_json::to_string(&order).unwrap()),
+                Output::Order { order, .. } => {
+                    format!("{cycle} order {}", serde_json::to_string(&order).unwrap())
+                }
                 other => panic!("{other:?}"),
             });
         }
@@ -255,16 +303,32 @@ fn trouble_is_told_once_by_name_and_stops_nothing() {
     let velocity = vec![[1.0; 3]; 27];
     let run = |pressure: &[f64], pipelines: &mut Runner, cycle| {
         let fields = [
-            FieldView { name: "pressure", association: Association::Vertex, values: ArrayView::scalars(pressure) },
-            FieldView { name: "velocity", association: Association::Vertex, values: ArrayView::vectors(&velocity) },
+            FieldView {
+                name: "pressure",
+                association: Association::Vertex,
+                values: ArrayView::scalars(pressure),
+            },
+            FieldView {
+                name: "velocity",
+                association: Association::Vertex,
+                values: ArrayView::vectors(&velocity),
+            },
         ];
         let channels = [Channel { name: "fluid", mesh: MeshView::from(&mesh), fields: &fields }];
         pipelines.run(&Snapshot { cycle, time: 0.0, channels: &channels })
     };
     let first = run(&pressure, &mut pipelines, 0);
     let told = errors(&first).join("\n");
-    assert!(told.contains("no channel `fluids`; its channels are fluid; did you mean `fluid`?"), "{told}");
-    assert!(told.contains("no field `presure`; its fields are pressure, velocity; did you mean `pressure`?"), "{told}");
+    assert!(
+        told.contains("no channel `fluids`; its channels are fluid; did you mean `fluid`?"),
+        "{told}"
+    );
+    assert!(
+        told.contains(
+            "no field `presure`; its fields are pressure, velocity; did you mean `pressure`?"
+        ),
+        "{told}"
+    );
     assert_eq!(errors(&run(&pressure, &mut pipelines, 1)), [""; 0], "told once");
 
     pressure[4] = f64::NAN;
@@ -280,9 +344,9 @@ fn trouble_is_told_once_by_name_and_stops_nothing() {
     let frames: Vec<_> = broken
         .iter()
         .filter_map(|output| match output {
-            Output::Frame(frame) => {
-                Some(frame.extract.fields.iter().map(|field| field.name.as_str()).collect::<Vec<_>>())
-            }
+            Output::Frame(frame) => Some(
+                frame.extract.fields.iter().map(|field| field.name.as_str()).collect::<Vec<_>>(),
+            ),
             _ => None,
         })
         .collect();
@@ -295,16 +359,25 @@ fn trouble_is_told_once_by_name_and_stops_nothing() {
 
     let short = vec![1.0; 26];
     let told = run(&short, &mut pipelines, 6);
-    assert!(errors(&told).iter().any(|message| message.contains("26 tuples, the mesh has 27")), "{told:?}");
+    assert!(
+        errors(&told).iter().any(|message| message.contains("26 tuples, the mesh has 27")),
+        "{told:?}"
+    );
 }
 
 #[test]
 fn a_broken_mesh_is_an_error() {
     let mesh = shapes::box_of_tets([1, 1, 1], [0.0; 3], [1.0; 3]);
     let connectivity = [0i32, 1, 2, 99];
-    let cells = CellsView::Uniform { cell_type: CellType::Tetra, connectivity: Indices::I32(&connectivity) };
-    let channels =
-        [Channel { name: "fluid", mesh: MeshView::new(ArrayView::vectors(mesh.points()), cells), fields: &[] }];
+    let cells = CellsView::Uniform {
+        cell_type: CellType::Tetra,
+        connectivity: Indices::I32(&connectivity),
+    };
+    let channels = [Channel {
+        name: "fluid",
+        mesh: MeshView::new(ArrayView::vectors(mesh.points()), cells),
+        fields: &[],
+    }];
     let mut pipelines = runner(r#"{"name": "a", "stages": [{"surface": {}}, {"stream": {}}]}"#);
     let outputs = pipelines.run(&Snapshot { cycle: 0, time: 0.0, channels: &channels });
     assert!(errors(&outputs)[0].contains("vertex 99 does not exist"), "{outputs:?}");
@@ -315,8 +388,9 @@ fn a_broken_mesh_is_an_error() {
     points[3][2] = f64::NAN;
     let moved = MeshView { points: ArrayView::vectors(&points), ..MeshView::from(&mesh) };
     let channels = [Channel { name: "fluid", mesh: moved, fields: &[] }];
-    let mut pipelines =
-        runner(r#"{"name": "a", "stages": [{"slice": {"origin": [0.5,0,0], "normal": [1,0,0]}}, {"stream": {}}]}"#);
+    let mut pipelines = runner(
+        r#"{"name": "a", "stages": [{"slice": {"origin": [0.5,0,0], "normal": [1,0,0]}}, {"stream": {}}]}"#,
+    );
     let outputs = pipelines.run(&Snapshot { cycle: 9, time: 0.0, channels: &channels });
     assert_eq!(errors(&outputs), ["cycle 9: a coordinate of vertex 3 is NaN"]);
 }
@@ -352,8 +426,16 @@ fn slices_are_those_of_vtk() {
     let mesh = Mesh::new(table.mesh.points, cells, FeatureSource::SharpEdges).unwrap();
     let values: Vec<f64> = mesh.points().iter().map(|[x, y, z]| x * y + z * z - 0.5 * x).collect();
     let fields = [
-        FieldView { name: "vertex", association: Association::Vertex, values: ArrayView::scalars(&values) },
-        FieldView { name: "element", association: Association::Element, values: ArrayView::scalars(&numbers) },
+        FieldView {
+            name: "vertex",
+            association: Association::Vertex,
+            values: ArrayView::scalars(&values),
+        },
+        FieldView {
+            name: "element",
+            association: Association::Element,
+            values: ArrayView::scalars(&numbers),
+        },
     ];
     for theirs in table.slices {
         let ours = cut(&mesh, &fields, theirs.origin, theirs.normal);
@@ -365,14 +447,21 @@ fn slices_are_those_of_vtk() {
             .map(|cell| {
                 let mut one = Cells::new();
                 one.push(ours.cells.cell_type(cell), ours.cells.vertices(cell)).unwrap();
-                area(&Extract { cells: one.into(), ..Extract::clone(&ours) }) * ours.fields[1].values[cell]
+                area(&Extract { cells: one.into(), ..Extract::clone(&ours) })
+                    * ours.fields[1].values[cell]
             })
             .sum();
-        assert!((integral - theirs.element_integral).abs() < 1e-11, "{integral} and {}", theirs.element_integral);
+        assert!(
+            (integral - theirs.element_integral).abs() < 1e-11,
+            "{integral} and {}",
+            theirs.element_integral
+        );
         assert_eq!(ours.points.len(), theirs.points.len());
         for point in &theirs.points {
-            let same = |other: &Vector| (0..3).all(|axis| (other[axis] - point[axis]).abs() < 1e-12);
-            let index = ours.points.iter().position(same).unwrap_or_else(|| panic!("{point:?} is missing"));
+            let same =
+                |other: &Vector| (0..3).all(|axis| (other[axis] - point[axis]).abs() < 1e-12);
+            let index =
+                ours.points.iter().position(same).unwrap_or_else(|| panic!("{point:?} is missing"));
             assert!((ours.fields[0].values[index] - point[3]).abs() < 1e-12);
         }
     }

@@ -21,7 +21,12 @@ fn we_read_what_vtkio_writes() {
     let mesh = mesh();
     let cells = vtkio::model::Cells {
         cell_verts: VertexNumbers::XML {
-            connectivity: mesh.cells().connectivity().iter().map(|&vertex| u64::from(vertex)).collect(),
+            connectivity: mesh
+                .cells()
+                .connectivity()
+                .iter()
+                .map(|&vertex| u64::from(vertex))
+                .collect(),
             offsets: mesh.cells().offsets()[1..].iter().map(|&offset| offset as u64).collect(),
         },
         types: vec![vtkio::model::CellType::Tetra; mesh.cells().len()],

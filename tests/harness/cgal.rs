@@ -24,7 +24,8 @@ pub fn cgal_program(name: &str) -> PathBuf {
     static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
     let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let source = project().join("tests/cgal").join(format!("{name}.cpp"));
-    let text = std::fs::read(&source).unwrap_or_else(|error| panic!("{}: {error}", source.display()));
+    let text =
+        std::fs::read(&source).unwrap_or_else(|error| panic!("{}: {error}", source.display()));
     let mut hasher = DefaultHasher::new();
     (&text, FLAGS, LIBRARIES).hash(&mut hasher);
 
@@ -43,7 +44,11 @@ pub fn cgal_program(name: &str) -> PathBuf {
             .output()
             .unwrap_or_else(|error| panic!("g++ does not start ({error}): run scripts/setup"));
         let messages = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{} does not compile; run scripts/setup\n{messages}", source.display());
+        assert!(
+            output.status.success(),
+            "{} does not compile; run scripts/setup\n{messages}",
+            source.display()
+        );
         std::fs::rename(&own, &program).expect("a file can be renamed");
     }
     program
@@ -69,7 +74,11 @@ pub fn cgal(name: &str, arguments: &[&str], input: &str) -> String {
         child.wait_with_output().expect("a program ends")
     });
     let messages = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{name} {arguments:?} ended with {}\n{messages}", output.status);
+    assert!(
+        output.status.success(),
+        "{name} {arguments:?} ended with {}\n{messages}",
+        output.status
+    );
     String::from_utf8(output.stdout).expect("a cross-check prints text")
 }
 

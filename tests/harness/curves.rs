@@ -55,11 +55,18 @@ impl CurveGraph {
         }
         let text = read.join().expect("the reader ends");
         let mut words = text.split_ascii_whitespace();
-        let mut number = || words.next().and_then(|word| word.parse::<f64>().ok()).expect("a number");
+        let mut number =
+            || words.next().and_then(|word| word.parse::<f64>().ok()).expect("a number");
         let seconds = number();
         let [points, edges] = [number() as usize, number() as usize];
         let points = (0..points).map(|_| [number(), number(), number()]).collect();
-        Some((seconds, Self { points, edges: (0..edges).map(|_| [number() as usize, number() as usize]).collect() }))
+        Some((
+            seconds,
+            Self {
+                points,
+                edges: (0..edges).map(|_| [number() as usize, number() as usize]).collect(),
+            },
+        ))
     }
 
     /// The graph without the branches with a free end that are shorter than a part of the surface's diagonal, shortest first.
@@ -93,10 +100,12 @@ impl CurveGraph {
         // What is left, numbered from 0 on; points without an edge were points before or the cut ends.
         let kept: Vec<usize> = (0..self.points.len())
             .filter(|&point| {
-                edges.iter().any(|edge| edge.contains(&point)) || !self.edges.iter().any(|edge| edge.contains(&point))
+                edges.iter().any(|edge| edge.contains(&point))
+                    || !self.edges.iter().any(|edge| edge.contains(&point))
             })
             .collect();
-        let number = |point: usize| kept.iter().position(|&other| other == point).expect("it has an edge");
+        let number =
+            |point: usize| kept.iter().position(|&other| other == point).expect("it has an edge");
         Self {
             points: kept.iter().map(|&point| self.points[point]).collect(),
             edges: edges.iter().map(|edge| edge.map(number)).collect(),
@@ -116,7 +125,8 @@ impl CurveGraph {
         }
         piece.sort_unstable();
         piece.dedup();
-        let of_degree = |wanted: fn(usize) -> bool| degrees.iter().filter(|&&degree| wanted(degree)).count();
+        let of_degree =
+            |wanted: fn(usize) -> bool| degrees.iter().filter(|&&degree| wanted(degree)).count();
         let loops = self.edges.len() + piece.len() - self.points.len();
         [piece.len(), loops, of_degree(|degree| degree > 2), of_degree(|degree| degree == 1)]
     }
@@ -147,13 +157,15 @@ impl CurveGraph {
 
 /// The diagonal of a surface's bounding box.
 fn diagonal(surface: &Surface) -> f64 {
-    let [lower, upper] =
-        surface.points().iter().fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[lower, upper], point| {
+    let [lower, upper] = surface.points().iter().fold(
+        [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
+        |[lower, upper], point| {
             [
                 std::array::from_fn(|axis| lower[axis].min(point[axis])),
                 std::array::from_fn(|axis| upper[axis].max(point[axis])),
             ]
-        });
+        },
+    );
     distance(lower, upper)
 }
 

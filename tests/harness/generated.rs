@@ -19,7 +19,8 @@ pub fn generated_surfaces(names: &[&str]) -> Vec<PathBuf> {
     let script = project().join("scripts/meshes");
     let changed = |path: &Path| std::fs::metadata(path).and_then(|data| data.modified()).ok();
     let path = |name: &str| directory.join(format!("{name}.msh"));
-    let stale: Vec<&str> = names.iter().copied().filter(|name| changed(&path(name)) < changed(&script)).collect();
+    let stale: Vec<&str> =
+        names.iter().copied().filter(|name| changed(&path(name)) < changed(&script)).collect();
     if !stale.is_empty() {
         let output = Command::new(project().join(".venv/bin/python"))
             .arg(&script)
@@ -28,7 +29,11 @@ pub fn generated_surfaces(names: &[&str]) -> Vec<PathBuf> {
             .arg(&directory)
             .output()
             .unwrap_or_else(|error| panic!("Python does not start ({error}): run scripts/setup"));
-        assert!(output.status.success(), "run scripts/setup\n{}", String::from_utf8_lossy(&output.stderr));
+        assert!(
+            output.status.success(),
+            "run scripts/setup\n{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
     }
     names.iter().map(|name| path(name)).collect()
 }

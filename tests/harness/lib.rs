@@ -41,7 +41,10 @@ pub fn target() -> PathBuf {
     let program = std::env::current_exe().expect("a running program has a path");
     // A test lies in target/debug/deps, a benchmark in target/release.
     let profile = program.ancestors().skip(1).find(|directory| !directory.ends_with("deps"));
-    profile.and_then(Path::parent).expect("a program lies in target/debug or target/release").to_owned()
+    profile
+        .and_then(Path::parent)
+        .expect("a program lies in target/debug or target/release")
+        .to_owned()
 }
 
 /// The programs of the book, run as tests.

@@ -26,7 +26,11 @@ pub fn programs() -> &'static Path {
             .args(cfg!(feature = "distributed").then_some("--features=tombolo-tests/distributed"))
             .output()
             .expect("cargo runs");
-        assert!(output.status.success(), "the programs do not build:\n{}", String::from_utf8_lossy(&output.stderr));
+        assert!(
+            output.status.success(),
+            "the programs do not build:\n{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         // A test lies in target/debug/deps, the programs in target/debug.
         let test = std::env::current_exe().expect("a running test has a path");
         test.ancestors().nth(2).expect("a test lies in target/debug/deps").to_owned()
@@ -81,8 +85,12 @@ impl Run {
     /// # Panics
     /// Where it cannot be started.
     pub fn start(command: &mut Command) -> Run {
-        let mut child =
-            command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("flow starts");
+        let mut child = command
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("flow starts");
         let (sender, lines) = channel();
         let text = Arc::new(Mutex::new(String::new()));
         let pipes: [Option<Box<dyn Read + Send>>; 2] = [
@@ -124,8 +132,12 @@ impl Run {
                         return link;
                     }
                 }
-                Err(RecvTimeoutError::Timeout) => panic!("flow printed no link in a minute:\n{}", self.text()),
-                Err(RecvTimeoutError::Disconnected) => panic!("flow ended and printed no link:\n{}", self.text()),
+                Err(RecvTimeoutError::Timeout) => {
+                    panic!("flow printed no link in a minute:\n{}", self.text())
+                }
+                Err(RecvTimeoutError::Disconnected) => {
+                    panic!("flow ended and printed no link:\n{}", self.text())
+                }
             }
         }
     }

@@ -72,7 +72,8 @@ impl Small {
     #[must_use]
     pub fn read(&self, name: &str) -> Value {
         let path = self.path(name);
-        let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        let text = std::fs::read_to_string(&path)
+            .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         serde_json::from_str(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
     }
 
@@ -101,7 +102,8 @@ impl Small {
     /// Never, in a directory whose name is UTF-8.
     #[must_use]
     pub fn arguments(&self, more: &[&str]) -> Vec<String> {
-        let text = |path: &Path| path.to_str().expect("a temporary directory has a plain name").to_owned();
+        let text =
+            |path: &Path| path.to_str().expect("a temporary directory has a plain name").to_owned();
         let mut arguments = vec![
             "--case".to_owned(),
             text(&self.path("case.json")),
@@ -112,8 +114,11 @@ impl Small {
         ];
         for argument in more {
             // Names of files of this directory are written as `@name`.
-            arguments
-                .push(argument.strip_prefix('@').map_or_else(|| (*argument).to_owned(), |name| text(&self.path(name))));
+            arguments.push(
+                argument
+                    .strip_prefix('@')
+                    .map_or_else(|| (*argument).to_owned(), |name| text(&self.path(name))),
+            );
         }
         arguments
     }

@@ -81,7 +81,9 @@ impl Viewer {
     pub fn connect(link: &Link) -> Result<Viewer, String> {
         let runtime = Builder::new_current_thread().enable_all().build().expect("a runtime");
         let url = format!("ws://{}/ws?token={}", link.address, link.token);
-        let (socket, _) = runtime.block_on(tokio_tungstenite::connect_async(url)).map_err(|error| error.to_string())?;
+        let (socket, _) = runtime
+            .block_on(tokio_tungstenite::connect_async(url))
+            .map_err(|error| error.to_string())?;
         Ok(Viewer { runtime, socket })
     }
 
@@ -106,10 +108,14 @@ impl Viewer {
         let until = Instant::now() + limit;
         loop {
             let left = until.saturating_duration_since(Instant::now());
-            let message = self.runtime.block_on(async { tokio::time::timeout(left, self.socket.next()).await });
+            let message = self
+                .runtime
+                .block_on(async { tokio::time::timeout(left, self.socket.next()).await });
             match message.ok()??.ok()? {
                 tungstenite::Message::Text(text) => {
-                    return Some(Message::Text(serde_json::from_str(&text).expect("the server sends JSON")));
+                    return Some(Message::Text(
+                        serde_json::from_str(&text).expect("the server sends JSON"),
+                    ));
                 }
                 tungstenite::Message::Binary(bytes) => return Some(Message::Frame(bytes.to_vec())),
                 _ => {}

@@ -19,8 +19,18 @@ use crate::{
 impl Adaptor {
     /// Takes in a command that no viewer sent. All ranks come here with the same one; rank 0 reads its files, names it and writes it
     /// to the journal, and what it takes, all obey.
-    pub(super) fn accept(&mut self, id: Option<String>, source: Source, command: Command, moment: Moment) {
-        let taken = if self.communicator.rank() == 0 { self.take_in(id, &source, command, moment) } else { None };
+    pub(super) fn accept(
+        &mut self,
+        id: Option<String>,
+        source: Source,
+        command: Command,
+        moment: Moment,
+    ) {
+        let taken = if self.communicator.rank() == 0 {
+            self.take_in(id, &source, command, moment)
+        } else {
+            None
+        };
         for (id, command) in self.told_to_all(taken.into_iter().collect()) {
             self.obey(id, &source, command, moment);
         }
@@ -107,9 +117,15 @@ impl Adaptor {
             return;
         }
         let questions = self.queue.take_questions();
-        let asked = questions.iter().map(|asked| (String::new(), Command::Order((*asked.order).clone()))).collect();
+        let asked = questions
+            .iter()
+            .map(|asked| (String::new(), Command::Order((*asked.order).clone())))
+            .collect();
         for (place, (_, command)) in self.told_to_all(asked).into_iter().enumerate() {
-            let (Command::Order(order), SteeredMesh::Steered(steerer, _)) = (command, &self.mesh) else { continue };
+            let (Command::Order(order), SteeredMesh::Steered(steerer, _)) = (command, &self.mesh)
+            else {
+                continue;
+            };
             let forecast = steerer.forecast(&order);
             if let (Some(Asked { client, id, .. }), Some(hub)) = (questions.get(place), &self.hub) {
                 hub.tell_client(*client, &json!({"forecast": {"id": id, "order": forecast}}));
@@ -120,7 +136,8 @@ impl Adaptor {
     fn obey(&mut self, id: String, source: &Source, command: Command, moment: Moment) {
         let outcome = match command {
             Command::Order(order) => {
-                let background = self.config.steering.background && matches!(source, Source::Viewer(_));
+                let background =
+                    self.config.steering.background && matches!(source, Source::Viewer(_));
                 match &mut self.mesh {
                     SteeredMesh::Steered(steerer, _) => steerer.take(id, order, background),
                     SteeredMesh::Refused(reason) => self.log.reject(&id, moment, &reason.into()),
@@ -183,7 +200,8 @@ impl Intake {
             self.queue.ask(Asked { client, id, order: Box::new(order) });
             return Ok(());
         }
-        let forecaster = self.forecaster.get().ok_or("there is no mesh yet whose shape could be changed")?;
+        let forecaster =
+            self.forecaster.get().ok_or("there is no mesh yet whose shape could be changed")?;
         let hub = Arc::clone(&self.hub);
         forecaster.ask(client, &order, move |forecast| {
             hub.tell_client(client, &json!({"forecast": {"id": id, "order": forecast}}));
@@ -204,16 +222,26 @@ fn check_files(command: &Command) -> Result<(), String> {
 }
 
 impl CommandSink for Intake {
-    fn receive(&self, client: u64, id: Option<String>, message: Message, bytes: usize) -> Result<(), String> {
+    fn receive(
+        &self,
+        client: u64,
+        id: Option<String>,
+        message: Message,
+        bytes: usize,
+    ) -> Result<(), String> {
         let command = match message {
-            Message::Question(Question::Forecast(order)) => return self.forecast(client, id, order),
+            Message::Question(Question::Forecast(order)) => {
+                return self.forecast(client, id, order);
+            }
             Message::Command(command) => command,
             // The session has answered it.
             Message::Drive => return Ok(()),
         };
         check_files(&command)?;
         self.queue.check_room(bytes).map_err(|exceeded| {
-            format!("{exceeded}; the solver has not come to those before this one yet, try again later")
+            format!(
+                "{exceeded}; the solver has not come to those before this one yet, try again later"
+            )
         })?;
         let (cycle, time) = self.hub.clock.get();
         let id = self.log.accept(id, &Source::Viewer(client), &command, Moment { cycle, time })?;

@@ -43,7 +43,12 @@ impl Lent {
 
 impl Adaptor {
     /// Refuses what the solver got wrong, as far as this rank can tell before it has spoken with the others.
-    pub(super) fn check(&mut self, step: &Step, moment: Moment, channels: &[Channel<'_>]) -> Result<(), ExecuteError> {
+    pub(super) fn check(
+        &mut self,
+        step: &Step,
+        moment: Moment,
+        channels: &[Channel<'_>],
+    ) -> Result<(), ExecuteError> {
         let cycle = step.cycle;
         if !step.time.is_finite() {
             return Err(ExecuteError::Time { cycle, what: "time", value: step.time });
@@ -60,16 +65,24 @@ impl Adaptor {
         let steered = self.steered_among(step, channels)?;
         for channel in channels.iter().filter(|channel| !self.lent.is_known(channel)) {
             channel.check_mesh().map_err(of_channel)?;
-            if let (Some((fingerprint, expected)), true) = (self.lent.reference, steered == Some(channel.name)) {
+            if let (Some((fingerprint, expected)), true) =
+                (self.lent.reference, steered == Some(channel.name))
+            {
                 let found = channel.mesh.cells.len();
                 if (channel.mesh.cells.fingerprint(), found) != (fingerprint, expected) {
-                    return Err(ExecuteError::OtherCells { cycle, channel: channel.name.into(), found, expected });
+                    return Err(ExecuteError::OtherCells {
+                        cycle,
+                        channel: channel.name.into(),
+                        found,
+                        expected,
+                    });
                 }
             }
         }
         for (index, channel) in channels.iter().enumerate() {
             let is_used = steered == Some(channel.name) && self.uses_steered(moment)
-                || self.pipelines.is_due(moment) && self.pipelines.reads(moment, channel.name, index == 0);
+                || self.pipelines.is_due(moment)
+                    && self.pipelines.reads(moment, channel.name, index == 0);
             if is_used && self.lent.is_known(channel) {
                 channel.check_points().map_err(of_channel)?;
             }
@@ -81,33 +94,51 @@ impl Adaptor {
     }
 
     /// The name of the channel whose shape can be changed, where one was taken over: with as many vertices as it had.
-    fn steered_among<'c>(&self, step: &Step, channels: &[Channel<'c>]) -> Result<Option<&'c str>, ExecuteError> {
+    fn steered_among<'c>(
+        &self,
+        step: &Step,
+        channels: &[Channel<'c>],
+    ) -> Result<Option<&'c str>, ExecuteError> {
         let SteeredMesh::Steered(steerer, _) = &self.mesh else { return Ok(None) };
         let (cycle, expected) = (step.cycle, steerer.vertex_count());
         let channel = Channel::find(channels, self.steered_channel())
             .map_err(|reason| ExecuteError::SteeredChannel { cycle, reason })?;
         let found = channel.mesh.points.len();
         if found != expected {
-            return Err(ExecuteError::VertexCount { cycle, channel: channel.name.into(), found, expected });
+            return Err(ExecuteError::VertexCount {
+                cycle,
+                channel: channel.name.into(),
+                found,
+                expected,
+            });
         }
         Ok(Some(channel.name))
     }
 
     /// Whether orders will look at the coordinates in this call, as far as all ranks know it alike.
     fn uses_steered(&self, moment: Moment) -> bool {
-        let is_busy = matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if !steerer.is_at_rest());
+        let is_busy =
+            matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if !steerer.is_at_rest());
         is_busy || self.timed.is_due(moment)
     }
 
     /// Refuses coordinates of the steered mesh that are not finite, where rank 0 was called to look at something: only it knew of
     /// that before. Collective.
-    pub(super) fn check_called(&self, step: &Step, channels: &[Channel<'_>]) -> Result<(), ExecuteError> {
+    pub(super) fn check_called(
+        &self,
+        step: &Step,
+        channels: &[Channel<'_>],
+    ) -> Result<(), ExecuteError> {
         let SteeredMesh::Steered(..) = &self.mesh else { return Ok(()) };
         let checked = Channel::find(channels, self.steered_channel()).map(Channel::check_points);
         let mine = match checked {
             Ok(Err(source)) => Err(ExecuteError::Channel { cycle: step.cycle, source }),
             _ => Ok(()),
         };
-        if self.communicator.size() == 1 { mine } else { Ok(comm::agree_on(&*self.communicator, mine)?) }
+        if self.communicator.size() == 1 {
+            mine
+        } else {
+            Ok(comm::agree_on(&*self.communicator, mine)?)
+        }
     }
 }

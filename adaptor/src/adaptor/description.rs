@@ -40,8 +40,10 @@ impl Adaptor {
             SteeredMesh::Steered(steerer, _) => steerer.quality(),
             _ => None,
         };
-        let quality = quality.map(|(min, mean, inverted)| json!({"min": min, "mean": mean, "inverted": inverted}));
-        let conditions = json!({"paused": self.paused, "stopped": self.stopped, "quality": quality});
+        let quality = quality
+            .map(|(min, mean, inverted)| json!({"min": min, "mean": mean, "inverted": inverted}));
+        let conditions =
+            json!({"paused": self.paused, "stopped": self.stopped, "quality": quality});
         if let Value::Object(conditions) = conditions {
             hub.conditions(conditions);
         }

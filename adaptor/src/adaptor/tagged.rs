@@ -18,7 +18,8 @@ impl Adaptor {
         let mut numbers: Vec<i64> = Vec::new();
         let mut own = Ok(());
         let (mut found, none) = (MisplacedFaces::default(), TaggedFaces::default());
-        let tagged = if let FeatureSource::Faces(tagged) = channel.mesh.features { tagged } else { &none };
+        let tagged =
+            if let FeatureSource::Faces(tagged) = channel.mesh.features { tagged } else { &none };
         if !tagged.tags.is_empty() {
             numbers.extend(&tagged.tags);
             let cells = match channel.mesh.cells {
@@ -67,12 +68,18 @@ impl Adaptor {
         let points = channel.mesh.points;
         let centre = |face: usize| -> Vector {
             let vertices = tagged.faces.vertices(face);
-            let there = vertices.iter().map(|&vertex| vertex as usize).filter(|&vertex| vertex < points.len());
-            let sum = |axis: usize| there.clone().map(|vertex| points.vector(vertex)[axis]).sum::<f64>();
+            let there = vertices
+                .iter()
+                .map(|&vertex| vertex as usize)
+                .filter(|&vertex| vertex < points.len());
+            let sum =
+                |axis: usize| there.clone().map(|vertex| points.vector(vertex)[axis]).sum::<f64>();
             [0, 1, 2].map(|axis: usize| sum(axis) / vertices.len().max(1) as f64)
         };
         let mut reach = [0.0_f64];
-        (0..tagged.faces.len()).flat_map(centre).for_each(|value| reach[0] = reach[0].max(value.abs()));
+        (0..tagged.faces.len())
+            .flat_map(centre)
+            .for_each(|value| reach[0] = reach[0].max(value.abs()));
         self.communicator.reduce(Reduction::Maximum, &mut reach);
         let square = |value: f64| (value / reach[0].max(f64::MIN_POSITIVE) * 1e6).round() as i64;
         let is_loose: HashSet<usize> = misplaced.loose.iter().copied().collect();
@@ -80,19 +87,26 @@ impl Adaptor {
             .filter(|face| !is_loose.contains(face))
             .map(|face| centre(face).map(square))
             .collect();
-        let mine: Vec<u8> = misplaced.loose.iter().flat_map(|&face| centre(face)).flat_map(f64::to_le_bytes).collect();
+        let mine: Vec<u8> = misplaced
+            .loose
+            .iter()
+            .flat_map(|&face| centre(face))
+            .flat_map(f64::to_le_bytes)
+            .collect();
         let gathered = self.communicator.gather(0, &mine);
         let mut all = gathered.map(|parts| parts.concat()).unwrap_or_default();
         self.communicator.broadcast(0, &mut all);
-        let all: Vec<f64> = all.as_chunks::<8>().0.iter().map(|value| f64::from_le_bytes(*value)).collect();
+        let all: Vec<f64> =
+            all.as_chunks::<8>().0.iter().map(|value| f64::from_le_bytes(*value)).collect();
         let mut known: Vec<f64> = all
             .as_chunks::<3>()
             .0
             .iter()
             .map(|centre| {
                 let [x, y, z] = centre.map(square);
-                let mut around = (0..27)
-                    .map(|neighbour: i64| [x + neighbour % 3 - 1, y + neighbour / 3 % 3 - 1, z + neighbour / 9 - 1]);
+                let mut around = (0..27).map(|neighbour: i64| {
+                    [x + neighbour % 3 - 1, y + neighbour / 3 % 3 - 1, z + neighbour / 9 - 1]
+                });
                 f64::from(u8::from(around.any(|square| own.contains(&square))))
             })
             .collect();
@@ -115,7 +129,9 @@ impl Adaptor {
         if self.communicator.size() == 1 {
             return;
         }
-        let bytes = |numbers: &[i64]| numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>();
+        let bytes = |numbers: &[i64]| {
+            numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>()
+        };
         let read = |bytes: &[u8]| -> Vec<i64> {
             bytes.as_chunks::<8>().0.iter().map(|number| i64::from_le_bytes(*number)).collect()
         };

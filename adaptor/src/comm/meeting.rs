@@ -17,8 +17,16 @@ pub(crate) fn meet(
 ) -> Result<bool, ExecuteError> {
     let (rank, size) = (communicator.rank(), communicator.size());
     #[expect(clippy::cast_precision_loss, reason = "ranks and cycles below 2^53")]
-    let (failing, cycle) = (if fault.is_some() { (size - rank) as f64 } else { 0.0 }, moment.cycle as f64);
-    let mut said = [failing, cycle, -cycle, moment.time, -moment.time, f64::from(u8::from(called && rank == 0))];
+    let (failing, cycle) =
+        (if fault.is_some() { (size - rank) as f64 } else { 0.0 }, moment.cycle as f64);
+    let mut said = [
+        failing,
+        cycle,
+        -cycle,
+        moment.time,
+        -moment.time,
+        f64::from(u8::from(called && rank == 0)),
+    ];
     communicator.reduce(Reduction::Maximum, &mut said);
     let [failing, highest, lowest, latest, earliest, called] = said;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts")]
@@ -55,9 +63,13 @@ mod tests {
             let fault = (ranks.rank() > 0).then_some(ExecuteError::NoChannel { cycle: 4 });
             meet(&ranks, at(4), fault, false).unwrap_err().to_string()
         });
-        assert!(said.iter().all(|said| said.starts_with("rank 1: cycle 4: no channel was given")), "{said:?}");
-        let said =
-            threads::run(3, |ranks| meet(&ranks, at(4 + ranks.rank() as u64), None, false).unwrap_err().to_string());
+        assert!(
+            said.iter().all(|said| said.starts_with("rank 1: cycle 4: no channel was given")),
+            "{said:?}"
+        );
+        let said = threads::run(3, |ranks| {
+            meet(&ranks, at(4 + ranks.rank() as u64), None, false).unwrap_err().to_string()
+        });
         assert!(said.iter().all(|said| said.contains("from 4 to 6")), "{said:?}");
         let said = threads::run(3, |ranks| {
             let time = if ranks.rank() == 1 { 0.25 } else { 0.5 };

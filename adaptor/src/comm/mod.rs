@@ -5,7 +5,8 @@ mod meeting;
 pub mod mpi;
 
 pub use tombolo_pipelines::communicator::{
-    Alarm, Communicator, Counted, RankError, Reduction, Solo, Threads, Traffic, agree as agree_on, threads,
+    Alarm, Communicator, Counted, RankError, Reduction, Solo, Threads, Traffic, agree as agree_on,
+    threads,
 };
 
 pub(crate) use meeting::meet;
@@ -23,10 +24,15 @@ pub(crate) fn share(
     if communicator.size() == 1 {
         return Ok(commands);
     }
-    let mut bytes =
-        if communicator.rank() == 0 { serde_json::to_vec(&commands).unwrap_or_default() } else { Vec::new() };
+    let mut bytes = if communicator.rank() == 0 {
+        serde_json::to_vec(&commands).unwrap_or_default()
+    } else {
+        Vec::new()
+    };
     communicator.broadcast(0, &mut bytes);
     // Every rank reads the same bytes, rank 0 too: what one cannot read, none obeys.
-    let text = std::str::from_utf8(&bytes).map_err(|error| format!("commands were lost between ranks: {error}"))?;
-    parse_json(text, "broadcast").map_err(|error| format!("commands were lost between ranks: {error}"))
+    let text = std::str::from_utf8(&bytes)
+        .map_err(|error| format!("commands were lost between ranks: {error}"))?;
+    parse_json(text, "broadcast")
+        .map_err(|error| format!("commands were lost between ranks: {error}"))
 }

@@ -259,7 +259,8 @@ impl Communicator for Mpi {
         let (children, parent) = tree(self.rank, self.size);
         for child in children {
             let bytes = ranks.receive(child, TREE);
-            let more: Vec<f64> = bytes.as_chunks().0.iter().map(|eight| f64::from_le_bytes(*eight)).collect();
+            let more: Vec<f64> =
+                bytes.as_chunks().0.iter().map(|eight| f64::from_le_bytes(*eight)).collect();
             reduction.take_in(values, &more);
         }
         if let Some(parent) = parent {
@@ -282,7 +283,8 @@ impl Communicator for Mpi {
         ranks.round = (ranks.round + 1) % ROUNDS;
         let tag = FIRST_ROUND + ranks.round;
         let ranks = &*ranks;
-        let (own, others): (Vec<_>, Vec<_>) = messages.into_iter().partition(|(to, _)| *to == self.rank);
+        let (own, others): (Vec<_>, Vec<_>) =
+            messages.into_iter().partition(|(to, _)| *to == self.rank);
         let mut heard = own;
         let mut unfinished: BTreeMap<usize, Vec<u8>> = BTreeMap::new();
         request::scope(|scope| {
@@ -343,9 +345,14 @@ impl Communicator for Mpi {
         heard
     }
 
-    fn exchange_with(&self, messages: Vec<(usize, Vec<u8>)>, from: &[usize]) -> Vec<(usize, Vec<u8>)> {
+    fn exchange_with(
+        &self,
+        messages: Vec<(usize, Vec<u8>)>,
+        from: &[usize],
+    ) -> Vec<(usize, Vec<u8>)> {
         let ranks = &*self.ranks();
-        let (own, others): (Vec<_>, Vec<_>) = messages.into_iter().partition(|(to, _)| *to == self.rank);
+        let (own, others): (Vec<_>, Vec<_>) =
+            messages.into_iter().partition(|(to, _)| *to == self.rank);
         let mut heard = own;
         request::scope(|scope| {
             let sends: Vec<_> = others
@@ -367,8 +374,10 @@ impl Communicator for Mpi {
     }
 
     fn abort(&self) {
-        let why =
-            format!("rank {} failed in itself; all ranks are ended, because the others would wait for it", self.rank);
+        let why = format!(
+            "rank {} failed in itself; all ranks are ended, because the others would wait for it",
+            self.rank
+        );
         // The last words of the process, also where nobody takes what is logged.
         if log::max_level() == log::LevelFilter::Off {
             eprintln!("tombolo: {why}");

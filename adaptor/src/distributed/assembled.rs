@@ -34,7 +34,8 @@ pub(super) fn assemble<const B: usize>(
     let size = block * owned.len() as PetscInt;
     // At most as many blocks in the rows of this rank as the ranks have between them, inside its own columns and beyond.
     let mut counts = vec![[0.0; 2]; matrix.rows()];
-    let owner_is_that_of = |row: usize, column: u32| shares.owns(row) == shares.owns(column as usize);
+    let owner_is_that_of =
+        |row: usize, column: u32| shares.owns(row) == shares.owns(column as usize);
     for (row, count) in counts.iter_mut().enumerate() {
         for &column in matrix.row(row).0 {
             // Two vertices of other ranks may belong to two of them: room is made for both cases.

@@ -63,7 +63,11 @@ impl Preconditioning {
     /// what was measured: [`Multigrid`](Self::Multigrid) for many, [`IncompleteCholesky`](Self::IncompleteCholesky) for few.
     #[must_use]
     pub fn quickest(vertices: usize, ranks: usize) -> Self {
-        if vertices >= FROM_VERTICES[usize::from(ranks > 1)] { Self::Multigrid } else { Self::IncompleteCholesky }
+        if vertices >= FROM_VERTICES[usize::from(ranks > 1)] {
+            Self::Multigrid
+        } else {
+            Self::IncompleteCholesky
+        }
     }
 }
 
@@ -80,7 +84,10 @@ pub struct Petsc {
 
 impl fmt::Debug for Petsc {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.debug_struct("Petsc").field("preconditioning", &self.preconditioning).finish_non_exhaustive()
+        formatter
+            .debug_struct("Petsc")
+            .field("preconditioning", &self.preconditioning)
+            .finish_non_exhaustive()
     }
 }
 
@@ -119,7 +126,8 @@ impl Petsc {
     }
 
     fn system<const B: usize>(&self, matrix: &Arc<SparseMatrix<B>>, vertices: &[u32]) -> Solver<B> {
-        let places: Vec<Vector> = vertices.iter().map(|&vertex| self.points[vertex as usize]).collect();
+        let places: Vec<Vector> =
+            vertices.iter().map(|&vertex| self.points[vertex as usize]).collect();
         let partition: Arc<dyn Partition> = Arc::new(self.ranks.clone());
         Ok(Box::new(System::new(
             Arc::clone(&self.library),
@@ -153,7 +161,11 @@ impl Partition for Petsc {
         self.ranks.exchange(messages)
     }
 
-    fn exchange_with(&self, messages: Vec<(usize, Vec<f64>)>, from: &[usize]) -> Vec<(usize, Vec<f64>)> {
+    fn exchange_with(
+        &self,
+        messages: Vec<(usize, Vec<f64>)>,
+        from: &[usize],
+    ) -> Vec<(usize, Vec<f64>)> {
         self.ranks.exchange_with(messages, from)
     }
 
@@ -194,7 +206,11 @@ mod tests {
             (18_000, 2, IncompleteCholesky),
             (36_000, 2, Multigrid),
         ] {
-            assert_eq!(Preconditioning::quickest(vertices, ranks), expected, "{vertices} on {ranks}");
+            assert_eq!(
+                Preconditioning::quickest(vertices, ranks),
+                expected,
+                "{vertices} on {ranks}"
+            );
         }
     }
 }

@@ -27,10 +27,16 @@ pub(super) struct Numbering {
 
 impl Numbering {
     /// Collective.
-    pub(super) fn new(partition: Arc<dyn Partition>, vertices: &[u32]) -> Result<Self, LinearError> {
+    pub(super) fn new(
+        partition: Arc<dyn Partition>,
+        vertices: &[u32],
+    ) -> Result<Self, LinearError> {
         let shares = Shares::new(&*partition, vertices);
-        let owned: Vec<u32> =
-            (0..).zip(vertices).map(|(place, _)| place).filter(|&place| shares.owns(place as usize)).collect();
+        let owned: Vec<u32> = (0..)
+            .zip(vertices)
+            .map(|(place, _)| place)
+            .filter(|&place| shares.owns(place as usize))
+            .collect();
         #[expect(clippy::cast_precision_loss, reason = "counts below 2^53")]
         let counts = partition.gather(&[owned.len() as f64]);
         let first: f64 = counts.iter().take(partition.rank()).sum();
@@ -58,7 +64,11 @@ impl Numbering {
     }
 
     /// Values of this rank's unknowns from those that it speaks for in a vector of PETSc's. Collective.
-    pub(super) fn spread<const B: usize>(&self, vector: sys::Vec, values: &mut [[f64; B]]) -> Result<(), LinearError> {
+    pub(super) fn spread<const B: usize>(
+        &self,
+        vector: sys::Vec,
+        values: &mut [[f64; B]],
+    ) -> Result<(), LinearError> {
         values.iter_mut().for_each(|value| *value = [0.0; B]);
         read(vector, |own| {
             for (&place, own) in self.owned.iter().zip(own.as_chunks().0) {
@@ -70,7 +80,11 @@ impl Numbering {
     }
 
     /// The values that this rank speaks for, to a vector of PETSc's.
-    pub(super) fn put<const B: usize>(&self, values: &[[f64; B]], vector: sys::Vec) -> Result<(), LinearError> {
+    pub(super) fn put<const B: usize>(
+        &self,
+        values: &[[f64; B]],
+        vector: sys::Vec,
+    ) -> Result<(), LinearError> {
         let own: Vec<f64> = self.owned.iter().flat_map(|&place| values[place as usize]).collect();
         write(vector, &own)
     }

@@ -48,7 +48,9 @@ pub(super) fn create<const B: usize>(
 ///
 /// # Safety
 /// It must be one of PETSc's, alive, of the type `shell`.
-pub(super) unsafe fn precondition<const B: usize>(preconditioner: sys::PC) -> Result<(), LinearError> {
+pub(super) unsafe fn precondition<const B: usize>(
+    preconditioner: sys::PC,
+) -> Result<(), LinearError> {
     // SAFETY: as the caller vouches for; the function is of the type that is asked for.
     done(unsafe { sys::PCShellSetApply(preconditioner, apply::<B>) })
 }
@@ -63,7 +65,8 @@ pub(super) fn with_context<const B: usize, R>(
 ) -> Result<R, LinearError> {
     multigrid.with_cycle(scale, |cycle| {
         let zeros = || vec![[0.0; B]; multigrid.matrix().rows()];
-        let mut context = Context::<B> { numbering, multigrid, cycle, values: (zeros(), zeros()), panic: None };
+        let mut context =
+            Context::<B> { numbering, multigrid, cycle, values: (zeros(), zeros()), panic: None };
         let set = |context: *mut c_void| {
             // SAFETY: both are alive; what they are given lives until the solve has ended, and is taken away then.
             unsafe {
@@ -112,7 +115,11 @@ impl<const B: usize> Context<'_, B> {
 
 /// # Safety
 /// PETSc calls it within `KSPSolve` or `MatMult`, with the context set, on the thread that called these.
-unsafe extern "C" fn multiply<const B: usize>(matrix: sys::Mat, vector: sys::Vec, result: sys::Vec) -> sys::ErrorCode {
+unsafe extern "C" fn multiply<const B: usize>(
+    matrix: sys::Mat,
+    vector: sys::Vec,
+    result: sys::Vec,
+) -> sys::ErrorCode {
     let mut context: *mut Context<'_, B> = null_mut();
     // SAFETY: the context was set for this solve; PETSc writes the pointer where it is told to.
     let code = unsafe { sys::MatShellGetContext(matrix, (&raw mut context).cast::<c_void>()) };
@@ -123,7 +130,11 @@ unsafe extern "C" fn multiply<const B: usize>(matrix: sys::Mat, vector: sys::Vec
 
 /// # Safety
 /// PETSc calls it within `KSPSolve` or `PCApply`, with the context set, on the thread that called these.
-unsafe extern "C" fn apply<const B: usize>(pc: sys::PC, vector: sys::Vec, result: sys::Vec) -> sys::ErrorCode {
+unsafe extern "C" fn apply<const B: usize>(
+    pc: sys::PC,
+    vector: sys::Vec,
+    result: sys::Vec,
+) -> sys::ErrorCode {
     let mut context: *mut Context<'_, B> = null_mut();
     // SAFETY: as above.
     let code = unsafe { sys::PCShellGetContext(pc, (&raw mut context).cast::<c_void>()) };

@@ -1,7 +1,12 @@
 //! What is used of PETSc's C interface (3.18 and later), as its headers declare it. The build script has seen to it that its numbers
 //! are those declared here.
 
-#![allow(non_snake_case, non_upper_case_globals, clippy::upper_case_acronyms, reason = "PETSc's own names")]
+#![allow(
+    non_snake_case,
+    non_upper_case_globals,
+    clippy::upper_case_acronyms,
+    reason = "PETSc's own names"
+)]
 
 use std::os::raw::{c_char, c_int, c_void};
 
@@ -101,7 +106,12 @@ unsafe extern "C" {
     pub(super) fn MatNullSpaceCreateRigidBody(places: Vec, space: *mut MatNullSpace) -> ErrorCode;
     pub(super) fn MatNullSpaceDestroy(space: *mut MatNullSpace) -> ErrorCode;
 
-    pub(super) fn VecCreateMPI(comm: MPI_Comm, own: PetscInt, all: PetscInt, vector: *mut Vec) -> ErrorCode;
+    pub(super) fn VecCreateMPI(
+        comm: MPI_Comm,
+        own: PetscInt,
+        all: PetscInt,
+        vector: *mut Vec,
+    ) -> ErrorCode;
     pub(super) fn VecSetBlockSize(vector: Vec, block: PetscInt) -> ErrorCode;
     pub(super) fn VecDuplicate(vector: Vec, copy: *mut Vec) -> ErrorCode;
     pub(super) fn VecGetArray(vector: Vec, values: *mut *mut f64) -> ErrorCode;
@@ -114,8 +124,13 @@ unsafe extern "C" {
     pub(super) fn KSPSetType(solver: KSP, name: *const c_char) -> ErrorCode;
     pub(super) fn KSPSetOperators(solver: KSP, matrix: Mat, preconditioner: Mat) -> ErrorCode;
     pub(super) fn KSPSetNormType(solver: KSP, norm: c_int) -> ErrorCode;
-    pub(super) fn KSPSetTolerances(solver: KSP, relative: f64, absolute: f64, growth: f64, most: PetscInt)
-    -> ErrorCode;
+    pub(super) fn KSPSetTolerances(
+        solver: KSP,
+        relative: f64,
+        absolute: f64,
+        growth: f64,
+        most: PetscInt,
+    ) -> ErrorCode;
     pub(super) fn KSPSetInitialGuessNonzero(solver: KSP, is: PetscBool) -> ErrorCode;
     pub(super) fn KSPGetPC(solver: KSP, preconditioner: *mut PC) -> ErrorCode;
     pub(super) fn KSPSetUp(solver: KSP) -> ErrorCode;
@@ -134,7 +149,10 @@ unsafe extern "C" {
         of: *mut *mut KSP,
     ) -> ErrorCode;
     pub(super) fn PCApply(preconditioner: PC, vector: Vec, result: Vec) -> ErrorCode;
-    pub(super) fn PCShellSetApply(pc: PC, apply: unsafe extern "C" fn(PC, Vec, Vec) -> ErrorCode) -> ErrorCode;
+    pub(super) fn PCShellSetApply(
+        pc: PC,
+        apply: unsafe extern "C" fn(PC, Vec, Vec) -> ErrorCode,
+    ) -> ErrorCode;
     pub(super) fn PCShellSetContext(preconditioner: PC, context: *mut c_void) -> ErrorCode;
     /// `context` is where the pointer is written to.
     pub(super) fn PCShellGetContext(preconditioner: PC, context: *mut c_void) -> ErrorCode;

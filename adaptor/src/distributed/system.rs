@@ -7,7 +7,9 @@ use std::{
 };
 
 use tombolo_deform::{
-    linear::{Convergence, DistributedMultigrid, LinearError, LinearSolver, SparseMatrix, Tolerance},
+    linear::{
+        Convergence, DistributedMultigrid, LinearError, LinearSolver, SparseMatrix, Tolerance,
+    },
     mesh::Vector,
     partition::{Partition, Reduction},
 };
@@ -53,7 +55,9 @@ impl Drop for Handles {
         unsafe {
             sys::KSPDestroy(&raw mut self.solver);
             sys::MatDestroy(&raw mut self.matrix);
-            for vector in [&mut self.right_side, &mut self.solution, &mut self.rest, &mut self.correction] {
+            for vector in
+                [&mut self.right_side, &mut self.solution, &mut self.rest, &mut self.correction]
+            {
                 sys::VecDestroy(vector);
             }
         }
@@ -102,7 +106,8 @@ impl<const B: usize> System<B> {
         let quickest = || Preconditioning::quickest(numbering.total, partition.ranks());
         let method = match preconditioning.unwrap_or_else(quickest) {
             Preconditioning::Multigrid => {
-                let multigrid = DistributedMultigrid::new(partition, Arc::clone(&matrix), vertices)?;
+                let multigrid =
+                    DistributedMultigrid::new(partition, Arc::clone(&matrix), vertices)?;
                 Method::Multigrid(Box::new(multigrid))
             }
             Preconditioning::IncompleteCholesky => Method::IncompleteCholesky,
@@ -127,7 +132,8 @@ impl<const B: usize> System<B> {
             rest: null_mut(),
             correction: null_mut(),
         };
-        let system = Self { handles: Mutex::new(handles), numbering, method, rows: matrix.rows(), library };
+        let system =
+            Self { handles: Mutex::new(handles), numbering, method, rows: matrix.rows(), library };
         system.set_up(matrix)?;
         Ok(system)
     }
@@ -147,7 +153,9 @@ impl<const B: usize> System<B> {
         unsafe {
             done(sys::VecCreateMPI(comm, size, -1, &raw mut handles.right_side))?;
             done(sys::VecSetBlockSize(handles.right_side, block))?;
-            for vector in [&raw mut handles.solution, &raw mut handles.rest, &raw mut handles.correction] {
+            for vector in
+                [&raw mut handles.solution, &raw mut handles.rest, &raw mut handles.correction]
+            {
                 done(sys::VecDuplicate(handles.right_side, vector))?;
             }
         }
@@ -167,7 +175,11 @@ impl<const B: usize> System<B> {
         self.precondition(handles, comm)
     }
 
-    fn precondition(&self, handles: &mut Handles, comm: mpi::ffi::MPI_Comm) -> Result<(), LinearError> {
+    fn precondition(
+        &self,
+        handles: &mut Handles,
+        comm: mpi::ffi::MPI_Comm,
+    ) -> Result<(), LinearError> {
         let name = match self.method {
             Method::Multigrid(_) => c"shell",
             Method::IncompleteCholesky => c"bjacobi",
@@ -211,15 +223,27 @@ impl<const B: usize> System<B> {
     }
 
     /// Solves, and goes on until the last correction is small too.
-    fn iterate(&self, handles: &Handles, tolerance: Tolerance, whole: f64) -> Result<Convergence, LinearError> {
-        let Handles { matrix, solver, preconditioner, right_side, solution, rest, correction } = *handles;
+    fn iterate(
+        &self,
+        handles: &Handles,
+        tolerance: Tolerance,
+        whole: f64,
+    ) -> Result<Convergence, LinearError> {
+        let Handles { matrix, solver, preconditioner, right_side, solution, rest, correction } =
+            *handles;
         let mut convergence = Convergence::default();
         let mut target = (tolerance.relative * whole).max(tolerance.absolute);
         for _ in 0..ROUNDS {
             let (mut count, mut reason, mut norm) = (0, 0, 0.0);
             // SAFETY: all objects are set up, of the same sizes.
             unsafe {
-                done(sys::KSPSetTolerances(solver, 1e-300, target, sys::PETSC_DEFAULT, ITERATIONS))?;
+                done(sys::KSPSetTolerances(
+                    solver,
+                    1e-300,
+                    target,
+                    sys::PETSC_DEFAULT,
+                    ITERATIONS,
+                ))?;
                 done(sys::KSPSetInitialGuessNonzero(solver, 1))?;
                 done(sys::KSPSolve(solver, right_side, solution))?;
                 done(sys::KSPGetIterationNumber(solver, &raw mut count))?;
@@ -271,7 +295,10 @@ impl<const B: usize> LinearSolver<B> for System<B> {
         solution: &mut [[f64; B]],
         tolerance: Tolerance,
     ) -> Result<Convergence, LinearError> {
-        assert!(right_side.len() == self.rows && solution.len() == self.rows, "one value for each unknown");
+        assert!(
+            right_side.len() == self.rows && solution.len() == self.rows,
+            "one value for each unknown"
+        );
         let handles = &*self.handles.lock().unwrap_or_else(PoisonError::into_inner);
         let numbering = &self.numbering;
         let mut summed = right_side.to_vec();
@@ -307,13 +334,23 @@ impl<const B: usize> LinearSolver<B> for System<B> {
         Ok(convergence)
     }
 
-    fn renewed(&self, matrix: Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
+    fn renewed(
+        &self,
+        matrix: Arc<SparseMatrix<B>>,
+    ) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
         let method = match &self.method {
-            Method::Multigrid(multigrid) => Method::Multigrid(Box::new(multigrid.of_like_matrix(Arc::clone(&matrix))?)),
+            Method::Multigrid(multigrid) => {
+                Method::Multigrid(Box::new(multigrid.of_like_matrix(Arc::clone(&matrix))?))
+            }
             Method::IncompleteCholesky => Method::IncompleteCholesky,
             Method::Gamg(places) => Method::Gamg(Arc::clone(places)),
             Method::Jacobi => Method::Jacobi,
         };
-        Ok(Box::new(Self::with_method(Arc::clone(&self.library), self.numbering.clone(), method, &matrix)?))
+        Ok(Box::new(Self::with_method(
+            Arc::clone(&self.library),
+            self.numbering.clone(),
+            method,
+            &matrix,
+        )?))
     }
 }

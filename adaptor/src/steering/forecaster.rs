@@ -33,7 +33,12 @@ pub(crate) struct Forecaster {
 impl Forecaster {
     /// Has `answer` called with what `order` would come to, were it given now. What the same `asker` asked for before and was
     /// not told yet is forgotten: its answer never comes.
-    pub(crate) fn ask(&self, asker: u64, order: &Order, answer: impl FnOnce(Forecast) + Send + 'static) {
+    pub(crate) fn ask(
+        &self,
+        asker: u64,
+        order: &Order,
+        answer: impl FnOnce(Forecast) + Send + 'static,
+    ) {
         let Present { stack, place, own } = lock(&self.present).clone();
         match self.defaults.wish(&stack, place, order) {
             Ok((_, wish)) => self.jobs.forecast(asker, Wish { own, ..wish }, Box::new(answer)),

@@ -61,7 +61,8 @@ pub(super) struct Rounding {
 impl Rounding {
     /// That of a mesh. Collective.
     pub(super) fn of(reference: &[Vector], partition: &dyn Partition) -> Self {
-        let mut extent = [reference.as_flattened().iter().fold(0.0_f64, |largest, x| largest.max(x.abs()))];
+        let mut extent =
+            [reference.as_flattened().iter().fold(0.0_f64, |largest, x| largest.max(x.abs()))];
         partition.reduce(Reduction::Maximum, &mut extent);
         Self { extent: extent[0] }
     }
@@ -88,7 +89,11 @@ impl Rounding {
     #[inline]
     pub(super) fn carried(self, lent: Vector, now: Vector, next: Vector) -> Vector {
         std::array::from_fn(|axis| {
-            if self.holds(lent[axis], now[axis]) { next[axis] } else { lent[axis] + (next[axis] - now[axis]) }
+            if self.holds(lent[axis], now[axis]) {
+                next[axis]
+            } else {
+                lent[axis] + (next[axis] - now[axis])
+            }
         })
     }
 
@@ -97,7 +102,12 @@ impl Rounding {
     /// A vertex has stayed where it went less than half as far along as it was asked to; a shape was not followed where those that
     /// stayed make up more than half of the motion, as its sum of squares. A vertex that the solver moves by itself does not stay.
     /// Collective.
-    pub(super) fn compare(self, handed: &HandedOut, lent: &ArrayView<'_>, partition: &dyn Partition) -> Outcome {
+    pub(super) fn compare(
+        self,
+        handed: &HandedOut,
+        lent: &ArrayView<'_>,
+        partition: &dyn Partition,
+    ) -> Outcome {
         let (mut all, mut stayed, mut distance) = (0.0, 0.0, 0.0_f64);
         for (vertex, (&from, &to)) in handed.from.iter().zip(&*handed.to).enumerate() {
             let now = lent.vector(vertex);
@@ -123,7 +133,12 @@ impl Rounding {
     }
 
     /// What the solver's own motion has added to `shape`. Collective.
-    pub(super) fn own(self, shape: &[Vector], lent: &ArrayView<'_>, partition: &dyn Partition) -> Own {
+    pub(super) fn own(
+        self,
+        shape: &[Vector],
+        lent: &ArrayView<'_>,
+        partition: &dyn Partition,
+    ) -> Own {
         let (mut is_same, mut is_rounding) = (true, true);
         for (vertex, &asked) in shape.iter().enumerate() {
             let now = lent.vector(vertex);
@@ -139,7 +154,9 @@ impl Rounding {
         }
         let offset = |(vertex, &asked): (usize, &Vector)| -> Vector {
             let now = lent.vector(vertex);
-            std::array::from_fn(|axis| if self.holds(now[axis], asked[axis]) { 0.0 } else { now[axis] - asked[axis] })
+            std::array::from_fn(|axis| {
+                if self.holds(now[axis], asked[axis]) { 0.0 } else { now[axis] - asked[axis] }
+            })
         };
         Own {
             lent: (!is_same).then(|| lent.to_vectors().into()),

@@ -85,7 +85,9 @@ impl Log {
         let id = {
             let mut state = self.lock();
             let id = match wanted {
-                Some(id) if state.has(&id) => return Err(format!("the id '{id}' was given to another command")),
+                Some(id) if state.has(&id) => {
+                    return Err(format!("the id '{id}' was given to another command"));
+                }
                 Some(id) => id,
                 None => state.next_id(),
             };
@@ -138,7 +140,9 @@ impl Log {
     pub(crate) fn settle(&self, id: &str, moment: Moment, outcome: Result<(), String>) {
         match outcome {
             Ok(()) => self.journal(id, JournalStatus::Applied, moment, None, None, [None; 2]),
-            Err(reason) => self.journal(id, JournalStatus::Rejected, moment, None, Some(reason), [None; 2]),
+            Err(reason) => {
+                self.journal(id, JournalStatus::Rejected, moment, None, Some(reason), [None; 2])
+            }
         }
     }
 
@@ -146,7 +150,9 @@ impl Log {
     pub(crate) fn update(&self, id: &str, change: impl FnOnce(&mut OrderReport)) {
         {
             let mut state = self.lock();
-            let Some(order) = state.orders.iter_mut().rev().find(|order| order.id == id) else { return };
+            let Some(order) = state.orders.iter_mut().rev().find(|order| order.id == id) else {
+                return;
+            };
             change(order);
         }
         self.tell(id);
@@ -167,15 +173,29 @@ impl Log {
     }
 
     /// Notes that the motion of an order begins; `clamped` is the fraction that is done, where that is not all of it.
-    pub(crate) fn begin(&self, id: &str, moment: Moment, min_scaled_jacobian: Option<f64>, clamped: Option<f64>) {
-        self.journal(id, JournalStatus::Applied, moment, None, None, [min_scaled_jacobian, clamped]);
+    pub(crate) fn begin(
+        &self,
+        id: &str,
+        moment: Moment,
+        min_scaled_jacobian: Option<f64>,
+        clamped: Option<f64>,
+    ) {
+        self.journal(
+            id,
+            JournalStatus::Applied,
+            moment,
+            None,
+            None,
+            [min_scaled_jacobian, clamped],
+        );
     }
 
     /// Notes how far the mesh was from where it was asked to be, which is not far.
     pub(crate) fn deviates(&self, id: &str, distance: f64) {
         if distance > 0.0 {
             self.update(id, |order| {
-                order.deviation = Some(order.deviation.map_or(distance, |known| known.max(distance)))
+                order.deviation =
+                    Some(order.deviation.map_or(distance, |known| known.max(distance)))
             });
         }
     }
@@ -212,7 +232,16 @@ impl Log {
         [min_scaled_jacobian, fraction]: [Option<f64>; 2],
     ) {
         let Moment { cycle, time } = moment;
-        let entry = JournalEntry { id: id.into(), status, cycle, time, command, reason, min_scaled_jacobian, fraction };
+        let entry = JournalEntry {
+            id: id.into(),
+            status,
+            cycle,
+            time,
+            command,
+            reason,
+            min_scaled_jacobian,
+            fraction,
+        };
         if let Err(error) = self.journal.write(&entry) {
             // The solver goes on without; it must not go unsaid.
             log::warn!("{error}; this run has no journal from here on");
@@ -227,7 +256,11 @@ impl Log {
         let state = self.lock();
         if let Some(order) = state.orders.iter().rev().find(|order| order.id == id) {
             // What it asks for is told once: to those who are there when it comes in, and to others when they come.
-            let told = if order.status == OrderStatus::Accepted { state.told(order) } else { json!(order) };
+            let told = if order.status == OrderStatus::Accepted {
+                state.told(order)
+            } else {
+                json!(order)
+            };
             hub.tell(&json!({ "order": told }));
         }
     }
@@ -264,7 +297,8 @@ impl State {
     }
 
     fn has(&self, id: &str) -> bool {
-        self.orders.iter().any(|order| order.id == id) || self.others.iter().any(|other| other == id)
+        self.orders.iter().any(|order| order.id == id)
+            || self.others.iter().any(|other| other == id)
     }
 
     fn next_id(&mut self) -> String {

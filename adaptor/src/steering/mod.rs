@@ -64,9 +64,15 @@ pub(crate) struct Defaults {
 
 impl Defaults {
     /// The stack that an order makes of `stack`, and what its plan from the place `start` is made from.
-    fn wish(&self, stack: &EditStack, start: Place, order: &Order) -> Result<(EditStack, Wish), StackError> {
+    fn wish(
+        &self,
+        stack: &EditStack,
+        start: Place,
+        order: &Order,
+    ) -> Result<(EditStack, Wish), StackError> {
         let default = ShapeSettings { deform: self.deform.clone(), guard: self.guard };
-        let (after, settings) = stack.after(&order.change, order.deform.as_ref(), order.guard, &default)?;
+        let (after, settings) =
+            stack.after(&order.change, order.deform.as_ref(), order.guard, &default)?;
         let ShapeSettings { deform, guard } = settings;
         let wish = Wish {
             stack: after.edits(),
@@ -194,7 +200,8 @@ impl Steerer {
     /// speak with the ranks, so that orders are planned when their turn comes, on all ranks in the same call. Collective, as are
     /// [`Steerer::advance`] and whatever else makes plans.
     pub(crate) fn of_part(shaper: Shaper, defaults: Defaults, log: Arc<Log>) -> Self {
-        let quality = quality_in_parts(shaper.mesh().cells(), shaper.reference(), &**shaper.partition());
+        let quality =
+            quality_in_parts(shaper.mesh().cells(), shaper.reference(), &**shaper.partition());
         let mut steerer = Self::of_shaper(shaper, defaults, log);
         lock(&steerer.planner).prepare(&steerer.defaults.deform);
         steerer.reference_quality = Some((quality.min, quality.mean, quality.inverted));
@@ -208,7 +215,8 @@ impl Steerer {
         let rounding = Rounding::of(shaper.reference(), &*partition);
         let planner = Arc::new(Mutex::new(Planner::new(shaper)));
         let stack = EditStack::default();
-        let present = Arc::new(Mutex::new(Present { stack: stack.clone(), place: place.clone(), own: None }));
+        let present =
+            Arc::new(Mutex::new(Present { stack: stack.clone(), place: place.clone(), own: None }));
         Self {
             mesh,
             partition,
@@ -241,7 +249,11 @@ impl Steerer {
     /// What answers forecasts; `None` where the worker has ended.
     pub(crate) fn forecaster(&self) -> Option<Forecaster> {
         let jobs = Arc::clone(self.worker.as_ref()?.jobs());
-        Some(Forecaster { defaults: self.defaults.clone(), present: Arc::clone(&self.present), jobs })
+        Some(Forecaster {
+            defaults: self.defaults.clone(),
+            present: Arc::clone(&self.present),
+            jobs,
+        })
     }
 
     /// What an order would come to, found out at once. Collective, where the mesh is in parts.
@@ -257,7 +269,9 @@ impl Steerer {
 
     /// Has the plan of an order that will come made ahead, as far as it can be known now; once for each shape.
     pub(crate) fn look_ahead(&mut self, order: Option<&Order>) {
-        let Some(order) = order.filter(|_| !self.foreseen && self.is_at_rest() && self.computing.is_none()) else {
+        let Some(order) =
+            order.filter(|_| !self.foreseen && self.is_at_rest() && self.computing.is_none())
+        else {
             return;
         };
         self.foreseen = true;
@@ -392,8 +406,10 @@ impl Steerer {
             }
             Done::Planned(plan) => {
                 if let Some(mut computing) = self.computing.take() {
-                    let is_stale =
-                        plan.as_ref().as_ref().is_ok_and(|plan| !Arc::ptr_eq(plan.start(), &self.place.points));
+                    let is_stale = plan
+                        .as_ref()
+                        .as_ref()
+                        .is_ok_and(|plan| !Arc::ptr_eq(plan.start(), &self.place.points));
                     if let Some(worker) = self.worker.as_ref().filter(|_| is_stale) {
                         // The worker may be at a forecast: the mesh waits for the way from here, not the solver.
                         computing.wish.start = self.place.clone();
@@ -446,7 +462,8 @@ impl Steerer {
             order.seconds = plan.seconds();
             order.added_steps = step_seconds.map(|step| begun.elapsed().as_secs_f64() / step);
         });
-        self.motion = Some(Motion { id, plan, guard: wish.guard, begun: moment, taken: 0, reached: 0 });
+        self.motion =
+            Some(Motion { id, plan, guard: wish.guard, begun: moment, taken: 0, reached: 0 });
     }
 
     /// The last change of the mesh and the coordinates at its end.
@@ -465,14 +482,17 @@ impl Steerer {
             return false;
         }
         let Some(motion) = self.motion.as_mut() else { return false };
-        let (cycles, time) = (moment.cycle.saturating_sub(motion.begun.cycle), moment.time - motion.begun.time);
+        let (cycles, time) =
+            (moment.cycle.saturating_sub(motion.begun.cycle), moment.time - motion.begun.time);
         if !motion.plan.schedule().is_due(motion.taken, cycles, time) {
             return false;
         }
         let next = motion.taken + 1;
         if !motion.plan.is_straight(motion.reached, next) {
-            let reason =
-                format!("the mesh stayed at shape {}, from which shape {next} is not a straight step", motion.reached);
+            let reason = format!(
+                "the mesh stayed at shape {}, from which shape {next} is not a straight step",
+                motion.reached
+            );
             self.give_up(&reason);
             return false;
         }
@@ -487,14 +507,19 @@ impl Steerer {
         let before = self.own.lent.as_ref().unwrap_or(&self.place.points);
         let carried: Option<Arc<[Vector]>> = self.own.lent.as_ref().map(|lent| {
             let shapes = self.place.points.iter().zip(&*points);
-            lent.iter().zip(shapes).map(|(&lent, (&now, &next))| self.rounding.carried(lent, now, next)).collect()
+            lent.iter()
+                .zip(shapes)
+                .map(|(&lent, (&now, &next))| self.rounding.carried(lent, now, next))
+                .collect()
         });
         let after = carried.as_ref().unwrap_or(&points);
         // The shape was judged as it is; what the mesh will be with the solver's own motion was known up to the last call at most.
         if self.own.offsets.is_some() && motion.plan.judged() == Judged::Volume {
-            let judged = judge_in_parts(&self.mesh, before, after, &[1.0], &motion.guard, &*self.partition);
+            let judged =
+                judge_in_parts(&self.mesh, before, after, &[1.0], &motion.guard, &*self.partition);
             if let Err(refusal) = judged {
-                let reason = format!("shape {next} is not handed out; with the mesh's own motion {refusal}");
+                let reason =
+                    format!("shape {next} is not handed out; with the mesh's own motion {refusal}");
                 self.give_up(&reason);
                 return false;
             }
@@ -551,7 +576,11 @@ impl Steerer {
         let Some(motion) = self.motion.take() else { return };
         self.log.update(&motion.id, |order| {
             order.status = OrderStatus::Applied;
-            order.reason = Some(format!("ended at shape {} of {}: {reason}", motion.reached, motion.plan.shapes()));
+            order.reason = Some(format!(
+                "ended at shape {} of {}: {reason}",
+                motion.reached,
+                motion.plan.shapes()
+            ));
         });
     }
 }

@@ -86,10 +86,12 @@ impl Parameters {
 
     pub(crate) fn check(&self, name: &str, value: f64) -> Result<usize, ParameterError> {
         let known = || self.all.iter().map(|parameter| parameter.name.clone()).collect::<Vec<_>>();
-        let index = self.all.iter().position(|parameter| parameter.name == name).ok_or_else(|| {
-            let near = nearest(name, self.all.iter().map(|parameter| parameter.name.as_str())).map(str::to_owned);
-            ParameterError::Unknown { name: name.into(), near, known: known() }
-        })?;
+        let index =
+            self.all.iter().position(|parameter| parameter.name == name).ok_or_else(|| {
+                let near = nearest(name, self.all.iter().map(|parameter| parameter.name.as_str()))
+                    .map(str::to_owned);
+                ParameterError::Unknown { name: name.into(), near, known: known() }
+            })?;
         check(&self.all[index], value)?;
         Ok(index)
     }
@@ -131,7 +133,8 @@ mod tests {
     use super::*;
 
     fn parameters() -> Parameters {
-        let parameter = |name: &str| Parameter { name: name.into(), value: 1.0, minimum: 0.0, maximum: 2.0 };
+        let parameter =
+            |name: &str| Parameter { name: name.into(), value: 1.0, minimum: 0.0, maximum: 2.0 };
         Parameters::new(vec![parameter("inlet_speed"), parameter("viscosity")]).unwrap()
     }
 
@@ -151,10 +154,16 @@ mod tests {
         let mut parameters = parameters();
         for bad in [f64::NAN, f64::INFINITY, -0.1, 2.1] {
             let message = parameters.set("viscosity", bad).unwrap_err().to_string();
-            assert!(message.contains("viscosity") && message.contains(&bad.to_string()), "{message}");
+            assert!(
+                message.contains("viscosity") && message.contains(&bad.to_string()),
+                "{message}"
+            );
         }
         let message = parameters.set("viscositi", 1.0).unwrap_err().to_string();
-        assert!(message.contains("did you mean 'viscosity'?") && message.contains("inlet_speed"), "{message}");
+        assert!(
+            message.contains("did you mean 'viscosity'?") && message.contains("inlet_speed"),
+            "{message}"
+        );
         assert!(parameters.take_changed().is_empty());
         let bad = Parameter { name: "x".into(), value: 1.0, minimum: f64::NAN, maximum: 2.0 };
         assert!(Parameters::new(vec![bad]).is_err());

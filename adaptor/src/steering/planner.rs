@@ -33,7 +33,10 @@ pub(crate) struct Wish {
 impl Wish {
     /// Whether both ask for the same shape, wherever they start.
     fn ends_like(&self, other: &Self) -> bool {
-        self.stack == other.stack && self.kept == other.kept && self.deform == other.deform && self.guard == other.guard
+        self.stack == other.stack
+            && self.kept == other.kept
+            && self.deform == other.deform
+            && self.guard == other.guard
     }
 
     pub(crate) fn is(&self, other: &Self) -> bool {
@@ -60,7 +63,12 @@ pub(crate) struct Rejection {
 
 impl<T: ToString> From<T> for Rejection {
     fn from(reason: T) -> Self {
-        Self { reason: reason.to_string(), min_scaled_jacobian: None, fraction: None, seconds: ShapeSeconds::default() }
+        Self {
+            reason: reason.to_string(),
+            min_scaled_jacobian: None,
+            fraction: None,
+            seconds: ShapeSeconds::default(),
+        }
     }
 }
 
@@ -96,13 +104,16 @@ impl Planner {
         let shaper = &mut self.shaper;
         let plan = match target {
             Some(target) => caught(shaper, |shaper| shaper.go(start, &target, schedule, guard)),
-            None => caught(shaper, |shaper| shaper.reach(stack, *kept, start, deform, schedule, guard)),
+            None => {
+                caught(shaper, |shaper| shaper.reach(stack, *kept, start, deform, schedule, guard))
+            }
         };
         let plan = plan.and_then(|plan| match own {
             Some(own) if plan.judged() == Judged::Volume => self.with_own_motion(plan, own, guard),
             _ => Ok(plan),
         });
-        let plan = plan.map_err(|rejection| Rejection { seconds: self.shaper.spent(), ..rejection });
+        let plan =
+            plan.map_err(|rejection| Rejection { seconds: self.shaper.spent(), ..rejection });
         if self.known.len() >= REMEMBERED {
             self.known.pop_front();
         }
@@ -111,15 +122,28 @@ impl Planner {
     }
 
     /// Judges a plan of the mesh that will be there: each shape and the solver's own motion up to now.
-    fn with_own_motion(&self, plan: Plan, own: &[Vector], guard: &Guard) -> Result<Plan, Rejection> {
+    fn with_own_motion(
+        &self,
+        plan: Plan,
+        own: &[Vector],
+        guard: &Guard,
+    ) -> Result<Plan, Rejection> {
         let moved = |shape: &Arc<[Vector]>| -> Vec<Vector> {
-            let sum = |(shape, own): (&Vector, &Vector)| std::array::from_fn(|axis| shape[axis] + own[axis]);
+            let sum = |(shape, own): (&Vector, &Vector)| {
+                std::array::from_fn(|axis| shape[axis] + own[axis])
+            };
             shape.iter().zip(own).map(sum).collect()
         };
         let partition = &**self.shaper.partition();
         for ends in plan.way().windows(2) {
-            let judged =
-                judge_in_parts(self.shaper.mesh(), &moved(&ends[0]), &moved(&ends[1]), &[1.0], guard, partition);
+            let judged = judge_in_parts(
+                self.shaper.mesh(),
+                &moved(&ends[0]),
+                &moved(&ends[1]),
+                &[1.0],
+                guard,
+                partition,
+            );
             if let Err(refusal) = judged {
                 let refused = Refused::from(refusal);
                 return Err(Rejection {
@@ -150,7 +174,10 @@ impl Planner {
 
 /// Runs a piece of the kernel so that a fault in it rejects one order instead of ending the solver. A panic leaves at worst a
 /// cache without its entry. In parts it goes through, because the ranks that did not panic wait for this one.
-fn caught<T>(shaper: &mut Shaper, attempt: impl FnOnce(&mut Shaper) -> Result<T, Refused>) -> Result<T, Rejection> {
+fn caught<T>(
+    shaper: &mut Shaper,
+    attempt: impl FnOnce(&mut Shaper) -> Result<T, Refused>,
+) -> Result<T, Rejection> {
     let attempted = if shaper.partition().ranks() > 1 {
         Ok(attempt(shaper))
     } else {
@@ -168,7 +195,9 @@ fn caught<T>(shaper: &mut Shaper, attempt: impl FnOnce(&mut Shaper) -> Result<T,
                 .map(|text| (*text).to_owned())
                 .or_else(|| panic.downcast_ref::<String>().cloned())
                 .unwrap_or_else(|| "no reason given".into());
-            Err(Rejection::from(format!("the geometry kernel failed, which is a defect of it: {message}")))
+            Err(Rejection::from(format!(
+                "the geometry kernel failed, which is a defect of it: {message}"
+            )))
         }
     }
 }
@@ -211,7 +240,11 @@ mod tests {
         let again = planner.plan(&from_there).unwrap();
         assert!(Arc::ptr_eq(again.end(), plan.end()) && Arc::ptr_eq(again.start(), aside.end()));
         let mut fresh = Planner::new(
-            Shaper::new(Arc::clone(planner.shaper.mesh()), Arc::clone(planner.shaper.surface().unwrap())).unwrap(),
+            Shaper::new(
+                Arc::clone(planner.shaper.mesh()),
+                Arc::clone(planner.shaper.surface().unwrap()),
+            )
+            .unwrap(),
         );
         assert_eq!(*fresh.plan(&from_there).unwrap().way(), *again.way());
         assert!(planner.plan(&wish(-3.0)).is_err());

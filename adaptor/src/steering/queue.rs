@@ -49,7 +49,9 @@ impl Queue {
     pub(crate) fn check_room(&self, bytes: usize) -> Result<(), Exceeded> {
         let waiting = self.lock();
         WAITING.check(waiting.len() + 1)?;
-        WAITING_BYTES.check(waiting.iter().map(|received| received.bytes).sum::<usize>().saturating_add(bytes))
+        WAITING_BYTES.check(
+            waiting.iter().map(|received| received.bytes).sum::<usize>().saturating_add(bytes),
+        )
     }
 
     pub(crate) fn push(&self, received: Received) {

@@ -73,7 +73,10 @@ impl EditStack {
 
     /// How many edits it begins with that `other` begins with too.
     pub(crate) fn shared(&self, other: &Self) -> usize {
-        self.present().zip(other.present()).take_while(|(a, b)| std::ptr::eq(*a, *b) || a == b).count()
+        self.present()
+            .zip(other.present())
+            .take_while(|(a, b)| std::ptr::eq(*a, *b) || a == b)
+            .count()
     }
 
     /// The stack with a fraction of the last order's edits, those after the first `kept` edits of the stack.
@@ -113,7 +116,10 @@ mod tests {
     use super::*;
 
     fn edit(x: f64) -> Edit {
-        serde_json::from_value(serde_json::json!({"translate": {"features": ["a"], "by": [x, 0.0, 0.0]}})).unwrap()
+        serde_json::from_value(
+            serde_json::json!({"translate": {"features": ["a"], "by": [x, 0.0, 0.0]}}),
+        )
+        .unwrap()
     }
 
     fn after(stack: &EditStack, change: Change) -> EditStack {
@@ -146,7 +152,9 @@ mod tests {
         let mending = Guard { otherwise: Otherwise::Untangle, ..Guard::default() };
         let none = EditStack::default();
         let default = ShapeSettings::default();
-        let (one, _) = none.after(&Change::Edits(vec![edit(1.0)]), Some(&stiff), Some(mending), &default).unwrap();
+        let (one, _) = none
+            .after(&Change::Edits(vec![edit(1.0)]), Some(&stiff), Some(mending), &default)
+            .unwrap();
         let two = after(&one, Change::Edits(vec![edit(2.0)]));
         let settings = ShapeSettings { deform: stiff, guard: mending };
         assert_eq!(two.after(&undo(1), None, None, &default).unwrap(), (one, settings));
@@ -156,7 +164,10 @@ mod tests {
     fn only_what_an_order_brought_is_clamped() {
         let one = after(&EditStack::default(), Change::Edits(vec![edit(1.0)]));
         let two = after(&one, Change::Edits(vec![edit(2.0), edit(4.0)]));
-        assert_eq!((one.shared(&two), two.clone().clamped(1, 0.5).edits()), (1, vec![edit(1.0), edit(1.0), edit(2.0)]));
+        assert_eq!(
+            (one.shared(&two), two.clone().clamped(1, 0.5).edits()),
+            (1, vec![edit(1.0), edit(1.0), edit(2.0)])
+        );
         let replaced = after(&two, Change::Stack(vec![edit(1.0), edit(2.0), edit(8.0)]));
         assert_eq!(two.shared(&replaced), 2);
         assert_eq!(replaced.clamped(2, 0.25).edits(), [edit(1.0), edit(2.0), edit(2.0)]);
@@ -165,6 +176,10 @@ mod tests {
     #[test]
     fn a_stack_does_not_grow_without_end() {
         let edits = vec![edit(1.0); EDITS.most + 1];
-        assert!(EditStack::default().after(&Change::Edits(edits), None, None, &ShapeSettings::default()).is_err());
+        assert!(
+            EditStack::default()
+                .after(&Change::Edits(edits), None, None, &ShapeSettings::default())
+                .is_err()
+        );
     }
 }

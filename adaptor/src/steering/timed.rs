@@ -46,19 +46,24 @@ impl Timed {
             Command::Order(order) => Some((cycle(command), order)),
             _ => None,
         });
-        orders.min_by(|(a, _), (b, _)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))).map(|(_, order)| order)
+        orders
+            .min_by(|(a, _), (b, _)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)))
+            .map(|(_, order)| order)
     }
 
     /// Whether any order drags the skeleton.
     pub(crate) fn drags_skeleton(&self) -> bool {
-        self.commands.iter().any(|timed| matches!(&timed.command, Command::Order(order) if order.drags_skeleton()))
+        self.commands
+            .iter()
+            .any(|timed| matches!(&timed.command, Command::Order(order) if order.drags_skeleton()))
     }
 
     /// Whether [`Timed::take_due`] would find one; two comparisons.
     #[inline]
     pub(crate) fn is_due(&self, moment: Moment) -> bool {
         !self.commands.is_empty()
-            && (moment.cycle >= self.cycle || At::Time(self.time).has_come(moment.cycle, moment.time))
+            && (moment.cycle >= self.cycle
+                || At::Time(self.time).has_come(moment.cycle, moment.time))
     }
 
     /// The commands that are due, in the order in which they were given; each is given once.
@@ -66,7 +71,9 @@ impl Timed {
         if !self.is_due(moment) {
             return Vec::new();
         }
-        let has_come = |command: &TimedCommand| command.at.is_none_or(|at| at.has_come(moment.cycle, moment.time));
+        let has_come = |command: &TimedCommand| {
+            command.at.is_none_or(|at| at.has_come(moment.cycle, moment.time))
+        };
         let (due, rest) = std::mem::take(&mut self.commands).into_iter().partition(has_come);
         self.commands = rest;
         self.look_ahead();
@@ -92,7 +99,10 @@ mod tests {
             assert_eq!(timed.is_due(moment), [0, 3, 5].contains(&cycle));
             given.extend(timed.take_due(moment).into_iter().map(|command| (cycle, command.at)));
         }
-        assert_eq!(given, [(0, None), (3, Some(At::Cycle(3))), (3, Some(At::Cycle(3))), (5, Some(At::Time(0.5)))]);
+        assert_eq!(
+            given,
+            [(0, None), (3, Some(At::Cycle(3))), (3, Some(At::Cycle(3))), (5, Some(At::Time(0.5)))]
+        );
         assert!(timed.is_empty());
     }
 }

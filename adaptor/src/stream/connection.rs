@@ -111,13 +111,19 @@ impl TimedStream {
     }
 
     /// Makes a pending write fail once it has been pending for [`WRITE_TIME`].
-    fn timed_write<T>(&mut self, context: &mut Context<'_>, written: Poll<io::Result<T>>) -> Poll<io::Result<T>> {
+    fn timed_write<T>(
+        &mut self,
+        context: &mut Context<'_>,
+        written: Poll<io::Result<T>>,
+    ) -> Poll<io::Result<T>> {
         if written.is_ready() {
             self.write_deadline = None;
             self.still_here();
             return written;
         }
-        let deadline = self.write_deadline.get_or_insert_with(|| Box::pin(sleep_until(Instant::now() + WRITE_TIME)));
+        let deadline = self
+            .write_deadline
+            .get_or_insert_with(|| Box::pin(sleep_until(Instant::now() + WRITE_TIME)));
         deadline.as_mut().poll(context).map(|()| Err(timed_out("the client does not read")))
     }
 }
@@ -127,7 +133,11 @@ fn timed_out(what: &str) -> io::Error {
 }
 
 impl AsyncRead for TimedStream {
-    fn poll_read(self: Pin<&mut Self>, context: &mut Context<'_>, buffer: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
+    fn poll_read(
+        self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
         let this = self.get_mut();
         let read = Pin::new(&mut this.stream).poll_read(context, buffer);
         if read.is_ready() {
@@ -137,12 +147,19 @@ impl AsyncRead for TimedStream {
             }
             return read;
         }
-        this.read_deadline.as_mut().poll(context).map(|()| Err(timed_out("the client says nothing")))
+        this.read_deadline
+            .as_mut()
+            .poll(context)
+            .map(|()| Err(timed_out("the client says nothing")))
     }
 }
 
 impl AsyncWrite for TimedStream {
-    fn poll_write(self: Pin<&mut Self>, context: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
+    fn poll_write(
+        self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
         let this = self.get_mut();
         let written = Pin::new(&mut this.stream).poll_write(context, bytes);
         this.timed_write(context, written)

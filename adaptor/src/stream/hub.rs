@@ -287,7 +287,9 @@ impl Hub {
                 .unwrap_or_else(|_| Err("the encoder failed".into()));
             match encoded {
                 Ok(frame) => self.publish(view, Arc::new(frame)),
-                Err(reason) => self.tell(&json!({"error": {"message": format!("a frame was not encoded: {reason}")}})),
+                Err(reason) => self.tell(
+                    &json!({"error": {"message": format!("a frame was not encoded: {reason}")}}),
+                ),
             }
         }
     }
@@ -316,10 +318,14 @@ impl Hub {
             return None;
         }
         state.next_client += 1;
-        let client =
-            Arc::new(Client { id: state.next_client, wake: Notify::new(), outbox: Mutex::new(Outbox::default()) });
+        let client = Arc::new(Client {
+            id: state.next_client,
+            wake: Notify::new(),
+            outbox: Mutex::new(Outbox::default()),
+        });
         let alone = state.clients.is_empty();
-        let kept_for_it = state.wheel_lost.is_some_and(|(_, driver)| Some(&*name(driver)) == returning);
+        let kept_for_it =
+            state.wheel_lost.is_some_and(|(_, driver)| Some(&*name(driver)) == returning);
         if state.driver.is_none() && (alone || kept_for_it || state.wheel_is_free()) {
             state.take_wheel(client.id);
         }
@@ -362,7 +368,9 @@ impl Hub {
         let mut state = lock(&self.state);
         match state.driver {
             Some(driver) if driver == client => Ok(()),
-            Some(driver) => Err(format!("{} has the wheel; it is free once that viewer has left", name(driver))),
+            Some(driver) => {
+                Err(format!("{} has the wheel; it is free once that viewer has left", name(driver)))
+            }
             None if state.wheel_is_free() => {
                 state.take_wheel(client);
                 state.greet();

@@ -26,7 +26,10 @@ use std::{
 
 use axum::{
     Router,
-    extract::{ConnectInfo, Query, Request, State, WebSocketUpgrade, ws::rejection::WebSocketUpgradeRejection},
+    extract::{
+        ConnectInfo, Query, Request, State, WebSocketUpgrade,
+        ws::rejection::WebSocketUpgradeRejection,
+    },
     http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header},
     middleware::{self, Next},
     response::{IntoResponse, Response},
@@ -61,7 +64,13 @@ pub(crate) trait CommandSink: Send + Sync {
     ///
     /// # Errors
     /// What is wrong with it, for the viewer to read; then nothing was taken.
-    fn receive(&self, client: u64, id: Option<String>, message: Message, bytes: usize) -> Result<(), String>;
+    fn receive(
+        &self,
+        client: u64,
+        id: Option<String>,
+        message: Message,
+        bytes: usize,
+    ) -> Result<(), String>;
 
     /// The orders so far, for a viewer that connects.
     fn orders(&self) -> serde_json::Value;
@@ -153,9 +162,12 @@ impl Server {
             loopback: address.ip().is_loopback(),
         };
         let (stop, stopped) = oneshot::channel();
-        let runtime =
-            tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(StreamError::Thread)?;
-        let mut server = Self { address, token, hub: Arc::clone(&hub), stop: Some(stop), threads: Vec::new() };
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()
+            .map_err(StreamError::Thread)?;
+        let mut server =
+            Self { address, token, hub: Arc::clone(&hub), stop: Some(stop), threads: Vec::new() };
         let thread = |name: &str| std::thread::Builder::new().name(name.into());
         let serving = move || runtime.block_on(serve(socket, shared, stopped));
         server.threads.push(thread("tombolo-stream").spawn(serving).map_err(StreamError::Thread)?);
@@ -241,7 +253,9 @@ fn refuse(headers: &HeaderMap, loopback: bool) -> Option<&'static str> {
     let text = |name: HeaderName| headers.get(name).map(|value| value.to_str().unwrap_or(""));
     let host = text(header::HOST).unwrap_or("");
     // Any port will do: a tunnel may end on another one.
-    let name = host.rsplit_once(':').map_or(host, |(name, port)| if port.ends_with(']') { host } else { name });
+    let name = host
+        .rsplit_once(':')
+        .map_or(host, |(name, port)| if port.ends_with(']') { host } else { name });
     if loopback && !matches!(name, "localhost" | "127.0.0.1" | "[::1]") {
         return Some("this server answers to localhost, 127.0.0.1 and [::1] only\n");
     }
@@ -284,24 +298,32 @@ async fn upgrade(
             None => {
                 use axum::extract::ws::{CloseFrame, Message as Wire};
                 let reason = format!("{VIEWERS} viewers watch already");
-                let _ = socket.send(Wire::Close(Some(CloseFrame { code: 1013, reason: reason.into() }))).await;
+                let _ = socket
+                    .send(Wire::Close(Some(CloseFrame { code: 1013, reason: reason.into() })))
+                    .await;
             }
         }
     })
 }
 
 /// The reference surface as a frame, 404 as long as there is none.
-async fn reference_surface(State(shared): State<Shared>, Query(credentials): Query<Credentials>) -> Response {
+async fn reference_surface(
+    State(shared): State<Shared>,
+    Query(credentials): Query<Credentials>,
+) -> Response {
     if !credentials.token.is_some_and(|token| shared.token.matches(&token)) {
         return (StatusCode::UNAUTHORIZED, UNAUTHORIZED).into_response();
     }
     let Some(surface) = shared.hub.surface() else {
-        return (StatusCode::NOT_FOUND, "this run has no mesh whose shape could be changed\n").into_response();
+        return (StatusCode::NOT_FOUND, "this run has no mesh whose shape could be changed\n")
+            .into_response();
     };
     // Elsewhere: the others are served while it is encoded.
     let failed = |reason: String| (StatusCode::INTERNAL_SERVER_ERROR, reason).into_response();
     match tokio::task::spawn_blocking(move || surface.frame()).await {
-        Ok(Ok(frame)) => ([(header::CONTENT_TYPE, "application/octet-stream")], frame).into_response(),
+        Ok(Ok(frame)) => {
+            ([(header::CONTENT_TYPE, "application/octet-stream")], frame).into_response()
+        }
         Ok(Err(reason)) => failed(format!("the surface was not encoded: {reason}\n")),
         Err(_) => failed("the encoder failed\n".into()),
     }
@@ -317,7 +339,9 @@ async fn file(State(shared): State<Shared>, uri: Uri, request: Request) -> Respo
         return (StatusCode::UNAUTHORIZED, UNAUTHORIZED).into_response();
     }
     match shared.files.get(uri.path()) {
-        Some((content_type, bytes)) => ([(header::CONTENT_TYPE, content_type)], bytes).into_response(),
+        Some((content_type, bytes)) => {
+            ([(header::CONTENT_TYPE, content_type)], bytes).into_response()
+        }
         None => (StatusCode::NOT_FOUND, "no such file\n").into_response(),
     }
 }

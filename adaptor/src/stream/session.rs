@@ -31,7 +31,12 @@ const WEIGHT: usize = 1 << 20;
 const WATCHED: usize = 1 << 10;
 
 /// Serves one viewer until either side ends it.
-pub(super) async fn serve(socket: WebSocket, client: Arc<Client>, hub: Arc<Hub>, commands: Arc<dyn CommandSink>) {
+pub(super) async fn serve(
+    socket: WebSocket,
+    client: Arc<Client>,
+    hub: Arc<Hub>,
+    commands: Arc<dyn CommandSink>,
+) {
     let (sink, stream) = socket.split();
     // Reading goes on while a write waits, so that a command is never stuck behind a frame.
     tokio::select! {
@@ -41,12 +46,19 @@ pub(super) async fn serve(socket: WebSocket, client: Arc<Client>, hub: Arc<Hub>,
     hub.leave(client.id);
 }
 
-async fn write(mut sink: SplitSink<WebSocket, Wire>, client: &Client, hub: &Hub, commands: &dyn CommandSink) {
+async fn write(
+    mut sink: SplitSink<WebSocket, Wire>,
+    client: &Client,
+    hub: &Hub,
+    commands: &dyn CommandSink,
+) {
     let mut topologies: Vec<Option<u64>> = Vec::new();
     let mut ping = tokio::time::interval(PING_PERIOD);
     loop {
         let written = match client.next() {
-            Ok(Some(Message::Hello)) => sink.send(Wire::text(&*hub.hello(client.id, commands.orders()))).await,
+            Ok(Some(Message::Hello)) => {
+                sink.send(Wire::text(&*hub.hello(client.id, commands.orders()))).await
+            }
             Ok(Some(Message::Text(text))) => sink.send(Wire::text(&*text)).await,
             Ok(Some(Message::Frame(view, frame))) => {
                 if topologies.len() <= view {
@@ -75,7 +87,9 @@ async fn write(mut sink: SplitSink<WebSocket, Wire>, client: &Client, hub: &Hub,
             }
             Err(()) => {
                 let reason = "too much was left unread";
-                let _ = sink.send(Wire::Close(Some(CloseFrame { code: 1008, reason: reason.into() }))).await;
+                let _ = sink
+                    .send(Wire::Close(Some(CloseFrame { code: 1008, reason: reason.into() })))
+                    .await;
                 return;
             }
         };
@@ -85,7 +99,12 @@ async fn write(mut sink: SplitSink<WebSocket, Wire>, client: &Client, hub: &Hub,
     }
 }
 
-async fn read(mut stream: SplitStream<WebSocket>, client: &Client, hub: &Hub, commands: &dyn CommandSink) {
+async fn read(
+    mut stream: SplitStream<WebSocket>,
+    client: &Client,
+    hub: &Hub,
+    commands: &dyn CommandSink,
+) {
     let mut allowance = Allowance { left: BURST, since: Instant::now() };
     while let Some(Ok(message)) = stream.next().await {
         let answer = match message {
@@ -107,9 +126,15 @@ async fn read(mut stream: SplitStream<WebSocket>, client: &Client, hub: &Hub, co
 }
 
 /// Takes one message: `{"id"?, "order" | "pause" | "resume" | "stop" | "parameter" | "forecast" | "drive": ...}`.
-fn receive(text: &str, client: &Client, hub: &Hub, commands: &dyn CommandSink) -> Result<(), (Option<String>, String)> {
+fn receive(
+    text: &str,
+    client: &Client,
+    hub: &Hub,
+    commands: &dyn CommandSink,
+) -> Result<(), (Option<String>, String)> {
     let drives = hub.is_driver(client.id);
-    let watches = "this viewer watches; only the one that drives steers. {\"drive\": {}} asks for the wheel";
+    let watches =
+        "this viewer watches; only the one that drives steers. {\"drive\": {}} asks for the wheel";
     // What cannot be a `drive` is not worth reading from one that watches.
     if !drives && text.len() > WATCHED {
         return Err((None, watches.into()));
@@ -170,7 +195,8 @@ mod tests {
 
     #[test]
     fn a_long_message_is_taken_and_paid_for() {
-        let mut allowance = Allowance { left: 1.0, since: Instant::now() + Duration::from_secs(3600) };
+        let mut allowance =
+            Allowance { left: 1.0, since: Instant::now() + Duration::from_secs(3600) };
         assert!(allowance.take(100 * WEIGHT));
         assert!(!allowance.take(0) && allowance.left < -90.0);
     }

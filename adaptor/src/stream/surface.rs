@@ -40,7 +40,8 @@ impl ReferenceSurface {
 
     /// The frame that holds it. The first call takes a while.
     pub(super) fn frame(&self) -> Result<Bytes, String> {
-        let encode = || encode_surface(&self.surface).map(Bytes::from).map_err(|error| error.to_string());
+        let encode =
+            || encode_surface(&self.surface).map(Bytes::from).map_err(|error| error.to_string());
         self.frame.get_or_init(encode).clone()
     }
 }

@@ -37,16 +37,23 @@ impl ViewerFiles {
         let name = path.strip_prefix('/').unwrap_or(path);
         let name = if name.is_empty() { "index.html" } else { name };
         // Only plain names: no way up, no hidden file, no other drive.
-        let plain = |part: &str| !part.is_empty() && !part.starts_with('.') && !part.contains(['\\', ':', '\0', '%']);
+        let plain = |part: &str| {
+            !part.is_empty() && !part.starts_with('.') && !part.contains(['\\', ':', '\0', '%'])
+        };
         if !name.split('/').all(plain) {
             return None;
         }
         let bytes = match self {
-            Self::Embedded => EMBEDDED.iter().find(|(known, _)| *known == name).map(|(_, bytes)| Cow::Borrowed(*bytes)),
+            Self::Embedded => EMBEDDED
+                .iter()
+                .find(|(known, _)| *known == name)
+                .map(|(_, bytes)| Cow::Borrowed(*bytes)),
             Self::Directory(directory) => read_within(directory, name).map(Cow::Owned),
         };
         match bytes {
-            None if name == "index.html" => Some((content_type(name), Cow::Borrowed(NO_VIEWER.as_bytes()))),
+            None if name == "index.html" => {
+                Some((content_type(name), Cow::Borrowed(NO_VIEWER.as_bytes())))
+            }
             None => None,
             Some(bytes) => Some((content_type(name), bytes)),
         }
@@ -94,7 +101,8 @@ mod tests {
         std::fs::write(inner.join(".env"), "hidden").unwrap();
         std::fs::write(inner.join("assets/kernel.wasm"), "wasm").unwrap();
         #[cfg(unix)]
-        std::os::unix::fs::symlink(outer.path().join("secret.txt"), inner.join("link.txt")).unwrap();
+        std::os::unix::fs::symlink(outer.path().join("secret.txt"), inner.join("link.txt"))
+            .unwrap();
         let files = ViewerFiles::Directory(inner);
         assert_eq!(files.get("/").unwrap().1, &b"index"[..]);
         let (content_type, bytes) = files.get("/assets/kernel.wasm").unwrap();

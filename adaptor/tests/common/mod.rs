@@ -66,10 +66,15 @@ impl Solver {
 
     pub fn step(&mut self) {
         let step = Step { cycle: self.cycle, time: self.cycle as f64 * 0.01, time_step: 0.01 };
-        let speed: Vec<f64> = self.mesh.points().iter().map(|[x, y, z]| x + y * z + step.time).collect();
-        let fields =
-            [FieldView { name: "speed", association: Association::Vertex, values: ArrayView::scalars(&speed) }];
-        let channels = [Channel { name: "fluid", mesh: MeshView::from(&self.mesh), fields: &fields }];
+        let speed: Vec<f64> =
+            self.mesh.points().iter().map(|[x, y, z]| x + y * z + step.time).collect();
+        let fields = [FieldView {
+            name: "speed",
+            association: Association::Vertex,
+            values: ArrayView::scalars(&speed),
+        }];
+        let channels =
+            [Channel { name: "fluid", mesh: MeshView::from(&self.mesh), fields: &fields }];
         let begun = Instant::now();
         let steering = self.adaptor.execute(&step, &channels).expect("execute");
         self.slowest = self.slowest.max(begun.elapsed());
@@ -110,14 +115,23 @@ impl Solver {
     }
 
     /// Steps until a viewer has a message that fits.
-    pub fn step_until_told(&mut self, viewer: &mut Viewer, key: &str, fits: impl Fn(&Value) -> bool) -> Value {
+    pub fn step_until_told(
+        &mut self,
+        viewer: &mut Viewer,
+        key: &str,
+        fits: impl Fn(&Value) -> bool,
+    ) -> Value {
         let begun = Instant::now();
         loop {
             self.step();
             if let Some(found) = viewer.look_for(key, Duration::from_millis(2), &fits) {
                 return found;
             }
-            assert!(begun.elapsed() < PATIENCE, "still waiting for {key}; seen: {:#?}", viewer.seen);
+            assert!(
+                begun.elapsed() < PATIENCE,
+                "still waiting for {key}; seen: {:#?}",
+                viewer.seen
+            );
         }
     }
 
@@ -154,8 +168,10 @@ impl Viewer {
     }
 
     pub fn try_connect(url: &str) -> Result<Self, Box<tokio_tungstenite::tungstenite::Error>> {
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
-        let (socket, _) = runtime.block_on(tokio_tungstenite::connect_async(url)).map_err(Box::new)?;
+        let runtime =
+            tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
+        let (socket, _) =
+            runtime.block_on(tokio_tungstenite::connect_async(url)).map_err(Box::new)?;
         Ok(Self { runtime, socket, seen: Vec::new(), frames: Vec::new() })
     }
 
@@ -186,7 +202,12 @@ impl Viewer {
     }
 
     /// A text message under `key` that fits, from those seen or the next ones.
-    pub fn look_for(&mut self, key: &str, wait: Duration, fits: impl Fn(&Value) -> bool) -> Option<Value> {
+    pub fn look_for(
+        &mut self,
+        key: &str,
+        wait: Duration,
+        fits: impl Fn(&Value) -> bool,
+    ) -> Option<Value> {
         let until = Instant::now() + wait;
         loop {
             let found = self.seen.iter().position(|message| message.get(key).is_some_and(&fits));
@@ -203,7 +224,8 @@ impl Viewer {
     }
 
     pub fn wait_for(&mut self, key: &str, fits: impl Fn(&Value) -> bool) -> Value {
-        self.look_for(key, PATIENCE, fits).unwrap_or_else(|| panic!("no {key}; seen: {:#?}", self.seen))
+        self.look_for(key, PATIENCE, fits)
+            .unwrap_or_else(|| panic!("no {key}; seen: {:#?}", self.seen))
     }
 
     pub fn hello(&mut self) -> Value {

@@ -19,12 +19,15 @@ impl Node {
     #[must_use]
     pub fn compatible(&self, other: &Node) -> bool {
         match (self.kind(), other.kind()) {
-            (Kind::Object, Kind::Object) => {
-                other.children().all(|(name, child)| self.get(name).is_none_or(|here| here.compatible(child)))
-            }
+            (Kind::Object, Kind::Object) => other
+                .children()
+                .all(|(name, child)| self.get(name).is_none_or(|here| here.compatible(child))),
             (Kind::List, Kind::List) => {
                 self.count() >= other.count()
-                    && self.children().zip(other.children()).all(|((_, here), (_, child))| here.compatible(child))
+                    && self
+                        .children()
+                        .zip(other.children())
+                        .all(|((_, here), (_, child))| here.compatible(child))
             }
             _ => self.datatype.compatible(&other.datatype),
         }
@@ -35,7 +38,13 @@ impl Node {
     ///
     /// # Errors
     /// There is no memory for the report.
-    pub fn difference(&self, other: &Node, info: &mut Node, epsilon: f64, comparison: Comparison) -> Result<bool> {
+    pub fn difference(
+        &self,
+        other: &Node,
+        info: &mut Node,
+        epsilon: f64,
+        comparison: Comparison,
+    ) -> Result<bool> {
         info.reset();
         let mut differs = false;
         if self.kind() == other.kind() {
@@ -54,7 +63,13 @@ impl Node {
         Ok(differs)
     }
 
-    fn difference_of_objects(&self, other: &Node, info: &mut Node, epsilon: f64, how: Comparison) -> Result<bool> {
+    fn difference_of_objects(
+        &self,
+        other: &Node,
+        info: &mut Node,
+        epsilon: f64,
+        how: Comparison,
+    ) -> Result<bool> {
         let mut differs = false;
         for (name, child) in self.children() {
             match other.get(name) {
@@ -77,7 +92,13 @@ impl Node {
         Ok(differs)
     }
 
-    fn difference_of_lists(&self, other: &Node, info: &mut Node, epsilon: f64, how: Comparison) -> Result<bool> {
+    fn difference_of_lists(
+        &self,
+        other: &Node,
+        info: &mut Node,
+        epsilon: f64,
+        how: Comparison,
+    ) -> Result<bool> {
         let mut differs = false;
         for (index, (_, child)) in self.children().enumerate() {
             match other.child(index) {
@@ -109,7 +130,13 @@ impl Node {
         Ok(!alike)
     }
 
-    fn difference_of_numbers(&self, other: &Node, info: &mut Node, epsilon: f64, how: Comparison) -> Result<bool> {
+    fn difference_of_numbers(
+        &self,
+        other: &Node,
+        info: &mut Node,
+        epsilon: f64,
+        how: Comparison,
+    ) -> Result<bool> {
         let (here, there) = (self.datatype().elements, other.datatype().elements);
         if here > there || (here < there && how == Comparison::Same) {
             complain(info, &format!("{here} elements against {there}"))?;
@@ -131,7 +158,10 @@ impl Node {
             }
         }
         if let Some((index, distance)) = worst {
-            complain(info, &format!("{differing} of {here} elements differ, most by {distance} at {index}"))?;
+            complain(
+                info,
+                &format!("{differing} of {here} elements differ, most by {distance} at {index}"),
+            )?;
             let value = info.child_named("value")?;
             value.take(self.copy()?)?;
             value.subtract(other);

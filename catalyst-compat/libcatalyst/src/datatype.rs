@@ -149,7 +149,8 @@ pub const BIG_ENDIAN: i64 = 1;
 /// The lowest byte first.
 pub const LITTLE_ENDIAN: i64 = 2;
 /// The order of this machine.
-pub const MACHINE_ENDIANNESS: i64 = if cfg!(target_endian = "big") { BIG_ENDIAN } else { LITTLE_ENDIAN };
+pub const MACHINE_ENDIANNESS: i64 =
+    if cfg!(target_endian = "big") { BIG_ENDIAN } else { LITTLE_ENDIAN };
 
 /// The type of a node and the layout of its elements; all lengths in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -183,7 +184,14 @@ impl Datatype {
     #[must_use]
     pub fn compact(kind: Kind, elements: i64) -> Self {
         let bytes = kind.bytes();
-        Self { kind, elements, offset: 0, stride: bytes, element_bytes: bytes, endianness: DEFAULT_ENDIANNESS }
+        Self {
+            kind,
+            elements,
+            offset: 0,
+            stride: bytes,
+            element_bytes: bytes,
+            endianness: DEFAULT_ENDIANNESS,
+        }
     }
 
     /// The offset of an element from the start of the data; `None` where the number does not fit.
@@ -216,7 +224,9 @@ impl Datatype {
     /// Whether what `other` describes fits into what this describes.
     #[must_use]
     pub fn compatible(&self, other: &Datatype) -> bool {
-        self.kind == other.kind && self.element_bytes == other.element_bytes && self.elements >= other.elements
+        self.kind == other.kind
+            && self.element_bytes == other.element_bytes
+            && self.elements >= other.elements
     }
 
     /// Whether the bytes of an element lie as this machine wants them.

@@ -52,7 +52,8 @@ pub fn check(directory: &Path, size: i32) -> Result<u64, String> {
         return Err("ERROR: Empty data_dump_directory path detected.".to_owned());
     }
     let unreadable = |error| format!("ERROR: Error opening directory {place}: {error}");
-    let (mut initialized, mut executed, mut finalized, mut executions) = (0_u64, 0_u64, 0_u64, 0_u64);
+    let (mut initialized, mut executed, mut finalized, mut executions) =
+        (0_u64, 0_u64, 0_u64, 0_u64);
     for entry in fs::read_dir(directory).map_err(unreadable)? {
         let name = entry.map_err(unreadable)?.file_name();
         let Some((stage, ranks)) = name.to_str().and_then(parse) else {
@@ -72,7 +73,9 @@ pub fn check(directory: &Path, size: i32) -> Result<u64, String> {
             }
         }
     }
-    let found = format!("'{place}' holds {initialized} of initialize, {executed} of execute, {finalized} of finalize");
+    let found = format!(
+        "'{place}' holds {initialized} of initialize, {executed} of execute, {finalized} of finalize"
+    );
     if initialized == 0 || executed == 0 || finalized == 0 {
         return Err(format!("ERROR: Missing node data for at least one stage: {found}."));
     }

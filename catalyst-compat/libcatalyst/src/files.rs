@@ -23,7 +23,11 @@ fn format(path: &str, protocol: &str) -> Result<Format> {
     } else {
         protocol
     };
-    if name == "conduit_bin" { Ok(Format::Binary) } else { Protocol::from_name(name).map(Format::Text) }
+    if name == "conduit_bin" {
+        Ok(Format::Binary)
+    } else {
+        Protocol::from_name(name).map(Format::Text)
+    }
 }
 
 /// Writes a tree. Without a protocol the end of the path says which, else it is `conduit_bin`.
@@ -32,7 +36,8 @@ fn format(path: &str, protocol: &str) -> Result<Format> {
 /// The file cannot be written, or a leaf has no data.
 pub fn save(node: &Node, path: &str, protocol: &str) -> Result<()> {
     let write = |path: &str, bytes: &[u8]| {
-        fs::write(Path::new(path), bytes).map_err(|error| Error::new(format!("'{path}' cannot be written: {error}")))
+        fs::write(Path::new(path), bytes)
+            .map_err(|error| Error::new(format!("'{path}' cannot be written: {error}")))
     };
     let style = Style::default();
     match format(path, protocol)? {
@@ -41,8 +46,12 @@ pub fn save(node: &Node, path: &str, protocol: &str) -> Result<()> {
             write(path, &data)?;
             write(&format!("{path}_json"), schema.as_bytes())
         }
-        Format::Text(Protocol::Json) => write(path, node.to_json(&style, Detail::Values).as_bytes()),
-        Format::Text(Protocol::Schema) => write(path, node.to_json(&style, Detail::Everything).as_bytes()),
+        Format::Text(Protocol::Json) => {
+            write(path, node.to_json(&style, Detail::Values).as_bytes())
+        }
+        Format::Text(Protocol::Schema) => {
+            write(path, node.to_json(&style, Detail::Everything).as_bytes())
+        }
         Format::Text(Protocol::Yaml) => write(path, node.to_yaml(&style).as_bytes()),
         Format::Text(Protocol::Base64) => write(path, schema::to_base64_json(node)?.as_bytes()),
     }
@@ -53,12 +62,16 @@ pub fn save(node: &Node, path: &str, protocol: &str) -> Result<()> {
 /// # Errors
 /// The file cannot be read, or is not what the protocol says.
 pub fn load(path: &str, protocol: &str) -> Result<Node> {
-    let read =
-        |path: &str| fs::read(Path::new(path)).map_err(|error| Error::new(format!("'{path}' cannot be read: {error}")));
+    let read = |path: &str| {
+        fs::read(Path::new(path))
+            .map_err(|error| Error::new(format!("'{path}' cannot be read: {error}")))
+    };
     let text = |path: &str| read(path).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     let inside = |error: Error| Error::new(format!("'{path}': {error}"));
     match format(path, protocol)? {
-        Format::Binary => schema::within(&text(&format!("{path}_json"))?, &mut read(path)?).map_err(inside),
+        Format::Binary => {
+            schema::within(&text(&format!("{path}_json"))?, &mut read(path)?).map_err(inside)
+        }
         Format::Text(protocol) => schema::parse(&text(path)?, protocol).map_err(inside),
     }
 }

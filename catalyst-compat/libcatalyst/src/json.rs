@@ -29,14 +29,19 @@ impl Value {
     #[must_use]
     pub fn get(&self, name: &str) -> Option<&Value> {
         match self {
-            Value::Object(entries) => entries.iter().find(|(key, _)| key == name).map(|(_, value)| value),
+            Value::Object(entries) => {
+                entries.iter().find(|(key, _)| key == name).map(|(_, value)| value)
+            }
             _ => None,
         }
     }
 
     /// The integer.
     #[must_use]
-    #[expect(clippy::cast_possible_truncation, reason = "only whole numbers well inside the range are converted")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "only whole numbers well inside the range are converted"
+    )]
     pub fn integer(&self) -> Option<i64> {
         match self {
             Value::Integer(value) => Some(*value),
@@ -89,7 +94,10 @@ pub fn number(word: &str) -> Option<Value> {
             return Some(Value::Unsigned(value));
         }
     }
-    if digits.bytes().all(|byte| byte.is_ascii_digit() || matches!(byte, b'.' | b'e' | b'E' | b'+' | b'-')) {
+    if digits
+        .bytes()
+        .all(|byte| byte.is_ascii_digit() || matches!(byte, b'.' | b'e' | b'E' | b'+' | b'-'))
+    {
         return plain.parse().ok().map(Value::Real);
     }
     None
@@ -126,7 +134,9 @@ impl Reader<'_> {
             Some(byte) => format!("byte {byte}"),
             None => "the end".to_owned(),
         };
-        Error::new(format!("JSON, line {line}, column {column}: {expected} is expected, not {found}"))
+        Error::new(format!(
+            "JSON, line {line}, column {column}: {expected} is expected, not {found}"
+        ))
     }
 
     fn peek(&self) -> Option<u8> {
@@ -265,7 +275,8 @@ impl Reader<'_> {
             b'f' => '\u{c}',
             b'u' => {
                 let high = self.hexadecimal()?;
-                let pair = (0xd800..0xdc00).contains(&high) && self.bytes.get(self.at..self.at + 2) == Some(b"\\u");
+                let pair = (0xd800..0xdc00).contains(&high)
+                    && self.bytes.get(self.at..self.at + 2) == Some(b"\\u");
                 let code = if pair {
                     self.at += 2;
                     let low = self.hexadecimal()?;
@@ -281,7 +292,10 @@ impl Reader<'_> {
     }
 
     fn hexadecimal(&mut self) -> Result<u32> {
-        let digits = self.bytes.get(self.at..self.at + 4).and_then(|digits| std::str::from_utf8(digits).ok());
+        let digits = self
+            .bytes
+            .get(self.at..self.at + 4)
+            .and_then(|digits| std::str::from_utf8(digits).ok());
         let Some(code) = digits.and_then(|digits| u32::from_str_radix(digits, 16).ok()) else {
             return Err(self.wrong("four hexadecimal digits"));
         };

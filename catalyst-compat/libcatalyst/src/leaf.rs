@@ -35,7 +35,10 @@ impl Number {
 
     /// The integer, if it is one that fits.
     #[must_use]
-    #[expect(clippy::cast_possible_truncation, reason = "only whole numbers well inside the range are converted")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "only whole numbers well inside the range are converted"
+    )]
     pub fn as_i64(self) -> Option<i64> {
         match self {
             Number::Signed(value) => Some(value),
@@ -73,14 +76,22 @@ pub fn described(kind: Kind, data: *const u8, mut layout: Datatype) -> Result<Da
         return refuse(format!("{} elements", layout.elements));
     }
     if layout.element_bytes != kind.bytes() {
-        return refuse(format!("elements of {} bytes, where the type has {}", layout.element_bytes, kind.bytes()));
+        return refuse(format!(
+            "elements of {} bytes, where the type has {}",
+            layout.element_bytes,
+            kind.bytes()
+        ));
     }
     if !(0..=2).contains(&layout.endianness) {
         return refuse(format!("no order of bytes has the number {}", layout.endianness));
     }
-    let last = layout.stride.checked_mul(layout.elements).and_then(|span| span.checked_add(layout.offset));
+    let last =
+        layout.stride.checked_mul(layout.elements).and_then(|span| span.checked_add(layout.offset));
     if last.is_none() {
-        return refuse(format!("{} elements at a stride of {} bytes", layout.elements, layout.stride));
+        return refuse(format!(
+            "{} elements at a stride of {} bytes",
+            layout.elements, layout.stride
+        ));
     }
     if data.is_null() && layout.elements > 1 {
         return refuse(format!("{} elements at a null address", layout.elements));
@@ -110,7 +121,9 @@ impl Node {
         let inside = (0..self.datatype.elements).contains(&index) && !address.is_null();
         let fits = match (self.memory.known_length(), self.datatype.element_index(index)) {
             (Some(length), Some(offset)) => {
-                offset >= 0 && usize::try_from(offset + self.datatype.element_bytes).is_ok_and(|end| end <= length)
+                offset >= 0
+                    && usize::try_from(offset + self.datatype.element_bytes)
+                        .is_ok_and(|end| end <= length)
             }
             (None, Some(_)) => true,
             _ => false,
@@ -121,7 +134,9 @@ impl Node {
     /// The bytes of an element in this machine's order; unused ones are 0.
     fn bytes(&self, index: i64) -> Option<[u8; 8]> {
         let address = self.readable(index)?;
-        let size = usize::try_from(self.datatype.element_bytes).ok().filter(|size| (1..=8).contains(size))?;
+        let size = usize::try_from(self.datatype.element_bytes)
+            .ok()
+            .filter(|size| (1..=8).contains(size))?;
         let mut bytes = [0; 8];
         // SAFETY: `readable` saw that the element lies inside the block; borrowed memory has the layout that its owner stated.
         unsafe { ptr::copy_nonoverlapping(address, bytes.as_mut_ptr(), size) };
@@ -169,7 +184,8 @@ impl Node {
         if self.kind() != Kind::Text {
             return None;
         }
-        let bytes = (0..self.datatype.elements).map_while(|index| self.bytes(index).map(|bytes| bytes[0]));
+        let bytes =
+            (0..self.datatype.elements).map_while(|index| self.bytes(index).map(|bytes| bytes[0]));
         Some(bytes.take_while(|byte| *byte != 0).collect())
     }
 
@@ -184,7 +200,8 @@ impl Node {
     /// # Errors
     /// There is not so much memory.
     pub fn make_room(&mut self, wanted: Datatype) -> Result<()> {
-        let room = self.datatype.compatible(&wanted) && (!self.data().is_null() || wanted.elements == 0);
+        let room =
+            self.datatype.compatible(&wanted) && (!self.data().is_null() || wanted.elements == 0);
         if room && self.datatype.matches_machine() {
             return Ok(());
         }
@@ -202,7 +219,12 @@ impl Node {
     ///
     /// # Errors
     /// As [`described`], or there is not so much memory.
-    pub unsafe fn set_elements(&mut self, kind: Kind, data: *const u8, layout: Datatype) -> Result<()> {
+    pub unsafe fn set_elements(
+        &mut self,
+        kind: Kind,
+        data: *const u8,
+        layout: Datatype,
+    ) -> Result<()> {
         let layout = described(kind, data, layout)?;
         if data.is_null() && layout.elements > 0 {
             return Err(Error::new(format!(
@@ -238,12 +260,21 @@ impl Node {
             return Ok(());
         }
         if !to.compatible(&from) {
-            return Err(Error::new(format!("{} elements of {} do not fit", from.elements, from.kind.name())));
+            return Err(Error::new(format!(
+                "{} elements of {} do not fit",
+                from.elements,
+                from.kind.name()
+            )));
         }
-        let missing = || Error::new(format!("an array of {} {} has no data", from.elements, from.kind.name()));
+        let missing = || {
+            Error::new(format!("an array of {} {} has no data", from.elements, from.kind.name()))
+        };
         let size = usize::try_from(from.element_bytes).map_err(|_| missing())?;
         let ends = [0, from.elements - 1];
-        if ends.iter().any(|index| source.readable(*index).is_none() || self.readable(*index).is_none()) {
+        if ends
+            .iter()
+            .any(|index| source.readable(*index).is_none() || self.readable(*index).is_none())
+        {
             return Err(missing());
         }
         let packed = from.stride == from.element_bytes && to.stride == to.element_bytes;
@@ -302,7 +333,9 @@ impl Node {
     /// There is no memory.
     pub fn set_number<T: Element>(&mut self, value: T) -> Result<()> {
         // SAFETY: `value` is one element of its own type.
-        unsafe { self.set_elements(T::KIND, ptr::from_ref(&value).cast(), Datatype::compact(T::KIND, 1)) }
+        unsafe {
+            self.set_elements(T::KIND, ptr::from_ref(&value).cast(), Datatype::compact(T::KIND, 1))
+        }
     }
 
     /// Sets an array of numbers.
@@ -312,7 +345,9 @@ impl Node {
     pub fn set_numbers<T: Element>(&mut self, values: &[T]) -> Result<()> {
         let count = i64::try_from(values.len()).map_err(|_| Error::new("too many elements"))?;
         // SAFETY: a slice is that many elements of its type.
-        unsafe { self.set_elements(T::KIND, values.as_ptr().cast(), Datatype::compact(T::KIND, count)) }
+        unsafe {
+            self.set_elements(T::KIND, values.as_ptr().cast(), Datatype::compact(T::KIND, count))
+        }
     }
 
     /// Sets a text; a nul is added.
@@ -320,14 +355,17 @@ impl Node {
     /// # Errors
     /// There is no memory.
     pub fn set_text(&mut self, text: impl AsRef<[u8]>) -> Result<()> {
-        let mut bytes: Vec<u8> = text.as_ref().iter().copied().take_while(|byte| *byte != 0).collect();
+        let mut bytes: Vec<u8> =
+            text.as_ref().iter().copied().take_while(|byte| *byte != 0).collect();
         bytes.push(0);
         let count = i64::try_from(bytes.len()).map_err(|_| Error::new("too long a text"))?;
         if self.datatype.elements != count && !matches!(self.memory, Memory::Borrowed(_)) {
             self.reset();
         }
         // SAFETY: the vector is that many bytes.
-        unsafe { self.set_elements(Kind::Text, bytes.as_ptr(), Datatype::compact(Kind::Text, count)) }
+        unsafe {
+            self.set_elements(Kind::Text, bytes.as_ptr(), Datatype::compact(Kind::Text, count))
+        }
     }
 
     /// Checks that this leaf holds elements of a type.
@@ -339,7 +377,12 @@ impl Node {
         if self.kind() == kind {
             return Ok(());
         }
-        Err(Error::warning(format!("{} holds {}, not {}", self.place(), self.kind().name(), kind.name())))
+        Err(Error::warning(format!(
+            "{} holds {}, not {}",
+            self.place(),
+            self.kind().name(),
+            kind.name()
+        )))
     }
 
     /// The first element, as what it is.

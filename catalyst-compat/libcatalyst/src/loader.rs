@@ -105,7 +105,9 @@ pub fn load(parameters: Option<&Node>) -> Result<Implementation, Status> {
         return Ok(implementation);
     }
     let prefer_environment = variable("CATALYST_IMPLEMENTATION_PREFER_ENV").is_some();
-    debug(|| format!("the environment comes {}", if prefer_environment { "first" } else { "second" }));
+    debug(|| {
+        format!("the environment comes {}", if prefer_environment { "first" } else { "second" })
+    });
     let from_node = parameters
         .and_then(|node| node.find("catalyst_load/implementation"))
         .and_then(Node::text_bytes)
@@ -113,9 +115,15 @@ pub fn load(parameters: Option<&Node>) -> Result<Implementation, Status> {
         .map(OsString::from_vec);
     let from_environment = variable("CATALYST_IMPLEMENTATION_NAME");
     debug(|| {
-        format!("'catalyst_load/implementation' is {from_node:?}, CATALYST_IMPLEMENTATION_NAME is {from_environment:?}")
+        format!(
+            "'catalyst_load/implementation' is {from_node:?}, CATALYST_IMPLEMENTATION_NAME is {from_environment:?}"
+        )
     });
-    let name = if prefer_environment { from_environment.or(from_node) } else { from_node.or(from_environment) };
+    let name = if prefer_environment {
+        from_environment.or(from_node)
+    } else {
+        from_node.or(from_environment)
+    };
     let implementation = match name {
         None => {
             debug(|| "no implementation is named; the stub answers".to_owned());
@@ -159,9 +167,13 @@ fn directories(parameters: Option<&Node>, prefer_environment: bool) -> Vec<PathB
     let from_node = parameters
         .and_then(|node| node.find("catalyst_load/search_paths"))
         .into_iter()
-        .flat_map(
-            |paths| if paths.count() == 0 { vec![paths] } else { paths.children().map(|(_, path)| path).collect() },
-        )
+        .flat_map(|paths| {
+            if paths.count() == 0 {
+                vec![paths]
+            } else {
+                paths.children().map(|(_, path)| path).collect()
+            }
+        })
         .filter_map(Node::text_bytes)
         .map(|path| PathBuf::from(OsString::from_vec(path)));
     let listed = variable("CATALYST_IMPLEMENTATION_PATHS").unwrap_or_default();
@@ -237,6 +249,10 @@ fn reason() -> String {
     // SAFETY: `dlerror` gives null or a C string that lives until the next call on this thread.
     unsafe {
         let message = libc::dlerror();
-        if message.is_null() { String::new() } else { CStr::from_ptr(message).to_string_lossy().into_owned() }
+        if message.is_null() {
+            String::new()
+        } else {
+            CStr::from_ptr(message).to_string_lossy().into_owned()
+        }
     }
 }

@@ -96,7 +96,10 @@ impl Node {
     pub fn children(&self) -> impl Iterator<Item = (&str, &Node)> {
         self.settle();
         // SAFETY: as in `child`.
-        self.children.list().iter().map(|child| (child.name.as_str(), unsafe { child.node.as_ref() }))
+        self.children
+            .list()
+            .iter()
+            .map(|child| (child.name.as_str(), unsafe { child.node.as_ref() }))
     }
 
     fn position(&self, name: &str) -> Option<usize> {
@@ -208,7 +211,9 @@ impl Node {
         let Some(parent) = (unsafe { self.parent.get().as_ref() }) else {
             return String::new();
         };
-        let Some(index) = parent.children.list().iter().position(|child| ptr::eq(child.node.as_ptr(), self)) else {
+        let Some(index) =
+            parent.children.list().iter().position(|child| ptr::eq(child.node.as_ptr(), self))
+        else {
             return String::new();
         };
         match parent.name_of(index) {
@@ -339,7 +344,11 @@ impl Node {
     /// There is no such child.
     pub fn remove(&mut self, index: usize) -> Result<()> {
         let Some(child) = self.children.remove(index) else {
-            return Err(Error::new(format!("{} has {} children, none of number {index}", self.place(), self.count())));
+            return Err(Error::new(format!(
+                "{} has {} children, none of number {index}",
+                self.place(),
+                self.count()
+            )));
         };
         // SAFETY: as in `release_children`.
         drop(unsafe { Box::from_raw(child.node.as_ptr()) });
@@ -383,8 +392,11 @@ impl Node {
     /// This is no object, the child is not there, or the new name is taken.
     pub fn rename(&mut self, old: &str, new: &str) -> Result<()> {
         if self.kind() != Kind::Object {
-            let message =
-                format!("{} holds {}; only an object's children have names", self.place(), self.kind().name());
+            let message = format!(
+                "{} holds {}; only an object's children have names",
+                self.place(),
+                self.kind().name()
+            );
             return Err(Error::new(message));
         }
         if self.position(new).is_some() {

@@ -108,7 +108,9 @@ impl Node {
             values = self.numbers().take(most - most / 2).map(write).collect();
             values.push("...".to_owned());
             let from = self.datatype().elements - last;
-            values.extend((from..self.datatype().elements).filter_map(|index| self.number(index)).map(write));
+            values.extend(
+                (from..self.datatype().elements).filter_map(|index| self.number(index)).map(write),
+            );
         } else {
             values = self.numbers().map(write).collect();
         }
@@ -137,7 +139,8 @@ impl Node {
                 let _ = write!(text, "{}: ", quote(name));
             }
             child.write_json(text, style, depth + 1, detail);
-            let _ = write!(text, "{}{}", if index + 1 < self.count() { "," } else { "" }, style.end);
+            let _ =
+                write!(text, "{}{}", if index + 1 < self.count() { "," } else { "" }, style.end);
         }
         let _ = write!(text, "{}{close}", style.margin(depth));
     }
@@ -145,7 +148,11 @@ impl Node {
     fn write_leaf(&self, text: &mut String, style: &Style, detail: Detail) {
         if detail == Detail::Values {
             let empty = self.kind() == Kind::Empty;
-            text.push_str(&if empty { "null".to_owned() } else { self.values(style.elements, true) });
+            text.push_str(&if empty {
+                "null".to_owned()
+            } else {
+                self.values(style.elements, true)
+            });
             return;
         }
         let datatype = self.datatype();
@@ -193,7 +200,12 @@ impl Node {
                 if index == first {
                     let left_out = self.count() - first - last;
                     let children = if left_out == 1 { "child" } else { "children" };
-                    let _ = write!(text, "{}... ( skipped {left_out} {children} ){}", style.margin(depth), style.end);
+                    let _ = write!(
+                        text,
+                        "{}... ( skipped {left_out} {children} ){}",
+                        style.margin(depth),
+                        style.end
+                    );
                 }
                 continue;
             }
@@ -215,7 +227,9 @@ impl Node {
 fn key(name: &str) -> String {
     let plain = !name.is_empty()
         && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"_-./ ()+*".contains(&byte))
-        && name.starts_with(|first: char| first.is_ascii_alphanumeric() || first == '_' || first == '/')
+        && name.starts_with(|first: char| {
+            first.is_ascii_alphanumeric() || first == '_' || first == '/'
+        })
         && name.trim() == name;
     if plain { name.to_owned() } else { quote(name) }
 }

@@ -22,7 +22,10 @@ pub fn has_mpi() -> bool {
 /// Rank and size of the world; 0 and 1 for a process by itself.
 #[must_use]
 pub fn rank_and_size() -> (i32, i32) {
-    from_mpi().or_else(from_environment).filter(|(rank, size)| *rank >= 0 && rank < size).unwrap_or((0, 1))
+    from_mpi()
+        .or_else(from_environment)
+        .filter(|(rank, size)| *rank >= 0 && rank < size)
+        .unwrap_or((0, 1))
 }
 
 /// The world of MPICH and its kin, which is a constant; Open MPI's is an object with a name.
@@ -36,7 +39,9 @@ pub fn world() -> Option<u64> {
         (Some(world), Some(convert)) => {
             // SAFETY: a function of this name in a process with Open MPI takes a communicator and gives a number.
             let handle = unsafe {
-                std::mem::transmute::<*mut c_void, unsafe extern "C" fn(*mut c_void) -> c_int>(convert)(world)
+                std::mem::transmute::<*mut c_void, unsafe extern "C" fn(*mut c_void) -> c_int>(
+                    convert,
+                )(world)
             };
             u64::try_from(handle).ok()
         }
@@ -54,7 +59,11 @@ fn from_mpi() -> Option<(i32, i32)> {
     unsafe {
         let initialized = std::mem::transmute::<*mut c_void, Ask>(initialized);
         let finalized = std::mem::transmute::<*mut c_void, Ask>(finalized);
-        if initialized(&raw mut started) != 0 || finalized(&raw mut ended) != 0 || started == 0 || ended != 0 {
+        if initialized(&raw mut started) != 0
+            || finalized(&raw mut ended) != 0
+            || started == 0
+            || ended != 0
+        {
             return None;
         }
         let rank_of = std::mem::transmute::<*mut c_void, AskOfWorld>(rank_of);

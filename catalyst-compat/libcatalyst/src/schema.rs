@@ -33,7 +33,9 @@ impl Protocol {
             "yaml" => Self::Yaml,
             _ => {
                 let known = "json, conduit_json, conduit_base64_json and yaml";
-                return Err(Error::new(format!("there is no protocol '{name}'; there are {known}")));
+                return Err(Error::new(format!(
+                    "there is no protocol '{name}'; there are {known}"
+                )));
             }
         })
     }
@@ -48,9 +50,11 @@ pub fn parse(text: &str, protocol: Protocol) -> Result<Node> {
     match protocol {
         Protocol::Json => plain(&json::parse(text)?, &mut node)?,
         Protocol::Yaml => plain(&yaml::parse(text)?, &mut node)?,
-        Protocol::Schema => {
-            Layout { data: std::ptr::null_mut(), length: None }.read(&json::parse(text)?, &mut node, &mut 0)?
-        }
+        Protocol::Schema => Layout { data: std::ptr::null_mut(), length: None }.read(
+            &json::parse(text)?,
+            &mut node,
+            &mut 0,
+        )?,
         Protocol::Base64 => return parse_base64(text),
     }
     Ok(node)
@@ -79,7 +83,11 @@ pub unsafe fn over(text: &str, protocol: Protocol, data: *mut u8) -> Result<Node
 pub fn within(schema: &str, data: &mut [u8]) -> Result<Node> {
     let mut node = Node::new();
     let length = i64::try_from(data.len()).map_err(|_| Error::new("too much data"))?;
-    Layout { data: data.as_mut_ptr(), length: Some(length) }.read(&json::parse(schema)?, &mut node, &mut 0)?;
+    Layout { data: data.as_mut_ptr(), length: Some(length) }.read(
+        &json::parse(schema)?,
+        &mut node,
+        &mut 0,
+    )?;
     node.copy()
 }
 
@@ -103,7 +111,8 @@ fn parse_base64(text: &str) -> Result<Node> {
 pub fn serialize(node: &Node) -> Result<(String, Vec<u8>)> {
     let compact = node.compacted()?;
     let schema = compact.to_json(&crate::print::Style::default(), crate::print::Detail::Layout);
-    let bytes = usize::try_from(compact.compact_bytes()).map_err(|_| Error::new("too much data"))?;
+    let bytes =
+        usize::try_from(compact.compact_bytes()).map_err(|_| Error::new("too much data"))?;
     let start = compact.data();
     if bytes == 0 || start.is_null() {
         return Ok((schema, Vec::new()));
@@ -118,7 +127,10 @@ pub fn serialize(node: &Node) -> Result<(String, Vec<u8>)> {
 /// As [`serialize`].
 pub fn to_base64_json(node: &Node) -> Result<String> {
     let (schema, data) = serialize(node)?;
-    Ok(format!("{{\n\"schema\": {schema},\n\"data\": {{\"base64\": \"{}\"}}\n}}\n", base64::encode(&data)))
+    Ok(format!(
+        "{{\n\"schema\": {schema},\n\"data\": {{\"base64\": \"{}\"}}\n}}\n",
+        base64::encode(&data)
+    ))
 }
 
 /// The child of a name, which a text brings once.
@@ -162,7 +174,9 @@ fn plain(value: &Value, node: &mut Node) -> Result<()> {
                 .collect();
             match integers {
                 Some(integers) => node.set_numbers(&integers),
-                None => node.set_numbers(&values.iter().filter_map(Value::real).collect::<Vec<_>>()),
+                None => {
+                    node.set_numbers(&values.iter().filter_map(Value::real).collect::<Vec<_>>())
+                }
             }
         }
     }
@@ -197,7 +211,9 @@ impl Layout {
                         return Err(Error::new("a schema nested too deeply"));
                     }
                     node.become_tree(Kind::Object);
-                    entries.iter().try_for_each(|(name, entry)| self.read(entry, new_child(node, name)?, used))
+                    entries.iter().try_for_each(|(name, entry)| {
+                        self.read(entry, new_child(node, name)?, used)
+                    })
                 }
             },
             other => Err(Error::new(format!("a schema holds types, not {other:?}"))),
@@ -205,7 +221,8 @@ impl Layout {
     }
 
     fn leaf(&self, name: &str, schema: &Value, node: &mut Node, used: &mut i64) -> Result<()> {
-        let kind = Kind::from_name(name).ok_or_else(|| Error::new(format!("there is no type '{name}'")))?;
+        let kind = Kind::from_name(name)
+            .ok_or_else(|| Error::new(format!("there is no type '{name}'")))?;
         match kind {
             Kind::Empty => {
                 node.reset();
@@ -220,7 +237,9 @@ impl Layout {
         let value = schema.get("value");
         let counted = match value {
             Some(Value::List(values)) => i64::try_from(values.len()).unwrap_or(i64::MAX),
-            Some(Value::Text(text)) if kind == Kind::Text => i64::try_from(text.len() + 1).unwrap_or(i64::MAX),
+            Some(Value::Text(text)) if kind == Kind::Text => {
+                i64::try_from(text.len() + 1).unwrap_or(i64::MAX)
+            }
             _ => 1,
         };
         let elements = integer(schema, &["number_of_elements", "length"])?.unwrap_or(counted);
@@ -229,7 +248,9 @@ impl Layout {
             Some(Value::Text(order)) if order == "default" => DEFAULT_ENDIANNESS,
             Some(Value::Text(order)) if order == "big" => BIG_ENDIAN,
             Some(Value::Text(order)) if order == "little" => LITTLE_ENDIAN,
-            Some(other) => return Err(Error::new(format!("'endianness' is big or little, not {other:?}"))),
+            Some(other) => {
+                return Err(Error::new(format!("'endianness' is big or little, not {other:?}")));
+            }
         };
         let datatype = Datatype {
             kind,
@@ -240,7 +261,11 @@ impl Layout {
             endianness,
         };
         let datatype = described(kind, self.data.cast_const(), datatype).or_else(|error| {
-            if self.data.is_null() { described(kind, std::ptr::dangling(), datatype) } else { Err(error) }
+            if self.data.is_null() {
+                described(kind, std::ptr::dangling(), datatype)
+            } else {
+                Err(error)
+            }
         })?;
         let end = datatype.offset.checked_add(datatype.strided_bytes());
         if self.data.is_null() {
@@ -252,8 +277,11 @@ impl Layout {
                     && end.is_some_and(|end| end <= length)
             };
             if let Some(length) = self.length.filter(|length| !fits(*length)) {
-                let message =
-                    format!("{elements} {} at {} reach beyond {length} bytes of data", kind.name(), datatype.offset);
+                let message = format!(
+                    "{elements} {} at {} reach beyond {length} bytes of data",
+                    kind.name(),
+                    datatype.offset
+                );
                 return Err(Error::new(message));
             }
             node.borrow_elements(kind, self.data, datatype)?;
@@ -268,7 +296,9 @@ fn fill(node: &mut Node, value: &Value) -> Result<()> {
     let mut written = Node::new();
     match (node.kind(), value) {
         (Kind::Text, Value::Text(text)) => written.set_text(text)?,
-        (Kind::Text, other) => return Err(Error::new(format!("a text is expected, not {other:?}"))),
+        (Kind::Text, other) => {
+            return Err(Error::new(format!("a text is expected, not {other:?}")));
+        }
         (kind, Value::List(values)) => convert(kind, values, &mut written)?,
         (_, Value::Null) => return Ok(()),
         (kind, one) => convert(kind, std::slice::from_ref(one), &mut written)?,
@@ -290,11 +320,17 @@ fn convert(kind: Kind, values: &[Value], node: &mut Node) -> Result<()> {
                 Value::Unsigned(value) => <$type>::try_from(*value).ok(),
                 value => value.integer().and_then(|value| <$type>::try_from(value).ok()),
             };
-            let all: Result<Vec<$type>> = values.iter().map(|value| one(value).ok_or_else(|| wrong(value))).collect();
+            let all: Result<Vec<$type>> =
+                values.iter().map(|value| one(value).ok_or_else(|| wrong(value))).collect();
             node.set_numbers(&all?)
         }};
     }
-    let reals = || values.iter().map(|value| value.real().ok_or_else(|| wrong(value))).collect::<Result<Vec<f64>>>();
+    let reals = || {
+        values
+            .iter()
+            .map(|value| value.real().ok_or_else(|| wrong(value)))
+            .collect::<Result<Vec<f64>>>()
+    };
     match kind {
         Kind::Int8 => integers!(i8),
         Kind::Int16 => integers!(i16),
@@ -304,7 +340,9 @@ fn convert(kind: Kind, values: &[Value], node: &mut Node) -> Result<()> {
         Kind::Uint16 => integers!(u16),
         Kind::Uint32 => integers!(u32),
         Kind::Uint64 => integers!(u64),
-        Kind::Float32 => node.set_numbers(&reals()?.into_iter().map(|value| value as f32).collect::<Vec<_>>()),
+        Kind::Float32 => {
+            node.set_numbers(&reals()?.into_iter().map(|value| value as f32).collect::<Vec<_>>())
+        }
         Kind::Float64 => node.set_numbers(&reals()?),
         Kind::Empty | Kind::Object | Kind::List | Kind::Text => Ok(()),
     }

@@ -20,18 +20,22 @@ pub const INTERFACE_VERSION: &str = "3";
 pub const CONDUIT_VERSION: &str = "0.9.2";
 
 /// The stub as a table of functions.
-pub const IMPLEMENTATION: Implementation = Implementation { initialize, execute, finalize, about, results };
+pub const IMPLEMENTATION: Implementation =
+    Implementation { initialize, execute, finalize, about, results };
 
 static EXECUTED: AtomicU64 = AtomicU64::new(0);
 
 fn dump(stage: Stage, node: *const Node) -> c_int {
-    let Some(directory) = env::var_os("CATALYST_DATA_DUMP_DIRECTORY").filter(|path| !path.is_empty()) else {
+    let Some(directory) =
+        env::var_os("CATALYST_DATA_DUMP_DIRECTORY").filter(|path| !path.is_empty())
+    else {
         return Status::Ok as c_int;
     };
     let written = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| -> Result<()> {
         let directory = PathBuf::from(directory);
-        fs::create_dir_all(&directory)
-            .map_err(|error| Error::new(format!("'{}' cannot be made: {error}", directory.display())))?;
+        fs::create_dir_all(&directory).map_err(|error| {
+            Error::new(format!("'{}' cannot be made: {error}", directory.display()))
+        })?;
         let path = dump::path(&directory, stage, ranks::rank_and_size());
         let empty = Node::new();
         // SAFETY: the caller of a Catalyst function hands over null or a live node.
@@ -41,7 +45,9 @@ fn dump(stage: Stage, node: *const Node) -> c_int {
     match written {
         Ok(Ok(())) => {}
         Ok(Err(error)) => eprintln!("catalyst: the node of {stage:?} is not written: {error}"),
-        Err(_) => eprintln!("catalyst: the node of {stage:?} is not written: a defect of this library"),
+        Err(_) => {
+            eprintln!("catalyst: the node of {stage:?} is not written: a defect of this library")
+        }
     }
     Status::Ok as c_int
 }
@@ -104,7 +110,8 @@ fn describe(node: &mut Node) -> Result<()> {
 /// There is no memory.
 pub fn about_conduit(node: &mut Node) -> Result<()> {
     node.at("version")?.set_text(CONDUIT_VERSION)?;
-    node.at("implementation")?.set_text(concat!("tombolo-libcatalyst ", env!("CARGO_PKG_VERSION")))?;
+    node.at("implementation")?
+        .set_text(concat!("tombolo-libcatalyst ", env!("CARGO_PKG_VERSION")))?;
     node.at("index_t")?.set_text("int64")?;
     for (name, width) in [
         ("char", "int8"),

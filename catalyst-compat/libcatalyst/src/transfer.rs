@@ -84,7 +84,10 @@ impl Node {
     pub fn take(&mut self, tree: Node) -> Result<()> {
         let (above, below) = (self.depth(), tree.height());
         if above + below > DEEPEST {
-            return Err(Error::new(format!("{below} levels below {} would be deeper than {DEEPEST}", self.place())));
+            return Err(Error::new(format!(
+                "{below} levels below {} would be deeper than {DEEPEST}",
+                self.place()
+            )));
         }
         self.replace(tree);
         Ok(())
@@ -111,7 +114,9 @@ impl Node {
                 }
                 Ok(())
             }
-            _ if self.datatype.compatible(&other.datatype) && !self.data().is_null() => self.write_from(other),
+            _ if self.datatype.compatible(&other.datatype) && !self.data().is_null() => {
+                self.write_from(other)
+            }
             _ => self.take(other.copy()?),
         }
     }
@@ -139,7 +144,9 @@ impl Node {
                 }
                 Ok(())
             }
-            (kind, _) if kind.is_leaf() && self.datatype.compatible(&other.datatype) => self.write_from(other),
+            (kind, _) if kind.is_leaf() && self.datatype.compatible(&other.datatype) => {
+                self.write_from(other)
+            }
             _ => Ok(()),
         }
     }
@@ -153,7 +160,9 @@ impl Node {
             Kind::Empty => Ok(()),
             Kind::Object => {
                 self.become_tree(Kind::Object);
-                other.children().try_for_each(|(name, child)| self.child_named(name)?.update_external(child))
+                other
+                    .children()
+                    .try_for_each(|(name, child)| self.child_named(name)?.update_external(child))
             }
             Kind::List => {
                 self.become_tree(Kind::List);
@@ -200,7 +209,8 @@ impl Node {
                 }
             }
             kind => {
-                let datatype = Datatype { offset: *used, ..Datatype::compact(kind, self.datatype().elements) };
+                let datatype =
+                    Datatype { offset: *used, ..Datatype::compact(kind, self.datatype().elements) };
                 copy.within(datatype, Arc::clone(block));
                 copy.write_from(self)?;
                 *used += datatype.compact_bytes();
@@ -230,8 +240,11 @@ impl Node {
     /// Bytes that the tree has allocated itself.
     #[must_use]
     pub fn allocated_bytes(&self) -> i64 {
-        let own =
-            if let Memory::Owned(block) = &self.memory { i64::try_from(block.len()).unwrap_or(i64::MAX) } else { 0 };
+        let own = if let Memory::Owned(block) = &self.memory {
+            i64::try_from(block.len()).unwrap_or(i64::MAX)
+        } else {
+            0
+        };
         self.children().fold(own, |sum, (_, child)| child.allocated_bytes().saturating_add(sum))
     }
 
@@ -249,7 +262,9 @@ impl Node {
             if here.is_null() || (!start.is_null() && here != start) {
                 return None;
             }
-            return Some(here.wrapping_offset(isize::try_from(self.datatype.strided_bytes()).ok()?));
+            return Some(
+                here.wrapping_offset(isize::try_from(self.datatype.strided_bytes()).ok()?),
+            );
         }
         self.children().try_fold(start, |end, (_, child)| child.contiguous_from(end))
     }

@@ -18,7 +18,8 @@ const MOST_ALIASED: usize = 1 << 20;
 /// # Errors
 /// It is not the YAML that is understood; the message has the line.
 pub fn parse(text: &str) -> Result<Value> {
-    let mut lines: Vec<Line<'_>> = text.lines().enumerate().map(|(number, line)| Line::new(number + 1, line)).collect();
+    let mut lines: Vec<Line<'_>> =
+        text.lines().enumerate().map(|(number, line)| Line::new(number + 1, line)).collect();
     let skipped = |line: &&Line<'_>| line.content().is_empty() || line.is_directive();
     let mut at = lines.iter().take_while(skipped).count();
     if let Some(first) = lines.get_mut(at).filter(|line| line.is_boundary("---")) {
@@ -79,7 +80,9 @@ fn without_comment(text: &str) -> &str {
     let mut quote = None;
     for (index, byte) in bytes.iter().enumerate() {
         match (quote, byte) {
-            (None, b'#') if index == 0 || bytes[index - 1].is_ascii_whitespace() => return text[..index].trim_end(),
+            (None, b'#') if index == 0 || bytes[index - 1].is_ascii_whitespace() => {
+                return text[..index].trim_end();
+            }
             (None, b'"' | b'\'') if opens(bytes, index) => quote = Some(*byte),
             (Some(b'"'), b'"') if bytes[index - 1] == b'\\' => {}
             (Some(open), _) if open == *byte => quote = None,
@@ -91,7 +94,11 @@ fn without_comment(text: &str) -> &str {
 
 /// Whether a quote at this place opens a quoted scalar, and is not a letter of a plain one.
 fn opens(bytes: &[u8], index: usize) -> bool {
-    bytes[..index].iter().rev().find(|byte| !byte.is_ascii_whitespace()).is_none_or(|byte| b":-[{,".contains(byte))
+    bytes[..index]
+        .iter()
+        .rev()
+        .find(|byte| !byte.is_ascii_whitespace())
+        .is_none_or(|byte| b":-[{,".contains(byte))
 }
 
 struct Reader<'a> {
@@ -141,7 +148,9 @@ impl<'a> Reader<'a> {
         let mut values = Vec::new();
         loop {
             self.skip();
-            let Some(line) = self.peek().filter(|line| line.indent == indent && is_entry(line.content())) else {
+            let Some(line) =
+                self.peek().filter(|line| line.indent == indent && is_entry(line.content()))
+            else {
                 return Ok(Value::List(values));
             };
             let rest = line.text[1..].trim_start();
@@ -174,7 +183,11 @@ impl<'a> Reader<'a> {
             };
             let key = Properties::split(key).rest;
             self.at += 1;
-            let name = if key.starts_with(['"', '\'']) { Flow::new(self, line, key).quoted()? } else { key.to_owned() };
+            let name = if key.starts_with(['"', '\'']) {
+                Flow::new(self, line, key).quoted()?
+            } else {
+                key.to_owned()
+            };
             let value = self.value(line, rest, Some(indent), true)?;
             entries.push((name, value));
         }
@@ -184,7 +197,9 @@ impl<'a> Reader<'a> {
     fn below(&mut self, indent: Option<usize>, named: bool) -> Result<Value> {
         self.skip();
         match self.peek() {
-            Some(line) if indent.is_none_or(|indent| line.indent > indent) => self.block(line.indent, indent),
+            Some(line) if indent.is_none_or(|indent| line.indent > indent) => {
+                self.block(line.indent, indent)
+            }
             Some(line) if named && Some(line.indent) == indent && is_entry(line.content()) => {
                 self.sequence(line.indent)
             }
@@ -193,7 +208,13 @@ impl<'a> Reader<'a> {
     }
 
     /// A value with what stands before it; without a text it is the block below.
-    fn value(&mut self, line: Line<'a>, text: &'a str, parent: Option<usize>, named: bool) -> Result<Value> {
+    fn value(
+        &mut self,
+        line: Line<'a>,
+        text: &'a str,
+        parent: Option<usize>,
+        named: bool,
+    ) -> Result<Value> {
         let Properties { anchor, is_text, rest } = Properties::split(text);
         let mut value = match rest.strip_prefix('*') {
             Some(name) => self.alias(line.number, name)?,
@@ -234,9 +255,10 @@ impl<'a> Reader<'a> {
                 flow.end()?;
                 Ok(value)
             }
-            _ if split_key(text).is_some() => {
-                Err(wrong(line.number, "a name is not expected here; a text with ': ' in it stands in quotes"))
-            }
+            _ if split_key(text).is_some() => Err(wrong(
+                line.number,
+                "a name is not expected here; a text with ': ' in it stands in quotes",
+            )),
             _ => self.plain(text, parent),
         }
     }
@@ -249,10 +271,15 @@ impl<'a> Reader<'a> {
         while let Some(line) = self.lines.get(next).copied() {
             if line.text.is_empty() {
                 breaks += 1;
-            } else if parent.is_some_and(|parent| line.indent <= parent) || line.text.starts_with('#') {
+            } else if parent.is_some_and(|parent| line.indent <= parent)
+                || line.text.starts_with('#')
+            {
                 break;
             } else if split_key(line.content()).is_some() {
-                return Err(wrong(line.number, "a name is not expected here; is it indented too far?"));
+                return Err(wrong(
+                    line.number,
+                    "a name is not expected here; is it indented too far?",
+                ));
             } else {
                 fold(&mut whole, breaks);
                 whole.push_str(line.content());
@@ -268,8 +295,10 @@ impl<'a> Reader<'a> {
     fn long_text(&mut self, header: &str, parent: Option<usize>) -> String {
         let folded = header.starts_with('>');
         let around = parent.map_or(0, |parent| parent + 1);
-        let stated =
-            header.bytes().find(u8::is_ascii_digit).map(|digit| around.saturating_sub(1) + usize::from(digit - b'0'));
+        let stated = header
+            .bytes()
+            .find(u8::is_ascii_digit)
+            .map(|digit| around.saturating_sub(1) + usize::from(digit - b'0'));
         let mut margin = stated;
         let mut lines: Vec<String> = Vec::new();
         while let Some(line) = self.peek() {
@@ -280,7 +309,11 @@ impl<'a> Reader<'a> {
                 margin.get_or_insert(line.indent);
             }
             let inner = line.indent.saturating_sub(margin.unwrap_or(line.indent));
-            lines.push(if line.text.is_empty() { String::new() } else { " ".repeat(inner) + line.text });
+            lines.push(if line.text.is_empty() {
+                String::new()
+            } else {
+                " ".repeat(inner) + line.text
+            });
             self.at += 1;
         }
         let blank = lines.iter().rev().take_while(|line| line.is_empty()).count();
@@ -332,7 +365,8 @@ impl<'a> Properties<'a> {
     fn split(text: &'a str) -> Self {
         let mut properties = Properties { anchor: None, is_text: false, rest: text };
         while let Some(mark @ ('&' | '!')) = properties.rest.chars().next() {
-            let (word, rest) = properties.rest.split_once(char::is_whitespace).unwrap_or((properties.rest, ""));
+            let (word, rest) =
+                properties.rest.split_once(char::is_whitespace).unwrap_or((properties.rest, ""));
             if mark == '&' {
                 properties.anchor = Some(&word[1..]);
             }
@@ -371,8 +405,9 @@ fn split_key(text: &str) -> Option<(&str, &str)> {
         b'[' | b'{' => return None,
         _ => 0,
     };
-    let colon = (start..bytes.len())
-        .find(|index| bytes[*index] == b':' && bytes.get(index + 1).is_none_or(u8::is_ascii_whitespace))?;
+    let colon = (start..bytes.len()).find(|index| {
+        bytes[*index] == b':' && bytes.get(index + 1).is_none_or(u8::is_ascii_whitespace)
+    })?;
     if start > 0 && !text[start..colon].trim().is_empty() {
         return None;
     }

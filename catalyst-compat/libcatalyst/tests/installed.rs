@@ -18,13 +18,16 @@ fn library() -> PathBuf {
 }
 
 fn output(command: &mut Command) -> Output {
-    command.output().unwrap_or_else(|error| panic!("{command:?} does not run ({error}); scripts/setup installs it"))
+    command.output().unwrap_or_else(|error| {
+        panic!("{command:?} does not run ({error}); scripts/setup installs it")
+    })
 }
 
 #[track_caller]
 fn succeed(command: &mut Command) -> String {
     let output = output(command);
-    let (told, errors) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    let (told, errors) =
+        (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     assert!(output.status.success(), "{command:?}: {}\n{told}\n{errors}", output.status);
     format!("{told}{errors}")
 }
@@ -74,7 +77,8 @@ impl Built {
 fn exactly_the_listed_symbols_are_exported() {
     let listed = include_str!("../symbols.txt");
     let told = succeed(Command::new("nm").args(["-D", "--defined-only"]).arg(library()));
-    let mut exported: Vec<&str> = told.lines().filter_map(|line| line.split_whitespace().nth(2)).collect();
+    let mut exported: Vec<&str> =
+        told.lines().filter_map(|line| line.split_whitespace().nth(2)).collect();
     let mut wanted: Vec<&str> = listed.split_whitespace().collect();
     exported.sort_unstable();
     wanted.sort_unstable();
@@ -89,27 +93,45 @@ fn nodes_work_from_c_cpp_and_fortran() {
     let built = Built::get();
     let directory = tempfile::tempdir().expect("a temporary directory");
     let told = succeed(built.program("node_c").arg(directory.path()));
-    assert!(told.contains("node.c: ok") && told.contains("conduit: the conduit node is null"), "{told}");
+    assert!(
+        told.contains("node.c: ok") && told.contains("conduit: the conduit node is null"),
+        "{told}"
+    );
     assert!(succeed(&mut built.program("blueprint")).contains("blueprint.c: ok"));
     let implementations = built.implementations();
-    let told = succeed(built.program("node_cpp").env("CATALYST_IMPLEMENTATION_PATHS", &implementations));
+    let told =
+        succeed(built.program("node_cpp").env("CATALYST_IMPLEMENTATION_PATHS", &implementations));
     assert!(told.contains("node.cpp: ok"), "{told}");
     assert!(succeed(&mut built.program("node_f90")).contains("ok with stub"));
     let mut echoed = built.program("node_f90");
-    echoed.env("CATALYST_IMPLEMENTATION_PATHS", implementations).env("CATALYST_IMPLEMENTATION_NAME", "echo");
+    echoed
+        .env("CATALYST_IMPLEMENTATION_PATHS", implementations)
+        .env("CATALYST_IMPLEMENTATION_NAME", "echo");
     assert!(succeed(&mut echoed).contains("ok with echo"));
 }
 
 #[test]
 fn every_python_sees_the_same_node() {
     let built = Built::get();
-    let packages = std::fs::read_dir(built.prefix.join("lib")).expect("the prefix can be read").flatten();
-    let packages = packages.map(|entry| entry.path().join("site-packages")).find(|path| path.is_dir());
+    let packages =
+        std::fs::read_dir(built.prefix.join("lib")).expect("the prefix can be read").flatten();
+    let packages =
+        packages.map(|entry| entry.path().join("site-packages")).find(|path| path.is_dir());
     let packages = packages.expect("the Python packages are installed");
     // The declarations as the compiler sees them: Python's idea of them must be the same.
     let mut preprocess = Command::new("gcc");
-    preprocess.args(["-E", "-P", "-x", "c", "-include", "catalyst.h", "-include", "conduit_blueprint.h"]);
-    let preprocess = preprocess.arg("-I").arg(built.prefix.join("include/catalyst-2.0")).arg("/dev/null");
+    preprocess.args([
+        "-E",
+        "-P",
+        "-x",
+        "c",
+        "-include",
+        "catalyst.h",
+        "-include",
+        "conduit_blueprint.h",
+    ]);
+    let preprocess =
+        preprocess.arg("-I").arg(built.prefix.join("include/catalyst-2.0")).arg("/dev/null");
     let directory = tempfile::tempdir().expect("a temporary directory");
     let declared = directory.path().join("declared");
     std::fs::write(&declared, succeed(preprocess)).expect("can be written");
@@ -120,10 +142,15 @@ fn every_python_sees_the_same_node() {
             run.arg(package().join("tests/programs/node.py"))
                 .arg(name)
                 .stdin(std::fs::File::open(&declared).expect("was written"))
-                .env("PYTHONPATH", std::env::join_paths([&packages, numpy]).expect("paths without a colon"))
+                .env(
+                    "PYTHONPATH",
+                    std::env::join_paths([&packages, numpy]).expect("paths without a colon"),
+                )
                 .env("PYTHONDONTWRITEBYTECODE", "1");
-            let told =
-                succeed(run.env_remove("CATALYST_IMPLEMENTATION_NAME").env("CATALYST_IMPLEMENTATION_PATHS", paths));
+            let told = succeed(
+                run.env_remove("CATALYST_IMPLEMENTATION_NAME")
+                    .env("CATALYST_IMPLEMENTATION_PATHS", paths),
+            );
             assert!(told.contains(&format!("node.py: ok with {name}")), "{told}");
         }
     }
@@ -133,10 +160,13 @@ fn every_python_sees_the_same_node() {
 /// it finds it. Those of a system lie below 4 GB, those that people build themselves do not: an address that is cut shows there.
 fn interpreters(directory: &Path) -> Vec<(PathBuf, PathBuf)> {
     let home = std::env::var_os("PYENV_ROOT").map(PathBuf::from);
-    let home = home.or_else(|| std::env::var_os("HOME").map(|home| Path::new(&home).join(".pyenv")));
+    let home =
+        home.or_else(|| std::env::var_os("HOME").map(|home| Path::new(&home).join(".pyenv")));
     let versions = home.and_then(|home| std::fs::read_dir(home.join("versions")).ok());
-    let built = versions.into_iter().flatten().flatten().map(|version| version.path().join("bin/python3"));
-    let candidates = [PathBuf::from("python3"), PathBuf::from("/usr/bin/python3")].into_iter().chain(built);
+    let built =
+        versions.into_iter().flatten().flatten().map(|version| version.path().join("bin/python3"));
+    let candidates =
+        [PathBuf::from("python3"), PathBuf::from("/usr/bin/python3")].into_iter().chain(built);
     let lent = directory.join("numpy");
     std::fs::create_dir(&lent).expect("can be made");
     let system = "/usr/lib/python3/dist-packages/numpy";
@@ -145,7 +175,10 @@ fn interpreters(directory: &Path) -> Vec<(PathBuf, PathBuf)> {
     for python in candidates {
         for numpy in [PathBuf::new(), lent.clone()] {
             let mut command = Command::new(&python);
-            command.args(["-c", "import numpy"]).env("PYTHONPATH", &numpy).env("PYTHONDONTWRITEBYTECODE", "1");
+            command
+                .args(["-c", "import numpy"])
+                .env("PYTHONPATH", &numpy)
+                .env("PYTHONDONTWRITEBYTECODE", "1");
             if command.output().is_ok_and(|output| output.status.success()) {
                 found.push((python, numpy));
                 break;
@@ -160,14 +193,29 @@ fn interpreters(directory: &Path) -> Vec<(PathBuf, PathBuf)> {
 fn valgrind_finds_nothing() {
     let built = Built::get();
     let directory = tempfile::tempdir().expect("a temporary directory");
-    let options = ["-q", "--error-exitcode=9", "--leak-check=full", "--errors-for-leak-kinds=definite"];
-    succeed(Command::new("valgrind").args(options).arg(built.build.join("node_c")).arg(directory.path()));
+    let options =
+        ["-q", "--error-exitcode=9", "--leak-check=full", "--errors-for-leak-kinds=definite"];
+    succeed(
+        Command::new("valgrind")
+            .args(options)
+            .arg(built.build.join("node_c"))
+            .arg(directory.path()),
+    );
     for seed in ["1", "2"] {
-        succeed(Command::new("valgrind").args(options).arg(built.build.join("rubbish")).args([seed, "3000"]));
+        succeed(
+            Command::new("valgrind")
+                .args(options)
+                .arg(built.build.join("rubbish"))
+                .args([seed, "3000"]),
+        );
         succeed(built.program("rubbish").args([seed, "50000"]));
     }
     let mut session = Command::new("valgrind");
-    session.args(options).arg(built.build.join("session")).args(["0", "echo"]).arg(built.implementations());
+    session
+        .args(options)
+        .arg(built.build.join("session"))
+        .args(["0", "echo"])
+        .arg(built.implementations());
     assert!(succeed(&mut session).contains("echo"));
 }
 
@@ -178,8 +226,17 @@ fn headers_define_what_programs_name() {
     let headers = built.prefix.join("include/catalyst-2.0");
     let compiled = |compiler: &str, standard: &str, source: &Path, program: &Path| {
         let mut compile = Command::new(compiler);
-        compile.arg(format!("-std={standard}")).args(["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-I"]).arg(&headers);
-        compile.arg(source).arg("-o").arg(program).arg("-L").arg(built.prefix.join("lib")).arg("-lcatalyst");
+        compile
+            .arg(format!("-std={standard}"))
+            .args(["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-I"])
+            .arg(&headers);
+        compile
+            .arg(source)
+            .arg("-o")
+            .arg(program)
+            .arg("-L")
+            .arg(built.prefix.join("lib"))
+            .arg("-lcatalyst");
         succeed(&mut compile);
     };
     for (compiler, standard, source) in [
@@ -198,16 +255,18 @@ fn headers_define_what_programs_name() {
     let mut count = 0;
     for entry in std::fs::read_dir(&headers).expect("the headers are installed").flatten() {
         let name = entry.file_name().into_string().expect("headers have plain names");
-        let languages: &[_] = match entry.path().extension().and_then(|extension| extension.to_str()) {
-            Some("h") => &[("gcc", "c99", "c"), ("g++", "c++11", "cpp")],
-            // Needs what includes it, and says so.
-            Some("hpp") if name == "catalyst_conduit_families.hpp" => continue,
-            Some("hpp") => &[("g++", "c++11", "cpp"), ("g++", "c++17", "cpp")],
-            _ => continue,
-        };
+        let languages: &[_] =
+            match entry.path().extension().and_then(|extension| extension.to_str()) {
+                Some("h") => &[("gcc", "c99", "c"), ("g++", "c++11", "cpp")],
+                // Needs what includes it, and says so.
+                Some("hpp") if name == "catalyst_conduit_families.hpp" => continue,
+                Some("hpp") => &[("g++", "c++11", "cpp"), ("g++", "c++17", "cpp")],
+                _ => continue,
+            };
         for (compiler, standard, extension) in languages {
             let source = directory.path().join(format!("alone.{extension}"));
-            let text = format!("#include <{name}>\n#include <{name}>\nint main(void) {{ return 0; }}\n");
+            let text =
+                format!("#include <{name}>\n#include <{name}>\nint main(void) {{ return 0; }}\n");
             std::fs::write(&source, text).expect("can be written");
             compiled(compiler, standard, &source, &directory.path().join("alone"));
         }
@@ -226,7 +285,9 @@ fn pkg_config_builds_the_same_programs() {
         ("gfortran", "node.f90", "catalyst_fortran"),
     ] {
         let mut query = Command::new("pkg-config");
-        query.env("PKG_CONFIG_PATH", built.prefix.join("lib/pkgconfig")).args(["--cflags", "--libs", name]);
+        query
+            .env("PKG_CONFIG_PATH", built.prefix.join("lib/pkgconfig"))
+            .args(["--cflags", "--libs", name]);
         let flags = succeed(&mut query);
         let program = directory.path().join(compiler);
         let mut compile = Command::new(compiler);
@@ -260,7 +321,9 @@ fn the_loader_finds_what_is_asked_for() {
     assert_eq!(with(&["0", "nothing"], &[paths, name("echo"), prefer]), "echo\n");
     let told = with(&["3", "nothing", "/no/such/directory"], &[paths]);
     assert!(
-        told.contains("no 'libcatalyst-nothing.so'") && told.contains("/no/such/directory") && told.contains(path),
+        told.contains("no 'libcatalyst-nothing.so'")
+            && told.contains("/no/such/directory")
+            && told.contains(path),
         "{told}"
     );
     with(&["4", "NO_TABLE"], &[paths]);
@@ -276,7 +339,12 @@ fn what_is_dumped_is_played_back() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let dumped = directory.path().join("dump");
     let mut record = built.program("session");
-    succeed(record.args(["0", "echo"]).arg(built.implementations()).env("CATALYST_DATA_DUMP_DIRECTORY", &dumped));
+    succeed(
+        record
+            .args(["0", "echo"])
+            .arg(built.implementations())
+            .env("CATALYST_DATA_DUMP_DIRECTORY", &dumped),
+    );
     for stage in ["initialize", "execute_invc0", "finalize"] {
         assert!(dumped.join(format!("{stage}_params.conduit_bin.1.0")).exists(), "{stage}");
         assert!(dumped.join(format!("{stage}_params.conduit_bin.1.0_json")).exists(), "{stage}");
@@ -284,18 +352,23 @@ fn what_is_dumped_is_played_back() {
     let again = directory.path().join("again");
     let replay = || {
         let mut command = Command::new(built.prefix.join("bin/catalyst_replay"));
-        command.env("CATALYST_DATA_DUMP_DIRECTORY", &again).env_remove("CATALYST_IMPLEMENTATION_NAME");
+        command
+            .env("CATALYST_DATA_DUMP_DIRECTORY", &again)
+            .env_remove("CATALYST_IMPLEMENTATION_NAME");
         command
     };
     succeed(replay().arg(&dumped));
-    let read =
-        |directory: &Path| std::fs::read(directory.join("execute_invc0_params.conduit_bin.1.0")).expect("was dumped");
+    let read = |directory: &Path| {
+        std::fs::read(directory.join("execute_invc0_params.conduit_bin.1.0")).expect("was dumped")
+    };
     assert_eq!(read(&dumped), read(&again));
-    let schema = std::fs::read_to_string(dumped.join("finalize_params.conduit_bin.1.0_json")).expect("was dumped");
+    let schema = std::fs::read_to_string(dumped.join("finalize_params.conduit_bin.1.0_json"))
+        .expect("was dumped");
     let leaf = "{\"dtype\":\"char8_str\",\"number_of_elements\": 5,\"offset\": 0,\"stride\": 1,\"element_bytes\": 1,\
                 \"endianness\": \"little\"}";
     assert!(
-        schema.starts_with("\n{\n  \"catalyst_load\": \n  {\n    \"implementation\": ") && schema.contains(leaf),
+        schema.starts_with("\n{\n  \"catalyst_load\": \n  {\n    \"implementation\": ")
+            && schema.contains(leaf),
         "{schema}"
     );
 
@@ -319,7 +392,8 @@ fn what_is_dumped_is_played_back() {
         without(stage, "ERROR: Missing node data for at least one stage");
     }
     let first = dumped.join("execute_invc0_params.conduit_bin.1.0");
-    std::fs::copy(&first, dumped.join("execute_invc1_params.conduit_bin.1.0")).expect("can be written");
+    std::fs::copy(&first, dumped.join("execute_invc1_params.conduit_bin.1.0"))
+        .expect("can be written");
     without("execute_invc0", "ERROR: Unexpected number of calls to execute");
     std::fs::remove_file(dumped.join("execute_invc1_params.conduit_bin.1.0")).expect("is there");
     let second = dumped.join("initialize_params.conduit_bin.1.1");

@@ -21,7 +21,8 @@ enum Tree {
 fn tree() -> impl Strategy<Value = Tree> {
     let leaf = prop_oneof![
         prop::collection::vec(any::<i64>(), 1..5).prop_map(Tree::Integers),
-        prop::collection::vec(prop::num::f64::NORMAL | prop::num::f64::ZERO, 1..5).prop_map(Tree::Reals),
+        prop::collection::vec(prop::num::f64::NORMAL | prop::num::f64::ZERO, 1..5)
+            .prop_map(Tree::Reals),
         prop::collection::vec(any::<u8>(), 1..5).prop_map(Tree::Small),
         "[^\u{0}]{0,12}".prop_map(Tree::Text),
     ];
@@ -157,7 +158,10 @@ fn yaml_is_read_as_it_is_meant() {
         ("%YAML 1.2\n--- # begins\na: 1\n...\nb: 2", r#"{"a": 1}"#),
         ("a: 1\n---\na: 2", r#"{"a": 1}"#),
         ("--- {a: 1}", r#"{"a": 1}"#),
-        ("base: &b {x: 1, y: [1, 2]}\ncopy: *b\n", r#"{"base": {"x": 1, "y": [1, 2]}, "copy": {"x": 1, "y": [1, 2]}}"#),
+        (
+            "base: &b {x: 1, y: [1, 2]}\ncopy: *b\n",
+            r#"{"base": {"x": 1, "y": [1, 2]}, "copy": {"x": 1, "y": [1, 2]}}"#,
+        ),
         ("a: &list\n  - 1\n  - 2\nb: [*list, *list]", r#"{"a": [1, 2], "b": [[1, 2], [1, 2]]}"#),
         ("- &one\n  k: v\n- *one", r#"[{"k": "v"}, {"k": "v"}]"#),
         ("a: !!str 12\nb: !thing {c: 1}\nd: ! text", r#"{"a": "12", "b": {"c": 1}, "d": "text"}"#),
@@ -178,12 +182,19 @@ fn yaml_is_read_as_it_is_meant() {
         ("a: |1\n  one", r#"{"a": " one\n"}"#),
         ("- - 1\n  - x\n- y", r#"[[1, "x"], "y"]"#),
         ("\"a: b\": 1\n'it''s': 2\n\"\\x41\\u00e9\": 3", r#"{"a: b": 1, "it's": 2, "A\u00e9": 3}"#),
-        ("a: 'one : two'\nb: http://x:1\nc: 12:30 # d: e", r#"{"a": "one : two", "b": "http://x:1", "c": "12:30"}"#),
-        ("a: true\nb: {c: true}\nd: +3\ne: 1e3", r#"{"a": "true", "b": {"c": "true"}, "d": 3, "e": 1000.0}"#),
+        (
+            "a: 'one : two'\nb: http://x:1\nc: 12:30 # d: e",
+            r#"{"a": "one : two", "b": "http://x:1", "c": "12:30"}"#,
+        ),
+        (
+            "a: true\nb: {c: true}\nd: +3\ne: 1e3",
+            r#"{"a": "true", "b": {"c": "true"}, "d": 3, "e": 1000.0}"#,
+        ),
         ("{a: [1, 2],\n b: {c: text}}", r#"{"a": [1, 2], "b": {"c": "text"}}"#),
     ];
     for (yaml, json) in same {
-        let read = schema::parse(yaml, Protocol::Yaml).unwrap_or_else(|error| panic!("{yaml}\n{error}"));
+        let read =
+            schema::parse(yaml, Protocol::Yaml).unwrap_or_else(|error| panic!("{yaml}\n{error}"));
         let wanted = schema::parse(json, Protocol::Json).expect("JSON");
         assert_eq!(differences(&wanted, &read), None, "{yaml}");
     }
@@ -207,10 +218,12 @@ fn yaml_is_read_as_it_is_meant() {
     assert!(schema::parse(r#"{"a": 1, "a": 2}"#, Protocol::Json).is_err());
     assert!(schema::parse("{a: int32, a: int64}", Protocol::Schema).is_err());
     // A few lines that would stand for 10 to the power of 12 values, and anchors that would nest without end.
-    let lines: Vec<String> =
-        (1..13).map(|i| format!("a{i}: &a{i} [{}]", vec![format!("*a{}", i - 1); 10].join(", "))).collect();
-    let error =
-        schema::parse(&format!("a0: &a0 [x]\n{}", lines.join("\n")), Protocol::Yaml).map(|_| ()).expect_err("too much");
+    let lines: Vec<String> = (1..13)
+        .map(|i| format!("a{i}: &a{i} [{}]", vec![format!("*a{}", i - 1); 10].join(", ")))
+        .collect();
+    let error = schema::parse(&format!("a0: &a0 [x]\n{}", lines.join("\n")), Protocol::Yaml)
+        .map(|_| ())
+        .expect_err("too much");
     assert!(error.to_string().contains("stand for too much"), "{error}");
     let lines: Vec<String> = (1..5000).map(|i| format!("a{i}: &a{i} [*a{}]", i - 1)).collect();
     assert!(schema::parse(&format!("a0: &a0 [x]\n{}", lines.join("\n")), Protocol::Yaml).is_err());
@@ -220,7 +233,9 @@ fn yaml_is_read_as_it_is_meant() {
 #[test]
 fn arrays_that_are_not_finite_stay_arrays() {
     let mut node = Node::new();
-    for (name, values) in [("some", [f64::NAN, 1.0, f64::NEG_INFINITY]), ("all", [f64::INFINITY, f64::NAN, f64::NAN])] {
+    for (name, values) in
+        [("some", [f64::NAN, 1.0, f64::NEG_INFINITY]), ("all", [f64::INFINITY, f64::NAN, f64::NAN])]
+    {
         node.at(name).expect("a path").set_numbers(&values).expect("memory");
     }
     for (text, protocol) in [
@@ -229,15 +244,20 @@ fn arrays_that_are_not_finite_stay_arrays() {
     ] {
         let read = schema::parse(&text, protocol).expect("what was written");
         for (name, written) in node.children() {
-            let found: Vec<f64> =
-                read.get(name).expect("it is there").numbers().map(|number| number.as_f64()).collect();
+            let found: Vec<f64> = read
+                .get(name)
+                .expect("it is there")
+                .numbers()
+                .map(|number| number.as_f64())
+                .collect();
             let written: Vec<f64> = written.numbers().map(|number| number.as_f64()).collect();
             assert_eq!(format!("{found:?}"), format!("{written:?}"), "{text}");
         }
     }
     let read = schema::parse(r#"["nan", 0, 1]"#, Protocol::Json).expect("JSON");
     assert_eq!((read.kind(), read.datatype().elements), (catalyst::datatype::Kind::Float64, 3));
-    let read = schema::parse(r#"{"a": "nan", "b": ["nan", "text"]}"#, Protocol::Json).expect("JSON");
+    let read =
+        schema::parse(r#"{"a": "nan", "b": ["nan", "text"]}"#, Protocol::Json).expect("JSON");
     assert_eq!(read.get("a").and_then(Node::text).as_deref(), Some("nan"));
     assert_eq!(read.get("b").map(Node::kind), Some(catalyst::datatype::Kind::List));
 }
@@ -252,7 +272,10 @@ fn many_children_are_found_by_name() {
         for (index, name) in names.iter().enumerate() {
             let found = node.get(name).expect("it is there");
             assert!(std::ptr::eq(found, node.child(index).expect("it is there")), "{name}");
-            assert_eq!(found.name(), if name.contains('/') { format!("{{{name}}}") } else { name.clone() });
+            assert_eq!(
+                found.name(),
+                if name.contains('/') { format!("{{{name}}}") } else { name.clone() }
+            );
         }
         assert!(node.get("nothing").is_none());
     };

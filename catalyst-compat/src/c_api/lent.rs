@@ -29,7 +29,13 @@ pub(super) fn number(what: &str, kind: c_int) -> Result<NumberType, Fault> {
         10 => NumberType::U64,
         11 => NumberType::F32,
         12 => NumberType::F64,
-        other => return Err(Fault::invalid(what, format!("the type {other}"), "one of enum tombolo_type")),
+        other => {
+            return Err(Fault::invalid(
+                what,
+                format!("the type {other}"),
+                "one of enum tombolo_type",
+            ));
+        }
     })
 }
 
@@ -49,7 +55,11 @@ unsafe impl Send for Address {}
 
 impl Address {
     /// Values one behind the other.
-    pub(super) fn beside<T: Typed>(what: &str, first: *const T, count: usize) -> Result<Self, Fault> {
+    pub(super) fn beside<T: Typed>(
+        what: &str,
+        first: *const T,
+        count: usize,
+    ) -> Result<Self, Fault> {
         Self::apart(what, T::NUMBER, first.cast(), count, T::NUMBER.bytes().cast_signed())
     }
 
@@ -62,11 +72,16 @@ impl Address {
         stride: isize,
     ) -> Result<Self, Fault> {
         if count > 0 && first.is_null() {
-            return Err(Fault::invalid(what, "a null pointer", format!("the address of {count} values")));
+            return Err(Fault::invalid(
+                what,
+                "a null pointer",
+                format!("the address of {count} values"),
+            ));
         }
         let least = number.bytes();
         let Some(stride) = usize::try_from(stride).ok().filter(|stride| *stride >= least) else {
-            let expected = format!("{least} or more from one value of type {} to the next", number.name());
+            let expected =
+                format!("{least} or more from one value of type {} to the next", number.name());
             return Err(Fault::invalid(what, format!("a stride of {stride} bytes"), expected));
         };
         if count.checked_mul(stride).is_none_or(|bytes| isize::try_from(bytes).is_err()) {
@@ -86,7 +101,9 @@ impl Address {
         let size = T::NUMBER.bytes();
         let stride = (components * size).cast_signed();
         let all = Self::apart(what, T::NUMBER, first.cast(), count, stride)?;
-        Ok((0..components).map(|at| Self { first: all.first.wrapping_byte_add(at * size), ..all }).collect())
+        Ok((0..components)
+            .map(|at| Self { first: all.first.wrapping_byte_add(at * size), ..all })
+            .collect())
     }
 
     /// The components of `count` tuples, each at an address of its own.
@@ -102,7 +119,11 @@ impl Address {
         stride: isize,
     ) -> Result<Vec<Self>, Fault> {
         if components.is_null() {
-            return Err(Fault::invalid(what, "a null pointer", format!("the addresses of {dimension} components")));
+            return Err(Fault::invalid(
+                what,
+                "a null pointer",
+                format!("the addresses of {dimension} components"),
+            ));
         }
         // SAFETY: not null, and of this length by the caller's promise.
         let components = unsafe { std::slice::from_raw_parts(components, dimension) };

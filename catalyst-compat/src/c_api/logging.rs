@@ -35,7 +35,11 @@ fn number(level: Level) -> c_int {
 /// # Safety
 /// As the module above says; the function can be called, with `user_data`, until another takes its place.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_log(level: c_int, function: Option<Function>, user_data: *mut c_void) -> c_int {
+pub unsafe extern "C" fn tombolo_log(
+    level: c_int,
+    function: Option<Function>,
+    user_data: *mut c_void,
+) -> c_int {
     answer(|| {
         let most = match level {
             0 => LevelFilter::Off,
@@ -43,7 +47,13 @@ pub unsafe extern "C" fn tombolo_log(level: c_int, function: Option<Function>, u
             2 => LevelFilter::Warn,
             3 => LevelFilter::Info,
             4 => LevelFilter::Debug,
-            other => return Err(Fault::invalid("log", format!("the level {other}"), "one of enum tombolo_level")),
+            other => {
+                return Err(Fault::invalid(
+                    "log",
+                    format!("the level {other}"),
+                    "one of enum tombolo_level",
+                ));
+            }
         };
         let sink = function.map(|function| -> logging::Sink {
             let user_data = UserData(user_data);

@@ -32,8 +32,13 @@ unsafe fn lend(
             let names = run.channels.iter().map(|known| known.name.as_str());
             let expected = match nearest(&channel, names.clone()) {
                 Some(near) => format!("one that tombolo_points has named; did you mean '{near}'?"),
-                None if run.channels.is_empty() => "one that tombolo_points has named; none has been yet".into(),
-                None => format!("one that tombolo_points has named: {}", names.collect::<Vec<_>>().join(", ")),
+                None if run.channels.is_empty() => {
+                    "one that tombolo_points has named; none has been yet".into()
+                }
+                None => format!(
+                    "one that tombolo_points has named: {}",
+                    names.collect::<Vec<_>>().join(", ")
+                ),
             };
             Err(Fault::invalid("channel", format!("'{channel}'"), expected))
         })
@@ -69,14 +74,21 @@ fn fixed_cell(what: &str, number: c_int) -> Result<(CellType, usize), Fault> {
         .ok()
         .and_then(CellType::from_vtk)
         .and_then(|cell_type| Some((cell_type, cell_type.vertex_count()?)))
-        .ok_or_else(|| Fault::invalid(what, format!("the cell type {number}"), "one of enum tombolo_cell_type"))
+        .ok_or_else(|| {
+            Fault::invalid(what, format!("the cell type {number}"), "one of enum tombolo_cell_type")
+        })
 }
 
 /// So many cells of so many vertices each.
-fn vertices<T: Typed>(what: &str, first: *const T, cells: usize, corners: usize) -> Result<Address, Fault> {
-    let count = cells
-        .checked_mul(corners)
-        .ok_or_else(|| Fault::invalid(what, format!("{cells} cells"), "as many as memory can hold"))?;
+fn vertices<T: Typed>(
+    what: &str,
+    first: *const T,
+    cells: usize,
+    corners: usize,
+) -> Result<Address, Fault> {
+    let count = cells.checked_mul(corners).ok_or_else(|| {
+        Fault::invalid(what, format!("{cells} cells"), "as many as memory can hold")
+    })?;
     Address::beside(what, first, count)
 }
 
@@ -84,23 +96,32 @@ fn association(what: &str, number: c_int) -> Result<Association, Fault> {
     match number {
         0 => Ok(Association::Vertex),
         1 => Ok(Association::Element),
-        other => {
-            Err(Fault::invalid(what, format!("the association {other}"), "TOMBOLO_VERTEX (0) or TOMBOLO_CELL (1)"))
-        }
+        other => Err(Fault::invalid(
+            what,
+            format!("the association {other}"),
+            "TOMBOLO_VERTEX (0) or TOMBOLO_CELL (1)",
+        )),
     }
 }
 
-fn component_count(what: &str, components: c_int, least: usize, most: usize) -> Result<usize, Fault> {
-    usize::try_from(components)
-        .ok()
-        .filter(|count| (least..=most).contains(count))
-        .ok_or_else(|| Fault::invalid(what, format!("{components} components"), format!("{least} to {most}")))
+fn component_count(
+    what: &str,
+    components: c_int,
+    least: usize,
+    most: usize,
+) -> Result<usize, Fault> {
+    usize::try_from(components).ok().filter(|count| (least..=most).contains(count)).ok_or_else(
+        || Fault::invalid(what, format!("{components} components"), format!("{least} to {most}")),
+    )
 }
 
 /// Tells the Fortran module how many vertices a cell of this type has; 0 of a type that is not known.
 #[unsafe(no_mangle)]
 pub extern "C" fn tombolo_vertices_of_cell(cell_type: c_int) -> c_int {
-    value(0, || Ok(fixed_cell("", cell_type).map_or(0, |(_, vertices)| c_int::try_from(vertices).unwrap_or(0))))
+    value(0, || {
+        Ok(fixed_cell("", cell_type)
+            .map_or(0, |(_, vertices)| c_int::try_from(vertices).unwrap_or(0)))
+    })
 }
 
 /// See `tombolo.h`.
@@ -120,7 +141,11 @@ pub unsafe extern "C" fn tombolo_points_strided(
     let points = |what: &str| {
         let number = number(what, kind)?;
         if !matches!(number, NumberType::F32 | NumberType::F64) {
-            return Err(Fault::invalid(what, format!("the type {}", number.name()), "float32 or float64"));
+            return Err(Fault::invalid(
+                what,
+                format!("the type {}", number.name()),
+                "float32 or float64",
+            ));
         }
         let dimension = component_count(what, dimension, 2, 3)?;
         // SAFETY: as the module above says.
@@ -152,7 +177,9 @@ pub unsafe extern "C" fn tombolo_feature(
     feature: *const c_char,
 ) -> c_int {
     // SAFETY: as the module above says.
-    unsafe { lend(run, channel, |named, _| named.feature(number, name(feature, "the feature's name")?)) }
+    unsafe {
+        lend(run, channel, |named, _| named.feature(number, name(feature, "the feature's name")?))
+    }
 }
 
 /// See `tombolo.h`.
@@ -198,7 +225,9 @@ pub unsafe extern "C" fn tombolo_field_strided(
         let number = number(&what, kind)?;
         let component_number = component_count(&what, component_number, 1, 9)?;
         // SAFETY: as the module above says.
-        let components = unsafe { Address::separate(&what, number, components, component_number, count, stride) }?;
+        let components = unsafe {
+            Address::separate(&what, number, components, component_number, count, stride)
+        }?;
         named.field(field, association, components);
         Ok(())
     };

@@ -152,7 +152,9 @@ fn find(run: *mut Handle) -> Result<Arc<Mutex<Opened>>, Fault> {
         return Err(Fault::null("the run"));
     }
     let known = runs().open.get(&run.addr()).map(Arc::clone);
-    known.ok_or_else(|| Fault::Call("the run is not open: it was closed, or never opened by tombolo_open".into()))
+    known.ok_or_else(|| {
+        Fault::Call("the run is not open: it was closed, or never opened by tombolo_open".into())
+    })
 }
 
 /// Holds a run for the length of a call.
@@ -167,7 +169,10 @@ fn hold(run: &Mutex<Opened>) -> Result<MutexGuard<'_, Opened>, Fault> {
 }
 
 /// Does something with an open run.
-fn with<T>(run: *mut Handle, call: impl FnOnce(&mut Opened) -> Result<T, Fault>) -> Result<T, Fault> {
+fn with<T>(
+    run: *mut Handle,
+    call: impl FnOnce(&mut Opened) -> Result<T, Fault>,
+) -> Result<T, Fault> {
     let run = find(run)?;
     call(&mut *hold(&run)?)
 }
@@ -180,7 +185,9 @@ unsafe fn text(text: *const c_char, what: &str) -> Result<String, Fault> {
     }
     // SAFETY: a C string, by the module's contract.
     let text = unsafe { CStr::from_ptr(text) };
-    text.to_str().map(str::to_owned).map_err(|_| Fault::invalid(what, "bytes that are not UTF-8", "a text in UTF-8"))
+    text.to_str()
+        .map(str::to_owned)
+        .map_err(|_| Fault::invalid(what, "bytes that are not UTF-8", "a text in UTF-8"))
 }
 
 /// A text that names something.
@@ -191,7 +198,11 @@ unsafe fn name(name: *const c_char, what: &str) -> Result<String, Fault> {
     // SAFETY: as above.
     let name = unsafe { text(name, what) }?;
     if name.is_empty() || name.chars().any(char::is_control) {
-        return Err(Fault::invalid(what, format!("{name:?}"), "a name of one letter or more, on one line"));
+        return Err(Fault::invalid(
+            what,
+            format!("{name:?}"),
+            "a name of one letter or more, on one line",
+        ));
     }
     Ok(name)
 }
@@ -210,9 +221,9 @@ impl Opened {
     fn under_way(&self) -> Result<&Run, Fault> {
         match &self.stage {
             Stage::UnderWay(run) => Ok(run),
-            Stage::Opened(_) => {
-                Err(Fault::Call("called before the run began, by tombolo_start or the first tombolo_execute".into()))
-            }
+            Stage::Opened(_) => Err(Fault::Call(
+                "called before the run began, by tombolo_start or the first tombolo_execute".into(),
+            )),
             Stage::Ended => Err(Self::after_the_end()),
         }
     }
@@ -230,17 +241,19 @@ impl Opened {
 #[unsafe(no_mangle)]
 pub extern "C" fn tombolo_message() -> *const c_char {
     // A borrowed message cannot be met: it is replaced whole, and nobody else is called meanwhile.
-    let kept = MESSAGE.try_with(|message| message.try_borrow().map_or(c"".as_ptr(), |message| message.as_ptr()));
+    let kept = MESSAGE
+        .try_with(|message| message.try_borrow().map_or(c"".as_ptr(), |message| message.as_ptr()));
     kept.unwrap_or(c"".as_ptr())
 }
 
 /// See `tombolo.h`.
 #[unsafe(no_mangle)]
 pub extern "C" fn tombolo_version() -> *const c_char {
-    const VERSION: &CStr = match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
-        Ok(version) => version,
-        Err(_) => c"",
-    };
+    const VERSION: &CStr =
+        match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
+            Ok(version) => version,
+            Err(_) => c"",
+        };
     VERSION.as_ptr()
 }
 
@@ -249,7 +262,11 @@ pub extern "C" fn tombolo_version() -> *const c_char {
 /// # Safety
 /// As the module says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_refuse(what: *const c_char, found: *const c_char, expected: *const c_char) -> c_int {
+pub unsafe extern "C" fn tombolo_refuse(
+    what: *const c_char,
+    found: *const c_char,
+    expected: *const c_char,
+) -> c_int {
     answer(|| {
         // SAFETY: as the module says.
         let [what, found, expected] =
@@ -304,7 +321,14 @@ mod tests {
             let source = source.split("#[cfg(test)]").next().unwrap_or_default();
             for function in source.split("extern \"C\" fn ").skip(1) {
                 let body = function.split("\n}\n").next().unwrap_or_default();
-                let guarded = ["answer(", "value(", "lend(", "lend_points(", "MESSAGE.try_with(", "const VERSION"];
+                let guarded = [
+                    "answer(",
+                    "value(",
+                    "lend(",
+                    "lend_points(",
+                    "MESSAGE.try_with(",
+                    "const VERSION",
+                ];
                 assert!(guarded.iter().any(|guard| body.contains(guard)), "{body}");
             }
         }

@@ -79,7 +79,12 @@ impl Named {
         }
     }
 
-    pub(super) fn field(&mut self, name: String, association: Association, components: Vec<Address>) {
+    pub(super) fn field(
+        &mut self,
+        name: String,
+        association: Association,
+        components: Vec<Address>,
+    ) {
         self.fields.retain(|(known, ..)| *known != name);
         self.fields.push((name, association, components));
     }
@@ -96,16 +101,23 @@ impl Named {
         };
         let Some(cells) = &self.cells else {
             let what = format!("channel '{}'", self.name);
-            let expected = "tombolo_cells, tombolo_mixed_cells, or tombolo_point_cells for points alone";
+            let expected =
+                "tombolo_cells, tombolo_mixed_cells, or tombolo_point_cells for points alone";
             return Err(missing(what, "points without cells", expected));
         };
         if let Some((number, name)) = self.features.first().filter(|_| self.faces.is_empty()) {
             let what = format!("channel '{}', feature '{name}' ({number})", self.name);
-            return Err(missing(what, "no faces", "tombolo_faces, with 0 faces on a rank that has none"));
+            return Err(missing(
+                what,
+                "no faces",
+                "tombolo_faces, with 0 faces on a rank that has none",
+            ));
         }
         let cells = match cells {
             Cells::Points => None,
-            Cells::Uniform(cell_type, connectivity) => Some(DescribedCells::Uniform(*cell_type, array(connectivity))),
+            Cells::Uniform(cell_type, connectivity) => {
+                Some(DescribedCells::Uniform(*cell_type, array(connectivity)))
+            }
             Cells::Mixed { types, sizes, connectivity } => Some(DescribedCells::Mixed {
                 types: array(types),
                 sizes: array(sizes),
@@ -116,7 +128,11 @@ impl Named {
             name: self.name.clone(),
             axes: self.points.iter().map(array).collect(),
             cells,
-            faces: self.faces.iter().map(|(cell_type, faces, tags)| (*cell_type, array(faces), array(tags))).collect(),
+            faces: self
+                .faces
+                .iter()
+                .map(|(cell_type, faces, tags)| (*cell_type, array(faces), array(tags)))
+                .collect(),
             feature_names: self.features.clone(),
             fields: self
                 .fields

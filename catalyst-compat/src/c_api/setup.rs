@@ -12,7 +12,10 @@ use tombolo::pipelines::{
 };
 use tombolo::{Parameter, Settings};
 
-use super::{Fault, Handle, Opened, Stage, answer, c_string, find, hold, name, register, runs, text, value, with};
+use super::{
+    Fault, Handle, Opened, Stage, answer, c_string, find, hold, name, register, runs, text, value,
+    with,
+};
 use crate::error::CatalystError;
 use crate::ranks;
 use crate::run::Run;
@@ -34,17 +37,23 @@ fn read_configuration(file: &str) -> Result<Config, CatalystError> {
 /// # Safety
 /// As the module says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_open(file: *const c_char, communicator: c_int, run: *mut *mut Handle) -> c_int {
+pub unsafe extern "C" fn tombolo_open(
+    file: *const c_char,
+    communicator: c_int,
+    run: *mut *mut Handle,
+) -> c_int {
     answer(|| {
         // SAFETY: as the module says.
         let run = unsafe { run.as_mut() }.ok_or_else(|| Fault::null("the address of the run"))?;
         *run = ptr::null_mut();
         let communicator = ranks::communicator(Some(communicator))?;
-        let mut settings = Settings { communicator: Arc::clone(&communicator), ..Settings::default() };
+        let mut settings =
+            Settings { communicator: Arc::clone(&communicator), ..Settings::default() };
         // SAFETY: as the module says.
         let file = if file.is_null() { Ok(None) } else { unsafe { text(file, "file") }.map(Some) };
         // A rank whose file cannot be read must not leave the others waiting.
-        let config = file.and_then(|file| Ok(file.map(|file| read_configuration(&file)).transpose()?));
+        let config =
+            file.and_then(|file| Ok(file.map(|file| read_configuration(&file)).transpose()?));
         let config = config.map_err(|fault| match fault {
             Fault::Error(error) => error,
             Fault::Call(message) => CatalystError::Configuration(message),
@@ -107,7 +116,8 @@ pub unsafe extern "C" fn tombolo_orders_file(run: *mut Handle, file: *const c_ch
         let file = unsafe { text(file, "file") }?;
         with(run, |run| {
             run.settings()?.orders =
-                language::parse_orders(&file_text(&file, WAITING_BYTES)?, &file).map_err(unreadable)?;
+                language::parse_orders(&file_text(&file, WAITING_BYTES)?, &file)
+                    .map_err(unreadable)?;
             Ok(())
         })
     })
@@ -191,7 +201,9 @@ impl Opened {
 pub unsafe extern "C" fn tombolo_start(run: *mut Handle) -> c_int {
     answer(|| {
         with(run, |run| match &run.stage {
-            Stage::UnderWay(_) => Err(Fault::Call("called twice, or after tombolo_execute; the run has begun".into())),
+            Stage::UnderWay(_) => {
+                Err(Fault::Call("called twice, or after tombolo_execute; the run has begun".into()))
+            }
             _ => run.begin().map(|_| ()),
         })
     })
@@ -229,7 +241,9 @@ pub unsafe extern "C" fn tombolo_report(run: *mut Handle) -> *const c_char {
     value(ptr::null(), || {
         with(run, |run| match &run.stage {
             Stage::Ended => Ok(run.report.as_ref().map_or(ptr::null(), |(_, text)| text.as_ptr())),
-            _ => Err(Fault::Call("called before tombolo_finalize; the report is made at the end".into())),
+            _ => Err(Fault::Call(
+                "called before tombolo_finalize; the report is made at the end".into(),
+            )),
         })
     })
 }

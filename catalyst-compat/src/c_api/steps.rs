@@ -15,22 +15,32 @@ use crate::motion::Motion;
 /// # Safety
 /// As the module says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_execute(run: *mut Handle, cycle: u64, time: f64, time_step: f64) -> c_int {
+pub unsafe extern "C" fn tombolo_execute(
+    run: *mut Handle,
+    cycle: u64,
+    time: f64,
+    time_step: f64,
+) -> c_int {
     answer(|| {
         with(run, |run| {
             run.begin()?;
             run.orders.clear();
-            let Stage::UnderWay(under_way) = &mut run.stage else { return Err(Opened::after_the_end()) };
+            let Stage::UnderWay(under_way) = &mut run.stage else {
+                return Err(Opened::after_the_end());
+            };
             let _alarm = under_way.alarm();
             // SAFETY: as the module says: the arrays live while this call runs.
-            let channels: Result<Vec<_>, _> = run.channels.iter().map(|named| unsafe { named.channel() }).collect();
+            let channels: Result<Vec<_>, _> =
+                run.channels.iter().map(|named| unsafe { named.channel() }).collect();
             let given = channels.map(|channels| (Step { cycle, time, time_step }, channels));
             if !under_way.execute(given)? {
                 return Err(ExecuteError::NoChannel { cycle }.into());
             }
             run.channels.iter_mut().for_each(|named| named.is_shown = true);
             let order = under_way.asked().motion.as_ref().map(|motion| motion.order.as_str());
-            if let Some(order) = order.filter(|order| run.motion_order.to_bytes() != order.as_bytes()) {
+            if let Some(order) =
+                order.filter(|order| run.motion_order.to_bytes() != order.as_bytes())
+            {
                 run.motion_order = c_string(order);
             }
             Ok(())
@@ -40,7 +50,11 @@ pub unsafe extern "C" fn tombolo_execute(run: *mut Handle, cycle: u64, time: f64
 
 /// Something of the motion that is asked for; `None` where the mesh stays.
 fn motion<T>(run: *mut Handle, part: impl FnOnce(&Motion, &Opened) -> T) -> Option<T> {
-    value(None, || with(run, |run| Ok(run.under_way()?.asked().motion.as_ref().map(|motion| part(motion, run)))))
+    value(None, || {
+        with(run, |run| {
+            Ok(run.under_way()?.asked().motion.as_ref().map(|motion| part(motion, run)))
+        })
+    })
 }
 
 fn first(vectors: &[Vector]) -> *const f64 {
@@ -53,7 +67,9 @@ fn first(vectors: &[Vector]) -> *const f64 {
 /// As the module says.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tombolo_coordinates(run: *mut Handle) -> *const f64 {
-    value(ptr::null(), || Ok(motion(run, |motion, _| first(&motion.coordinates)).unwrap_or(ptr::null())))
+    value(ptr::null(), || {
+        Ok(motion(run, |motion, _| first(&motion.coordinates)).unwrap_or(ptr::null()))
+    })
 }
 
 /// See `tombolo.h`.
@@ -62,7 +78,9 @@ pub unsafe extern "C" fn tombolo_coordinates(run: *mut Handle) -> *const f64 {
 /// As the module says.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tombolo_displacement(run: *mut Handle) -> *const f64 {
-    value(ptr::null(), || Ok(motion(run, |motion, _| first(&motion.displacement)).unwrap_or(ptr::null())))
+    value(ptr::null(), || {
+        Ok(motion(run, |motion, _| first(&motion.displacement)).unwrap_or(ptr::null()))
+    })
 }
 
 /// See `tombolo.h`.
@@ -71,7 +89,9 @@ pub unsafe extern "C" fn tombolo_displacement(run: *mut Handle) -> *const f64 {
 /// As the module says.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tombolo_velocity(run: *mut Handle) -> *const f64 {
-    value(ptr::null(), || Ok(motion(run, |motion, _| first(&motion.velocity)).unwrap_or(ptr::null())))
+    value(ptr::null(), || {
+        Ok(motion(run, |motion, _| first(&motion.velocity)).unwrap_or(ptr::null()))
+    })
 }
 
 /// See `tombolo.h`.
@@ -89,7 +109,9 @@ pub unsafe extern "C" fn tombolo_motion_count(run: *mut Handle) -> usize {
 /// As the module says.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tombolo_surface_coordinates(run: *mut Handle) -> *const f64 {
-    value(ptr::null(), || Ok(motion(run, |motion, _| first(&motion.surface.coordinates)).unwrap_or(ptr::null())))
+    value(ptr::null(), || {
+        Ok(motion(run, |motion, _| first(&motion.surface.coordinates)).unwrap_or(ptr::null()))
+    })
 }
 
 /// See `tombolo.h`.
@@ -98,7 +120,9 @@ pub unsafe extern "C" fn tombolo_surface_coordinates(run: *mut Handle) -> *const
 /// As the module says.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tombolo_surface_displacement(run: *mut Handle) -> *const f64 {
-    value(ptr::null(), || Ok(motion(run, |motion, _| first(&motion.surface.displacement)).unwrap_or(ptr::null())))
+    value(ptr::null(), || {
+        Ok(motion(run, |motion, _| first(&motion.surface.displacement)).unwrap_or(ptr::null()))
+    })
 }
 
 /// See `tombolo.h`.
@@ -107,7 +131,9 @@ pub unsafe extern "C" fn tombolo_surface_displacement(run: *mut Handle) -> *cons
 /// As the module says.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tombolo_surface_velocity(run: *mut Handle) -> *const f64 {
-    value(ptr::null(), || Ok(motion(run, |motion, _| first(&motion.surface.velocity)).unwrap_or(ptr::null())))
+    value(ptr::null(), || {
+        Ok(motion(run, |motion, _| first(&motion.surface.velocity)).unwrap_or(ptr::null()))
+    })
 }
 
 /// See `tombolo.h`.
@@ -116,7 +142,9 @@ pub unsafe extern "C" fn tombolo_surface_velocity(run: *mut Handle) -> *const f6
 /// As the module says.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tombolo_surface_vertices(run: *mut Handle) -> *const u32 {
-    value(ptr::null(), || Ok(motion(run, |motion, _| motion.surface.vertices.as_ptr()).unwrap_or(ptr::null())))
+    value(ptr::null(), || {
+        Ok(motion(run, |motion, _| motion.surface.vertices.as_ptr()).unwrap_or(ptr::null()))
+    })
 }
 
 /// See `tombolo.h`.
@@ -134,7 +162,10 @@ pub unsafe extern "C" fn tombolo_surface_count(run: *mut Handle) -> usize {
 /// As the module says.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tombolo_motion_order(run: *mut Handle) -> *const c_char {
-    value(ptr::null(), || Ok(motion(run, |_, run| run.motion_order.as_ptr()).unwrap_or(ptr::null())))
+    value(
+        ptr::null(),
+        || Ok(motion(run, |_, run| run.motion_order.as_ptr()).unwrap_or(ptr::null())),
+    )
 }
 
 /// See `tombolo.h`.
@@ -142,13 +173,19 @@ pub unsafe extern "C" fn tombolo_motion_order(run: *mut Handle) -> *const c_char
 /// # Safety
 /// As the module says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_motion_shape(run: *mut Handle, shape: *mut c_uint, shapes: *mut c_uint) -> c_int {
+pub unsafe extern "C" fn tombolo_motion_shape(
+    run: *mut Handle,
+    shape: *mut c_uint,
+    shapes: *mut c_uint,
+) -> c_int {
     answer(|| {
         // SAFETY: as the module says.
         let (shape, shapes) = unsafe { (shape.as_mut(), shapes.as_mut()) };
         let (shape, shapes) = shape.zip(shapes).ok_or_else(|| Fault::null("shape or shapes"))?;
         (*shape, *shapes) = (0, 0);
-        let asked = with(run, |run| Ok(run.under_way()?.asked().motion.as_ref().map(|motion| motion.shape)))?;
+        let asked = with(run, |run| {
+            Ok(run.under_way()?.asked().motion.as_ref().map(|motion| motion.shape))
+        })?;
         (*shape, *shapes) = asked.unwrap_or_default();
         Ok(())
     })
@@ -159,7 +196,11 @@ pub unsafe extern "C" fn tombolo_motion_shape(run: *mut Handle, shape: *mut c_ui
 /// # Safety
 /// As the module says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn tombolo_parameter_value(run: *mut Handle, name: *const c_char, value: *mut f64) -> c_int {
+pub unsafe extern "C" fn tombolo_parameter_value(
+    run: *mut Handle,
+    name: *const c_char,
+    value: *mut f64,
+) -> c_int {
     answer(|| {
         // SAFETY: as the module says.
         let (name, value) = unsafe { (text(name, "the parameter's name")?, value.as_mut()) };
@@ -169,8 +210,12 @@ pub unsafe extern "C" fn tombolo_parameter_value(run: *mut Handle, name: *const 
             *value = *known.get(&name).ok_or_else(|| {
                 let names = known.keys().map(String::as_str);
                 let expected = match nearest(&name, names.clone()) {
-                    Some(near) => format!("one that tombolo_parameter declared; did you mean '{near}'?"),
-                    None if known.is_empty() => "one that tombolo_parameter declared; none was".into(),
+                    Some(near) => {
+                        format!("one that tombolo_parameter declared; did you mean '{near}'?")
+                    }
+                    None if known.is_empty() => {
+                        "one that tombolo_parameter declared; none was".into()
+                    }
                     None => format!("one of: {}", names.collect::<Vec<_>>().join(", ")),
                 };
                 Fault::invalid("parameter", format!("'{name}'"), expected)

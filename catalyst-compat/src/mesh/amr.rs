@@ -22,18 +22,26 @@ pub(crate) struct Grid {
 mod bits {
     use serde::{Deserialize as _, Deserializer, Serialize as _, Serializer};
 
-    pub(super) fn serialize<S: Serializer>(numbers: &[f64; 3], serializer: S) -> Result<S::Ok, S::Error> {
+    pub(super) fn serialize<S: Serializer>(
+        numbers: &[f64; 3],
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
         numbers.map(f64::to_bits).serialize(serializer)
     }
 
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; 3], D::Error> {
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<[f64; 3], D::Error> {
         Ok(<[u64; 3]>::deserialize(deserializer)?.map(f64::from_bits))
     }
 }
 
 impl Grid {
     /// Reads a domain that says its level; `None` for one that does not, or is no uniform grid.
-    pub(super) fn read(node: &Node<'_, '_>, domain: &Domain<'_>) -> Result<Option<Self>, CatalystError> {
+    pub(super) fn read(
+        node: &Node<'_, '_>,
+        domain: &Domain<'_>,
+    ) -> Result<Option<Self>, CatalystError> {
         let (Coordset::Uniform { origin, spacing, .. }, Topology::Grid { cells }) =
             (&domain.coordset, &domain.topology)
         else {
@@ -47,7 +55,10 @@ impl Grid {
 
     /// The least distance between two of its points along an axis.
     pub(super) fn least_spacing(&self) -> f64 {
-        (0..3).filter(|&axis| self.cells[axis] > 0).map(|axis| self.spacing[axis].abs()).fold(f64::INFINITY, f64::min)
+        (0..3)
+            .filter(|&axis| self.cells[axis] > 0)
+            .map(|axis| self.spacing[axis].abs())
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// The cells of this grid whose middle lies in a finer one.
@@ -55,8 +66,11 @@ impl Grid {
         let mut covered = Covered { child: None, origin: [0; 3], counts: [1; 3] };
         for axis in (0..3).filter(|&axis| self.cells[axis] > 0) {
             #[expect(clippy::cast_precision_loss, reason = "a number of cells below 2^32")]
-            let [own, length] = [self.cells[axis] as f64, finer.cells[axis] as f64 * finer.spacing[axis]];
-            let at = |place: f64| ((place - self.lower[axis]) / self.spacing[axis] - 0.5).ceil().clamp(0.0, own);
+            let [own, length] =
+                [self.cells[axis] as f64, finer.cells[axis] as f64 * finer.spacing[axis]];
+            let at = |place: f64| {
+                ((place - self.lower[axis]) / self.spacing[axis] - 0.5).ceil().clamp(0.0, own)
+            };
             let (from, to) = (at(finer.lower[axis]), at(finer.lower[axis] + length));
             // False for what is no number, too.
             let has_any = from < to;
@@ -106,12 +120,20 @@ impl Mask {
                 if window.need(c"domain_type", "'child' or 'parent'")?.text()? != "child" {
                     continue;
                 }
-                let (counts, _) = counts(&window.need(c"dims", "the cells that the child covers")?)?;
-                let corner =
-                    whole_numbers(&window.need(c"origin", "the first cell that the child covers")?, ["i", "j", "k"])?;
+                let (counts, _) =
+                    counts(&window.need(c"dims", "the cells that the child covers")?)?;
+                let corner = whole_numbers(
+                    &window.need(c"origin", "the first cell that the child covers")?,
+                    ["i", "j", "k"],
+                )?;
                 let origin = std::array::from_fn(|axis| corner[axis] - origin[axis]);
-                let child = window.child(c"domain_id").map(|child| whole_number(&child)).transpose()?;
-                mask.covered.push(Covered { child, origin, counts: counts.map(|count| count.max(1)) });
+                let child =
+                    window.child(c"domain_id").map(|child| whole_number(&child)).transpose()?;
+                mask.covered.push(Covered {
+                    child,
+                    origin,
+                    counts: counts.map(|count| count.max(1)),
+                });
             }
         }
         Ok(mask)
@@ -154,7 +176,9 @@ impl Mask {
 fn first_cell(domain: &Node<'_, '_>) -> Result<[i64; 3], CatalystError> {
     let Some(topologies) = domain.child(c"topologies") else { return Ok([0; 3]) };
     let names = topologies.names();
-    let Some(topology) = names.first().and_then(|name| topologies.at(0, name)) else { return Ok([0; 3]) };
+    let Some(topology) = names.first().and_then(|name| topologies.at(0, name)) else {
+        return Ok([0; 3]);
+    };
     let Some(elements) = topology.child(c"elements") else { return Ok([0; 3]) };
     match elements.child(c"origin") {
         Some(origin) => whole_numbers(&origin, ["i0", "j0", "k0"]),

@@ -74,7 +74,11 @@ impl<'call> Channel<'call> {
         }
         // A mesh may come in domains, as those of several blocks do.
         let has_domains = data.child(c"coordsets").is_none()
-            && data.names().first().and_then(|name| data.at(0, name)?.child(c"coordsets").map(drop)).is_some();
+            && data
+                .names()
+                .first()
+                .and_then(|name| data.at(0, name)?.child(c"coordsets").map(drop))
+                .is_some();
         if kind_name == "mesh" && !has_domains {
             channel.push(String::new(), &data, false, looked_at)?;
         } else {
@@ -140,7 +144,10 @@ impl<'call> Channel<'call> {
             }
             match Field::read_of_mesh(&child)? {
                 Some(field) => self.of_mesh.push(field),
-                None => self.notes.push(format!("'{}' is passed over: fields hold numbers, not texts", child.path())),
+                None => self.notes.push(format!(
+                    "'{}' is passed over: fields hold numbers, not texts",
+                    child.path()
+                )),
             }
         }
         Ok(())
@@ -189,7 +196,9 @@ impl<'call> Channel<'call> {
                 return Err(CatalystError::Wrong {
                     path: format!("catalyst/channels/{}/state/fields/{}", self.name, field.name),
                     found,
-                    expected: "values in the main memory of this process, not in that of a graphics card".into(),
+                    expected:
+                        "values in the main memory of this process, not in that of a graphics card"
+                            .into(),
                 });
             }
         }
@@ -202,7 +211,9 @@ fn refuse_devices(node: &Node<'_, '_>) -> Result<(), CatalystError> {
     for name in [c"memoryspace", c"memory_space"] {
         if let Some(space) = node.child(name) {
             let text = space.text()?;
-            if !["", "serial", "host", "openmp", "tbb"].contains(&text.to_ascii_lowercase().as_str()) {
+            if !["", "serial", "host", "openmp", "tbb"]
+                .contains(&text.to_ascii_lowercase().as_str())
+            {
                 return Err(space.wrong_found(
                     format!("'{text}'"),
                     "'host': arrays in a graphics card's memory are copied to the main memory by the solver".into(),
@@ -223,7 +234,8 @@ fn feature_names(node: &Node<'_, '_>) -> Result<Vec<(i64, String)>, CatalystErro
         let Some(child) = features.at(index, name) else { continue };
         let array = child.array()?;
         let number = (array.len() == 1).then(|| array.integer(0)).flatten();
-        let number = number.ok_or_else(|| child.wrong("one whole number, that of the feature".into()))?;
+        let number =
+            number.ok_or_else(|| child.wrong("one whole number, that of the feature".into()))?;
         found.push((number, name.to_string_lossy().into_owned()));
     }
     Ok(found)

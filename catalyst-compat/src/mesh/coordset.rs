@@ -30,7 +30,11 @@ pub(super) fn counts(node: &Node<'_, '_>) -> Result<([usize; 3], usize), Catalys
             dimension = axis + 1;
         }
     }
-    if dimension == 0 { Err(node.wrong("whole numbers i, j, k".into())) } else { Ok((counts, dimension)) }
+    if dimension == 0 {
+        Err(node.wrong("whole numbers i, j, k".into()))
+    } else {
+        Ok((counts, dimension))
+    }
 }
 
 impl<'call> Coordset<'call> {
@@ -51,7 +55,10 @@ impl<'call> Coordset<'call> {
                 }
                 Ok(Coordset::Explicit { axes })
             }
-            other => Err(kind.wrong_found(format!("'{other}'"), "'uniform', 'rectilinear' or 'explicit'".into())),
+            other => Err(kind.wrong_found(
+                format!("'{other}'"),
+                "'uniform', 'rectilinear' or 'explicit'".into(),
+            )),
         }
     }
 
@@ -61,22 +68,28 @@ impl<'call> Coordset<'call> {
         points.iter_mut().skip(dimension).for_each(|count| *count = 1);
         let product = points.iter().try_fold(1_usize, |product, count| product.checked_mul(*count));
         if product.is_none_or(|product| product > u32::MAX as usize) {
-            return Err(dims.wrong_found(format!("{points:?} points"), format!("at most {} points in all", u32::MAX)));
+            return Err(dims.wrong_found(
+                format!("{points:?} points"),
+                format!("at most {} points in all", u32::MAX),
+            ));
         }
-        let vector = |name: &CStr, parts: [&CStr; 3], default: f64| -> Result<Vector, CatalystError> {
-            let mut vector = [default; 3];
-            if let Some(parent) = node.child(name) {
-                for (value, part) in vector.iter_mut().zip(parts) {
-                    if let Some(child) = parent.child(part) {
-                        *value = child.number()?;
-                        if !value.is_finite() {
-                            return Err(child.wrong_found(format!("{value}"), "a finite number".into()));
+        let vector =
+            |name: &CStr, parts: [&CStr; 3], default: f64| -> Result<Vector, CatalystError> {
+                let mut vector = [default; 3];
+                if let Some(parent) = node.child(name) {
+                    for (value, part) in vector.iter_mut().zip(parts) {
+                        if let Some(child) = parent.child(part) {
+                            *value = child.number()?;
+                            if !value.is_finite() {
+                                return Err(
+                                    child.wrong_found(format!("{value}"), "a finite number".into())
+                                );
+                            }
                         }
                     }
                 }
-            }
-            Ok(vector)
-        };
+                Ok(vector)
+            };
         let origin = vector(c"origin", AXES, 0.0)?;
         let spacing = vector(c"spacing", SPACINGS, 1.0)?;
         Ok(Coordset::Uniform { points, origin, spacing })
@@ -86,7 +99,9 @@ impl<'call> Coordset<'call> {
     pub(super) fn grid(&self) -> Option<[usize; 3]> {
         match self {
             Coordset::Uniform { points, .. } => Some(*points),
-            Coordset::Rectilinear { axes } => Some(std::array::from_fn(|axis| axes.get(axis).map_or(1, Array::len))),
+            Coordset::Rectilinear { axes } => {
+                Some(std::array::from_fn(|axis| axes.get(axis).map_or(1, Array::len)))
+            }
             Coordset::Explicit { .. } => None,
         }
     }
@@ -108,14 +123,14 @@ impl<'call> Coordset<'call> {
     pub(super) fn append(&self, points: &mut Vec<Vector>) {
         let place = |array: &Array, index: usize| array.get(index);
         match self {
-            Coordset::Explicit { axes } => points.extend(
-                (0..self.len())
-                    .map(|index| std::array::from_fn(|axis| axes.get(axis).map_or(0.0, |axis| place(axis, index)))),
-            ),
+            Coordset::Explicit { axes } => points.extend((0..self.len()).map(|index| {
+                std::array::from_fn(|axis| axes.get(axis).map_or(0.0, |axis| place(axis, index)))
+            })),
             Coordset::Uniform { points: counts, origin, spacing, .. } => {
                 grid(*counts, |at| {
                     points.push(std::array::from_fn(|axis| {
-                        let along = if counts[axis] > 1 { at[axis] as f64 * spacing[axis] } else { 0.0 };
+                        let along =
+                            if counts[axis] > 1 { at[axis] as f64 * spacing[axis] } else { 0.0 };
                         origin[axis] + along
                     }));
                 });
@@ -123,7 +138,9 @@ impl<'call> Coordset<'call> {
             Coordset::Rectilinear { axes } => {
                 let Some(counts) = self.grid() else { return };
                 grid(counts, |at| {
-                    points.push(std::array::from_fn(|axis| axes.get(axis).map_or(0.0, |axis_| place(axis_, at[axis]))));
+                    points.push(std::array::from_fn(|axis| {
+                        axes.get(axis).map_or(0.0, |axis_| place(axis_, at[axis]))
+                    }));
                 });
             }
         }

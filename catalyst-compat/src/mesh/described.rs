@@ -39,8 +39,17 @@ pub(crate) enum DescribedCells<'call> {
 impl<'call> Description<'call> {
     /// The channel that the arrays describe.
     pub(crate) fn channel(self) -> Result<Channel<'call>, CatalystError> {
-        let Description { name, axes, cells, faces, feature_names, fields, ghosts, global_vertices, global_cells } =
-            self;
+        let Description {
+            name,
+            axes,
+            cells,
+            faces,
+            feature_names,
+            fields,
+            ghosts,
+            global_vertices,
+            global_cells,
+        } = self;
         let wrong = |what: &str, found: String, expected: String| CatalystError::Argument {
             what: format!("channel '{name}', {what}"),
             found,
@@ -51,16 +60,28 @@ impl<'call> Description<'call> {
         let uniform = |what: &str, cell_type: CellType, connectivity: Array<'call>| {
             let size = cell_type.vertex_count().unwrap_or(1);
             if connectivity.len().is_multiple_of(size) {
-                Ok(Topology::Uniform { cell_type, connectivity, path: format!("channel '{name}', {what}") })
+                Ok(Topology::Uniform {
+                    cell_type,
+                    connectivity,
+                    path: format!("channel '{name}', {what}"),
+                })
             } else {
-                Err(wrong(what, format!("{} vertex numbers", connectivity.len()), format!("a multiple of {size}")))
+                Err(wrong(
+                    what,
+                    format!("{} vertex numbers", connectivity.len()),
+                    format!("a multiple of {size}"),
+                ))
             }
         };
         let topology = match cells {
             None => Topology::Points(vertices),
-            Some(DescribedCells::Uniform(cell_type, connectivity)) => uniform("cells", cell_type, connectivity)?,
+            Some(DescribedCells::Uniform(cell_type, connectivity)) => {
+                uniform("cells", cell_type, connectivity)?
+            }
             Some(DescribedCells::Mixed { types, sizes, connectivity }) => {
-                let map = CellType::ALL.into_iter().filter(|cell_type| *cell_type != CellType::Polyhedron);
+                let map = CellType::ALL
+                    .into_iter()
+                    .filter(|cell_type| *cell_type != CellType::Polyhedron);
                 Topology::Mixed {
                     cells: Rows::of(connectivity, sizes, format!("channel '{name}', cells")),
                     shapes: types,
@@ -80,7 +101,12 @@ impl<'call> Description<'call> {
         let mut own = Vec::with_capacity(fields.len());
         for (field, association, components) in fields {
             // What has to be copied is copied before the adaptor sees it, so that it is asked here.
-            check_field_length(&name, (&field, association), components.first().map_or(0, Array::len), counts)?;
+            check_field_length(
+                &name,
+                (&field, association),
+                components.first().map_or(0, Array::len),
+                counts,
+            )?;
             own.push(Field::new(field, association, components));
         }
         let roles = Roles { ghosts, global_vertices, global_cells, vertex_features: None };

@@ -52,7 +52,10 @@ struct Named<'call> {
 
 impl<'call> Domain<'call> {
     /// Reads a mesh; `None` for one that says nothing, as that of a rank without cells may.
-    pub(super) fn read(node: &Node<'_, 'call>, with_fields: bool) -> Result<Option<Self>, CatalystError> {
+    pub(super) fn read(
+        node: &Node<'_, 'call>,
+        with_fields: bool,
+    ) -> Result<Option<Self>, CatalystError> {
         if node.kind() == Kind::Empty || (node.kind() == Kind::Object && node.len() == 0) {
             return Ok(None);
         }
@@ -64,13 +67,21 @@ impl<'call> Domain<'call> {
             let coordset_name = topology.need(c"coordset", "the name of its coordset")?;
             let text = CString::new(&*coordset_name.text()?).unwrap_or_default();
             let Some(coordset_node) = coordsets.child(&text) else {
-                let known: Vec<String> =
-                    coordsets.names().iter().map(|name| name.to_string_lossy().into_owned()).collect();
-                return Err(coordset_name.wrong(format!("one of the coordsets {}", known.join(", "))));
+                let known: Vec<String> = coordsets
+                    .names()
+                    .iter()
+                    .map(|name| name.to_string_lossy().into_owned())
+                    .collect();
+                return Err(
+                    coordset_name.wrong(format!("one of the coordsets {}", known.join(", ")))
+                );
             };
             let coordset = Coordset::read(&coordset_node)?;
             let cells = Topology::read(&topology, &coordset)?;
-            named.push((Named { name: name.clone(), coordset: text.clone(), topology: cells }, coordset));
+            named.push((
+                Named { name: name.clone(), coordset: text.clone(), topology: cells },
+                coordset,
+            ));
         }
         // The cells are those of the highest dimension.
         let main = (0..named.len()).rev().max_by_key(|&index| named[index].0.topology.dimension());
@@ -127,7 +138,9 @@ impl<'call> Domain<'call> {
             if self.faces.is_empty() {
                 self.faces.extend(faces(&field_node, name, main, others)?);
             }
-            let Some(field) = Field::read(&field_node, &main.name, vertices, elements)? else { continue };
+            let Some(field) = Field::read(&field_node, &main.name, vertices, elements)? else {
+                continue;
+            };
             let role = told.as_ref().and_then(|told| told.child(name));
             let role = match role.as_ref().and_then(|role| role.child(c"attribute_type")) {
                 Some(role) => role.text()?.into_owned(),
@@ -140,7 +153,12 @@ impl<'call> Domain<'call> {
         Ok(())
     }
 
-    fn take_role(&mut self, field: &Field<'call>, role: &str, node: &Node<'_, 'call>) -> Result<(), CatalystError> {
+    fn take_role(
+        &mut self,
+        field: &Field<'call>,
+        role: &str,
+        node: &Node<'_, 'call>,
+    ) -> Result<(), CatalystError> {
         let [values] = field.components.as_slice() else { return Ok(()) };
         let is_features = field.name == "features" && field.association == Association::Vertex;
         let slot = match (role, field.association) {
@@ -151,7 +169,9 @@ impl<'call> Domain<'call> {
             _ => return Ok(()),
         };
         if !values.is_integer() {
-            return Err(node.need(c"values", "integers")?.wrong(format!("integers, as it holds {role}")));
+            return Err(node
+                .need(c"values", "integers")?
+                .wrong(format!("integers, as it holds {role}")));
         }
         *slot = Some(*values);
         Ok(())
@@ -166,26 +186,39 @@ impl<'call> Domain<'call> {
             faces.tags.fingerprint(into);
         }
         let Roles { ghosts, global_vertices, global_cells, vertex_features } = &self.roles;
-        for array in [ghosts, global_vertices, global_cells, vertex_features].into_iter().flatten() {
+        for array in [ghosts, global_vertices, global_cells, vertex_features].into_iter().flatten()
+        {
             array.fingerprint(into);
         }
     }
 
     /// Refuses arrays whose memory cannot be read.
     pub(super) fn check_memory(&self) -> Result<(), CatalystError> {
-        let of_faces = self.faces.iter().flat_map(|faces| faces.topology.arrays().into_iter().chain([&faces.tags]));
+        let of_faces = self
+            .faces
+            .iter()
+            .flat_map(|faces| faces.topology.arrays().into_iter().chain([&faces.tags]));
         let of_fields = self.fields.iter().flat_map(|field| {
-            field.components.iter().map(move |array| (array, format_args!("fields/{}/values", field.name).to_string()))
+            field
+                .components
+                .iter()
+                .map(move |array| (array, format_args!("fields/{}/values", field.name).to_string()))
         });
         let coordsets = self.coordset.arrays().iter().map(|array| (array, "coordsets".to_owned()));
-        let topologies =
-            self.topology.arrays().into_iter().chain(of_faces).map(|array| (array, "topologies".to_owned()));
+        let topologies = self
+            .topology
+            .arrays()
+            .into_iter()
+            .chain(of_faces)
+            .map(|array| (array, "topologies".to_owned()));
         for (array, place) in coordsets.chain(topologies).chain(of_fields) {
             if let Some(found) = memory::fault(array) {
                 return Err(CatalystError::Wrong {
                     path: format!("{}/{place}", self.path),
                     found,
-                    expected: "values in the main memory of this process, not in that of a graphics card".into(),
+                    expected:
+                        "values in the main memory of this process, not in that of a graphics card"
+                            .into(),
                 });
             }
         }
@@ -220,6 +253,9 @@ fn faces<'call>(
         [tags] if tags.is_integer() && tags.len() == other.topology.len() => {
             Ok(Some(Faces { topology: other.topology.clone(), tags: *tags }))
         }
-        _ => Err(values.wrong(format!("{} integers, one for each face of topology '{of}'", other.topology.len()))),
+        _ => Err(values.wrong(format!(
+            "{} integers, one for each face of topology '{of}'",
+            other.topology.len()
+        ))),
     }
 }

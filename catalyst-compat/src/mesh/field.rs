@@ -30,7 +30,8 @@ fn number(components: &[Array<'_>]) -> NumberType {
 
 /// Components as they lie in the solver's memory, where each can be lent.
 pub(super) fn lent<'call>(components: &[Array<'call>]) -> Option<ArrayView<'call>> {
-    let mut columns: [(Values<'call>, usize, usize); COMPONENTS] = [(Values::U8(&[]), 0, 1); COMPONENTS];
+    let mut columns: [(Values<'call>, usize, usize); COMPONENTS] =
+        [(Values::U8(&[]), 0, 1); COMPONENTS];
     for (column, array) in columns.iter_mut().zip(components) {
         let (values, stride) = array.values()?;
         *column = (values, 0, stride);
@@ -39,7 +40,9 @@ pub(super) fn lent<'call>(components: &[Array<'call>]) -> Option<ArrayView<'call
 }
 
 /// The components of a `values` node: an array, or an object (or list) of arrays.
-pub(super) fn components<'call>(values: &Node<'_, 'call>) -> Result<Vec<Array<'call>>, CatalystError> {
+pub(super) fn components<'call>(
+    values: &Node<'_, 'call>,
+) -> Result<Vec<Array<'call>>, CatalystError> {
     if !matches!(values.kind(), Kind::Object | Kind::List) {
         return Ok(vec![values.array()?]);
     }
@@ -52,7 +55,9 @@ pub(super) fn components<'call>(values: &Node<'_, 'call>) -> Result<Vec<Array<'c
         let Some(child) = values.at(index, name) else { continue };
         let array = child.array()?;
         if let Some(first) = components.first().filter(|first| first.len() != array.len()) {
-            return Err(child.wrong(format!("{} values, as many as in the first component", first.len())));
+            return Err(
+                child.wrong(format!("{} values, as many as in the first component", first.len()))
+            );
         }
         components.push(array);
     }
@@ -86,7 +91,8 @@ impl<'call> Field<'call> {
             "vertex" => (Association::Vertex, vertices),
             "element" => (Association::Element, elements),
             other => {
-                return Err(association_node.wrong_found(format!("'{other}'"), "'vertex' or 'element'".into()));
+                return Err(association_node
+                    .wrong_found(format!("'{other}'"), "'vertex' or 'element'".into()));
             }
         };
         let values = node.need(c"values", "an array, or an object of components")?;
@@ -95,7 +101,10 @@ impl<'call> Field<'call> {
         if found != expected {
             return Err(values.wrong_found(
                 format!("{found} values"),
-                format!("{expected}, one for each {association} of topology '{}'", topology.to_string_lossy()),
+                format!(
+                    "{expected}, one for each {association} of topology '{}'",
+                    topology.to_string_lossy()
+                ),
             ));
         }
         Ok(Some(Self::new(node.name().into_owned(), association, components)))
@@ -109,7 +118,11 @@ impl<'call> Field<'call> {
         Ok(Some(Self::new(node.name().into_owned(), Association::Mesh, components(node)?)))
     }
 
-    pub(super) fn new(name: String, association: Association, components: Vec<Array<'call>>) -> Self {
+    pub(super) fn new(
+        name: String,
+        association: Association,
+        components: Vec<Array<'call>>,
+    ) -> Self {
         Self { name, association, number: number(&components), components }
     }
 

@@ -72,8 +72,15 @@ pub(crate) struct Kept {
 impl Kept {
     /// Brings what is kept up to date with what the solver shows. Where nobody will look at the values of this step
     /// (`looked_at`), nothing is copied or compared unless the mesh has another size. Says whether the cells are others than before.
-    pub(crate) fn update(&mut self, channel: &Channel<'_>, looked_at: bool) -> Result<bool, CatalystError> {
-        let counts = (channel.vertex_count(), channel.blocks.iter().map(|block| block.domain.topology.len()).sum());
+    pub(crate) fn update(
+        &mut self,
+        channel: &Channel<'_>,
+        looked_at: bool,
+    ) -> Result<bool, CatalystError> {
+        let counts = (
+            channel.vertex_count(),
+            channel.blocks.iter().map(|block| block.domain.topology.len()).sum(),
+        );
         if !looked_at && self.fingerprint.is_some() && counts == self.counts {
             return Ok(false);
         }
@@ -133,7 +140,9 @@ impl Kept {
     fn copy_fields(&mut self, channel: &Channel<'_>) {
         let mut of_blocks: Vec<&Field<'_>> = Vec::new();
         if let Some(domain) = channel.single() {
-            of_blocks.extend(domain.fields.iter().filter(|field| field::lent(&field.components).is_none()));
+            of_blocks.extend(
+                domain.fields.iter().filter(|field| field::lent(&field.components).is_none()),
+            );
         } else {
             for field in channel.blocks.iter().flat_map(|block| &block.domain.fields) {
                 if !of_blocks.iter().any(|known| known.name == field.name) {
@@ -141,7 +150,8 @@ impl Kept {
                 }
             }
         }
-        let of_mesh = channel.of_mesh.iter().filter(|field| field::lent(&field.components).is_none());
+        let of_mesh =
+            channel.of_mesh.iter().filter(|field| field::lent(&field.components).is_none());
         let of_mesh: Vec<&Field<'_>> = of_mesh.collect();
         self.fields.resize_with(of_blocks.len() + of_mesh.len(), Copied::default);
         let mut copies = self.fields.iter_mut();
@@ -166,19 +176,26 @@ impl Kept {
                         // Where a block says nothing of ghosts there are none.
                         None if copied.name == GHOST_FIELD => copied.values.push(0.0),
                         // A block that lacks the field has no values to show.
-                        None => copied.values.extend(std::iter::repeat_n(ABSENT, copied.components)),
+                        None => {
+                            copied.values.extend(std::iter::repeat_n(ABSENT, copied.components))
+                        }
                     }
                 }
             }
         }
         for (field, copied) in of_mesh.into_iter().zip(copies) {
             copied.begin(field);
-            (0..field.components.first().map_or(0, Array::len)).for_each(|tuple| copied.append(field, tuple));
+            (0..field.components.first().map_or(0, Array::len))
+                .for_each(|tuple| copied.append(field, tuple));
         }
     }
 
     /// What the adaptor is lent: the mesh and its fields.
-    pub(crate) fn views<'a>(&'a self, channel: &'a Channel<'a>, fields: &mut Vec<FieldView<'a>>) -> MeshView<'a> {
+    pub(crate) fn views<'a>(
+        &'a self,
+        channel: &'a Channel<'a>,
+        fields: &mut Vec<FieldView<'a>>,
+    ) -> MeshView<'a> {
         let single = channel.single();
         let points = single.and_then(|domain| domain.coordset.lent());
         let points = points.unwrap_or_else(|| ArrayView::vectors(&self.points));
@@ -193,11 +210,16 @@ impl Kept {
         for field in single.iter().flat_map(|domain| &domain.fields).chain(&channel.of_mesh) {
             if let Some(values) = field::lent(&field.components) {
                 let values = values.copied_from(field.number);
-                fields.push(FieldView { name: &field.name, association: field.association, values });
+                fields.push(FieldView {
+                    name: &field.name,
+                    association: field.association,
+                    values,
+                });
             }
         }
         for copied in &self.fields {
-            let values = ArrayView::interleaved(Values::F64(&copied.values), copied.components.max(1));
+            let values =
+                ArrayView::interleaved(Values::F64(&copied.values), copied.components.max(1));
             if let (Ok(values), Some(association)) = (values, copied.association) {
                 let values = values.copied_from(copied.number);
                 fields.push(FieldView { name: &copied.name, association, values });
@@ -238,21 +260,26 @@ fn joined(cells: &Cells, points: &[Vector], channel: &Channel<'_>) -> Result<Cel
     let finest = channel.grids().map(|grid| grid.least_spacing()).fold(f64::INFINITY, f64::min);
     // Grids of one mesh have their points on one lattice, but for rounding.
     let unit = if finest.is_finite() && finest > 0.0 { finest / 8.0 } else { 1.0 };
-    let lowest: Vector = points
-        .iter()
-        .fold([f64::INFINITY; 3], |lowest, point| std::array::from_fn(|axis| lowest[axis].min(point[axis])));
+    let lowest: Vector = points.iter().fold([f64::INFINITY; 3], |lowest, point| {
+        std::array::from_fn(|axis| lowest[axis].min(point[axis]))
+    });
     let mut first: HashMap<[i64; 3], u32> = HashMap::new();
     let numbers: Vec<u32> = (0..)
         .zip(points)
         .map(|(number, point)| {
-            #[expect(clippy::cast_possible_truncation, reason = "eighths of the finest cell that fit into the mesh")]
-            let place = std::array::from_fn(|axis| ((point[axis] - lowest[axis]) / unit).round() as i64);
+            #[expect(
+                clippy::cast_possible_truncation,
+                reason = "eighths of the finest cell that fit into the mesh"
+            )]
+            let place =
+                std::array::from_fn(|axis| ((point[axis] - lowest[axis]) / unit).round() as i64);
             *first.entry(place).or_insert(number)
         })
         .collect();
     let mut joined = Cells::new();
     for (cell_type, vertices) in cells.iter() {
-        let vertices: Vec<u32> = vertices.iter().filter_map(|&vertex| numbers.get(vertex as usize).copied()).collect();
+        let vertices: Vec<u32> =
+            vertices.iter().filter_map(|&vertex| numbers.get(vertex as usize).copied()).collect();
         joined.push(cell_type, &vertices).map_err(|error| CatalystError::Wrong {
             path: format!("catalyst/channels/{}/data", channel.name),
             found: error.to_string(),
@@ -263,7 +290,8 @@ fn joined(cells: &Cells, points: &[Vector], channel: &Channel<'_>) -> Result<Cel
 }
 
 fn marks(channel: &Channel<'_>) -> Result<Marks, CatalystError> {
-    let mut marks = Marks { features: features(channel)?, ghosts: ghosts(channel), ..Marks::default() };
+    let mut marks =
+        Marks { features: features(channel)?, ghosts: ghosts(channel), ..Marks::default() };
     let Some(domain) = channel.single() else { return Ok(marks) };
     let roles = &domain.roles;
     let numbers = |array: &Array<'_>| -> Result<Vec<u64>, CatalystError> {
@@ -307,7 +335,9 @@ fn features(channel: &Channel<'_>) -> Result<FeatureSource, CatalystError> {
         && let Some(numbers) = &domain.roles.vertex_features
         && channel.blocks.iter().all(|block| block.domain.faces.is_empty())
     {
-        return Ok(FeatureSource::Vertices((0..numbers.len()).map(|at| numbers.integer(at).unwrap_or(0)).collect()));
+        return Ok(FeatureSource::Vertices(
+            (0..numbers.len()).map(|at| numbers.integer(at).unwrap_or(0)).collect(),
+        ));
     }
     let mut tagged = TaggedFaces { names: channel.feature_names.clone(), ..TaggedFaces::default() };
     let mut base = 0;
@@ -320,5 +350,9 @@ fn features(channel: &Channel<'_>) -> Result<FeatureSource, CatalystError> {
         }
         base += block.vertex_count();
     }
-    Ok(if tagged.tags.is_empty() { FeatureSource::SharpEdges } else { FeatureSource::Faces(tagged) })
+    Ok(if tagged.tags.is_empty() {
+        FeatureSource::SharpEdges
+    } else {
+        FeatureSource::Faces(tagged)
+    })
 }

@@ -24,7 +24,8 @@ pub(super) fn turn_outward(faces: &mut [Vec<u32>], place: impl Fn(u32) -> Vector
         while let Some(&face) = piece.get(next) {
             next += 1;
             for (from, to) in edges(&faces[face].clone()) {
-                let across = by_edge.get(&(from.min(to), from.max(to))).map_or(&[][..], Vec::as_slice);
+                let across =
+                    by_edge.get(&(from.min(to), from.max(to))).map_or(&[][..], Vec::as_slice);
                 for &other in across {
                     if std::mem::replace(&mut seen[other], true) {
                         continue;
@@ -75,8 +76,11 @@ mod tests {
 
     #[test]
     fn every_face_of_a_cube_looks_outward_however_it_was_told() {
-        let place = |vertex: u32| [f64::from(vertex & 1), f64::from(vertex >> 1 & 1), f64::from(vertex >> 2 & 1)];
-        let told = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        let place = |vertex: u32| {
+            [f64::from(vertex & 1), f64::from(vertex >> 1 & 1), f64::from(vertex >> 2 & 1)]
+        };
+        let told =
+            [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
         for turned in 0..64_u32 {
             let mut faces: Vec<Vec<u32>> = told.iter().map(|face| face.to_vec()).collect();
             for (face, vertices) in faces.iter_mut().enumerate() {

@@ -24,7 +24,8 @@ impl<'call> Rows<'call> {
                 let offsets = offsets_node.array()?;
                 // Some give the end of the last row too.
                 if offsets.len() != sizes.len() && offsets.len() != sizes.len() + 1 {
-                    return Err(offsets_node.wrong(format!("{} values, as many as in 'sizes'", sizes.len())));
+                    return Err(offsets_node
+                        .wrong(format!("{} values, as many as in 'sizes'", sizes.len())));
                 }
                 Some(offsets)
             }
@@ -53,7 +54,9 @@ impl<'call> Rows<'call> {
         for index in 0..self.len() {
             let size = self.at(&self.sizes, "sizes", index, u64::from(u32::MAX))?;
             let start = match &self.offsets {
-                Some(offsets) => self.at(offsets, "offsets", index, self.connectivity.len() as u64 + 1)?,
+                Some(offsets) => {
+                    self.at(offsets, "offsets", index, self.connectivity.len() as u64 + 1)?
+                }
                 None => next,
             };
             let end = start.checked_add(size).filter(|end| *end <= self.connectivity.len());
@@ -78,7 +81,13 @@ impl<'call> Rows<'call> {
         Ok(())
     }
 
-    fn at(&self, array: &Array, name: &str, index: usize, limit: u64) -> Result<usize, CatalystError> {
+    fn at(
+        &self,
+        array: &Array,
+        name: &str,
+        index: usize,
+        limit: u64,
+    ) -> Result<usize, CatalystError> {
         entry(array, &format_args!("{}/{name}", self.path), index, limit)
     }
 

@@ -50,18 +50,23 @@ fn shape(name: &str) -> Option<CellType> {
     SHAPES.into_iter().find(|(shape, _)| *shape == name).map(|(_, cell_type)| cell_type)
 }
 
-const KNOWN_SHAPES: &str =
-    "'point', 'line', 'tri', 'quad', 'tet', 'hex', 'wedge', 'pyramid', 'polygonal', 'polyhedral' or 'mixed'";
+const KNOWN_SHAPES: &str = "'point', 'line', 'tri', 'quad', 'tet', 'hex', 'wedge', 'pyramid', 'polygonal', 'polyhedral' or 'mixed'";
 const KNOWN_TYPES: &str = "'points', 'uniform', 'rectilinear', 'structured' or 'unstructured'";
 
 impl<'call> Topology<'call> {
-    pub(super) fn read(node: &Node<'_, 'call>, coordset: &Coordset<'call>) -> Result<Self, CatalystError> {
+    pub(super) fn read(
+        node: &Node<'_, 'call>,
+        coordset: &Coordset<'call>,
+    ) -> Result<Self, CatalystError> {
         let kind = node.need(c"type", KNOWN_TYPES)?;
         match &*kind.text()? {
             "points" => Ok(Topology::Points(coordset.len())),
             "uniform" | "rectilinear" => {
                 let points = coordset.grid().ok_or_else(|| {
-                    kind.wrong_found("a grid over explicit coordinates".into(), "'structured' or 'unstructured'".into())
+                    kind.wrong_found(
+                        "a grid over explicit coordinates".into(),
+                        "'structured' or 'unstructured'".into(),
+                    )
                 })?;
                 let cells = points.map(|count| count.saturating_sub(1));
                 Ok(Topology::Grid { cells })
@@ -70,12 +75,16 @@ impl<'call> Topology<'call> {
                 let elements = node.need(c"elements", "an object with 'dims'")?;
                 let dims = elements.need(c"dims", "the number of cells along i, j, k")?;
                 let (cells, dimension) = counts(&dims)?;
-                let points =
-                    cells.iter().try_fold(1_usize, |product, count| product.checked_mul(count.checked_add(1)?));
+                let points = cells
+                    .iter()
+                    .try_fold(1_usize, |product, count| product.checked_mul(count.checked_add(1)?));
                 if points != Some(coordset.len()) {
                     return Err(dims.wrong_found(
                         format!("{:?} cells", &cells[..dimension]),
-                        format!("cell counts whose grid has the {} points of the coordset", coordset.len()),
+                        format!(
+                            "cell counts whose grid has the {} points of the coordset",
+                            coordset.len()
+                        ),
                     ));
                 }
                 Ok(Topology::Grid { cells })
@@ -99,16 +108,17 @@ impl<'call> Topology<'call> {
                 Ok(Topology::Polyhedral { cells: Rows::read(&elements)?, faces })
             }
             Some(cell_type) => {
-                let connectivity_node = elements.need(c"connectivity", "vertex numbers, cell after cell")?;
+                let connectivity_node =
+                    elements.need(c"connectivity", "vertex numbers, cell after cell")?;
                 let connectivity = connectivity_node.array()?;
                 if !connectivity.is_integer() {
                     return Err(connectivity_node.wrong("integers".into()));
                 }
                 let size = cell_type.vertex_count().unwrap_or(1);
                 if !connectivity.len().is_multiple_of(size) {
-                    return Err(
-                        connectivity_node.wrong(format!("a multiple of {size} values, for cells of shape '{name}'"))
-                    );
+                    return Err(connectivity_node.wrong(format!(
+                        "a multiple of {size} values, for cells of shape '{name}'"
+                    )));
                 }
                 Ok(Topology::Uniform { cell_type, connectivity, path: connectivity_node.path() })
             }
@@ -126,10 +136,17 @@ impl<'call> Topology<'call> {
         let mut map = Vec::new();
         for (index, name) in map_node.names().iter().enumerate() {
             let Some(child) = map_node.at(index, name) else { continue };
-            let number = child.array().ok().filter(|array| array.len() == 1).and_then(|array| array.integer(0));
+            let number = child
+                .array()
+                .ok()
+                .filter(|array| array.len() == 1)
+                .and_then(|array| array.integer(0));
             let number = number.ok_or_else(|| child.wrong("one whole number".into()))?;
             let cell_type = shape(&name.to_string_lossy()).ok_or_else(|| {
-                child.wrong_found(format!("the shape '{}'", name.to_string_lossy()), KNOWN_SHAPES.into())
+                child.wrong_found(
+                    format!("the shape '{}'", name.to_string_lossy()),
+                    KNOWN_SHAPES.into(),
+                )
             })?;
             map.push((number, cell_type));
         }
@@ -165,7 +182,9 @@ impl<'call> Topology<'call> {
             Topology::Uniform { cell_type, .. } => cell_type.dimension(),
             Topology::Polygonal(_) => 2,
             Topology::Polyhedral { .. } => 3,
-            Topology::Mixed { map, .. } => map.iter().map(|(_, cell_type)| cell_type.dimension()).max().unwrap_or(0),
+            Topology::Mixed { map, .. } => {
+                map.iter().map(|(_, cell_type)| cell_type.dimension()).max().unwrap_or(0)
+            }
         }
     }
 
@@ -194,9 +213,13 @@ impl<'call> Topology<'call> {
         keep: &dyn Fn(usize) -> bool,
     ) -> Result<(), CatalystError> {
         let vertices = points.len().saturating_sub(base);
-        #[expect(clippy::cast_possible_truncation, reason = "the number of points was held against u32::MAX")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "the number of points was held against u32::MAX"
+        )]
         let shift = base as u32;
-        let shifted = |row: &[u32]| -> Vec<u32> { row.iter().map(|vertex| vertex + shift).collect() };
+        let shifted =
+            |row: &[u32]| -> Vec<u32> { row.iter().map(|vertex| vertex + shift).collect() };
         let unfit = |path: &str, cell: usize, error: &dyn std::fmt::Display| CatalystError::Wrong {
             path: path.to_owned(),
             found: format!("cell {cell}: {error}"),
@@ -214,7 +237,9 @@ impl<'call> Topology<'call> {
             Topology::Grid { cells: counts } => {
                 for cell in (0..self.len()).filter(|cell| keep(*cell)) {
                     let (cell_type, row) = grid_cell(*counts, cell);
-                    cells.push(cell_type, &shifted(&row)).map_err(|error| unfit("grid", cell, &error))?;
+                    cells
+                        .push(cell_type, &shifted(&row))
+                        .map_err(|error| unfit("grid", cell, &error))?;
                 }
             }
             Topology::Uniform { cell_type, connectivity, path } => {
@@ -223,7 +248,10 @@ impl<'call> Topology<'call> {
                 for cell in (0..self.len()).filter(|cell| keep(*cell)) {
                     row.clear();
                     for index in cell * size..(cell + 1) * size {
-                        #[expect(clippy::cast_possible_truncation, reason = "below the number of vertices")]
+                        #[expect(
+                            clippy::cast_possible_truncation,
+                            reason = "below the number of vertices"
+                        )]
                         row.push(shift + entry(connectivity, path, index, vertices as u64)? as u32);
                     }
                     cells.push(*cell_type, &row).map_err(|error| unfit(path, cell, &error))?;
@@ -236,12 +264,17 @@ impl<'call> Topology<'call> {
             Topology::Polyhedral { cells: rows, faces } => {
                 let faces = all_faces(faces, vertices)?;
                 rows.for_each(faces.len(), |cell, row| {
-                    let pushed = if keep(cell) { push_polyhedron(cells, &faces, row, shift, points) } else { Ok(()) };
+                    let pushed = if keep(cell) {
+                        push_polyhedron(cells, &faces, row, shift, points)
+                    } else {
+                        Ok(())
+                    };
                     pushed.map_err(|found| rows.error(cell, found, "four faces or more"))
                 })?;
             }
             Topology::Mixed { cells: rows, shapes, map, faces, path } => {
-                let faces = faces.as_ref().map_or(Ok(Vec::new()), |faces| all_faces(faces, vertices))?;
+                let faces =
+                    faces.as_ref().map_or(Ok(Vec::new()), |faces| all_faces(faces, vertices))?;
                 rows.for_each(vertices.max(faces.len()), |cell, row| {
                     if !keep(cell) {
                         return Ok(());
@@ -255,16 +288,25 @@ impl<'call> Topology<'call> {
                             expected: "one of the numbers in 'shape_map'".into(),
                         });
                     };
-                    let limit = if *cell_type == CellType::Polyhedron { faces.len() } else { vertices };
+                    let limit =
+                        if *cell_type == CellType::Polyhedron { faces.len() } else { vertices };
                     if let Some(vertex) = row.iter().find(|vertex| **vertex as usize >= limit) {
-                        return Err(rows.error(cell, format!("{vertex}"), &format!("numbers below {limit}")));
+                        return Err(rows.error(
+                            cell,
+                            format!("{vertex}"),
+                            &format!("numbers below {limit}"),
+                        ));
                     }
                     let pushed = match cell_type {
                         CellType::Polyhedron => push_polyhedron(cells, &faces, row, shift, points),
                         CellType::Polygon => push_polygon(cells, &shifted(row)),
-                        fixed => cells.push(*fixed, &shifted(row)).map_err(|error| error.to_string()),
+                        fixed => {
+                            cells.push(*fixed, &shifted(row)).map_err(|error| error.to_string())
+                        }
                     };
-                    pushed.map_err(|found| rows.error(cell, found, "as many vertices as the shape has"))
+                    pushed.map_err(|found| {
+                        rows.error(cell, found, "as many vertices as the shape has")
+                    })
                 })?;
             }
         }
@@ -291,7 +333,9 @@ impl<'call> Topology<'call> {
             Topology::Mixed { cells, shapes, map, faces, .. } => {
                 cells.fingerprint(into);
                 shapes.fingerprint(into);
-                map.iter().for_each(|(number, shape)| into.add(number.cast_unsigned() ^ u64::from(shape.vtk()) << 48));
+                map.iter().for_each(|(number, shape)| {
+                    into.add(number.cast_unsigned() ^ u64::from(shape.vtk()) << 48)
+                });
                 if let Some(faces) = faces {
                     faces.fingerprint(into);
                 }
@@ -331,7 +375,9 @@ fn push_polyhedron(
 ) -> Result<(), String> {
     let mut own: Vec<Vec<u32>> = Vec::with_capacity(row.len());
     for &face in row {
-        let face = faces.get(face as usize).ok_or_else(|| format!("the face {face}, which does not exist"))?;
+        let face = faces
+            .get(face as usize)
+            .ok_or_else(|| format!("the face {face}, which does not exist"))?;
         own.push(face.iter().map(|vertex| vertex + shift).collect());
     }
     turn_outward(&mut own, |vertex| points.get(vertex as usize).copied().unwrap_or_default());
@@ -353,14 +399,21 @@ fn grid_cell(counts: [usize; 3], cell: usize) -> (CellType, Vec<u32>) {
     let at = [cell % along(0), cell / along(0) % along(1), cell / (along(0) * along(1))];
     let strides = [1, counts[0] + 1, (counts[0] + 1) * (counts[1] + 1)];
     let first: usize = at.iter().zip(strides).map(|(at, stride)| at * stride).sum();
-    let steps: Vec<usize> =
-        strides.into_iter().zip(counts).filter(|(_, count)| *count > 0).map(|(step, _)| step).collect();
+    let steps: Vec<usize> = strides
+        .into_iter()
+        .zip(counts)
+        .filter(|(_, count)| *count > 0)
+        .map(|(step, _)| step)
+        .collect();
     let (cell_type, corners) = match steps[..] {
         [] => (CellType::Vertex, vec![0]),
         [a] => (CellType::Line, vec![0, a]),
         [a, b] => (CellType::Quad, vec![0, a, a + b, b]),
         [a, b, c, ..] => (CellType::Hexahedron, vec![0, a, a + b, b, c, a + c, a + b + c, b + c]),
     };
-    #[expect(clippy::cast_possible_truncation, reason = "the number of points was held against u32::MAX")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "the number of points was held against u32::MAX"
+    )]
     (cell_type, corners.into_iter().map(|corner| (first + corner) as u32).collect())
 }

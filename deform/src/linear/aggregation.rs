@@ -60,13 +60,18 @@ impl Aggregates {
         .concat();
         let threshold = threshold * threshold;
         let strong: Vec<bool> = parallel::map_chunks(rows, ROW_CHUNK, |range| {
-            let mut strong = Vec::with_capacity(matrix.offsets()[range.end] - matrix.offsets()[range.start]);
+            let mut strong =
+                Vec::with_capacity(matrix.offsets()[range.end] - matrix.offsets()[range.start]);
             for row in range {
                 let couplings = &couplings[matrix.offsets()[row]..matrix.offsets()[row + 1]];
-                strong.extend(matrix.row(row).0.iter().zip(couplings).map(|(&column, coupling)| {
-                    let other = column as usize;
-                    other != row && other < rows && coupling * coupling > threshold * diagonal[row] * diagonal[other]
-                }));
+                strong.extend(matrix.row(row).0.iter().zip(couplings).map(
+                    |(&column, coupling)| {
+                        let other = column as usize;
+                        other != row
+                            && other < rows
+                            && coupling * coupling > threshold * diagonal[row] * diagonal[other]
+                    },
+                ));
             }
             strong
         })
@@ -89,7 +94,8 @@ impl Aggregates {
     ) -> Interpolation {
         let (offsets, rows) = (matrix.offsets(), self.of_row.len());
         let parts = parallel::map_chunks(rows, ROW_CHUNK, |range| {
-            let (mut lengths, mut columns, mut weights, mut arms) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+            let (mut lengths, mut columns, mut weights, mut arms) =
+                (Vec::new(), Vec::new(), Vec::new(), Vec::new());
             let mut found: Vec<(u32, f64, Vector)> = Vec::new();
             for row in range {
                 found.clear();
@@ -109,7 +115,8 @@ impl Aggregates {
                 }
                 let diagonal = if lumped > 0.1 * whole { lumped } else { whole };
                 let mut gather = |row: usize, aggregate: u32, weight: f64| {
-                    let arm = bodies.map_or([0.0; 3], |bodies| scale(bodies.arm(row, aggregate), weight));
+                    let arm =
+                        bodies.map_or([0.0; 3], |bodies| scale(bodies.arm(row, aggregate), weight));
                     match found.iter_mut().find(|(other, ..)| *other == aggregate) {
                         Some((_, sum, arms)) => {
                             *sum += weight;
@@ -142,8 +149,11 @@ impl Aggregates {
             }
             (lengths, columns, weights, arms)
         });
-        let mut result =
-            Interpolation { offsets: vec![0], turn: bodies.map_or(0.0, |bodies| bodies.turn), ..Default::default() };
+        let mut result = Interpolation {
+            offsets: vec![0],
+            turn: bodies.map_or(0.0, |bodies| bodies.turn),
+            ..Default::default()
+        };
         let mut end = 0;
         for (lengths, columns, weights, arms) in parts {
             result.offsets.extend(lengths.into_iter().map(|length| {
@@ -187,7 +197,8 @@ impl Bodies {
     pub(super) fn new(aggregates: &Aggregates, places: Vec<Vector>, turn_size: f64) -> Self {
         let mut centres = vec![[0.0; 3]; aggregates.count];
         let mut members = vec![0.0f64; aggregates.count];
-        let pairs = || aggregates.of_row.iter().zip(&places).filter(|(aggregate, _)| **aggregate != NONE);
+        let pairs =
+            || aggregates.of_row.iter().zip(&places).filter(|(aggregate, _)| **aggregate != NONE);
         for (&aggregate, &place) in pairs() {
             centres[aggregate as usize] = add(centres[aggregate as usize], place);
             members[aggregate as usize] += 1.0;
@@ -203,7 +214,8 @@ impl Bodies {
         #[expect(clippy::cast_precision_loss, reason = "fewer aggregates than 2^53")]
         let size = (sizes.iter().sum::<f64>() / sizes.len().max(1) as f64).sqrt();
         let size = if size.is_normal() { size } else { 1.0 };
-        let sizes = sizes.into_iter().map(|square| (square.sqrt() / size).max(LEAST_SIZE)).collect();
+        let sizes =
+            sizes.into_iter().map(|square| (square.sqrt() / size).max(LEAST_SIZE)).collect();
         Self { places, centres, size, turn: turn_size / size, sizes }
     }
 
@@ -241,7 +253,9 @@ fn group<const B: usize>(
     let mut of_row = vec![NONE; rows];
     let mut count = 0u32;
     for row in 0..rows {
-        if of_row[row] == NONE && neighbours(row).next().is_some() && neighbours(row).all(|other| of_row[other] == NONE)
+        if of_row[row] == NONE
+            && neighbours(row).next().is_some()
+            && neighbours(row).all(|other| of_row[other] == NONE)
         {
             of_row[row] = count;
             for other in neighbours(row) {

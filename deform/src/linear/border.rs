@@ -30,7 +30,11 @@ pub(super) struct Border<T, const B: usize> {
 
 impl<T: Real, const B: usize> Border<T, B> {
     /// That of an assembled part, and what is added to the diagonal of each of its own rows. Collective.
-    pub(super) fn new(parts: &Parts, matrix: &SparseMatrix<B>, pieces: Pieces) -> (Self, Vec<[f64; B]>) {
+    pub(super) fn new(
+        parts: &Parts,
+        matrix: &SparseMatrix<B>,
+        pieces: Pieces,
+    ) -> (Self, Vec<[f64; B]>) {
         let own = parts.own();
         #[expect(clippy::cast_possible_truncation, reason = "rows are 32-bit")]
         let slot = |row: u32| pieces.slot(row as usize) as u32;
@@ -47,8 +51,11 @@ impl<T: Real, const B: usize> Border<T, B> {
         let mut added = vec![[0.0; B]; parts.rows()];
         for row in (0..).take(parts.rows()) {
             let (columns, blocks) = matrix.row(row as usize);
-            let from =
-                if (row as usize) < own { columns.partition_point(|&column| (column as usize) < own) } else { 0 };
+            let from = if (row as usize) < own {
+                columns.partition_point(|&column| (column as usize) < own)
+            } else {
+                0
+            };
             if from == columns.len() {
                 continue;
             }
@@ -64,7 +71,8 @@ impl<T: Real, const B: usize> Border<T, B> {
         }
         parts.shares().sum(&*border.partition, B, added.as_flattened_mut());
         added.truncate(own);
-        let touched = (0..).zip(&added).filter(|(_, added)| added.iter().any(|&value| value != 0.0));
+        let touched =
+            (0..).zip(&added).filter(|(_, added)| added.iter().any(|&value| value != 0.0));
         border.touched = touched.map(|(row, added)| (slot(row), added.map(T::of))).collect();
         (border, added)
     }
@@ -80,7 +88,11 @@ impl<T: Real, const B: usize> Border<T, B> {
     }
 
     /// Makes of the residual of each rank's own rows by themselves this rank's part of that of the system.
-    pub(super) fn complete<const K: usize>(&self, solution: &[[[T; B]; K]], residual: &mut [[[T; B]; K]]) {
+    pub(super) fn complete<const K: usize>(
+        &self,
+        solution: &[[[T; B]; K]],
+        residual: &mut [[[T; B]; K]],
+    ) {
         residual[self.own..].fill([[T::default(); B]; K]);
         for (slot, added) in &self.touched {
             let slot = *slot as usize;
@@ -114,14 +126,22 @@ impl<T: Real, const B: usize> Border<T, B> {
     }
 
     /// Puts each value of the product with `vector` to those of `result`.
-    fn multiply<const K: usize>(&self, vector: &[[[T; B]; K]], put: impl Fn(&mut T, T), result: &mut [[[T; B]; K]]) {
+    fn multiply<const K: usize>(
+        &self,
+        vector: &[[[T; B]; K]],
+        put: impl Fn(&mut T, T),
+        result: &mut [[[T; B]; K]],
+    ) {
         for (index, &slot) in self.rows.iter().enumerate() {
             let mut sum = [[T::default(); B]; K];
             let range = self.offsets[index]..self.offsets[index + 1];
             for (&column, block) in self.columns[range.clone()].iter().zip(&self.blocks[range]) {
                 for (sum, value) in sum.iter_mut().zip(&vector[column as usize]) {
                     for (sum, entries) in sum.iter_mut().zip(block) {
-                        entries.iter().zip(value).for_each(|(&entry, &value)| *sum += entry * value);
+                        entries
+                            .iter()
+                            .zip(value)
+                            .for_each(|(&entry, &value)| *sum += entry * value);
                     }
                 }
             }

@@ -47,15 +47,26 @@ impl<const B: usize> LinearSolver<B> for Cholesky<B> {
         solution: &mut [[f64; B]],
         tolerance: Tolerance,
     ) -> Result<Convergence, LinearError> {
-        let apply = |vector: &[[[f64; B]; 1]], result: &mut [[[f64; B]; 1]]| self.factor.solve(vector, result);
+        let apply = |vector: &[[[f64; B]; 1]], result: &mut [[[f64; B]; 1]]| {
+            self.factor.solve(vector, result)
+        };
         let (right_side, solution) = (single_column(right_side), single_column_mut(solution));
-        let [mut convergence] =
-            conjugate_gradients(&*self.matrix, apply, right_side, solution, [tolerance], REFINEMENTS)?;
+        let [mut convergence] = conjugate_gradients(
+            &*self.matrix,
+            apply,
+            right_side,
+            solution,
+            [tolerance],
+            REFINEMENTS,
+        )?;
         convergence.iterations = 0;
         Ok(convergence)
     }
 
-    fn renewed(&self, matrix: Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
+    fn renewed(
+        &self,
+        matrix: Arc<SparseMatrix<B>>,
+    ) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
         Ok(Box::new(Self::new(matrix)?))
     }
 }
@@ -82,7 +93,9 @@ impl<const B: usize> Factor<B> {
         for row in 0..matrix.rows() {
             let (columns, blocks) = matrix.row(row);
             for axis in 0..B {
-                for (&column, block) in columns.iter().zip(blocks).take_while(|(column, _)| **column as usize <= row) {
+                for (&column, block) in
+                    columns.iter().zip(blocks).take_while(|(column, _)| **column as usize <= row)
+                {
                     let count = if column as usize == row { axis + 1 } else { B };
                     for (other, &value) in block[axis].iter().enumerate().take(count) {
                         rows.push(u32::try_from(B * column as usize + other).ok()?);
@@ -103,7 +116,8 @@ impl<const B: usize> Factor<B> {
         let mut factor = Vec::new();
         factor.try_reserve_exact(symbolic.len_val()).ok()?;
         factor.resize(symbolic.len_val(), 0.0);
-        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, faer::Spec::default());
+        let scratch =
+            symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, faer::Spec::default());
         let mut memory = MemBuffer::try_new(scratch).ok()?;
         symbolic
             .factorize_numeric_llt(
@@ -116,13 +130,21 @@ impl<const B: usize> Factor<B> {
                 faer::Spec::default(),
             )
             .ok()?;
-        factor.iter().all(|value| value.is_finite()).then_some(Self { factor: Some((symbolic, factor)) })
+        factor
+            .iter()
+            .all(|value| value.is_finite())
+            .then_some(Self { factor: Some((symbolic, factor)) })
     }
 
     /// `result = A⁻¹ vector` for `K` right sides side by side.
-    pub(super) fn solve<const K: usize>(&self, vector: &[[[f64; B]; K]], result: &mut [[[f64; B]; K]]) {
+    pub(super) fn solve<const K: usize>(
+        &self,
+        vector: &[[[f64; B]; K]],
+        result: &mut [[[f64; B]; K]],
+    ) {
         let Some((symbolic, factor)) = &self.factor else { return };
-        let mut sides = Mat::from_fn(B * vector.len(), K, |row, side| vector[row / B][side][row % B]);
+        let mut sides =
+            Mat::from_fn(B * vector.len(), K, |row, side| vector[row / B][side][row % B]);
         let scratch = symbolic.solve_in_place_scratch::<f64>(K, Par::Seq);
         LltRef::new(symbolic, factor).solve_in_place_with_conj(
             Conj::No,
@@ -131,7 +153,9 @@ impl<const B: usize> Factor<B> {
             MemStack::new(&mut MemBuffer::new(scratch)),
         );
         for (row, value) in result.iter_mut().enumerate() {
-            *value = std::array::from_fn(|side| std::array::from_fn(|axis| sides[(B * row + axis, side)]));
+            *value = std::array::from_fn(|side| {
+                std::array::from_fn(|axis| sides[(B * row + axis, side)])
+            });
         }
     }
 }

@@ -3,7 +3,10 @@
 use std::sync::{Arc, OnceLock};
 
 use super::iteration::{Columns, conjugate_gradients, single_column, single_column_mut};
-use super::{BlockPreconditioner, Convergence, Factorization, LinearError, LinearSolver, SparseMatrix, Tolerance};
+use super::{
+    BlockPreconditioner, Convergence, Factorization, LinearError, LinearSolver, SparseMatrix,
+    Tolerance,
+};
 
 /// Conjugate gradients (Hestenes, Stiefel 1952) preconditioned by a [`BlockPreconditioner`].
 ///
@@ -51,8 +54,14 @@ impl<const B: usize> ConjugateGradients<B> {
             preconditioner.apply(vector.as_flattened(), result.as_flattened_mut());
         };
         let (right_side, solution) = (single_column(right_side), single_column_mut(solution));
-        let [convergence] =
-            conjugate_gradients(&*self.matrix, apply, right_side, solution, [tolerance], self.max_iterations)?;
+        let [convergence] = conjugate_gradients(
+            &*self.matrix,
+            apply,
+            right_side,
+            solution,
+            [tolerance],
+            self.max_iterations,
+        )?;
         Ok(convergence)
     }
 }
@@ -72,7 +81,9 @@ impl<const B: usize> LinearSolver<B> for ConjugateGradients<B> {
             Err(LinearError::NotConverged { .. } | LinearError::Indefinite { .. }) => {
                 let fallback = self
                     .fallback
-                    .get_or_init(|| BlockPreconditioner::new(&self.matrix, Factorization::GaussSeidel))
+                    .get_or_init(|| {
+                        BlockPreconditioner::new(&self.matrix, Factorization::GaussSeidel)
+                    })
                     .as_ref()
                     .map_err(|error| *error)?;
                 self.iterate(fallback, right_side, solution, tolerance)
@@ -81,7 +92,10 @@ impl<const B: usize> LinearSolver<B> for ConjugateGradients<B> {
         }
     }
 
-    fn renewed(&self, matrix: Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
+    fn renewed(
+        &self,
+        matrix: Arc<SparseMatrix<B>>,
+    ) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
         Ok(Box::new(Self::new(matrix)?.with_max_iterations(self.max_iterations)))
     }
 }
@@ -92,7 +106,8 @@ mod tests {
 
     /// The Laplacian of a chain with its ends held, `-u'' = 1`: the solution is a parabola.
     fn chain(count: u32, off: f64) -> SparseMatrix<1> {
-        let rows: Vec<Vec<u32>> = (0..count).map(|i| (i.saturating_sub(1)..(i + 2).min(count)).collect()).collect();
+        let rows: Vec<Vec<u32>> =
+            (0..count).map(|i| (i.saturating_sub(1)..(i + 2).min(count)).collect()).collect();
         let offsets = std::iter::once(0)
             .chain(rows.iter().scan(0, |sum, row| {
                 *sum += row.len();
@@ -100,8 +115,11 @@ mod tests {
             }))
             .collect();
         let mut matrix = SparseMatrix::zeros(offsets, rows.concat());
-        let diagonal: Vec<bool> =
-            rows.iter().enumerate().flat_map(|(i, row)| row.iter().map(move |&j| j as usize == i)).collect();
+        let diagonal: Vec<bool> = rows
+            .iter()
+            .enumerate()
+            .flat_map(|(i, row)| row.iter().map(move |&j| j as usize == i))
+            .collect();
         for (value, diagonal) in matrix.offsets_and_values_mut().2.iter_mut().zip(diagonal) {
             *value = [[if diagonal { 2.0 } else { off }]];
         }
@@ -113,7 +131,8 @@ mod tests {
     #[test]
     fn solves_a_chain_over_several_pieces() {
         let count = 5000;
-        let solver = ConjugateGradients::new(chain(count, -1.0)).unwrap().with_max_iterations(20_000);
+        let solver =
+            ConjugateGradients::new(chain(count, -1.0)).unwrap().with_max_iterations(20_000);
         let mut solution = vec![[0.0]; count as usize];
         let convergence = solver.solve(&vec![[1.0]; count as usize], &mut solution, TIGHT).unwrap();
         for (i, value) in solution.iter().enumerate() {
@@ -128,7 +147,10 @@ mod tests {
         let mut solution = vec![[0.0]; 50];
         let ones = vec![[1.0]; 50];
         let indefinite = ConjugateGradients::new(chain(50, -1.5)).unwrap();
-        assert!(matches!(indefinite.solve(&ones, &mut solution, TIGHT), Err(LinearError::Indefinite { .. })));
+        assert!(matches!(
+            indefinite.solve(&ones, &mut solution, TIGHT),
+            Err(LinearError::Indefinite { .. })
+        ));
         let short = ConjugateGradients::new(chain(5000, -1.0)).unwrap().with_max_iterations(2);
         let mut long = vec![[0.0]; 5000];
         let error = short.solve(&vec![[1.0]; 5000], &mut long, TIGHT).unwrap_err();
@@ -139,7 +161,10 @@ mod tests {
         let solver = ConjugateGradients::new(chain(50, -1.0)).unwrap();
         let mut bad = ones;
         bad[7][0] = f64::NAN;
-        assert_eq!(solver.solve(&bad, &mut solution, TIGHT), Err(LinearError::NotFinite { iteration: 0 }));
+        assert_eq!(
+            solver.solve(&bad, &mut solution, TIGHT),
+            Err(LinearError::NotFinite { iteration: 0 })
+        );
     }
 
     #[test]

@@ -56,7 +56,11 @@ struct Spread {
 impl<T: Real, const B: usize> Direct<T, B> {
     /// `None` where there is no inverse. `pieces` is the order of this rank's own rows in vectors. Collective over the ranks of `parts`;
     /// the matrix is then an assembled one.
-    pub(super) fn new(matrix: &SparseMatrix<B>, pieces: Pieces, parts: Option<&Parts>) -> Option<Self> {
+    pub(super) fn new(
+        matrix: &SparseMatrix<B>,
+        pieces: Pieces,
+        parts: Option<&Parts>,
+    ) -> Option<Self> {
         let rows = matrix.rows();
         let Some(parts) = parts else {
             return Some(Self { inverse: Inverse::new(matrix)?, rows, pieces, spread: None });
@@ -79,7 +83,9 @@ impl<T: Real, const B: usize> Direct<T, B> {
     /// The solution for the right side, which is that of the sum.
     pub(super) fn solve<const K: usize>(&self, vectors: &mut Vectors<T, B, K>) {
         let own = 0..self.pieces.rows();
-        let wide = |row: usize| vectors.right_side[self.pieces.slot(row)].map(|column| column.map(T::wide));
+        let wide = |row: usize| {
+            vectors.right_side[self.pieces.slot(row)].map(|column| column.map(T::wide))
+        };
         let mut right_side: Vec<[[f64; B]; K]> = own.map(wide).collect();
         if let Some(spread) = &self.spread {
             let all = spread.partition.gather(right_side.as_flattened().as_flattened());
@@ -89,7 +95,8 @@ impl<T: Real, const B: usize> Direct<T, B> {
         self.inverse.apply(&right_side, &mut solution);
         for row in 0..self.rows {
             let number = self.spread.as_ref().map_or(row, |spread| spread.numbers[row]);
-            vectors.solution[self.pieces.slot(row)] = solution[number].map(|column| column.map(T::of));
+            vectors.solution[self.pieces.slot(row)] =
+                solution[number].map(|column| column.map(T::of));
         }
     }
 }
@@ -102,7 +109,11 @@ impl Spread {
         clippy::cast_sign_loss,
         reason = "numbers of rows, which are 32-bit"
     )]
-    fn new<const B: usize>(parts: &Parts, matrix: &SparseMatrix<B>, pieces: Pieces) -> (Self, SparseMatrix<B>) {
+    fn new<const B: usize>(
+        parts: &Parts,
+        matrix: &SparseMatrix<B>,
+        pieces: Pieces,
+    ) -> (Self, SparseMatrix<B>) {
         let (partition, own) = (Arc::clone(parts.partition()), parts.own());
         let counts = partition.gather(&[own as f64]);
         let first: f64 = counts.iter().take(partition.rank()).sum();
@@ -130,7 +141,10 @@ impl Spread {
 }
 
 /// The matrix of so many rows whose blocks are the sums of those given for their places.
-fn summed<const B: usize>(rows: usize, mut entries: Vec<(usize, u32, Block<B>)>) -> SparseMatrix<B> {
+fn summed<const B: usize>(
+    rows: usize,
+    mut entries: Vec<(usize, u32, Block<B>)>,
+) -> SparseMatrix<B> {
     // Those of one place stay as they came, so that sums are always taken in the same order.
     entries.sort_by_key(|&(row, column, _)| (row, column));
     let (mut offsets, mut columns, mut blocks) = (vec![0], Vec::new(), Vec::<Block<B>>::new());

@@ -3,8 +3,13 @@
 use std::sync::{Arc, OnceLock};
 
 use super::hierarchy::Hierarchy;
-use super::iteration::{Columns, Operator, conjugate_gradients, dot, largest, single_column, single_column_mut};
-use super::{BlockPreconditioner, Convergence, Factorization, LinearError, LinearSolver, SparseMatrix, Tolerance};
+use super::iteration::{
+    Columns, Operator, conjugate_gradients, dot, largest, single_column, single_column_mut,
+};
+use super::{
+    BlockPreconditioner, Convergence, Factorization, LinearError, LinearSolver, SparseMatrix,
+    Tolerance,
+};
 use crate::partition::{Partition, Reduction, Shares, all};
 
 /// The iterations after which multigrid is taken to have stalled, and those that the fallback may take.
@@ -55,7 +60,9 @@ impl<const B: usize> Sum<'_, B> {
             let place = place as usize;
             if !self.shares.owns(place) {
                 for (column, sum) in sum.iter_mut().enumerate() {
-                    *sum -= (0..B).map(|axis| a[place][column][axis] * b[place][column][axis]).sum::<f64>();
+                    *sum -= (0..B)
+                        .map(|axis| a[place][column][axis] * b[place][column][axis])
+                        .sum::<f64>();
                 }
             }
         }
@@ -141,15 +148,26 @@ impl<const B: usize> DistributedMultigrid<B> {
 
     /// Calls `work` with the preconditioner, an approximate inverse of the sum: from a vector that all ranks have the same of, to one
     /// that they do. `scale`, the same on all ranks, brings vectors to the order of 1. Collective, as the preconditioner is.
-    pub fn with_cycle<R>(&self, scale: f64, work: impl FnOnce(&mut dyn FnMut(&[[f64; B]], &mut [[f64; B]])) -> R) -> R {
+    pub fn with_cycle<R>(
+        &self,
+        scale: f64,
+        work: impl FnOnce(&mut dyn FnMut(&[[f64; B]], &mut [[f64; B]])) -> R,
+    ) -> R {
         match &self.levels {
             Some(levels) => {
                 let mut workspace = levels.workspace();
                 work(&mut |vector, result| {
-                    levels.apply(&mut workspace, [scale], single_column(vector), single_column_mut(result));
+                    levels.apply(
+                        &mut workspace,
+                        [scale],
+                        single_column(vector),
+                        single_column_mut(result),
+                    );
                 })
             }
-            None => work(&mut |vector, result| self.fall_back(single_column(vector), single_column_mut(result))),
+            None => work(&mut |vector, result| {
+                self.fall_back(single_column(vector), single_column_mut(result))
+            }),
         }
     }
 
@@ -165,10 +183,14 @@ impl<const B: usize> DistributedMultigrid<B> {
             let mut diagonal = vec![[[0.0; B]; B]; matrix.rows()];
             let place_of = |place: u32| {
                 let (columns, _) = matrix.row(place as usize);
-                columns.binary_search(&place).ok().map(|found| matrix.offsets()[place as usize] + found)
+                columns
+                    .binary_search(&place)
+                    .ok()
+                    .map(|found| matrix.offsets()[place as usize] + found)
             };
             for &place in shares.places() {
-                diagonal[place as usize] = place_of(place).map_or([[0.0; B]; B], |found| matrix.values()[found]);
+                diagonal[place as usize] =
+                    place_of(place).map_or([[0.0; B]; B], |found| matrix.values()[found]);
             }
             shares.sum(&*self.partition, B * B, diagonal.as_flattened_mut().as_flattened_mut());
             let (_, _, values) = whole.offsets_and_values_mut();
@@ -177,7 +199,8 @@ impl<const B: usize> DistributedMultigrid<B> {
                     values[found] = diagonal[place as usize];
                 }
             }
-            let found = (matrix.rows() > 0).then(|| BlockPreconditioner::new(&whole, Factorization::GaussSeidel));
+            let found = (matrix.rows() > 0)
+                .then(|| BlockPreconditioner::new(&whole, Factorization::GaussSeidel));
             let found = found.transpose();
             match (all(&*self.partition, found.is_ok()), found) {
                 (false, Ok(_)) => Err(LinearError::OtherRank),
@@ -218,7 +241,14 @@ impl<const B: usize> DistributedMultigrid<B> {
             let precondition = |vector: &[Columns<B, K>], result: &mut [Columns<B, K>]| {
                 levels.apply(&mut workspace, scale, vector, result);
             };
-            match conjugate_gradients(&sum, precondition, &right_side, solution, tolerances, ITERATIONS) {
+            match conjugate_gradients(
+                &sum,
+                precondition,
+                &right_side,
+                solution,
+                tolerances,
+                ITERATIONS,
+            ) {
                 Err(LinearError::NotConverged { .. } | LinearError::Indefinite { .. }) => {}
                 Err(LinearError::NotFinite { iteration }) if iteration > 0 => {}
                 other => return other,
@@ -226,8 +256,16 @@ impl<const B: usize> DistributedMultigrid<B> {
         }
         solution.iter_mut().for_each(|value| *value = [[0.0; B]; K]);
         self.fallback()?;
-        let precondition = |vector: &[Columns<B, K>], result: &mut [Columns<B, K>]| self.fall_back(vector, result);
-        conjugate_gradients(&sum, precondition, &right_side, solution, tolerances, FALLBACK_ITERATIONS)
+        let precondition =
+            |vector: &[Columns<B, K>], result: &mut [Columns<B, K>]| self.fall_back(vector, result);
+        conjugate_gradients(
+            &sum,
+            precondition,
+            &right_side,
+            solution,
+            tolerances,
+            FALLBACK_ITERATIONS,
+        )
     }
 }
 
@@ -242,7 +280,11 @@ impl<const B: usize> LinearSolver<B> for DistributedMultigrid<B> {
         solution: &mut [[f64; B]],
         tolerance: Tolerance,
     ) -> Result<Convergence, LinearError> {
-        let [convergence] = self.solve_columns(single_column(right_side), single_column_mut(solution), [tolerance])?;
+        let [convergence] = self.solve_columns(
+            single_column(right_side),
+            single_column_mut(solution),
+            [tolerance],
+        )?;
         Ok(convergence)
     }
 
@@ -255,7 +297,10 @@ impl<const B: usize> LinearSolver<B> for DistributedMultigrid<B> {
         self.solve_columns(right_sides, solutions, tolerances)
     }
 
-    fn renewed(&self, matrix: Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
+    fn renewed(
+        &self,
+        matrix: Arc<SparseMatrix<B>>,
+    ) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
         Ok(Box::new(self.of_like_matrix(matrix)?))
     }
 }

@@ -35,7 +35,8 @@ impl Pieces {
         let piece_rows = rows.div_ceil(PIECES).max(PIECE_ROWS).max(width);
         let whole = rows / piece_rows;
         let rest = rows % piece_rows;
-        let even_rows = whole.div_ceil(2) * piece_rows + if whole.is_multiple_of(2) { rest } else { 0 };
+        let even_rows =
+            whole.div_ceil(2) * piece_rows + if whole.is_multiple_of(2) { rest } else { 0 };
         Self { rows, piece_rows, even_rows }
     }
 
@@ -64,12 +65,16 @@ impl Pieces {
         if slot >= self.rows {
             return slot;
         }
-        let (odd, index) = if slot < self.even_rows { (0, slot) } else { (1, slot - self.even_rows) };
+        let (odd, index) =
+            if slot < self.even_rows { (0, slot) } else { (1, slot - self.even_rows) };
         (2 * (index / self.piece_rows) + odd) * self.piece_rows + index % self.piece_rows
     }
 
     /// Calls `copy` with each run of rows, and of the slots where they are placed.
-    pub(super) fn for_each_run(&self, mut copy: impl FnMut(std::ops::Range<usize>, std::ops::Range<usize>)) {
+    pub(super) fn for_each_run(
+        &self,
+        mut copy: impl FnMut(std::ops::Range<usize>, std::ops::Range<usize>),
+    ) {
         for start in (0..self.rows).step_by(self.piece_rows) {
             let count = self.piece_rows.min(self.rows - start);
             let slot = self.slot(start);
@@ -125,23 +130,39 @@ struct Parts {
 
 impl Parts {
     /// Those of the row in a slot, which is the one of number `index` in its half.
-    fn new<const B: usize>(matrix: &SparseMatrix<B>, pieces: Pieces, slot: usize, index: usize) -> Self {
+    fn new<const B: usize>(
+        matrix: &SparseMatrix<B>,
+        pieces: Pieces,
+        slot: usize,
+        index: usize,
+    ) -> Self {
         let row = pieces.row(slot);
         let piece = row / pieces.piece_rows;
         let own = piece * pieces.piece_rows;
         let (first, columns) = (matrix.offsets()[row], among(matrix, row, pieces.rows));
-        let below = |bound: usize| first + columns.partition_point(|&column| (column as usize) < bound);
+        let below =
+            |bound: usize| first + columns.partition_point(|&column| (column as usize) < bound);
         let (begin, middle, end) = (below(own), below(row), below(own + pieces.piece_rows));
-        let after = middle + usize::from(columns.get(middle - first).is_some_and(|&column| column as usize == row));
+        let after = middle
+            + usize::from(
+                columns.get(middle - first).is_some_and(|&column| column as usize == row),
+            );
         #[expect(clippy::cast_possible_truncation, reason = "columns are 32-bit")]
-        let run = |places: Range<usize>, from: usize, to: usize| Run { places, shift: to.wrapping_sub(from) as u32 };
+        let run = |places: Range<usize>, from: usize, to: usize| Run {
+            places,
+            shift: to.wrapping_sub(from) as u32,
+        };
         // No piece couples with any but the ones beside it.
         let beside = |piece: usize| (piece * pieces.piece_rows, piece / 2 * pieces.piece_rows);
-        let ((before, before_place), (next, next_place)) = (beside(piece.saturating_sub(1)), beside(piece + 1));
+        let ((before, before_place), (next, next_place)) =
+            (beside(piece.saturating_sub(1)), beside(piece + 1));
         Self {
             lower: run(begin..middle, row, index),
             upper: run(after..end, row, index),
-            cross: [run(first..begin, before, before_place), run(end..first + columns.len(), next, next_place)],
+            cross: [
+                run(first..begin, before, before_place),
+                run(end..first + columns.len(), next, next_place),
+            ],
         }
     }
 }
@@ -149,7 +170,11 @@ impl Parts {
 impl<T: Real, const B: usize> GaussSeidel<T, B> {
     /// The rows and columns of `pieces`, with what is `added` to the diagonal of each, if anything is. `None` where a diagonal block is
     /// missing, or not positive definite, or has no inverse in this precision.
-    pub(super) fn new(matrix: &SparseMatrix<B>, pieces: Pieces, added: &[[f64; B]]) -> Option<Self> {
+    pub(super) fn new(
+        matrix: &SparseMatrix<B>,
+        pieces: Pieces,
+        added: &[[f64; B]],
+    ) -> Option<Self> {
         let half = |odd: bool| {
             let slots = if odd { pieces.even_rows..pieces.rows } else { 0..pieces.even_rows };
             let (start, count) = (slots.start, slots.len());
@@ -158,13 +183,18 @@ impl<T: Real, const B: usize> GaussSeidel<T, B> {
                 let invert = |index: usize| {
                     let row = pieces.row(start + index);
                     let (columns, blocks) = matrix.row(row);
-                    let place = columns.binary_search_by_key(&row, |&column| column as usize).ok()?;
+                    let place =
+                        columns.binary_search_by_key(&row, |&column| column as usize).ok()?;
                     let mut block = blocks[place];
                     for (axis, more) in added.get(row).into_iter().flatten().enumerate() {
                         block[axis][axis] += more;
                     }
                     let inverse = invert_positive(&block)?.map(|entries| entries.map(T::of));
-                    inverse.as_flattened().iter().all(|value| value.wide().is_finite()).then_some(inverse)
+                    inverse
+                        .as_flattened()
+                        .iter()
+                        .all(|value| value.wide().is_finite())
+                        .then_some(inverse)
                 };
                 range.map(invert).collect::<Option<Vec<_>>>()
             });
@@ -172,14 +202,21 @@ impl<T: Real, const B: usize> GaussSeidel<T, B> {
                 lower: Rows::new(matrix, count, |index| [parts(index).lower, Run::default()]),
                 upper: Rows::new(matrix, count, |index| [parts(index).upper, Run::default()]),
                 cross: Rows::new(matrix, count, |index| parts(index).cross),
-                inverse_diagonal: inverse_diagonal.into_iter().collect::<Option<Vec<_>>>()?.concat(),
+                inverse_diagonal: inverse_diagonal
+                    .into_iter()
+                    .collect::<Option<Vec<_>>>()?
+                    .concat(),
             })
         };
         Some(Self { pieces, even: half(false)?, odd: half(true)? })
     }
 
     /// One sweep forwards from zero.
-    pub(super) fn forward<const K: usize>(&self, right_side: &[[[T; B]; K]], solution: &mut [[[T; B]; K]]) {
+    pub(super) fn forward<const K: usize>(
+        &self,
+        right_side: &[[[T; B]; K]],
+        solution: &mut [[[T; B]; K]],
+    ) {
         let size = self.pieces.piece_rows;
         let (even_right, odd_right) = right_side.split_at(self.pieces.even_rows);
         let (even, odd) = solution.split_at_mut(self.pieces.even_rows);
@@ -192,7 +229,11 @@ impl<T: Real, const B: usize> GaussSeidel<T, B> {
     }
 
     /// The residual after [`GaussSeidel::forward`].
-    pub(super) fn residual<const K: usize>(&self, solution: &[[[T; B]; K]], residual: &mut [[[T; B]; K]]) {
+    pub(super) fn residual<const K: usize>(
+        &self,
+        solution: &[[[T; B]; K]],
+        residual: &mut [[[T; B]; K]],
+    ) {
         let (even, odd) = solution.split_at(self.pieces.even_rows);
         let (even_residual, odd_residual) = residual.split_at_mut(self.pieces.even_rows);
         for (half, own, other, residual) in
@@ -213,7 +254,11 @@ impl<T: Real, const B: usize> GaussSeidel<T, B> {
     }
 
     /// One sweep backwards from what `solution` holds.
-    pub(super) fn backward<const K: usize>(&self, right_side: &[[[T; B]; K]], solution: &mut [[[T; B]; K]]) {
+    pub(super) fn backward<const K: usize>(
+        &self,
+        right_side: &[[[T; B]; K]],
+        solution: &mut [[[T; B]; K]],
+    ) {
         let size = self.pieces.piece_rows;
         let (even_right, odd_right) = right_side.split_at(self.pieces.even_rows);
         let (even, odd) = solution.split_at_mut(self.pieces.even_rows);
@@ -266,7 +311,12 @@ impl<T: Real, const B: usize> Half<T, B> {
 
     /// `D⁻¹ (right - sum)`.
     #[inline(always)]
-    fn divide<const K: usize>(&self, row: usize, right: &[[T; B]; K], sum: &[[T; B]; K]) -> [[T; B]; K] {
+    fn divide<const K: usize>(
+        &self,
+        row: usize,
+        right: &[[T; B]; K],
+        sum: &[[T; B]; K],
+    ) -> [[T; B]; K] {
         let mut result = [[T::default(); B]; K];
         let inverse = &self.inverse_diagonal[row];
         for column in 0..K {

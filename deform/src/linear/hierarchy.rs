@@ -106,7 +106,8 @@ impl<'a, const B: usize> System<'a, B> {
             None => matrix,
         };
         let own = parts.as_ref().map_or(matrix.rows(), Parts::own);
-        let pieces = if B * own <= COARSEST { Pieces::whole(own) } else { Pieces::new(&matrix, own) };
+        let pieces =
+            if B * own <= COARSEST { Pieces::whole(own) } else { Pieces::new(&matrix, own) };
         Self { matrix, parts, pieces }
     }
 
@@ -133,17 +134,26 @@ impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
         like: Option<&Self>,
         places: Option<&[Vector]>,
     ) -> Option<Self> {
-        let parts = parts.map(|(partition, shares)| Parts::new(Arc::clone(partition), shares, matrix.rows()));
-        let (parts, order) = parts.map_or((None, None), |(parts, order)| (Some(parts), Some(order)));
+        let parts = parts
+            .map(|(partition, shares)| Parts::new(Arc::clone(partition), shares, matrix.rows()));
+        let (parts, order) =
+            parts.map_or((None, None), |(parts, order)| (Some(parts), Some(order)));
         let mut places = places.map(|places| (places.to_vec(), 0.0));
         let system = System::new(Cow::Borrowed(matrix), parts, order.as_ref());
-        let known = like.and_then(|like| like.finest.as_ref()).map(|level| Arc::clone(&level.aggregates));
-        let (finest, mut current) = match coarsened::<T, B, C>(system, known, THRESHOLD, &mut places)? {
-            Step::Last(direct) => {
-                return Some(Self { order, finest: None, coarser: Vec::new(), coarsest: Coarsest::Finest(direct) });
-            }
-            Step::Level(found) => *found,
-        };
+        let known =
+            like.and_then(|like| like.finest.as_ref()).map(|level| Arc::clone(&level.aggregates));
+        let (finest, mut current) =
+            match coarsened::<T, B, C>(system, known, THRESHOLD, &mut places)? {
+                Step::Last(direct) => {
+                    return Some(Self {
+                        order,
+                        finest: None,
+                        coarser: Vec::new(),
+                        coarsest: Coarsest::Finest(direct),
+                    });
+                }
+                Step::Level(found) => *found,
+            };
         let mut coarser: Vec<Level<T, C>> = Vec::new();
         let mut threshold = THRESHOLD;
         loop {
@@ -152,7 +162,12 @@ impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
             let known = known.map(|level| Arc::clone(&level.aggregates));
             match coarsened::<T, C, C>(current, known, threshold, &mut places)? {
                 Step::Last(direct) => {
-                    return Some(Self { order, finest: Some(finest), coarser, coarsest: Coarsest::Coarse(direct) });
+                    return Some(Self {
+                        order,
+                        finest: Some(finest),
+                        coarser,
+                        coarsest: Coarsest::Coarse(direct),
+                    });
                 }
                 Step::Level(found) => {
                     let (level, next) = *found;
@@ -186,17 +201,24 @@ impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
         result: &mut [[[f64; B]; K]],
     ) {
         let Workspace { finest, coarser } = workspace;
-        let pieces = self.finest.as_ref().map_or_else(|| Pieces::whole(vector.len()), |level| level.pieces);
+        let pieces =
+            self.finest.as_ref().map_or_else(|| Pieces::whole(vector.len()), |level| level.pieces);
         let narrow = |wide: &[[f64; B]; K]| -> [[T; B]; K] {
             std::array::from_fn(|column| wide[column].map(|entry| T::of(scale[column] * entry)))
         };
         match &self.order {
             None => pieces.for_each_run(|rows, slots| {
-                parallel::for_each_chunk(&mut finest.right_side[slots], ROW_CHUNK, |chunk, part| {
-                    for (value, wide) in part.iter_mut().zip(&vector[rows.start + chunk * ROW_CHUNK..rows.end]) {
-                        *value = narrow(wide);
-                    }
-                });
+                parallel::for_each_chunk(
+                    &mut finest.right_side[slots],
+                    ROW_CHUNK,
+                    |chunk, part| {
+                        for (value, wide) in
+                            part.iter_mut().zip(&vector[rows.start + chunk * ROW_CHUNK..rows.end])
+                        {
+                            *value = narrow(wide);
+                        }
+                    },
+                );
             }),
             Some(order) => {
                 for (row, &old) in order.old.iter().enumerate() {
@@ -279,9 +301,11 @@ fn coarsened<T: Real, const B: usize, const C: usize>(
     let couplings = couplings(matrix);
     let (border, added) = parts.as_ref().map(|parts| Border::new(parts, matrix, *pieces)).unzip();
     let added = added.unwrap_or_default();
-    let reaches = |row: usize| added.get(row).is_some_and(|added| added.iter().any(|&value| value != 0.0));
-    let aggregates =
-        known.unwrap_or_else(|| Arc::new(Aggregates::new(matrix, &couplings, threshold, pieces.rows(), reaches)));
+    let reaches =
+        |row: usize| added.get(row).is_some_and(|added| added.iter().any(|&value| value != 0.0));
+    let aggregates = known.unwrap_or_else(|| {
+        Arc::new(Aggregates::new(matrix, &couplings, threshold, pieces.rows(), reaches))
+    });
     #[expect(clippy::cast_precision_loss, reason = "counts below 2^53")]
     if let Some(parts) = parts
         && parts.sum(aggregates.count()) as f64 > COARSER * total as f64
@@ -291,7 +315,8 @@ fn coarsened<T: Real, const B: usize, const C: usize>(
     let bodies = places.take().map(|(places, size)| Bodies::new(&aggregates, places, size));
     let (interpolation, coarse) = match parts {
         Some(parts) => {
-            let (interpolation, coarse) = parts.interpolation(matrix, &couplings, &aggregates, DAMPING);
+            let (interpolation, coarse) =
+                parts.interpolation(matrix, &couplings, &aggregates, DAMPING);
             (interpolation, Some(coarse))
         }
         None => {
@@ -299,7 +324,8 @@ fn coarsened<T: Real, const B: usize, const C: usize>(
             (aggregates.interpolation(matrix, &couplings, DAMPING, bodies.as_ref(), &none), None)
         }
     };
-    let (starts, entries) = interpolation.transposed(coarse.as_ref().map_or(aggregates.count(), Parts::rows));
+    let (starts, entries) =
+        interpolation.transposed(coarse.as_ref().map_or(aggregates.count(), Parts::rows));
     let sizes = bodies.as_ref().map_or(&[][..], Bodies::sizes);
     let next = galerkin::<B, C>(matrix, &interpolation, (&starts, &entries), sizes);
     *places = bodies.map(Bodies::into_coarse);
@@ -312,7 +338,11 @@ fn coarsened<T: Real, const B: usize, const C: usize>(
         rows: matrix.rows(),
         smoother,
         border,
-        interpolation: Transfer::interpolation(&interpolation, |slot| own.row(slot), |column| coarse.slot(column)),
+        interpolation: Transfer::interpolation(
+            &interpolation,
+            |slot| own.row(slot),
+            |column| coarse.slot(column),
+        ),
         restriction: Transfer::restriction(
             &interpolation,
             (&starts, &entries),
@@ -325,7 +355,11 @@ fn coarsened<T: Real, const B: usize, const C: usize>(
 
 impl<T: Real, const B: usize> Level<T, B> {
     /// A sweep, and what it leaves to the coarser level.
-    fn down<const C: usize, const K: usize>(&self, own: &mut Vectors<T, B, K>, next: &mut Vectors<T, C, K>) {
+    fn down<const C: usize, const K: usize>(
+        &self,
+        own: &mut Vectors<T, B, K>,
+        next: &mut Vectors<T, C, K>,
+    ) {
         let count = self.pieces.rows();
         self.smoother.forward(&own.right_side[..count], &mut own.solution[..count]);
         self.smoother.residual(&own.solution[..count], &mut own.residual[..count]);
@@ -342,7 +376,11 @@ impl<T: Real, const B: usize> Level<T, B> {
     }
 
     /// What the coarser level has found, and a sweep back.
-    fn up<const C: usize, const K: usize>(&self, own: &mut Vectors<T, B, K>, next: &Vectors<T, C, K>) {
+    fn up<const C: usize, const K: usize>(
+        &self,
+        own: &mut Vectors<T, B, K>,
+        next: &Vectors<T, C, K>,
+    ) {
         parallel::for_each_chunk(&mut own.solution, ROW_CHUNK, |chunk, part| {
             for (index, value) in part.iter_mut().enumerate() {
                 self.interpolation.interpolate(chunk * ROW_CHUNK + index, &next.solution, value);

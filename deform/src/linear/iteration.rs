@@ -75,9 +75,12 @@ pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
     if !whole.iter().all(|norm| norm.is_finite()) {
         return Err(LinearError::NotFinite { iteration: 0 });
     }
-    let target: [f64; K] =
-        std::array::from_fn(|column| (tolerances[column].relative * whole[column]).max(tolerances[column].absolute));
-    let relative = |column: usize, residual: f64| if whole[column] > 0.0 { residual / whole[column] } else { 0.0 };
+    let target: [f64; K] = std::array::from_fn(|column| {
+        (tolerances[column].relative * whole[column]).max(tolerances[column].absolute)
+    });
+    let relative = |column: usize, residual: f64| {
+        if whole[column] > 0.0 { residual / whole[column] } else { 0.0 }
+    };
 
     let mut residual = right_side.to_vec();
     let mut image = vec![[[0.0; B]; K]; residual.len()];
@@ -90,17 +93,23 @@ pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
         if whole[column] <= target[column] && reached[column] > target[column] {
             // Nothing to solve for: zero answers it, whatever the iteration was to start from.
             solution.iter_mut().for_each(|value| value[column] = [0.0; B]);
-            residual.iter_mut().zip(right_side).for_each(|(value, right)| value[column] = right[column]);
+            residual
+                .iter_mut()
+                .zip(right_side)
+                .for_each(|(value, right)| value[column] = right[column]);
             reached[column] = whole[column];
         }
     }
     if !reached.iter().all(|norm| norm.is_finite()) {
         return Err(LinearError::NotFinite { iteration: 0 });
     }
-    let mut result: [Convergence; K] =
-        std::array::from_fn(|column| Convergence { iterations: 0, residual: relative(column, reached[column]) });
+    let mut result: [Convergence; K] = std::array::from_fn(|column| Convergence {
+        iterations: 0,
+        residual: relative(column, reached[column]),
+    });
     // Exact zeros, and what only rounding has left, need no preconditioner.
-    if (0..K).all(|column| reached[column] <= tolerances[column].absolute || reached[column] == 0.0) {
+    if (0..K).all(|column| reached[column] <= tolerances[column].absolute || reached[column] == 0.0)
+    {
         return Ok(result);
     }
     let mut preconditioned = vec![[[0.0; B]; K]; residual.len()];
@@ -121,7 +130,10 @@ pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
                 return Err(LinearError::NotFinite { iteration });
             }
             if curvature <= 0.0 || energy <= 0.0 {
-                return Err(LinearError::Indefinite { iteration, curvature: curvature.min(energy) });
+                return Err(LinearError::Indefinite {
+                    iteration,
+                    curvature: curvature.min(energy),
+                });
             }
             step[column] = energy / curvature;
         }
@@ -130,11 +142,14 @@ pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
         let square = matrix.dot(&residual, &residual);
         for column in (0..K).filter(|&column| active[column]) {
             reached[column] = square[column].sqrt();
-            result[column] = Convergence { iterations: iteration, residual: relative(column, reached[column]) };
+            result[column] =
+                Convergence { iterations: iteration, residual: relative(column, reached[column]) };
         }
-        if (0..K)
-            .all(|column| !active[column] || reached[column] <= tolerances[column].absolute || reached[column] == 0.0)
-        {
+        if (0..K).all(|column| {
+            !active[column]
+                || reached[column] <= tolerances[column].absolute
+                || reached[column] == 0.0
+        }) {
             return Ok(result);
         }
         precondition(&residual, &mut preconditioned);
@@ -145,11 +160,15 @@ pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
         }
         let before = std::mem::replace(&mut energy, matrix.dot(&residual, &preconditioned));
         let factor: [f64; K] =
-            std::array::from_fn(|column| if active[column] { energy[column] / before[column] } else { 0.0 });
+            std::array::from_fn(
+                |column| if active[column] { energy[column] / before[column] } else { 0.0 },
+            );
         parallel::for_each_chunk(&mut direction, ROW_CHUNK, |chunk, part| {
             for (value, new) in part.iter_mut().zip(&preconditioned[chunk * ROW_CHUNK..]) {
                 *value = std::array::from_fn(|column| {
-                    std::array::from_fn(|axis| new[column][axis] + factor[column] * value[column][axis])
+                    std::array::from_fn(|axis| {
+                        new[column][axis] + factor[column] * value[column][axis]
+                    })
                 });
             }
         });
@@ -186,16 +205,21 @@ fn unfinished<const B: usize, const K: usize>(
 pub(super) fn largest<const B: usize, const K: usize>(vector: &[Columns<B, K>]) -> [f64; K] {
     let parts = parallel::map_chunks(vector.len(), ROW_CHUNK, |range| {
         vector[range].iter().fold([0.0; K], |most: [f64; K], value| {
-            std::array::from_fn(|column| value[column].iter().fold(most[column], |most, entry| most.max(entry.abs())))
+            std::array::from_fn(|column| {
+                value[column].iter().fold(most[column], |most, entry| most.max(entry.abs()))
+            })
         })
     });
-    parts
-        .into_iter()
-        .fold([0.0; K], |most: [f64; K], part| std::array::from_fn(|column| most[column].max(part[column])))
+    parts.into_iter().fold([0.0; K], |most: [f64; K], part| {
+        std::array::from_fn(|column| most[column].max(part[column]))
+    })
 }
 
 /// The inner product of each column, summed chunk by chunk.
-pub(super) fn dot<const B: usize, const K: usize>(a: &[Columns<B, K>], b: &[Columns<B, K>]) -> [f64; K] {
+pub(super) fn dot<const B: usize, const K: usize>(
+    a: &[Columns<B, K>],
+    b: &[Columns<B, K>],
+) -> [f64; K] {
     let parts = parallel::map_chunks(a.len(), ROW_CHUNK, |range| {
         // Four sums side by side, so that one need not wait for another.
         let mut sums = [[0.0; K]; 4];
@@ -209,9 +233,13 @@ pub(super) fn dot<const B: usize, const K: usize>(a: &[Columns<B, K>], b: &[Colu
                 }
             }
         }
-        std::array::from_fn(|column| (sums[0][column] + sums[1][column]) + (sums[2][column] + sums[3][column]))
+        std::array::from_fn(|column| {
+            (sums[0][column] + sums[1][column]) + (sums[2][column] + sums[3][column])
+        })
     });
-    parts.into_iter().fold([0.0; K], |total, part: [f64; K]| std::array::from_fn(|column| total[column] + part[column]))
+    parts.into_iter().fold([0.0; K], |total, part: [f64; K]| {
+        std::array::from_fn(|column| total[column] + part[column])
+    })
 }
 
 fn add_multiple<const B: usize, const K: usize>(

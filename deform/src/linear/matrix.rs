@@ -26,7 +26,10 @@ impl<const B: usize> SparseMatrix<B> {
     /// Where `offsets` does not rise from 0 to the number of columns, or the columns of a row do not rise.
     #[must_use]
     pub fn zeros(offsets: Vec<usize>, columns: Vec<u32>) -> Self {
-        assert!(offsets.first() == Some(&0) && offsets.last() == Some(&columns.len()), "offsets span the columns");
+        assert!(
+            offsets.first() == Some(&0) && offsets.last() == Some(&columns.len()),
+            "offsets span the columns"
+        );
         assert!(offsets.is_sorted(), "offsets rise");
         for row in offsets.windows(2) {
             assert!(columns[row[0]..row[1]].is_sorted_by(|a, b| a < b), "columns of a row rise");
@@ -36,7 +39,11 @@ impl<const B: usize> SparseMatrix<B> {
     }
 
     /// As [`SparseMatrix::zeros`], with values, of parts known to fit.
-    pub(crate) fn from_parts(offsets: Vec<usize>, columns: Vec<u32>, values: Vec<Block<B>>) -> Self {
+    pub(crate) fn from_parts(
+        offsets: Vec<usize>,
+        columns: Vec<u32>,
+        values: Vec<Block<B>>,
+    ) -> Self {
         debug_assert!(offsets.last() == Some(&columns.len()) && columns.len() == values.len());
         Self { offsets, columns, values }
     }
@@ -93,7 +100,11 @@ impl<const B: usize> SparseMatrix<B> {
     }
 
     /// The same for `K` vectors side by side.
-    pub(crate) fn multiply_columns<const K: usize>(&self, vector: &[[[f64; B]; K]], result: &mut [[[f64; B]; K]]) {
+    pub(crate) fn multiply_columns<const K: usize>(
+        &self,
+        vector: &[[[f64; B]; K]],
+        result: &mut [[[f64; B]; K]],
+    ) {
         assert_eq!(result.len(), self.rows(), "one result for each row");
         parallel::for_each_chunk(result, ROW_CHUNK, |chunk, part| {
             for (index, value) in part.iter_mut().enumerate() {
@@ -110,7 +121,11 @@ impl<const B: usize> SparseMatrix<B> {
 
 /// `sum += block * vector`, for each column of the vector.
 #[inline(always)]
-fn multiply_add<const B: usize, const K: usize>(sum: &mut [[f64; B]; K], block: &Block<B>, vector: &[[f64; B]; K]) {
+fn multiply_add<const B: usize, const K: usize>(
+    sum: &mut [[f64; B]; K],
+    block: &Block<B>,
+    vector: &[[f64; B]; K],
+) {
     for (sum, vector) in sum.iter_mut().zip(vector) {
         for (total, row) in sum.iter_mut().zip(block) {
             for (entry, value) in row.iter().zip(vector) {
@@ -172,7 +187,11 @@ mod tests {
     fn multiplies_blocks() {
         let mut matrix = SparseMatrix::<2>::zeros(vec![0, 1, 3], vec![1, 0, 1]);
         let (_, _, values) = matrix.offsets_and_values_mut();
-        values.copy_from_slice(&[[[1.0, 2.0], [3.0, 4.0]], [[5.0, 6.0], [7.0, 8.0]], [[1.0, 0.0], [0.0, 1.0]]]);
+        values.copy_from_slice(&[
+            [[1.0, 2.0], [3.0, 4.0]],
+            [[5.0, 6.0], [7.0, 8.0]],
+            [[1.0, 0.0], [0.0, 1.0]],
+        ]);
         let mut result = [[0.0; 2]; 2];
         matrix.multiply(&[[1.0, 2.0], [3.0, 4.0]], &mut result);
         assert_eq!(result, [[11.0, 25.0], [5.0 + 12.0 + 3.0, 7.0 + 16.0 + 4.0]]);
@@ -184,7 +203,8 @@ mod tests {
         let inverse = invert_positive(&block).unwrap();
         for (i, row) in block.iter().enumerate() {
             for j in 0..3 {
-                let product: f64 = row.iter().zip(&inverse).map(|(entry, other)| entry * other[j]).sum();
+                let product: f64 =
+                    row.iter().zip(&inverse).map(|(entry, other)| entry * other[j]).sum();
                 assert!((product - f64::from(u8::from(i == j))).abs() < 1e-14);
             }
         }

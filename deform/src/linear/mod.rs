@@ -46,7 +46,9 @@ const DIRECT: usize = 1500;
 ///
 /// # Errors
 /// [`LinearError::Diagonal`].
-pub fn solver<const B: usize>(matrix: Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
+pub fn solver<const B: usize>(
+    matrix: Arc<SparseMatrix<B>>,
+) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
     if B * matrix.rows() <= DIRECT
         && let Ok(direct) = Cholesky::new(Arc::clone(&matrix))
     {
@@ -139,7 +141,10 @@ pub trait LinearSolver<const B: usize>: std::fmt::Debug + Send + Sync {
     ///
     /// # Errors
     /// [`LinearError::Diagonal`], [`LinearError::Factor`].
-    fn renewed(&self, matrix: Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError>;
+    fn renewed(
+        &self,
+        matrix: Arc<SparseMatrix<B>>,
+    ) -> Result<Box<dyn LinearSolver<B>>, LinearError>;
 }
 
 /// Why a linear system was not solved.
@@ -160,7 +165,9 @@ pub enum LinearError {
         tolerance: f64,
     },
     /// The matrix is not positive definite.
-    #[error("the linear system is not positive definite (curvature {curvature:.3e} at iteration {iteration})")]
+    #[error(
+        "the linear system is not positive definite (curvature {curvature:.3e} at iteration {iteration})"
+    )]
     Indefinite {
         /// The iteration that met it.
         iteration: usize,
@@ -197,7 +204,9 @@ pub enum LinearError {
     #[error("the linear system could not be set up on another rank")]
     OtherRank,
     /// A matrix could not be factored.
-    #[error("the linear system has no Cholesky factor: it is not positive definite, or too large for memory")]
+    #[error(
+        "the linear system has no Cholesky factor: it is not positive definite, or too large for memory"
+    )]
     Factor,
     /// The right side, or something computed from it, is NaN or infinite.
     #[error("the linear solve met a value that is not finite at iteration {iteration}")]

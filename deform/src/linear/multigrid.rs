@@ -66,7 +66,10 @@ impl<const B: usize> Multigrid<B> {
     ///
     /// # Errors
     /// [`LinearError::Diagonal`].
-    pub fn new(matrix: impl Into<Arc<SparseMatrix<B>>>, settings: MultigridSettings) -> Result<Self, LinearError> {
+    pub fn new(
+        matrix: impl Into<Arc<SparseMatrix<B>>>,
+        settings: MultigridSettings,
+    ) -> Result<Self, LinearError> {
         let matrix = matrix.into();
         let levels = match settings.precision {
             Precision::Single => Hierarchy::new(&matrix, None, None, None).map(Levels::Single),
@@ -88,18 +91,30 @@ impl<const B: usize> Multigrid<B> {
     ) -> Result<Self, LinearError> {
         let (matrix, places) = (matrix.into(), places.into());
         if B != 3 || places.len() != matrix.rows() {
-            return Err(LinearError::Places { found: places.len(), expected: matrix.rows(), block: B });
+            return Err(LinearError::Places {
+                found: places.len(),
+                expected: matrix.rows(),
+                block: B,
+            });
         }
         let levels = Hierarchy::new(&matrix, None, None, Some(&places));
-        Self::with_levels(matrix, settings, levels.map(|levels| Levels::Bodies(Box::new(levels), places)))
+        Self::with_levels(
+            matrix,
+            settings,
+            levels.map(|levels| Levels::Bodies(Box::new(levels), places)),
+        )
     }
 
     /// The same for another matrix; the aggregates are used again where that has its blocks at the same places.
     pub(super) fn of_like_matrix(&self, matrix: Arc<SparseMatrix<B>>) -> Result<Self, LinearError> {
         let same = self.matrix.has_pattern_of(&matrix);
         let levels = match &self.levels {
-            Levels::Single(like) => Hierarchy::new(&matrix, None, same.then_some(like), None).map(Levels::Single),
-            Levels::Double(like) => Hierarchy::new(&matrix, None, same.then_some(like), None).map(Levels::Double),
+            Levels::Single(like) => {
+                Hierarchy::new(&matrix, None, same.then_some(like), None).map(Levels::Single)
+            }
+            Levels::Double(like) => {
+                Hierarchy::new(&matrix, None, same.then_some(like), None).map(Levels::Double)
+            }
             Levels::Bodies(like, places) => (places.len() == matrix.rows())
                 .then(|| Hierarchy::new(&matrix, None, same.then_some(&**like), Some(places)))
                 .flatten()
@@ -120,7 +135,12 @@ impl<const B: usize> Multigrid<B> {
         settings: MultigridSettings,
         levels: Option<Levels<B>>,
     ) -> Result<Self, LinearError> {
-        let solver = Self { matrix, settings, levels: levels.unwrap_or(Levels::None), fallback: OnceLock::new() };
+        let solver = Self {
+            matrix,
+            settings,
+            levels: levels.unwrap_or(Levels::None),
+            fallback: OnceLock::new(),
+        };
         if matches!(solver.levels, Levels::None) {
             solver.fallback()?;
         }
@@ -128,7 +148,10 @@ impl<const B: usize> Multigrid<B> {
     }
 
     fn fallback(&self) -> Result<&ConjugateGradients<B>, LinearError> {
-        self.fallback.get_or_init(|| ConjugateGradients::new(Arc::clone(&self.matrix))).as_ref().map_err(|error| *error)
+        self.fallback
+            .get_or_init(|| ConjugateGradients::new(Arc::clone(&self.matrix)))
+            .as_ref()
+            .map_err(|error| *error)
     }
 
     fn iterate<T: Real, const C: usize, const K: usize>(
@@ -159,16 +182,20 @@ impl<const B: usize> Multigrid<B> {
         let result = match &self.levels {
             Levels::Single(hierarchy) => self.iterate(hierarchy, right_side, solution, tolerances),
             Levels::Double(hierarchy) => self.iterate(hierarchy, right_side, solution, tolerances),
-            Levels::Bodies(hierarchy, _) => self.iterate(hierarchy, right_side, solution, tolerances),
-            Levels::None => {
-                Err(LinearError::NotConverged { iterations: 0, residual: f64::NAN, tolerance: tolerances[0].relative })
+            Levels::Bodies(hierarchy, _) => {
+                self.iterate(hierarchy, right_side, solution, tolerances)
             }
+            Levels::None => Err(LinearError::NotConverged {
+                iterations: 0,
+                residual: f64::NAN,
+                tolerance: tolerances[0].relative,
+            }),
         };
         let before = match result {
             Err(LinearError::NotConverged { iterations, .. }) => iterations,
-            Err(LinearError::Indefinite { iteration, .. } | LinearError::NotFinite { iteration }) if iteration > 0 => {
-                iteration
-            }
+            Err(
+                LinearError::Indefinite { iteration, .. } | LinearError::NotFinite { iteration },
+            ) if iteration > 0 => iteration,
             other => return other,
         };
         let fallback = self.fallback()?;
@@ -200,7 +227,11 @@ impl<const B: usize> LinearSolver<B> for Multigrid<B> {
         solution: &mut [[f64; B]],
         tolerance: Tolerance,
     ) -> Result<Convergence, LinearError> {
-        let [convergence] = self.solve_columns(single_column(right_side), single_column_mut(solution), [tolerance])?;
+        let [convergence] = self.solve_columns(
+            single_column(right_side),
+            single_column_mut(solution),
+            [tolerance],
+        )?;
         Ok(convergence)
     }
 
@@ -213,7 +244,10 @@ impl<const B: usize> LinearSolver<B> for Multigrid<B> {
         self.solve_columns(right_sides, solutions, tolerances)
     }
 
-    fn renewed(&self, matrix: Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
+    fn renewed(
+        &self,
+        matrix: Arc<SparseMatrix<B>>,
+    ) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
         Ok(Box::new(self.of_like_matrix(matrix)?))
     }
 }

@@ -38,7 +38,11 @@ pub(super) struct Order {
 
 impl Parts {
     /// `rows` rows in any order, and the order that has this rank's own ones first, otherwise as they were.
-    pub(super) fn new(partition: Arc<dyn Partition>, shares: &Shares, rows: usize) -> (Self, Order) {
+    pub(super) fn new(
+        partition: Arc<dyn Partition>,
+        shares: &Shares,
+        rows: usize,
+    ) -> (Self, Order) {
         let (mut old, foreign): (Vec<u32>, Vec<u32>) =
             (0..).take(rows).partition(|&row: &u32| shares.owns(row as usize));
         let own = old.len();
@@ -93,13 +97,18 @@ impl Parts {
     /// A part of the same sum: blocks between rows that one rank speaks for are moved there, those between rows of different ranks
     /// stay where they are. So the first [`own`](Self::own) rows and columns are those of the sum. `order` is that of the rows where
     /// those of `matrix` have another one.
-    pub(super) fn assembled<const B: usize>(&self, matrix: &SparseMatrix<B>, order: Option<&Order>) -> SparseMatrix<B> {
+    pub(super) fn assembled<const B: usize>(
+        &self,
+        matrix: &SparseMatrix<B>,
+        order: Option<&Order>,
+    ) -> SparseMatrix<B> {
         let old = |row: usize| order.map_or(row, |order| order.old[row] as usize);
         let new = |row: u32| order.map_or(row, |order| order.new[row as usize]);
         let mut messages = Vec::new();
         let mut listed = vec![NONE; self.rows()];
         for (rank, common) in self.shares.others() {
-            let theirs = || (0..).zip(common).filter(|(_, row)| self.owner(**row as usize) == *rank);
+            let theirs =
+                || (0..).zip(common).filter(|(_, row)| self.owner(**row as usize) == *rank);
             theirs().for_each(|(index, &row): (u32, _)| listed[row as usize] = index);
             let mut message: Vec<f64> = Vec::new();
             for (index, &row) in theirs() {
@@ -117,12 +126,21 @@ impl Parts {
         }
         let mut more: Vec<(u32, u32, Block<B>)> = Vec::new();
         for (from, message) in self.partition.exchange(messages) {
-            let Some((_, common)) = self.shares.others().iter().find(|(rank, _)| *rank == from) else { continue };
+            let Some((_, common)) = self.shares.others().iter().find(|(rank, _)| *rank == from)
+            else {
+                continue;
+            };
             for entry in message.chunks_exact(2 + B * B) {
-                let (Some(row), Some(column)) = (place_in(common, entry[0]), place_in(common, entry[1])) else {
+                let (Some(row), Some(column)) =
+                    (place_in(common, entry[0]), place_in(common, entry[1]))
+                else {
                     continue;
                 };
-                more.push((row, column, std::array::from_fn(|i| std::array::from_fn(|j| entry[2 + B * i + j]))));
+                more.push((
+                    row,
+                    column,
+                    std::array::from_fn(|i| std::array::from_fn(|j| entry[2 + B * i + j])),
+                ));
             }
         }
         // As the ranks come, so that sums are always taken in the same order.
@@ -137,7 +155,8 @@ impl Parts {
                 let foreign = |&(column, _): &(u32, Block<B>)| column as usize >= self.own;
                 if row < self.own {
                     let from = more.partition_point(|(other, ..)| (*other as usize) < row);
-                    let until = from + more[from..].partition_point(|(other, ..)| *other as usize == row);
+                    let until =
+                        from + more[from..].partition_point(|(other, ..)| *other as usize == row);
                     blocks_of_row.extend(blocks.clone().filter(|block| !foreign(block)));
                     for &(_, column, block) in &more[from..until] {
                         match blocks_of_row.binary_search_by_key(&column, |(column, _)| *column) {
@@ -148,7 +167,8 @@ impl Parts {
                     blocks_of_row.extend(blocks.filter(foreign));
                 } else {
                     let owner = self.owner(row);
-                    let across = |(column, _): &(u32, Block<B>)| self.owner(*column as usize) != owner;
+                    let across =
+                        |(column, _): &(u32, Block<B>)| self.owner(*column as usize) != owner;
                     blocks_of_row.extend(blocks.filter(across));
                     blocks_of_row.sort_unstable_by_key(|(column, _)| *column);
                 }
@@ -190,20 +210,30 @@ impl Parts {
         };
         let across: Across = across
             .iter()
-            .map(|(&row, sums)| (row, sums.iter().map(|(key, &sum)| (numbered(&met, key), sum)).collect()))
+            .map(|(&row, sums)| {
+                (row, sums.iter().map(|(key, &sum)| (numbered(&met, key), sum)).collect())
+            })
             .collect();
         let own = aggregates.interpolation(matrix, couplings, damping, None, &across);
-        let key_of = |column: u32| (column as usize).checked_sub(count).map_or((rank, column), |place| met[place]);
+        let key_of = |column: u32| {
+            (column as usize).checked_sub(count).map_or((rank, column), |place| met[place])
+        };
 
         let of_row = |row: u32| {
             let range = own.offsets[row as usize]..own.offsets[row as usize + 1];
             let weights = own.weights[range.clone()].iter().copied();
             own.columns[range].iter().map(|&column| key_of(column)).zip(weights).collect()
         };
-        let messages = self.shares.given().iter().map(|(to, rows)| (*to, message(rows.iter().map(|&row| of_row(row)))));
+        let messages = self
+            .shares
+            .given()
+            .iter()
+            .map(|(to, rows)| (*to, message(rows.iter().map(|&row| of_row(row)))));
         let mut theirs: Vec<Vec<(Key, f64)>> = vec![Vec::new(); self.owners.len()];
         for (from, message) in self.partition.exchange(messages.collect()) {
-            let Some((_, rows)) = self.shares.taken().iter().find(|(rank, _)| *rank == from) else { continue };
+            let Some((_, rows)) = self.shares.taken().iter().find(|(rank, _)| *rank == from) else {
+                continue;
+            };
             for (&row, weights) in rows.iter().zip(lists(&message)) {
                 theirs[row as usize - self.own] = weights;
             }
@@ -239,7 +269,11 @@ impl Parts {
         let mut across: BTreeMap<u32, BTreeMap<Key, f64>> = BTreeMap::new();
         for row in 0..self.rows() {
             let (columns, first) = (matrix.row(row).0, matrix.offsets()[row]);
-            let from = if row < self.own { columns.partition_point(|&column| (column as usize) < self.own) } else { 0 };
+            let from = if row < self.own {
+                columns.partition_point(|&column| (column as usize) < self.own)
+            } else {
+                0
+            };
             for (place, &column) in columns.iter().enumerate().skip(from) {
                 if let Some(key) = key(column as usize) {
                     #[expect(clippy::cast_possible_truncation, reason = "rows are 32-bit")]
@@ -248,13 +282,22 @@ impl Parts {
                 }
             }
         }
-        let of_row =
-            |row: u32| across.get(&row).map_or_else(Vec::new, |sums| sums.iter().map(|(k, v)| (*k, *v)).collect());
-        let messages = self.shares.taken().iter().map(|(to, rows)| (*to, message(rows.iter().map(|&row| of_row(row)))));
+        let of_row = |row: u32| {
+            across
+                .get(&row)
+                .map_or_else(Vec::new, |sums| sums.iter().map(|(k, v)| (*k, *v)).collect())
+        };
+        let messages = self
+            .shares
+            .taken()
+            .iter()
+            .map(|(to, rows)| (*to, message(rows.iter().map(|&row| of_row(row)))));
         let heard = self.partition.exchange(messages.collect());
         across.retain(|&row, _| (row as usize) < self.own);
         for (from, message) in heard {
-            let Some((_, rows)) = self.shares.given().iter().find(|(rank, _)| *rank == from) else { continue };
+            let Some((_, rows)) = self.shares.given().iter().find(|(rank, _)| *rank == from) else {
+                continue;
+            };
             for (&row, list) in rows.iter().zip(lists(&message)) {
                 for (key, value) in list {
                     *across.entry(row).or_default().entry(key).or_default() += value;
@@ -271,7 +314,10 @@ fn message(lists: impl Iterator<Item = Vec<(Key, f64)>>) -> Vec<f64> {
     let mut message = Vec::new();
     for list in lists {
         message.push(list.len() as f64);
-        message.extend(list.iter().flat_map(|&((owner, index), value)| [owner as f64, f64::from(index), value]));
+        message.extend(
+            list.iter()
+                .flat_map(|&((owner, index), value)| [owner as f64, f64::from(index), value]),
+        );
     }
     message
 }
@@ -283,7 +329,9 @@ fn lists(message: &[f64]) -> impl Iterator<Item = Vec<(Key, f64)>> {
         let (&length, after) = rest.split_first()?;
         let (list, after) = after.split_at_checked(3 * number(length)? as usize)?;
         rest = after;
-        list.chunks_exact(3).map(|entry| Some(((number(entry[0])? as usize, number(entry[1])?), entry[2]))).collect()
+        list.chunks_exact(3)
+            .map(|entry| Some(((number(entry[0])? as usize, number(entry[1])?), entry[2])))
+            .collect()
     })
 }
 

@@ -68,9 +68,14 @@ impl<const B: usize> BlockPreconditioner<B> {
     ///
     /// # Errors
     /// [`LinearError::Diagonal`] for a diagonal block that is missing or not positive definite.
-    pub fn new(matrix: &SparseMatrix<B>, factorization: Factorization) -> Result<Self, LinearError> {
+    pub fn new(
+        matrix: &SparseMatrix<B>,
+        factorization: Factorization,
+    ) -> Result<Self, LinearError> {
         let rows = matrix.rows();
-        let width = (0..rows).filter_map(|row| Some(row.saturating_sub(*matrix.row(row).0.first()? as usize))).max();
+        let width = (0..rows)
+            .filter_map(|row| Some(row.saturating_sub(*matrix.row(row).0.first()? as usize)))
+            .max();
         let piece_rows = rows.div_ceil(PIECES).max(PIECE_ROWS).max(width.unwrap_or(0));
         let pieces = rows.div_ceil(piece_rows);
         let range = |piece: usize| piece * piece_rows..((piece + 1) * piece_rows).min(rows);
@@ -128,8 +133,11 @@ impl<const B: usize> BlockPreconditioner<B> {
                 .map(|row| {
                     let mut total = [0.0; B];
                     for (other, block) in self.below.row(row) {
-                        let value =
-                            if other < first { before[other + self.piece_rows - first] } else { after[other - end] };
+                        let value = if other < first {
+                            before[other + self.piece_rows - first]
+                        } else {
+                            after[other - end]
+                        };
                         add_transposed(&mut total, block, value);
                     }
                     total
@@ -141,7 +149,13 @@ impl<const B: usize> BlockPreconditioner<B> {
 
     /// Solves `(D + L) w = vector` for the rows of a piece that starts at row `first`; `before` and `after` hold `w` for the
     /// pieces on either side.
-    fn forward(&self, first: usize, vector: &[[f64; B]], result: &mut [[f64; B]], [before, after]: [&[[f64; B]]; 2]) {
+    fn forward(
+        &self,
+        first: usize,
+        vector: &[[f64; B]],
+        result: &mut [[f64; B]],
+        [before, after]: [&[[f64; B]]; 2],
+    ) {
         let end = first + result.len();
         for row in first..end {
             let mut sum = vector[row];
@@ -169,7 +183,8 @@ impl<const B: usize> BlockPreconditioner<B> {
         let end = first + result.len();
         for row in (first..end).rev() {
             let correction = multiply(&self.inverse_diagonal[row], above[row - first]);
-            let value: [f64; B] = std::array::from_fn(|axis| result[row - first][axis] - correction[axis]);
+            let value: [f64; B] =
+                std::array::from_fn(|axis| result[row - first][axis] - correction[axis]);
             result[row - first] = value;
             for (column, block) in self.lower.row(row) {
                 if (first..end).contains(&column) {
@@ -197,7 +212,11 @@ fn below<const B: usize>(lower: &Rows<B>, piece_rows: usize) -> Rows<B> {
         offsets[row + 1] += offsets[row];
     }
     let mut next = offsets.clone();
-    let mut result = Rows { columns: vec![0; offsets[rows]], blocks: vec![[[0.0; B]; B]; offsets[rows]], offsets };
+    let mut result = Rows {
+        columns: vec![0; offsets[rows]],
+        blocks: vec![[[0.0; B]; B]; offsets[rows]],
+        offsets,
+    };
     for (row, column, block) in blocks() {
         let place = next[column];
         next[column] += 1;
@@ -261,8 +280,9 @@ impl<const B: usize> Piece<B> {
             // In the order of elimination: the pieces beside this one, then this one.
             let own = columns.partition_point(|&column| (column as usize) < rows.start);
             let after = columns.partition_point(|&column| (column as usize) < rows.end);
-            let before =
-                neighbours[0].map_or(own, |other| columns.partition_point(|&column| (column as usize) < other.first));
+            let before = neighbours[0].map_or(own, |other| {
+                columns.partition_point(|&column| (column as usize) < other.first)
+            });
             let last = neighbours[1].map_or(after, |other| {
                 columns.partition_point(|&column| (column as usize) < other.first + other.rows())
             });
@@ -271,12 +291,16 @@ impl<const B: usize> Piece<B> {
                 piece.lower.extend_from_slice(&blocks[range]);
             }
             piece.offsets.push(piece.columns.len());
-            piece.inverse_diagonal.push(invert_positive(&blocks[place]).ok_or(LinearError::Diagonal { row })?);
+            piece
+                .inverse_diagonal
+                .push(invert_positive(&blocks[place]).ok_or(LinearError::Diagonal { row })?);
             diagonal.push(blocks[place]);
         }
         if factorization == Factorization::IncompleteCholesky {
             for shift in [0.0, 1e-3, 1e-2, 1e-1] {
-                if let Some((lower, inverse_diagonal)) = piece.incomplete_cholesky(&diagonal, neighbours, shift) {
+                if let Some((lower, inverse_diagonal)) =
+                    piece.incomplete_cholesky(&diagonal, neighbours, shift)
+                {
                     (piece.lower, piece.inverse_diagonal) = (lower, inverse_diagonal);
                     break;
                 }
@@ -332,7 +356,9 @@ impl<const B: usize> Piece<B> {
                 };
                 let mut value = lower[start + index];
                 for (&shared, block) in owner.columns[range].iter().zip(blocks) {
-                    if let Some(found) = place.get(shared as usize - base).and_then(|&at| scaled.get(at as usize)) {
+                    if let Some(found) =
+                        place.get(shared as usize - base).and_then(|&at| scaled.get(at as usize))
+                    {
                         subtract_product(&mut value, found, block);
                     }
                 }

@@ -26,9 +26,15 @@ pub(super) struct Run {
 
 impl<T: Real, const B: usize> Rows<T, B> {
     /// `count` rows of blocks of a matrix, each of two runs.
-    pub(super) fn new(matrix: &SparseMatrix<B>, count: usize, runs: impl Fn(usize) -> [Run; 2] + Sync) -> Self {
+    pub(super) fn new(
+        matrix: &SparseMatrix<B>,
+        count: usize,
+        runs: impl Fn(usize) -> [Run; 2] + Sync,
+    ) -> Self {
         let lengths = parallel::map_chunks(count, ROW_CHUNK, |range| {
-            range.map(|row| runs(row).iter().map(|run| run.places.len()).sum()).collect::<Vec<usize>>()
+            range
+                .map(|row| runs(row).iter().map(|run| run.places.len()).sum())
+                .collect::<Vec<usize>>()
         });
         let mut offsets = Vec::with_capacity(count + 1);
         offsets.push(0);
@@ -41,19 +47,27 @@ impl<T: Real, const B: usize> Rows<T, B> {
         let mut entries = vec![T::default(); B * B * end + 1];
         let (found, _) = entries.as_chunks_mut::<B>();
         let (found, _) = found.as_chunks_mut::<B>();
-        parallel::for_each_rows(ROW_CHUNK, (&offsets, &mut columns), (&offsets, found), |rows, columns, found| {
-            let mut kept = columns.iter_mut().zip(found);
-            for row in rows {
-                for Run { places, shift } in runs(row) {
-                    let blocks = matrix.columns()[places.clone()].iter().zip(&matrix.values()[places]);
-                    // The blocks come first, so that none of those to be kept is passed over where they end.
-                    for ((&column, block), (place, found)) in blocks.zip(kept.by_ref()) {
-                        *place = column.wrapping_add(shift);
-                        *found = std::array::from_fn(|j| std::array::from_fn(|i| T::of(block[i][j])));
+        parallel::for_each_rows(
+            ROW_CHUNK,
+            (&offsets, &mut columns),
+            (&offsets, found),
+            |rows, columns, found| {
+                let mut kept = columns.iter_mut().zip(found);
+                for row in rows {
+                    for Run { places, shift } in runs(row) {
+                        let blocks =
+                            matrix.columns()[places.clone()].iter().zip(&matrix.values()[places]);
+                        // The blocks come first, so that none of those to be kept is passed over where they end.
+                        for ((&column, block), (place, found)) in blocks.zip(kept.by_ref()) {
+                            *place = column.wrapping_add(shift);
+                            *found = std::array::from_fn(|j| {
+                                std::array::from_fn(|i| T::of(block[i][j]))
+                            });
+                        }
                     }
                 }
-            }
-        });
+            },
+        );
         Self { offsets, columns, entries }
     }
 
@@ -93,14 +107,16 @@ impl<T: Real, const B: usize> Rows<T, B> {
         let range = self.offsets[row]..self.offsets[row + 1];
         let entries = &self.entries[B * B * range.start..=B * B * range.end];
         let columns = &self.columns[range];
-        let places = (0..columns.len()).map(|place| if BACKWARDS { columns.len() - 1 - place } else { place });
+        let places = (0..columns.len())
+            .map(|place| if BACKWARDS { columns.len() - 1 - place } else { place });
         if B == 3 {
             // Four entries at a time, as processors have it; the fourth is the next column's and comes to nothing. Each column of
             // a block has its own sum, so that none need wait for another.
             let mut wide = [[[T::default(); 4]; 3]; K];
             for place in places {
                 let Some(block) = entries[9 * place..].first_chunk::<10>() else { break };
-                for (sums, vector) in wide.iter_mut().zip(&vector[columns[place] as usize - first]) {
+                for (sums, vector) in wide.iter_mut().zip(&vector[columns[place] as usize - first])
+                {
                     for (j, sum) in sums.iter_mut().enumerate() {
                         for lane in 0..4 {
                             sum[lane] += block[3 * j + lane] * vector[j];

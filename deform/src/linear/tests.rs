@@ -17,7 +17,8 @@ fn noise(seed: u64) -> f64 {
 
 /// A symmetric positive definite block that looks random: the identity plus a product of a block with itself.
 fn positive<const B: usize>(seed: u64) -> Block<B> {
-    let part: Block<B> = std::array::from_fn(|i| std::array::from_fn(|j| noise(seed * 31 + (B * i + j) as u64)));
+    let part: Block<B> =
+        std::array::from_fn(|i| std::array::from_fn(|j| noise(seed * 31 + (B * i + j) as u64)));
     std::array::from_fn(|i| {
         std::array::from_fn(|j| {
             let product: f64 = part[i].iter().zip(&part[j]).map(|(a, b)| a * b).sum();
@@ -30,7 +31,8 @@ fn positive<const B: usize>(seed: u64) -> Block<B> {
 /// block of each.
 fn grid<const B: usize>(count: usize, spring: impl Fn(u64) -> Block<B>) -> SparseMatrix<B> {
     let vertices = count.pow(3);
-    let mut rows: Vec<std::collections::BTreeMap<u32, Block<B>>> = vec![Default::default(); vertices];
+    let mut rows: Vec<std::collections::BTreeMap<u32, Block<B>>> =
+        vec![Default::default(); vertices];
     let mut add = |row: usize, column: usize, block: &Block<B>, sign: f64| {
         let target = rows[row].entry(column as u32).or_insert([[0.0; B]; B]);
         for (target, block) in target.iter_mut().flatten().zip(block.iter().flatten()) {
@@ -73,11 +75,18 @@ fn right_side<const B: usize>(rows: usize) -> Vec<[f64; B]> {
 }
 
 /// The norm of the residual by that of the right side, computed anew.
-fn residual<const B: usize>(matrix: &SparseMatrix<B>, right_side: &[[f64; B]], solution: &[[f64; B]]) -> f64 {
+fn residual<const B: usize>(
+    matrix: &SparseMatrix<B>,
+    right_side: &[[f64; B]],
+    solution: &[[f64; B]],
+) -> f64 {
     let mut image = vec![[0.0; B]; solution.len()];
     matrix.multiply(solution, &mut image);
-    let rest: Vec<[f64; B]> =
-        image.iter().zip(right_side).map(|(a, b)| std::array::from_fn(|axis| a[axis] - b[axis])).collect();
+    let rest: Vec<[f64; B]> = image
+        .iter()
+        .zip(right_side)
+        .map(|(a, b)| std::array::from_fn(|axis| a[axis] - b[axis]))
+        .collect();
     let norm = |vector: &[[f64; B]]| norms::<B, 1>(vector.as_chunks().0)[0];
     norm(&rest) / norm(right_side)
 }
@@ -88,7 +97,10 @@ fn distance<const B: usize>(a: &[[f64; B]], b: &[[f64; B]]) -> f64 {
     differences.fold(0.0, f64::max) / largest
 }
 
-fn solved<const B: usize>(solver: &dyn LinearSolver<B>, right_side: &[[f64; B]]) -> (Vec<[f64; B]>, usize) {
+fn solved<const B: usize>(
+    solver: &dyn LinearSolver<B>,
+    right_side: &[[f64; B]],
+) -> (Vec<[f64; B]>, usize) {
     let mut solution = vec![[7.0; B]; right_side.len()];
     let convergence = solver.solve(right_side, &mut solution, TIGHT).unwrap();
     assert!(convergence.residual <= TIGHT.relative);
@@ -166,7 +178,9 @@ fn what_stalls_is_finished_by_the_fallback() {
 fn a_solve_goes_on_from_where_it_is_told_to() {
     let matrix = laplace(14);
     let right_side = right_side(matrix.rows());
-    for solver in [solver(Arc::new(matrix.clone())).unwrap(), Box::new(Cholesky::new(matrix).unwrap())] {
+    for solver in
+        [solver(Arc::new(matrix.clone())).unwrap(), Box::new(Cholesky::new(matrix).unwrap())]
+    {
         let (mut solution, iterations) = solved(solver.as_ref(), &right_side);
         let kept = solution.clone();
         let loose = Tolerance { relative: 1e-10, absolute: 0.0 };
@@ -175,7 +189,8 @@ fn a_solve_goes_on_from_where_it_is_told_to() {
         solution.iter_mut().for_each(|value| value[0] *= 1.001);
         let again = solver.solve_from(&right_side, &mut solution, TIGHT).unwrap().iterations;
         assert!(again < iterations || iterations == 0);
-        let convergence = solver.solve_from(&vec![[0.0]; kept.len()], &mut solution, TIGHT).unwrap();
+        let convergence =
+            solver.solve_from(&vec![[0.0]; kept.len()], &mut solution, TIGHT).unwrap();
         assert!(convergence.iterations == 0 && solution.iter().all(|value| value[0] == 0.0));
     }
 }
@@ -184,16 +199,24 @@ fn a_solve_goes_on_from_where_it_is_told_to() {
 fn three_right_sides_are_solved_as_each_would_be() {
     let matrix = laplace(14);
     let solver = Multigrid::new(matrix, MultigridSettings::default()).unwrap();
-    let sides = [right_side(solver.unknowns()), vec![[0.0]; solver.unknowns()], vec![[1.0]; solver.unknowns()]];
-    let together: Vec<[[f64; 1]; 3]> =
-        (0..solver.unknowns()).map(|row| std::array::from_fn(|column| sides[column][row])).collect();
+    let sides = [
+        right_side(solver.unknowns()),
+        vec![[0.0]; solver.unknowns()],
+        vec![[1.0]; solver.unknowns()],
+    ];
+    let together: Vec<[[f64; 1]; 3]> = (0..solver.unknowns())
+        .map(|row| std::array::from_fn(|column| sides[column][row]))
+        .collect();
     let mut solutions = vec![[[0.0]; 3]; together.len()];
     let convergence = solver.solve_three_from(&together, &mut solutions, [TIGHT; 3]).unwrap();
     for (column, side) in sides.iter().enumerate() {
         let (alone, iterations) = solved(&solver, side);
         assert_eq!(convergence[column].iterations, iterations);
         for (value, alone) in solutions.iter().zip(alone) {
-            assert!((value[column][0] - alone[0]).abs() < 1e-12 && (column != 1 || value[1][0].to_bits() == 0));
+            assert!(
+                (value[column][0] - alone[0]).abs() < 1e-12
+                    && (column != 1 || value[1][0].to_bits() == 0)
+            );
         }
     }
 }
@@ -225,7 +248,10 @@ fn matrices_that_are_not_positive_are_refused() {
     let solver = Multigrid::new(laplace(12), MultigridSettings::default()).unwrap();
     let mut solution = vec![[0.0]; solver.unknowns()];
     let bad = vec![[f64::NAN]; solver.unknowns()];
-    assert_eq!(solver.solve(&bad, &mut solution, TIGHT), Err(LinearError::NotFinite { iteration: 0 }));
+    assert_eq!(
+        solver.solve(&bad, &mut solution, TIGHT),
+        Err(LinearError::NotFinite { iteration: 0 })
+    );
 }
 
 #[cfg(feature = "parallel")]

@@ -48,7 +48,10 @@ impl Interpolation {
             starts[column] += starts[column - 1];
         }
         let mut entries = vec![(0, 0); self.columns.len()];
-        #[expect(clippy::cast_possible_truncation, reason = "rows are 32-bit, and they have few weights")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "rows are 32-bit, and they have few weights"
+        )]
         for row in 0..self.rows() {
             for place in self.offsets[row]..self.offsets[row + 1] {
                 let next = &mut starts[self.columns[place] as usize + 1];
@@ -73,26 +76,28 @@ pub(super) fn galerkin<const F: usize, const C: usize>(
     sizes: &[f64],
 ) -> SparseMatrix<C> {
     let count = starts.len() - 1;
-    let image: Vec<RowsFound<Image<F, C>>> = parallel::map_chunks(matrix.rows(), ROW_CHUNK, |range| {
-        let mut row = Accumulator::new(count, [[0.0; C]; F]);
-        let mut found = RowsFound::default();
-        for index in range {
-            let (columns, blocks) = matrix.row(index);
-            for (&column, block) in columns.iter().zip(blocks) {
-                let column = column as usize;
-                for place in interpolation.offsets[column]..interpolation.offsets[column + 1] {
-                    let sum = row.at(interpolation.columns[place]);
-                    let (weight, arm) = (interpolation.weights[place], interpolation.arm(place));
-                    for (sum, entries) in sum.iter_mut().zip(block) {
-                        add_row(sum, entries, weight, arm, interpolation.turn);
+    let image: Vec<RowsFound<Image<F, C>>> =
+        parallel::map_chunks(matrix.rows(), ROW_CHUNK, |range| {
+            let mut row = Accumulator::new(count, [[0.0; C]; F]);
+            let mut found = RowsFound::default();
+            for index in range {
+                let (columns, blocks) = matrix.row(index);
+                for (&column, block) in columns.iter().zip(blocks) {
+                    let column = column as usize;
+                    for place in interpolation.offsets[column]..interpolation.offsets[column + 1] {
+                        let sum = row.at(interpolation.columns[place]);
+                        let (weight, arm) =
+                            (interpolation.weights[place], interpolation.arm(place));
+                        for (sum, entries) in sum.iter_mut().zip(block) {
+                            add_row(sum, entries, weight, arm, interpolation.turn);
+                        }
                     }
                 }
+                // The sums that follow take the columns in any order.
+                row.finish(&mut found);
             }
-            // The sums that follow take the columns in any order.
-            row.finish(&mut found);
-        }
-        found
-    });
+            found
+        });
     let parts = parallel::map_chunks(count, COARSE_CHUNK, |range| {
         let mut row = Accumulator::new(count, [[0.0; C]; C]);
         let mut found = RowsFound::default();
@@ -108,7 +113,9 @@ pub(super) fn galerkin<const F: usize, const C: usize>(
             if C == 6 {
                 #[expect(clippy::cast_possible_truncation, reason = "rows are 32-bit")]
                 let own = row.at(coarse as u32);
-                let stiffness = TURNING * sizes[coarse] * sizes[coarse] * (own[0][0] + own[1][1] + own[2][2]) / 3.0;
+                let stiffness =
+                    TURNING * sizes[coarse] * sizes[coarse] * (own[0][0] + own[1][1] + own[2][2])
+                        / 3.0;
                 for (axis, entries) in own.iter_mut().enumerate().skip(3) {
                     entries[axis] += stiffness;
                 }
@@ -208,7 +215,10 @@ impl<T> RowsFound<T> {
 }
 
 /// One matrix of rows that were built `chunk` at a time.
-pub(super) fn collected<const B: usize>(chunk: usize, parts: &[RowsFound<Block<B>>]) -> SparseMatrix<B> {
+pub(super) fn collected<const B: usize>(
+    chunk: usize,
+    parts: &[RowsFound<Block<B>>],
+) -> SparseMatrix<B> {
     let mut offsets = vec![0];
     let mut base = 0;
     for part in parts {
@@ -217,11 +227,16 @@ pub(super) fn collected<const B: usize>(chunk: usize, parts: &[RowsFound<Block<B
     }
     let mut columns = vec![0; base];
     let mut blocks = vec![[[0.0; B]; B]; base];
-    parallel::for_each_rows(chunk, (&offsets, &mut columns), (&offsets, &mut blocks), |rows, columns, blocks| {
-        let part = &parts[rows.start / chunk];
-        columns.copy_from_slice(&part.columns);
-        blocks.copy_from_slice(&part.blocks);
-    });
+    parallel::for_each_rows(
+        chunk,
+        (&offsets, &mut columns),
+        (&offsets, &mut blocks),
+        |rows, columns, blocks| {
+            let part = &parts[rows.start / chunk];
+            columns.copy_from_slice(&part.columns);
+            blocks.copy_from_slice(&part.blocks);
+        },
+    );
     SparseMatrix::from_parts(offsets, columns, blocks)
 }
 
@@ -241,7 +256,10 @@ impl<T: Copy> Accumulator<T> {
     fn at(&mut self, column: u32) -> &mut T {
         let place = &mut self.places[column as usize];
         if *place == NONE {
-            #[expect(clippy::cast_possible_truncation, reason = "a row has fewer blocks than there are columns")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                reason = "a row has fewer blocks than there are columns"
+            )]
             (*place = self.entries.len() as u32);
             self.entries.push((column, self.zero));
         }
@@ -304,7 +322,11 @@ impl<T: Real> Transfer<T> {
         })
     }
 
-    fn new(count: usize, from: &Interpolation, row: impl Fn(usize, &mut dyn FnMut(usize, usize)) + Sync) -> Self {
+    fn new(
+        count: usize,
+        from: &Interpolation,
+        row: impl Fn(usize, &mut dyn FnMut(usize, usize)) + Sync,
+    ) -> Self {
         let parts = parallel::map_chunks(count, ROW_CHUNK, |range| {
             let (mut ends, mut found) = (Vec::with_capacity(range.len()), Vec::new());
             for slot in range {
@@ -344,7 +366,9 @@ impl<T: Real> Transfer<T> {
         for place in self.offsets[row]..self.offsets[row + 1] {
             let weight = self.weights[place];
             for (value, coarse) in value.iter_mut().zip(&coarse[self.columns[place] as usize]) {
-                for (value, &coarse) in value.iter_mut().zip(coarse).take(if C == 6 { 3 } else { C }) {
+                for (value, &coarse) in
+                    value.iter_mut().zip(coarse).take(if C == 6 { 3 } else { C })
+                {
                     *value += weight * coarse;
                 }
                 if C == 6 && F >= 3 {

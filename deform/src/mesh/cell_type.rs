@@ -83,7 +83,11 @@ impl CellType {
         match self {
             CellType::Vertex | CellType::PolyVertex => 0,
             CellType::Line | CellType::PolyLine => 1,
-            CellType::Triangle | CellType::TriangleStrip | CellType::Polygon | CellType::Pixel | CellType::Quad => 2,
+            CellType::Triangle
+            | CellType::TriangleStrip
+            | CellType::Polygon
+            | CellType::Pixel
+            | CellType::Quad => 2,
             _ => 3,
         }
     }
@@ -116,15 +120,27 @@ impl CellType {
     pub const fn faces(self) -> &'static [&'static [usize]] {
         match self {
             CellType::Tetra => &[&[0, 1, 3], &[1, 2, 3], &[2, 0, 3], &[0, 2, 1]],
-            CellType::Voxel => {
-                &[&[0, 4, 6, 2], &[1, 3, 7, 5], &[0, 1, 5, 4], &[2, 6, 7, 3], &[0, 2, 3, 1], &[4, 5, 7, 6]]
-            }
-            CellType::Hexahedron => {
-                &[&[0, 4, 7, 3], &[1, 2, 6, 5], &[0, 1, 5, 4], &[3, 7, 6, 2], &[0, 3, 2, 1], &[4, 5, 6, 7]]
-            }
+            CellType::Voxel => &[
+                &[0, 4, 6, 2],
+                &[1, 3, 7, 5],
+                &[0, 1, 5, 4],
+                &[2, 6, 7, 3],
+                &[0, 2, 3, 1],
+                &[4, 5, 7, 6],
+            ],
+            CellType::Hexahedron => &[
+                &[0, 4, 7, 3],
+                &[1, 2, 6, 5],
+                &[0, 1, 5, 4],
+                &[3, 7, 6, 2],
+                &[0, 3, 2, 1],
+                &[4, 5, 6, 7],
+            ],
             // VTK's manual has wedges whose first triangle's normal points out of the cell, its measures and most mesh generators
             // those whose first triangle's normal points in: a mesh turns the ones to be the others.
-            CellType::Wedge => &[&[0, 2, 1], &[3, 4, 5], &[0, 1, 4, 3], &[1, 2, 5, 4], &[2, 0, 3, 5]],
+            CellType::Wedge => {
+                &[&[0, 2, 1], &[3, 4, 5], &[0, 1, 4, 3], &[1, 2, 5, 4], &[2, 0, 3, 5]]
+            }
             CellType::Pyramid => &[&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]],
             CellType::PentagonalPrism => &[
                 &[0, 4, 3, 2, 1],

@@ -53,7 +53,13 @@ impl Cells {
     /// No cells.
     #[must_use]
     pub fn new() -> Self {
-        Self { types: Vec::new(), offsets: vec![0], connectivity: Vec::new(), polyhedra: Vec::new(), turned: None }
+        Self {
+            types: Vec::new(),
+            offsets: vec![0],
+            connectivity: Vec::new(),
+            polyhedra: Vec::new(),
+            turned: None,
+        }
     }
 
     /// Cells that are all of one type with a fixed number of vertices.
@@ -104,7 +110,11 @@ impl Cells {
             fixed => fixed.vertex_count() == Some(vertices.len()),
         };
         if !fits {
-            return Err(MeshError::VertexCount { cell: self.len(), cell_type, found: vertices.len() });
+            return Err(MeshError::VertexCount {
+                cell: self.len(),
+                cell_type,
+                found: vertices.len(),
+            });
         }
         self.types.push(cell_type);
         self.connectivity.extend_from_slice(vertices);
@@ -239,14 +249,18 @@ impl Cells {
             turned: self.turned,
         };
         cells.offsets.push(0);
-        let renumbered = |vertices: &[u32]| vertices.iter().map(|&vertex| number[vertex as usize]).collect();
+        let renumbered =
+            |vertices: &[u32]| vertices.iter().map(|&vertex| number[vertex as usize]).collect();
         for (place, &cell) in order.iter().enumerate() {
             let cell = cell as usize;
             cells.types.push(self.types[cell]);
-            cells.connectivity.extend(self.vertices(cell).iter().map(|&vertex| number[vertex as usize]));
+            cells
+                .connectivity
+                .extend(self.vertices(cell).iter().map(|&vertex| number[vertex as usize]));
             cells.offsets.push(cells.connectivity.len());
             if self.types[cell] == CellType::Polyhedron {
-                let faces = self.polyhedron_faces(cell).iter().map(|face| renumbered(face)).collect();
+                let faces =
+                    self.polyhedron_faces(cell).iter().map(|face| renumbered(face)).collect();
                 cells.polyhedra.push(PolyhedronFaces { cell: place, faces });
             }
         }
@@ -388,7 +402,11 @@ impl Cells {
         for cell in 0..self.len() {
             for &vertex in self.vertices(cell) {
                 if vertex as usize >= vertex_count {
-                    return Err(MeshError::VertexNumber { cell, vertex: u64::from(vertex), vertex_count });
+                    return Err(MeshError::VertexNumber {
+                        cell,
+                        vertex: u64::from(vertex),
+                        vertex_count,
+                    });
                 }
             }
         }

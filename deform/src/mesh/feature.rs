@@ -42,13 +42,21 @@ impl FeatureSource {
                 }
                 for (cell, &cell_type) in tagged.faces.types().iter().enumerate() {
                     if cell_type.dimension() != 2 {
-                        return Err(MeshError::CellType { cell, found: cell_type, expected: "a face" });
+                        return Err(MeshError::CellType {
+                            cell,
+                            found: cell_type,
+                            expected: "a face",
+                        });
                     }
                 }
                 tagged.faces.validate(vertex_count)
             }
             FeatureSource::Vertices(tags) if tags.len() != vertex_count => {
-                Err(MeshError::FeatureCount { found: tags.len(), expected: vertex_count, what: "vertices" })
+                Err(MeshError::FeatureCount {
+                    found: tags.len(),
+                    expected: vertex_count,
+                    what: "vertices",
+                })
             }
             FeatureSource::Vertices(_) => Ok(()),
         }

@@ -37,7 +37,12 @@ pub(super) enum Hand {
 }
 
 /// Which way round a volume cell runs whose vertices lie `at`.
-pub(super) fn hand(cells: &Cells, cell: usize, points: &[Vector], tets: &mut Vec<[Vector; 4]>) -> Hand {
+pub(super) fn hand(
+    cells: &Cells,
+    cell: usize,
+    points: &[Vector],
+    tets: &mut Vec<[Vector; 4]>,
+) -> Hand {
     corner_tets(cells, cell, |vertex| points[vertex as usize], tets);
     let all = |sign: f64| tets.iter().all(|&tet| sign * tet_determinant(tet) > 0.0);
     match (all(1.0), all(-1.0)) {
@@ -81,8 +86,14 @@ pub(super) fn hands(cells: &Cells, points: &[Vector]) -> (Types, Types) {
     });
     let (mut left, mut neither) = (Types::default(), Types::default());
     for cell_type in CellType::ALL {
-        let all = |of: fn(&Count) -> usize| parts.iter().map(|counts| of(&counts[number(cell_type)])).sum::<usize>();
-        let count = Count { right: all(|it| it.right), left: all(|it| it.left), neither: all(|it| it.neither) };
+        let all = |of: fn(&Count) -> usize| {
+            parts.iter().map(|counts| of(&counts[number(cell_type)])).sum::<usize>()
+        };
+        let count = Count {
+            right: all(|it| it.right),
+            left: all(|it| it.left),
+            neither: all(|it| it.neither),
+        };
         if count.left > count.right {
             left.insert(cell_type);
         }

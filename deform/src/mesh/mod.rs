@@ -47,7 +47,11 @@ impl Mesh {
     /// [`MeshError::NotFinite`] for a NaN or infinite coordinate, [`MeshError::VertexNumber`] for a vertex that does not exist,
     /// [`MeshError::FeatureCount`] where the feature tags do not match the mesh, [`MeshError::OtherOrder`] where most cells of a type
     /// have their vertices in an order that is not VTK's and can be told.
-    pub fn new(points: Vec<Vector>, cells: Cells, features: FeatureSource) -> Result<Self, MeshError> {
+    pub fn new(
+        points: Vec<Vector>,
+        cells: Cells,
+        features: FeatureSource,
+    ) -> Result<Self, MeshError> {
         check_finite(&points)?;
         cells.validate(points.len())?;
         features.validate(points.len())?;
@@ -95,7 +99,11 @@ pub(crate) fn check_finite(points: &[Vector]) -> Result<(), MeshError> {
     for (vertex, point) in points.iter().enumerate() {
         for (axis, value) in point.iter().enumerate() {
             if !value.is_finite() {
-                return Err(MeshError::NotFinite { vertex, axis: ["x", "y", "z"][axis], value: *value });
+                return Err(MeshError::NotFinite {
+                    vertex,
+                    axis: ["x", "y", "z"][axis],
+                    value: *value,
+                });
             }
         }
     }
@@ -128,7 +136,9 @@ pub enum MeshError {
         value: f64,
     },
     /// A cell names a vertex that does not exist.
-    #[error("cell {cell}: vertex {vertex} does not exist; the mesh has {vertex_count} vertices, numbered from 0")]
+    #[error(
+        "cell {cell}: vertex {vertex} does not exist; the mesh has {vertex_count} vertices, numbered from 0"
+    )]
     VertexNumber {
         /// The cell.
         cell: usize,
@@ -161,7 +171,9 @@ pub enum MeshError {
     #[error("{0}")]
     OtherOrder(Box<OtherOrder>),
     /// A cell type number that is not a linear VTK cell.
-    #[error("cell {cell}: VTK cell type {number} is not a linear cell; the linear ones are 1 to 16 and 42")]
+    #[error(
+        "cell {cell}: VTK cell type {number} is not a linear cell; the linear ones are 1 to 16 and 42"
+    )]
     UnknownCellType {
         /// The cell.
         cell: usize,
@@ -169,7 +181,9 @@ pub enum MeshError {
         number: u64,
     },
     /// Offsets that are not those of compressed rows.
-    #[error("cell {cell}: its connectivity would run from {start} to {end} in an array of {length}")]
+    #[error(
+        "cell {cell}: its connectivity would run from {start} to {end} in an array of {length}"
+    )]
     Offsets {
         /// The cell.
         cell: usize,
@@ -222,7 +236,10 @@ pub enum MeshError {
         faces: usize,
     },
     /// A feature is named whose number no face has.
-    #[error("feature '{name}' has the number {number}, which no face has; the faces have {}", listed(numbers))]
+    #[error(
+        "feature '{name}' has the number {number}, which no face has; the faces have {}",
+        listed(numbers)
+    )]
     EmptyFeature {
         /// Its number.
         number: i64,

@@ -38,7 +38,11 @@ impl Ordered {
     pub(crate) fn new(mesh: &Mesh) -> Self {
         let count = mesh.points.len();
         if is_near(mesh) {
-            return Self { mesh: mesh.clone(), numbering: Numbering { count, numbers: None }, cells: None };
+            return Self {
+                mesh: mesh.clone(),
+                numbering: Numbering { count, numbers: None },
+                cells: None,
+            };
         }
         let vertices = along_curve(&mesh.points);
         let mut places = vec![0u32; count];
@@ -121,7 +125,8 @@ impl Numbering {
 /// Whether the vertices of a cell have numbers near to each other already.
 fn is_near(mesh: &Mesh) -> bool {
     let spread = |vertices: &[u32]| {
-        let (least, most) = vertices.iter().fold((u32::MAX, 0), |(a, b), &vertex| (a.min(vertex), b.max(vertex)));
+        let (least, most) =
+            vertices.iter().fold((u32::MAX, 0), |(a, b), &vertex| (a.min(vertex), b.max(vertex)));
         u64::from(most.saturating_sub(least))
     };
     let sum: u64 = mesh.cells.iter().map(|(_, vertices)| spread(vertices)).sum();
@@ -131,7 +136,11 @@ fn is_near(mesh: &Mesh) -> bool {
 }
 
 /// The vertices in the order of Morton's curve through their bounding cube.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturating; vertex numbers are 32-bit")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "saturating; vertex numbers are 32-bit"
+)]
 fn along_curve(points: &[Vector]) -> Vec<u32> {
     const CHUNK: usize = 16384;
     let bound = |start: f64, pick: fn(f64, f64) -> f64| {
@@ -144,7 +153,9 @@ fn along_curve(points: &[Vector]) -> Vec<u32> {
     parallel::for_each_chunk(&mut order, CHUNK, |chunk, part| {
         for (index, entry) in part.iter_mut().enumerate() {
             let vertex = chunk * CHUNK + index;
-            let along = |axis: usize| spread(((points[vertex][axis] - lower[axis]) / size * steps) as u64) << axis;
+            let along = |axis: usize| {
+                spread(((points[vertex][axis] - lower[axis]) / size * steps) as u64) << axis
+            };
             *entry = (along(0) | along(1) | along(2), vertex as u32);
         }
     });
@@ -174,7 +185,8 @@ fn by_first_vertex(mesh: &Mesh, places: &[u32]) -> Vec<u32> {
         let vertices = mesh.cells.vertices(cell).iter();
         vertices.map(|&vertex| places[vertex as usize]).min().map_or(0, |first| first as usize)
     };
-    let firsts = parallel::map_chunks(mesh.cells.len(), CHUNK, |range| range.map(first).collect::<Vec<_>>());
+    let firsts =
+        parallel::map_chunks(mesh.cells.len(), CHUNK, |range| range.map(first).collect::<Vec<_>>());
     let mut next = vec![0u32; places.len() + 1];
     for &first in firsts.iter().flatten() {
         next[first + 1] += 1;
@@ -193,7 +205,9 @@ fn by_first_vertex(mesh: &Mesh, places: &[u32]) -> Vec<u32> {
 /// A mesh whose vertices and cells have other numbers, and those of the vertices.
 #[cfg(test)]
 pub(crate) fn shuffled(mesh: &Mesh) -> (Mesh, Vec<u32>) {
-    let turned = |count: usize, step: usize| -> Vec<u32> { (0..count).map(|i| (i * step % count) as u32).collect() };
+    let turned = |count: usize, step: usize| -> Vec<u32> {
+        (0..count).map(|i| (i * step % count) as u32).collect()
+    };
     // Steps without a factor in common with the counts visit all of them.
     let number = turned(mesh.points.len(), 619);
     let mut points = vec![[0.0; 3]; number.len()];
@@ -201,7 +215,11 @@ pub(crate) fn shuffled(mesh: &Mesh) -> (Mesh, Vec<u32>) {
         points[number as usize] = point;
     }
     let order = turned(mesh.cells.len(), 1009);
-    (Mesh::new(points, mesh.cells.renumbered(&order, &number), FeatureSource::default()).unwrap(), number)
+    (
+        Mesh::new(points, mesh.cells.renumbered(&order, &number), FeatureSource::default())
+            .unwrap(),
+        number,
+    )
 }
 
 #[cfg(test)]
@@ -229,7 +247,8 @@ mod tests {
             assert!(!std::mem::replace(&mut seen[cell], true));
             let (new, old) = (ordered.mesh().cells(), mesh.cells());
             assert_eq!(new.cell_type(place), old.cell_type(cell));
-            let back: Vec<u32> = new.vertices(place).iter().map(|&vertex| numbering.vertex(vertex)).collect();
+            let back: Vec<u32> =
+                new.vertices(place).iter().map(|&vertex| numbering.vertex(vertex)).collect();
             assert_eq!(back, old.vertices(cell));
         }
         let mut values = vec![[0.0; 3]; mesh.points().len()];

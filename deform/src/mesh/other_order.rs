@@ -24,11 +24,23 @@ const KNOWN: [(CellType, &[usize], &str); 6] = [
         &[0, 1, 3, 2, 4, 5, 7, 6],
         "lexicographic (tensor-product) order, as in deal.II, p4est and VTK's voxel",
     ),
-    (CellType::Voxel, &[0, 1, 3, 2, 4, 5, 7, 6], "the order of VTK's hexahedron: give the cells that type"),
-    (CellType::Pyramid, &[0, 1, 3, 2, 4], "the base in lexicographic (tensor-product) order, as in deal.II"),
+    (
+        CellType::Voxel,
+        &[0, 1, 3, 2, 4, 5, 7, 6],
+        "the order of VTK's hexahedron: give the cells that type",
+    ),
+    (
+        CellType::Pyramid,
+        &[0, 1, 3, 2, 4],
+        "the base in lexicographic (tensor-product) order, as in deal.II",
+    ),
     (CellType::Pyramid, &[1, 2, 3, 4, 0], "the apex before the base"),
     (CellType::Wedge, &[0, 2, 4, 1, 3, 5], "one edge between the triangles after the other"),
-    (CellType::Wedge, &[0, 1, 4, 3, 2, 5], "a quadrilateral before the edge across from it, as in Nektar++"),
+    (
+        CellType::Wedge,
+        &[0, 1, 4, 3, 2, 5],
+        "a quadrilateral before the edge across from it, as in Nektar++",
+    ),
 ];
 
 /// Cells whose vertices stand in another order than VTK's.
@@ -66,37 +78,51 @@ impl std::fmt::Display for OtherOrder {
 /// What to say of cells of the types `neither`, most of which are neither right- nor left-handed: the order in which all that are
 /// looked at would be valid, where there is one.
 pub(super) fn other_order(cells: &Cells, points: &[Vector], neither: Types) -> Option<MeshError> {
-    CellType::ALL.into_iter().filter(|&cell_type| neither.contains(cell_type)).find_map(|cell_type| {
-        let size = cell_type.vertex_count().filter(|&size| size <= 8)?;
-        let mut tets = Vec::new();
-        let of_type = |cell: &usize| cells.cell_type(*cell) == cell_type;
-        let count = (0..cells.len()).filter(of_type).count();
-        let sample: Vec<usize> =
-            (0..cells.len()).filter(of_type).step_by(count.div_ceil(SAMPLE)).take(SAMPLE).collect();
-        let wrong =
-            (0..cells.len()).filter(of_type).find(|&cell| hand(cells, cell, points, &mut tets) == Hand::Neither)?;
-        let samples: Vec<Vec<Vector>> = sample
-            .iter()
-            .map(|&cell| cells.vertices(cell).iter().map(|&vertex| points[vertex as usize]).collect())
-            .collect();
-        let mut best: Option<(f64, Vec<usize>)> = None;
-        let mut consider = |order: &[usize]| {
-            let Some(value) = worth(cell_type, &samples, order) else { return };
-            if best.as_ref().is_none_or(|(least, _)| value > least + SAME) {
-                best = Some((value, order.to_vec()));
+    CellType::ALL.into_iter().filter(|&cell_type| neither.contains(cell_type)).find_map(
+        |cell_type| {
+            let size = cell_type.vertex_count().filter(|&size| size <= 8)?;
+            let mut tets = Vec::new();
+            let of_type = |cell: &usize| cells.cell_type(*cell) == cell_type;
+            let count = (0..cells.len()).filter(of_type).count();
+            let sample: Vec<usize> = (0..cells.len())
+                .filter(of_type)
+                .step_by(count.div_ceil(SAMPLE))
+                .take(SAMPLE)
+                .collect();
+            let wrong = (0..cells.len())
+                .filter(of_type)
+                .find(|&cell| hand(cells, cell, points, &mut tets) == Hand::Neither)?;
+            let samples: Vec<Vec<Vector>> = sample
+                .iter()
+                .map(|&cell| {
+                    cells.vertices(cell).iter().map(|&vertex| points[vertex as usize]).collect()
+                })
+                .collect();
+            let mut best: Option<(f64, Vec<usize>)> = None;
+            let mut consider = |order: &[usize]| {
+                let Some(value) = worth(cell_type, &samples, order) else { return };
+                if best.as_ref().is_none_or(|(least, _)| value > least + SAME) {
+                    best = Some((value, order.to_vec()));
+                }
+            };
+            // A known order is preferred to its like.
+            let known = || KNOWN.iter().filter(|(of, _, _)| *of == cell_type);
+            known().for_each(|(_, order, _)| consider(order));
+            if samples.len() >= FEW {
+                for_each_order(size, &mut consider);
             }
-        };
-        // A known order is preferred to its like.
-        let known = || KNOWN.iter().filter(|(of, _, _)| *of == cell_type);
-        known().for_each(|(_, order, _)| consider(order));
-        if samples.len() >= FEW {
-            for_each_order(size, &mut consider);
-        }
-        let (_, order) = best?;
-        let name = known().find(|(_, known, _)| *known == order).map(|&(_, _, name)| name);
-        let centroid = centroid(cells, wrong, points);
-        Some(MeshError::OtherOrder(Box::new(OtherOrder { cell: wrong, cell_type, centroid, order, name })))
-    })
+            let (_, order) = best?;
+            let name = known().find(|(_, known, _)| *known == order).map(|&(_, _, name)| name);
+            let centroid = centroid(cells, wrong, points);
+            Some(MeshError::OtherOrder(Box::new(OtherOrder {
+                cell: wrong,
+                cell_type,
+                centroid,
+                order,
+                name,
+            })))
+        },
+    )
 }
 
 /// The sum of the scaled Jacobians of cells whose vertices are read in another order; `None` where one of them is not valid then.
@@ -122,8 +148,12 @@ fn for_each_order(size: usize, visit: &mut impl FnMut(&[usize])) {
     let mut order: Vec<usize> = (0..size).collect();
     loop {
         visit(&order);
-        let Some(place) = (1..size).rev().find(|&place| order[place - 1] < order[place]) else { return };
-        let Some(next) = (place..size).rev().find(|&next| order[next] > order[place - 1]) else { return };
+        let Some(place) = (1..size).rev().find(|&place| order[place - 1] < order[place]) else {
+            return;
+        };
+        let Some(next) = (place..size).rev().find(|&next| order[next] > order[place - 1]) else {
+            return;
+        };
         order.swap(place - 1, next);
         order[place..].reverse();
     }

@@ -119,7 +119,10 @@ impl Values<'_> {
             Values::F32(values) => f64::from(values[index]),
             Values::F64(values) => values[index],
             Values::I32(values) => f64::from(values[index]),
-            #[expect(clippy::cast_precision_loss, reason = "fields of large integers are shown, not computed with")]
+            #[expect(
+                clippy::cast_precision_loss,
+                reason = "fields of large integers are shown, not computed with"
+            )]
             Values::I64(values) => values[index] as f64,
             Values::U8(values) => f64::from(values[index]),
         }
@@ -185,15 +188,24 @@ impl<'a> ArrayView<'a> {
     ///
     /// # Errors
     /// [`MeshError::ArrayLength`] where a component's values end before its last one, or there are none or more than 9.
-    pub fn strided(len: usize, components: &[(Values<'a>, usize, usize)]) -> Result<Self, MeshError> {
+    pub fn strided(
+        len: usize,
+        components: &[(Values<'a>, usize, usize)],
+    ) -> Result<Self, MeshError> {
         let Some(&(first, _, _)) = components.first().filter(|_| components.len() <= 9) else {
-            return Err(MeshError::ArrayLength { name: "components".into(), found: components.len(), expected: 9 });
+            return Err(MeshError::ArrayLength {
+                name: "components".into(),
+                found: components.len(),
+                expected: 9,
+            });
         };
         let mut columns = [Column { values: first, offset: 0, stride: 1 }; 9];
         for (column, &(values, offset, stride)) in columns.iter_mut().zip(components) {
             let needed = match len {
                 0 => Some(0),
-                _ => (len - 1).checked_mul(stride).and_then(|span| span.checked_add(offset)?.checked_add(1)),
+                _ => (len - 1)
+                    .checked_mul(stride)
+                    .and_then(|span| span.checked_add(offset)?.checked_add(1)),
             };
             if needed.is_none_or(|needed| needed > values.len()) {
                 return Err(MeshError::ArrayLength {
@@ -246,7 +258,10 @@ impl<'a> ArrayView<'a> {
     /// Where `tuple` or `component` is out of range.
     #[must_use]
     pub fn get(&self, tuple: usize, component: usize) -> f64 {
-        assert!(component < self.components && tuple < self.len, "tuple {tuple}, component {component}");
+        assert!(
+            component < self.components && tuple < self.len,
+            "tuple {tuple}, component {component}"
+        );
         let column = &self.columns[component];
         column.values.get(column.offset + tuple * column.stride)
     }
@@ -257,14 +272,17 @@ impl<'a> ArrayView<'a> {
     /// Where `tuple` is out of range.
     #[must_use]
     pub fn vector(&self, tuple: usize) -> Vector {
-        std::array::from_fn(|component| if component < self.components { self.get(tuple, component) } else { 0.0 })
+        std::array::from_fn(|component| {
+            if component < self.components { self.get(tuple, component) } else { 0.0 }
+        })
     }
 
     /// The values as they lie in memory, where they lie tuple after tuple in double precision.
     pub(super) fn contiguous(&self) -> Option<&'a [f64]> {
         let Values::F64(first) = self.columns[0].values else { return None };
         let follows = |(component, column): (usize, &Column<'a>)| {
-            let is_same = matches!(column.values, Values::F64(values) if std::ptr::eq(values, first));
+            let is_same =
+                matches!(column.values, Values::F64(values) if std::ptr::eq(values, first));
             is_same && column.stride == self.components && column.offset == component
         };
         let whole = self.columns[..self.components].iter().enumerate().all(follows);
@@ -392,8 +410,9 @@ impl CellsView<'_> {
             CellsView::Owned(cells) => Ok(cells.clone()),
             CellsView::Uniform { cell_type, connectivity } => {
                 let size = cell_type.vertex_count().unwrap_or(1);
-                let vertices: Result<Vec<u32>, _> =
-                    (0..connectivity.len()).map(|index| vertex(index / size, connectivity.get(index))).collect();
+                let vertices: Result<Vec<u32>, _> = (0..connectivity.len())
+                    .map(|index| vertex(index / size, connectivity.get(index)))
+                    .collect();
                 Cells::uniform(cell_type, vertices?)
             }
             CellsView::Mixed { types, offsets, connectivity } => {
@@ -411,11 +430,19 @@ impl CellsView<'_> {
                         .ok_or(MeshError::UnknownCellType { cell, number: u64::from(number) })?;
                     let (start, end) = (offsets.get(cell), offsets.get(cell + 1));
                     if start > end || end > connectivity.len() as u64 {
-                        return Err(MeshError::Offsets { cell, start, end, length: connectivity.len() });
+                        return Err(MeshError::Offsets {
+                            cell,
+                            start,
+                            end,
+                            length: connectivity.len(),
+                        });
                     }
                     row.clear();
                     for index in start..end {
-                        #[expect(clippy::cast_possible_truncation, reason = "below a slice's length")]
+                        #[expect(
+                            clippy::cast_possible_truncation,
+                            reason = "below a slice's length"
+                        )]
                         row.push(vertex(cell, connectivity.get(index as usize))?);
                     }
                     cells.push(cell_type, &row)?;
@@ -433,7 +460,9 @@ impl CellsView<'_> {
             CellsView::Uniform { connectivity, .. } | CellsView::Mixed { connectivity, .. } => {
                 (connectivity.address(), connectivity.len())
             }
-            CellsView::Owned(cells) => (cells.connectivity().as_ptr().addr(), cells.connectivity().len()),
+            CellsView::Owned(cells) => {
+                (cells.connectivity().as_ptr().addr(), cells.connectivity().len())
+            }
         }
     }
 }
@@ -490,6 +519,7 @@ impl<'a> MeshView<'a> {
 
 impl<'a> From<&'a Mesh> for MeshView<'a> {
     fn from(mesh: &'a Mesh) -> Self {
-        MeshView::new(ArrayView::vectors(mesh.points()), CellsView::Owned(mesh.cells())).with_features(mesh.features())
+        MeshView::new(ArrayView::vectors(mesh.points()), CellsView::Owned(mesh.cells()))
+            .with_features(mesh.features())
     }
 }

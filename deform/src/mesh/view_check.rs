@@ -11,20 +11,26 @@ impl ArrayView<'_> {
     pub fn first_not_finite(&self) -> Option<(usize, usize, f64)> {
         let suspicious = |from: usize, to: usize| -> bool {
             // Times 0 every finite value is 0, and every other NaN.
-            let sum = |component| (from..to).map(|tuple| self.get(tuple, component) * 0.0).sum::<f64>();
+            let sum =
+                |component| (from..to).map(|tuple| self.get(tuple, component) * 0.0).sum::<f64>();
             (0..self.components()).any(|component| sum(component) != 0.0)
         };
         let in_chunk = |from: usize, to: usize| {
-            let values = (from..to).flat_map(|tuple| (0..self.components()).map(move |component| (tuple, component)));
-            values.map(|(tuple, axis)| (tuple, axis, self.get(tuple, axis))).find(|(_, _, value)| !value.is_finite())
+            let values = (from..to)
+                .flat_map(|tuple| (0..self.components()).map(move |component| (tuple, component)));
+            values
+                .map(|(tuple, axis)| (tuple, axis, self.get(tuple, axis)))
+                .find(|(_, _, value)| !value.is_finite())
         };
         if let Some(values) = self.contiguous() {
             let is_bad = |chunk: &[f64]| chunk.iter().map(|value| value * 0.0).sum::<f64>() != 0.0;
             let chunk = values.chunks(CHUNK).position(is_bad)?;
-            let index = chunk * CHUNK + values[chunk * CHUNK..].iter().position(|value| !value.is_finite())?;
+            let index = chunk * CHUNK
+                + values[chunk * CHUNK..].iter().position(|value| !value.is_finite())?;
             return Some((index / self.components(), index % self.components(), values[index]));
         }
-        let mut starts = (0..self.len()).step_by(CHUNK).map(|from| (from, (from + CHUNK).min(self.len())));
+        let mut starts =
+            (0..self.len()).step_by(CHUNK).map(|from| (from, (from + CHUNK).min(self.len())));
         starts.find(|&(from, to)| suspicious(from, to)).and_then(|(from, to)| in_chunk(from, to))
     }
 
@@ -35,9 +41,11 @@ impl ArrayView<'_> {
     pub fn check_finite(&self) -> Result<(), MeshError> {
         match self.first_not_finite() {
             None => Ok(()),
-            Some((vertex, axis, value)) => {
-                Err(MeshError::NotFinite { vertex, axis: ["x", "y", "z"].get(axis).unwrap_or(&"of no axis"), value })
-            }
+            Some((vertex, axis, value)) => Err(MeshError::NotFinite {
+                vertex,
+                axis: ["x", "y", "z"].get(axis).unwrap_or(&"of no axis"),
+                value,
+            }),
         }
     }
 }
@@ -52,16 +60,29 @@ impl CellsView<'_> {
             CellsView::Owned(_) => Ok(()),
             CellsView::Uniform { cell_type, connectivity } => {
                 let expected = "a type with a fixed vertex count";
-                let size =
-                    cell_type.vertex_count().ok_or(MeshError::CellType { cell: 0, found: cell_type, expected })?;
+                let size = cell_type.vertex_count().ok_or(MeshError::CellType {
+                    cell: 0,
+                    found: cell_type,
+                    expected,
+                })?;
                 let (cell, found) = (connectivity.len() / size, connectivity.len() % size);
-                if found > 0 { Err(MeshError::VertexCount { cell, cell_type, found }) } else { Ok(()) }
+                if found > 0 {
+                    Err(MeshError::VertexCount { cell, cell_type, found })
+                } else {
+                    Ok(())
+                }
             }
             CellsView::Mixed { types, offsets, connectivity } => {
                 length("offsets", offsets.len(), types.len() + 1)?;
-                let (start, end, length) = (offsets.get(0), offsets.get(types.len()), connectivity.len());
+                let (start, end, length) =
+                    (offsets.get(0), offsets.get(types.len()), connectivity.len());
                 if start > end || end > length as u64 {
-                    return Err(MeshError::Offsets { cell: types.len().saturating_sub(1), start, end, length });
+                    return Err(MeshError::Offsets {
+                        cell: types.len().saturating_sub(1),
+                        start,
+                        end,
+                        length,
+                    });
                 }
                 Ok(())
             }
@@ -79,8 +100,13 @@ impl CellsView<'_> {
             CellsView::Owned(cells) => cells.validate(vertex_count),
             CellsView::Uniform { cell_type, connectivity } => {
                 let size = cell_type.vertex_count().unwrap_or(1);
-                in_range(connectivity, 0..connectivity.len(), vertex_count)
-                    .map_err(|(index, vertex)| MeshError::VertexNumber { cell: index / size, vertex, vertex_count })
+                in_range(connectivity, 0..connectivity.len(), vertex_count).map_err(
+                    |(index, vertex)| MeshError::VertexNumber {
+                        cell: index / size,
+                        vertex,
+                        vertex_count,
+                    },
+                )
             }
             CellsView::Mixed { types, offsets, connectivity } => {
                 for (cell, &number) in types.iter().enumerate() {
@@ -88,19 +114,24 @@ impl CellsView<'_> {
                         .ok_or(MeshError::UnknownCellType { cell, number: u64::from(number) })?;
                     let (start, end) = (offsets.get(cell), offsets.get(cell + 1));
                     if start > end || end > connectivity.len() as u64 {
-                        return Err(MeshError::Offsets { cell, start, end, length: connectivity.len() });
+                        return Err(MeshError::Offsets {
+                            cell,
+                            start,
+                            end,
+                            length: connectivity.len(),
+                        });
                     }
                     #[expect(clippy::cast_possible_truncation, reason = "below a slice's length")]
                     let range = start as usize..end as usize;
                     let found = range.len();
                     if cell_type.vertex_count() != Some(found) {
                         // What the types with any number of vertices allow is known there.
-                        Cells::new().push(cell_type, &vec![0; found]).map_err(|error| at(cell, error))?;
+                        Cells::new()
+                            .push(cell_type, &vec![0; found])
+                            .map_err(|error| at(cell, error))?;
                     }
-                    in_range(connectivity, range, vertex_count).map_err(|(_, vertex)| MeshError::VertexNumber {
-                        cell,
-                        vertex,
-                        vertex_count,
+                    in_range(connectivity, range, vertex_count).map_err(|(_, vertex)| {
+                        MeshError::VertexNumber { cell, vertex, vertex_count }
                     })?;
                 }
                 Ok(())
@@ -164,7 +195,11 @@ impl MeshView<'_> {
             length("global_vertices", numbers.len(), vertices)?;
         }
         let count = |found, expected, what| {
-            if found == expected { Ok(()) } else { Err(MeshError::FeatureCount { found, expected, what }) }
+            if found == expected {
+                Ok(())
+            } else {
+                Err(MeshError::FeatureCount { found, expected, what })
+            }
         };
         match self.features {
             FeatureSource::SharpEdges => Ok(()),
@@ -187,21 +222,34 @@ impl MeshView<'_> {
 }
 
 fn length(name: &str, found: usize, expected: usize) -> Result<(), MeshError> {
-    if found == expected { Ok(()) } else { Err(MeshError::ArrayLength { name: name.into(), found, expected }) }
+    if found == expected {
+        Ok(())
+    } else {
+        Err(MeshError::ArrayLength { name: name.into(), found, expected })
+    }
 }
 
 /// An error of a cell that was looked at by itself.
 fn at(cell: usize, error: MeshError) -> MeshError {
     match error {
-        MeshError::VertexCount { cell_type, found, .. } => MeshError::VertexCount { cell, cell_type, found },
-        MeshError::CellType { found, expected, .. } => MeshError::CellType { cell, found, expected },
+        MeshError::VertexCount { cell_type, found, .. } => {
+            MeshError::VertexCount { cell, cell_type, found }
+        }
+        MeshError::CellType { found, expected, .. } => {
+            MeshError::CellType { cell, found, expected }
+        }
         other => other,
     }
 }
 
 /// The first of these numbers that is out of range, and where it stands.
-fn in_range(numbers: Indices<'_>, range: std::ops::Range<usize>, count: usize) -> Result<(), (usize, u64)> {
-    let beyond = range.map(|index| (index, numbers.get(index))).find(|(_, number)| *number >= count as u64);
+fn in_range(
+    numbers: Indices<'_>,
+    range: std::ops::Range<usize>,
+    count: usize,
+) -> Result<(), (usize, u64)> {
+    let beyond =
+        range.map(|index| (index, numbers.get(index))).find(|(_, number)| *number >= count as u64);
     beyond.map_or(Ok(()), Err)
 }
 

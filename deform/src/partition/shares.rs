@@ -40,19 +40,35 @@ impl Shares {
         let count = vertices.iter().max().map_or(0, |&last| last as usize + 1);
         let mut place_of = vec![u32::MAX; count];
         (0..).zip(vertices).for_each(|(place, &vertex)| place_of[vertex as usize] = place);
-        let place = |vertex: u32| place_of.get(vertex as usize).copied().filter(|&place| place != u32::MAX);
-        let mark = |vertex: u32| place(vertex).map_or(0.0, |_| if partition.owns(vertex) { OWNED } else { LISTED });
-        let listed = |neighbour: &Neighbour| neighbour.vertices.iter().map(|&vertex| mark(vertex)).collect();
-        let messages = partition.neighbours().iter().map(|neighbour| (neighbour.rank, listed(neighbour))).collect();
+        let place =
+            |vertex: u32| place_of.get(vertex as usize).copied().filter(|&place| place != u32::MAX);
+        let mark = |vertex: u32| {
+            place(vertex).map_or(0.0, |_| if partition.owns(vertex) { OWNED } else { LISTED })
+        };
+        let listed =
+            |neighbour: &Neighbour| neighbour.vertices.iter().map(|&vertex| mark(vertex)).collect();
+        let messages = partition
+            .neighbours()
+            .iter()
+            .map(|neighbour| (neighbour.rank, listed(neighbour)))
+            .collect();
         let heard = partition.exchange(messages);
         let mut others = Vec::new();
         for neighbour in partition.neighbours() {
-            let theirs = heard.iter().find(|(from, _)| *from == neighbour.rank).map_or(&[][..], |(_, marks)| marks);
+            let theirs = heard
+                .iter()
+                .find(|(from, _)| *from == neighbour.rank)
+                .map_or(&[][..], |(_, marks)| marks);
             let common = neighbour.vertices.iter().zip(theirs).filter(|(_, mark)| **mark > 0.0);
-            let common = common.filter_map(|(&vertex, &mark)| Some((place(vertex)?, mark >= OWNED)));
+            let common =
+                common.filter_map(|(&vertex, &mark)| Some((place(vertex)?, mark >= OWNED)));
             others.push((neighbour.rank, common.collect()));
         }
-        Self::with_others(rank, others, vertices.iter().map(|&vertex| partition.owns(vertex)).collect())
+        Self::with_others(
+            rank,
+            others,
+            vertices.iter().map(|&vertex| partition.owns(vertex)).collect(),
+        )
     }
 
     /// What is shared of a list whose first `own` values this rank speaks for; of each of the others it has the rank that does, and
@@ -63,7 +79,11 @@ impl Shares {
         clippy::cast_sign_loss,
         reason = "32-bit numbers as they were sent"
     )]
-    pub(crate) fn of_owners(partition: &dyn Partition, own: usize, foreign: &[(usize, u32)]) -> Self {
+    pub(crate) fn of_owners(
+        partition: &dyn Partition,
+        own: usize,
+        foreign: &[(usize, u32)],
+    ) -> Self {
         let rank = partition.rank();
         if partition.ranks() == 1 {
             return Self::with_others(rank, Vec::new(), Arc::new([]));
@@ -74,7 +94,11 @@ impl Shares {
         }
         let mut holders: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         for (from, indices) in partition.exchange(asked.into_iter().collect()) {
-            for index in indices.into_iter().map(|index| index as u32).filter(|&index| (index as usize) < own) {
+            for index in indices
+                .into_iter()
+                .map(|index| index as u32)
+                .filter(|&index| (index as usize) < own)
+            {
                 holders.entry(index).or_default().push(from);
             }
         }
@@ -84,7 +108,9 @@ impl Shares {
             for &to in holding {
                 let reply = replies.entry(to).or_default();
                 reply.extend([f64::from(index), (holding.len() - 1) as f64]);
-                reply.extend(holding.iter().filter(|&&other| other != to).map(|&other| other as f64));
+                reply.extend(
+                    holding.iter().filter(|&&other| other != to).map(|&other| other as f64),
+                );
             }
         }
         // By the other rank, then by the owner's number, which both have.
@@ -98,7 +124,8 @@ impl Shares {
             let mut told = told.into_iter();
             while let (Some(index), Some(count)) = (told.next(), told.next()) {
                 let index = index as u32;
-                let others: Vec<usize> = told.by_ref().take(count as usize).map(|other| other as usize).collect();
+                let others: Vec<usize> =
+                    told.by_ref().take(count as usize).map(|other| other as usize).collect();
                 let Ok(place) = foreign.binary_search(&(owner, index)) else { continue };
                 let place = (own + place) as u32;
                 found.entry(owner).or_default().insert((owner, index), (place, true));
@@ -107,7 +134,10 @@ impl Shares {
                 }
             }
         }
-        let others = found.into_iter().map(|(other, shared)| (other, shared.into_values().collect())).collect();
+        let others = found
+            .into_iter()
+            .map(|(other, shared)| (other, shared.into_values().collect()))
+            .collect();
         Self::with_others(rank, others, (0..own + foreign.len()).map(|place| place < own).collect())
     }
 
@@ -115,7 +145,11 @@ impl Shares {
         let owns = |place: u32| owned.get(place as usize).is_none_or(|&owned| owned);
         let only = |wanted: &dyn Fn(u32, bool) -> bool| -> WithOthers {
             let filter = |shared: &[Shared]| -> Vec<u32> {
-                shared.iter().filter(|(place, theirs)| wanted(*place, *theirs)).map(|(place, _)| *place).collect()
+                shared
+                    .iter()
+                    .filter(|(place, theirs)| wanted(*place, *theirs))
+                    .map(|(place, _)| *place)
+                    .collect()
             };
             others
                 .iter()
@@ -124,7 +158,8 @@ impl Shares {
                 .collect()
         };
         let (given, taken) = (only(&|place, _| owns(place)), only(&|_, theirs| theirs));
-        Self { rank, given, taken, places: Vec::new(), others: only(&|_, _| true), owned }.with_places()
+        Self { rank, given, taken, places: Vec::new(), others: only(&|_, _| true), owned }
+            .with_places()
     }
 
     fn with_places(mut self) -> Self {
@@ -184,7 +219,10 @@ impl Shares {
     /// The same of a list in another order: `moved` is where each value has gone.
     pub(crate) fn moved(&self, moved: impl Fn(u32) -> u32) -> Self {
         let all = |lists: &WithOthers| -> WithOthers {
-            lists.iter().map(|(rank, places)| (*rank, places.iter().map(|&place| moved(place)).collect())).collect()
+            lists
+                .iter()
+                .map(|(rank, places)| (*rank, places.iter().map(|&place| moved(place)).collect()))
+                .collect()
         };
         let mut owned = self.owned.to_vec();
         for (place, &value) in (0..).zip(&*self.owned) {
@@ -208,11 +246,20 @@ impl Shares {
     }
 
     /// The same in either precision.
-    pub(crate) fn sum_real<T: Real>(&self, partition: &dyn Partition, width: usize, values: &mut [T]) {
+    pub(crate) fn sum_real<T: Real>(
+        &self,
+        partition: &dyn Partition,
+        width: usize,
+        values: &mut [T],
+    ) {
         if partition.ranks() == 1 {
             return;
         }
-        let messages = self.others.iter().map(|(rank, places)| (*rank, message(places, width, values))).collect();
+        let messages = self
+            .others
+            .iter()
+            .map(|(rank, places)| (*rank, message(places, width, values)))
+            .collect();
         let heard = partition.exchange_with(messages, &ranks(&self.others));
         let own = message(&self.places, width, values);
         self.places.iter().for_each(|&place| values[at(place, width)].fill(T::default()));
@@ -224,7 +271,9 @@ impl Shares {
                 }
             }
         };
-        let theirs = |rank: usize| heard.iter().find(|(from, _)| *from == rank).map_or(&[][..], |(_, values)| values);
+        let theirs = |rank: usize| {
+            heard.iter().find(|(from, _)| *from == rank).map_or(&[][..], |(_, values)| values)
+        };
         let below = self.others.partition_point(|(rank, _)| *rank < self.rank);
         self.others[..below].iter().for_each(|(rank, places)| add(places, theirs(*rank)));
         add(&self.places, &own);
@@ -232,14 +281,24 @@ impl Shares {
     }
 
     /// Gives all ranks, of what they share, the values of the one that speaks for them. Otherwise as [`Shares::sum`].
-    pub(crate) fn spread<T: Real>(&self, partition: &dyn Partition, width: usize, values: &mut [T]) {
+    pub(crate) fn spread<T: Real>(
+        &self,
+        partition: &dyn Partition,
+        width: usize,
+        values: &mut [T],
+    ) {
         if partition.ranks() == 1 {
             return;
         }
-        let messages = self.given.iter().map(|(rank, places)| (*rank, message(places, width, values))).collect();
+        let messages = self
+            .given
+            .iter()
+            .map(|(rank, places)| (*rank, message(places, width, values)))
+            .collect();
         let heard = partition.exchange_with(messages, &ranks(&self.taken));
         for (rank, places) in &self.taken {
-            let theirs = heard.iter().find(|(from, _)| from == rank).map_or(&[][..], |(_, values)| values);
+            let theirs =
+                heard.iter().find(|(from, _)| from == rank).map_or(&[][..], |(_, values)| values);
             let mut theirs = theirs.iter();
             for &place in places {
                 for value in &mut values[at(place, width)] {
@@ -261,6 +320,8 @@ fn at(place: u32, width: usize) -> std::ops::Range<usize> {
 
 fn message<T: Real>(places: &[u32], width: usize, values: &[T]) -> Vec<f64> {
     let mut message = Vec::with_capacity(width * places.len());
-    places.iter().for_each(|&place| message.extend(values[at(place, width)].iter().map(|value| value.wide())));
+    places.iter().for_each(|&place| {
+        message.extend(values[at(place, width)].iter().map(|value| value.wide()))
+    });
     message
 }

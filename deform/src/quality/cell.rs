@@ -9,15 +9,24 @@ use crate::vector::{add, cross, determinant, dot, mean, subtract};
 pub(crate) const VOXEL_AS_HEXAHEDRON: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
 
 /// Each corner of a hexahedron with its three neighbours, right-handed.
-pub(crate) const HEXAHEDRON_CORNERS: [[usize; 4]; 8] =
-    [[0, 1, 3, 4], [1, 2, 0, 5], [2, 3, 1, 6], [3, 0, 2, 7], [4, 7, 5, 0], [5, 4, 6, 1], [6, 5, 7, 2], [7, 6, 4, 3]];
+pub(crate) const HEXAHEDRON_CORNERS: [[usize; 4]; 8] = [
+    [0, 1, 3, 4],
+    [1, 2, 0, 5],
+    [2, 3, 1, 6],
+    [3, 0, 2, 7],
+    [4, 7, 5, 0],
+    [5, 4, 6, 1],
+    [6, 5, 7, 2],
+    [7, 6, 4, 3],
+];
 
 /// Each corner of a wedge with its three neighbours, right-handed where the first triangle's normal points at the second.
 pub(crate) const WEDGE_CORNERS: [[usize; 4]; 6] =
     [[0, 1, 2, 3], [1, 2, 0, 4], [2, 0, 1, 5], [3, 5, 4, 0], [4, 3, 5, 1], [5, 4, 3, 2]];
 
 /// Each corner of a pyramid's base with its neighbours and the apex.
-pub(crate) const PYRAMID_CORNERS: [[usize; 4]; 4] = [[0, 1, 3, 4], [1, 2, 0, 4], [2, 3, 1, 4], [3, 0, 2, 4]];
+pub(crate) const PYRAMID_CORNERS: [[usize; 4]; 4] =
+    [[0, 1, 3, 4], [1, 2, 0, 4], [2, 3, 1, 4], [3, 0, 2, 4]];
 
 /// The scaled Jacobian of one cell: 1 for the ideal cell, 0 for a flat one, negative for one turned inside out.
 ///
@@ -54,7 +63,9 @@ pub fn scaled_jacobian(cell_type: CellType, points: &[Vector]) -> Option<f64> {
     match cell_type {
         CellType::Tetra => fixed(points).map(tetra),
         CellType::Hexahedron => fixed(points).map(hexahedron),
-        CellType::Voxel => fixed::<8>(points).map(|p| hexahedron(VOXEL_AS_HEXAHEDRON.map(|local| p[local]))),
+        CellType::Voxel => {
+            fixed::<8>(points).map(|p| hexahedron(VOXEL_AS_HEXAHEDRON.map(|local| p[local])))
+        }
         CellType::Wedge => fixed(points).map(wedge),
         CellType::Pyramid => fixed(points).map(pyramid),
         CellType::Triangle => fixed(points).map(triangle),
@@ -86,7 +97,10 @@ fn fixed<const N: usize>(points: &[Vector]) -> Option<[Vector; N]> {
 
 /// The least value; NaN if any is.
 pub(crate) fn least(values: impl Iterator<Item = f64>) -> f64 {
-    values.fold(f64::INFINITY, |least, value| if value < least || value.is_nan() { value } else { least })
+    values.fold(
+        f64::INFINITY,
+        |least, value| if value < least || value.is_nan() { value } else { least },
+    )
 }
 
 /// `numerator / denominator`, with 0 for a cell shrunk to nothing.
@@ -114,22 +128,30 @@ fn corner([p, a, b, c]: [Vector; 4]) -> f64 {
 
 fn hexahedron(p: [Vector; 8]) -> f64 {
     let axis = |plus: [usize; 4], minus: [usize; 4]| {
-        let sum = |local: [usize; 4]| local.into_iter().fold([0.0; 3], |sum, index| add(sum, p[index]));
+        let sum =
+            |local: [usize; 4]| local.into_iter().fold([0.0; 3], |sum, index| add(sum, p[index]));
         subtract(sum(plus), sum(minus))
     };
-    let axes = [axis([1, 2, 5, 6], [0, 3, 4, 7]), axis([2, 3, 6, 7], [0, 1, 4, 5]), axis([4, 5, 6, 7], [0, 1, 2, 3])];
+    let axes = [
+        axis([1, 2, 5, 6], [0, 3, 4, 7]),
+        axis([2, 3, 6, 7], [0, 1, 4, 5]),
+        axis([4, 5, 6, 7], [0, 1, 2, 3]),
+    ];
     let centre = corner([[0.0; 3], axes[0], axes[1], axes[2]]);
     least(
-        std::iter::once(centre).chain(HEXAHEDRON_CORNERS.into_iter().map(|local| corner(local.map(|index| p[index])))),
+        std::iter::once(centre)
+            .chain(HEXAHEDRON_CORNERS.into_iter().map(|local| corner(local.map(|index| p[index])))),
     )
 }
 
 fn wedge(p: [Vector; 6]) -> f64 {
-    2.0 / 3.0f64.sqrt() * least(WEDGE_CORNERS.into_iter().map(|local| corner(local.map(|index| p[index]))))
+    2.0 / 3.0f64.sqrt()
+        * least(WEDGE_CORNERS.into_iter().map(|local| corner(local.map(|index| p[index]))))
 }
 
 fn pyramid(p: [Vector; 5]) -> f64 {
-    let value = SQRT_2 * least(PYRAMID_CORNERS.into_iter().map(|local| tetra(local.map(|index| p[index]))));
+    let value =
+        SQRT_2 * least(PYRAMID_CORNERS.into_iter().map(|local| tetra(local.map(|index| p[index]))));
     if value <= 0.0 {
         0.0
     } else if value < 1.0 || value.is_nan() {
@@ -143,7 +165,8 @@ fn triangle([a, b, c]: [Vector; 3]) -> f64 {
     let (ab, ac, bc) = (subtract(b, a), subtract(c, a), subtract(c, b));
     let (lab, lac, lbc) = (dot(ab, ab), dot(ac, ac), dot(bc, bc));
     let normal = cross(ab, ac);
-    2.0 / 3.0f64.sqrt() * ratio(dot(normal, normal).sqrt(), (lab * lac).max(lab * lbc).max(lac * lbc).sqrt())
+    2.0 / 3.0f64.sqrt()
+        * ratio(dot(normal, normal).sqrt(), (lab * lac).max(lab * lbc).max(lac * lbc).sqrt())
 }
 
 fn quad(points: [Vector; 4]) -> f64 {
@@ -158,7 +181,8 @@ fn polygon(points: &[Vector]) -> f64 {
     #[expect(clippy::cast_precision_loss, reason = "a polygon's vertex count is small")]
     let regular = if count == 4 { 1.0 } else { (TAU / count as f64).sin() };
     least((0..count).map(|index| {
-        let (before, at, after) = (points[(index + count - 1) % count], points[index], points[(index + 1) % count]);
+        let (before, at, after) =
+            (points[(index + count - 1) % count], points[index], points[(index + 1) % count]);
         let (from, to) = (subtract(at, before), subtract(after, at));
         let sides = (dot(from, from) * dot(to, to)).sqrt();
         ratio(dot(normal, cross(from, to)), length * sides) / regular
@@ -168,12 +192,19 @@ fn polygon(points: &[Vector]) -> f64 {
 /// Twice the vector area of a closed polygon.
 pub(crate) fn vector_area(points: &[Vector]) -> Vector {
     let Some(&origin) = points.first() else { return [0.0; 3] };
-    points.windows(2).fold([0.0; 3], |sum, pair| add(sum, cross(subtract(pair[0], origin), subtract(pair[1], origin))))
+    points.windows(2).fold([0.0; 3], |sum, pair| {
+        add(sum, cross(subtract(pair[0], origin), subtract(pair[1], origin)))
+    })
 }
 
 /// Appends the tetrahedra that the edges of one face make with the mean of the face (itself, where it is a triangle) and
 /// `centre`. They have positive volume where the face is counter-clockwise seen from outside and the cell is star-shaped.
-fn split_face<I: Copy>(face: &[I], point: impl Fn(I) -> Vector, centre: Vector, tets: &mut Vec<[Vector; 4]>) {
+fn split_face<I: Copy>(
+    face: &[I],
+    point: impl Fn(I) -> Vector,
+    centre: Vector,
+    tets: &mut Vec<[Vector; 4]>,
+) {
     if let &[a, b, c] = face {
         tets.push([point(b), point(a), point(c), centre]);
         return;
@@ -188,7 +219,12 @@ fn split_face<I: Copy>(face: &[I], point: impl Fn(I) -> Vector, centre: Vector, 
 /// corners of hexahedra, wedges and pyramids (base); of prisms and polyhedra the tetrahedra of [`scaled_jacobian`].
 ///
 /// Each is made of means of vertices, so that it moves linearly where the vertices do.
-pub(crate) fn corner_tets(cells: &Cells, cell: usize, at: impl Fn(u32) -> Vector, tets: &mut Vec<[Vector; 4]>) {
+pub(crate) fn corner_tets(
+    cells: &Cells,
+    cell: usize,
+    at: impl Fn(u32) -> Vector,
+    tets: &mut Vec<[Vector; 4]>,
+) {
     tets.clear();
     let vertices = cells.vertices(cell);
     let point = |local: usize| at(vertices[local]);
@@ -196,7 +232,10 @@ pub(crate) fn corner_tets(cells: &Cells, cell: usize, at: impl Fn(u32) -> Vector
         CellType::Tetra => tets.push([0, 1, 2, 3].map(point)),
         CellType::Hexahedron => tets.extend(HEXAHEDRON_CORNERS.map(|local| local.map(point))),
         CellType::Voxel => {
-            tets.extend(HEXAHEDRON_CORNERS.map(|local| local.map(|index| point(VOXEL_AS_HEXAHEDRON[index]))));
+            tets.extend(
+                HEXAHEDRON_CORNERS
+                    .map(|local| local.map(|index| point(VOXEL_AS_HEXAHEDRON[index]))),
+            );
         }
         CellType::Wedge => tets.extend(WEDGE_CORNERS.map(|local| local.map(point))),
         CellType::Pyramid => tets.extend(PYRAMID_CORNERS.map(|local| local.map(point))),

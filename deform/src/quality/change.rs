@@ -72,12 +72,21 @@ pub fn change(cells: &Cells, reference: &[Vector], points: &[Vector]) -> Change 
 /// # Panics
 /// As [`change`].
 #[must_use]
-pub fn change_in_parts(cells: &Cells, reference: &[Vector], points: &[Vector], partition: &dyn Partition) -> Change {
+pub fn change_in_parts(
+    cells: &Cells,
+    reference: &[Vector],
+    points: &[Vector],
+    partition: &dyn Partition,
+) -> Change {
     let cells = &*cells.right_handed(reference);
     let (before, after) = (volumes(cells, reference), volumes(cells, points));
-    let ratios: Vec<f64> = before.iter().zip(after).map(|(&a, b)| if a == 0.0 { f64::NAN } else { b / a }).collect();
+    let ratios: Vec<f64> =
+        before.iter().zip(after).map(|(&a, b)| if a == 0.0 { f64::NAN } else { b / a }).collect();
     Change {
-        normalized_scaled_jacobian: Spread::in_parts(&normalized_scaled_jacobians(cells, reference, points), partition),
+        normalized_scaled_jacobian: Spread::in_parts(
+            &normalized_scaled_jacobians(cells, reference, points),
+            partition,
+        ),
         volume_ratio: Spread::in_parts(&ratios, partition),
     }
 }
@@ -200,12 +209,16 @@ mod tests {
     #[test]
     fn a_stretched_mesh_has_changed_by_its_stretch() {
         let mesh = shapes::box_of_hexahedra([3, 2, 2], [0.0; 3], [1.0; 3]);
-        let end: Vec<Vector> = mesh.points().iter().map(|&[x, y, z]| [3.0 * x, 0.5 * y, z]).collect();
+        let end: Vec<Vector> =
+            mesh.points().iter().map(|&[x, y, z]| [3.0 * x, 0.5 * y, z]).collect();
         let change = change(mesh.cells(), mesh.points(), &end);
         for value in [change.volume_ratio.min, change.volume_ratio.mean, change.volume_ratio.max] {
             assert!((value - 1.5).abs() < 1e-13);
         }
-        assert!((change.normalized_scaled_jacobian.min - 1.0).abs() < 1e-12, "right angles stay right");
+        assert!(
+            (change.normalized_scaled_jacobian.min - 1.0).abs() < 1e-12,
+            "right angles stay right"
+        );
         assert_eq!(Spread::of(&[]), Spread { min: 1.0, mean: 1.0, max: 1.0 });
     }
 

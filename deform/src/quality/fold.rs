@@ -70,8 +70,11 @@ fn for_each_boundary_face(cells: &Cells, mut visit: impl FnMut(&[u32])) {
         });
     }
     faces.sort_unstable();
-    let mut single: Vec<(usize, u32)> =
-        faces.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1).map(|same| (same[0].1, same[0].2)).collect();
+    let mut single: Vec<(usize, u32)> = faces
+        .chunk_by(|a, b| a.0 == b.0)
+        .filter(|same| same.len() == 1)
+        .map(|same| (same[0].1, same[0].2))
+        .collect();
     single.sort_unstable();
     for (cell, wanted) in single {
         let mut index = 0;
@@ -95,6 +98,8 @@ mod tests {
         let mut faces = Vec::new();
         for_each_boundary_face(&cells, |face| faces.push(face.to_vec()));
         assert_eq!(faces.len(), 6);
-        assert!(faces.iter().all(|face| !(face.contains(&1) && face.contains(&2) && face.contains(&3))));
+        assert!(
+            faces.iter().all(|face| !(face.contains(&1) && face.contains(&2) && face.contains(&3)))
+        );
     }
 }

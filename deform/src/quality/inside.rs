@@ -18,8 +18,15 @@ type Edge = [Vector; 2];
 
 /// The least Bernstein coefficient that is not positive on the way of a cell from `start` to `start + until (end - start)`,
 /// after the cuts; [`Least::NONE`] where there is none.
-pub(super) fn least_inside(cell_type: CellType, start: &[Vector], end: &[Vector], until: f64) -> Least {
-    let edge = |from: usize, to: usize| -> Edge { [subtract(start[to], start[from]), subtract(end[to], end[from])] };
+pub(super) fn least_inside(
+    cell_type: CellType,
+    start: &[Vector],
+    end: &[Vector],
+    until: f64,
+) -> Least {
+    let edge = |from: usize, to: usize| -> Edge {
+        [subtract(start[to], start[from]), subtract(end[to], end[from])]
+    };
     match cell_type {
         CellType::Hexahedron => hexahedron(edge, |local| local, until),
         CellType::Voxel => hexahedron(edge, |local| VOXEL_AS_HEXAHEDRON[local], until),
@@ -46,7 +53,13 @@ pub(super) fn least_inside(cell_type: CellType, start: &[Vector], end: &[Vector]
                         for q in 0..2 {
                             let (i, j) = (r + p, s + q);
                             let factor = 1.0 / (weight(i) * weight(j));
-                            accumulate(&mut coefficients[i + 3 * j], u, v, edge(base(p, q), 4), factor);
+                            accumulate(
+                                &mut coefficients[i + 3 * j],
+                                u,
+                                v,
+                                edge(base(p, q), 4),
+                                factor,
+                            );
                         }
                     }
                 }
@@ -57,7 +70,11 @@ pub(super) fn least_inside(cell_type: CellType, start: &[Vector], end: &[Vector]
     }
 }
 
-fn hexahedron(edge: impl Fn(usize, usize) -> Edge, at: impl Fn(usize) -> usize, until: f64) -> Least {
+fn hexahedron(
+    edge: impl Fn(usize, usize) -> Edge,
+    at: impl Fn(usize) -> usize,
+    until: f64,
+) -> Least {
     let corner = |a: usize, b: usize, c: usize| at(4 * c + if b == 0 { a } else { 3 - a });
     let mut coefficients = [[0.0; 4]; 27];
     for pair in 0..4 {
@@ -91,7 +108,10 @@ fn accumulate(sum: &mut Cubic, [u0, u1]: Edge, [v0, v1]: Edge, [w0, w1]: Edge, f
 
 /// Looks at `3^axes` coefficients, the first axis running fastest.
 fn least(coefficients: &[Cubic], axes: usize, until: f64, cuts: usize) -> Least {
-    let worst = coefficients.iter().map(|&cubic| least_of_cubic(cubic, until)).fold(Least::NONE, Least::worse);
+    let worst = coefficients
+        .iter()
+        .map(|&cubic| least_of_cubic(cubic, until))
+        .fold(Least::NONE, Least::worse);
     if worst.positive {
         return Least::NONE;
     }
@@ -118,13 +138,18 @@ fn least(coefficients: &[Cubic], axes: usize, until: f64, cuts: usize) -> Least 
         let stride = 3usize.pow(u32::try_from(axis).unwrap_or(0));
         parts = parts.iter().flat_map(|part| halves(part, stride)).collect();
     }
-    parts.iter().map(|part| least(part, axes, until, cuts - 1)).find(|least| !least.positive).unwrap_or(Least::NONE)
+    parts
+        .iter()
+        .map(|part| least(part, axes, until, cuts - 1))
+        .find(|least| !least.positive)
+        .unwrap_or(Least::NONE)
 }
 
 /// The coefficients on both halves along the axis of this stride (P. de Casteljau).
 fn halves(coefficients: &[Cubic], stride: usize) -> [Vec<Cubic>; 2] {
     let mut result = [coefficients.to_vec(), coefficients.to_vec()];
-    let middle = |a: Cubic, b: Cubic| -> Cubic { std::array::from_fn(|power| 0.5 * (a[power] + b[power])) };
+    let middle =
+        |a: Cubic, b: Cubic| -> Cubic { std::array::from_fn(|power| 0.5 * (a[power] + b[power])) };
     for first in (0..coefficients.len()).filter(|index| (index / stride).is_multiple_of(3)) {
         let [a, b, c] = [0, 1, 2].map(|step| coefficients[first + step * stride]);
         let (ab, bc) = (middle(a, b), middle(b, c));
@@ -159,10 +184,12 @@ mod tests {
     fn at(points: &[Vector], place: Vector) -> f64 {
         let mut columns = [[0.0; 3]; 3];
         for (corner, &point) in CUBE.iter().zip(points) {
-            let value: Vector = std::array::from_fn(|k| if corner[k] > 0.5 { place[k] } else { 1.0 - place[k] });
+            let value: Vector =
+                std::array::from_fn(|k| if corner[k] > 0.5 { place[k] } else { 1.0 - place[k] });
             let slope: Vector = std::array::from_fn(|k| if corner[k] > 0.5 { 1.0 } else { -1.0 });
             for (axis, column) in columns.iter_mut().enumerate() {
-                let factor: f64 = (0..3).map(|k| if k == axis { slope[k] } else { value[k] }).product();
+                let factor: f64 =
+                    (0..3).map(|k| if k == axis { slope[k] } else { value[k] }).product();
                 *column = add(*column, scale(point, factor));
             }
         }
@@ -221,10 +248,15 @@ mod tests {
     fn a_cell_broken_between_its_corners_is_found() {
         let (sine, cosine) = 150f64.to_radians().sin_cos();
         let lift = |[x, y, z]: Vector| {
-            if z > 0.5 { [3.0 * cosine * x - sine / 3.0 * y, 3.0 * sine * x + cosine / 3.0 * y, z] } else { [x, y, z] }
+            if z > 0.5 {
+                [3.0 * cosine * x - sine / 3.0 * y, 3.0 * sine * x + cosine / 3.0 * y, z]
+            } else {
+                [x, y, z]
+            }
         };
         let wedge = [CUBE[0], CUBE[1], CUBE[3], CUBE[4], CUBE[5], CUBE[7]].map(lift);
-        for (cell_type, points) in [(CellType::Hexahedron, CUBE.map(lift).to_vec()), (CellType::Wedge, wedge.to_vec())]
+        for (cell_type, points) in
+            [(CellType::Hexahedron, CUBE.map(lift).to_vec()), (CellType::Wedge, wedge.to_vec())]
         {
             let numbers = (0..).take(points.len()).collect();
             let cells = Cells::uniform(cell_type, numbers).unwrap();

@@ -59,7 +59,11 @@ pub enum SurfaceRule {
 impl Default for Guard {
     /// A floor of 0.02; whatever would fall under it is rejected, and so is a broken surface.
     fn default() -> Self {
-        Self { min_scaled_jacobian: 0.02, otherwise: Otherwise::Reject, surface: SurfaceRule::Reject }
+        Self {
+            min_scaled_jacobian: 0.02,
+            otherwise: Otherwise::Reject,
+            surface: SurfaceRule::Reject,
+        }
     }
 }
 
@@ -144,7 +148,9 @@ pub enum Refusal {
         expected: usize,
     },
     /// A coordinate that is NaN or infinite.
-    #[error("vertex {vertex} of the {which} shape lies at {point:?}; every coordinate must be finite")]
+    #[error(
+        "vertex {vertex} of the {which} shape lies at {point:?}; every coordinate must be finite"
+    )]
     NotFinite {
         /// `start` or `end`.
         which: &'static str,
@@ -182,16 +188,27 @@ impl BrokenPath {
     fn described(&self, way_of: impl Fn(&FailingCell) -> String) -> String {
         let mut text = match self.inverted {
             0 => {
-                format!("{} cell(s) would fall under the scaled Jacobian of {:.4}", self.failing, Number(self.floor))
+                format!(
+                    "{} cell(s) would fall under the scaled Jacobian of {:.4}",
+                    self.failing,
+                    Number(self.floor)
+                )
             }
             inverted => format!("{inverted} cell(s) would be turned inside out"),
         };
         if let Some(worst) = self.worst.first() {
             let (place, value) = (Position(worst.centroid), Number(worst.scaled_jacobian));
-            text += &format!("; the worst is cell {} at {place} with {value:.4}{}", worst.cell, way_of(worst));
+            text += &format!(
+                "; the worst is cell {} at {place} with {value:.4}{}",
+                worst.cell,
+                way_of(worst)
+            );
         }
         if self.folded_faces > 0 {
-            text += &format!("; the prescribed surface itself turns over at {} face(s)", self.folded_faces);
+            text += &format!(
+                "; the prescribed surface itself turns over at {} face(s)",
+                self.folded_faces
+            );
             if let Some(place) = self.folded_at {
                 text += &format!(", the first at {}", Position(place));
             }
@@ -214,7 +231,10 @@ impl Refusal {
 fn describe(path: &BrokenPath) -> String {
     let text = path.described(|worst| format!(" at {:.1} % of the way", 100.0 * worst.fraction));
     // Rounded down, so that what is shown is feasible.
-    text + &format!("; the largest feasible fraction is {:.4}", (path.feasible_fraction * 1e4).floor() / 1e4)
+    text + &format!(
+        "; the largest feasible fraction is {:.4}",
+        (path.feasible_fraction * 1e4).floor() / 1e4
+    )
 }
 
 /// The point of a straight path a `fraction` of the way from `start` to `end`; at 0 and 1 exactly these.
@@ -273,7 +293,8 @@ pub fn judge_in_parts(
         return Err(Refusal::OtherRank);
     }
     let (path, floor) = Path::new(mesh, start, end, guard, partition);
-    let parts = parallel::map_chunks(mesh.cells().len(), CHUNK, |range| path.look(range, fractions));
+    let parts =
+        parallel::map_chunks(mesh.cells().len(), CHUNK, |range| path.look(range, fractions));
     let mut total = Part::new(fractions.len());
     for part in parts {
         total.merge(part);
@@ -290,7 +311,11 @@ pub fn judge_in_parts(
     let shapes: Vec<ShapeQuality> = fractions
         .iter()
         .zip(&total.shapes)
-        .map(|(&fraction, &(min, sum))| ShapeQuality { fraction, min: value(min), mean: value(sum / count) })
+        .map(|(&fraction, &(min, sum))| ShapeQuality {
+            fraction,
+            min: value(min),
+            mean: value(sum / count),
+        })
         .collect();
     let min_scaled_jacobian = shapes.iter().map(|shape| shape.min).fold(1.0, f64::min);
     Ok(PathQuality { floor, min_scaled_jacobian, shapes })
@@ -304,7 +329,13 @@ pub fn keeps(mesh: &Mesh, start: &[Vector], end: &[Vector], guard: &Guard) -> bo
 
 /// Whether [`judge_in_parts`] would let a straight step through. Collective.
 #[must_use]
-pub fn keeps_in_parts(mesh: &Mesh, start: &[Vector], end: &[Vector], guard: &Guard, partition: &dyn Partition) -> bool {
+pub fn keeps_in_parts(
+    mesh: &Mesh,
+    start: &[Vector],
+    end: &[Vector],
+    guard: &Guard,
+    partition: &dyn Partition,
+) -> bool {
     if !all(partition, check_arguments(mesh, start, end, &[1.0], guard).is_ok()) {
         return false;
     }
@@ -324,7 +355,9 @@ fn check_arguments(
         if shape.len() != expected {
             return Err(Refusal::PointCount { which, found: shape.len(), expected });
         }
-        if let Some(vertex) = shape.iter().position(|point| !point.iter().all(|value| value.is_finite())) {
+        if let Some(vertex) =
+            shape.iter().position(|point| !point.iter().all(|value| value.is_finite()))
+        {
             return Err(Refusal::NotFinite { which, vertex, point: shape[vertex] });
         }
     }
@@ -375,7 +408,13 @@ struct Part {
 
 impl Part {
     fn new(shapes: usize) -> Self {
-        Self { cells: 0, failing: 0, inverted: 0, shapes: vec![(f64::INFINITY, 0.0); shapes], worst: Vec::new() }
+        Self {
+            cells: 0,
+            failing: 0,
+            inverted: 0,
+            shapes: vec![(f64::INFINITY, 0.0); shapes],
+            worst: Vec::new(),
+        }
     }
 
     fn fail(&mut self, cell: FailingCell) {
@@ -388,7 +427,9 @@ impl Part {
     }
 
     fn keep_worst(&mut self) {
-        self.worst.sort_by(|a, b| a.scaled_jacobian.total_cmp(&b.scaled_jacobian).then(a.cell.cmp(&b.cell)));
+        self.worst.sort_by(|a, b| {
+            a.scaled_jacobian.total_cmp(&b.scaled_jacobian).then(a.cell.cmp(&b.cell))
+        });
         self.worst.truncate(WORST);
     }
 
@@ -402,12 +443,18 @@ impl Part {
     fn added_up(mut self, partition: &dyn Partition) -> Self {
         self.keep_worst();
         let shapes = self.shapes.len();
-        let mut mine = vec![self.cells as f64, self.failing as f64, self.inverted as f64, self.worst.len() as f64];
+        let mut mine = vec![
+            self.cells as f64,
+            self.failing as f64,
+            self.inverted as f64,
+            self.worst.len() as f64,
+        ];
         mine.extend(self.shapes.iter().flat_map(|&(least, sum)| [least, sum]));
         mine.extend(self.worst.iter().flat_map(|worst| {
             let [x, y, z] = worst.centroid;
             let kind = [worst.cell as f64, f64::from(worst.cell_type)];
-            let measures = [worst.scaled_jacobian, worst.fraction, f64::from(u8::from(worst.inverts))];
+            let measures =
+                [worst.scaled_jacobian, worst.fraction, f64::from(u8::from(worst.inverts))];
             kind.into_iter().chain([x, y, z]).chain(measures)
         }));
         let mut values = partition.gather(&mine).into_iter();
@@ -415,7 +462,8 @@ impl Part {
         let mut total = Self::new(shapes);
         for _ in 0..partition.ranks() {
             let mut part = Self::new(shapes);
-            (part.cells, part.failing, part.inverted) = (next() as usize, next() as usize, next() as usize);
+            (part.cells, part.failing, part.inverted) =
+                (next() as usize, next() as usize, next() as usize);
             let worst = next() as usize;
             part.shapes.iter_mut().for_each(|shape| *shape = (next(), next()));
             part.worst = (0..worst.min(WORST))
@@ -482,7 +530,8 @@ impl<'a> Path<'a> {
                     (value, at) = (scaled, fraction);
                 }
             }
-            let least = least_on_path(&self.measure, cell, self.start, self.end, 1.0, &mut memory.ends);
+            let least =
+                least_on_path(&self.measure, cell, self.start, self.end, 1.0, &mut memory.ends);
             if !least.positive {
                 inverts = true;
                 let (scaled, _) = self.quality_at(cell, least.at, &mut memory);
@@ -506,12 +555,15 @@ impl<'a> Path<'a> {
     }
 
     fn quality_at(&self, cell: usize, fraction: f64, memory: &mut Memory) -> (f64, bool) {
-        let point = |vertex: u32| shape_at(self.start[vertex as usize], self.end[vertex as usize], fraction);
+        let point = |vertex: u32| {
+            shape_at(self.start[vertex as usize], self.end[vertex as usize], fraction)
+        };
         self.measure.cell(cell, point, &mut memory.measure).unwrap_or((1.0, false))
     }
 
     fn broken(&self, total: Part, floor: f64) -> BrokenPath {
-        let (folded_faces, folded_at) = folded_faces(self.measure.cells, self.start, self.end, self.partition);
+        let (folded_faces, folded_at) =
+            folded_faces(self.measure.cells, self.start, self.end, self.partition);
         BrokenPath {
             floor,
             min_scaled_jacobian: total.worst.first().map_or(floor, |worst| worst.scaled_jacobian),
@@ -546,8 +598,15 @@ impl<'a> Path<'a> {
                     let (value, inverted) = self.quality_at(cell, fraction, &mut memory);
                     inverted
                         || value < self.floor
-                        || !least_on_path(&self.measure, cell, self.start, self.end, fraction, &mut memory.ends)
-                            .positive
+                        || !least_on_path(
+                            &self.measure,
+                            cell,
+                            self.start,
+                            self.end,
+                            fraction,
+                            &mut memory.ends,
+                        )
+                        .positive
                 }
             })
         });

@@ -16,12 +16,14 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 pub use cell::scaled_jacobian;
-pub(crate) use cell::{HEXAHEDRON_CORNERS, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, corner_tets};
+pub(crate) use cell::{
+    HEXAHEDRON_CORNERS, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, corner_tets,
+};
 pub use change::{Change, Spread, change, change_in_parts, swept_volume, volumes};
 pub use fold::turns_over;
 pub use judge::{
-    BrokenPath, FailingCell, Guard, Otherwise, PathQuality, Refusal, ShapeQuality, SurfaceRule, judge, judge_in_parts,
-    keeps, keeps_in_parts, shape_at,
+    BrokenPath, FailingCell, Guard, Otherwise, PathQuality, Refusal, ShapeQuality, SurfaceRule,
+    judge, judge_in_parts, keeps, keeps_in_parts, shape_at,
 };
 
 use crate::mesh::{CellType, Cells, Vector};
@@ -98,7 +100,9 @@ pub fn quality_in_parts(cells: &Cells, points: &[Vector], partition: &dyn Partit
         let mut part = Quality::empty();
         let mut scratch = Scratch::default();
         for cell in range {
-            if let Some((value, inverted)) = measure.cell(cell, |vertex| points[vertex as usize], &mut scratch) {
+            if let Some((value, inverted)) =
+                measure.cell(cell, |vertex| points[vertex as usize], &mut scratch)
+            {
                 part.add(cell, value, inverted);
             }
         }
@@ -136,7 +140,9 @@ pub fn scaled_jacobians(cells: &Cells, points: &[Vector]) -> Vec<f64> {
         let mut scratch = Scratch::default();
         for (index, value) in part.iter_mut().enumerate() {
             let cell = chunk * CHUNK + index;
-            if let Some(measured) = scaled_jacobian_of(cells, cell, |vertex| points[vertex as usize], &mut scratch) {
+            if let Some(measured) =
+                scaled_jacobian_of(cells, cell, |vertex| points[vertex as usize], &mut scratch)
+            {
                 *value = measured;
             }
         }
@@ -150,7 +156,11 @@ pub fn scaled_jacobians(cells: &Cells, points: &[Vector]) -> Vec<f64> {
 /// # Panics
 /// Where a cell names a vertex beyond `reference` or `points`.
 #[must_use]
-pub fn normalized_scaled_jacobians(cells: &Cells, reference: &[Vector], points: &[Vector]) -> Vec<f64> {
+pub fn normalized_scaled_jacobians(
+    cells: &Cells,
+    reference: &[Vector],
+    points: &[Vector],
+) -> Vec<f64> {
     let cells = &*cells.right_handed(reference);
     let mut values = scaled_jacobians(cells, points);
     for (value, start) in values.iter_mut().zip(scaled_jacobians(cells, reference)) {
@@ -178,12 +188,20 @@ impl Quality {
         self.max = self.max.max(value);
         self.mean += value;
         self.inverted += usize::from(inverted);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the classes")]
-        let class = ((value + 1.0) * 0.5 * CLASSES as f64).clamp(0.0, CLASSES as f64 - 1.0) as usize;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "clamped to the classes"
+        )]
+        let class =
+            ((value + 1.0) * 0.5 * CLASSES as f64).clamp(0.0, CLASSES as f64 - 1.0) as usize;
         self.histogram[class] += 1;
-        if self.worst.len() < WORST || self.worst.last().is_some_and(|last| value < last.scaled_jacobian) {
+        if self.worst.len() < WORST
+            || self.worst.last().is_some_and(|last| value < last.scaled_jacobian)
+        {
             let place = self.worst.partition_point(|other| other.scaled_jacobian <= value);
-            self.worst.insert(place, WorstCell { cell, scaled_jacobian: value, centroid: [0.0; 3] });
+            self.worst
+                .insert(place, WorstCell { cell, scaled_jacobian: value, centroid: [0.0; 3] });
             self.worst.truncate(WORST);
         }
     }
@@ -209,7 +227,13 @@ impl Quality {
         let mut total = Self::empty();
         let mut next = || values.next().unwrap_or(f64::NAN);
         for _ in 0..partition.ranks() {
-            let mut part = Self { cells: next() as usize, min: next(), mean: next(), max: next(), ..Self::empty() };
+            let mut part = Self {
+                cells: next() as usize,
+                min: next(),
+                mean: next(),
+                max: next(),
+                ..Self::empty()
+            };
             part.inverted = next() as usize;
             part.histogram = std::array::from_fn(|_| next() as u64);
             let count = next() as usize;
@@ -235,7 +259,9 @@ impl Quality {
             *count += more;
         }
         self.worst.extend(other.worst);
-        self.worst.sort_by(|a, b| a.scaled_jacobian.total_cmp(&b.scaled_jacobian).then(a.cell.cmp(&b.cell)));
+        self.worst.sort_by(|a, b| {
+            a.scaled_jacobian.total_cmp(&b.scaled_jacobian).then(a.cell.cmp(&b.cell))
+        });
         self.worst.truncate(WORST);
     }
 }
@@ -271,9 +297,10 @@ impl<'a> Measure<'a> {
             return Some((-1.0, true));
         }
         let valid = match self.cells.cell_type(cell) {
-            CellType::Tetra | CellType::PentagonalPrism | CellType::HexagonalPrism | CellType::Polyhedron => {
-                value > 0.0
-            }
+            CellType::Tetra
+            | CellType::PentagonalPrism
+            | CellType::HexagonalPrism
+            | CellType::Polyhedron => value > 0.0,
             cell_type if cell_type.dimension() == 2 => value > 0.0,
             _ => {
                 corner_tets(self.cells, cell, at, &mut scratch.tets);

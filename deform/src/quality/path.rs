@@ -19,14 +19,17 @@ impl Least {
     pub(super) const NONE: Self = Self { value: f64::INFINITY, at: 0.0, positive: true };
 
     pub(super) fn worse(self, other: Self) -> Self {
-        let first = if other.positive == self.positive { other.value < self.value } else { self.positive };
+        let first =
+            if other.positive == self.positive { other.value < self.value } else { self.positive };
         if first { other } else { self }
     }
 }
 
 /// The determinant of a tetrahedron whose corners go straight from `start` to `end`: a cubic `c0 + c1 t + c2 t² + c3 t³`.
 fn tet_cubic(start: [Vector; 4], end: [Vector; 4]) -> Cubic {
-    let edges = |tet: [Vector; 4]| [subtract(tet[1], tet[0]), subtract(tet[2], tet[0]), subtract(tet[3], tet[0])];
+    let edges = |tet: [Vector; 4]| {
+        [subtract(tet[1], tet[0]), subtract(tet[2], tet[0]), subtract(tet[3], tet[0])]
+    };
     triple(edges(start), edges(end))
 }
 
@@ -125,7 +128,10 @@ pub(super) fn least_on_path(
 
 /// Whether the determinant of a cell can be least elsewhere than at the corners that are looked at.
 pub(super) fn has_inside(cell_type: CellType) -> bool {
-    matches!(cell_type, CellType::Hexahedron | CellType::Voxel | CellType::Wedge | CellType::Pyramid)
+    matches!(
+        cell_type,
+        CellType::Hexahedron | CellType::Voxel | CellType::Wedge | CellType::Pyramid
+    )
 }
 
 fn least_of_polygon(start: &[Vector], end: &[Vector], until: f64) -> Least {
@@ -134,14 +140,22 @@ fn least_of_polygon(start: &[Vector], end: &[Vector], until: f64) -> Least {
     (0..count)
         .map(|index| {
             let sides = |points: &[Vector]| {
-                let (before, at, after) =
-                    (points[(index + count - 1) % count], points[index], points[(index + 1) % count]);
+                let (before, at, after) = (
+                    points[(index + count - 1) % count],
+                    points[index],
+                    points[(index + 1) % count],
+                );
                 (subtract(at, before), subtract(after, at))
             };
             let ((a, b), (a1, b1)) = (sides(start), sides(end));
             let (da, db) = (subtract(a1, a), subtract(b1, b));
             let along = |v: Vector| dot(v, normal);
-            let quadratic = [along(cross(a, b)), along(cross(da, b)) + along(cross(a, db)), along(cross(da, db)), 0.0];
+            let quadratic = [
+                along(cross(a, b)),
+                along(cross(da, b)) + along(cross(a, db)),
+                along(cross(da, db)),
+                0.0,
+            ];
             least_of_cubic(quadratic, until)
         })
         .fold(Least::NONE, Least::worse)

@@ -53,7 +53,8 @@ fn pixels_voxels_and_strips_follow_their_like() {
 fn regular_polygons_are_ideal_and_other_counts_are_no_cells() {
     for count in 3..9 {
         let angle = |index: i32| std::f64::consts::TAU * f64::from(index) / f64::from(count);
-        let points: Vec<Vector> = (0..count).map(|i| [angle(i).cos(), angle(i).sin(), 2.0]).collect();
+        let points: Vec<Vector> =
+            (0..count).map(|i| [angle(i).cos(), angle(i).sin(), 2.0]).collect();
         assert!((scaled_jacobian(CellType::Polygon, &points).unwrap() - 1.0).abs() < 1e-12);
         assert_eq!(scaled_jacobian(CellType::Hexahedron, &points[..1]), None);
     }
@@ -72,10 +73,14 @@ fn every_mirrored_volume_cell_is_inverted() {
         let inverted = quality(mesh.cells(), &mirrored);
         assert!(inverted.inverted == 1 && inverted.min <= 0.0, "{cell_type}: {inverted:?}");
         // Whatever its order, the guard sees it pass through itself.
-        let refusal = judge(&mesh, mesh.points(), &mirrored, &[1.0], &Guard::default()).unwrap_err();
+        let refusal =
+            judge(&mesh, mesh.points(), &mirrored, &[1.0], &Guard::default()).unwrap_err();
         let Refusal::Quality(path) = refusal else { panic!("{cell_type}: {refusal}") };
         assert_eq!((path.inverted, path.failing), (1, 1), "{cell_type}");
-        assert!(path.feasible_fraction < 0.5 && path.feasible_fraction > 0.3, "{cell_type}: {path:?}");
+        assert!(
+            path.feasible_fraction < 0.5 && path.feasible_fraction > 0.3,
+            "{cell_type}: {path:?}"
+        );
         assert!(path.folded_faces > 0);
     }
 }
@@ -147,7 +152,8 @@ fn a_mesh_is_summed_up() {
     assert_eq!(sum.histogram.iter().sum::<u64>(), values.len() as u64);
     let mut sorted: Vec<(f64, usize)> = values.iter().copied().zip(0..).collect();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let worst: Vec<(f64, usize)> = sum.worst.iter().map(|cell| (cell.scaled_jacobian, cell.cell)).collect();
+    let worst: Vec<(f64, usize)> =
+        sum.worst.iter().map(|cell| (cell.scaled_jacobian, cell.cell)).collect();
     assert_eq!(worst, sorted[..10]);
     assert_eq!(sum.worst[0].centroid, centroid(mesh.cells(), sum.worst[0].cell, &points));
 
@@ -169,12 +175,18 @@ fn nothing_to_measure_is_nothing_broken() {
 #[test]
 fn the_same_bits_whatever_the_number_of_threads() {
     let mesh = shapes::box_of_tets([16; 3], [0.0; 3], [1.0, 2.0, 3.0]);
-    let end: Vec<Vector> = mesh.points().iter().map(|&[x, y, z]| [x + 0.1 * (7.0 * z).sin(), y * y, z]).collect();
+    let end: Vec<Vector> =
+        mesh.points().iter().map(|&[x, y, z]| [x + 0.1 * (7.0 * z).sin(), y * y, z]).collect();
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let judged =
-                judge(&mesh, mesh.points(), &end, &[0.5, 1.0], &Guard { min_scaled_jacobian: 0.0, ..Guard::default() });
+            let judged = judge(
+                &mesh,
+                mesh.points(),
+                &end,
+                &[0.5, 1.0],
+                &Guard { min_scaled_jacobian: 0.0, ..Guard::default() },
+            );
             (quality(mesh.cells(), &end), judged)
         })
     };
@@ -236,7 +248,10 @@ fn the_feasible_fraction_is_that_of_the_closed_form() {
     let value = scaled_jacobian(CellType::Tetra, &at).unwrap();
     assert!((value - 0.02).abs() < 1e-5 && value >= 0.02, "{value}");
     let error = Refusal::Quality(Box::new(path)).to_string();
-    assert!(error.contains("cell 0") && error.contains("inside out") && error.contains("feasible"), "{error}");
+    assert!(
+        error.contains("cell 0") && error.contains("inside out") && error.contains("feasible"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -244,10 +259,14 @@ fn a_mesh_below_the_floor_may_move_but_not_get_worse() {
     let flat: Vec<Vector> = one_tet().points().iter().map(|&[x, y, z]| [x, y, 0.01 * z]).collect();
     let mesh = one_tet().with_points(flat).unwrap();
     let shift = |by: f64, squeeze: f64| -> Vec<Vector> {
-        mesh.points().iter().map(|&[x, y, z]| [x + by, y - 0.7 * by, squeeze * z + 0.3 * by]).collect()
+        mesh.points()
+            .iter()
+            .map(|&[x, y, z]| [x + by, y - 0.7 * by, squeeze * z + 0.3 * by])
+            .collect()
     };
     let fractions = [0.2, 0.4, 1.0];
-    let path = judge(&mesh, mesh.points(), &shift(1e3, 1.0), &fractions, &Guard::default()).unwrap();
+    let path =
+        judge(&mesh, mesh.points(), &shift(1e3, 1.0), &fractions, &Guard::default()).unwrap();
     assert!(path.floor < 0.02 && (path.min_scaled_jacobian - path.floor).abs() < 1e-9);
     assert_eq!(path.shapes.len(), 3);
     assert!(judge(&mesh, mesh.points(), &shift(0.0, 0.9), &fractions, &Guard::default()).is_err());
@@ -281,11 +300,15 @@ fn senseless_arguments_are_named() {
         Err(Refusal::NotFinite { which: "end", vertex: 2, .. })
     ));
     for fractions in [&[0.0][..], &[0.5, 0.5], &[1.5], &[f64::NAN]] {
-        assert!(matches!(judge(&mesh, points, points, fractions, &guard), Err(Refusal::Fraction { .. })));
+        assert!(matches!(
+            judge(&mesh, points, points, fractions, &guard),
+            Err(Refusal::Fraction { .. })
+        ));
     }
     let guard = Guard { min_scaled_jacobian: f64::NAN, ..guard };
     assert!(matches!(judge(&mesh, points, points, &[1.0], &guard), Err(Refusal::Floor { .. })));
-    let message = serde_json::from_str::<Guard>(r#"{"otherwise": "mend"}"#).unwrap_err().to_string();
+    let message =
+        serde_json::from_str::<Guard>(r#"{"otherwise": "mend"}"#).unwrap_err().to_string();
     assert!(message.contains("mend") && message.contains("reject"), "{message}");
 }
 

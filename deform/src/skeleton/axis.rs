@@ -79,14 +79,20 @@ impl Axis {
             Some(_) => radius,
             None => (2.0 * radius - axis.lengths[node].min(whole - axis.lengths[node])).max(radius),
         };
-        let reaches: Vec<f64> = own.iter().enumerate().map(|(node, &radius)| reach(node, radius)).collect();
+        let reaches: Vec<f64> =
+            own.iter().enumerate().map(|(node, &radius)| reach(node, radius)).collect();
         let fit_all = |axis: &Self, leads: &[Option<f64>]| {
             reaches.iter().enumerate().map(|(node, &reach)| axis.fit(node, reach, leads)).collect()
         };
         axis.fits = fit_all(&axis, &vec![Some(0.0); own.len()]);
         let lift: Vec<Vector> = own.iter().map(|&radius| [radius, 0.0, 0.0]).collect();
-        axis.radii = smooth(&axis.fits, &lift, 0).iter().zip(&own).map(|(fit, own)| fit[0].max(0.5 * own)).collect();
-        (axis.points, axis.slopes) = (smooth(&axis.fits, &reference, 0), smooth(&axis.fits, &reference, 1));
+        axis.radii = smooth(&axis.fits, &lift, 0)
+            .iter()
+            .zip(&own)
+            .map(|(fit, own)| fit[0].max(0.5 * own))
+            .collect();
+        (axis.points, axis.slopes) =
+            (smooth(&axis.fits, &reference, 0), smooth(&axis.fits, &reference, 1));
         axis.tangents = directions(&axis.slopes);
         let leads = axis.mean_leads(skeleton, surface);
         axis.carried_fits = fit_all(&axis, &leads);
@@ -94,7 +100,8 @@ impl Axis {
             let branch = |node: u32| skeleton.degree(node as usize) > 2;
             let [first, last] = [axis.nodes[0], axis.nodes[axis.nodes.len() - 1]];
             for (node, turn) in axis.turns.iter_mut().enumerate() {
-                for (end, away) in [(first, axis.lengths[node]), (last, whole - axis.lengths[node])] {
+                for (end, away) in [(first, axis.lengths[node]), (last, whole - axis.lengths[node])]
+                {
                     let radius = radii[end as usize];
                     if branch(end) && away < radius {
                         *turn *= smooth_step(away / radius);
@@ -182,12 +189,15 @@ impl Axis {
         let terms: Vec<(f64, f64)> = (0..=steps)
             .map(|step| (first + step) % count)
             .map(|place| match offset(place).map(|offset| offset / reach) {
-                Some(offset) => ((1.0 - offset.abs().powi(3)).max(0.0).powi(3) * share(place), offset),
+                Some(offset) => {
+                    ((1.0 - offset.abs().powi(3)).max(0.0).powi(3) * share(place), offset)
+                }
                 None => (0.0, 0.0),
             })
             .collect();
-        let m: [f64; 5] =
-            std::array::from_fn(|power| terms.iter().map(|(weight, offset)| weight * offset.powi(power as i32)).sum());
+        let m: [f64; 5] = std::array::from_fn(|power| {
+            terms.iter().map(|(weight, offset)| weight * offset.powi(power as i32)).sum()
+        });
         // The first two rows of the inverse of the matrix m[i + j], by cofactors.
         let cofactors = [
             [m[2] * m[4] - m[3] * m[3], m[2] * m[3] - m[1] * m[4], m[1] * m[3] - m[2] * m[2]],
@@ -202,7 +212,9 @@ impl Axis {
         };
         let weights = terms
             .iter()
-            .map(|&(weight, offset)| [row(cofactors[0], weight, offset), row(cofactors[1], weight, offset) / reach])
+            .map(|&(weight, offset)| {
+                [row(cofactors[0], weight, offset), row(cofactors[1], weight, offset) / reach]
+            })
             .collect();
         Fit { first, weights }
     }
@@ -255,7 +267,9 @@ impl Axis {
             }
             if self.lead(point, node) < 0.0 {
                 match self.before(node) {
-                    Some(before) if self.lead(point, before) >= 0.0 => return self.between(point, before),
+                    Some(before) if self.lead(point, before) >= 0.0 => {
+                        return self.between(point, before);
+                    }
                     Some(before) => node = before,
                     None => return self.at(node, 0.0),
                 }
@@ -286,7 +300,8 @@ impl Axis {
         let (from, to) = (station.node as usize, station.next as usize);
         let lead = |fraction: f64| {
             let center = Station { fraction, ..station }.cubic(&self.points, &self.slopes);
-            let tangent = add(scale(self.tangents[from], 1.0 - fraction), scale(self.tangents[to], fraction));
+            let tangent =
+                add(scale(self.tangents[from], 1.0 - fraction), scale(self.tangents[to], fraction));
             dot(subtract(point, center), tangent)
         };
         let ([mut low, mut high], [mut at_low, mut at_high]) = ([0.0, 1.0], [lead(0.0), lead(1.0)]);
@@ -325,16 +340,23 @@ impl Axis {
 
     /// The axis where edits below have moved what its nodes carry by `below` on the mean, and where it now bends by `moved`.
     pub fn bend(&self, below: &[Vector], moved: &[Vector]) -> Bent {
-        let (mut points, mut slopes, mut tangents) = (self.points.clone(), self.slopes.clone(), self.tangents.clone());
+        let (mut points, mut slopes, mut tangents) =
+            (self.points.clone(), self.slopes.clone(), self.tangents.clone());
         if below.iter().any(|moved| *moved != [0.0; 3]) {
-            let plus = |a: &mut Vec<Vector>, b: Vec<Vector>| a.iter_mut().zip(b).for_each(|(a, b)| *a = add(*a, b));
+            let plus = |a: &mut Vec<Vector>, b: Vec<Vector>| {
+                a.iter_mut().zip(b).for_each(|(a, b)| *a = add(*a, b))
+            };
             plus(&mut points, smooth(&self.carried_fits, below, 0));
             plus(&mut slopes, smooth(&self.carried_fits, below, 1));
             tangents = directions(&slopes);
         }
-        let turned: Vec<Vector> =
-            slopes.iter().zip(smooth(&self.fits, moved, 1)).map(|(&slope, change)| add(slope, change)).collect();
-        let mut rotations = transported(&tangents, &directions(&turned), &self.lengths, self.period);
+        let turned: Vec<Vector> = slopes
+            .iter()
+            .zip(smooth(&self.fits, moved, 1))
+            .map(|(&slope, change)| add(slope, change))
+            .collect();
+        let mut rotations =
+            transported(&tangents, &directions(&turned), &self.lengths, self.period);
         for (rotation, &turn) in rotations.iter_mut().zip(&self.turns) {
             *rotation = rotation.part(turn);
         }
@@ -392,8 +414,12 @@ impl Station {
         let s = 1.0 - t;
         let [a, b] = [s * s * (1.0 + 2.0 * t), t * t * (1.0 + 2.0 * s)];
         let [u, v] = [s * s * t * self.length, -t * t * s * self.length];
-        [0, 1, 2]
-            .map(|axis| a * values[from][axis] + b * values[to][axis] + u * slopes[from][axis] + v * slopes[to][axis])
+        [0, 1, 2].map(|axis| {
+            a * values[from][axis]
+                + b * values[to][axis]
+                + u * slopes[from][axis]
+                + v * slopes[to][axis]
+        })
     }
 }
 
@@ -411,8 +437,11 @@ impl Bent {
     /// How a point that belongs to a station moves: with the axis, and turning about it.
     pub fn displacement(&self, station: Station, point: Vector) -> Vector {
         let center = station.cubic(&self.points, &self.slopes);
-        let rotation =
-            self.rotations[station.node as usize].blend(self.rotations[station.next as usize], station.fraction);
-        add(station.cubic(&self.moved, &self.moved_slopes), rotation.change(subtract(point, center)))
+        let rotation = self.rotations[station.node as usize]
+            .blend(self.rotations[station.next as usize], station.fraction);
+        add(
+            station.cubic(&self.moved, &self.moved_slopes),
+            rotation.change(subtract(point, center)),
+        )
     }
 }

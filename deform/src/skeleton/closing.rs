@@ -63,7 +63,9 @@ pub(super) fn closed_pieces(surface: &Surface) -> Result<Vec<Piece>, SkeletonErr
     let mesh_vertex = |vertex: u32| surface.vertices()[vertices[vertex as usize] as usize];
     let joined = join_open_edges(&points, &triangles);
     if joined.iter().zip(0u32..).any(|(&into, vertex)| into != vertex) {
-        triangles.iter_mut().for_each(|triangle| *triangle = triangle.map(|vertex| joined[vertex as usize]));
+        triangles
+            .iter_mut()
+            .for_each(|triangle| *triangle = triangle.map(|vertex| joined[vertex as usize]));
         triangles.retain(|[a, b, c]| a != b && b != c && c != a);
     }
     let mut twins = twins(&triangles, points.len(), mesh_vertex)?;
@@ -137,7 +139,9 @@ fn join_open_edges(points: &[Vector], triangles: &[[u32; 3]]) -> Vec<u32> {
     let mut first: Option<u32> = None;
     for vertex in (0..points.len() as u32).filter(|&vertex| is_open[vertex as usize]) {
         match first {
-            Some(first) if points[first as usize] == points[vertex as usize] => joined[vertex as usize] = first,
+            Some(first) if points[first as usize] == points[vertex as usize] => {
+                joined[vertex as usize] = first
+            }
             _ => first = Some(vertex),
         }
     }
@@ -195,7 +199,11 @@ fn sorted([a, b]: [u32; 2]) -> [u32; 2] {
 const OPEN: u32 = u32::MAX;
 
 /// For each side (three a triangle) the side of the other triangle at its edge. `mesh_vertex` names vertices in errors.
-fn twins(triangles: &[[u32; 3]], vertices: usize, mesh_vertex: impl Fn(u32) -> u32) -> Result<Vec<u32>, SkeletonError> {
+fn twins(
+    triangles: &[[u32; 3]],
+    vertices: usize,
+    mesh_vertex: impl Fn(u32) -> u32,
+) -> Result<Vec<u32>, SkeletonError> {
     let mut twins = vec![OPEN; 3 * triangles.len()];
     let mut fault = None;
     Sides::new(triangles, vertices).for_each_edge(|ends, sides| match sides {
@@ -207,7 +215,9 @@ fn twins(triangles: &[[u32; 3]], vertices: usize, mesh_vertex: impl Fn(u32) -> u
         more => fault = fault.or(Some((ends, more.len()))),
     });
     match fault {
-        Some((edge, faces)) => Err(SkeletonError::NonManifoldEdge { edge: sorted(edge.map(mesh_vertex)), faces }),
+        Some((edge, faces)) => {
+            Err(SkeletonError::NonManifoldEdge { edge: sorted(edge.map(mesh_vertex)), faces })
+        }
         None => Ok(twins),
     }
 }
@@ -251,7 +261,8 @@ fn orient(
     }
     if turned.contains(&true) {
         // A triangle [a, b, c] becomes [a, c, b]: its first side and its last change places.
-        let now = |side: u32| if turned[side as usize / 3] { side + 2 - 2 * (side % 3) } else { side };
+        let now =
+            |side: u32| if turned[side as usize / 3] { side + 2 - 2 * (side % 3) } else { side };
         let old = twins.to_vec();
         for (side, twin) in (0u32..).zip(old) {
             twins[now(side) as usize] = if twin == OPEN { OPEN } else { now(twin) };
@@ -282,8 +293,11 @@ fn part_sheets(triangles: &[[u32; 3]], twins: &[u32]) -> Vec<u32> {
         for place in [side % 3, (side + 1) % 3] {
             let vertex = triangles[side / 3][place];
             let own = (side - side % 3 + place) as u32;
-            if let Some(there) = triangles[twin as usize / 3].iter().position(|&other| other == vertex) {
-                let [a, b] = [root(&mut sheets, own), root(&mut sheets, twin - twin % 3 + there as u32)];
+            if let Some(there) =
+                triangles[twin as usize / 3].iter().position(|&other| other == vertex)
+            {
+                let [a, b] =
+                    [root(&mut sheets, own), root(&mut sheets, twin - twin % 3 + there as u32)];
                 sheets[a.max(b) as usize] = a.min(b);
             }
         }
@@ -317,7 +331,8 @@ fn pieces(
     let mut numbers = vec![OPEN; corners.len()];
     let mut stands_for = vec![(OPEN, OPEN); all_points.len()];
     let mut closed = Vec::with_capacity(count);
-    let largest = all_points.iter().flatten().fold(0.0f64, |largest, value| largest.max(value.abs()));
+    let largest =
+        all_points.iter().flatten().fold(0.0f64, |largest, value| largest.max(value.abs()));
     let unit = if largest > 0.0 { largest } else { 1.0 };
     for (piece, members) in members.iter().enumerate() {
         let mut points = Vec::new();
@@ -369,7 +384,12 @@ fn pieces(
 }
 
 /// Closes every loop of open edges by triangles about its centre. At most one open edge leaves each vertex.
-fn close_holes(points: &mut Vec<Vector>, triangles: &mut Vec<[u32; 3]>, starts: &[u32], next: &mut HashMap<u32, u32>) {
+fn close_holes(
+    points: &mut Vec<Vector>,
+    triangles: &mut Vec<[u32; 3]>,
+    starts: &[u32],
+    next: &mut HashMap<u32, u32>,
+) {
     for &start in starts {
         let mut rim = Vec::new();
         let mut vertex = start;

@@ -106,7 +106,12 @@ struct Walk {
 }
 
 impl Walk {
-    fn new(points: &[Vector], closed: bool, start: usize, dragged: &[usize]) -> Result<Self, CurveError> {
+    fn new(
+        points: &[Vector],
+        closed: bool,
+        start: usize,
+        dragged: &[usize],
+    ) -> Result<Self, CurveError> {
         let count = points.len();
         let steps = if closed { count } else { count - 1 };
         let nodes: Vec<usize> = (0..=steps).map(|step| (start + step) % count).collect();
@@ -116,13 +121,19 @@ impl Walk {
                 let segment = subtract(points[pair[1]], points[pair[0]]);
                 // In units of the largest part, so that no square overflows.
                 let unit = segment.iter().fold(0.0f64, |largest, value| largest.max(value.abs()));
-                if unit > 0.0 { unit * dot(scale(segment, 1.0 / unit), scale(segment, 1.0 / unit)).sqrt() } else { 0.0 }
+                if unit > 0.0 {
+                    unit * dot(scale(segment, 1.0 / unit), scale(segment, 1.0 / unit)).sqrt()
+                } else {
+                    0.0
+                }
             })
             .collect();
         let total: f64 = lengths.iter().sum();
         let is_bad = |length: &f64| !(*length > 0.0 && length.is_finite());
-        let bad =
-            lengths.iter().position(is_bad).or_else(|| lengths.iter().position(|length| is_bad(&(length / total))));
+        let bad = lengths
+            .iter()
+            .position(is_bad)
+            .or_else(|| lengths.iter().position(|length| is_bad(&(length / total))));
         if let Some(segment) = bad {
             return Err(CurveError::Segment { nodes: [nodes[segment], nodes[segment + 1]] });
         }
@@ -200,8 +211,9 @@ impl Walk {
         }
         let factor = cholesky(gram).ok_or(CurveError::NotSolvable)?;
         moments.iter_mut().for_each(|moments| solve(&factor, moments));
-        let influences: Vec<Vec<f64>> =
-            (0..dragged).map(|place| self.influence(count, place, |row| moments[place][row])).collect();
+        let influences: Vec<Vec<f64>> = (0..dragged)
+            .map(|place| self.influence(count, place, |row| moments[place][row]))
+            .collect();
         if influences.iter().flatten().all(|value| value.is_finite()) {
             Ok(influences)
         } else {
@@ -236,9 +248,11 @@ fn cholesky(mut matrix: Vec<Vec<f64>>) -> Option<Vec<Vec<f64>>> {
         for column in 0..=row {
             let (done, rest) = matrix.split_at(row);
             let other = if column < row { &done[column] } else { &rest[0] };
-            let product: f64 = rest[0][..column].iter().zip(&other[..column]).map(|(a, b)| a * b).sum();
+            let product: f64 =
+                rest[0][..column].iter().zip(&other[..column]).map(|(a, b)| a * b).sum();
             let value = rest[0][column] - product;
-            matrix[row][column] = if column < row { value / matrix[column][column] } else { value.sqrt() };
+            matrix[row][column] =
+                if column < row { value / matrix[column][column] } else { value.sqrt() };
         }
         // Also where the root was of a negative number.
         if !(matrix[row][row] > 0.0 && matrix[row][row].is_finite()) {
@@ -255,7 +269,8 @@ fn solve(factor: &[Vec<f64>], values: &mut [f64]) {
         values[row] = (values[row] - product) / factor[row][row];
     }
     for row in (0..values.len()).rev() {
-        let product: f64 = (row + 1..values.len()).map(|below| factor[below][row] * values[below]).sum();
+        let product: f64 =
+            (row + 1..values.len()).map(|below| factor[below][row] * values[below]).sum();
         values[row] = (values[row] - product) / factor[row][row];
     }
 }
@@ -361,8 +376,10 @@ impl SkeletonDrag {
                 if closed {
                     nodes.pop();
                 }
-                let points: Vec<Vector> = nodes.iter().map(|&node| skeleton.nodes()[node as usize]).collect();
-                let inner = |&place: &usize| nodes.iter().position(|&node| node as usize == dragged[place]);
+                let points: Vec<Vector> =
+                    nodes.iter().map(|&node| skeleton.nodes()[node as usize]).collect();
+                let inner =
+                    |&place: &usize| nodes.iter().position(|&node| node as usize == dragged[place]);
                 let wanted: Vec<usize> = places.iter().filter_map(inner).collect();
                 let deformation = CurveDeformation::new(&points, closed, &wanted)
                     .map_err(|source| DragError::Curve { curve, source })?;
@@ -382,8 +399,11 @@ impl SkeletonDrag {
     pub fn displacement(&self, by: &[Vector]) -> Vec<Vector> {
         let mut displacement = vec![[0.0; 3]; self.nodes];
         for dragged in &self.curves {
-            let own: Vec<Vector> =
-                dragged.places.iter().map(|&place| by.get(place).copied().unwrap_or_default()).collect();
+            let own: Vec<Vector> = dragged
+                .places
+                .iter()
+                .map(|&place| by.get(place).copied().unwrap_or_default())
+                .collect();
             // A node where a curve comes back to its own branch node is met twice, both times unmoved.
             for (&node, moved) in dragged.nodes.iter().zip(dragged.deformation.displacement(&own)) {
                 displacement[node as usize] = moved;

@@ -22,7 +22,8 @@ fn dense_reference(points: &[Vector], closed: bool, prescribed: &[(usize, f64)])
     }
     let mut rows: Vec<Vec<f64>> = (0..count)
         .map(|i| {
-            let entry = |j: usize| (0..count).map(|k| laplacian[i][k] / mass[k] * laplacian[k][j]).sum();
+            let entry =
+                |j: usize| (0..count).map(|k| laplacian[i][k] / mass[k] * laplacian[k][j]).sum();
             (0..count).map(entry).chain([0.0]).collect()
         })
         .collect();
@@ -33,12 +34,17 @@ fn dense_reference(points: &[Vector], closed: bool, prescribed: &[(usize, f64)])
         rows[node][count] = value;
     }
     for pivot in 0..count {
-        let best = (pivot..count).max_by(|&a, &b| rows[a][pivot].abs().total_cmp(&rows[b][pivot].abs())).unwrap();
+        let best = (pivot..count)
+            .max_by(|&a, &b| rows[a][pivot].abs().total_cmp(&rows[b][pivot].abs()))
+            .unwrap();
         rows.swap(pivot, best);
         let leading = rows[pivot].clone();
         for (_, row) in rows.iter_mut().enumerate().filter(|(number, _)| *number != pivot) {
             let factor = row[pivot] / leading[pivot];
-            row.iter_mut().zip(&leading).skip(pivot).for_each(|(value, leading)| *value -= factor * leading);
+            row.iter_mut()
+                .zip(&leading)
+                .skip(pivot)
+                .for_each(|(value, leading)| *value -= factor * leading);
         }
     }
     (0..count).map(|row| rows[row][count] / rows[row][row]).collect()
@@ -89,7 +95,9 @@ proptest! {
 fn on_even_nodes_it_is_the_natural_spline_that_central_differences_give() {
     // From numpy.linalg.solve of the assembled system for 6 segments of length 1 and node 2 dragged by 1.
     let curve = CurveDeformation::new(&line(7), false, &[2]).unwrap();
-    for (value, wanted) in curve.influence(0).unwrap().iter().zip([0.0, 10.0, 17.0, 18.0, 14.5, 8.0, 0.0]) {
+    for (value, wanted) in
+        curve.influence(0).unwrap().iter().zip([0.0, 10.0, 17.0, 18.0, 14.5, 8.0, 0.0])
+    {
         assert!((value - wanted / 17.0).abs() < 1e-14, "{value} {wanted}");
     }
 }
@@ -120,9 +128,14 @@ fn a_loop_is_carried_by_one_drag_and_bent_by_two() {
         .collect();
     let one = CurveDeformation::new(&points, true, &[5]).unwrap();
     assert!(one.displacement(&[[1.0, 2.0, 3.0]]).iter().all(|moved| *moved == [1.0, 2.0, 3.0]));
-    let two = CurveDeformation::new(&points, true, &[5, 17]).unwrap().displacement(&[[0.0, 0.0, 1.0], [0.0; 3]]);
+    let two = CurveDeformation::new(&points, true, &[5, 17])
+        .unwrap()
+        .displacement(&[[0.0, 0.0, 1.0], [0.0; 3]]);
     for (node, moved) in two.iter().enumerate() {
-        assert!((moved[2] - two[(34 - node) % 24][2]).abs() < 1e-13, "symmetric about the dragged node");
+        assert!(
+            (moved[2] - two[(34 - node) % 24][2]).abs() < 1e-13,
+            "symmetric about the dragged node"
+        );
         assert!((-1e-13..=1.0 + 1e-13).contains(&moved[2]));
     }
 }
@@ -138,10 +151,15 @@ fn what_cannot_be_dragged_is_named() {
     assert_eq!(fails(&line(4), false, &[1, 2, 1]), "node 1 is dragged twice");
     let mut same = line(5);
     same[3] = same[2];
-    assert!(fails(&same, false, &[1]).starts_with("nodes 2 and 3 of the curve are at the same place"));
+    assert!(
+        fails(&same, false, &[1]).starts_with("nodes 2 and 3 of the curve are at the same place")
+    );
     same[3] = [1e308, -1e308, 1e308];
     assert!(CurveDeformation::new(&same, false, &[1]).is_err());
-    assert_eq!(CurveDeformation::new(&line(3), false, &[]).unwrap().displacement(&[]), [[0.0; 3]; 3]);
+    assert_eq!(
+        CurveDeformation::new(&line(3), false, &[]).unwrap().displacement(&[]),
+        [[0.0; 3]; 3]
+    );
 }
 
 #[test]
@@ -153,7 +171,10 @@ fn only_the_curves_of_the_dragged_nodes_move() {
     let drag = SkeletonDrag::new(&skeleton, &[10, 2, 11]).unwrap();
     assert_eq!(drag.curves().collect::<Vec<_>>(), [0, 2]);
     let moved = drag.displacement(&[[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.5]]);
-    assert_eq!((moved[10], moved[2], moved[11]), ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.5]));
+    assert_eq!(
+        (moved[10], moved[2], moved[11]),
+        ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.5])
+    );
     assert!([0, 4, 5, 6, 7, 8, 12].iter().all(|&node| moved[node] == [0.0; 3]));
     assert!(drag.displacement(&[[0.0; 3]; 3]).iter().all(|moved| *moved == [0.0; 3]));
 
@@ -163,13 +184,17 @@ fn only_the_curves_of_the_dragged_nodes_move() {
         "node 0 of the skeleton is the end of a curve and is pinned; the nearest node that can be dragged is node 1 at (1, 0, 0)"
     );
     assert_eq!(SkeletonDrag::new(&skeleton, &[2, 2]).unwrap_err(), DragError::Twice { node: 2 });
-    assert!(SkeletonDrag::new(&skeleton, &[99]).unwrap_err().to_string().contains("is on no curve"));
+    assert!(
+        SkeletonDrag::new(&skeleton, &[99]).unwrap_err().to_string().contains("is on no curve")
+    );
 }
 
 #[test]
 fn a_loop_at_a_branch_node_is_pinned_there_and_a_free_one_nowhere() {
-    let nodes = vec![[-1.0, 0.0, 0.0], [0.0; 3], [1.0, 1.0, 0.0], [2.0, 0.0, 0.0], [1.0, -1.0, 0.0]];
-    let skeleton = Skeleton::new(nodes.clone(), vec![vec![0, 1], vec![1, 2, 3, 4, 1]], vec![]).unwrap();
+    let nodes =
+        vec![[-1.0, 0.0, 0.0], [0.0; 3], [1.0, 1.0, 0.0], [2.0, 0.0, 0.0], [1.0, -1.0, 0.0]];
+    let skeleton =
+        Skeleton::new(nodes.clone(), vec![vec![0, 1], vec![1, 2, 3, 4, 1]], vec![]).unwrap();
     let moved = SkeletonDrag::new(&skeleton, &[3]).unwrap().displacement(&[[0.0, 0.0, 1.0]]);
     assert_eq!((moved[0], moved[1], moved[3]), ([0.0; 3], [0.0; 3], [0.0, 0.0, 1.0]));
 

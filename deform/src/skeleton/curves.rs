@@ -38,7 +38,12 @@ pub(super) struct Curves {
 impl Curves {
     /// `originals` are surface vertices, each with the vertex of the graph it has become part of; `surface` has the points that
     /// the graph lies amid.
-    pub fn new(graph: Graph, originals: &[(u32, u32)], surface: &NearestPoints, settings: &SkeletonSettings) -> Self {
+    pub fn new(
+        graph: Graph,
+        originals: &[(u32, u32)],
+        surface: &NearestPoints,
+        settings: &SkeletonSettings,
+    ) -> Self {
         let radii = graph.points.iter().map(|&point| surface.distance(point)).collect();
         let mut pruning = Pruning { graph, radii };
         pruning.prune(settings.shortest_branch);
@@ -81,7 +86,9 @@ impl Pruning {
         let mut chains = Vec::new();
         let mut walked = vec![false; self.graph.points.len()];
         let count = self.graph.points.len() as u32;
-        for start in (0..count).filter(|&vertex| self.is_alive(vertex) && !matches!(self.degree(vertex), 0 | 2)) {
+        for start in (0..count)
+            .filter(|&vertex| self.is_alive(vertex) && !matches!(self.degree(vertex), 0 | 2))
+        {
             for &second in &self.graph.neighbours[start as usize] {
                 let vertices = self.walk(start, second);
                 // Each chain is met from both ends; the one walk that began at the lower end counts.
@@ -117,7 +124,8 @@ impl Pruning {
     fn chain(&self, vertices: Vec<u32>, walked: &mut [bool]) -> Chain {
         vertices.iter().for_each(|&vertex| walked[vertex as usize] = true);
         let place = |vertex: u32| self.graph.points[vertex as usize];
-        let length = vertices.windows(2).map(|pair| length(subtract(place(pair[1]), place(pair[0])))).sum();
+        let length =
+            vertices.windows(2).map(|pair| length(subtract(place(pair[1]), place(pair[0])))).sum();
         Chain { vertices, length }
     }
 
@@ -131,7 +139,13 @@ impl Pruning {
                 let [first, last] = [chain.vertices[0], chain.vertices[chain.vertices.len() - 1]];
                 let [radius_first, radius_last] = [first, last].map(|end| self.radii[end as usize]);
                 // The widest, not where a branch begins: at a corner that may lie well off the middle.
-                let widest = || chain.vertices.iter().map(|&vertex| self.radii[vertex as usize]).fold(0.0, f64::max);
+                let widest = || {
+                    chain
+                        .vertices
+                        .iter()
+                        .map(|&vertex| self.radii[vertex as usize])
+                        .fold(0.0, f64::max)
+                };
                 let is_short = || chain.length < shortest * widest();
                 match (self.degree(first) == 1, self.degree(last) == 1) {
                     (true, true) => (alone && chain.length < LONE * widest())
@@ -166,10 +180,16 @@ impl Pruning {
                 let away = |vertex: u32| {
                     others()
                         .flat_map(|(_, chain)| chain.vertices.windows(2))
-                        .map(|pair| distance_to_segment(place(vertex), [place(pair[0]), place(pair[1])]))
+                        .map(|pair| {
+                            distance_to_segment(place(vertex), [place(pair[0]), place(pair[1])])
+                        })
                         .fold(f64::INFINITY, f64::min)
                 };
-                vertices.iter().map(|&vertex| away(vertex)).fold(0.0, f64::max).min(chains[own].length)
+                vertices
+                    .iter()
+                    .map(|&vertex| away(vertex))
+                    .fold(0.0, f64::max)
+                    .min(chains[own].length)
             })
             .collect();
         chains.iter_mut().zip(reaches).for_each(|(chain, reach)| chain.length = reach);
@@ -181,7 +201,9 @@ impl Pruning {
     /// from there until it is about one radius from the cap.
     fn finish_ends(&mut self, surface: &NearestPoints) {
         for chain in self.chains() {
-            for mut vertices in [chain.vertices.clone(), chain.vertices.iter().rev().copied().collect()] {
+            for mut vertices in
+                [chain.vertices.clone(), chain.vertices.iter().rev().copied().collect()]
+            {
                 if self.degree(vertices[0]) != 1 {
                     continue;
                 }
@@ -204,20 +226,28 @@ impl Pruning {
         let whole = runs[runs.len() - 1];
         let at = |run: f64| runs.partition_point(|&own| own < run).min(vertices.len() - 1);
         let largest = |from: usize, to: usize| {
-            vertices[from..=to].iter().map(|&vertex| self.radii[vertex as usize]).fold(0.0, f64::max)
+            vertices[from..=to]
+                .iter()
+                .map(|&vertex| self.radii[vertex as usize])
+                .fold(0.0, f64::max)
         };
         // The distance to the surface where the end has become a tube, and the mean distance to it across, which is more where
         // the tube is flat.
         let depth = largest(0, at(2.0 * self.radii[vertices[0] as usize]));
         let [near, far] = [at(depth), at(2.5 * depth)];
-        let width = match surface.mean_across([place(vertices[near]), place(vertices[far])], FLATTEST * depth) {
+        let width = match surface
+            .mean_across([place(vertices[near]), place(vertices[far])], FLATTEST * depth)
+        {
             Some(width) if near < far => width.max(depth),
             _ => depth,
         };
         let is_flat = width > FLAT * depth;
         let whole_tube = at(width);
         let reached = 0.93 * largest(0, whole_tube);
-        let cut = match vertices[..whole_tube].iter().position(|&vertex| self.radii[vertex as usize] >= reached) {
+        let cut = match vertices[..whole_tube]
+            .iter()
+            .position(|&vertex| self.radii[vertex as usize] >= reached)
+        {
             Some(cut) if !is_flat => cut,
             _ => whole_tube,
         };
@@ -232,12 +262,14 @@ impl Pruning {
         let start = place(vertices[cut]);
         let ahead = |run: f64| add(start, scale(along, run));
         let step = 0.05 * depth;
-        let steps =
-            (0..200).take_while(|&count| surface.distance(ahead(f64::from(count) * step)) >= CAP * depth).count();
+        let steps = (0..200)
+            .take_while(|&count| surface.distance(ahead(f64::from(count) * step)) >= CAP * depth)
+            .count();
         if steps == 0 {
             return;
         }
-        let reach = (steps as f64 - 1.0) * step - if is_flat { WIDE * (width - FLAT * depth) } else { 0.0 };
+        let reach =
+            (steps as f64 - 1.0) * step - if is_flat { WIDE * (width - FLAT * depth) } else { 0.0 };
         // As many of its vertices as lie as close as those before them.
         let spacing = (runs[back] - runs[cut]) / (back - cut) as f64;
         let wanted = ((reach / spacing).round().max(0.0) as usize).min(cut);
@@ -256,7 +288,8 @@ impl Pruning {
     /// curve runs. `runs` are the lengths from the end to each vertex.
     fn cut_straight(&mut self, vertices: &[u32], runs: &[f64]) {
         let first = self.radii[vertices[0] as usize];
-        let excess = |place: usize| self.radii[vertices[place] as usize] - first - STRAIGHT * runs[place];
+        let excess =
+            |place: usize| self.radii[vertices[place] as usize] - first - STRAIGHT * runs[place];
         let most = (0..vertices.len()).map(excess).fold(0.0, f64::max);
         // Not to the last node before the turn: where exactly it lies is blurred by the spacing of the vertices.
         let cut = (0..vertices.len()).position(|place| excess(place) >= 0.7 * most).unwrap_or(0);
@@ -330,10 +363,14 @@ impl Pruning {
             })
         };
         let chains = self.chains();
-        let polylines: Vec<Vec<u32>> =
-            chains.iter().map(|chain| chain.vertices.iter().map(|&vertex| number(vertex)).collect()).collect();
-        let node_of_original =
-            originals.iter().map(|&(_, vertex)| number(self.graph.merged[vertex as usize])).collect();
+        let polylines: Vec<Vec<u32>> = chains
+            .iter()
+            .map(|chain| chain.vertices.iter().map(|&vertex| number(vertex)).collect())
+            .collect();
+        let node_of_original = originals
+            .iter()
+            .map(|&(_, vertex)| number(self.graph.merged[vertex as usize]))
+            .collect();
         Curves { nodes, polylines, node_of_original }
     }
 }

@@ -56,11 +56,14 @@ pub(super) fn from_vertices(
                 let mut length = reached + distance(a, c);
                 if is_final[other as usize]
                     && let Some((other, _)) = best[other as usize]
-                    && let Some(straight) = straight_front(subtract(a, c), subtract(b, c), reached, other)
+                    && let Some(straight) =
+                        straight_front(subtract(a, c), subtract(b, c), reached, other)
                 {
                     length = length.min(straight);
                 }
-                if length <= farthest && best[target as usize].is_none_or(|(known, _)| length < known) {
+                if length <= farthest
+                    && best[target as usize].is_none_or(|(known, _)| length < known)
+                {
                     best[target as usize] = Some((length, source));
                     front.push(Reverse(Front { distance: length, vertex: target }));
                 }
@@ -92,7 +95,8 @@ fn straight_front(to_a: Vector, to_b: Vector, at_a: f64, at_b: f64) -> Option<f6
         (bb * x[0] * y[0] - ab * (x[0] * y[1] + x[1] * y[0]) + aa * x[1] * y[1]) / determinant
     };
     let (ones, known) = ([1.0, 1.0], [at_a, at_b]);
-    let [quadratic, linear, constant] = [inverse(ones, ones), inverse(ones, known), inverse(known, known) - 1.0];
+    let [quadratic, linear, constant] =
+        [inverse(ones, ones), inverse(ones, known), inverse(known, known) - 1.0];
     let discriminant = linear * linear - quadratic * constant;
     if discriminant < 0.0 {
         return None;
@@ -142,7 +146,8 @@ mod tests {
         let error = |count: usize| {
             let mesh = shapes::plate([count, count], [0.0; 2], [1.0; 2]);
             let surface = Surface::extract(&mesh, &FeatureSettings::default()).unwrap();
-            let distances = from_vertices(surface.points(), surface.triangles(), [0].into_iter(), 10.0);
+            let distances =
+                from_vertices(surface.points(), surface.triangles(), [0].into_iter(), 10.0);
             let error = |(vertex, found): (usize, &Option<(f64, u32)>)| {
                 (found.unwrap().0 - distance(surface.points()[vertex], surface.points()[0])).abs()
             };
@@ -156,7 +161,8 @@ mod tests {
     fn from_a_side_they_are_exact_and_end_at_the_farthest() {
         let mesh = shapes::plate([10, 4], [0.0; 2], [1.0, 0.4]);
         let surface = Surface::extract(&mesh, &FeatureSettings::default()).unwrap();
-        let side = (0..surface.points().len() as u32).filter(|&vertex| surface.points()[vertex as usize][0] == 0.0);
+        let side = (0..surface.points().len() as u32)
+            .filter(|&vertex| surface.points()[vertex as usize][0] == 0.0);
         let distances = from_vertices(surface.points(), surface.triangles(), side, 0.55);
         for (point, found) in surface.points().iter().zip(&distances) {
             match found {

@@ -68,7 +68,11 @@ impl SkeletonEditor {
         let skeleton = self.skeleton()?;
         if self.near.is_empty() {
             let least = NEAR * diagonal(skeleton.nodes());
-            self.near = skeleton.radii(self.surface.points()).iter().map(|radius| radius.max(least)).collect();
+            self.near = skeleton
+                .radii(self.surface.points())
+                .iter()
+                .map(|radius| radius.max(least))
+                .collect();
         }
         let nodes = edit
             .moves()
@@ -82,14 +86,24 @@ impl SkeletonEditor {
                 if distance <= within {
                     Ok(node)
                 } else {
-                    Err(SkeletonEditError::Far { field: field(edit, index), at: drag.at, distance, nearest, within })
+                    Err(SkeletonEditError::Far {
+                        field: field(edit, index),
+                        at: drag.at,
+                        distance,
+                        nearest,
+                        within,
+                    })
                 }
             })
             .collect::<Result<Vec<usize>, _>>()?;
         for (index, node) in nodes.iter().enumerate() {
             if let Some(first) = nodes[..index].iter().position(|other| other == node) {
                 let [first, second] = [first, index].map(|index| field(edit, index));
-                return Err(SkeletonEditError::Same { first, second, node: skeleton.nodes()[*node] });
+                return Err(SkeletonEditError::Same {
+                    first,
+                    second,
+                    node: skeleton.nodes()[*node],
+                });
             }
         }
         match SkeletonDrag::new(&skeleton, &nodes) {
@@ -113,7 +127,9 @@ impl SkeletonEditor {
     ) -> Result<Vec<Vector>, SkeletonEditError> {
         let nodes = self.nodes(edit)?;
         let by: Vec<Vector> = edit.moves().iter().map(|drag| drag.by).collect();
-        let is_this = |bound: &Bound| bound.nodes == nodes && bound.skinning == edit.skinning && bound.held == held;
+        let is_this = |bound: &Bound| {
+            bound.nodes == nodes && bound.skinning == edit.skinning && bound.held == held
+        };
         let bound = match self.skins.iter().position(is_this) {
             Some(found) => self.skins.remove(found),
             None => {
@@ -140,7 +156,9 @@ fn extracted(
     skeleton: &OnceLock<Result<Arc<Skeleton>, SkeletonError>>,
     surface: &Surface,
 ) -> Result<Arc<Skeleton>, SkeletonError> {
-    skeleton.get_or_init(|| Skeleton::extract(surface, &SkeletonSettings::default()).map(Arc::new)).clone()
+    skeleton
+        .get_or_init(|| Skeleton::extract(surface, &SkeletonSettings::default()).map(Arc::new))
+        .clone()
 }
 
 /// The field that gives the place of a drag.
@@ -199,7 +217,9 @@ pub enum SkeletonEditError {
         source: DragError,
     },
     /// No vertex of the handle is on what moves.
-    #[error("nothing follows: all that the dragged curve carries is fixed, or outside of the features and the region")]
+    #[error(
+        "nothing follows: all that the dragged curve carries is fixed, or outside of the features and the region"
+    )]
     NothingFollows,
     /// The skeleton is not one of this surface.
     #[error(transparent)]
@@ -219,7 +239,8 @@ mod tests {
         let nodes: Vec<Vector> = (0..=40).map(|node| [0.0, 0.0, 0.25 * f64::from(node)]).collect();
         let mesh = shapes::tube(&nodes, 1.0, 16);
         let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).unwrap());
-        let carriers = surface.points().iter().map(|point| (4.0 * point[2]).round() as u32).collect();
+        let carriers =
+            surface.points().iter().map(|point| (4.0 * point[2]).round() as u32).collect();
         let skeleton = Skeleton::new(nodes, vec![(0..=40).collect()], carriers).unwrap();
         Editor::new(surface).unwrap().with_skeleton(Arc::new(skeleton)).unwrap()
     }
@@ -240,13 +261,19 @@ mod tests {
              within 1 of a node"
         );
         assert_eq!(
-            refusal(json!({ "moves": [{ "at": [0, 0, 5], "by": [1, 0, 0] }, { "at": [0, 0, 9.9], "by": [1, 0, 0] }] })),
+            refusal(
+                json!({ "moves": [{ "at": [0, 0, 5], "by": [1, 0, 0] }, { "at": [0, 0, 9.9], "by": [1, 0, 0] }] })
+            ),
             "edit 0 (skeleton): moves[1].at: node 40 of the skeleton is the end of a curve and is pinned; the nearest node that can \
              be dragged is node 39 at (0, 0, 9.75)"
         );
-        let same =
-            refusal(json!({ "moves": [{ "at": [0, 0, 5], "by": [1, 0, 0] }, { "at": [0.1, 0, 5], "by": [0, 0, 0] }] }));
-        assert!(same.contains("moves[1].at: means the same node of the skeleton as moves[0].at"), "{same}");
+        let same = refusal(
+            json!({ "moves": [{ "at": [0, 0, 5], "by": [1, 0, 0] }, { "at": [0.1, 0, 5], "by": [0, 0, 0] }] }),
+        );
+        assert!(
+            same.contains("moves[1].at: means the same node of the skeleton as moves[0].at"),
+            "{same}"
+        );
         let half = json!({ "half_space": { "origin": [0, 0, 20], "normal": [0, 0, 1] } });
         assert!(
             refusal(json!({ "at": [0, 0, 5], "by": [1, 0, 0], "region": half }))
@@ -260,7 +287,8 @@ mod tests {
     #[test]
     fn a_stack_depends_on_its_edits_alone() {
         let first = json!({ "skeleton": { "at": [0, 0, 4], "by": [0, 2, 0] } });
-        let second = json!({ "skeleton": { "at": [0, 0, 7], "by": [1, 0, 0], "skinning": "nearest" } });
+        let second =
+            json!({ "skeleton": { "at": [0, 0, 7], "by": [1, 0, 0], "skinning": "nearest" } });
         let mut muted = second.clone();
         muted["skeleton"]["muted"] = true.into();
         let mut used = editor();
@@ -277,7 +305,10 @@ mod tests {
         assert!(used.displacement(&[]).unwrap().iter().all(|moved| *moved == [0.0; 3]));
         // Nothing of a stack is evaluated where one edit is wrong.
         assert!(
-            used.displacement(&stack(json!([first, { "skeleton": { "at": [0, 0, 0], "by": [0, 1, 0] } }]))).is_err()
+            used.displacement(&stack(
+                json!([first, { "skeleton": { "at": [0, 0, 0], "by": [0, 1, 0] } }])
+            ))
+            .is_err()
         );
     }
 
@@ -285,12 +316,15 @@ mod tests {
     fn what_is_fixed_or_outside_of_the_region_stays() {
         let below = json!({ "half_space": { "origin": [0, 0, 2], "normal": [0, 0, -1] } });
         let above = json!({ "half_space": { "origin": [0, 0, 6], "normal": [0, 0, -1] } });
-        let edits =
-            json!([{ "skeleton": { "at": [0, 0, 4], "by": [0, 2, 0], "region": above, "fixed_region": below } }]);
+        let edits = json!([{ "skeleton": { "at": [0, 0, 4], "by": [0, 2, 0], "region": above, "fixed_region": below } }]);
         let mut editor = editor();
         let moved = editor.displacement(&stack(edits)).unwrap();
         for (point, moved) in editor.surface().points().iter().zip(&moved) {
-            assert_eq!(*moved == [0.0; 3], !(2.01..=6.01).contains(&point[2]), "{point:?} {moved:?}");
+            assert_eq!(
+                *moved == [0.0; 3],
+                !(2.01..=6.01).contains(&point[2]),
+                "{point:?} {moved:?}"
+            );
         }
     }
 }

@@ -155,7 +155,10 @@ impl Skeleton {
             }
             nodes.extend(found.nodes.iter().map(|&node| piece.frame.leave(node)));
             curves.extend(
-                found.polylines.into_iter().map(|polyline| polyline.iter().map(|node| node + offset).collect()),
+                found
+                    .polylines
+                    .into_iter()
+                    .map(|polyline| polyline.iter().map(|node| node + offset).collect()),
             );
         }
         Ok(Self::new(nodes, curves, node_of_vertex)?)

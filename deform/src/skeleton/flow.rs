@@ -23,7 +23,11 @@ const DEPTH: f64 = 0.5;
 const REACH: f64 = 2.0;
 
 /// Contracts a surface of diagonal 1 until it hardly has an area (Tagliasacchi, Alhashim, Olson and Zhang 2012).
-pub(super) fn contract(mesh: &mut Triangulation, tree: &NearestPoints, settings: &SkeletonSettings) {
+pub(super) fn contract(
+    mesh: &mut Triangulation,
+    tree: &NearestPoints,
+    settings: &SkeletonSettings,
+) {
     let first_area = mesh.area();
     let mut flow = Flow {
         shortest: settings.shortest_edge,
@@ -104,7 +108,8 @@ impl Flow<'_> {
                 weights.push((last, mesh.cotangent(next, last, vertex)));
             }
             weights.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-            let mut row = Row { entries: Vec::with_capacity(weights.len() / 2 + 1), right_side: [0.0; 3] };
+            let mut row =
+                Row { entries: Vec::with_capacity(weights.len() / 2 + 1), right_side: [0.0; 3] };
             let mut total = 0.0;
             for same in weights.chunk_by(|a, b| a.0 == b.0) {
                 let weight: f64 = same.iter().map(|(_, weight)| weight).sum();
@@ -112,7 +117,8 @@ impl Flow<'_> {
                 total += weight;
                 match slots[other as usize] {
                     NONE => {
-                        row.right_side = subtract(row.right_side, scale(mesh.points[other as usize], weight));
+                        row.right_side =
+                            subtract(row.right_side, scale(mesh.points[other as usize], weight));
                     }
                     column => row.entries.push((column, weight)),
                 }
@@ -139,13 +145,16 @@ impl Flow<'_> {
                     self.mesh.neighbours(vertex, &mut around);
                     let mut short: Vec<(f64, u32)> = around
                         .iter()
-                        .filter(|&&other| !(self.fixed[vertex as usize] && self.fixed[other as usize]))
+                        .filter(|&&other| {
+                            !(self.fixed[vertex as usize] && self.fixed[other as usize])
+                        })
                         .map(|&other| (self.mesh.length(vertex, other), other))
                         .filter(|edge| edge.0 < self.shortest)
                         .collect();
                     short.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-                    let found =
-                        short.into_iter().find(|&(_, other)| self.mesh.can_collapse(vertex, other, &mut self.work));
+                    let found = short
+                        .into_iter()
+                        .find(|&(_, other)| self.mesh.can_collapse(vertex, other, &mut self.work));
                     let Some((_, other)) = found else { break };
                     self.collapse(vertex, other);
                 }
@@ -168,7 +177,9 @@ impl Flow<'_> {
         // Of two poles the nearer is the more likely to be still inside.
         let distance = |pole: Vector| length(subtract(pole, place));
         let nearer = match (self.poles[kept as usize], self.poles[gone as usize]) {
-            (Some(own), Some(other)) => Some(if distance(other) < distance(own) { other } else { own }),
+            (Some(own), Some(other)) => {
+                Some(if distance(other) < distance(own) { other } else { own })
+            }
             (own, other) => own.or(other),
         };
         self.poles[kept as usize] = nearer;
@@ -234,7 +245,8 @@ impl Flow<'_> {
             triangles.clear();
             for &inside in &disc {
                 self.mesh.neighbours(inside, &mut around);
-                edges += around.iter().filter(|&&other| other > inside && disc.contains(&other)).count();
+                edges +=
+                    around.iter().filter(|&&other| other > inside && disc.contains(&other)).count();
                 triangles.extend(&self.mesh.triangles_at[inside as usize]);
             }
             triangles.sort_unstable();

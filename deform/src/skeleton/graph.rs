@@ -65,15 +65,25 @@ impl Skeleton {
     /// assert_eq!((skeleton.branch_count(), skeleton.end_count(), skeleton.loop_count()), (0, 2, 0));
     /// # Ok::<(), tombolo_deform::skeleton::InvalidSkeleton>(())
     /// ```
-    pub fn new(nodes: Vec<Vector>, curves: Vec<Vec<u32>>, node_of_vertex: Vec<u32>) -> Result<Self, InvalidSkeleton> {
+    pub fn new(
+        nodes: Vec<Vector>,
+        curves: Vec<Vec<u32>>,
+        node_of_vertex: Vec<u32>,
+    ) -> Result<Self, InvalidSkeleton> {
         if nodes.is_empty() {
             return Err(InvalidSkeleton::NoNodes);
         }
-        if let Some(node) = nodes.iter().position(|node| !node.iter().all(|value| value.is_finite())) {
+        if let Some(node) =
+            nodes.iter().position(|node| !node.iter().all(|value| value.is_finite()))
+        {
             return Err(InvalidSkeleton::NotFinite { node });
         }
         if let Some(vertex) = node_of_vertex.iter().position(|&node| node as usize >= nodes.len()) {
-            return Err(InvalidSkeleton::NoSuchCarrier { vertex, node: node_of_vertex[vertex], nodes: nodes.len() });
+            return Err(InvalidSkeleton::NoSuchCarrier {
+                vertex,
+                node: node_of_vertex[vertex],
+                nodes: nodes.len(),
+            });
         }
         let mut degrees = vec![0u32; nodes.len()];
         let mut inner = vec![false; nodes.len()];
@@ -98,7 +108,9 @@ impl Skeleton {
             }
         }
         for (curve, polyline) in curves.iter().enumerate() {
-            if let Some(&node) = polyline[1..polyline.len() - 1].iter().find(|&&node| degrees[node as usize] != 2) {
+            if let Some(&node) =
+                polyline[1..polyline.len() - 1].iter().find(|&&node| degrees[node as usize] != 2)
+            {
                 return Err(InvalidSkeleton::Crossing { curve, node });
             }
             let ends = [polyline[0], polyline[polyline.len() - 1]];
@@ -201,7 +213,8 @@ impl Skeleton {
             neighbours[pair[0] as usize].push(pair[1]);
             neighbours[pair[1] as usize].push(pair[0]);
         }
-        let mut queue: Vec<usize> = (0..radii.len()).filter(|&node| radii[node].is_some()).collect();
+        let mut queue: Vec<usize> =
+            (0..radii.len()).filter(|&node| radii[node].is_some()).collect();
         let mut next = 0;
         while let Some(&node) = queue.get(next) {
             next += 1;
@@ -260,7 +273,9 @@ pub enum InvalidSkeleton {
         node: usize,
     },
     /// A curve has too few nodes.
-    #[error("curve {curve} has {nodes} nodes: expected at least 2, or 4 where it starts and ends in the same node")]
+    #[error(
+        "curve {curve} has {nodes} nodes: expected at least 2, or 4 where it starts and ends in the same node"
+    )]
     ShortCurve {
         /// The curve.
         curve: usize,
@@ -278,7 +293,9 @@ pub enum InvalidSkeleton {
         nodes: usize,
     },
     /// A surface vertex is carried by a node that is not there.
-    #[error("surface vertex {vertex} is carried by node {node}, but there are {nodes} nodes, counted from 0")]
+    #[error(
+        "surface vertex {vertex} is carried by node {node}, but there are {nodes} nodes, counted from 0"
+    )]
     NoSuchCarrier {
         /// The surface vertex.
         vertex: usize,
@@ -298,7 +315,9 @@ pub enum InvalidSkeleton {
         node: u32,
     },
     /// Two curves meet in a node where no other does.
-    #[error("curve {curve} ends in node {node}, where only one other begins: the two are one curve")]
+    #[error(
+        "curve {curve} ends in node {node}, where only one other begins: the two are one curve"
+    )]
     Unjoined {
         /// The curve.
         curve: usize,
@@ -317,8 +336,12 @@ mod tests {
 
     #[test]
     fn a_lollipop_has_one_end_one_branch_and_one_loop() {
-        let skeleton = Skeleton::new(line(5), vec![vec![0, 1], vec![1, 2, 3, 4, 1]], vec![4; 7]).unwrap();
-        assert_eq!((skeleton.end_count(), skeleton.branch_count(), skeleton.loop_count()), (1, 1, 1));
+        let skeleton =
+            Skeleton::new(line(5), vec![vec![0, 1], vec![1, 2, 3, 4, 1]], vec![4; 7]).unwrap();
+        assert_eq!(
+            (skeleton.end_count(), skeleton.branch_count(), skeleton.loop_count()),
+            (1, 1, 1)
+        );
         assert_eq!(skeleton.component_count(), 1);
         assert_eq!(skeleton.degree(1), 3);
         assert!(skeleton.curves()[1].is_closed() && !skeleton.curves()[0].is_closed());
@@ -335,14 +358,26 @@ mod tests {
     fn what_is_no_skeleton_is_named() {
         let fails = |nodes, curves, carriers| Skeleton::new(nodes, curves, carriers).unwrap_err();
         assert_eq!(fails(vec![], vec![], vec![]), InvalidSkeleton::NoNodes);
-        assert_eq!(fails(vec![[0.0, f64::NAN, 0.0]], vec![], vec![]), InvalidSkeleton::NotFinite { node: 0 });
-        assert_eq!(fails(line(2), vec![vec![]], vec![]), InvalidSkeleton::ShortCurve { curve: 0, nodes: 0 });
-        assert_eq!(fails(line(2), vec![vec![0, 1, 0]], vec![]), InvalidSkeleton::ShortCurve { curve: 0, nodes: 3 });
+        assert_eq!(
+            fails(vec![[0.0, f64::NAN, 0.0]], vec![], vec![]),
+            InvalidSkeleton::NotFinite { node: 0 }
+        );
+        assert_eq!(
+            fails(line(2), vec![vec![]], vec![]),
+            InvalidSkeleton::ShortCurve { curve: 0, nodes: 0 }
+        );
+        assert_eq!(
+            fails(line(2), vec![vec![0, 1, 0]], vec![]),
+            InvalidSkeleton::ShortCurve { curve: 0, nodes: 3 }
+        );
         assert_eq!(
             fails(line(2), vec![vec![0, 2]], vec![]),
             InvalidSkeleton::NoSuchNode { curve: 0, node: 2, nodes: 2 }
         );
-        assert_eq!(fails(line(2), vec![], vec![0, 9]), InvalidSkeleton::NoSuchCarrier { vertex: 1, node: 9, nodes: 2 });
+        assert_eq!(
+            fails(line(2), vec![], vec![0, 9]),
+            InvalidSkeleton::NoSuchCarrier { vertex: 1, node: 9, nodes: 2 }
+        );
         let crossing = fails(line(4), vec![vec![0, 1, 2], vec![1, 3]], vec![]);
         assert_eq!(crossing, InvalidSkeleton::Crossing { curve: 0, node: 1 });
         assert_eq!(

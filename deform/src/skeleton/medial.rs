@@ -30,14 +30,21 @@ pub(super) fn poles(mesh: &Triangulation, tree: &NearestPoints) -> Vec<Option<Ve
             continue;
         }
         mesh.neighbours(vertex, &mut around);
-        let spacing = around.iter().map(|&other| mesh.length(vertex, other)).sum::<f64>() / around.len() as f64;
+        let spacing = around.iter().map(|&other| mesh.length(vertex, other)).sum::<f64>()
+            / around.len() as f64;
         let pole = shrink(tree, vertex, point, normal, largest);
         poles.push((length(subtract(pole, point)) > LEAST_RADIUS * spacing).then_some(pole));
     }
     poles
 }
 
-fn shrink(tree: &NearestPoints, vertex: u32, point: Vector, normal: Vector, largest: f64) -> Vector {
+fn shrink(
+    tree: &NearestPoints,
+    vertex: u32,
+    point: Vector,
+    normal: Vector,
+    largest: f64,
+) -> Vector {
     let mut radius = largest;
     let center = |radius: f64| subtract(point, scale(normal, radius));
     for ball in 0..MOST_BALLS {
@@ -53,7 +60,8 @@ fn shrink(tree: &NearestPoints, vertex: u32, point: Vector, normal: Vector, larg
         if !(next.is_finite() && next > 0.0 && next < radius) {
             break;
         }
-        let [to_point, to_nearest] = [subtract(point, center(next)), subtract(nearest, center(next))];
+        let [to_point, to_nearest] =
+            [subtract(point, center(next)), subtract(nearest, center(next))];
         let cosine = dot(to_point, to_nearest) / (length(to_point) * length(to_nearest));
         if ball > 0 && cosine > LEAST_SEPARATION {
             break;
@@ -81,7 +89,8 @@ impl NearestPoints {
 
     /// The distance from a place to the nearest point; infinite where there is none.
     pub fn distance(&self, place: Vector) -> f64 {
-        self.nearest(place, u32::MAX).map_or(f64::INFINITY, |(point, _)| length(subtract(point, place)))
+        self.nearest(place, u32::MAX)
+            .map_or(f64::INFINITY, |(point, _)| length(subtract(point, place)))
     }
 
     /// The mean distance from an axis of the points beside it that are not farther than a bound; `None` where there is none.
@@ -119,10 +128,12 @@ impl NearestPoints {
                 }
             }
             let extent = subtract(upper, lower);
-            let axis = (0..3).fold(0, |best, axis| if extent[axis] > extent[best] { axis } else { best });
+            let axis =
+                (0..3).fold(0, |best, axis| if extent[axis] > extent[best] { axis } else { best });
             let middle = usize::midpoint(start, end);
-            points[start..end]
-                .select_nth_unstable_by(middle - start, |a, b| a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1)));
+            points[start..end].select_nth_unstable_by(middle - start, |a, b| {
+                a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1))
+            });
             axes[middle] = axis as u8;
             ranges.extend([(start, middle), (middle + 1, end)]);
         }
@@ -179,11 +190,14 @@ mod tests {
     fn the_nearest_point_is_that_of_a_search_one_by_one() {
         let mut state = 1u64;
         let mut random = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (state >> 40) as f64 / (1u64 << 24) as f64
         };
-        let points: Vec<(Vector, u32)> =
-            (0..3000).map(|number| ([random(), random(), (4.0 * random()).floor()], number)).collect();
+        let points: Vec<(Vector, u32)> = (0..3000)
+            .map(|number| ([random(), random(), (4.0 * random()).floor()], number))
+            .collect();
         let tree = NearestPoints::new(points.clone());
         for except in 0..300 {
             let place = [random(), random(), 3.0 * random()];
@@ -198,7 +212,8 @@ mod tests {
     #[test]
     fn the_poles_of_a_torus_lie_on_its_core() {
         let mesh = shapes::torus(1.0, 0.3, [90, 40]);
-        let triangles = mesh.cells().connectivity().chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+        let triangles =
+            mesh.cells().connectivity().chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
         let mesh = Triangulation::new(mesh.points().to_vec(), triangles);
         for pole in poles(&mesh, &NearestPoints::of(&mesh)) {
             let [x, y, z] = pole.unwrap();

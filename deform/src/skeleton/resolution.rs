@@ -37,12 +37,14 @@ fn coarsen(mesh: &mut Triangulation, most: usize) {
                 continue;
             }
             mesh.neighbours(vertex, &mut around);
-            let mut edges: Vec<(f64, u32)> = around.iter().map(|&other| (mesh.length(vertex, other), other)).collect();
+            let mut edges: Vec<(f64, u32)> =
+                around.iter().map(|&other| (mesh.length(vertex, other), other)).collect();
             edges.retain(|edge| edge.0 < threshold);
             edges.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             for (_, other) in edges {
                 let place = mesh.middle(vertex, other);
-                if mesh.can_collapse(vertex, other, &mut work) && !folds(mesh, vertex, other, place) {
+                if mesh.can_collapse(vertex, other, &mut work) && !folds(mesh, vertex, other, place)
+                {
                     mesh.collapse(vertex, other, place);
                     break;
                 }
@@ -66,9 +68,11 @@ fn folds(mesh: &Triangulation, a: u32, b: u32, place: Vector) -> bool {
                 return false;
             }
             let old = mesh.normal(triangle);
-            let moved = triangle.map(|corner| if corner == vertex { place } else { mesh.points[corner as usize] });
+            let moved = triangle
+                .map(|corner| if corner == vertex { place } else { mesh.points[corner as usize] });
             let [p, q, r] = moved;
-            let new = crate::vector::cross(crate::vector::subtract(q, p), crate::vector::subtract(r, p));
+            let new =
+                crate::vector::cross(crate::vector::subtract(q, p), crate::vector::subtract(r, p));
             let size = (dot(old, old) * dot(new, new)).sqrt();
             dot(old, new) < 0.25 * size
         })
@@ -109,7 +113,8 @@ mod tests {
 
     fn torus(counts: [usize; 2]) -> Triangulation {
         let mesh = shapes::torus(1.0, 0.3, counts);
-        let triangles = mesh.cells().connectivity().chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+        let triangles =
+            mesh.cells().connectivity().chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
         Triangulation::new(mesh.points().to_vec(), triangles)
     }
 
@@ -125,7 +130,10 @@ mod tests {
         resample(&mut mesh, 500, 2000);
         assert!((500..=2000).contains(&mesh.vertex_count()), "{}", mesh.vertex_count());
         assert_eq!(euler_characteristic(&mesh), 0);
-        assert!((mesh.area() / area - 1.0).abs() < 0.02 && (mesh.signed_volume() / volume - 1.0).abs() < 0.03);
+        assert!(
+            (mesh.area() / area - 1.0).abs() < 0.02
+                && (mesh.signed_volume() / volume - 1.0).abs() < 0.03
+        );
         let merged = mesh.merged();
         for (vertex, &into) in merged.iter().enumerate().take(12000) {
             assert!(mesh.is_alive(into));

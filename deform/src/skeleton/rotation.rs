@@ -148,7 +148,8 @@ pub(super) fn transported(
         for (node, &rotation) in rotations.iter().enumerate() {
             let angle = twist(rotation, node);
             // Without the jumps by a whole turn.
-            before = angle + ((before - angle) / std::f64::consts::TAU).round() * std::f64::consts::TAU;
+            before =
+                angle + ((before - angle) / std::f64::consts::TAU).round() * std::f64::consts::TAU;
             mean += before / reference.len() as f64;
         }
         turn(&mut rotations, &|_| -mean);
@@ -192,8 +193,14 @@ mod tests {
         near(quarter.apply([1.0, 0.0, 5.0]), [0.0, 1.0, 5.0]);
         near(quarter.after(quarter).apply([1.0, 0.0, 0.0]), [-1.0, 0.0, 0.0]);
         near(quarter.inverse().apply([0.0, 1.0, 0.0]), [1.0, 0.0, 0.0]);
-        near(quarter.part(1.0 / 3.0).after(quarter.part(2.0 / 3.0)).apply([0.0, 1.0, 0.0]), [-1.0, 0.0, 0.0]);
-        near(Rotation::IDENTITY.blend(quarter, 0.5).apply([1.0, 0.0, 0.0]), [0.5f64.sqrt(), 0.5f64.sqrt(), 0.0]);
+        near(
+            quarter.part(1.0 / 3.0).after(quarter.part(2.0 / 3.0)).apply([0.0, 1.0, 0.0]),
+            [-1.0, 0.0, 0.0],
+        );
+        near(
+            Rotation::IDENTITY.blend(quarter, 0.5).apply([1.0, 0.0, 0.0]),
+            [0.5f64.sqrt(), 0.5f64.sqrt(), 0.0],
+        );
         assert!((quarter.angle_about([0.0, 0.0, 1.0]) - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
         assert_eq!(Rotation::IDENTITY.change([1.0, 2.0, 3.0]), [0.0; 3]);
         let [a, b] = [[0.6, 0.8, 0.0], [0.0, -0.6, 0.8]];
@@ -222,7 +229,8 @@ mod tests {
         // The same little twist in each step.
         let twists: Vec<f64> = (1..count)
             .map(|node| {
-                let carried = Rotation::between(helix[node - 1], helix[node]).after(rotations[node - 1]);
+                let carried =
+                    Rotation::between(helix[node - 1], helix[node]).after(rotations[node - 1]);
                 rotations[node].after(carried.inverse()).angle_about(helix[node])
             })
             .collect();

@@ -111,10 +111,14 @@ impl Skin {
         let radii = skeleton.radii(surface.points());
         let binding = match skinning {
             Skinning::Smooth => {
-                let curves = drag.curves().map(|curve| BoundCurve::new(&surface, &skeleton, curve, &radii, held));
+                let curves = drag
+                    .curves()
+                    .map(|curve| BoundCurve::new(&surface, &skeleton, curve, &radii, held));
                 Binding::Smooth(curves.collect())
             }
-            Skinning::Nearest => Binding::Nearest(bind_to_nodes(&surface, &skeleton, &drag, &radii, held)),
+            Skinning::Nearest => {
+                Binding::Nearest(bind_to_nodes(&surface, &skeleton, &drag, &radii, held))
+            }
         };
         Ok(Self { surface, skeleton, drag, binding })
     }
@@ -142,12 +146,17 @@ impl Skin {
                 let nodes = self.moved_below(below);
                 for curve in curves {
                     let along = |node: &u32| *node as usize;
-                    let reached: Vec<_> = curve.axis.nodes().iter().map(|node| nodes[along(node)]).collect();
-                    let moved: Vec<_> = curve.axis.nodes().iter().map(|node| moved[along(node)]).collect();
+                    let reached: Vec<_> =
+                        curve.axis.nodes().iter().map(|node| nodes[along(node)]).collect();
+                    let moved: Vec<_> =
+                        curve.axis.nodes().iter().map(|node| moved[along(node)]).collect();
                     let bent = curve.axis.bend(&reached, &moved);
                     for bound in &curve.vertices {
                         let vertex = bound.vertex as usize;
-                        let point = add(self.surface.points()[vertex], below.get(vertex).copied().unwrap_or_default());
+                        let point = add(
+                            self.surface.points()[vertex],
+                            below.get(vertex).copied().unwrap_or_default(),
+                        );
                         let own = scale(bent.displacement(bound.station, point), bound.weight);
                         displacement[vertex] = add(displacement[vertex], own);
                     }
@@ -179,7 +188,13 @@ impl Skin {
 }
 
 impl BoundCurve {
-    fn new(surface: &Surface, skeleton: &Skeleton, curve: usize, radii: &[f64], held: &[bool]) -> Self {
+    fn new(
+        surface: &Surface,
+        skeleton: &Skeleton,
+        curve: usize,
+        radii: &[f64],
+        held: &[bool],
+    ) -> Self {
         let axis = Axis::new(skeleton, curve, radii, surface.points());
         // Branch nodes carry what several curves share.
         let mut places = vec![None; skeleton.nodes().len()];
@@ -201,7 +216,8 @@ impl BoundCurve {
         let mut vertices: Vec<BoundVertex> = Vec::new();
         let mut stations: Vec<Option<Station>> = vec![None; surface.points().len()];
         for vertex in all.clone() {
-            stations[vertex as usize] = own(vertex).map(|place| axis.station(surface.points()[vertex as usize], place));
+            stations[vertex as usize] =
+                own(vertex).map(|place| axis.station(surface.points()[vertex as usize], place));
         }
         for vertex in all {
             let Some((away, source)) = from_own[vertex as usize] else { continue };
@@ -209,7 +225,8 @@ impl BoundCurve {
             let (station, follows) = match stations[vertex as usize] {
                 Some(station) => (station, 1.0),
                 None => {
-                    let station = axis.station(surface.points()[vertex as usize], axis.place(at_source));
+                    let station =
+                        axis.station(surface.points()[vertex as usize], axis.place(at_source));
                     (station, 1.0 - share(away, axis.radius(at_source)))
                 }
             };
@@ -252,18 +269,18 @@ struct Held(Option<Vec<Option<(f64, u32)>>>);
 impl Held {
     fn new(surface: &Surface, held: &[bool], farthest: f64) -> Self {
         let sources = || (0..held.len() as u32).filter(|&vertex| held[vertex as usize]);
-        Self(
-            sources()
-                .next()
-                .map(|_| distance::from_vertices(surface.points(), surface.triangles(), sources(), farthest)),
-        )
+        Self(sources().next().map(|_| {
+            distance::from_vertices(surface.points(), surface.triangles(), sources(), farthest)
+        }))
     }
 
     /// How much of the motion a vertex makes: nothing where it is held, all of it one radius away.
     fn fade(&self, vertex: u32, radius: f64) -> f64 {
         match &self.0 {
             None => 1.0,
-            Some(distances) => distances[vertex as usize].map_or(1.0, |(away, _)| share(away, radius)),
+            Some(distances) => {
+                distances[vertex as usize].map_or(1.0, |(away, _)| share(away, radius))
+            }
         }
     }
 }

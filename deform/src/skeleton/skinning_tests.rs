@@ -8,7 +8,9 @@ use crate::surface::FeatureSettings;
 use crate::vector::{cross, dot, subtract};
 
 fn line(from: Vector, to: Vector, steps: usize) -> Vec<Vector> {
-    let at = |step: usize| add(scale(from, 1.0 - step as f64 / steps as f64), scale(to, step as f64 / steps as f64));
+    let at = |step: usize| {
+        add(scale(from, 1.0 - step as f64 / steps as f64), scale(to, step as f64 / steps as f64))
+    };
     (0..=steps).map(at).collect()
 }
 
@@ -39,7 +41,10 @@ struct Case {
 }
 
 impl Case {
-    fn new((surface, skeleton): (Arc<Surface>, Arc<Skeleton>), moves: Vec<(usize, Vector)>) -> Self {
+    fn new(
+        (surface, skeleton): (Arc<Surface>, Arc<Skeleton>),
+        moves: Vec<(usize, Vector)>,
+    ) -> Self {
         let count = surface.points().len();
         Self { surface, skeleton, held: vec![false; count], moves, below: vec![[0.0; 3]; count] }
     }
@@ -48,12 +53,19 @@ impl Case {
         let dragged: Vec<usize> = self.moves.iter().map(|(node, _)| *node).collect();
         let by: Vec<Vector> = self.moves.iter().map(|(_, by)| *by).collect();
         let drag = SkeletonDrag::new(&self.skeleton, &dragged).unwrap();
-        let skin = Skin::new(self.surface.clone(), self.skeleton.clone(), drag, &self.held, skinning).unwrap();
+        let skin =
+            Skin::new(self.surface.clone(), self.skeleton.clone(), drag, &self.held, skinning)
+                .unwrap();
         skin.displacement(&by, &self.below)
     }
 
     fn shape(&self, skinning: Skinning) -> Vec<Vector> {
-        self.surface.points().iter().zip(self.displacement(skinning)).map(|(&point, moved)| add(point, moved)).collect()
+        self.surface
+            .points()
+            .iter()
+            .zip(self.displacement(skinning))
+            .map(|(&point, moved)| add(point, moved))
+            .collect()
     }
 
     fn bent_nodes(&self) -> Vec<Vector> {
@@ -77,7 +89,13 @@ impl Case {
 
 /// The area that a plane cuts out of a closed surface within some distance of a point: the sum of the signed triangles between
 /// the point and each cut, which follow the boundary counter-clockwise about the normal.
-fn section(triangles: &[[u32; 3]], points: &[Vector], center: Vector, normal: Vector, within: f64) -> f64 {
+fn section(
+    triangles: &[[u32; 3]],
+    points: &[Vector],
+    center: Vector,
+    normal: Vector,
+    within: f64,
+) -> f64 {
     let mut twice = 0.0;
     for triangle in triangles {
         let corners = triangle.map(|vertex| subtract(points[vertex as usize], center));
@@ -131,7 +149,8 @@ fn a_tube_bent_by_90_degrees_with_one_drag_keeps_its_cross_sections() {
     // The slope of the curve at its ends is 3 by / length: 45 degrees there, 90 between them.
     let case = Case::new(straight_tube(80), vec![(40, [10.0 / 3.0, 0.0, 0.0])]);
     let nodes = case.bent_nodes();
-    let [start, end] = [subtract(nodes[1], nodes[0]), subtract(nodes[80], nodes[79])].map(|v| direction(v).unwrap());
+    let [start, end] = [subtract(nodes[1], nodes[0]), subtract(nodes[80], nodes[79])]
+        .map(|v| direction(v).unwrap());
     assert!(dot(start, end).abs() < 0.01, "90 degrees");
 
     let smooth = worst(&case.areas(Skinning::Smooth));
@@ -173,10 +192,13 @@ fn so_does_a_bent_tube_that_is_made_straight_and_one_with_a_rough_skeleton() {
     let rough: Vec<Vector> = line([0.0; 3], [0.0, 0.0, 10.0], 40)
         .into_iter()
         .enumerate()
-        .map(|(node, [_, _, z])| [0.03 * (7.3 * node as f64).sin(), 0.03 * (3.1 * node as f64).cos(), z])
+        .map(|(node, [_, _, z])| {
+            [0.03 * (7.3 * node as f64).sin(), 0.03 * (3.1 * node as f64).cos(), z]
+        })
         .collect();
     let even = Case::new(straight_tube(40), vec![(20, [3.0, 0.0, 0.0])]);
-    let rough = Case::new(tube(&line([0.0; 3], [0.0, 0.0, 10.0], 160), rough), vec![(20, [3.0, 0.0, 0.0])]);
+    let rough =
+        Case::new(tube(&line([0.0; 3], [0.0, 0.0, 10.0], 160), rough), vec![(20, [3.0, 0.0, 0.0])]);
     let (even, rough) = (even.displacement(Skinning::Smooth), rough.displacement(Skinning::Smooth));
     assert!(difference(&even, &rough) < 0.1, "{}", difference(&even, &rough));
 }
@@ -184,7 +206,8 @@ fn so_does_a_bent_tube_that_is_made_straight_and_one_with_a_rough_skeleton() {
 #[test]
 fn how_densely_nodes_lie_makes_no_difference() {
     let moved = |nodes: usize| {
-        Case::new(straight_tube(nodes), vec![(nodes / 2, [2.0, 1.0, 0.0])]).displacement(Skinning::Smooth)
+        Case::new(straight_tube(nodes), vec![(nodes / 2, [2.0, 1.0, 0.0])])
+            .displacement(Skinning::Smooth)
     };
     let finest = moved(320);
     let errors = [10, 20, 40, 80].map(|nodes| difference(&moved(nodes), &finest));
@@ -211,16 +234,20 @@ fn dragging_by_zero_and_held_vertices_are_exact_zeros() {
                 assert_eq!(moved, free);
             }
         }
-        assert!(steepest(&case.surface, &moved) < if skinning == Skinning::Smooth { 3.0 } else { 6.0 });
+        assert!(
+            steepest(&case.surface, &moved) < if skinning == Skinning::Smooth { 3.0 } else { 6.0 }
+        );
     }
 }
 
 /// The largest difference of two neighbours' displacements by their distance.
 fn steepest(surface: &Surface, moved: &[Vector]) -> f64 {
-    largest(surface.triangles().iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]).map(|(a, b)| {
-        let [a, b] = [a as usize, b as usize];
-        distance_of(moved[a], moved[b]) / distance_of(surface.points()[a], surface.points()[b])
-    }))
+    largest(surface.triangles().iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]).map(
+        |(a, b)| {
+            let [a, b] = [a as usize, b as usize];
+            distance_of(moved[a], moved[b]) / distance_of(surface.points()[a], surface.points()[b])
+        },
+    ))
 }
 
 #[test]
@@ -233,15 +260,22 @@ fn a_loop_is_carried_as_a_body() {
     let carriers = surface.points().iter().map(|&point| nearest(&nodes, point)).collect();
     let curve = (0..32).chain([0]).collect();
     let pair = (surface, Arc::new(Skeleton::new(nodes, vec![curve], carriers).unwrap()));
-    for moved in Case::new(pair.clone(), vec![(7, [1.0, -2.0, 0.5])]).displacement(Skinning::Smooth) {
+    for moved in Case::new(pair.clone(), vec![(7, [1.0, -2.0, 0.5])]).displacement(Skinning::Smooth)
+    {
         assert!(distance_of(moved, [1.0, -2.0, 0.5]) < 1e-12, "{moved:?}");
     }
     // Bent out of its plane, it is the same about both dragged nodes.
-    let case = Case::new(pair, vec![(0, [0.0, 0.0, 2.0]), (16, [0.0, 0.0, 2.0]), (8, [0.0; 3]), (24, [0.0; 3])]);
+    let case = Case::new(
+        pair,
+        vec![(0, [0.0, 0.0, 2.0]), (16, [0.0, 0.0, 2.0]), (8, [0.0; 3]), (24, [0.0; 3])],
+    );
     let moved = case.displacement(Skinning::Smooth);
     for (point, value) in case.surface.points().iter().zip(&moved) {
-        let mirror =
-            case.surface.points().iter().position(|other| distance_of(*other, [-point[0], -point[1], point[2]]) < 1e-9);
+        let mirror = case
+            .surface
+            .points()
+            .iter()
+            .position(|other| distance_of(*other, [-point[0], -point[1], point[2]]) < 1e-9);
         assert!((moved[mirror.unwrap()][2] - value[2]).abs() < 1e-9);
     }
     assert!(steepest(&case.surface, &moved) < 2.0);
@@ -249,7 +283,8 @@ fn a_loop_is_carried_as_a_body() {
 
 #[test]
 fn what_was_moved_before_is_turned_with_it() {
-    let mut case = Case::new(straight_tube(32), vec![(12, [1.0, 2.0, 0.5]), (24, [-1.0, 0.0, 0.0])]);
+    let mut case =
+        Case::new(straight_tube(32), vec![(12, [1.0, 2.0, 0.5]), (24, [-1.0, 0.0, 0.0])]);
     let first = case.displacement(Skinning::Smooth);
     // Carried along as a body, the curve bends as before.
     case.below = vec![[3.0, -1.0, 2.0]; first.len()];
@@ -274,7 +309,10 @@ fn what_was_moved_before_is_turned_with_it() {
     for node in 4..28 {
         let normal = direction(subtract(nodes[node + 1], nodes[node - 1])).unwrap();
         let area = section(case.surface.triangles(), &shape, nodes[node], normal, 2.5);
-        assert!((area / 2.25 / (24.0 * (std::f64::consts::TAU / 48.0).sin()) - 1.0).abs() < 0.03, "{node} {area}");
+        assert!(
+            (area / 2.25 / (24.0 * (std::f64::consts::TAU / 48.0).sin()) - 1.0).abs() < 0.03,
+            "{node} {area}"
+        );
     }
 }
 
@@ -284,14 +322,17 @@ fn tee(fine: usize) -> (Arc<Surface>, Arc<Skeleton>) {
     let mesh = shapes::box_of_hexahedra(counts, [-6.0, -1.0, -1.0], [6.0, 7.0, 1.0]);
     let mut connectivity = Vec::new();
     for (_, vertices) in mesh.cells().iter() {
-        let center =
-            scale(vertices.iter().fold([0.0; 3], |sum, &vertex| add(sum, mesh.points()[vertex as usize])), 0.125);
+        let center = scale(
+            vertices.iter().fold([0.0; 3], |sum, &vertex| add(sum, mesh.points()[vertex as usize])),
+            0.125,
+        );
         if center[1] < 1.0 || center[0].abs() < 1.0 {
             connectivity.extend(vertices);
         }
     }
     let cells = Cells::uniform(CellType::Hexahedron, connectivity).unwrap();
-    let surface = surface_of(&Mesh::new(mesh.points().to_vec(), cells, FeatureSource::SharpEdges).unwrap());
+    let surface =
+        surface_of(&Mesh::new(mesh.points().to_vec(), cells, FeatureSource::SharpEdges).unwrap());
     let mut nodes = line([-6.0, 0.0, 0.0], [6.0, 0.0, 0.0], 48);
     nodes.extend(line([0.0, 0.25, 0.0], [0.0, 7.0, 0.0], 27));
     let leg = [24].into_iter().chain(49..=76).collect();

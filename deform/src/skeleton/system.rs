@@ -16,7 +16,11 @@ pub(super) struct Row {
 
 /// Minimises `|A x - b|^2 + sum of diagonal_i |x_i|^2 - 2 right_side_i x_i` for the rows of `A` and `b` given, by normal
 /// equations and a Cholesky factorisation. The diagonal must be positive. `None` where the digits do not suffice.
-pub(super) fn least_squares(rows: &[Row], diagonal: &[f64], mut right_side: Mat<f64>) -> Option<Mat<f64>> {
+pub(super) fn least_squares(
+    rows: &[Row],
+    diagonal: &[f64],
+    mut right_side: Mat<f64>,
+) -> Option<Mat<f64>> {
     let size = diagonal.len();
     // The rows that hold each unknown.
     let mut starts = vec![0usize; size + 1];
@@ -72,10 +76,16 @@ pub(super) fn least_squares(rows: &[Row], diagonal: &[f64], mut right_side: Mat<
         column_starts.push(u32::try_from(row_numbers.len()).ok()?);
     }
 
-    let shape = SymbolicSparseColMatRef::new_checked(size, size, &column_starts, None, &row_numbers);
+    let shape =
+        SymbolicSparseColMatRef::new_checked(size, size, &column_starts, None, &row_numbers);
     let order = SymmetricOrdering::Amd;
-    let symbolic =
-        cholesky::factorize_symbolic_cholesky(shape, Side::Upper, order, CholeskySymbolicParams::default()).ok()?;
+    let symbolic = cholesky::factorize_symbolic_cholesky(
+        shape,
+        Side::Upper,
+        order,
+        CholeskySymbolicParams::default(),
+    )
+    .ok()?;
     let mut factor = Vec::new();
     factor.try_reserve_exact(symbolic.len_val()).ok()?;
     factor.resize(symbolic.len_val(), 0.0);

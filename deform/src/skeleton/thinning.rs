@@ -113,12 +113,15 @@ impl Thinning {
     }
 
     fn bounds_triangle(&self, [a, b]: [u32; 2]) -> bool {
-        self.triangles_at[a as usize].iter().any(|&number| self.triangles[number as usize].contains(&b))
+        self.triangles_at[a as usize]
+            .iter()
+            .any(|&number| self.triangles[number as usize].contains(&b))
     }
 
     fn collapse(&mut self, [kept, gone]: [u32; 2]) {
         let [own, other] = [kept, gone].map(|vertex| self.weights[vertex as usize]);
-        let sum = add(scale(self.points[kept as usize], own), scale(self.points[gone as usize], other));
+        let sum =
+            add(scale(self.points[kept as usize], own), scale(self.points[gone as usize], other));
         self.points[kept as usize] = scale(sum, 1.0 / (own + other));
         self.weights[kept as usize] = own + other;
         self.merged[gone as usize] = kept;

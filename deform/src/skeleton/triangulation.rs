@@ -35,7 +35,8 @@ impl Triangulation {
     /// scattered: neighbours have no close ones, so that passes over all vertices lean towards no side.
     pub fn scattered(self) -> (Self, Vec<u32>) {
         let merged = self.merged();
-        let mut alive: Vec<u32> = (0..self.points.len() as u32).filter(|&vertex| self.is_alive(vertex)).collect();
+        let mut alive: Vec<u32> =
+            (0..self.points.len() as u32).filter(|&vertex| self.is_alive(vertex)).collect();
         // The golden ratio of the range spreads them evenly.
         alive.sort_unstable_by_key(|vertex| vertex.wrapping_mul(0x9E37_79B1));
         let mut numbers = vec![0; self.points.len()];
@@ -43,7 +44,10 @@ impl Triangulation {
             numbers[vertex as usize] = number;
         }
         let points = alive.iter().map(|&vertex| self.points[vertex as usize]).collect();
-        let triangles = self.live_triangles().map(|triangle| triangle.map(|vertex| numbers[vertex as usize])).collect();
+        let triangles = self
+            .live_triangles()
+            .map(|triangle| triangle.map(|vertex| numbers[vertex as usize]))
+            .collect();
         let into = merged.iter().map(|&root| numbers[root as usize]).collect();
         (Self::new(points, triangles), into)
     }
@@ -103,7 +107,9 @@ impl Triangulation {
         for triangle in self.live_triangles() {
             let area = length(self.normal(triangle));
             let corners = triangle.map(|vertex| self.points[vertex as usize]);
-            (0..3).for_each(|axis| sum[axis] += area / 3.0 * corners.iter().map(|corner| corner[axis]).sum::<f64>());
+            (0..3).for_each(|axis| {
+                sum[axis] += area / 3.0 * corners.iter().map(|corner| corner[axis]).sum::<f64>()
+            });
             whole += area;
         }
         sum.map(|value| value / whole)
@@ -114,7 +120,8 @@ impl Triangulation {
         let Some(&origin) = self.points.first() else { return 0.0 };
         self.live_triangles()
             .map(|triangle| {
-                let [a, b, c] = triangle.map(|vertex| subtract(self.points[vertex as usize], origin));
+                let [a, b, c] =
+                    triangle.map(|vertex| subtract(self.points[vertex as usize], origin));
                 dot(a, cross(b, c))
             })
             .sum()
@@ -174,7 +181,8 @@ impl Triangulation {
                 }
                 self.triangles[number as usize] = GONE;
             } else {
-                self.triangles[number as usize] = triangle.map(|vertex| if vertex == gone { kept } else { vertex });
+                self.triangles[number as usize] =
+                    triangle.map(|vertex| if vertex == gone { kept } else { vertex });
                 self.triangles_at[kept as usize].push(number);
             }
         }
@@ -204,7 +212,8 @@ impl Triangulation {
             let triangle = self.triangles[number as usize];
             let added = self.triangles.len() as u32;
             // The old triangle keeps the end a, the new one gets b.
-            self.triangles[number as usize] = triangle.map(|vertex| if vertex == b { new } else { vertex });
+            self.triangles[number as usize] =
+                triangle.map(|vertex| if vertex == b { new } else { vertex });
             self.triangles.push(triangle.map(|vertex| if vertex == a { new } else { vertex }));
             self.triangles_at[b as usize].retain(|&other| other != number);
             self.triangles_at[b as usize].push(added);

@@ -56,7 +56,8 @@ impl Adjacency {
                     [_] | [] => {}
                     [(upper, _), ..] => {
                         return Err(SurfaceError::NonManifoldEdge {
-                            edge: [lower as u32, upper].map(|vertex| surface.vertices()[vertex as usize]),
+                            edge: [lower as u32, upper]
+                                .map(|vertex| surface.vertices()[vertex as usize]),
                             faces: same.len(),
                         });
                     }
@@ -90,7 +91,9 @@ impl Adjacency {
             })
         });
         match failures.into_iter().flatten().next() {
-            Some(vertex) => Err(SurfaceError::NonManifoldVertex { vertex: surface.vertices()[vertex] }),
+            Some(vertex) => {
+                Err(SurfaceError::NonManifoldVertex { vertex: surface.vertices()[vertex] })
+            }
             None => Ok(()),
         }
     }
@@ -125,12 +128,15 @@ impl Adjacency {
     pub fn seams(&self, surface: &Surface) -> Vec<[u32; 2]> {
         let corners = surface.triangles().as_flattened();
         let ends = |side: usize| [corners[side], corners[around(side)[1]]];
-        let mut rim: Vec<u32> =
-            (0..self.across.len()).filter(|&side| self.across[side] == OPEN).flat_map(ends).collect();
+        let mut rim: Vec<u32> = (0..self.across.len())
+            .filter(|&side| self.across[side] == OPEN)
+            .flat_map(ends)
+            .collect();
         rim.sort_unstable();
         rim.dedup();
         // -0 and 0 are the same place.
-        let key = |vertex: u32| surface.points()[vertex as usize].map(|value| (value + 0.0).to_bits());
+        let key =
+            |vertex: u32| surface.points()[vertex as usize].map(|value| (value + 0.0).to_bits());
         rim.sort_by_key(|&vertex| key(vertex));
         let mut seams: Vec<[u32; 2]> = rim
             .chunk_by(|&a, &b| key(a) == key(b))

@@ -35,7 +35,11 @@ impl Advance {
     ///
     /// # Errors
     /// [`EditError`], as [`Editor::displacement`](super::Editor::displacement).
-    pub fn new(surface: &Arc<Surface>, edit: &Edit, place: usize) -> Result<Option<Self>, EditError> {
+    pub fn new(
+        surface: &Arc<Surface>,
+        edit: &Edit,
+        place: usize,
+    ) -> Result<Option<Self>, EditError> {
         let Some(order) = edit.harmonic_order() else { return Ok(None) };
         let handle = Handle::find(surface, edit, place)?;
         Ok(Some(Self {
@@ -80,7 +84,14 @@ impl Advance {
         for (level, slack) in SLACKS.into_iter().enumerate() {
             let laplacian = Laplacian::new(surface, &adjacency, slack);
             let prescribed = self.prescribed.clone();
-            match Polyharmonic::new(surface.points(), &laplacian, level, self.order, prescribed, &self.parts) {
+            match Polyharmonic::new(
+                surface.points(),
+                &laplacian,
+                level,
+                self.order,
+                prescribed,
+                &self.parts,
+            ) {
                 Ok(operator) => {
                     operator.solve(&laplacian, &self.parts, fields);
                     return Ok(());

@@ -25,7 +25,9 @@ impl Edit {
         match &mut edit {
             Edit::Translate(edit) => edit.by = scale(edit.by, fraction),
             Edit::Rotate(edit) => edit.degrees *= fraction,
-            Edit::ScaleDirection(edit) => edit.factors = edit.factors.map(|factor| 1.0 + fraction * (factor - 1.0)),
+            Edit::ScaleDirection(edit) => {
+                edit.factors = edit.factors.map(|factor| 1.0 + fraction * (factor - 1.0))
+            }
             Edit::ScaleNormals(edit) => edit.distance *= fraction,
             Edit::Affine(edit) => {
                 for (place, row) in edit.matrix.iter_mut().enumerate() {

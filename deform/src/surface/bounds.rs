@@ -17,7 +17,9 @@ impl Bounds {
 
     /// The least box around points; a coordinate that is no number is left out.
     pub fn around(points: impl IntoIterator<Item = Vector>) -> Self {
-        points.into_iter().fold(Self::EMPTY, |bounds, point| bounds.join(&Self { lower: point, upper: point }))
+        points
+            .into_iter()
+            .fold(Self::EMPTY, |bounds, point| bounds.join(&Self { lower: point, upper: point }))
     }
 
     #[inline]
@@ -81,10 +83,17 @@ pub(super) struct Hierarchy {
 
 impl Hierarchy {
     /// Over the triangles of `chosen`; `moves` tells which of all triangles move.
-    pub fn new(points: &[Vector], triangles: &[[u32; 3]], chosen: &[u32], moves: impl Fn(u32) -> bool) -> Self {
-        let bounds_of =
-            |triangle: u32| Bounds::around(triangles[triangle as usize].map(|vertex| points[vertex as usize]));
-        let all = chosen.iter().fold(Bounds::EMPTY, |all, &triangle| all.join(&bounds_of(triangle)));
+    pub fn new(
+        points: &[Vector],
+        triangles: &[[u32; 3]],
+        chosen: &[u32],
+        moves: impl Fn(u32) -> bool,
+    ) -> Self {
+        let bounds_of = |triangle: u32| {
+            Bounds::around(triangles[triangle as usize].map(|vertex| points[vertex as usize]))
+        };
+        let all =
+            chosen.iter().fold(Bounds::EMPTY, |all, &triangle| all.join(&bounds_of(triangle)));
         let size = (0..3).map(|axis| all.upper[axis] - all.lower[axis]).fold(0.0, f64::max);
         let scale = if size > 0.0 { f64::from((1u32 << 21) - 1) / size } else { 0.0 };
         let mut curve: Vec<(u64, u32)> = chosen
@@ -100,8 +109,10 @@ impl Hierarchy {
             .collect();
         curve.sort_unstable();
         let order: Vec<u32> = curve.into_iter().map(|(_, triangle)| triangle).collect();
-        let items: Vec<Node> =
-            order.iter().map(|&triangle| Node { bounds: bounds_of(triangle), moves: moves(triangle) }).collect();
+        let items: Vec<Node> = order
+            .iter()
+            .map(|&triangle| Node { bounds: bounds_of(triangle), moves: moves(triangle) })
+            .collect();
 
         let leaves = items.len().div_ceil(LEAF).next_power_of_two();
         let mut nodes = vec![NOTHING; 2 * leaves - 1];

@@ -167,7 +167,11 @@ impl std::fmt::Display for SurfaceReport {
 #[must_use]
 pub fn check(surface: &Surface, reference: &[Vector], shape: &[Vector]) -> SurfaceReport {
     for points in [reference, shape] {
-        assert_eq!(points.len(), surface.points().len(), "one point for each vertex of the surface");
+        assert_eq!(
+            points.len(),
+            surface.points().len(),
+            "one point for each vertex of the surface"
+        );
     }
     let found = Shapes { triangles: surface.triangles(), reference, shape }.look();
     let face = |triangle: u32| surface.triangle_faces()[triangle as usize];
@@ -185,7 +189,8 @@ pub fn check(surface: &Surface, reference: &[Vector], shape: &[Vector]) -> Surfa
     let first = found.intersecting.iter().map(|&[a, b]| {
         let corners = [a, b].map(|triangle| surface.triangles()[triangle as usize]);
         let place = place(shape, corners[0], corners[1]).unwrap_or_else(|| {
-            let [a, b] = corners.map(|corners| Bounds::around(corners.map(|vertex| shape[vertex as usize])));
+            let [a, b] =
+                corners.map(|corners| Bounds::around(corners.map(|vertex| shape[vertex as usize])));
             a.middle_with(&b)
         });
         let (a, b) = (face(a), face(b));
@@ -193,7 +198,11 @@ pub fn check(surface: &Surface, reference: &[Vector], shape: &[Vector]) -> Surfa
     });
     SurfaceReport {
         degenerate: faces(found.degenerate),
-        intersections: Intersections { count: found.count, more: found.more, first: first.collect() },
+        intersections: Intersections {
+            count: found.count,
+            more: found.more,
+            first: first.collect(),
+        },
         flipped: faces(found.flipped),
         inside_out: faces(turned_inside_out(surface.triangles(), reference, shape)),
     }
@@ -220,7 +229,11 @@ pub struct BrokenSurface {
 ///
 /// # Panics
 /// As [`check`].
-pub fn require_sound(surface: &Surface, reference: &[Vector], shape: &[Vector]) -> Result<(), Box<BrokenSurface>> {
+pub fn require_sound(
+    surface: &Surface,
+    reference: &[Vector],
+    shape: &[Vector],
+) -> Result<(), Box<BrokenSurface>> {
     let report = check(surface, reference, shape);
     if report.is_sound() {
         return Ok(());
@@ -238,7 +251,11 @@ pub fn require_sound(surface: &Surface, reference: &[Vector], shape: &[Vector]) 
 /// As [`check`].
 #[must_use]
 pub fn sound_fraction(surface: &Surface, reference: &[Vector], shape: &[Vector]) -> f64 {
-    if check(surface, reference, shape).is_sound() { 1.0 } else { bisect(surface, reference, shape) }
+    if check(surface, reference, shape).is_sound() {
+        1.0
+    } else {
+        bisect(surface, reference, shape)
+    }
 }
 
 /// The fraction of a shape that is not sound.
@@ -250,7 +267,11 @@ fn bisect(surface: &Surface, reference: &[Vector], shape: &[Vector]) -> f64 {
             .map(|(&from, &to)| {
                 // What does not move must not seem to.
                 std::array::from_fn(|axis| {
-                    if from[axis] == to[axis] { from[axis] } else { from[axis] + fraction * (to[axis] - from[axis]) }
+                    if from[axis] == to[axis] {
+                        from[axis]
+                    } else {
+                        from[axis] + fraction * (to[axis] - from[axis])
+                    }
                 })
             })
             .collect();
@@ -326,7 +347,8 @@ impl Shapes<'_> {
                 chosen.push(number as u32);
             }
         }
-        let hierarchy = Hierarchy::new(self.shape, self.triangles, &chosen, |triangle| self.moves(triangle));
+        let hierarchy =
+            Hierarchy::new(self.shape, self.triangles, &chosen, |triangle| self.moves(triangle));
         let parts = parallel::map_chunks(hierarchy.leaves(), CHUNK, |leaves| {
             let mut part = Part::default();
             for leaf in leaves {
@@ -334,7 +356,8 @@ impl Shapes<'_> {
                     part.more = true;
                     break;
                 }
-                hierarchy.for_each_pair(leaf, |a, b| self.look_at_pair([a.min(b), a.max(b)], &mut part));
+                hierarchy
+                    .for_each_pair(leaf, |a, b| self.look_at_pair([a.min(b), a.max(b)], &mut part));
             }
             part
         });
@@ -398,14 +421,19 @@ impl Shapes<'_> {
     fn is_turned(&self, triangle: u32, around: &TrianglesAround) -> bool {
         let corners = self.triangles[triangle as usize];
         let [was, is] = [self.reference, self.shape].map(|points| normal(points, corners));
-        let mut neighbours: Vec<u32> =
-            corners.iter().flat_map(|&vertex| around.of(vertex)).copied().filter(|&other| other != triangle).collect();
+        let mut neighbours: Vec<u32> = corners
+            .iter()
+            .flat_map(|&vertex| around.of(vertex))
+            .copied()
+            .filter(|&other| other != triangle)
+            .collect();
         neighbours.sort_unstable();
         neighbours.dedup();
         let [mut with, mut against] = [0.0, 0.0];
         for other in neighbours {
             let corners = self.triangles[other as usize];
-            let [other_was, other_is] = [self.reference, self.shape].map(|points| normal(points, corners));
+            let [other_was, other_is] =
+                [self.reference, self.shape].map(|points| normal(points, corners));
             let before = cosine(was, other_was);
             if before.abs() > 0.5 {
                 let area = dot(other_was, other_was).sqrt();
@@ -458,7 +486,9 @@ fn longest_side(points: &[Vector], [a, b, c]: [u32; 3]) -> f64 {
 fn is_flat(points: &[Vector], triangle: [u32; 3], least: f64) -> bool {
     let longest = longest_side(points, triangle);
     let normal = normal(points, triangle);
-    let has_area = longest > least && dot(normal, normal).sqrt() > FLAT * longest * longest && longest.is_finite();
+    let has_area = longest > least
+        && dot(normal, normal).sqrt() > FLAT * longest * longest
+        && longest.is_finite();
     !has_area
 }
 
@@ -489,6 +519,7 @@ impl TrianglesAround {
     }
 
     fn of(&self, vertex: u32) -> &[u32] {
-        &self.triangles[self.offsets[vertex as usize] as usize..self.offsets[vertex as usize + 1] as usize]
+        &self.triangles
+            [self.offsets[vertex as usize] as usize..self.offsets[vertex as usize + 1] as usize]
     }
 }

@@ -77,7 +77,8 @@ impl<'a, N: Iterator<Item = usize>, F: Fn(usize) -> N + Sync> Search<'a, F> {
             vec![self.cut(lower, first), self.cut(upper, middle)]
         } else {
             let mut other = Search::new(self.points, self.neighbours, self.rings);
-            let (lower, upper) = parallel::join(|| self.cut(lower, first), || other.cut(upper, middle));
+            let (lower, upper) =
+                parallel::join(|| self.cut(lower, first), || other.cut(upper, middle));
             vec![lower, upper]
         };
         Branch { own: middle + kept..last, parts }
@@ -135,7 +136,8 @@ mod tests {
 
     /// The neighbours of a vertex of a grid of `n` by `n` squares, each cut in two.
     fn grid(n: usize) -> (Vec<Vector>, impl Fn(usize) -> std::vec::IntoIter<usize> + Sync) {
-        let points = (0..n * n).map(|vertex| [(vertex % n) as f64, (vertex / n) as f64, 0.0]).collect();
+        let points =
+            (0..n * n).map(|vertex| [(vertex % n) as f64, (vertex / n) as f64, 0.0]).collect();
         let neighbours = move |vertex: usize| {
             let (x, y) = ((vertex % n) as i64, (vertex / n) as i64);
             [(1, 0), (1, 1), (0, 1), (-1, 0), (-1, -1), (0, -1)]
@@ -151,7 +153,8 @@ mod tests {
 
     /// The branch each place belongs to, and the branch above each.
     fn walk(branch: &Branch, branches: &mut Vec<Vec<usize>>, of_place: &mut [usize]) -> usize {
-        let parts: Vec<usize> = branch.parts.iter().map(|part| walk(part, branches, of_place)).collect();
+        let parts: Vec<usize> =
+            branch.parts.iter().map(|part| walk(part, branches, of_place)).collect();
         let number = branches.len();
         for place in branch.own.clone() {
             of_place[place] = number;
@@ -168,12 +171,15 @@ mod tests {
         let (points, neighbours) = grid(n);
         for rings in 1..4 {
             // Some vertices take no part; couplings run through them all the same.
-            let mut vertices: Vec<u32> = (0..(n * n) as u32).filter(|vertex| vertex % 7 != 3).collect();
+            let mut vertices: Vec<u32> =
+                (0..(n * n) as u32).filter(|vertex| vertex % 7 != 3).collect();
             let count = vertices.len();
             let branch = dissect(&points, &neighbours, rings, &mut vertices);
             let mut sorted = vertices.clone();
             sorted.sort_unstable();
-            assert!(sorted.iter().copied().eq((0..(n * n) as u32).filter(|vertex| vertex % 7 != 3)));
+            assert!(
+                sorted.iter().copied().eq((0..(n * n) as u32).filter(|vertex| vertex % 7 != 3))
+            );
             assert_eq!(branch.own.end, count);
 
             let (mut branches, mut of_place) = (Vec::new(), vec![usize::MAX; count]);
@@ -185,13 +191,24 @@ mod tests {
             for (place, &vertex) in vertices.iter().enumerate() {
                 let mut near = vec![vertex as usize];
                 for _ in 0..rings {
-                    near = near.iter().flat_map(|&vertex| neighbours(vertex)).chain(near.iter().copied()).collect();
+                    near = near
+                        .iter()
+                        .flat_map(|&vertex| neighbours(vertex))
+                        .chain(near.iter().copied())
+                        .collect();
                     near.sort_unstable();
                     near.dedup();
                 }
-                for other in near.into_iter().map(|vertex| places[vertex]).filter(|&place| place != usize::MAX) {
+                for other in near
+                    .into_iter()
+                    .map(|vertex| places[vertex])
+                    .filter(|&place| place != usize::MAX)
+                {
                     let [a, b] = [of_place[place], of_place[other]];
-                    assert!(branches[a].contains(&b) || branches[b].contains(&a), "{place} and {other} couple");
+                    assert!(
+                        branches[a].contains(&b) || branches[b].contains(&a),
+                        "{place} and {other} couple"
+                    );
                 }
             }
         }

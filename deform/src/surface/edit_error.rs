@@ -71,7 +71,9 @@ pub enum InvalidEdit {
         values: usize,
     },
     /// A vertex is named twice.
-    #[error("vertices[{second}]: vertex {vertex} is also vertices[{first}]; expected each vertex once")]
+    #[error(
+        "vertices[{second}]: vertex {vertex} is also vertices[{first}]; expected each vertex once"
+    )]
     VertexTwice {
         /// The vertex, by mesh vertex number.
         vertex: u32,
@@ -110,7 +112,9 @@ pub(super) fn finite(field: &str, values: &[f64]) -> Result<(), InvalidEdit> {
         Some(index) if values.len() > 1 => {
             Err(InvalidEdit::NotFinite { field: format!("{field}[{index}]"), value: values[index] })
         }
-        Some(index) => Err(InvalidEdit::NotFinite { field: field.to_string(), value: values[index] }),
+        Some(index) => {
+            Err(InvalidEdit::NotFinite { field: field.to_string(), value: values[index] })
+        }
         None => Ok(()),
     }
 }
@@ -166,7 +170,9 @@ pub enum EditError {
         surroundings: Box<Surroundings>,
     },
     /// No vertex of the features lies in the region.
-    #[error("edit {edit} ({name}): region: no vertex of {features:?} lies in it, though {vertices} other vertices do")]
+    #[error(
+        "edit {edit} ({name}): region: no vertex of {features:?} lies in it, though {vertices} other vertices do"
+    )]
     NothingInCommon {
         /// The place of the edit.
         edit: usize,
@@ -178,7 +184,9 @@ pub enum EditError {
         vertices: usize,
     },
     /// Fixed parts hold the whole handle.
-    #[error("edit {edit} ({name}): every vertex of {handle} is also fixed, so that nothing can move")]
+    #[error(
+        "edit {edit} ({name}): every vertex of {handle} is also fixed, so that nothing can move"
+    )]
     HandleFixed {
         /// The place of the edit.
         edit: usize,
@@ -208,7 +216,9 @@ pub enum EditError {
         face: u32,
     },
     /// A displacement names a vertex that is not on the surface.
-    #[error("edit {edit} (displacement): vertices[{index}]: mesh vertex {vertex} is not on the surface")]
+    #[error(
+        "edit {edit} (displacement): vertices[{index}]: mesh vertex {vertex} is not on the surface"
+    )]
     NotOnSurface {
         /// The place of the edit.
         edit: usize,
@@ -260,7 +270,9 @@ pub enum EditError {
         vertices: [u32; 2],
     },
     /// A coordinate would overflow.
-    #[error("edit {edit} ({name}): mesh vertex {vertex} would leave the range of floating-point numbers")]
+    #[error(
+        "edit {edit} ({name}): mesh vertex {vertex} would leave the range of floating-point numbers"
+    )]
     OutOfRange {
         /// The place of the edit.
         edit: usize,
@@ -270,7 +282,9 @@ pub enum EditError {
         vertex: u32,
     },
     /// The polyharmonic equation could not be solved.
-    #[error("edit {edit} ({name}): the operator of harmonic order {order} could not be factored: {reason}")]
+    #[error(
+        "edit {edit} ({name}): the operator of harmonic order {order} could not be factored: {reason}"
+    )]
     NotSolvable {
         /// The place of the edit.
         edit: usize,
@@ -296,7 +310,11 @@ impl std::fmt::Display for Surroundings {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         if let Some((vertex, point, distance)) = self.nearest {
             let distance = Number(distance);
-            write!(f, "; the nearest, mesh vertex {vertex} at {}, is {distance:.7} away", Position(point))?;
+            write!(
+                f,
+                "; the nearest, mesh vertex {vertex} at {}, is {distance:.7} away",
+                Position(point)
+            )?;
         }
         let [lower, upper] = self.bounds;
         write!(f, "; the surface reaches from {} to {}", Position(lower), Position(upper))

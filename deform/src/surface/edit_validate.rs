@@ -63,14 +63,20 @@ fn displacement(edit: &Displacement) -> Result<(), InvalidEdit> {
     match &edit.file {
         Some(_) if numbers => return Err(either_or("file")),
         Some(file) if file.is_empty() => {
-            return Err(InvalidEdit::EmptyList { field: "file".into(), expected: "the name of a file" });
+            return Err(InvalidEdit::EmptyList {
+                field: "file".into(),
+                expected: "the name of a file",
+            });
         }
         Some(_) => return Ok(()),
         None if !numbers => return Err(either_or("vertices")),
         None => {}
     }
     if edit.vertices.len() != edit.values.len() {
-        return Err(InvalidEdit::Lengths { vertices: edit.vertices.len(), values: edit.values.len() });
+        return Err(InvalidEdit::Lengths {
+            vertices: edit.vertices.len(),
+            values: edit.values.len(),
+        });
     }
     for (index, value) in edit.values.iter().enumerate() {
         finite(&format!("values[{index}]"), value)?;
@@ -79,14 +85,21 @@ fn displacement(edit: &Displacement) -> Result<(), InvalidEdit> {
     places.sort_by_key(|&place| (edit.vertices[place], place));
     let twice = places.windows(2).filter(|pair| edit.vertices[pair[0]] == edit.vertices[pair[1]]);
     match twice.min_by_key(|pair| pair[1]) {
-        Some(pair) => Err(InvalidEdit::VertexTwice { vertex: edit.vertices[pair[0]], first: pair[0], second: pair[1] }),
+        Some(pair) => Err(InvalidEdit::VertexTwice {
+            vertex: edit.vertices[pair[0]],
+            first: pair[0],
+            second: pair[1],
+        }),
         None => Ok(()),
     }
 }
 
 fn skeleton(edit: &Skeleton) -> Result<(), InvalidEdit> {
-    let either_or =
-        |field: &str| InvalidEdit::EitherOr { field: field.into(), first: "both `at` and `by`", second: "`moves`" };
+    let either_or = |field: &str| InvalidEdit::EitherOr {
+        field: field.into(),
+        first: "both `at` and `by`",
+        second: "`moves`",
+    };
     match (edit.at, edit.by, edit.moves.is_empty()) {
         (Some(at), Some(by), true) => {
             finite("at", &at)?;

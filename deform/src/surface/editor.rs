@@ -106,11 +106,9 @@ impl Editor {
         let parts = Parts::components(surface.points().len(), surface.triangles());
         let seams = adjacency.seams(&surface);
         let skeletons = SkeletonEditor::new(Arc::clone(&surface));
-        let farthest = surface
-            .points()
-            .as_flattened()
-            .iter()
-            .fold(0.0, |farthest, value| if value.abs() > farthest { value.abs() } else { farthest });
+        let farthest = surface.points().as_flattened().iter().fold(0.0, |farthest, value| {
+            if value.abs() > farthest { value.abs() } else { farthest }
+        });
         Ok(Self {
             surface,
             farthest,
@@ -168,7 +166,11 @@ impl Editor {
     ///
     /// # Errors
     /// Those of [`Editor::displacement`].
-    pub fn displacement_into(&mut self, stack: &[Edit], displacement: &mut Vec<Vector>) -> Result<(), EditError> {
+    pub fn displacement_into(
+        &mut self,
+        stack: &[Edit],
+        displacement: &mut Vec<Vector>,
+    ) -> Result<(), EditError> {
         let kept = self.layers.best_for(stack);
         let known = kept.map_or(0, |kept| self.layers.get(kept).place);
         // Handles are as large as the surface: of several edits none is kept for the time when it is needed.
@@ -176,7 +178,11 @@ impl Editor {
         for (place, edit) in stack.iter().enumerate().skip(known) {
             let followed = kept.and_then(|kept| self.layers.get(kept).followed.as_ref());
             handle = if place == known && followed.is_some_and(|followed| followed.is_for(edit)) {
-                edit.validate().map_err(|source| EditError::Invalid { edit: place, name: edit.name(), source })?;
+                edit.validate().map_err(|source| EditError::Invalid {
+                    edit: place,
+                    name: edit.name(),
+                    source,
+                })?;
                 None
             } else {
                 Some(Handle::find(&self.surface, edit, place)?)
@@ -193,7 +199,11 @@ impl Editor {
         if kept.is_none() {
             displacement.fill([0.0; 3]);
         }
-        let layers = kept.and_then(|kept| self.layers.take(kept)).map(|layer| (known, layer)).into_iter().collect();
+        let layers = kept
+            .and_then(|kept| self.layers.take(kept))
+            .map(|layer| (known, layer))
+            .into_iter()
+            .collect();
         self.evaluate(stack, known, layers, handle, displacement, |_, _, _| Ok(()))
     }
 
@@ -257,25 +267,31 @@ impl Editor {
         };
         let handle = Handle::find(&self.surface, edit, place)?;
         let prescribed: Vec<bool> = handle.roles.iter().map(|role| *role != Role::Free).collect();
-        self.choose_operator(order, prescribed.clone()).map_err(|reason| EditError::NotSolvable {
-            edit: place,
-            name: edit.name(),
-            order,
-            reason,
+        self.choose_operator(order, prescribed.clone()).map_err(|reason| {
+            EditError::NotSolvable { edit: place, name: edit.name(), order, reason }
         })?;
         let operator = self.operators.last();
         let followed = self.layers.last().and_then(|layer| layer.followed.as_ref());
         let (Some(operator), Some(followed)) = (operator, followed) else { return Ok(0.0) };
         let laplacian = &self.laplacians[operator.level()];
+        let errors = followed
+            .bases
+            .iter()
+            .map(|base| base.as_ref().map(|base| operator.error(laplacian, base)))
+            .collect();
         let errors =
-            followed.bases.iter().map(|base| base.as_ref().map(|base| operator.error(laplacian, base))).collect();
-        let errors = Followed { setting: followed.setting.clone(), unit: followed.unit, bases: errors };
-        let size = |moved: &Vector| moved.iter().fold(0.0f64, |largest, part| largest.max(part.abs()));
+            Followed { setting: followed.setting.clone(), unit: followed.unit, bases: errors };
+        let size =
+            |moved: &Vector| moved.iter().fold(0.0f64, |largest, part| largest.max(part.abs()));
         let below = vec![[0.0; 3]; self.surface.points().len()];
         let [mut moved, mut wrong] = [below.clone(), below.clone()];
         followed.add(edit, &below, f64::MAX, &mut moved);
         errors.add(edit, &below, f64::MAX, &mut wrong);
-        let motion = moved.iter().zip(&prescribed).filter(|(_, prescribed)| **prescribed).map(|(moved, _)| size(moved));
+        let motion = moved
+            .iter()
+            .zip(&prescribed)
+            .filter(|(_, prescribed)| **prescribed)
+            .map(|(moved, _)| size(moved));
         let motion = motion.fold(0.0, f64::max);
         Ok(if motion > 0.0 { wrong.iter().map(size).fold(0.0, f64::max) / motion } else { 0.0 })
     }
@@ -333,9 +349,12 @@ impl Editor {
             }
         };
         if !finite {
-            let reached = self.surface.points().iter().zip(displacement.iter()).map(|(a, b)| add(*a, *b));
-            let vertex =
-                reached.into_iter().position(|point| !point.iter().all(|value| value.is_finite())).unwrap_or(0);
+            let reached =
+                self.surface.points().iter().zip(displacement.iter()).map(|(a, b)| add(*a, *b));
+            let vertex = reached
+                .into_iter()
+                .position(|point| !point.iter().all(|value| value.is_finite()))
+                .unwrap_or(0);
             let vertex = self.surface.vertices()[vertex];
             return Err(EditError::OutOfRange { edit: place, name: edit.name(), vertex });
         }
@@ -349,7 +368,12 @@ impl Editor {
     }
 
     fn all_finite(&self, displacement: &[Vector]) -> bool {
-        let mut reached = self.surface.points().iter().zip(displacement).map(|(point, moved)| add(*point, *moved));
+        let mut reached = self
+            .surface
+            .points()
+            .iter()
+            .zip(displacement)
+            .map(|(point, moved)| add(*point, *moved));
         reached.all(|point| point.iter().all(|value| value.is_finite()))
     }
 
@@ -362,13 +386,20 @@ impl Editor {
         layer: &mut Layer,
     ) -> Result<(), EditError> {
         let Some(order) = edit.harmonic_order() else { return Ok(()) };
-        if layer.followed.as_ref().is_some_and(|followed| followed.is_for(edit) && followed.has_bases_of(edit)) {
+        if layer
+            .followed
+            .as_ref()
+            .is_some_and(|followed| followed.is_for(edit) && followed.has_bases_of(edit))
+        {
             return Ok(());
         }
         let handle = handle.map_or_else(|| Handle::find(&self.surface, edit, place), Ok)?;
         let points = self.surface.points().iter();
-        let shape: Vec<Vector> = points.zip(&layer.below).map(|(point, moved)| add(*point, *moved)).collect();
-        let Some(motion) = Motion::new(&self.surface, edit, place, &handle, &shape)? else { return Ok(()) };
+        let shape: Vec<Vector> =
+            points.zip(&layer.below).map(|(point, moved)| add(*point, *moved)).collect();
+        let Some(motion) = Motion::new(&self.surface, edit, place, &handle, &shape)? else {
+            return Ok(());
+        };
 
         let old = layer.followed.take().filter(|followed| followed.is_for(edit));
         let mut followed = old.unwrap_or_else(|| Followed {
@@ -403,11 +434,17 @@ impl Editor {
     }
 
     /// Refuses what would open a seam.
-    fn check_seams(&self, place: usize, edit: &Edit, displacement: &[Vector]) -> Result<(), EditError> {
+    fn check_seams(
+        &self,
+        place: usize,
+        edit: &Edit,
+        displacement: &[Vector],
+    ) -> Result<(), EditError> {
         if self.seams.is_empty() {
             return Ok(());
         }
-        let largest = displacement.iter().flatten().fold(0.0f64, |largest, value| largest.max(value.abs()));
+        let largest =
+            displacement.iter().flatten().fold(0.0f64, |largest, value| largest.max(value.abs()));
         for &seam in &self.seams {
             let [a, b] = seam.map(|vertex| displacement[vertex as usize]);
             if (0..3).any(|axis| (a[axis] - b[axis]).abs() > SEAM * largest) {
@@ -420,11 +457,16 @@ impl Editor {
 
     /// Brings the operator for an order and a set of prescribed vertices to the end of the kept ones: kept from before, or
     /// factored now.
-    fn choose_operator(&mut self, order: HarmonicOrder, prescribed: Vec<bool>) -> Result<(), String> {
-        let operator = match self.operators.iter().position(|operator| operator.is_for(order, &prescribed)) {
-            Some(found) => self.operators.remove(found),
-            None => self.factor(order, prescribed)?,
-        };
+    fn choose_operator(
+        &mut self,
+        order: HarmonicOrder,
+        prescribed: Vec<bool>,
+    ) -> Result<(), String> {
+        let operator =
+            match self.operators.iter().position(|operator| operator.is_for(order, &prescribed)) {
+                Some(found) => self.operators.remove(found),
+                None => self.factor(order, prescribed)?,
+            };
         let mut room = NUMBERS_KEPT.saturating_sub(operator.size());
         // The most recently used are at the end.
         let kept = self.operators.iter().rev().take(OPERATORS_KEPT - 1).take_while(|operator| {
@@ -438,7 +480,11 @@ impl Editor {
         Ok(())
     }
 
-    fn factor(&mut self, order: HarmonicOrder, prescribed: Vec<bool>) -> Result<Polyharmonic, String> {
+    fn factor(
+        &mut self,
+        order: HarmonicOrder,
+        prescribed: Vec<bool>,
+    ) -> Result<Polyharmonic, String> {
         let mut reason = String::new();
         for (level, slack) in SLACKS.into_iter().enumerate() {
             if self.laplacians.len() == level {
@@ -447,7 +493,14 @@ impl Editor {
             }
             let laplacian = &self.laplacians[level];
             let points = self.surface.points();
-            match Polyharmonic::new(points, laplacian, level, order, prescribed.clone(), &self.parts) {
+            match Polyharmonic::new(
+                points,
+                laplacian,
+                level,
+                order,
+                prescribed.clone(),
+                &self.parts,
+            ) {
                 Ok(operator) => return Ok(operator),
                 Err(NotFactored::NotPositive) => reason = NotFactored::NotPositive.to_string(),
                 Err(other) => return Err(other.to_string()),

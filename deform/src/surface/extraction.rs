@@ -61,12 +61,14 @@ impl Surface {
         for &vertex in mesh_faces.connectivity() {
             used[vertex as usize] = true;
         }
-        let vertices: Vec<u32> = (0..used.len()).filter(|&vertex| used[vertex]).map(|vertex| vertex as u32).collect();
+        let vertices: Vec<u32> =
+            (0..used.len()).filter(|&vertex| used[vertex]).map(|vertex| vertex as u32).collect();
         let mut local = vec![0u32; used.len()];
         for (number, &vertex) in vertices.iter().enumerate() {
             local[vertex as usize] = number as u32;
         }
-        let points: Vec<Vector> = vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect();
+        let points: Vec<Vector> =
+            vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect();
         let mut faces = renumbered(&mesh_faces, &local, |_| false);
         if may_run_either_way(dimension, cells) {
             turn_alike(&points, &mut faces);
@@ -169,7 +171,8 @@ impl Surface {
     pub fn feature_sizes(&self) -> Vec<FeatureSize> {
         let size = |(feature, name): (u32, &String)| {
             let vertices = self.features.vertices(feature);
-            let bounds = Bounds::around(vertices.iter().map(|&vertex| self.points[vertex as usize]));
+            let bounds =
+                Bounds::around(vertices.iter().map(|&vertex| self.points[vertex as usize]));
             let faces = self.features.faces(feature).count();
             let bounds = [bounds.lower, bounds.upper];
             FeatureSize { name: name.clone(), faces, vertices: vertices.len(), area: 0.0, bounds }
@@ -177,7 +180,8 @@ impl Surface {
         let mut sizes: Vec<FeatureSize> = (0..).zip(self.features.names()).map(size).collect();
         for (triangle, &face) in self.triangles.iter().zip(&self.triangle_faces) {
             let normal = polygon_normal(&self.points, triangle);
-            sizes[self.features.face_features()[face as usize] as usize].area += 0.5 * dot(normal, normal).sqrt();
+            sizes[self.features.face_features()[face as usize] as usize].area +=
+                0.5 * dot(normal, normal).sqrt();
         }
         sizes
     }
@@ -260,7 +264,11 @@ pub(super) fn turn_alike(points: &[Vector], faces: &mut Cells) {
 }
 
 /// Refuses what makes no surface: `vertices` are the mesh vertices of the `points`, `faces` are by surface vertex numbers.
-pub(super) fn check_parts(points: &[Vector], vertices: &[u32], faces: &Cells) -> Result<(), SurfaceError> {
+pub(super) fn check_parts(
+    points: &[Vector],
+    vertices: &[u32],
+    faces: &Cells,
+) -> Result<(), SurfaceError> {
     check_finite(points)?;
     if faces.is_empty() {
         return Err(SurfaceError::NoBoundary);
@@ -283,7 +291,9 @@ pub(super) fn check_parts(points: &[Vector], vertices: &[u32], faces: &Cells) ->
         sorted.sort_unstable();
         sorted.dedup();
         if sorted.len() < corners.len() {
-            return Err(MeshError::VertexCount { cell, cell_type: found, found: sorted.len() }.into());
+            return Err(
+                MeshError::VertexCount { cell, cell_type: found, found: sorted.len() }.into()
+            );
         }
         corners.iter().for_each(|&vertex| referenced[vertex as usize] = true);
     }
@@ -300,7 +310,11 @@ fn split_into_triangles(points: &[Vector], faces: &Cells) -> (Vec<[u32; 3]>, Vec
         let count = vertices.len();
         let start = if count == 3 { 0 } else { best_fan(points, vertices) };
         for step in 1..count - 1 {
-            triangles.push([vertices[start], vertices[(start + step) % count], vertices[(start + step + 1) % count]]);
+            triangles.push([
+                vertices[start],
+                vertices[(start + step) % count],
+                vertices[(start + step + 1) % count],
+            ]);
             triangle_faces.push(face as u32);
         }
     }
@@ -319,12 +333,16 @@ fn best_fan(points: &[Vector], vertices: &[u32]) -> usize {
         let smallest = (1..count - 1)
             .map(|step| {
                 let apex = point(start);
-                let area = cross(subtract(point(start + step), apex), subtract(point(start + step + 1), apex));
+                let area = cross(
+                    subtract(point(start + step), apex),
+                    subtract(point(start + step + 1), apex),
+                );
                 dot(area, normal) / length
             })
             .fold(f64::INFINITY, f64::min);
-        let better = best
-            .is_none_or(|(value, number, _)| smallest > value + 1e-9 || (smallest > value - 1e-9 && vertex < number));
+        let better = best.is_none_or(|(value, number, _)| {
+            smallest > value + 1e-9 || (smallest > value - 1e-9 && vertex < number)
+        });
         if better {
             best = Some((smallest, vertex, start));
         }
@@ -351,7 +369,9 @@ pub(super) fn polygon_normal(points: &[Vector], vertices: &[u32]) -> Vector {
 #[non_exhaustive]
 pub enum SurfaceError {
     /// No cell has faces.
-    #[error("the mesh has no surface: none of its {cells} cells has dimension 2 or 3, the highest is {dimension}")]
+    #[error(
+        "the mesh has no surface: none of its {cells} cells has dimension 2 or 3, the highest is {dimension}"
+    )]
     NoFaces {
         /// How many cells there are.
         cells: usize,
@@ -359,10 +379,14 @@ pub enum SurfaceError {
         dimension: usize,
     },
     /// Every face is shared by two cells.
-    #[error("the mesh has no boundary: every face with three distinct vertices belongs to two cells")]
+    #[error(
+        "the mesh has no boundary: every face with three distinct vertices belongs to two cells"
+    )]
     NoBoundary,
     /// More than two cells share a face.
-    #[error("cells {cells:?} share the face with vertices {vertices:?}; a face belongs to at most two cells")]
+    #[error(
+        "cells {cells:?} share the face with vertices {vertices:?}; a face belongs to at most two cells"
+    )]
     SharedFace {
         /// The vertices of the face, by mesh vertex numbers.
         vertices: Vec<u32>,

@@ -37,7 +37,9 @@ pub(super) fn boundary_faces_of_any(
     dimension: usize,
     left_out: Option<&[bool]>,
 ) -> Result<Vec<CellFace>, SurfaceError> {
-    let counts = |cell: &usize| !left_out.is_some_and(|left_out| left_out.get(*cell).is_some_and(|&out| out));
+    let counts = |cell: &usize| {
+        !left_out.is_some_and(|left_out| left_out.get(*cell).is_some_and(|&out| out))
+    };
     let mut starts = vec![0usize; vertex_count + 1];
     let mut buffer = FaceBuffer::default();
     let mut any_large = false;
@@ -57,7 +59,8 @@ pub(super) fn boundary_faces_of_any(
         buffer.for_each(cells, cell, dimension, |face, vertices| {
             let key = key(vertices);
             let slot = &mut next[key[0] as usize];
-            entries[*slot] = Entry { second: key[1], third: key[2], fourth: key[3], cell: cell as u32, face };
+            entries[*slot] =
+                Entry { second: key[1], third: key[2], fourth: key[3], cell: cell as u32, face };
             *slot += 1;
         });
     }
@@ -113,10 +116,15 @@ fn match_faces(
             Ok(())
         }
         [first, second] => {
-            if same_vertices(cells.vertices(first.cell as usize), cells.vertices(second.cell as usize))
-                && first.cell != second.cell
+            if same_vertices(
+                cells.vertices(first.cell as usize),
+                cells.vertices(second.cell as usize),
+            ) && first.cell != second.cell
             {
-                return Err(SurfaceError::DuplicateCells { first: first.cell, second: second.cell });
+                return Err(SurfaceError::DuplicateCells {
+                    first: first.cell,
+                    second: second.cell,
+                });
             }
             Ok(())
         }
@@ -125,7 +133,8 @@ fn match_faces(
             let mut owners: Vec<u32> = more.iter().map(|entry| entry.cell).collect();
             owners.dedup();
             for pair in owners.windows(2) {
-                if same_vertices(cells.vertices(pair[0] as usize), cells.vertices(pair[1] as usize)) {
+                if same_vertices(cells.vertices(pair[0] as usize), cells.vertices(pair[1] as usize))
+                {
                     return Err(SurfaceError::DuplicateCells { first: pair[0], second: pair[1] });
                 }
             }
@@ -157,7 +166,10 @@ fn split_by_all_vertices(cells: &Cells, dimension: usize, group: &[Entry]) -> Ve
         })
         .collect();
     keyed.sort_unstable();
-    keyed.chunk_by(|a, b| a.0 == b.0).map(|same| same.iter().map(|(_, entry)| *entry).collect()).collect()
+    keyed
+        .chunk_by(|a, b| a.0 == b.0)
+        .map(|same| same.iter().map(|(_, entry)| *entry).collect())
+        .collect()
 }
 
 /// The vertices of one face, in order around, without repeats.
@@ -194,7 +206,13 @@ pub(super) struct FaceBuffer {
 impl FaceBuffer {
     /// Calls `visit` with each face of a cell: its place among them, and its distinct vertices in order around. The faces of a
     /// cell of dimension 2 are itself, or the triangles of a strip.
-    pub fn for_each(&mut self, cells: &Cells, cell: usize, dimension: usize, mut visit: impl FnMut(u32, &[u32])) {
+    pub fn for_each(
+        &mut self,
+        cells: &Cells,
+        cell: usize,
+        dimension: usize,
+        mut visit: impl FnMut(u32, &[u32]),
+    ) {
         let cell_type = cells.cell_type(cell);
         if cell_type.dimension() != dimension {
             return;
@@ -286,7 +304,9 @@ impl TagLookup {
         for first in 0..count {
             for second in first + 1..count {
                 let corners = |third: usize| [vertices[first], vertices[second], vertices[third]];
-                tags.extend((second + 1..count).filter_map(|third| self.get_whole(&corners(third))));
+                tags.extend(
+                    (second + 1..count).filter_map(|third| self.get_whole(&corners(third))),
+                );
             }
         }
         if tags.len() < count - 2 { None } else { most_frequent(tags) }

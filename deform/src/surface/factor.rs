@@ -124,11 +124,21 @@ struct Worker<'a, R, F> {
 
 impl<'a, R: Rows, F: Fn() -> R + Sync> Worker<'a, R, F> {
     fn new(make_rows: &'a F, size: usize) -> Self {
-        Self { make_rows, rows: make_rows(), local: vec![0; size], entries: Vec::new(), pool: Vec::new() }
+        Self {
+            make_rows,
+            rows: make_rows(),
+            local: vec![0; size],
+            entries: Vec::new(),
+            pool: Vec::new(),
+        }
     }
 
     /// The fronts of a branch, its own last, and what they leave over.
-    fn eliminate(mut self, branch: &Branch, piece: usize) -> Result<(Vec<Front>, LeftOver), NoFactor> {
+    fn eliminate(
+        mut self,
+        branch: &Branch,
+        piece: usize,
+    ) -> Result<(Vec<Front>, LeftOver), NoFactor> {
         let mut fronts = Vec::new();
         let left_over = match branch.parts.as_slice() {
             [first, second] if first.size() > piece => {
@@ -150,7 +160,11 @@ impl<'a, R: Rows, F: Fn() -> R + Sync> Worker<'a, R, F> {
         Ok((fronts, left_over))
     }
 
-    fn eliminate_here(&mut self, branch: &Branch, fronts: &mut Vec<Front>) -> Result<LeftOver, NoFactor> {
+    fn eliminate_here(
+        &mut self,
+        branch: &Branch,
+        fronts: &mut Vec<Front>,
+    ) -> Result<LeftOver, NoFactor> {
         let mut parts = Vec::with_capacity(branch.parts.len());
         for part in &branch.parts {
             let left_over = self.eliminate_here(part, fronts)?;
@@ -168,7 +182,8 @@ impl<'a, R: Rows, F: Fn() -> R + Sync> Worker<'a, R, F> {
     ) -> Result<LeftOver, NoFactor> {
         let Range { start, end } = branch.own;
         let own = end - start;
-        let boundary = self.read_rows(start..end, parts.iter().map(|(part, _)| &fronts[*part].boundary));
+        let boundary =
+            self.read_rows(start..end, parts.iter().map(|(part, _)| &fronts[*part].boundary));
         let [own_strips, strips] = [strips(own), strips(own) + strips(boundary.len())];
         let local = |place: u32| match place as usize {
             place if place < end => place - start,
@@ -185,14 +200,21 @@ impl<'a, R: Rows, F: Fn() -> R + Sync> Worker<'a, R, F> {
         for row in own..LANES * own_strips {
             values[triangle(row / LANES) + row][row % LANES] = 1.0;
         }
-        let mut moved: Vec<Vec<usize>> =
-            parts.iter().map(|(part, _)| fronts[*part].boundary.iter().map(|&place| local(place)).collect()).collect();
+        let mut moved: Vec<Vec<usize>> = parts
+            .iter()
+            .map(|(part, _)| fronts[*part].boundary.iter().map(|&place| local(place)).collect())
+            .collect();
         for ((_, from), moved) in parts.iter().zip(&moved) {
             let inside = moved.partition_point(|&row| row < own);
             for (place, &row) in moved.iter().enumerate() {
                 let lanes = [row, place].map(|row| row % LANES);
                 let target = &mut values[trapezoid(own_strips, row / LANES)..];
-                add_row(target, from[triangle(place / LANES)..].iter(), &moved[..inside.min(place + 1)], lanes);
+                add_row(
+                    target,
+                    from[triangle(place / LANES)..].iter(),
+                    &moved[..inside.min(place + 1)],
+                    lanes,
+                );
             }
         }
         for &place in &boundary {
@@ -207,7 +229,12 @@ impl<'a, R: Rows, F: Fn() -> R + Sync> Worker<'a, R, F> {
             for (place, &row) in moved.iter().enumerate().skip(inside) {
                 let lanes = [row, place].map(|row| row % LANES);
                 let target = &mut left_over[triangle(row / LANES)..];
-                add_row(target, from[triangle(place / LANES)..].iter().skip(inside), &moved[inside..=place], lanes);
+                add_row(
+                    target,
+                    from[triangle(place / LANES)..].iter().skip(inside),
+                    &moved[inside..=place],
+                    lanes,
+                );
             }
         }
         if !front::eliminate(&mut values, own_strips, strips, &mut left_over) {
@@ -219,7 +246,11 @@ impl<'a, R: Rows, F: Fn() -> R + Sync> Worker<'a, R, F> {
     }
 
     /// Reads the rows of a front into `entries`, finds its boundary and fills in `local`.
-    fn read_rows<'b>(&mut self, own: Range<usize>, parts: impl Iterator<Item = &'b Vec<u32>>) -> Vec<u32> {
+    fn read_rows<'b>(
+        &mut self,
+        own: Range<usize>,
+        parts: impl Iterator<Item = &'b Vec<u32>>,
+    ) -> Vec<u32> {
         let Range { start, end } = own;
         let mut boundary = Vec::new();
         let Self { rows, local, entries, .. } = self;
@@ -295,7 +326,10 @@ mod tests {
     /// Two chains that meet in two vertices, one of which a branch with a single part eliminates.
     fn example() -> (Branch, Vec<Vec<f64>>) {
         let leaf = |own| Branch { own, parts: vec![] };
-        let branch = Branch { own: 7..8, parts: vec![Branch { own: 6..7, parts: vec![leaf(0..3), leaf(3..6)] }] };
+        let branch = Branch {
+            own: 7..8,
+            parts: vec![Branch { own: 6..7, parts: vec![leaf(0..3), leaf(3..6)] }],
+        };
         let mut matrix = vec![vec![0.0; 8]; 8];
         for (i, j) in [(0, 1), (1, 2), (2, 6), (3, 4), (4, 5), (5, 7), (6, 7), (3, 6), (0, 7)] {
             let value = -1.0 - 0.1 * (i + j) as f64;
@@ -332,7 +366,11 @@ mod tests {
         for bad in [-1.0, 0.0, f64::NAN, f64::INFINITY] {
             let (branch, mut matrix) = example();
             matrix[4][4] = bad;
-            assert_eq!(Factor::new(&branch, &|| Dense(matrix.clone())).err(), Some(NoFactor::NotPositive), "{bad}");
+            assert_eq!(
+                Factor::new(&branch, &|| Dense(matrix.clone())).err(),
+                Some(NoFactor::NotPositive),
+                "{bad}"
+            );
         }
     }
 }

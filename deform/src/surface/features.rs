@@ -84,13 +84,27 @@ impl Features {
     }
 
     /// Features that are known already: `face_features` are indices into `names`, one for each face.
-    pub(super) fn of_faces(names: Vec<String>, face_features: Vec<u32>, faces: &Cells) -> Result<Self, MeshError> {
+    pub(super) fn of_faces(
+        names: Vec<String>,
+        face_features: Vec<u32>,
+        faces: &Cells,
+    ) -> Result<Self, MeshError> {
         if face_features.len() != faces.len() {
-            return Err(MeshError::FeatureCount { found: face_features.len(), expected: faces.len(), what: "faces" });
+            return Err(MeshError::FeatureCount {
+                found: face_features.len(),
+                expected: faces.len(),
+                what: "faces",
+            });
         }
-        if let Some(&feature) = face_features.iter().find(|&&feature| feature as usize >= names.len()) {
+        if let Some(&feature) =
+            face_features.iter().find(|&&feature| feature as usize >= names.len())
+        {
             let found = feature as usize + 1;
-            return Err(MeshError::FeatureCount { found, expected: names.len(), what: "feature names" });
+            return Err(MeshError::FeatureCount {
+                found,
+                expected: names.len(),
+                what: "feature names",
+            });
         }
         let (offsets, vertices) = feature_vertices(names.len(), &face_features, faces);
         Ok(Self { names, face_features, offsets, vertices })
@@ -122,7 +136,10 @@ impl Features {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn faces(&self, feature: u32) -> impl Iterator<Item = u32> {
-        (0..).zip(&self.face_features).filter(move |(_, other)| **other == feature).map(|(face, _)| face)
+        (0..)
+            .zip(&self.face_features)
+            .filter(move |(_, other)| **other == feature)
+            .map(|(face, _)| face)
     }
 
     /// The index of the feature with this name.
@@ -163,7 +180,11 @@ impl Features {
 
 /// A name that is no feature of the surface.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("there is no feature '{name}'{}; the features are {}", did_you_mean(near), listed(features))]
+#[error(
+    "there is no feature '{name}'{}; the features are {}",
+    did_you_mean(near),
+    listed(features)
+)]
 pub struct UnknownFeature {
     /// The name.
     pub name: String,
@@ -175,7 +196,11 @@ pub struct UnknownFeature {
 
 fn did_you_mean(near: &[String]) -> String {
     let quoted: Vec<String> = near.iter().map(|name| format!("'{name}'")).collect();
-    if quoted.is_empty() { String::new() } else { format!("; did you mean {}?", quoted.join(" or ")) }
+    if quoted.is_empty() {
+        String::new()
+    } else {
+        format!("; did you mean {}?", quoted.join(" or "))
+    }
 }
 
 fn listed(names: &[String]) -> String {
@@ -188,7 +213,9 @@ fn near(name: &str, names: &[String]) -> Vec<String> {
     let wanted = name.to_lowercase();
     let mut scored: Vec<(f64, &String)> = names
         .iter()
-        .map(|known| (strsim::normalized_damerau_levenshtein(&wanted, &known.to_lowercase()), known))
+        .map(|known| {
+            (strsim::normalized_damerau_levenshtein(&wanted, &known.to_lowercase()), known)
+        })
         .filter(|(score, _)| *score >= 0.5)
         .collect();
     scored.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(b.1)));
@@ -198,7 +225,8 @@ fn near(name: &str, names: &[String]) -> Vec<String> {
 fn named_features(tags: &[Option<i64>], names: &[(i64, String)]) -> (Vec<String>, Vec<u32>) {
     let given: HashMap<i64, &String> = names.iter().rev().map(|(tag, name)| (*tag, name)).collect();
     // In the order of the numbers, untagged last; numbers with one name are one feature.
-    let mut order: BTreeMap<(bool, i64), u32> = tags.iter().map(|tag| ((tag.is_none(), tag.unwrap_or(0)), 0)).collect();
+    let mut order: BTreeMap<(bool, i64), u32> =
+        tags.iter().map(|tag| ((tag.is_none(), tag.unwrap_or(0)), 0)).collect();
     let mut found: Vec<String> = Vec::new();
     let mut indices: HashMap<String, u32> = HashMap::new();
     for (&(untagged, tag), index) in &mut order {
@@ -216,7 +244,11 @@ fn named_features(tags: &[Option<i64>], names: &[(i64, String)]) -> (Vec<String>
     (found, face_features)
 }
 
-fn sharp_features(points: &[Vector], faces: &Cells, settings: &FeatureSettings) -> (Vec<String>, Vec<u32>) {
+fn sharp_features(
+    points: &[Vector],
+    faces: &Cells,
+    settings: &FeatureSettings,
+) -> (Vec<String>, Vec<u32>) {
     let (count, face_features) = parts_between_sharp_edges(points, faces, settings);
     ((1..=count).map(|number| format!("feature-{number}")).collect(), face_features)
 }

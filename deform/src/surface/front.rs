@@ -81,7 +81,12 @@ fn update<const FUSED: bool>(target: &mut [Lanes; LANES], a: &[Lanes], b: &[Lane
 
 /// Eliminates the own columns of a front of `rows` strips, `own` of which are those of its own rows, and subtracts what they do to
 /// the strips below from the lower triangle `left_over`. Whether the front is positive definite.
-pub(super) fn eliminate(values: &mut [Lanes], own: usize, rows: usize, left_over: &mut [Lanes]) -> bool {
+pub(super) fn eliminate(
+    values: &mut [Lanes],
+    own: usize,
+    rows: usize,
+    left_over: &mut [Lanes],
+) -> bool {
     #[cfg(target_arch = "x86_64")]
     {
         struct Task<'a>(&'a mut [Lanes], usize, usize, &'a mut [Lanes]);
@@ -108,7 +113,12 @@ pub(super) fn eliminate(values: &mut [Lanes], own: usize, rows: usize, left_over
 }
 
 #[inline(always)]
-fn eliminate_with<const FUSED: bool>(values: &mut [Lanes], own: usize, rows: usize, left_over: &mut [Lanes]) -> bool {
+fn eliminate_with<const FUSED: bool>(
+    values: &mut [Lanes],
+    own: usize,
+    rows: usize,
+    left_over: &mut [Lanes],
+) -> bool {
     for first in (0..own).step_by(BLOCK) {
         let last = (first + BLOCK).min(own);
         let (above, below) = values.split_at_mut(triangle(last));
@@ -165,7 +175,8 @@ fn eliminate_with<const FUSED: bool>(values: &mut [Lanes], own: usize, rows: usi
         for strip in first..rows - own {
             let row = &mut left_over[triangle(strip)..triangle(strip + 1)][LANES * first..];
             let a = &boundary[strip * length..(strip + 1) * length];
-            for (other, target) in row.as_chunks_mut::<LANES>().0.iter_mut().take(BLOCK).enumerate() {
+            for (other, target) in row.as_chunks_mut::<LANES>().0.iter_mut().take(BLOCK).enumerate()
+            {
                 update::<FUSED>(target, a, &others[other * length..(other + 1) * length]);
             }
         }
@@ -274,8 +285,11 @@ pub(super) fn backward(front: &[Lanes], own: usize, values: &mut [Lanes]) {
         let column = LANES * block;
         let rows = (block + 1..own).map(|strip| &above[triangle(strip) + column..]);
         let inside = transposed_times(rows, inside);
-        let outside = transposed_times(below.chunks_exact(LANES * own).map(|row| &row[column..]), outside);
-        let Some(corner) = above[triangle(block)..].as_chunks::<LANES>().0.get(block) else { return };
+        let outside =
+            transposed_times(below.chunks_exact(LANES * own).map(|row| &row[column..]), outside);
+        let Some(corner) = above[triangle(block)..].as_chunks::<LANES>().0.get(block) else {
+            return;
+        };
         for j in (0..LANES).rev() {
             value[j] -= inside[j] + outside[j];
             for i in j + 1..LANES {
@@ -307,7 +321,9 @@ mod tests {
 
     /// A positive definite matrix without structure.
     fn example(size: usize) -> Vec<Vec<f64>> {
-        let value = |row: usize, column: usize| (1.0 + (row * column) as f64 + 3.0 * (row + column) as f64).sin();
+        let value = |row: usize, column: usize| {
+            (1.0 + (row * column) as f64 + 3.0 * (row + column) as f64).sin()
+        };
         let mut matrix: Vec<Vec<f64>> =
             (0..size).map(|row| (0..size).map(|column| value(row, column)).collect()).collect();
         for (place, row) in matrix.iter_mut().enumerate() {
@@ -319,10 +335,14 @@ mod tests {
     /// Every size of blocks: less than one, some, and one that is cut.
     #[test]
     fn fronts_are_eliminated_and_solved() {
-        for (own, boundary) in [(0, 3), (1, 0), (3, 5), (BLOCK, 1), (BLOCK + 3, 2 * BLOCK + 1), (3 * BLOCK - 1, 2)] {
+        for (own, boundary) in
+            [(0, 3), (1, 0), (3, 5), (BLOCK, 1), (BLOCK + 3, 2 * BLOCK + 1), (3 * BLOCK - 1, 2)]
+        {
             let rows = own + boundary;
             let matrix = example(LANES * rows);
-            let entry = |strip: usize, column: usize| std::array::from_fn(|lane| matrix[LANES * strip + lane][column]);
+            let entry = |strip: usize, column: usize| {
+                std::array::from_fn(|lane| matrix[LANES * strip + lane][column])
+            };
             let mut front = Vec::new();
             for strip in 0..rows {
                 assert_eq!(front.len(), trapezoid(own, strip));
@@ -331,34 +351,44 @@ mod tests {
             let mut left_over: Vec<Lanes> = Vec::new();
             for strip in own..rows {
                 assert_eq!(left_over.len(), triangle(strip - own));
-                left_over.extend((LANES * own..LANES * (strip + 1)).map(|column| entry(strip, column)));
+                left_over
+                    .extend((LANES * own..LANES * (strip + 1)).map(|column| entry(strip, column)));
             }
             assert!(eliminate(&mut front, own, rows, &mut left_over));
 
             let factor = |row: usize, column: usize| match row / LANES {
-                strip if column < LANES * (strip + 1).min(own) => front[trapezoid(own, strip) + column][row % LANES],
+                strip if column < LANES * (strip + 1).min(own) => {
+                    front[trapezoid(own, strip) + column][row % LANES]
+                }
                 _ => 0.0,
             };
             for row in 0..LANES * rows {
                 for column in 0..=row {
-                    let product: f64 = (0..LANES * own).map(|k| factor(row, k) * factor(column, k)).sum();
+                    let product: f64 =
+                        (0..LANES * own).map(|k| factor(row, k) * factor(column, k)).sum();
                     let rest = match column.checked_sub(LANES * own) {
-                        Some(column) => left_over[triangle(row / LANES - own) + column][row % LANES],
+                        Some(column) => {
+                            left_over[triangle(row / LANES - own) + column][row % LANES]
+                        }
                         None => 0.0,
                     };
-                    assert!((product + rest - matrix[row][column]).abs() < 1e-11 * matrix.len() as f64);
+                    assert!(
+                        (product + rest - matrix[row][column]).abs() < 1e-11 * matrix.len() as f64
+                    );
                 }
             }
 
             // The factor, with the identity for what is not eliminated, times its transpose.
-            let expected: Vec<f64> = (0..LANES * rows).map(|row| (0.3 * row as f64).cos()).collect();
+            let expected: Vec<f64> =
+                (0..LANES * rows).map(|row| (0.3 * row as f64).cos()).collect();
             let whole = |row: usize, column: usize| match column < LANES * own {
                 true => factor(row, column),
                 false => f64::from(row == column),
             };
             let size = LANES * rows;
-            let middle: Vec<f64> =
-                (0..size).map(|column| (0..size).map(|row| whole(row, column) * expected[row]).sum()).collect();
+            let middle: Vec<f64> = (0..size)
+                .map(|column| (0..size).map(|row| whole(row, column) * expected[row]).sum())
+                .collect();
             let mut values = vec![[0.0; LANES]; rows];
             for (row, value) in values.as_flattened_mut().iter_mut().enumerate() {
                 *value = (0..size).map(|column| whole(row, column) * middle[column]).sum();

@@ -29,7 +29,11 @@ impl Handle {
     /// # Errors
     /// [`EditError`] for an edit that is invalid, that names what the surface does not have, or that moves nothing.
     pub fn find(surface: &Surface, edit: &Edit, place: usize) -> Result<Self, EditError> {
-        edit.validate().map_err(|source| EditError::Invalid { edit: place, name: edit.name(), source })?;
+        edit.validate().map_err(|source| EditError::Invalid {
+            edit: place,
+            name: edit.name(),
+            source,
+        })?;
         let finder = Finder { surface, edit, place };
         let in_features = finder.features("features", edit.features())?;
         let in_region = edit.region().map(|region| finder.region("region", region)).transpose()?;
@@ -39,16 +43,20 @@ impl Handle {
             in_features.as_ref().is_none_or(|inside| inside.vertices[vertex])
                 && in_region.as_ref().is_none_or(|inside| inside[vertex])
         };
-        let mut roles: Vec<Role> =
-            (0..count).map(|vertex| if takes(vertex) { Role::Handle } else { Role::Free }).collect();
-        let vertices: Vec<u32> =
-            (0..count).filter(|&vertex| roles[vertex] == Role::Handle).map(|vertex| vertex as u32).collect();
+        let mut roles: Vec<Role> = (0..count)
+            .map(|vertex| if takes(vertex) { Role::Handle } else { Role::Free })
+            .collect();
+        let vertices: Vec<u32> = (0..count)
+            .filter(|&vertex| roles[vertex] == Role::Handle)
+            .map(|vertex| vertex as u32)
+            .collect();
         if vertices.is_empty() {
             return Err(EditError::NothingInCommon {
                 edit: place,
                 name: edit.name(),
                 features: edit.features().to_vec(),
-                vertices: in_region.map_or(0, |inside| inside.iter().filter(|inside| **inside).count()),
+                vertices: in_region
+                    .map_or(0, |inside| inside.iter().filter(|inside| **inside).count()),
             });
         }
         let mut faces: Vec<bool> = match &in_features {
@@ -84,14 +92,25 @@ impl Handle {
             }
         }
         if vertices.iter().all(|&vertex| roles[vertex as usize] == Role::Fixed) {
-            return Err(EditError::HandleFixed { edit: place, name: edit.name(), handle: in_words(edit) });
+            return Err(EditError::HandleFixed {
+                edit: place,
+                name: edit.name(),
+                handle: in_words(edit),
+            });
         }
         if let Edit::Displacement(import) = edit {
             check_import(surface, import, place)?;
-            let moves =
-                |vertex: &u32| surface.vertices().binary_search(vertex).is_ok_and(|local| roles[local] == Role::Handle);
+            let moves = |vertex: &u32| {
+                surface
+                    .vertices()
+                    .binary_search(vertex)
+                    .is_ok_and(|local| roles[local] == Role::Handle)
+            };
             if !import.vertices.iter().any(moves) {
-                return Err(EditError::NothingMoves { edit: place, vertices: import.vertices.len() });
+                return Err(EditError::NothingMoves {
+                    edit: place,
+                    vertices: import.vertices.len(),
+                });
             }
         }
         Ok(Self { roles, vertices, faces })
@@ -123,11 +142,21 @@ struct Finder<'a> {
 
 impl Finder<'_> {
     /// `None` where no features are named.
-    fn features(&self, field: &'static str, names: &[String]) -> Result<Option<InFeatures>, EditError> {
+    fn features(
+        &self,
+        field: &'static str,
+        names: &[String],
+    ) -> Result<Option<InFeatures>, EditError> {
         let features = self.surface.features();
-        let found =
-            names.iter().map(|name| features.index(name)).collect::<Result<Vec<u32>, _>>().map_err(|source| {
-                EditError::UnknownFeature { edit: self.place, name: self.edit.name(), field, source }
+        let found = names
+            .iter()
+            .map(|name| features.index(name))
+            .collect::<Result<Vec<u32>, _>>()
+            .map_err(|source| EditError::UnknownFeature {
+                edit: self.place,
+                name: self.edit.name(),
+                field,
+                source,
             })?;
         if found.is_empty() {
             return Ok(None);
@@ -138,19 +167,26 @@ impl Finder<'_> {
                 vertices[vertex as usize] = true;
             }
         }
-        let faces = features.face_features().iter().map(|feature| found.contains(feature)).collect();
+        let faces =
+            features.face_features().iter().map(|feature| found.contains(feature)).collect();
         Ok(Some(InFeatures { vertices, faces }))
     }
 
     fn region(&self, field: &'static str, region: &Region) -> Result<Vec<bool>, EditError> {
         let (edit, name) = (self.place, self.edit.name());
-        let found = region.vertices(self.surface).map_err(|source| EditError::Region { edit, name, field, source })?;
+        let found = region.vertices(self.surface).map_err(|source| EditError::Region {
+            edit,
+            name,
+            field,
+            source,
+        })?;
         if found.is_empty() {
             let points = self.surface.points();
             let nearest = region.nearest(self.surface).map(|(vertex, distance)| {
                 (self.surface.vertices()[vertex as usize], points[vertex as usize], distance)
             });
-            let surroundings = Box::new(Surroundings { nearest, bounds: bounds(points.iter().copied()) });
+            let surroundings =
+                Box::new(Surroundings { nearest, bounds: bounds(points.iter().copied()) });
             return Err(EditError::EmptyRegion { edit, name, field, surroundings });
         }
         let mut inside = vec![false; self.surface.points().len()];

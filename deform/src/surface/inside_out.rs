@@ -8,17 +8,25 @@ use crate::vector::{determinant, subtract};
 const EMPTY: f64 = 1e-12;
 
 /// The triangles of closed pieces that enclose a volume of another sign at `shape` than at `reference`.
-pub(super) fn turned_inside_out(triangles: &[[u32; 3]], reference: &[Vector], shape: &[Vector]) -> Vec<u32> {
+pub(super) fn turned_inside_out(
+    triangles: &[[u32; 3]],
+    reference: &[Vector],
+    shape: &[Vector],
+) -> Vec<u32> {
     let parts = Parts::components(reference.len(), triangles);
     let [before, after] = [reference, shape].map(|points| volumes(triangles, points, &parts));
-    let mut suspect: Vec<bool> = before.iter().zip(&after).map(|(before, after)| before * after < 0.0).collect();
+    let mut suspect: Vec<bool> =
+        before.iter().zip(&after).map(|(before, after)| before * after < 0.0).collect();
     if !suspect.contains(&true) {
         return Vec::new();
     }
     // An open piece encloses nothing.
     let part = |triangle: &[u32; 3]| parts[triangle[0] as usize] as usize;
-    let chosen: Vec<u32> =
-        (0..).zip(triangles).filter(|(_, triangle)| suspect[part(triangle)]).map(|(number, _)| number).collect();
+    let chosen: Vec<u32> = (0..)
+        .zip(triangles)
+        .filter(|(_, triangle)| suspect[part(triangle)])
+        .map(|(number, _)| number)
+        .collect();
     let faces = chosen.iter().map(|&number| &triangles[number as usize][..]);
     for same in edges(faces).chunk_by(|a, b| a.ends == b.ends) {
         let is_closed = matches!(same, [a, b] if a.forward != b.forward);

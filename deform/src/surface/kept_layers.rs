@@ -74,8 +74,11 @@ impl KeptLayers {
     /// The kept layer that has the most of a stack below it, and best fits the edit above.
     pub(super) fn best_for(&self, stack: &[Edit]) -> Option<usize> {
         let mut best: Option<((usize, bool), usize)> = None;
-        for (index, (layer, in_common)) in self.layers.iter().zip(self.in_common(stack)).enumerate() {
-            let Some(edit) = stack.get(layer.place).filter(|_| layer.place <= in_common) else { continue };
+        for (index, (layer, in_common)) in self.layers.iter().zip(self.in_common(stack)).enumerate()
+        {
+            let Some(edit) = stack.get(layer.place).filter(|_| layer.place <= in_common) else {
+                continue;
+            };
             if best.is_some_and(|((place, _), _)| layer.place < place) {
                 continue;
             }
@@ -155,7 +158,13 @@ impl Followed {
     }
 
     /// `displacement` becomes `below` and what an edit adds to it; whether it is everywhere at most `limit`.
-    pub(super) fn add(&self, edit: &Edit, below: &[Vector], limit: f64, displacement: &mut [Vector]) -> bool {
+    pub(super) fn add(
+        &self,
+        edit: &Edit,
+        below: &[Vector],
+        limit: f64,
+        displacement: &mut [Vector],
+    ) -> bool {
         let coefficients = Motion::coefficients(edit, self.unit);
         let terms: Vec<(&[f64], Vector)> = self
             .bases
@@ -260,8 +269,11 @@ mod tests {
 
     /// Comparisons of edits, and copies of edits that are kept.
     fn cost(count: usize) -> (usize, usize) {
-        let surface =
-            Surface::extract(&box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]), &FeatureSettings::default()).unwrap();
+        let surface = Surface::extract(
+            &box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]),
+            &FeatureSettings::default(),
+        )
+        .unwrap();
         let mut editor = Editor::new(Arc::new(surface)).unwrap();
         COMPARED.set(0);
         let mut stack = lifts(count);
@@ -287,13 +299,20 @@ mod tests {
     fn a_stack_costs_as_much_as_it_is_long() {
         let ((compared, kept), (compared_twice, kept_twice)) = (cost(100), cost(200));
         assert!(compared <= 10 * 100 && kept <= 2 * 100, "{compared} comparisons, {kept} copies");
-        assert!(compared_twice <= 2 * compared && kept_twice <= 2 * kept, "{compared_twice}, {kept_twice}");
+        assert!(
+            compared_twice <= 2 * compared && kept_twice <= 2 * kept,
+            "{compared_twice}, {kept_twice}"
+        );
     }
 
     #[test]
     fn layers_say_the_same_whether_or_not_they_were_evaluated_before() {
         let surface = Arc::new(
-            Surface::extract(&box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]), &FeatureSettings::default()).unwrap(),
+            Surface::extract(
+                &box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]),
+                &FeatureSettings::default(),
+            )
+            .unwrap(),
         );
         let stack = lifts(12);
         let mut fresh = Editor::new(Arc::clone(&surface)).unwrap();

@@ -53,7 +53,10 @@ impl Laplacian {
     /// The neighbours of a vertex with their weights.
     pub fn neighbours(&self, vertex: usize) -> impl Iterator<Item = (usize, f64)> {
         let row = self.offsets[vertex]..self.offsets[vertex + 1];
-        self.columns[row.clone()].iter().zip(&self.weights[row]).map(|(&column, &weight)| (column as usize, weight))
+        self.columns[row.clone()]
+            .iter()
+            .zip(&self.weights[row])
+            .map(|(&column, &weight)| (column as usize, weight))
     }
 
     /// The row of `L` of a vertex, its diagonal first.
@@ -67,7 +70,9 @@ impl Laplacian {
         (0..self.len())
             .map(|vertex| {
                 let own = values[vertex];
-                self.neighbours(vertex).map(|(column, weight)| weight * (own - values[column])).sum()
+                self.neighbours(vertex)
+                    .map(|(column, weight)| weight * (own - values[column]))
+                    .sum()
             })
             .collect()
     }
@@ -88,8 +93,9 @@ impl Laplacian {
     pub fn apply_power_exactly(&self, order: usize, values: &[DoubleDouble]) -> Vec<DoubleDouble> {
         let apply = |values: &[DoubleDouble]| -> Vec<DoubleDouble> {
             let row = |vertex: usize| {
-                let terms =
-                    self.neighbours(vertex).map(|(column, weight)| (values[vertex] - values[column]).times(weight));
+                let terms = self
+                    .neighbours(vertex)
+                    .map(|(column, weight)| (values[vertex] - values[column]).times(weight));
                 terms.fold(DoubleDouble::default(), |sum, term| sum + term)
             };
             (0..self.len()).map(row).collect()
@@ -125,7 +131,9 @@ impl Triangulation {
         let lengths = edge_lengths(surface, least_slack);
         let mut cotangents = vec![0.0; lengths.len()];
         parallel::for_each_chunk(&mut cotangents, 3 * CHUNK, |chunk, part| {
-            for (sides, lengths) in part.chunks_exact_mut(3).zip(lengths[3 * CHUNK * chunk..].chunks_exact(3)) {
+            for (sides, lengths) in
+                part.chunks_exact_mut(3).zip(lengths[3 * CHUNK * chunk..].chunks_exact(3))
+            {
                 sides.copy_from_slice(&three_cotangents(lengths[0], lengths[1], lengths[2]));
             }
         });
@@ -168,7 +176,9 @@ impl Triangulation {
                 continue;
             }
             flips_left -= 1;
-            for moved in [side, twin].into_iter().flat_map(|side| [around(side)[1], around(side)[2]]) {
+            for moved in
+                [side, twin].into_iter().flat_map(|side| [around(side)[1], around(side)[2]])
+            {
                 let other = self.twins[moved];
                 if other != OPEN {
                     let lower = moved.min(other as usize);
@@ -199,11 +209,13 @@ impl Triangulation {
         for (slot, corner) in [(h, d), (h1, c), (h2, a), (g, c), (g1, d), (g2, b)] {
             self.corners[slot] = corner;
         }
-        for (slot, length) in [(h, diagonal), (h1, ca), (h2, ad), (g, diagonal), (g1, db), (g2, bc)] {
+        for (slot, length) in [(h, diagonal), (h1, ca), (h2, ad), (g, diagonal), (g1, db), (g2, bc)]
+        {
             self.lengths[slot] = length;
         }
         for [first, second, third] in [[h, h1, h2], [g, g1, g2]] {
-            let cotangents = three_cotangents(self.lengths[first], self.lengths[second], self.lengths[third]);
+            let cotangents =
+                three_cotangents(self.lengths[first], self.lengths[second], self.lengths[third]);
             for (slot, cotangent) in [first, second, third].into_iter().zip(cotangents) {
                 self.cotangents[slot] = cotangent;
             }
@@ -338,7 +350,8 @@ fn apex(base: f64, from_origin: f64, from_end: f64) -> (f64, f64) {
 /// The lengths of all sides, in units of their mean, lengthened where a triangle would have no area.
 fn edge_lengths(surface: &Surface, least_slack: f64) -> Vec<f64> {
     let points = surface.points();
-    let larger = |largest: f64, value: &f64| if value.abs() > largest { value.abs() } else { largest };
+    let larger =
+        |largest: f64, value: &f64| if value.abs() > largest { value.abs() } else { largest };
     let scale = points.iter().flatten().fold(0.0, larger);
     let scale = if scale > 0.0 { scale } else { 1.0 };
     let triangles = surface.triangles();
@@ -361,7 +374,9 @@ fn edge_lengths(surface: &Surface, least_slack: f64) -> Vec<f64> {
     let missing = lengths
         .chunks_exact(3)
         .map(|sides| {
-            let longest = sides.iter().fold(0.0, |longest, &side| if side > longest { side } else { longest });
+            let longest = sides
+                .iter()
+                .fold(0.0, |longest, &side| if side > longest { side } else { longest });
             let slack = sides.iter().sum::<f64>() - 2.0 * longest;
             least_slack * if longest > 1e-6 { longest } else { 1e-6 } - slack
         })
@@ -398,7 +413,9 @@ mod tests {
     fn inner_edges_of_obtuse_triangles_have_no_negative_weight() {
         let torus = shapes::torus(2.0, 0.5, [30, 18]);
         let (_, laplacian) = laplacian(&torus, |[x, y, z]| [x + 3.0 * z, 4.0 * y + 2.0 * x, z]);
-        let lowest = (0..laplacian.len()).flat_map(|vertex| laplacian.neighbours(vertex)).map(|(_, weight)| weight);
+        let lowest = (0..laplacian.len())
+            .flat_map(|vertex| laplacian.neighbours(vertex))
+            .map(|(_, weight)| weight);
         assert!(lowest.fold(f64::INFINITY, f64::min) > -1e-9);
         let mean = laplacian.mass().iter().sum::<f64>() / laplacian.len() as f64;
         assert!((mean - 1.0).abs() < 1e-12 && laplacian.mass().iter().all(|&mass| mass > 0.0));
@@ -411,7 +428,8 @@ mod tests {
         let triangles = surface.triangles();
         let flipped = (0..laplacian.len()).any(|vertex| {
             laplacian.neighbours(vertex).any(|(other, weight)| {
-                let joined = |t: &[u32; 3]| t.contains(&(vertex as u32)) && t.contains(&(other as u32));
+                let joined =
+                    |t: &[u32; 3]| t.contains(&(vertex as u32)) && t.contains(&(other as u32));
                 weight > 1e-6 && !triangles.iter().any(joined)
             })
         });
@@ -439,16 +457,26 @@ mod tests {
 
     #[test]
     fn the_laplacian_is_symmetric_and_annihilates_constants() {
-        let (_, laplacian) = laplacian(&shapes::torus(2.0, 0.5, [20, 12]), |[x, y, z]| [x, y + 0.3 * x * z, 3.0 * z]);
+        let (_, laplacian) = laplacian(&shapes::torus(2.0, 0.5, [20, 12]), |[x, y, z]| {
+            [x, y + 0.3 * x * z, 3.0 * z]
+        });
         for vertex in 0..laplacian.len() {
             for (other, weight) in laplacian.neighbours(vertex) {
-                let back: Vec<f64> =
-                    laplacian.neighbours(other).filter(|(back, _)| *back == vertex).map(|(_, weight)| weight).collect();
+                let back: Vec<f64> = laplacian
+                    .neighbours(other)
+                    .filter(|(back, _)| *back == vertex)
+                    .map(|(_, weight)| weight)
+                    .collect();
                 assert_eq!(back, [weight]);
             }
         }
         for order in 1..4 {
-            assert!(laplacian.apply_power(order, &vec![0.1; laplacian.len()]).iter().all(|&value| value == 0.0));
+            assert!(
+                laplacian
+                    .apply_power(order, &vec![0.1; laplacian.len()])
+                    .iter()
+                    .all(|&value| value == 0.0)
+            );
         }
     }
 
@@ -456,17 +484,21 @@ mod tests {
     #[test]
     fn the_curvature_of_a_torus_converges() {
         let error = |count: usize| {
-            let (surface, laplacian) = laplacian(&shapes::torus(2.0, 1.0, [2 * count, count]), |point| point);
+            let (surface, laplacian) =
+                laplacian(&shapes::torus(2.0, 1.0, [2 * count, count]), |point| point);
             let total: f64 = 4.0 * std::f64::consts::PI.powi(2) * 2.0;
             let area = total / laplacian.len() as f64;
-            let images =
-                [0, 1, 2].map(|axis| laplacian.apply(&surface.points().iter().map(|p| p[axis]).collect::<Vec<f64>>()));
+            let images = [0, 1, 2].map(|axis| {
+                laplacian.apply(&surface.points().iter().map(|p| p[axis]).collect::<Vec<f64>>())
+            });
             (0..laplacian.len())
                 .map(|vertex| {
                     let [x, y, z] = surface.points()[vertex];
                     let cosine = x.hypot(y) - 2.0;
                     let expected = (2.0 + 2.0 * cosine) / (2.0 + cosine);
-                    let image = images.each_ref().map(|image| image[vertex] / (laplacian.mass()[vertex] * area));
+                    let image = images
+                        .each_ref()
+                        .map(|image| image[vertex] / (laplacian.mass()[vertex] * area));
                     let normal = [cosine * x / x.hypot(y), cosine * y / x.hypot(y), z];
                     let found: f64 = (0..3).map(|axis| image[axis] * normal[axis]).sum();
                     (found - expected).abs()

@@ -116,12 +116,12 @@ mod triangle_pair;
 
 pub use advance::Advance;
 pub use check::{
-    BrokenSurface, FlawedFace, FlawedFaces, Intersection, Intersections, SurfaceReport, check, require_sound,
-    sound_fraction,
+    BrokenSurface, FlawedFace, FlawedFaces, Intersection, Intersections, SurfaceReport, check,
+    require_sound, sound_fraction,
 };
 pub use edit::{
-    Affine, Displacement, Edit, HarmonicOrder, Rotate, ScaleDirection, ScaleNormals, Skeleton, SkeletonMove, Skinning,
-    Translate,
+    Affine, Displacement, Edit, HarmonicOrder, Rotate, ScaleDirection, ScaleNormals, Skeleton,
+    SkeletonMove, Skinning, Translate,
 };
 pub use edit_error::{EditError, InvalidEdit, Surroundings};
 pub use editor::Editor;

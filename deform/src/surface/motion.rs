@@ -43,7 +43,8 @@ impl Motion {
             }
             Edit::ScaleNormals(_) => {
                 let normals = handle_normals(surface, handle, shape, place)?;
-                let bases = [0, 1, 2].map(|axis| normals.iter().map(|normal| normal[axis]).collect());
+                let bases =
+                    [0, 1, 2].map(|axis| normals.iter().map(|normal| normal[axis]).collect());
                 Self { bases: bases.to_vec(), unit: 1.0 }
             }
             Edit::Displacement(_) | Edit::Skeleton(_) => return Ok(None),
@@ -54,12 +55,15 @@ impl Motion {
     pub fn coefficients(edit: &Edit, unit: f64) -> Vec<Vector> {
         match edit {
             Edit::Translate(edit) => vec![edit.by],
-            Edit::Rotate(edit) => {
-                rotation_minus_identity(edit.axis, edit.degrees).map(|column| scale(column, unit)).to_vec()
+            Edit::Rotate(edit) => rotation_minus_identity(edit.axis, edit.degrees)
+                .map(|column| scale(column, unit))
+                .to_vec(),
+            Edit::ScaleDirection(edit) => {
+                diagonal(edit.factors.map(|factor| (factor - 1.0) * unit))
             }
-            Edit::ScaleDirection(edit) => diagonal(edit.factors.map(|factor| (factor - 1.0) * unit)),
             Edit::Affine(edit) => {
-                let mut columns = [0, 1, 2].map(|column| edit.matrix.map(|row| row[column])).to_vec();
+                let mut columns =
+                    [0, 1, 2].map(|column| edit.matrix.map(|row| row[column])).to_vec();
                 for (axis, column) in columns.iter_mut().enumerate() {
                     column[axis] -= 1.0;
                     *column = scale(*column, unit);
@@ -76,15 +80,18 @@ impl Motion {
     fn coordinates(handle: &Handle, shape: &[Vector], center: Option<Vector>) -> Self {
         let points = || handle.vertices.iter().map(|&vertex| shape[vertex as usize]);
         let [lower, upper] = bounds(points());
-        let center = center.unwrap_or_else(|| [0, 1, 2].map(|axis| 0.5 * lower[axis] + 0.5 * upper[axis]));
+        let center =
+            center.unwrap_or_else(|| [0, 1, 2].map(|axis| 0.5 * lower[axis] + 0.5 * upper[axis]));
         let reach = [lower, upper]
             .map(|corner| subtract(corner, center))
             .as_flattened()
             .iter()
             .fold(0.0f64, |largest, value| largest.max(value.abs()));
         // A power of two changes no digit.
-        let unit = if reach.is_normal() { reach.log2().ceil().clamp(-1000.0, 1000.0).exp2() } else { 1.0 };
-        let bases = [0, 1, 2].map(|axis| points().map(|point| (point[axis] - center[axis]) / unit).collect());
+        let unit =
+            if reach.is_normal() { reach.log2().ceil().clamp(-1000.0, 1000.0).exp2() } else { 1.0 };
+        let bases = [0, 1, 2]
+            .map(|axis| points().map(|point| (point[axis] - center[axis]) / unit).collect());
         Self { bases: bases.to_vec(), unit }
     }
 }

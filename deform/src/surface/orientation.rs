@@ -50,7 +50,8 @@ pub(super) fn faces_to_turn(points: &[Vector], faces: &Cells) -> Vec<bool> {
         let [mut kept, mut changed] = [0.0, 0.0];
         for &face in &piece {
             let normal = super::extraction::polygon_normal(points, faces.vertices(face));
-            *if turned[face] == Some(true) { &mut changed } else { &mut kept } += dot(normal, normal).sqrt();
+            *if turned[face] == Some(true) { &mut changed } else { &mut kept } +=
+                dot(normal, normal).sqrt();
         }
         for &face in &piece {
             turned[face] = Some(has_two_sides && (turned[face] == Some(true)) != (changed > kept));

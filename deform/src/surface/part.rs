@@ -88,7 +88,8 @@ impl BoundaryFaces {
     /// Those of the faces whose cell is `wanted`.
     #[must_use]
     pub fn of_cells(&self, wanted: impl Fn(usize) -> bool) -> Self {
-        let kept: Vec<usize> = (0..self.cells.len()).filter(|&face| wanted(self.cells[face] as usize)).collect();
+        let kept: Vec<usize> =
+            (0..self.cells.len()).filter(|&face| wanted(self.cells[face] as usize)).collect();
         Self {
             faces: self.faces.subset(kept.iter().copied()),
             cells: kept.iter().map(|&face| self.cells[face]).collect(),
@@ -118,7 +119,9 @@ pub fn face_tags(source: &FeatureSource, faces: &Cells) -> Option<FaceTags> {
 
 /// The number that most of the vertices carry, the lowest on a tie.
 fn majority(tags: &[i64], vertices: &[u32]) -> Option<i64> {
-    most_frequent(vertices.iter().filter_map(|&vertex| tags.get(vertex as usize).copied()).collect())
+    most_frequent(
+        vertices.iter().filter_map(|&vertex| tags.get(vertex as usize).copied()).collect(),
+    )
 }
 
 impl Surface {
@@ -141,10 +144,17 @@ impl Surface {
     ) -> Result<Self, SurfaceError> {
         settings.validate()?;
         check_parts(&points, &vertices, &faces)?;
-        for found in [Some(owner_cells.len()), tags.map(|tags| tags.tags.len())].into_iter().flatten() {
+        for found in
+            [Some(owner_cells.len()), tags.map(|tags| tags.tags.len())].into_iter().flatten()
+        {
             if found != faces.len() {
                 let what = "faces";
-                return Err(crate::mesh::MeshError::FeatureCount { found, expected: faces.len(), what }.into());
+                return Err(crate::mesh::MeshError::FeatureCount {
+                    found,
+                    expected: faces.len(),
+                    what,
+                }
+                .into());
             }
         }
         if may_run_either_way {

@@ -55,8 +55,9 @@ impl Polyharmonic {
         if operator.free.is_empty() {
             return Ok(operator);
         }
-        let couplings: f64 =
-            (0..laplacian.len()).map(|vertex| (laplacian.neighbours(vertex).count() as f64).powi(order as i32)).sum();
+        let couplings: f64 = (0..laplacian.len())
+            .map(|vertex| (laplacian.neighbours(vertex).count() as f64).powi(order as i32))
+            .sum();
         if order != HarmonicOrder::Harmonic && couplings > COUPLINGS * laplacian.len() as f64 {
             return Err(NotFactored::TooLarge);
         }
@@ -79,7 +80,11 @@ impl Polyharmonic {
             NoFactor::NotPositive => NotFactored::NotPositive,
         })?;
         operator.factor = Some(factor);
-        if operator.error_on_ones(laplacian) < LARGEST_ERROR { Ok(operator) } else { Err(NotFactored::NotPositive) }
+        if operator.error_on_ones(laplacian) < LARGEST_ERROR {
+            Ok(operator)
+        } else {
+            Err(NotFactored::NotPositive)
+        }
     }
 
     /// The largest error, before refinement, where the solution is 1 at every free vertex and 0 at every prescribed one.
@@ -89,10 +94,14 @@ impl Polyharmonic {
             ones[vertex as usize] = 1.0;
         }
         let image = laplacian.apply_power(self.order as usize, &ones);
-        let mut solution: Vec<f64> = self.free.iter().map(|&vertex| image[vertex as usize]).collect();
+        let mut solution: Vec<f64> =
+            self.free.iter().map(|&vertex| image[vertex as usize]).collect();
         self.solve_in_place(&mut solution);
         // A maximum that keeps NaN.
-        solution.iter().map(|value| (value - 1.0).abs()).fold(0.0, |a, b| if b <= a { a } else { b })
+        solution
+            .iter()
+            .map(|value| (value - 1.0).abs())
+            .fold(0.0, |a, b| if b <= a { a } else { b })
     }
 
     /// Whether this operator answers for an order and a set of prescribed vertices.
@@ -122,12 +131,18 @@ impl Polyharmonic {
             let mut work: Vec<f64> = field
                 .iter()
                 .enumerate()
-                .map(
-                    |(vertex, value)| if self.prescribed[vertex] { value - bases[parts[vertex] as usize] } else { 0.0 },
-                )
+                .map(|(vertex, value)| {
+                    if self.prescribed[vertex] {
+                        value - bases[parts[vertex] as usize]
+                    } else {
+                        0.0
+                    }
+                })
                 .collect();
             // In units of the largest value, so that nothing overflows on the way.
-            let larger = |largest: f64, value: &f64| if value.abs() > largest { value.abs() } else { largest };
+            let larger = |largest: f64, value: &f64| {
+                if value.abs() > largest { value.abs() } else { largest }
+            };
             let scale = work.iter().fold(0.0, larger);
             for &vertex in &self.free {
                 field[vertex as usize] = bases[parts[vertex as usize] as usize];
@@ -142,8 +157,10 @@ impl Polyharmonic {
         }
         let corrections = if self.order == HarmonicOrder::Harmonic { 1 } else { 2 };
         for _ in 0..corrections {
-            let residuals: Vec<Vec<f64>> =
-                active.iter().map(|(_, _, work)| laplacian.apply_power(self.order as usize, work)).collect();
+            let residuals: Vec<Vec<f64>> = active
+                .iter()
+                .map(|(_, _, work)| laplacian.apply_power(self.order as usize, work))
+                .collect();
             let mut correction: Vec<f64> = residuals
                 .iter()
                 .flat_map(|residual| self.free.iter().map(|&vertex| -residual[vertex as usize]))
@@ -206,7 +223,9 @@ impl Polyharmonic {
 pub(super) enum NotFactored {
     #[error("its factor does not fit in memory")]
     TooLarge,
-    #[error("it is too ill-conditioned: the surface has nearly degenerate triangles; a lower harmonic order may work")]
+    #[error(
+        "it is too ill-conditioned: the surface has nearly degenerate triangles; a lower harmonic order may work"
+    )]
     NotPositive,
 }
 

@@ -77,7 +77,11 @@ impl Region {
         if let Region::Faces(faces) = self {
             for (index, &face) in faces.iter().enumerate() {
                 if face as usize >= surface.faces().len() {
-                    return Err(RegionError::UnknownFace { index, face, faces: surface.faces().len() });
+                    return Err(RegionError::UnknownFace {
+                        index,
+                        face,
+                        faces: surface.faces().len(),
+                    });
                 }
                 for &vertex in surface.faces().vertices(face as usize) {
                     inside[vertex as usize] = true;
@@ -94,15 +98,19 @@ impl Region {
 
     /// How far a point is from the region; 0 in it. Infinite for picked faces, which are no part of space.
     fn distance(&self, point: Vector) -> f64 {
-        let length = |vector: Vector| vector.iter().fold(0.0f64, |length, part| length.hypot(*part));
+        let length =
+            |vector: Vector| vector.iter().fold(0.0f64, |length, part| length.hypot(*part));
         match self {
-            Region::Box(region) => length(
-                [0, 1, 2].map(|axis| (region.lower[axis] - point[axis]).max(point[axis] - region.upper[axis]).max(0.0)),
-            ),
-            Region::Sphere(region) => (length(subtract(point, region.center)) - region.radius).max(0.0),
+            Region::Box(region) => length([0, 1, 2].map(|axis| {
+                (region.lower[axis] - point[axis]).max(point[axis] - region.upper[axis]).max(0.0)
+            })),
+            Region::Sphere(region) => {
+                (length(subtract(point, region.center)) - region.radius).max(0.0)
+            }
             Region::HalfSpace(region) => {
                 // In units of its largest part, so that no length overflows.
-                let largest = region.normal.iter().fold(0.0f64, |largest, part| largest.max(part.abs()));
+                let largest =
+                    region.normal.iter().fold(0.0f64, |largest, part| largest.max(part.abs()));
                 let normal = region.normal.map(|part| part / largest);
                 (-dot(normal, subtract(point, region.origin)) / length(normal)).max(0.0)
             }
@@ -112,8 +120,11 @@ impl Region {
 
     /// The surface vertex nearest to the region, and how far it is.
     pub(super) fn nearest(&self, surface: &Surface) -> Option<(u32, f64)> {
-        let distances =
-            surface.points().iter().enumerate().map(|(vertex, point)| (vertex as u32, self.distance(*point)));
+        let distances = surface
+            .points()
+            .iter()
+            .enumerate()
+            .map(|(vertex, point)| (vertex as u32, self.distance(*point)));
         distances.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, distance)| distance.is_finite())
     }
 
@@ -137,7 +148,10 @@ impl Region {
                 let radius = format!("{field}.sphere.radius");
                 finite(&radius, &[region.radius])?;
                 if region.radius < 0.0 {
-                    return Err(InvalidEdit::NegativeRadius { field: radius, radius: region.radius });
+                    return Err(InvalidEdit::NegativeRadius {
+                        field: radius,
+                        radius: region.radius,
+                    });
                 }
                 Ok(())
             }
@@ -150,9 +164,10 @@ impl Region {
                 }
                 Ok(())
             }
-            Region::Faces(faces) if faces.is_empty() => {
-                Err(InvalidEdit::EmptyList { field: format!("{field}.faces"), expected: "at least one face" })
-            }
+            Region::Faces(faces) if faces.is_empty() => Err(InvalidEdit::EmptyList {
+                field: format!("{field}.faces"),
+                expected: "at least one face",
+            }),
             Region::Faces(_) => Ok(()),
         }
     }
@@ -176,7 +191,9 @@ fn diagonal(points: &[Vector]) -> f64 {
 #[non_exhaustive]
 pub enum RegionError {
     /// A picked face that the surface does not have.
-    #[error("faces[{index}]: there is no face {face}; the surface has {faces} faces, numbered from 0")]
+    #[error(
+        "faces[{index}]: there is no face {face}; the surface has {faces} faces, numbered from 0"
+    )]
     UnknownFace {
         /// Its place in the list.
         index: usize,

@@ -18,7 +18,9 @@ pub(super) fn parts_between_sharp_edges(
     let rule = Sharpness::new(settings.sharp_angle_degrees);
     let points = brought_to_order_one(points);
     let mut parts = Parts::new(faces.len());
-    for pair in edges((0..faces.len()).map(|face| faces.vertices(face))).chunk_by(|a, b| a.ends == b.ends) {
+    for pair in
+        edges((0..faces.len()).map(|face| faces.vertices(face))).chunk_by(|a, b| a.ends == b.ends)
+    {
         if let [first, second] = pair {
             let [a, b] = normals_at_edge(&points, faces, *first, *second);
             if !rule.is_sharp(a, b) {
@@ -83,7 +85,12 @@ impl Sharpness {
 
 /// The normals of the two faces at an edge, as long as twice their areas, on the same side of the surface even where the faces
 /// run opposite ways round.
-fn normals_at_edge(points: &[Vector], faces: &Cells, first: EdgeSide, second: EdgeSide) -> [Vector; 2] {
+fn normals_at_edge(
+    points: &[Vector],
+    faces: &Cells,
+    first: EdgeSide,
+    second: EdgeSide,
+) -> [Vector; 2] {
     let [source, target] = if first.forward { first.ends } else { [first.ends[1], first.ends[0]] };
     let [source, along] = {
         let [source, target] = [source, target].map(|vertex| points[vertex as usize]);
@@ -91,13 +98,15 @@ fn normals_at_edge(points: &[Vector], faces: &Cells, first: EdgeSide, second: Ed
     };
     // The vertex of a triangle that is no end of the edge.
     let third = |side: EdgeSide| match faces.vertices(side.face as usize) {
-        [a, b, c] => {
-            [a, b, c].into_iter().find(|vertex| !side.ends.contains(vertex)).map(|&vertex| points[vertex as usize])
-        }
+        [a, b, c] => [a, b, c]
+            .into_iter()
+            .find(|vertex| !side.ends.contains(vertex))
+            .map(|&vertex| points[vertex as usize]),
         _ => None,
     };
     let whole = |side: EdgeSide| polygon_normal(points, faces.vertices(side.face as usize));
-    let a = third(first).map_or_else(|| whole(first), |third| cross(along, subtract(third, source)));
+    let a =
+        third(first).map_or_else(|| whole(first), |third| cross(along, subtract(third, source)));
     let b = third(second).map_or_else(
         || whole(second).map(|part| if first.forward == second.forward { -part } else { part }),
         |third| cross(along, subtract(source, third)),

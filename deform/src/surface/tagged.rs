@@ -22,7 +22,8 @@ impl MisplacedFaces {
     pub fn check(&self, tagged: &TaggedFaces) -> Result<(), MeshError> {
         let Some(&face) = self.loose.first() else { return Ok(()) };
         let tag = tagged.tags.get(face).copied().unwrap_or_default();
-        let name = tagged.names.iter().find(|(number, _)| *number == tag).map(|(_, name)| name.clone());
+        let name =
+            tagged.names.iter().find(|(number, _)| *number == tag).map(|(_, name)| name.clone());
         Err(MeshError::LooseFace {
             face,
             feature: name.unwrap_or_else(|| tag.to_string()),
@@ -67,7 +68,10 @@ pub fn misplaced_faces(tagged: &TaggedFaces, cells: &Cells) -> MisplacedFaces {
     let dimension = cells.dimension().max(2);
     for cell in 0..cells.len() {
         buffer.for_each(cells, cell, dimension, |_, vertices| {
-            if vertices.iter().any(|&vertex| !is_touched.get(vertex as usize).copied().unwrap_or(false)) {
+            if vertices
+                .iter()
+                .any(|&vertex| !is_touched.get(vertex as usize).copied().unwrap_or(false))
+            {
                 return;
             }
             if let Some(count) = uses.get_mut(&key(vertices)) {
@@ -112,9 +116,11 @@ pub fn misplaced_faces(tagged: &TaggedFaces, cells: &Cells) -> MisplacedFaces {
 pub fn check_feature_names(names: &[(i64, String)], numbers: &[i64]) -> Result<(), MeshError> {
     match names.iter().find(|(number, _)| numbers.binary_search(number).is_err()) {
         None => Ok(()),
-        Some((number, name)) => {
-            Err(MeshError::EmptyFeature { number: *number, name: name.clone(), numbers: numbers.to_vec() })
-        }
+        Some((number, name)) => Err(MeshError::EmptyFeature {
+            number: *number,
+            name: name.clone(),
+            numbers: numbers.to_vec(),
+        }),
     }
 }
 
@@ -139,7 +145,10 @@ mod tests {
 
     #[test]
     fn every_face_of_a_box_is_one_and_no_other_is() {
-        for mesh in [box_of_tets([3, 2, 2], [0.0; 3], [1.0; 3]), box_of_hexahedra([3, 2, 2], [0.0; 3], [1.0; 3])] {
+        for mesh in [
+            box_of_tets([3, 2, 2], [0.0; 3], [1.0; 3]),
+            box_of_hexahedra([3, 2, 2], [0.0; 3], [1.0; 3]),
+        ] {
             let FeatureSource::Faces(mut tagged) = mesh.features().clone() else { panic!("sides") };
             assert_eq!(check_tagged_faces(&tagged, mesh.cells()), Ok(0));
             // From one corner of the box to the opposite one.
@@ -149,8 +158,13 @@ mod tests {
             tagged.names.push((7, "lid".into()));
             let error = check_tagged_faces(&tagged, mesh.cells()).expect_err("no face");
             let faces = tagged.faces.len();
-            let expected =
-                MeshError::LooseFace { face: faces - 1, feature: "lid".into(), vertices: triangle, loose: 1, faces };
+            let expected = MeshError::LooseFace {
+                face: faces - 1,
+                feature: "lid".into(),
+                vertices: triangle,
+                loose: 1,
+                faces,
+            };
             assert_eq!(error, expected);
         }
     }
@@ -158,10 +172,15 @@ mod tests {
     #[test]
     fn triangles_of_a_quad_and_faces_inside_are_none_of_it() {
         let mesh = box_of_hexahedra([2, 1, 1], [0.0; 3], [1.0; 3]);
-        let quad = |cell: usize, local: [usize; 4]| local.map(|corner| mesh.cells().vertices(cell)[corner]);
+        let quad = |cell: usize, local: [usize; 4]| {
+            local.map(|corner| mesh.cells().vertices(cell)[corner])
+        };
         let [a, b, c, d] = quad(0, [0, 1, 2, 3]);
         assert_eq!(
-            check_tagged_faces(&tagged(CellType::Triangle, vec![a, b, c, c, d, a], vec![7, 7]), mesh.cells()),
+            check_tagged_faces(
+                &tagged(CellType::Triangle, vec![a, b, c, c, d, a], vec![7, 7]),
+                mesh.cells()
+            ),
             Ok(0)
         );
         let shared: Vec<u32> = mesh
@@ -171,7 +190,10 @@ mod tests {
             .copied()
             .filter(|vertex| mesh.cells().vertices(1).contains(vertex))
             .collect();
-        assert_eq!(check_tagged_faces(&tagged(CellType::Quad, shared, vec![7]), mesh.cells()), Ok(1));
+        assert_eq!(
+            check_tagged_faces(&tagged(CellType::Quad, shared, vec![7]), mesh.cells()),
+            Ok(1)
+        );
     }
 
     #[test]
@@ -179,6 +201,9 @@ mod tests {
         let names = [(1, "low".to_owned()), (3, "high".to_owned())];
         assert_eq!(check_feature_names(&names, &[1, 2, 3]), Ok(()));
         let error = check_feature_names(&names, &[1, 2]).expect_err("3 is missing");
-        assert_eq!(error.to_string(), "feature 'high' has the number 3, which no face has; the faces have 1, 2");
+        assert_eq!(
+            error.to_string(),
+            "feature 'high' has the number 3, which no face has; the faces have 1, 2"
+        );
     }
 }

@@ -22,12 +22,17 @@ struct Entry {
 /// The faces that belong to one cell only, in the order of the cells and of the faces in a cell. Cells marked in `left_out` are none.
 ///
 /// `None` where there are other cells, where one is collapsed, and where something is wrong: what that is, is not said here.
-pub(super) fn boundary_faces(cells: &Cells, vertex_count: usize, left_out: Option<&[bool]>) -> Option<Vec<CellFace>> {
+pub(super) fn boundary_faces(
+    cells: &Cells,
+    vertex_count: usize,
+    left_out: Option<&[bool]>,
+) -> Option<Vec<CellFace>> {
     if cells.uniform_type() != Some(CellType::Tetra) || u32::try_from(4 * cells.len()).is_err() {
         return None;
     }
     let tetrahedra = cells.connectivity().as_chunks::<4>().0;
-    let counts = |cell: usize| !left_out.is_some_and(|left_out| left_out.get(cell).is_some_and(|&out| out));
+    let counts =
+        |cell: usize| !left_out.is_some_and(|left_out| left_out.get(cell).is_some_and(|&out| out));
     let mut starts = vec![0_usize; vertex_count + 1];
     for (_, &corners) in tetrahedra.iter().enumerate().filter(|(cell, _)| counts(*cell)) {
         let [first, second, third, fourth] = rising(corners);
@@ -56,9 +61,13 @@ pub(super) fn boundary_faces(cells: &Cells, vertex_count: usize, left_out: Optio
                 [second, third, fourth]
             };
             let slot = &mut next[lowest as usize];
-            #[expect(clippy::cast_possible_truncation, reason = "four times the cells fit, as was checked")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                reason = "four times the cells fit, as was checked"
+            )]
             let face = 4 * cell as u32 + place;
-            entries[*slot] = Entry { others: u64::from(middle) << 32 | u64::from(highest), opposite, face };
+            entries[*slot] =
+                Entry { others: u64::from(middle) << 32 | u64::from(highest), opposite, face };
             *slot += 1;
         }
     }
@@ -135,7 +144,9 @@ mod tests {
         let count = mesh.points().len();
         let mut state = 9_u64;
         let mut random = move |below: usize| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (state >> 33) as usize % below
         };
         for round in 0..20 {
@@ -143,17 +154,29 @@ mod tests {
             for last in (1..count).rev() {
                 numbers.swap(last, random(last + 1));
             }
-            let mut corners: Vec<u32> =
-                mesh.cells().connectivity().iter().map(|&vertex| numbers[vertex as usize]).collect();
+            let mut corners: Vec<u32> = mesh
+                .cells()
+                .connectivity()
+                .iter()
+                .map(|&vertex| numbers[vertex as usize])
+                .collect();
             if round == 3 {
                 // A hub: the least vertex of more than a hundred faces.
-                corners.chunks_mut(4).enumerate().filter(|(cell, _)| cell % 3 == 0).for_each(|(cell, tetra)| {
-                    tetra.copy_from_slice(&[0, count as u32 + 2 * cell as u32, count as u32 + 2 * cell as u32 + 1, 5]);
-                });
+                corners.chunks_mut(4).enumerate().filter(|(cell, _)| cell % 3 == 0).for_each(
+                    |(cell, tetra)| {
+                        tetra.copy_from_slice(&[
+                            0,
+                            count as u32 + 2 * cell as u32,
+                            count as u32 + 2 * cell as u32 + 1,
+                            5,
+                        ]);
+                    },
+                );
             }
             let vertices = corners.iter().max().map_or(0, |&vertex| vertex as usize + 1);
             let cells = Cells::uniform(CellType::Tetra, corners).unwrap();
-            let left_out: Vec<bool> = (0..cells.len()).map(|_| round % 2 == 1 && random(4) == 0).collect();
+            let left_out: Vec<bool> =
+                (0..cells.len()).map(|_| round % 2 == 1 && random(4) == 0).collect();
             let found = boundary_faces(&cells, vertices, Some(&left_out));
             let expected = boundary_faces_of_any(&cells, vertices, 3, Some(&left_out));
             match expected {

@@ -43,7 +43,8 @@ impl Shared {
                 let place = usize::from(in_b[1]) + 2 * usize::from(in_b[2]);
                 let other = usize::from(b[1] == a[place]) + 2 * usize::from(b[2] == a[place]);
                 let turned = |triangle: [u32; 3], first: usize| {
-                    [triangle[first], triangle[(first + 1) % 3], triangle[(first + 2) % 3]].map(point)
+                    [triangle[first], triangle[(first + 1) % 3], triangle[(first + 2) % 3]]
+                        .map(point)
                 };
                 Self::Vertex([turned(a, place), turned(b, other)])
             }
@@ -63,7 +64,8 @@ impl Shared {
             Self::All => true,
             Self::Edge { ends, thirds } => folded_flat(*ends, *thirds),
             Self::Vertex([a, b]) => {
-                !cones_are_apart(a, b) && (segment_meets(a, [b[1], b[2]]) || segment_meets(b, [a[1], a[2]]))
+                !cones_are_apart(a, b)
+                    && (segment_meets(a, [b[1], b[2]]) || segment_meets(b, [a[1], a[2]]))
             }
             Self::Nothing([a, b]) => !are_apart(a, b, ROUNDING) && meet(a, b),
         }
@@ -108,7 +110,8 @@ fn folded_flat([start, end]: [Vector; 2], [a, b]: [Vector; 2]) -> bool {
     let [normal_a, normal_b] = [a, b].map(|third| cross(along, subtract(third, start)));
     let product = dot(normal_a, normal_b);
     // Rounding does not turn a fold into this.
-    if product < 0.0 && product * product > 1e-6 * dot(normal_a, normal_a) * dot(normal_b, normal_b) {
+    if product < 0.0 && product * product > 1e-6 * dot(normal_a, normal_a) * dot(normal_b, normal_b)
+    {
         return false;
     }
     let triangle = [start, end, a];
@@ -120,8 +123,10 @@ fn folded_flat([start, end]: [Vector; 2], [a, b]: [Vector; 2]) -> bool {
 }
 
 fn meet(a: &Triangle, b: &Triangle) -> bool {
-    let sides = |triangle: &Triangle| [0, 1, 2].map(|side| [triangle[side], triangle[(side + 1) % 3]]);
-    sides(b).into_iter().any(|side| segment_meets(a, side)) || sides(a).into_iter().any(|side| segment_meets(b, side))
+    let sides =
+        |triangle: &Triangle| [0, 1, 2].map(|side| [triangle[side], triangle[(side + 1) % 3]]);
+    sides(b).into_iter().any(|side| segment_meets(a, side))
+        || sides(a).into_iter().any(|side| segment_meets(b, side))
 }
 
 fn exact(point: Vector) -> Coord3D<f64> {
@@ -140,10 +145,12 @@ fn segment_meets(triangle: &Triangle, [start, end]: [Vector; 2]) -> bool {
         return false;
     }
     if from == 0.0 && to == 0.0 {
-        return Plane::of(triangle).is_some_and(|plane| plane.segment_meets(triangle, [start, end]));
+        return Plane::of(triangle)
+            .is_some_and(|plane| plane.segment_meets(triangle, [start, end]));
     }
     // The line through the segment passes all sides of the triangle the same way round, or touches them.
-    let turns = [0, 1, 2].map(|side| orientation(&[start, end, triangle[side]], triangle[(side + 1) % 3]));
+    let turns =
+        [0, 1, 2].map(|side| orientation(&[start, end, triangle[side]], triangle[(side + 1) % 3]));
     turns.iter().all(|&turn| turn >= 0.0) || turns.iter().all(|&turn| turn <= 0.0)
 }
 
@@ -155,7 +162,10 @@ struct Plane {
 
 impl Plane {
     fn of(triangle: &Triangle) -> Option<Self> {
-        [[0, 1], [1, 2], [2, 0]].into_iter().map(|axes| Self { axes }).find(|plane| plane.turn(triangle) != 0.0)
+        [[0, 1], [1, 2], [2, 0]]
+            .into_iter()
+            .map(|axes| Self { axes })
+            .find(|plane| plane.turn(triangle) != 0.0)
     }
 
     fn project(self, point: Vector) -> Coord<f64> {
@@ -175,14 +185,17 @@ impl Plane {
                 self.turn(&[a, b, point]) * way.signum() >= 0.0
             })
         };
-        inside(start) || inside(end) || (0..3).any(|number| self.segments_cross([start, end], side(number)))
+        inside(start)
+            || inside(end)
+            || (0..3).any(|number| self.segments_cross([start, end], side(number)))
     }
 
     /// Whether segments cross in a point inside at least one of them; of segments along one line the ends decide, elsewhere.
     fn segments_cross(self, [a, b]: [Vector; 2], [c, d]: [Vector; 2]) -> bool {
         let [first, second] = [self.turn(&[a, b, c]), self.turn(&[a, b, d])];
         let [third, fourth] = [self.turn(&[c, d, a]), self.turn(&[c, d, b])];
-        let parted = |one: f64, other: f64| (one > 0.0 && other > 0.0) || (one < 0.0 && other < 0.0);
+        let parted =
+            |one: f64, other: f64| (one > 0.0 && other > 0.0) || (one < 0.0 && other < 0.0);
         let in_line = first == 0.0 && second == 0.0 && third == 0.0 && fourth == 0.0;
         !in_line && !parted(first, second) && !parted(third, fourth)
     }
@@ -215,7 +228,9 @@ fn are_apart(a: &Triangle, b: &Triangle, margin: f64) -> bool {
         || parts(normal_b)
         || sides_a.into_iter().any(|side| parts(cross(normal_a, side)))
         || sides_b.into_iter().any(|side| parts(cross(normal_b, side)))
-        || sides_a.into_iter().any(|side| sides_b.into_iter().any(|other| parts(cross(side, other))))
+        || sides_a
+            .into_iter()
+            .any(|side| sides_b.into_iter().any(|other| parts(cross(side, other))))
 }
 
 /// Whether a plane through the first vertex, which is both triangles', is found that parts the cones they span there.
@@ -225,7 +240,8 @@ fn cones_are_apart(a: &Triangle, b: &Triangle) -> bool {
         let length = dot(vector, vector).sqrt();
         vector.map(|value| value / length)
     };
-    let [a, b] = [a, b].map(|triangle| [triangle[1], triangle[2]].map(|point| unit(subtract(point, apex))));
+    let [a, b] =
+        [a, b].map(|triangle| [triangle[1], triangle[2]].map(|point| unit(subtract(point, apex))));
     let parts = |axis: Vector| {
         let length = dot(axis, axis).sqrt();
         let range = |pair: [Vector; 2]| {

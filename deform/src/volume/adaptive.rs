@@ -185,8 +185,11 @@ pub fn follow<M: BoundaryMotion>(
         loop {
             // A last sub-step that would leave next to nothing takes it along.
             let next = if reached + 1.25 * step >= goal { goal } else { reached + step };
-            let places = follower.motion.at(reached, next, &shape).map_err(FollowError::Boundary)?;
-            let guess = latest.as_ref().map(|(displacement, length)| scaled(displacement, (next - reached) / length));
+            let places =
+                follower.motion.at(reached, next, &shape).map_err(FollowError::Boundary)?;
+            let guess = latest
+                .as_ref()
+                .map(|(displacement, length)| scaled(displacement, (next - reached) / length));
             let mut candidate = match follower.moved(current.as_deref(), &shape, &places, guess)? {
                 Some((displacement, candidate)) => {
                     latest = Some((displacement, next - reached));
@@ -222,7 +225,8 @@ pub fn follow<M: BoundaryMotion>(
             follower.route.rejected += 1;
             if stiffening < STIFFER && !folds {
                 stiffening = STIFFER;
-                current = follower.operator(current.as_deref(), &stiffened, stiffening, &settings)?;
+                current =
+                    follower.operator(current.as_deref(), &stiffened, stiffening, &settings)?;
                 continue;
             }
             step = 0.5 * (next - reached);
@@ -263,7 +267,9 @@ impl<M: BoundaryMotion> Follower<'_, M> {
             return Ok((1.0, None));
         }
         let Domain { mesh, boundary, partition, .. } = self.domain;
-        let floor = quality_in_parts(mesh.cells(), mesh.points(), &**partition).min.min(self.guard.min_scaled_jacobian);
+        let floor = quality_in_parts(mesh.cells(), mesh.points(), &**partition)
+            .min
+            .min(self.guard.min_scaled_jacobian);
         let floor = floor - 1e-6 * floor.abs();
         let mut proof = |fraction: f64| {
             let places = self.motion.at(0.0, fraction, &self.here.points)?;
@@ -290,7 +296,8 @@ impl<M: BoundaryMotion> Follower<'_, M> {
         let Domain { mesh, boundary, partition, .. } = self.domain;
         let floor = self.guard.min_scaled_jacobian;
         let possible = Impossible::find(mesh, boundary, points, 0.0, &**partition).is_none();
-        possible && self.untangler.is_some_and(|untangler| untangler().untangle(mesh, points, floor))
+        possible
+            && self.untangler.is_some_and(|untangler| untangler().untangle(mesh, points, floor))
     }
 
     fn go(&mut self, fraction: f64, points: Arc<[Vector]>) {
@@ -309,7 +316,8 @@ impl<M: BoundaryMotion> Follower<'_, M> {
         operator: Option<&VolumeOperator>,
     ) -> Result<Option<Waypoint>, FollowError<M::Error>> {
         let shape = Arc::clone(&self.here.points);
-        let places = self.motion.at(self.here.fraction, fraction, &shape).map_err(FollowError::Boundary)?;
+        let places =
+            self.motion.at(self.here.fraction, fraction, &shape).map_err(FollowError::Boundary)?;
         let solved = self.moved(operator, &shape, &places, None)?.map(|(_, candidate)| candidate);
         // From where the solve leaves the inside, and from where it is.
         for start in solved.into_iter().chain([self.placed(&shape, &places)]) {
@@ -337,8 +345,13 @@ impl<M: BoundaryMotion> Follower<'_, M> {
             }
             let fraction = 0.5 * (self.here.fraction + next.fraction);
             let places = self.motion.at(self.here.fraction, fraction, &self.here.points)?;
-            let middle: Vec<Vector> =
-                self.here.points.iter().zip(&*next.points).map(|(&a, &b)| scale(add(a, b), 0.5)).collect();
+            let middle: Vec<Vector> = self
+                .here
+                .points
+                .iter()
+                .zip(&*next.points)
+                .map(|(&a, &b)| scale(add(a, b), 0.5))
+                .collect();
             let mut middle = self.placed(&middle, &places);
             if !self.keeps(&middle, &middle) && !self.untangle(&mut middle) {
                 return Ok(false);
@@ -357,8 +370,11 @@ impl<M: BoundaryMotion> Follower<'_, M> {
         let count = way.len();
         for (index, points) in way.into_iter().enumerate() {
             #[expect(clippy::cast_precision_loss, reason = "a few hundred shapes")]
-            let fraction =
-                if index + 1 == count { end.fraction } else { end.fraction * (index + 1) as f64 / count as f64 };
+            let fraction = if index + 1 == count {
+                end.fraction
+            } else {
+                end.fraction * (index + 1) as f64 / count as f64
+            };
             self.route.untangled += 1;
             self.go(fraction, points);
         }
@@ -385,7 +401,8 @@ impl<M: BoundaryMotion> Follower<'_, M> {
                 Ok(made) => return Ok(Some(Arc::new(made.with_tolerance(settings.tolerance)))),
                 Err(VolumeError::Linear(_)) => {}
                 // A mesh that the guard lets through and the material does not is one that no solve can follow.
-                Err(VolumeError::InvertedCell { .. } | VolumeError::OtherRank) if self.here.fraction > 0.0 => {}
+                Err(VolumeError::InvertedCell { .. } | VolumeError::OtherRank)
+                    if self.here.fraction > 0.0 => {}
                 Err(error) => return Err(FollowError::Volume(error)),
             }
         }
@@ -418,9 +435,13 @@ impl<M: BoundaryMotion> Follower<'_, M> {
     ) -> FollowError<M::Error> {
         let Domain { mesh, partition, .. } = self.domain;
         match judge_in_parts(mesh, &self.here.points, candidate, &[1.0], self.guard, &**partition) {
-            Err(refusal) => {
-                FollowError::Stalled(Box::new(Stalled { route: self.route, refusal, folds, impossible, end_is_valid }))
-            }
+            Err(refusal) => FollowError::Stalled(Box::new(Stalled {
+                route: self.route,
+                refusal,
+                folds,
+                impossible,
+                end_is_valid,
+            })),
             // `keeps` and `judge` are one test.
             Ok(_) => FollowError::Volume(overflow()),
         }
@@ -458,7 +479,8 @@ fn moved(
         None => operator.solve(&displacement)?,
     };
     *iterations += solution.iterations;
-    let candidate: Vec<Vector> = shape.iter().zip(&solution.displacement).map(|(&a, &b)| add(a, b)).collect();
+    let candidate: Vec<Vector> =
+        shape.iter().zip(&solution.displacement).map(|(&a, &b)| add(a, b)).collect();
     Ok((solution.displacement, with_boundary(operator.boundary(), &candidate, places)))
 }
 
@@ -520,9 +542,12 @@ mod tests {
             let untangler = Arc::new(Untangler::new(&mesh, &boundary));
             let untangler = || Arc::clone(&untangler);
             let partition = whole();
-            let domain = Domain { mesh: &mesh, boundary: &boundary, partition: &partition, operator: None };
+            let domain =
+                Domain { mesh: &mesh, boundary: &boundary, partition: &partition, operator: None };
             let mut motion = Places(|to| twisted(&mesh, &boundary, 180.0 * to));
-            let route = follow(domain, &start, &mut motion, &Deform::default(), &guard, Some(&untangler)).unwrap();
+            let route =
+                follow(domain, &start, &mut motion, &Deform::default(), &guard, Some(&untangler))
+                    .unwrap();
             let mut before = &start;
             for point in &route.waypoints {
                 assert!(keeps(&mesh, before, &point.points, &guard));
@@ -533,7 +558,9 @@ mod tests {
             for (&vertex, place) in boundary.iter().zip(&end) {
                 assert_eq!(before[vertex as usize], *place);
             }
-            let again = follow(domain, &start, &mut motion, &Deform::default(), &guard, Some(&untangler)).unwrap();
+            let again =
+                follow(domain, &start, &mut motion, &Deform::default(), &guard, Some(&untangler))
+                    .unwrap();
             assert_eq!(route, again);
         }
     }
@@ -555,8 +582,16 @@ mod tests {
         let untangler = || Arc::clone(&untangler);
         let guard = Guard { min_scaled_jacobian: 0.05, ..Guard::default() };
         let partition = whole();
-        let domain = Domain { mesh: &mesh, boundary: &boundary, partition: &partition, operator: None };
-        let result = follow(domain, &start, &mut Places(pressed), &Deform::default(), &guard, Some(&untangler));
+        let domain =
+            Domain { mesh: &mesh, boundary: &boundary, partition: &partition, operator: None };
+        let result = follow(
+            domain,
+            &start,
+            &mut Places(pressed),
+            &Deform::default(),
+            &guard,
+            Some(&untangler),
+        );
         let Err(FollowError::Stalled(stalled)) = result else { panic!("{result:?}") };
         assert!((0.6..0.8).contains(&stalled.fraction()), "{}", stalled.fraction());
         assert!(matches!(stalled.refusal, Refusal::Quality(_)));

@@ -133,7 +133,8 @@ struct Incidence {
 impl Incidence {
     fn new(mesh: &Mesh) -> Self {
         let cells = mesh.cells();
-        let volume_cells = || (0..cells.len()).filter(|&cell| cells.cell_type(cell).dimension() == 3);
+        let volume_cells =
+            || (0..cells.len()).filter(|&cell| cells.cell_type(cell).dimension() == 3);
         let mut offsets = vec![0usize; mesh.points().len() + 2];
         for cell in volume_cells() {
             for &vertex in cells.vertices(cell) {
@@ -147,7 +148,10 @@ impl Incidence {
         for cell in volume_cells() {
             for &vertex in cells.vertices(cell) {
                 let place = &mut offsets[vertex as usize + 1];
-                #[expect(clippy::cast_possible_truncation, reason = "checked where the operator is set up")]
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    reason = "checked where the operator is set up"
+                )]
                 (found[*place] = cell as u32);
                 *place += 1;
             }
@@ -164,7 +168,11 @@ impl Incidence {
 impl Graph {
     /// # Errors
     /// [`VolumeError::BoundaryVertex`], [`VolumeError::BoundaryTwice`], [`VolumeError::Unattached`].
-    pub(super) fn new(ordered: Arc<Ordered>, boundary: &[u32], partition: &dyn Partition) -> Result<Self, VolumeError> {
+    pub(super) fn new(
+        ordered: Arc<Ordered>,
+        boundary: &[u32],
+        partition: &dyn Partition,
+    ) -> Result<Self, VolumeError> {
         let boundary: Vec<u32> = agreed(partition, boundary_places(&ordered, boundary))?;
         let mesh = ordered.mesh();
         let vertex_count = mesh.points().len();
@@ -210,13 +218,19 @@ impl Graph {
         });
         let (inner, outer): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
         let (matrix, coupling) = (compressed(inner), compressed(outer));
-        let slot_vertices: Vec<u32> = order.iter().map(|&old| free[old as usize]).chain(boundary).collect();
+        let slot_vertices: Vec<u32> =
+            order.iter().map(|&old| free[old as usize]).chain(boundary).collect();
         for (slot, &vertex) in (0..).zip(&slot_vertices) {
             slots[vertex as usize] = slot;
         }
-        let vertices: Vec<u32> =
-            slot_vertices[..free.len()].iter().map(|&vertex| ordered.numbering().vertex(vertex)).collect();
-        agreed(partition, check_attached(&vertices, (&matrix.0, &matrix.1), &coupling.0, partition))?;
+        let vertices: Vec<u32> = slot_vertices[..free.len()]
+            .iter()
+            .map(|&vertex| ordered.numbering().vertex(vertex))
+            .collect();
+        agreed(
+            partition,
+            check_attached(&vertices, (&matrix.0, &matrix.1), &coupling.0, partition),
+        )?;
         Ok(Self { ordered, vertices, slots, slot_vertices, incidence, matrix, coupling })
     }
 
@@ -250,7 +264,8 @@ impl Graph {
         stiffness: &[f64],
     ) -> (SparseMatrix<B>, SparseMatrix<B>) {
         let mut matrix = SparseMatrix::<B>::zeros(self.matrix.0.clone(), self.matrix.1.clone());
-        let mut coupling = SparseMatrix::<B>::zeros(self.coupling.0.clone(), self.coupling.1.clone());
+        let mut coupling =
+            SparseMatrix::<B>::zeros(self.coupling.0.clone(), self.coupling.1.clone());
         let (offsets, columns, values) = matrix.offsets_and_values_mut();
         let (outer_offsets, outer_columns, outer_values) = coupling.offsets_and_values_mut();
         let free_count = self.vertices.len();
@@ -267,9 +282,11 @@ impl Graph {
                 for row in rows {
                     let inner_range = offsets[row]..offsets[row + 1];
                     let outer_range = outer_offsets[row]..outer_offsets[row + 1];
-                    let inner_columns = columns[inner_range.clone()].iter().map(|&column| column as usize);
-                    let outer_columns =
-                        outer_columns[outer_range.clone()].iter().map(|&column| free_count + column as usize);
+                    let inner_columns =
+                        columns[inner_range.clone()].iter().map(|&column| column as usize);
+                    let outer_columns = outer_columns[outer_range.clone()]
+                        .iter()
+                        .map(|&column| free_count + column as usize);
                     for (place, slot) in (0..).zip(inner_columns.chain(outer_columns)) {
                         places[self.slot_vertices[slot] as usize] = place;
                     }
@@ -279,7 +296,9 @@ impl Graph {
                     for &cell in self.incidence.cells(vertex) {
                         let cell = cell as usize;
                         let vertices = mesh.cells().vertices(cell);
-                        let Some(own) = vertices.iter().position(|&other| other == vertex) else { continue };
+                        let Some(own) = vertices.iter().position(|&other| other == vertex) else {
+                            continue;
+                        };
                         elements.for_each_point(cell, &mut scratch, |weight, gradients| {
                             let weight = weight * stiffness[cell];
                             let own: Vector = gradients[own].map(|value| value * weight);
@@ -290,8 +309,10 @@ impl Graph {
                     }
                     let (own, other) = sums.split_at(inner_range.len());
                     let inner = &mut inner[inner_range.start - first..inner_range.end - first];
-                    let outer = &mut outer[outer_range.start - outer_first..outer_range.end - outer_first];
-                    for (block, sum) in inner.iter_mut().zip(own).chain(outer.iter_mut().zip(other)) {
+                    let outer =
+                        &mut outer[outer_range.start - outer_first..outer_range.end - outer_first];
+                    for (block, sum) in inner.iter_mut().zip(own).chain(outer.iter_mut().zip(other))
+                    {
                         *block = form.block(sum);
                     }
                 }
@@ -302,7 +323,12 @@ impl Graph {
 }
 
 /// The slots of the vertices that share a cell with each free vertex (itself among them), rising, in compressed rows.
-fn neighbours(mesh: &Mesh, incidence: &Incidence, free: &[u32], slots: &[u32]) -> (Vec<usize>, Vec<u32>) {
+fn neighbours(
+    mesh: &Mesh,
+    incidence: &Incidence,
+    free: &[u32],
+    slots: &[u32],
+) -> (Vec<usize>, Vec<u32>) {
     let parts = parallel::map_chunks(free.len(), ASSEMBLY_CHUNK, |range| {
         let mut lengths = Vec::with_capacity(range.len());
         let mut found: Vec<u32> = Vec::new();
@@ -329,7 +355,8 @@ fn neighbours(mesh: &Mesh, incidence: &Incidence, free: &[u32], slots: &[u32]) -
 
 /// One array of rows whose lengths and entries were found part by part.
 fn compressed(parts: Vec<(Vec<usize>, Vec<u32>)>) -> (Vec<usize>, Vec<u32>) {
-    let mut offsets = Vec::with_capacity(1 + parts.iter().map(|(lengths, _)| lengths.len()).sum::<usize>());
+    let mut offsets =
+        Vec::with_capacity(1 + parts.iter().map(|(lengths, _)| lengths.len()).sum::<usize>());
     let mut all = Vec::with_capacity(parts.iter().map(|(_, found)| found.len()).sum());
     offsets.push(0);
     let mut end = 0;
@@ -348,7 +375,10 @@ fn boundary_places(ordered: &Ordered, boundary: &[u32]) -> Result<Vec<u32>, Volu
     let vertex_count = ordered.mesh().points().len();
     let mut named = vec![false; vertex_count];
     let mut place = |&vertex: &u32| {
-        let place = ordered.numbering().place(vertex).ok_or(VolumeError::BoundaryVertex { vertex, vertex_count })?;
+        let place = ordered
+            .numbering()
+            .place(vertex)
+            .ok_or(VolumeError::BoundaryVertex { vertex, vertex_count })?;
         if std::mem::replace(&mut named[place as usize], true) {
             return Err(VolumeError::BoundaryTwice { vertex });
         }
@@ -381,8 +411,10 @@ fn check_attached(
         // What is held on one rank holds what other ranks have of it.
         let shares = Shares::new(partition, vertices);
         loop {
-            let mut held: Vec<f64> =
-                component.iter().map(|&component| f64::from(u8::from(attached[component]))).collect();
+            let mut held: Vec<f64> = component
+                .iter()
+                .map(|&component| f64::from(u8::from(attached[component])))
+                .collect();
             shares.sum(partition, 1, &mut held);
             let mut news = false;
             for &place in shares.places() {
@@ -395,10 +427,13 @@ fn check_attached(
             }
         }
     }
-    let loose = || (0..vertices.len()).filter(|&row| !attached[component[row]]).map(|row| vertices[row]);
+    let loose =
+        || (0..vertices.len()).filter(|&row| !attached[component[row]]).map(|row| vertices[row]);
     match loose().min() {
         None => Ok(()),
-        Some(vertex) => Err(VolumeError::Unattached { vertex: vertex as usize, count: loose().count() }),
+        Some(vertex) => {
+            Err(VolumeError::Unattached { vertex: vertex as usize, count: loose().count() })
+        }
     }
 }
 
@@ -426,9 +461,9 @@ pub(super) fn stiffness(
         }
     });
     let sums = parallel::map_chunks(volumes.len(), CELL_CHUNK, |range| {
-        volumes[range]
-            .iter()
-            .fold((0.0, 0usize), |(sum, count), &volume| (sum + volume, count + usize::from(volume != 0.0)))
+        volumes[range].iter().fold((0.0, 0usize), |(sum, count), &volume| {
+            (sum + volume, count + usize::from(volume != 0.0))
+        })
     });
     let (sum, count) = sums.into_iter().fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
     #[expect(clippy::cast_precision_loss, reason = "fewer cells than 2^53")]
@@ -449,8 +484,9 @@ pub(super) fn stiffness(
     }
     // A NaN sum makes all of them NaN: the cells are looked at again to tell which are to blame.
     let mut scratch = Scratch::default();
-    let is_broken =
-        |&cell: &usize| cells.cell_type(cell).dimension() == 3 && elements.volume(cell, &mut scratch).is_none();
+    let is_broken = |&cell: &usize| {
+        cells.cell_type(cell).dimension() == 3 && elements.volume(cell, &mut scratch).is_none()
+    };
     let broken: Vec<usize> = (0..cells.len()).filter(is_broken).collect();
     // With cells of another rank to blame there may be none here.
     let first = broken.iter().copied().min_by_key(|&cell| ordered.cell(cell));
@@ -460,6 +496,9 @@ pub(super) fn stiffness(
         cell_type: cells.cell_type(cell),
         centroid: centroid(cells, cell, mesh.points()),
         count: broken.len(),
-        left_handed: broken.iter().filter(|&&cell| is_left_handed(cells, cell, mesh.points())).count(),
+        left_handed: broken
+            .iter()
+            .filter(|&&cell| is_left_handed(cells, cell, mesh.points()))
+            .count(),
     })
 }

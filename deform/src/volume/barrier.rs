@@ -1,5 +1,8 @@
 //! The energy whose minimum has good cells around a vertex.
-#![expect(clippy::needless_range_loop, reason = "loops over lanes and axes read like the formulas, and vectorise")]
+#![expect(
+    clippy::needless_range_loop,
+    reason = "loops over lanes and axes read like the formulas, and vectorise"
+)]
 
 use crate::lanes::{LANES, Lanes, with_wide_registers};
 use crate::mesh::Vector;
@@ -111,7 +114,8 @@ impl Star {
     /// Adds a piece, of whose vertices `place` is the star's own.
     pub(super) fn push(&mut self, piece: &Piece, place: usize, points: &[Vector]) {
         let order = FIRST[place];
-        let others = [order[1], order[2], order[3]].map(|local| points[piece.vertices[local] as usize]);
+        let others =
+            [order[1], order[2], order[3]].map(|local| points[piece.vertices[local] as usize]);
         let [a, b, c] = others;
         let square = |p: Vector, q: Vector| {
             let edge = subtract(p, q);
@@ -152,7 +156,8 @@ impl Star {
                     let mut least = Lanes::all(f64::INFINITY);
                     for corner in 0..4 {
                         let infinite = Lanes::all(f64::INFINITY);
-                        least = least.least(qualities[corner].where_finite(four.products[corner], infinite));
+                        least = least
+                            .least(qualities[corner].where_finite(four.products[corner], infinite));
                     }
                     least.all_above(bound)
                 })
@@ -177,7 +182,8 @@ impl Barrier {
             #[inline(always)]
             || {
                 let point = point.map(Lanes::all);
-                let (floor, gap, one) = (Lanes::all(self.floor), Lanes::all(self.gap), Lanes::all(1.0));
+                let (floor, gap, one) =
+                    (Lanes::all(self.floor), Lanes::all(self.gap), Lanes::all(1.0));
                 let (mut sum, mut logarithms) = (Lanes::ZERO, 0.0);
                 for four in &star.fours {
                     let (edges, squares) = four.edges(point);
@@ -220,7 +226,8 @@ impl Barrier {
             #[inline(always)]
             || {
                 let point = point.map(Lanes::all);
-                let (floor, gap, zero) = (Lanes::all(self.floor), Lanes::all(self.gap), Lanes::ZERO);
+                let (floor, gap, zero) =
+                    (Lanes::all(self.floor), Lanes::all(self.gap), Lanes::ZERO);
                 let (mean, two, six) = (Lanes::all(MEAN), Lanes::all(2.0), Lanes::all(6.0));
                 let mut gradient = [zero; 3];
                 let mut hessian = [[zero; 3]; 3];
@@ -255,7 +262,8 @@ impl Barrier {
                                 slope[row] += units[other][row];
                                 bend[row][row] += inverse[other];
                                 for column in 0..=row {
-                                    bend[row][column] -= two * units[other][row] * units[other][column];
+                                    bend[row][column] -=
+                                        two * units[other][row] * units[other][column];
                                 }
                             }
                         }
@@ -272,14 +280,18 @@ impl Barrier {
                         for row in 0..3 {
                             gradient[row] -= (slope[row] * first).where_finite(counts, zero);
                             for column in 0..=row {
-                                let value = slope[row] * slope[column] * outer - bend[row][column] * first;
+                                let value =
+                                    slope[row] * slope[column] * outer - bend[row][column] * first;
                                 hessian[row][column] += value.where_finite(counts, zero);
                             }
                         }
                     }
                 }
                 let h = |row: usize, column: usize| hessian[row.max(column)][row.min(column)].sum();
-                (gradient.map(Lanes::sum), std::array::from_fn(|row| std::array::from_fn(|column| h(row, column))))
+                (
+                    gradient.map(Lanes::sum),
+                    std::array::from_fn(|row| std::array::from_fn(|column| h(row, column))),
+                )
             },
         )
     }
@@ -295,7 +307,12 @@ pub(super) fn length(index: usize) -> f64 {
 
 /// The place along a direction where the energy, a function of the length, has fallen enough: where the direction itself is not too
 /// long but falls short, as it does near the barrier, it is doubled while that helps.
-pub(super) fn searched(point: Vector, direction: Vector, slope: f64, mut energy: impl FnMut(f64) -> f64) -> Vector {
+pub(super) fn searched(
+    point: Vector,
+    direction: Vector,
+    slope: f64,
+    mut energy: impl FnMut(f64) -> f64,
+) -> Vector {
     let before = energy(0.0);
     if !before.is_finite() {
         return point;
@@ -330,7 +347,9 @@ pub(super) fn newton(gradient: &Vector, hessian: &[Vector; 3]) -> Option<Vector>
     let mut shift = 0.0;
     for _ in 0..20 {
         let added = shift;
-        let h = |row: usize, column: usize| hessian[row][column] + if row == column { added } else { 0.0 };
+        let h = |row: usize, column: usize| {
+            hessian[row][column] + if row == column { added } else { 0.0 }
+        };
         shift = if shift == 0.0 { 1e-3 * size } else { 4.0 * shift };
         let first = h(0, 0);
         if first.is_nan() || first <= least {
@@ -398,11 +417,19 @@ mod tests {
                 moved
             };
             let slope = (barrier.energy(at(1e-6), &star) - barrier.energy(at(-1e-6), &star)) / 2e-6;
-            assert!((slope - gradient[axis]).abs() < 1e-5 * (1.0 + slope.abs()), "{slope} {}", gradient[axis]);
+            assert!(
+                (slope - gradient[axis]).abs() < 1e-5 * (1.0 + slope.abs()),
+                "{slope} {}",
+                gradient[axis]
+            );
             let [after, before] = [1e-6, -1e-6].map(|step| barrier.derivatives(at(step), &star).0);
             for row in 0..3 {
                 let bend = (after[row] - before[row]) / 2e-6;
-                assert!((bend - hessian[row][axis]).abs() < 1e-4 * (1.0 + bend.abs()), "{bend} {}", hessian[row][axis]);
+                assert!(
+                    (bend - hessian[row][axis]).abs() < 1e-4 * (1.0 + bend.abs()),
+                    "{bend} {}",
+                    hessian[row][axis]
+                );
             }
         }
     }
@@ -412,15 +439,21 @@ mod tests {
     fn corners_count_as_their_piece_says() {
         let points = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let barrier = Barrier { floor: 0.1, gap: 0.3 };
-        for (whole, least, corners) in [(true, 0.4, vec![0.8, 0.4, 0.4, 0.4]), (false, 0.8, vec![0.8])] {
+        for (whole, least, corners) in
+            [(true, 0.4, vec![0.8, 0.4, 0.4, 0.4]), (false, 0.8, vec![0.8])]
+        {
             let piece = Piece { vertices: [0, 1, 2, 3], factor: 0.8, whole };
             assert!((piece.least(&points) - least).abs() < 1e-15);
-            let expected: f64 = corners.iter().map(|q: &f64| (0.3 / (q - 0.1)).powi(2) - MEAN * q.ln()).sum();
+            let expected: f64 =
+                corners.iter().map(|q: &f64| (0.3 / (q - 0.1)).powi(2) - MEAN * q.ln()).sum();
             for place in 0..4 {
                 let mut star = Star::default();
                 star.push(&piece, place, &points);
                 assert!((barrier.energy(points[place], &star) - expected).abs() < 1e-13, "{place}");
-                assert!(star.is_above(points[place], 0.999 * least) && !star.is_above(points[place], 1.001 * least));
+                assert!(
+                    star.is_above(points[place], 0.999 * least)
+                        && !star.is_above(points[place], 1.001 * least)
+                );
             }
             assert_eq!(
                 Barrier { floor: least, ..barrier }.energy(points[0], &{

@@ -18,11 +18,16 @@ impl Held {
         let mesh = ordered.mesh();
         let mut used = vec![false; mesh.points().len()];
         mesh.cells().connectivity().iter().for_each(|&vertex| used[vertex as usize] = true);
-        let vertices: Vec<u32> = (0..).zip(&used).filter(|(_, used)| **used).map(|(vertex, _)| vertex).collect();
-        let numbers: Vec<u32> = vertices.iter().map(|&place| ordered.numbering().vertex(place)).collect();
+        let vertices: Vec<u32> =
+            (0..).zip(&used).filter(|(_, used)| **used).map(|(vertex, _)| vertex).collect();
+        let numbers: Vec<u32> =
+            vertices.iter().map(|&place| ordered.numbering().vertex(place)).collect();
         let shares = Shares::new(partition, &numbers);
         let mut places = vec![None; used.len()];
-        shares.places().iter().for_each(|&place| places[vertices[place as usize] as usize] = Some(place));
+        shares
+            .places()
+            .iter()
+            .for_each(|&place| places[vertices[place as usize] as usize] = Some(place));
         Self { vertices, shares, places }
     }
 
@@ -44,8 +49,11 @@ impl Held {
 
     /// Leaves a mark at a shared vertex only where all that have it do. Collective.
     pub(super) fn all(&self, partition: &dyn Partition, marks: &mut [bool]) {
-        let mut missing: Vec<f64> =
-            self.vertices.iter().map(|&vertex| f64::from(u8::from(!marks[vertex as usize]))).collect();
+        let mut missing: Vec<f64> = self
+            .vertices
+            .iter()
+            .map(|&vertex| f64::from(u8::from(!marks[vertex as usize])))
+            .collect();
         self.shares.sum(partition, 1, &mut missing);
         for &place in self.shares.places() {
             marks[self.vertex(place) as usize] &= missing[place as usize] == 0.0;
@@ -92,7 +100,8 @@ pub(super) fn colours(
             }
         }
     }
-    let mut order: Vec<(Key, u32)> = free.iter().filter_map(|&vertex| Some((keys[vertex as usize]?, vertex))).collect();
+    let mut order: Vec<(Key, u32)> =
+        free.iter().filter_map(|&vertex| Some((keys[vertex as usize]?, vertex))).collect();
     order.sort_unstable();
     let mut colour_of: Vec<Option<u16>> = vec![None; points.len()];
     let mut used: Vec<u32> = Vec::new();
@@ -129,7 +138,9 @@ pub(super) fn colours(
             let Some(place) = held.places[vertex as usize] else { continue };
             let known = &mut known[place as usize * width..][..width];
             around(vertex, &mut |other| match (keys[other as usize], colour_of[other as usize]) {
-                (Some(before), None) if (before, other) < (key, vertex) && other != vertex => known[0] = 1.0,
+                (Some(before), None) if (before, other) < (key, vertex) && other != vertex => {
+                    known[0] = 1.0
+                }
                 (_, Some(colour)) => known[usize::from(colour) + 1] = 1.0,
                 _ => {}
             });

@@ -51,7 +51,12 @@ impl<'a> Elements<'a> {
         });
         if self.mesh.cells().cell_type(cell) != CellType::Tetra {
             let points = self.mesh.points();
-            corner_tets(self.mesh.cells(), cell, |vertex| points[vertex as usize], &mut scratch.tets);
+            corner_tets(
+                self.mesh.cells(),
+                cell,
+                |vertex| points[vertex as usize],
+                &mut scratch.tets,
+            );
             valid &= scratch.tets.iter().all(|&tet| tet_determinant(tet) > 0.0);
         }
         (valid && volume.is_finite()).then_some(volume)
@@ -60,14 +65,20 @@ impl<'a> Elements<'a> {
     /// Calls `visit` with the weight (in units of volume) of each point of quadrature of a volume cell, and the gradients there
     /// of the shape functions of the cell's vertices.
     #[inline]
-    pub(super) fn for_each_point(&self, cell: usize, scratch: &mut Scratch, mut visit: impl FnMut(f64, &[Vector])) {
+    pub(super) fn for_each_point(
+        &self,
+        cell: usize,
+        scratch: &mut Scratch,
+        mut visit: impl FnMut(f64, &[Vector]),
+    ) {
         let cells = self.mesh.cells();
         let points = self.mesh.points();
         let vertices = cells.vertices(cell);
         let rule = match cells.cell_type(cell) {
             CellType::Tetra => {
                 if let &[a, b, c, d] = vertices {
-                    let (weight, gradients) = tetra([a, b, c, d].map(|vertex| points[vertex as usize]));
+                    let (weight, gradients) =
+                        tetra([a, b, c, d].map(|vertex| points[vertex as usize]));
                     visit(weight, &gradients);
                 }
                 return;
@@ -102,7 +113,12 @@ impl<'a> Elements<'a> {
     }
 
     /// A prism or polyhedron, by its tetrahedra.
-    fn for_each_part(&self, cell: usize, gradients: &mut Vec<Vector>, mut visit: impl FnMut(f64, &[Vector])) {
+    fn for_each_part(
+        &self,
+        cell: usize,
+        gradients: &mut Vec<Vector>,
+        mut visit: impl FnMut(f64, &[Vector]),
+    ) {
         let cells = self.mesh.cells();
         let vertices = cells.vertices(cell);
         let point = |vertex: u32| self.mesh.points()[vertex as usize];
@@ -237,7 +253,9 @@ mod tests {
                     let gradient = vertices
                         .iter()
                         .zip(gradients)
-                        .fold([0.0; 3], |sum, (&vertex, &gradient)| add(sum, scale(gradient, field(vertex))));
+                        .fold([0.0; 3], |sum, (&vertex, &gradient)| {
+                            add(sum, scale(gradient, field(vertex)))
+                        });
                     for (other, value) in gradient.into_iter().enumerate() {
                         let exact = f64::from(u8::from(axis == other));
                         assert!((value - exact).abs() < 1e-13, "{cell_type}: {gradient:?}");

@@ -52,8 +52,11 @@ pub(super) fn determinant_of(j: &Matrix) -> f64 {
 fn regularised(determinant: f64, epsilon: f64) -> (f64, f64) {
     let root = determinant.hypot(epsilon);
     // Without cancellation where the determinant is negative.
-    let chi =
-        if determinant > 0.0 { 0.5 * (determinant + root) } else { 0.5 * epsilon * epsilon / (root - determinant) };
+    let chi = if determinant > 0.0 {
+        0.5 * (determinant + root)
+    } else {
+        0.5 * epsilon * epsilon / (root - determinant)
+    };
     (chi, root)
 }
 
@@ -80,8 +83,8 @@ pub(super) fn local(j: &Matrix, epsilon: f64, gradients: &[Vector; 4]) -> Local 
     // Derivatives by the squared norm and the determinant.
     let by_square = shape;
     let mixed = -2.0 / 3.0 * shape / chi * slope;
-    let by_determinant =
-        square * mixed + VOLUME * (2.0 * determinant - (1.0 + determinant * determinant) * slope / chi) / chi;
+    let by_determinant = square * mixed
+        + VOLUME * (2.0 * determinant - (1.0 + determinant * determinant) * slope / chi) / chi;
     let twice = square * shape * (10.0 / 9.0 * (slope / chi).powi(2) - 2.0 / 3.0 * bend / chi)
         + VOLUME / chi
             * (2.0
@@ -89,8 +92,9 @@ pub(super) fn local(j: &Matrix, epsilon: f64, gradients: &[Vector; 4]) -> Local 
                 - (1.0 + determinant * determinant) * (bend / chi - 2.0 * (slope / chi).powi(2)));
 
     let cofactors = [cross(j[1], j[2]), cross(j[2], j[0]), cross(j[0], j[1])];
-    let stress: Matrix =
-        std::array::from_fn(|row| add(scale(j[row], 2.0 * by_square), scale(cofactors[row], by_determinant)));
+    let stress: Matrix = std::array::from_fn(|row| {
+        add(scale(j[row], 2.0 * by_square), scale(cofactors[row], by_determinant))
+    });
     let gradient = gradients.map(|g| stress.map(|row| dot(row, g)));
 
     let (left, sigma, right) = singular(j);
@@ -101,8 +105,9 @@ pub(super) fn local(j: &Matrix, epsilon: f64, gradients: &[Vector; 4]) -> Local 
     for a in 0..3 {
         for b in 0..3 {
             let own = if a == b { 2.0 * by_square } else { by_determinant * sigma[3 - a - b] };
-            stretch[a][b] =
-                own + 2.0 * mixed * (sigma[a] * minors[b] + sigma[b] * minors[a]) + twice * minors[a] * minors[b];
+            stretch[a][b] = own
+                + 2.0 * mixed * (sigma[a] * minors[b] + sigma[b] * minors[a])
+                + twice * minors[a] * minors[b];
         }
     }
     let stretch = projected(stretch, floor);
@@ -136,8 +141,12 @@ pub(super) fn local(j: &Matrix, epsilon: f64, gradients: &[Vector; 4]) -> Local 
 
 /// `Σ left[p] block[p][q] left[q]ᵀ`.
 fn rotated(left: &Matrix, block: &Block<3>) -> Block<3> {
-    let half: Matrix = std::array::from_fn(|p| (0..3).fold([0.0; 3], |sum, q| add(sum, scale(left[q], block[p][q]))));
-    std::array::from_fn(|row| (0..3).fold([0.0; 3], |sum, p| add(sum, scale(half[p], left[p][row]))))
+    let half: Matrix = std::array::from_fn(|p| {
+        (0..3).fold([0.0; 3], |sum, q| add(sum, scale(left[q], block[p][q])))
+    });
+    std::array::from_fn(|row| {
+        (0..3).fold([0.0; 3], |sum, p| add(sum, scale(half[p], left[p][row])))
+    })
 }
 
 /// `J = Σ sigma[k] left[k] right[k]ᵀ` to rounding, with right-handed vectors and the sign of the determinant in the last value.
@@ -228,7 +237,8 @@ mod tests {
 
     use super::*;
 
-    const GRADIENTS: [Vector; 4] = [[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    const GRADIENTS: [Vector; 4] =
+        [[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(200))]

@@ -76,9 +76,12 @@ impl Impossible {
         let mut prescribed = vec![false; mesh.points().len()];
         boundary.iter().for_each(|&vertex| prescribed[vertex as usize] = true);
         let numbered = |proof: Self| match proof {
-            Self::Cell { cell, cell_type, centroid, scaled_jacobian } => {
-                Self::Cell { cell: partition.cell_number(cell), cell_type, centroid, scaled_jacobian }
-            }
+            Self::Cell { cell, cell_type, centroid, scaled_jacobian } => Self::Cell {
+                cell: partition.cell_number(cell),
+                cell_type,
+                centroid,
+                scaled_jacobian,
+            },
             Self::Vertex { point, cells } => {
                 Self::Vertex { point, cells: cells.map(|cell| partition.cell_number(cell)) }
             }
@@ -108,7 +111,12 @@ impl Impossible {
     fn unpacked(&[kind, x, y, z, a, b, c, d]: &[f64; LENGTH]) -> Option<Self> {
         if kind == 0.0 {
             let cell_type = CellType::from_vtk(b as u8)?;
-            Some(Self::Cell { cell: a as usize, cell_type, centroid: [x, y, z], scaled_jacobian: c })
+            Some(Self::Cell {
+                cell: a as usize,
+                cell_type,
+                centroid: [x, y, z],
+                scaled_jacobian: c,
+            })
         } else if kind == 1.0 {
             Some(Self::Vertex { point: [x, y, z], cells: [a, b, c, d].map(|cell| cell as usize) })
         } else {
@@ -121,13 +129,20 @@ impl Impossible {
 const LENGTH: usize = 8;
 
 /// The worst of the cells whose vertices are all prescribed, where it is inverted or below `floor`.
-fn broken_cell(mesh: &Mesh, prescribed: &[bool], points: &[Vector], floor: f64) -> Option<Impossible> {
+fn broken_cell(
+    mesh: &Mesh,
+    prescribed: &[bool],
+    points: &[Vector],
+    floor: f64,
+) -> Option<Impossible> {
     let cells = mesh.cells();
     let measure = Measure::new(cells);
     let mut scratch = Scratch::default();
-    let held = |cell: &usize| cells.vertices(*cell).iter().all(|&vertex| prescribed[vertex as usize]);
+    let held =
+        |cell: &usize| cells.vertices(*cell).iter().all(|&vertex| prescribed[vertex as usize]);
     let measured = (0..cells.len()).filter(held).filter_map(|cell| {
-        let (value, inverted) = measure.cell(cell, |vertex| points[vertex as usize], &mut scratch)?;
+        let (value, inverted) =
+            measure.cell(cell, |vertex| points[vertex as usize], &mut scratch)?;
         (inverted || value < floor).then_some((cell, value))
     });
     let (cell, scaled_jacobian) = measured.min_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -151,7 +166,9 @@ fn torn_vertex(mesh: &Mesh, prescribed: &[bool], points: &[Vector]) -> Option<Im
     for corner in corners(mesh) {
         let mut free = (0..4).filter(|&local| !prescribed[corner.vertices[local] as usize]);
         if let (Some(local), None) = (free.next(), free.next()) {
-            about.extend(half_space(&corner, local, points).map(|half| (corner.vertices[local], half)));
+            about.extend(
+                half_space(&corner, local, points).map(|half| (corner.vertices[local], half)),
+            );
         }
     }
     about.sort_by_key(|(vertex, _)| *vertex);
@@ -187,7 +204,8 @@ fn disjoint(halves: &[&HalfSpace]) -> Option<[usize; 4]> {
                     let four = [a, b, c, d].map(|index| halves[index]);
                     let [p, q, r, s] = four.map(|half| half.normal);
                     let triple = |u, v, w| dot(cross(u, v), w);
-                    let mut factors = [triple(q, r, s), -triple(p, r, s), triple(p, q, s), -triple(p, q, r)];
+                    let mut factors =
+                        [triple(q, r, s), -triple(p, r, s), triple(p, q, s), -triple(p, q, r)];
                     if factors.iter().all(|&factor| factor <= 0.0) {
                         factors = factors.map(|factor| -factor);
                     }
@@ -195,9 +213,11 @@ fn disjoint(halves: &[&HalfSpace]) -> Option<[usize; 4]> {
                     if factors.iter().any(|&factor| factor < 0.0) || sum < ROUNDING {
                         continue;
                     }
-                    let apart: f64 = factors.iter().zip(four).map(|(factor, half)| factor * half.offset).sum();
+                    let apart: f64 =
+                        factors.iter().zip(four).map(|(factor, half)| factor * half.offset).sum();
                     // What rounding leaves of the sum of the normals moves the sum of the offsets by as much.
-                    let rest = (0..4).fold([0.0; 3], |rest, k| add(rest, scale(four[k].normal, factors[k])));
+                    let rest = (0..4)
+                        .fold([0.0; 3], |rest, k| add(rest, scale(four[k].normal, factors[k])));
                     let slack = ROUNDING * size * sum + size * dot(rest, rest).sqrt();
                     if apart > slack {
                         return Some(four.map(|half| half.cell));
@@ -248,7 +268,13 @@ mod tests {
     /// One cell of each type, all of whose vertices are on the boundary.
     #[test]
     fn a_cell_without_a_free_vertex_is_named() {
-        for cell_type in [CellType::Tetra, CellType::Pyramid, CellType::Wedge, CellType::Hexahedron, CellType::Voxel] {
+        for cell_type in [
+            CellType::Tetra,
+            CellType::Pyramid,
+            CellType::Wedge,
+            CellType::Hexahedron,
+            CellType::Voxel,
+        ] {
             let mesh = shapes::single_cell(cell_type);
             let boundary: Vec<u32> = (0..mesh.points().len() as u32).collect();
             assert_eq!(Impossible::find(&mesh, &boundary, mesh.points(), 0.0, &Whole), None);
@@ -256,7 +282,10 @@ mod tests {
             let [away, from] = [pushed[0], pushed[pushed.len() - 1]];
             pushed[0] = add(from, scale(subtract(from, away), 2.0));
             let proof = Impossible::find(&mesh, &boundary, &pushed, 0.0, &Whole);
-            assert!(matches!(proof, Some(Impossible::Cell { cell: 0, .. })), "{cell_type}: {proof:?}");
+            assert!(
+                matches!(proof, Some(Impossible::Cell { cell: 0, .. })),
+                "{cell_type}: {proof:?}"
+            );
             assert!(proof.unwrap().to_string().contains(&cell_type.to_string()));
         }
     }
@@ -275,7 +304,9 @@ mod tests {
         assert_eq!(find(&outside), None);
         let mut mirrored = mesh.points().to_vec();
         mirrored[3] = [0.3, 0.2, -1.0];
-        let Some(Impossible::Vertex { point, mut cells }) = find(&mirrored) else { panic!("no proof") };
+        let Some(Impossible::Vertex { point, mut cells }) = find(&mirrored) else {
+            panic!("no proof")
+        };
         cells.sort_unstable();
         assert_eq!((point, cells), ([0.2, 0.2, 0.2], [0, 1, 2, 3]));
         assert!(find(&mirrored).unwrap().to_string().contains("cells 0, 1, 2, 3"));

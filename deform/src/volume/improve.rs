@@ -8,7 +8,8 @@ use crate::mesh::{CellType, Mesh, Numbering, Ordered, Vector};
 use crate::parallel;
 use crate::partition::{Partition, Reduction, Shares, all, most, whole};
 use crate::quality::{
-    HEXAHEDRON_CORNERS, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, scaled_jacobians, tet_determinant,
+    HEXAHEDRON_CORNERS, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, scaled_jacobians,
+    tet_determinant,
 };
 use crate::vector::{add, dot, scale};
 
@@ -87,7 +88,10 @@ impl Improver {
         let held = (partition.ranks() > 1).then(|| Held::new(&ordered, &**partition));
         let (mesh, numbering) = ordered.into_parts();
         let mut free = vec![true; mesh.points().len()];
-        boundary.iter().filter_map(|&vertex| numbering.place(vertex)).for_each(|place| free[place as usize] = false);
+        boundary
+            .iter()
+            .filter_map(|&vertex| numbering.place(vertex))
+            .for_each(|place| free[place as usize] = false);
         let pieces = pieces(&mesh, &mut free);
         if let Some(held) = &held {
             held.all(&**partition, &mut free);
@@ -115,15 +119,28 @@ impl Improver {
                 movable.push(number);
             }
         }
-        let mut improver =
-            Self { numbering, pieces, colours: Vec::new(), incident, offsets, movable, parts: None, good: GOOD };
+        let mut improver = Self {
+            numbering,
+            pieces,
+            colours: Vec::new(),
+            incident,
+            offsets,
+            movable,
+            parts: None,
+            good: GOOD,
+        };
         let around = |vertex: u32, visit: &mut dyn FnMut(u32)| {
             for &code in improver.incident(vertex) {
-                improver.pieces[(code / 4) as usize].vertices.iter().for_each(|&other| visit(other));
+                improver.pieces[(code / 4) as usize]
+                    .vertices
+                    .iter()
+                    .for_each(|&other| visit(other));
             }
         };
-        let free: Vec<u32> = (0..).zip(&free).filter(|(_, free)| **free).map(|(vertex, _)| vertex).collect();
-        let colour_of = colours(mesh.points(), &free, around, held.as_ref().map(|held| (&**partition, held)));
+        let free: Vec<u32> =
+            (0..).zip(&free).filter(|(_, free)| **free).map(|(vertex, _)| vertex).collect();
+        let colour_of =
+            colours(mesh.points(), &free, around, held.as_ref().map(|held| (&**partition, held)));
         let mut colours: Vec<Vec<u32>> = Vec::new();
         for &vertex in &free {
             let shared = held.as_ref().is_some_and(|held| held.is_shared(vertex));
@@ -137,7 +154,8 @@ impl Improver {
             let shared = held.shares().places().iter().filter_map(|&place| of_place(place));
             let own = shared.fold(colours.len(), |count, colour| count.max(colour + 1));
             colours.resize_with(most(&**partition, own), Vec::new);
-            let of_colour = |colour: usize| held.shares().only(|place| of_place(place) == Some(colour));
+            let of_colour =
+                |colour: usize| held.shares().only(|place| of_place(place) == Some(colour));
             let shares = (0..colours.len()).map(of_colour).collect();
             Parts { partition: Arc::clone(partition), held, colours: shares }
         });
@@ -178,13 +196,16 @@ impl Improver {
     /// The least quality of what can be moved.
     fn least(&self, points: &[Vector]) -> f64 {
         let least = parallel::map_chunks(self.movable.len(), CHUNK, |range| {
-            self.movable[range]
-                .iter()
-                .map(|&piece| self.pieces[piece as usize].least(points))
-                .fold(f64::INFINITY, |least, value| if value < least || value.is_nan() { value } else { least })
+            self.movable[range].iter().map(|&piece| self.pieces[piece as usize].least(points)).fold(
+                f64::INFINITY,
+                |least, value| if value < least || value.is_nan() { value } else { least },
+            )
         })
         .into_iter()
-        .fold(f64::INFINITY, |least, value| if value < least || value.is_nan() { value } else { least });
+        .fold(
+            f64::INFINITY,
+            |least, value| if value < least || value.is_nan() { value } else { least },
+        );
         match &self.parts {
             None => least,
             Some(Parts { partition, .. }) => {
@@ -221,9 +242,16 @@ impl Improver {
 
     /// The same for the vertices of one colour that other ranks have too: what the cells of all of them say is added up, so that
     /// all move them to the same place.
-    fn sweep_shared(&self, points: &mut [Vector], barrier: &Barrier, parts: &Parts, shares: &Shares) {
+    fn sweep_shared(
+        &self,
+        points: &mut [Vector],
+        barrier: &Barrier,
+        parts: &Parts,
+        shares: &Shares,
+    ) {
         let Parts { partition, held, .. } = parts;
-        let vertices: Vec<(u32, u32)> = shares.places().iter().map(|&place| (place, held.vertex(place))).collect();
+        let vertices: Vec<(u32, u32)> =
+            shares.places().iter().map(|&place| (place, held.vertex(place))).collect();
         let mut star = Star::default();
         // Whether any cell is not good, the gradient and the Hessian.
         let mut slopes = vec![[0.0; 13]; held.len()];
@@ -240,8 +268,10 @@ impl Improver {
         let direction = |place: u32| {
             let [bad, a, b, c, hessian @ ..] = slopes[place as usize];
             let gradient = [a, b, c];
-            let direction =
-                newton(&gradient, &std::array::from_fn(|row| std::array::from_fn(|k| hessian[3 * row + k])))?;
+            let direction = newton(
+                &gradient,
+                &std::array::from_fn(|row| std::array::from_fn(|k| hessian[3 * row + k])),
+            )?;
             (bad > 0.0).then(|| (direction, dot(direction, gradient)))
         };
         let mut energies = vec![[0.0; LENGTHS + 1]; held.len()];
@@ -257,7 +287,9 @@ impl Improver {
         for &(place, vertex) in &vertices {
             let Some((direction, slope)) = direction(place) else { continue };
             let energies = &energies[place as usize];
-            let along = |wanted: f64| energies[(0..=LENGTHS).find(|&index| length(index) == wanted).unwrap_or(0)];
+            let along = |wanted: f64| {
+                energies[(0..=LENGTHS).find(|&index| length(index) == wanted).unwrap_or(0)]
+            };
             points[vertex as usize] = searched(points[vertex as usize], direction, slope, along);
         }
     }
@@ -291,8 +323,11 @@ fn pieces(mesh: &Mesh, free: &mut [bool]) -> Vec<Piece> {
         };
         let from = pieces.len();
         for corner in corners {
-            let local =
-                if cell_type == CellType::Voxel { corner.map(|local| VOXEL_AS_HEXAHEDRON[local]) } else { *corner };
+            let local = if cell_type == CellType::Voxel {
+                corner.map(|local| VOXEL_AS_HEXAHEDRON[local])
+            } else {
+                *corner
+            };
             let vertices = local.map(|index| vertices[index]);
             if tet_determinant(vertices.map(|vertex| points[vertex as usize])) > 0.0 {
                 pieces.push(Piece { vertices, factor: regular / scaled, whole });
@@ -332,12 +367,18 @@ mod tests {
 
     fn spread(mesh: &Mesh, points: &[Vector]) -> (f64, f64) {
         let values = normalized_scaled_jacobians(mesh.cells(), mesh.points(), points);
-        (values.iter().copied().fold(f64::INFINITY, f64::min), values.iter().sum::<f64>() / values.len() as f64)
+        (
+            values.iter().copied().fold(f64::INFINITY, f64::min),
+            values.iter().sum::<f64>() / values.len() as f64,
+        )
     }
 
     fn meshes() -> Vec<Mesh> {
         let size = ([5, 6, 4], [0.0; 3], [1.0; 3]);
-        vec![shapes::box_of_tets(size.0, size.1, size.2), shapes::box_of_hexahedra(size.0, size.1, size.2)]
+        vec![
+            shapes::box_of_tets(size.0, size.1, size.2),
+            shapes::box_of_hexahedra(size.0, size.1, size.2),
+        ]
     }
 
     /// With the boundary where it was, every cell can have the quality of the reference.
@@ -366,8 +407,11 @@ mod tests {
             let improver = Improver::new(&mesh, &boundary);
             // Turned and moved.
             let (s, c) = 0.7f64.sin_cos();
-            let turned: Vec<Vector> =
-                mesh.points().iter().map(|&[x, y, z]| [c * x - s * y + 3.0, s * x + c * y, z - 1.0]).collect();
+            let turned: Vec<Vector> = mesh
+                .points()
+                .iter()
+                .map(|&[x, y, z]| [c * x - s * y + 3.0, s * x + c * y, z - 1.0])
+                .collect();
             let mirrored: Vec<Vector> = mesh.points().iter().map(|&[x, y, z]| [x, y, -z]).collect();
             for mut points in [turned, mirrored] {
                 let start = points.clone();

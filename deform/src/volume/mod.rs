@@ -101,7 +101,9 @@ pub enum VolumeError {
     #[error("the mesh does not have the cells that the volume operator was set up for")]
     OtherCells,
     /// A boundary vertex that the mesh does not have.
-    #[error("boundary vertex {vertex} does not exist; the mesh has {vertex_count} vertices, numbered from 0")]
+    #[error(
+        "boundary vertex {vertex} does not exist; the mesh has {vertex_count} vertices, numbered from 0"
+    )]
     BoundaryVertex {
         /// The vertex.
         vertex: u32,
@@ -115,7 +117,9 @@ pub enum VolumeError {
         vertex: u32,
     },
     /// Cells that hang together with no boundary vertex, so that nothing says where they go.
-    #[error("vertex {vertex} belongs to cells that no boundary vertex holds; {count} such vertices in all")]
+    #[error(
+        "vertex {vertex} belongs to cells that no boundary vertex holds; {count} such vertices in all"
+    )]
     Unattached {
         /// The first such vertex.
         vertex: usize,

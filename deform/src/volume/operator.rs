@@ -9,7 +9,9 @@ use super::sliding::{Constraint, Sliding, constrain, constraints};
 use super::{Deform, Method, VolumeError, agreed};
 use crate::linear::{Convergence, LinearError, LinearSolver, SparseMatrix, Tolerance};
 use crate::mesh::{Cells, Mesh, Ordered, Vector};
-use crate::partition::{Partition, Reduction, Shares, all, any, scalar_solver, vector_solver, whole};
+use crate::partition::{
+    Partition, Reduction, Shares, all, any, scalar_solver, vector_solver, whole,
+};
 use crate::vector::{add, subtract};
 
 /// A residual this small against the right side is rounding.
@@ -154,16 +156,31 @@ impl VolumeOperator {
     ) -> Result<Self, VolumeError> {
         settings.validate()?;
         let cells = mesh.cells().len();
-        let countable = if u32::try_from(cells).is_ok() { Ok(()) } else { Err(VolumeError::TooLarge { cells }) };
+        let countable = if u32::try_from(cells).is_ok() {
+            Ok(())
+        } else {
+            Err(VolumeError::TooLarge { cells })
+        };
         agreed(&**partition, countable)?;
         let ordered = Arc::new(Ordered::new(mesh));
         let elements = Elements::new(ordered.mesh());
-        let stiffness = stiffness(&ordered, ordered.mesh(), &elements, settings.stiffening, &**partition)?;
+        let stiffness =
+            stiffness(&ordered, ordered.mesh(), &elements, settings.stiffening, &**partition)?;
         let graph = Arc::new(Graph::new(Arc::clone(&ordered), boundary, &**partition)?);
         let constraints = agreed(&**partition, checked_constraints(mesh, &graph, sliding))?;
         let start = Start::Fresh(partition);
-        let equations = equations(&graph, ordered.mesh(), &elements, &stiffness, &constraints, settings, start)?;
-        let places = |vertices: &[u32]| vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect();
+        let equations = equations(
+            &graph,
+            ordered.mesh(),
+            &elements,
+            &stiffness,
+            &constraints,
+            settings,
+            start,
+        )?;
+        let places = |vertices: &[u32]| {
+            vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect()
+        };
         let owned = (0..).zip(boundary).filter(|(_, vertex)| partition.owns(**vertex));
         Ok(Self {
             cells: Arc::clone(mesh.shared_cells()),
@@ -198,14 +215,26 @@ impl VolumeOperator {
     pub fn restiffened(&self, mesh: &Mesh, stiffening: f64) -> Result<Self, VolumeError> {
         let settings = Deform { stiffening, ..self.settings };
         settings.validate()?;
-        let same = *mesh.shared_cells() == self.cells && mesh.points().len() == self.graph.vertex_count();
+        let same =
+            *mesh.shared_cells() == self.cells && mesh.points().len() == self.graph.vertex_count();
         agreed(&*self.partition, if same { Ok(()) } else { Err(VolumeError::OtherCells) })?;
         let ordered = self.graph.ordered.like(mesh);
         let elements = Elements::new(&ordered);
-        let stiffness = stiffness(&self.graph.ordered, &ordered, &elements, stiffening, &*self.partition)?;
+        let stiffness =
+            stiffness(&self.graph.ordered, &ordered, &elements, stiffening, &*self.partition)?;
         let like = Start::Like(&self.equations);
-        let equations = equations(&self.graph, &ordered, &elements, &stiffness, &self.constraints, &settings, like)?;
-        let places = |vertices: &[u32]| vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect();
+        let equations = equations(
+            &self.graph,
+            &ordered,
+            &elements,
+            &stiffness,
+            &self.constraints,
+            &settings,
+            like,
+        )?;
+        let places = |vertices: &[u32]| {
+            vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect()
+        };
         Ok(Self {
             graph: Arc::clone(&self.graph),
             cells: Arc::clone(&self.cells),
@@ -264,11 +293,20 @@ impl VolumeOperator {
     /// # Panics
     /// Where there is not one displacement for each of [`VolumeOperator::boundary`].
     #[must_use]
-    pub fn coupled_equations(&self, boundary_displacement: &[Vector]) -> Option<(&SparseMatrix<3>, Vec<Vector>)> {
-        assert_eq!(boundary_displacement.len(), self.boundary.len(), "one displacement for each boundary vertex");
+    pub fn coupled_equations(
+        &self,
+        boundary_displacement: &[Vector],
+    ) -> Option<(&SparseMatrix<3>, Vec<Vector>)> {
+        assert_eq!(
+            boundary_displacement.len(),
+            self.boundary.len(),
+            "one displacement for each boundary vertex"
+        );
         let Equations::Coupled(system) = &self.equations else { return None };
         let (rigid, rest) = self.less_rigid(boundary_displacement);
-        let across = |constraint: &Constraint| constraint.across(rigid.at(self.unknown_points[constraint.row]));
+        let across = |constraint: &Constraint| {
+            constraint.across(rigid.at(self.unknown_points[constraint.row]))
+        };
         let rest_sliding: Vec<Vector> = self.constraints.iter().map(across).collect();
         Some((&system.matrix, self.coupled_right_side(system, &rest, &rest_sliding)))
     }
@@ -317,23 +355,35 @@ impl VolumeOperator {
         sliding_displacement: &[Vector],
         start: Option<&[Vector]>,
     ) -> Result<VolumeSolution, VolumeError> {
-        agreed(&*self.partition, self.check_displacements(boundary_displacement, sliding_displacement, start))?;
+        agreed(
+            &*self.partition,
+            self.check_displacements(boundary_displacement, sliding_displacement, start),
+        )?;
         let mut displacement = vec![[0.0; 3]; self.graph.vertex_count()];
         for (&vertex, &value) in self.boundary.iter().zip(boundary_displacement) {
             displacement[vertex as usize] = value;
         }
         let convergence = match &self.equations {
-            Equations::Coupled(system) => {
-                self.solve_coupled(system, boundary_displacement, sliding_displacement, start, &mut displacement)?
-            }
+            Equations::Coupled(system) => self.solve_coupled(
+                system,
+                boundary_displacement,
+                sliding_displacement,
+                start,
+                &mut displacement,
+            )?,
             Equations::Separate(system) => {
                 self.solve_separate(system, boundary_displacement, start, &mut displacement)?
             }
         };
-        if !all(&*self.partition, displacement.as_flattened().iter().all(|value| value.is_finite())) {
+        if !all(&*self.partition, displacement.as_flattened().iter().all(|value| value.is_finite()))
+        {
             return Err(LinearError::NotFinite { iteration: convergence.iterations }.into());
         }
-        Ok(VolumeSolution { displacement, iterations: convergence.iterations, residual: convergence.residual })
+        Ok(VolumeSolution {
+            displacement,
+            iterations: convergence.iterations,
+            residual: convergence.residual,
+        })
     }
 
     fn check_displacements(
@@ -343,19 +393,28 @@ impl VolumeOperator {
         start: Option<&[Vector]>,
     ) -> Result<(), VolumeError> {
         if sliding.len() != self.sliding.len() {
-            return Err(VolumeError::SlidingCount { found: sliding.len(), expected: self.sliding.len() });
+            return Err(VolumeError::SlidingCount {
+                found: sliding.len(),
+                expected: self.sliding.len(),
+            });
         }
         if boundary.len() != self.boundary.len() {
-            return Err(VolumeError::BoundaryCount { found: boundary.len(), expected: self.boundary.len() });
+            return Err(VolumeError::BoundaryCount {
+                found: boundary.len(),
+                expected: self.boundary.len(),
+            });
         }
         let given = self.sliding.iter().map(|sliding| sliding.vertex).zip(sliding);
         let given = given.chain(self.boundary.iter().copied().zip(boundary));
-        if let Some(found) = start.map(<[Vector]>::len).filter(|&found| found != self.graph.vertex_count()) {
+        if let Some(found) =
+            start.map(<[Vector]>::len).filter(|&found| found != self.graph.vertex_count())
+        {
             return Err(VolumeError::StartCount { found, expected: self.graph.vertex_count() });
         }
         let start = start.unwrap_or_default();
-        if let Some((vertex, &value)) =
-            given.chain((0..).zip(start)).find(|(_, value)| !value.iter().all(|component| component.is_finite()))
+        if let Some((vertex, &value)) = given
+            .chain((0..).zip(start))
+            .find(|(_, value)| !value.iter().all(|component| component.is_finite()))
         {
             return Err(VolumeError::NotFinite { vertex, value });
         }
@@ -386,7 +445,11 @@ impl VolumeOperator {
 
     /// The rigid motion nearest to the boundary's, and that motion less the boundary's.
     fn less_rigid(&self, boundary: &[Vector]) -> (RigidMotion, Vec<Vector>) {
-        let mut rigid = RigidMotion::nearest(&self.own(&self.boundary_points), &self.own(boundary), &*self.partition);
+        let mut rigid = RigidMotion::nearest(
+            &self.own(&self.boundary_points),
+            &self.own(boundary),
+            &*self.partition,
+        );
         if self.settings.method == Method::Harmonic {
             // A rotation is no solution where the boundary is free.
             rigid = rigid.translation();
@@ -415,8 +478,9 @@ impl VolumeOperator {
             self.constraints.iter().map(|constraint| constraint.across(part(constraint))).collect()
         };
         let whole_sliding = across(&|constraint| sliding[constraint.first]);
-        let rest_sliding =
-            across(&|constraint| subtract(rigid.at(self.unknown_points[constraint.row]), sliding[constraint.first]));
+        let rest_sliding = across(&|constraint| {
+            subtract(rigid.at(self.unknown_points[constraint.row]), sliding[constraint.first])
+        });
         let whole = self.coupled_right_side(system, boundary, &whole_sliding);
         let [norm] = self.norms::<3, 1>(whole.as_chunks().0);
         let absolute = ROUNDING * norm;
@@ -424,7 +488,9 @@ impl VolumeOperator {
         let tolerance = Tolerance { relative: self.settings.tolerance, absolute };
         let mut solution = vec![[0.0; 3]; right_side.len()];
         if let Some(start) = start {
-            for ((value, &vertex), &point) in solution.iter_mut().zip(&self.graph.vertices).zip(&self.unknown_points) {
+            for ((value, &vertex), &point) in
+                solution.iter_mut().zip(&self.graph.vertices).zip(&self.unknown_points)
+            {
                 *value = subtract(start[vertex as usize], rigid.at(point));
             }
             for constraint in &self.constraints {
@@ -435,7 +501,9 @@ impl VolumeOperator {
         for (constraint, &rest) in self.constraints.iter().zip(&rest_sliding) {
             solution[constraint.row] = subtract(constraint.along(solution[constraint.row]), rest);
         }
-        for ((&vertex, &point), value) in self.graph.vertices.iter().zip(&self.unknown_points).zip(solution) {
+        for ((&vertex, &point), value) in
+            self.graph.vertices.iter().zip(&self.unknown_points).zip(solution)
+        {
             let motion = rigid.at(point);
             displacement[vertex as usize] = std::array::from_fn(|axis| motion[axis] + value[axis]);
         }
@@ -443,7 +511,12 @@ impl VolumeOperator {
     }
 
     /// The right side for the boundary motion `-rest`, the prescribed motion of sliding vertices being `-rest_sliding`.
-    fn coupled_right_side(&self, system: &System<3>, rest: &[Vector], rest_sliding: &[Vector]) -> Vec<Vector> {
+    fn coupled_right_side(
+        &self,
+        system: &System<3>,
+        rest: &[Vector],
+        rest_sliding: &[Vector],
+    ) -> Vec<Vector> {
         let mut right_side = vec![[0.0; 3]; self.graph.vertices.len()];
         system.coupling.multiply(rest, &mut right_side);
         if !self.constraints.is_empty() {
@@ -467,9 +540,12 @@ impl VolumeOperator {
         start: Option<&[Vector]>,
         displacement: &mut [Vector],
     ) -> Result<Convergence, LinearError> {
-        let from = |vertex: u32, axis: usize, mean: f64| start.map_or(0.0, |start| start[vertex as usize][axis] - mean);
-        let mut moves: Vector =
-            std::array::from_fn(|axis| f64::from(u8::from(boundary.iter().any(|value| value[axis] != 0.0))));
+        let from = |vertex: u32, axis: usize, mean: f64| {
+            start.map_or(0.0, |start| start[vertex as usize][axis] - mean)
+        };
+        let mut moves: Vector = std::array::from_fn(|axis| {
+            f64::from(u8::from(boundary.iter().any(|value| value[axis] != 0.0)))
+        });
         self.partition.reduce(Reduction::Maximum, &mut moves);
         let moving = moves.map(|moves| moves > 0.0);
         let own = self.own(boundary);
@@ -486,8 +562,12 @@ impl VolumeOperator {
             let [norm] = self.norms::<1, 1>(right_side.as_chunks().0);
             let absolute = ROUNDING * norm;
             system.coupling.multiply(&rest, &mut right_side);
-            let mut solution: Vec<[f64; 1]> =
-                self.graph.vertices.iter().map(|&vertex| [from(vertex, axis, mean[axis])]).collect();
+            let mut solution: Vec<[f64; 1]> = self
+                .graph
+                .vertices
+                .iter()
+                .map(|&vertex| [from(vertex, axis, mean[axis])])
+                .collect();
             let tolerance = Tolerance { relative: self.settings.tolerance, absolute };
             let convergence = system.solver.solve_from(&right_side, &mut solution, tolerance)?;
             for (&vertex, [value]) in self.graph.vertices.iter().zip(solution) {
@@ -498,17 +578,25 @@ impl VolumeOperator {
         if !moving.contains(&true) {
             return Ok(Convergence::default());
         }
-        let columns = |values: Vec<Vector>| values.into_iter().map(|value| value.map(|entry| [entry])).collect();
+        let columns = |values: Vec<Vector>| {
+            values.into_iter().map(|value| value.map(|entry| [entry])).collect()
+        };
         let values: Vec<[[f64; 1]; 3]> = columns(boundary.to_vec());
-        let rest = boundary.iter().map(|value| std::array::from_fn(|axis| mean[axis] - value[axis])).collect();
+        let rest = boundary
+            .iter()
+            .map(|value| std::array::from_fn(|axis| mean[axis] - value[axis]))
+            .collect();
         let rest: Vec<[[f64; 1]; 3]> = columns(rest);
         let mut right_side = vec![[[0.0]; 3]; self.graph.vertices.len()];
         system.coupling.multiply_columns(&values, &mut right_side);
         let absolute = self.norms(&right_side).map(|norm| ROUNDING * norm);
         system.coupling.multiply_columns(&rest, &mut right_side);
-        let tolerances = absolute.map(|absolute| Tolerance { relative: self.settings.tolerance, absolute });
+        let tolerances =
+            absolute.map(|absolute| Tolerance { relative: self.settings.tolerance, absolute });
         let at = |&vertex: &u32| {
-            std::array::from_fn(|axis| [if moving[axis] { from(vertex, axis, mean[axis]) } else { 0.0 }])
+            std::array::from_fn(|axis| {
+                [if moving[axis] { from(vertex, axis, mean[axis]) } else { 0.0 }]
+            })
         };
         let mut solution: Vec<[[f64; 1]; 3]> = self.graph.vertices.iter().map(at).collect();
         let convergence = system.solver.solve_three_from(&right_side, &mut solution, tolerances)?;
@@ -542,7 +630,11 @@ impl Start<'_> {
     }
 }
 
-fn checked_constraints(mesh: &Mesh, graph: &Graph, sliding: &[Sliding]) -> Result<Vec<Constraint>, VolumeError> {
+fn checked_constraints(
+    mesh: &Mesh,
+    graph: &Graph,
+    sliding: &[Sliding],
+) -> Result<Vec<Constraint>, VolumeError> {
     for &Sliding { vertex, .. } in sliding {
         let vertex_count = mesh.points().len();
         if vertex as usize >= vertex_count {
@@ -585,7 +677,9 @@ fn equations(
         }
         Method::Harmonic => {
             let system = graph.assemble(mesh, elements, &Laplace, stiffness);
-            let none = |matrix: &mut SparseMatrix<1>| SparseMatrix::zeros(vec![0; matrix.rows() + 1], Vec::new());
+            let none = |matrix: &mut SparseMatrix<1>| {
+                SparseMatrix::zeros(vec![0; matrix.rows() + 1], Vec::new())
+            };
             let set_up = |matrix: Arc<SparseMatrix<1>>| match start {
                 Start::Like(Equations::Separate(like)) => like.solver.renewed(matrix),
                 Start::Like(Equations::Coupled(_)) => crate::linear::solver(matrix),

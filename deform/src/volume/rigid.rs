@@ -17,15 +17,19 @@ impl RigidMotion {
     /// The motion nearest to `displacement` at `points` in the least squares; of those that the ranks have between them where
     /// each rank brings the points that it speaks for. Where the points do not tell the rotation (all on one line), it is left
     /// out.
-    pub(super) fn nearest(points: &[Vector], displacement: &[Vector], partition: &dyn Partition) -> Self {
+    pub(super) fn nearest(
+        points: &[Vector],
+        displacement: &[Vector],
+        partition: &dyn Partition,
+    ) -> Self {
         #[expect(clippy::cast_precision_loss, reason = "fewer vertices than 2^53")]
         let mut sums = [points.len() as f64, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
         sums[1..4].copy_from_slice(&points.iter().copied().fold([0.0; 3], add));
         sums[4..].copy_from_slice(&displacement.iter().copied().fold([0.0; 3], add));
         partition.reduce(Reduction::Sum, &mut sums);
         let [count, sums @ ..] = sums;
-        let [centre, translation] =
-            [0, 3].map(|from| scale([sums[from], sums[from + 1], sums[from + 2]], 1.0 / count.max(1.0)));
+        let [centre, translation] = [0, 3]
+            .map(|from| scale([sums[from], sums[from + 1], sums[from + 2]], 1.0 / count.max(1.0)));
         let mut inertia = [[0.0; 3]; 3];
         let mut moment = [0.0; 3];
         for (&point, &value) in points.iter().zip(displacement) {
@@ -44,7 +48,8 @@ impl RigidMotion {
         partition.reduce(Reduction::Sum, &mut sums);
         let row = |from: usize| [sums[from], sums[from + 1], sums[from + 2]];
         let (inertia, moment) = ([row(0), row(3), row(6)], row(9));
-        let rotation = invert_positive(&inertia).map_or([0.0; 3], |inverse| inverse.map(|row| dot(row, moment)));
+        let rotation = invert_positive(&inertia)
+            .map_or([0.0; 3], |inverse| inverse.map(|row| dot(row, moment)));
         Self { centre, translation, rotation }
     }
 

@@ -44,7 +44,13 @@ pub enum Method {
 impl Default for Deform {
     /// Elasticity, stiffening 0.5, Poisson's ratio 0.2, tolerance 1e-8, 10 sweeps of improvement.
     fn default() -> Self {
-        Self { method: Method::Elasticity, stiffening: 0.5, poisson_ratio: 0.2, tolerance: 1e-8, improve: 10 }
+        Self {
+            method: Method::Elasticity,
+            stiffening: 0.5,
+            poisson_ratio: 0.2,
+            tolerance: 1e-8,
+            improve: 10,
+        }
     }
 }
 
@@ -79,7 +85,8 @@ mod tests {
     fn defaults_are_visible_and_unknown_names_refused() {
         let deform: Deform = serde_json::from_str(r#"{"method": "harmonic"}"#).unwrap();
         assert_eq!(deform, Deform { method: Method::Harmonic, ..Deform::default() });
-        let message = serde_json::from_str::<Deform>(r#"{"stiffness": 1}"#).unwrap_err().to_string();
+        let message =
+            serde_json::from_str::<Deform>(r#"{"stiffness": 1}"#).unwrap_err().to_string();
         assert!(message.contains("stiffness") && message.contains("stiffening"), "{message}");
         let schema = serde_json::to_value(schemars::schema_for!(Deform)).unwrap();
         assert_eq!(schema["properties"]["poisson_ratio"]["default"], 0.2);

@@ -86,13 +86,17 @@ pub(super) fn constraints(
 
 /// Takes the directions across out of the equations: `P A P + α (1 - P)`, which is positive definite where `A` is. What is
 /// returned couples the unknowns to the prescribed displacements, one column for each constraint.
-pub(super) fn constrain(matrix: &mut SparseMatrix<3>, constraints: &[Constraint]) -> SparseMatrix<3> {
+pub(super) fn constrain(
+    matrix: &mut SparseMatrix<3>,
+    constraints: &[Constraint],
+) -> SparseMatrix<3> {
     let mut of_row = vec![None; matrix.rows()];
     for (index, constraint) in (0u32..).zip(constraints) {
         of_row[constraint.row] = Some((index, constraint));
     }
     let (offsets, columns, values) = matrix.offsets_and_values_mut();
-    let (mut found_offsets, mut found_columns, mut found_values) = (vec![0], Vec::new(), Vec::new());
+    let (mut found_offsets, mut found_columns, mut found_values) =
+        (vec![0], Vec::new(), Vec::new());
     for row in 0..of_row.len() {
         for place in offsets[row]..offsets[row + 1] {
             let column = columns[place] as usize;
@@ -105,7 +109,8 @@ pub(super) fn constrain(matrix: &mut SparseMatrix<3>, constraints: &[Constraint]
                 *block = block.map(|entries| constraint.along(entries));
             }
             if let Some((_, constraint)) = of_row[row] {
-                let transposed: Block<3> = std::array::from_fn(|i| std::array::from_fn(|j| block[j][i]));
+                let transposed: Block<3> =
+                    std::array::from_fn(|i| std::array::from_fn(|j| block[j][i]));
                 let along = transposed.map(|entries| constraint.along(entries));
                 *block = std::array::from_fn(|i| std::array::from_fn(|j| along[j][i]));
                 if column == row {

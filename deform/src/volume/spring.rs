@@ -27,8 +27,9 @@ pub(super) fn sprung(
     let still = |vertex: &&u32| start[**vertex as usize] == end[**vertex as usize];
     let held: Vec<u32> = boundary.iter().filter(still).copied().collect();
     let free = crate::partition::count(&**partition, held.len()) == 0;
-    let turned =
-        |shape: &[Vector]| -> Rigid { if free { Rigid::nearest(start, shape, &**partition) } else { Rigid::IDENTITY } };
+    let turned = |shape: &[Vector]| -> Rigid {
+        if free { Rigid::nearest(start, shape, &**partition) } else { Rigid::IDENTITY }
+    };
     let mut back = vec![Arc::clone(end)];
     let arrived = Untangler::of_part(mesh, &held, partition).take_back(
         end,
@@ -55,7 +56,9 @@ pub(super) fn sprung(
         }
         // As far as a straight step goes, in strides that grow.
         let mut stride = 1;
-        while let Some(further) = next.checked_sub(stride).filter(|&further| keeps(here, &back[further])) {
+        while let Some(further) =
+            next.checked_sub(stride).filter(|&further| keeps(here, &back[further]))
+        {
             (next, stride) = (further, 2 * stride);
         }
         way.push(Arc::clone(&back[next]));
@@ -73,12 +76,17 @@ struct Rigid {
 }
 
 impl Rigid {
-    const IDENTITY: Self = Self { centre: [0.0; 3], shift: [0.0; 3], axis: [0.0, 0.0, 1.0], angle: 0.0 };
+    const IDENTITY: Self =
+        Self { centre: [0.0; 3], shift: [0.0; 3], axis: [0.0, 0.0, 1.0], angle: 0.0 };
 
     /// The one that takes `from` nearest to `to`, by the squares of the distances (W. Kabsch 1976).
     fn nearest(from: &[Vector], to: &[Vector], partition: &dyn Partition) -> Self {
-        let pairs =
-            || (0u32..).zip(from.iter().zip(to)).filter(|(vertex, _)| partition.owns(*vertex)).map(|(_, pair)| pair);
+        let pairs = || {
+            (0u32..)
+                .zip(from.iter().zip(to))
+                .filter(|(vertex, _)| partition.owns(*vertex))
+                .map(|(_, pair)| pair)
+        };
         let mut sums = [0.0; 7];
         for (a, b) in pairs() {
             sums[0] += 1.0;
@@ -86,7 +94,8 @@ impl Rigid {
         }
         partition.reduce(Reduction::Sum, &mut sums);
         let [count, rest @ ..] = sums;
-        let mean = |at: usize| -> Vector { std::array::from_fn(|axis| rest[at + axis] / count.max(1.0)) };
+        let mean =
+            |at: usize| -> Vector { std::array::from_fn(|axis| rest[at + axis] / count.max(1.0)) };
         let (centre, there) = (mean(0), mean(3));
         let mut products = [[0.0; 3]; 3];
         for (a, b) in pairs() {
@@ -97,8 +106,9 @@ impl Rigid {
         }
         partition.reduce(Reduction::Sum, products.as_flattened_mut());
         let (left, _, right) = singular(&products);
-        let rotation: [Vector; 3] =
-            std::array::from_fn(|row| (0..3).fold([0.0; 3], |sum, k| add(sum, scale(right[k], left[k][row]))));
+        let rotation: [Vector; 3] = std::array::from_fn(|row| {
+            (0..3).fold([0.0; 3], |sum, k| add(sum, scale(right[k], left[k][row])))
+        });
         let (axis, angle) = axis_and_angle(&rotation);
         Self { centre, shift: subtract(there, centre), axis, angle }
     }
@@ -106,7 +116,11 @@ impl Rigid {
     /// The straight steps that it is gone in; none where it moves nothing.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 3")]
     fn steps(&self) -> u32 {
-        if self.angle == 0.0 && self.shift == [0.0; 3] { 0 } else { ((self.angle / ANGLE).ceil() as u32).max(1) }
+        if self.angle == 0.0 && self.shift == [0.0; 3] {
+            0
+        } else {
+            ((self.angle / ANGLE).ceil() as u32).max(1)
+        }
     }
 
     /// A shape after a `fraction` of it.
@@ -141,8 +155,10 @@ fn axis_and_angle(rotation: &[Vector; 3]) -> (Vector, f64) {
     }
     // Half a turn: the symmetric part is twice the axis times itself, less one.
     let squares = [a[0] + 1.0, b[1] + 1.0, c[2] + 1.0];
-    let most = (0..3).fold(0, |most, index| if squares[index] > squares[most] { index } else { most });
-    let column: Vector = std::array::from_fn(|row| rotation[row][most] + if row == most { 1.0 } else { 0.0 });
+    let most =
+        (0..3).fold(0, |most, index| if squares[index] > squares[most] { index } else { most });
+    let column: Vector =
+        std::array::from_fn(|row| rotation[row][most] + if row == most { 1.0 } else { 0.0 });
     (scale(column, 1.0 / dot(column, column).sqrt()), std::f64::consts::PI)
 }
 
@@ -153,10 +169,15 @@ mod tests {
 
     #[test]
     fn a_rigid_motion_is_found_again() {
-        let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.3, 0.2, 3.0], [1.0, 1.0, 1.0]];
-        for (angle, axis) in [(0.3, [0.0, 0.0, 1.0]), (3.0, [0.6, 0.0, 0.8]), (std::f64::consts::PI, [0.0, -0.6, 0.8])]
-        {
-            let there = Rigid { centre: [0.1, 0.2, 0.3], shift: [4.0, -5.0, 6.0], axis, angle }.of(&points, 1.0);
+        let points =
+            [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.3, 0.2, 3.0], [1.0, 1.0, 1.0]];
+        for (angle, axis) in [
+            (0.3, [0.0, 0.0, 1.0]),
+            (3.0, [0.6, 0.0, 0.8]),
+            (std::f64::consts::PI, [0.0, -0.6, 0.8]),
+        ] {
+            let there = Rigid { centre: [0.1, 0.2, 0.3], shift: [4.0, -5.0, 6.0], axis, angle }
+                .of(&points, 1.0);
             let found = Rigid::nearest(&points, &there, &Whole);
             for (a, b) in found.of(&points, 1.0).iter().zip(&there) {
                 let off = subtract(*a, *b);

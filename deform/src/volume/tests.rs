@@ -9,8 +9,13 @@ use crate::linear::{Cholesky, LinearError, LinearSolver, Multigrid, MultigridSet
 use crate::mesh::{Cells, FeatureSource, Mesh};
 use crate::shapes;
 
-const TIGHT: Deform =
-    Deform { method: Method::Elasticity, stiffening: 0.0, poisson_ratio: 0.3, tolerance: 1e-13, improve: 0 };
+const TIGHT: Deform = Deform {
+    method: Method::Elasticity,
+    stiffening: 0.0,
+    poisson_ratio: 0.3,
+    tolerance: 1e-13,
+    improve: 0,
+};
 
 /// A number from -1 to 1 that looks random.
 fn noise(seed: usize) -> f64 {
@@ -44,7 +49,10 @@ fn cube(count: usize) -> Mesh {
 
 /// Hexahedra, wedges, pyramids and tetrahedra side by side.
 fn mixed(count: usize) -> Mesh {
-    mixed_of(count, &jiggled(&shapes::box_of_hexahedra([count; 3], [0.0; 3], [1.0; 3]), 0.15 / count as f64))
+    mixed_of(
+        count,
+        &jiggled(&shapes::box_of_hexahedra([count; 3], [0.0; 3], [1.0; 3]), 0.15 / count as f64),
+    )
 }
 
 fn mixed_of(count: usize, hexahedra: &Mesh) -> Mesh {
@@ -62,12 +70,15 @@ fn mixed_of(count: usize, hexahedra: &Mesh) -> Mesh {
             for face in CellType::Hexahedron.faces() {
                 // Inwards, as the base of a pyramid whose apex is the centre.
                 let base: Vec<u32> = face.iter().rev().map(|&local| v[local]).collect();
-                let on_side = |side: f64| base.iter().all(|&vertex| points[vertex as usize][0] == side);
+                let on_side =
+                    |side: f64| base.iter().all(|&vertex| points[vertex as usize][0] == side);
                 if on_side(1.0) {
                     cells.push(CellType::Tetra, &[base[0], base[1], base[2], centre]).unwrap();
                     cells.push(CellType::Tetra, &[base[0], base[2], base[3], centre]).unwrap();
                 } else {
-                    cells.push(CellType::Pyramid, &[base[0], base[1], base[2], base[3], centre]).unwrap();
+                    cells
+                        .push(CellType::Pyramid, &[base[0], base[1], base[2], base[3], centre])
+                        .unwrap();
                 }
             }
         } else {
@@ -78,7 +89,10 @@ fn mixed_of(count: usize, hexahedra: &Mesh) -> Mesh {
 }
 
 fn polyhedra(count: usize) -> Mesh {
-    polyhedra_of(&jiggled(&shapes::box_of_hexahedra([count; 3], [0.0; 3], [1.0; 3]), 0.15 / count as f64))
+    polyhedra_of(&jiggled(
+        &shapes::box_of_hexahedra([count; 3], [0.0; 3], [1.0; 3]),
+        0.15 / count as f64,
+    ))
 }
 
 fn polyhedra_of(hexahedra: &Mesh) -> Mesh {
@@ -121,7 +135,8 @@ fn pyramids(count: usize) -> Mesh {
 fn voxels(count: usize) -> Mesh {
     let hexahedra = shapes::box_of_hexahedra([count; 3], [0.0; 3], [1.0; 3]);
     let order = [0, 1, 3, 2, 4, 5, 7, 6];
-    let connectivity = hexahedra.cells().iter().flat_map(|(_, v)| order.map(|local| v[local])).collect();
+    let connectivity =
+        hexahedra.cells().iter().flat_map(|(_, v)| order.map(|local| v[local])).collect();
     let cells = Cells::uniform(CellType::Voxel, connectivity).unwrap();
     Mesh::new(hexahedra.points().to_vec(), cells, FeatureSource::SharpEdges).unwrap()
 }
@@ -143,7 +158,8 @@ fn all_meshes() -> Vec<(&'static str, Mesh)> {
 fn error_of(mesh: &Mesh, settings: &Deform, field: impl Fn(Vector) -> Vector) -> f64 {
     let boundary = cube_boundary(mesh);
     let operator = VolumeOperator::new(mesh, &boundary, settings).unwrap();
-    let motion: Vec<Vector> = boundary.iter().map(|&vertex| field(mesh.points()[vertex as usize])).collect();
+    let motion: Vec<Vector> =
+        boundary.iter().map(|&vertex| field(mesh.points()[vertex as usize])).collect();
     let solution = operator.solve(&motion).unwrap();
     let difference = |(value, &point): (&Vector, &Vector)| {
         let exact = field(point);
@@ -160,7 +176,8 @@ fn rigid_motions_are_exact_whatever_the_stiffening_and_tolerance() {
             let error = error_of(&mesh, &settings, |_| [0.3, -2.0, 0.7]);
             assert!(error < 1e-9, "{name}, {method:?}: translation off by {error:e}");
         }
-        let turn = |[x, y, z]: Vector| [0.2 * y - 0.1 * z, -0.2 * x + 0.4 * z + 1.0, 0.1 * x - 0.4 * y];
+        let turn =
+            |[x, y, z]: Vector| [0.2 * y - 0.1 * z, -0.2 * x + 0.4 * z + 1.0, 0.1 * x - 0.4 * y];
         let error = error_of(&mesh, &Deform { tolerance: 1e-2, ..Deform::default() }, turn);
         assert!(error < 1e-9, "{name}: rotation off by {error:e}");
     }
@@ -168,7 +185,9 @@ fn rigid_motions_are_exact_whatever_the_stiffening_and_tolerance() {
 
 #[test]
 fn linear_fields_are_reproduced() {
-    let field = |[x, y, z]: Vector| [0.3 * x - 0.2 * y + 0.1, 0.5 * y + 0.4 * z - 0.3 * x, -0.7 * z + 0.2 * x - y];
+    let field = |[x, y, z]: Vector| {
+        [0.3 * x - 0.2 * y + 0.1, 0.5 * y + 0.4 * z - 0.3 * x, -0.7 * z + 0.2 * x - y]
+    };
     for (name, mesh) in all_meshes() {
         for method in [Method::Elasticity, Method::Harmonic] {
             let error = error_of(&mesh, &Deform { method, ..TIGHT }, field);
@@ -194,8 +213,11 @@ fn wedges_of_either_order_are_the_same() {
     }
     let other = Mesh::new(mesh.points().to_vec(), cells, FeatureSource::SharpEdges).unwrap();
     let boundary = cube_boundary(&mesh);
-    let motion: Vec<Vector> = boundary.iter().map(|&vertex| [noise(vertex as usize), 0.0, 1.0]).collect();
-    let solve = |mesh| VolumeOperator::new(mesh, &boundary, &TIGHT).unwrap().solve(&motion).unwrap().displacement;
+    let motion: Vec<Vector> =
+        boundary.iter().map(|&vertex| [noise(vertex as usize), 0.0, 1.0]).collect();
+    let solve = |mesh| {
+        VolumeOperator::new(mesh, &boundary, &TIGHT).unwrap().solve(&motion).unwrap().displacement
+    };
     for (a, b) in solve(&mesh).iter().zip(solve(&other)) {
         assert!((0..3).all(|axis| (a[axis] - b[axis]).abs() < 1e-10));
     }
@@ -205,7 +227,10 @@ fn wedges_of_either_order_are_the_same() {
 fn harmonic([x, y, z]: Vector) -> (f64, Vector) {
     let root = 2.0f64.sqrt();
     let e = (root * x).exp();
-    (e * y.sin() * z.sin(), [root * e * y.sin() * z.sin(), e * y.cos() * z.sin(), e * y.sin() * z.cos()])
+    (
+        e * y.sin() * z.sin(),
+        [root * e * y.sin() * z.sin(), e * y.cos() * z.sin(), e * y.sin() * z.cos()],
+    )
 }
 
 fn check_second_order(settings: &Deform, field: impl Fn(Vector) -> Vector) {
@@ -232,7 +257,9 @@ fn check_second_order(settings: &Deform, field: impl Fn(Vector) -> Vector) {
 #[test]
 fn laplace_converges_with_order_two() {
     let settings = Deform { method: Method::Harmonic, ..TIGHT };
-    check_second_order(&settings, |point| [harmonic(point).0, 0.0, harmonic([point[1], point[2], point[0]]).0]);
+    check_second_order(&settings, |point| {
+        [harmonic(point).0, 0.0, harmonic([point[1], point[2], point[0]]).0]
+    });
 }
 
 /// A displacement without body force and with change of volume, after Papkovich and Neuber: `grad(z b) - 4 (1 - ν) b e_z`.
@@ -263,7 +290,8 @@ fn stiffening_protects_thin_cells() {
     let column = 4 + 9 * 4;
     let height = |stiffening: f64| {
         let settings = Deform { stiffening, ..Deform::default() };
-        let solution = VolumeOperator::new(&mesh, &boundary, &settings).unwrap().solve(&press).unwrap();
+        let solution =
+            VolumeOperator::new(&mesh, &boundary, &settings).unwrap().solve(&press).unwrap();
         let top = column + 81;
         (1.0f64 / 512.0 + solution.displacement[top][2] - solution.displacement[column][2]) * 512.0
     };
@@ -275,16 +303,27 @@ fn no_motion_gives_exact_zeros_and_still_components_stay_still() {
     let mesh = jiggled(&cube(5), 0.03);
     let boundary = cube_boundary(&mesh);
     for method in [Method::Elasticity, Method::Harmonic] {
-        let operator = VolumeOperator::new(&mesh, &boundary, &Deform { method, ..Deform::default() }).unwrap();
+        let operator =
+            VolumeOperator::new(&mesh, &boundary, &Deform { method, ..Deform::default() }).unwrap();
         let solution = operator.solve(&vec![[0.0; 3]; boundary.len()]).unwrap();
         assert!(solution.displacement.as_flattened().iter().all(|value| value.to_bits() == 0));
         assert_eq!(solution.iterations, 0);
     }
-    let operator =
-        VolumeOperator::new(&mesh, &boundary, &Deform { method: Method::Harmonic, ..Deform::default() }).unwrap();
-    let motion: Vec<Vector> = boundary.iter().map(|&vertex| [0.0, noise(vertex as usize), 0.0]).collect();
+    let operator = VolumeOperator::new(
+        &mesh,
+        &boundary,
+        &Deform { method: Method::Harmonic, ..Deform::default() },
+    )
+    .unwrap();
+    let motion: Vec<Vector> =
+        boundary.iter().map(|&vertex| [0.0, noise(vertex as usize), 0.0]).collect();
     let solution = operator.solve(&motion).unwrap();
-    assert!(solution.displacement.iter().all(|value| value[0].to_bits() == 0 && value[2].to_bits() == 0));
+    assert!(
+        solution
+            .displacement
+            .iter()
+            .all(|value| value[0].to_bits() == 0 && value[2].to_bits() == 0)
+    );
     assert!(solution.displacement.iter().any(|value| value[1] != 0.0));
 }
 
@@ -300,7 +339,8 @@ fn prescribed_vertices_get_exactly_their_value_and_vertices_without_cells_stay()
         .iter()
         .map(|&v| [noise(v as usize), noise(v as usize + 1000), 1e-3 * noise(v as usize + 2000)])
         .collect();
-    let solution = VolumeOperator::new(&mesh, &boundary, &Deform::default()).unwrap().solve(&motion).unwrap();
+    let solution =
+        VolumeOperator::new(&mesh, &boundary, &Deform::default()).unwrap().solve(&motion).unwrap();
     for (&vertex, value) in boundary.iter().zip(&motion) {
         assert_eq!(&solution.displacement[vertex as usize], value);
     }
@@ -322,8 +362,9 @@ fn split_boundary(mesh: &Mesh, slides: &[(usize, f64)]) -> (Vec<u32>, Vec<Slidin
     let mut sliding = Vec::new();
     for vertex in cube_boundary(mesh) {
         let point = mesh.points()[vertex as usize];
-        let held =
-            (0..3).any(|axis| [0.0, 1.0].iter().any(|&side| point[axis] == side && !slides.contains(&(axis, side))));
+        let held = (0..3).any(|axis| {
+            [0.0, 1.0].iter().any(|&side| point[axis] == side && !slides.contains(&(axis, side)))
+        });
         if held {
             boundary.push(vertex);
             continue;
@@ -345,17 +386,25 @@ fn sliding_sides_follow_a_stretch() {
         for method in [Method::Elasticity, Method::Harmonic] {
             let (boundary, sliding) = split_boundary(&mesh, &sides);
             let settings = Deform { method, tolerance: 1e-12, ..TIGHT };
-            let operator = VolumeOperator::with_sliding(&mesh, &boundary, &sliding, &settings).unwrap();
+            let operator =
+                VolumeOperator::with_sliding(&mesh, &boundary, &sliding, &settings).unwrap();
             let stretch = |point: Vector| [0.3 * point[0], 0.0, 0.0];
-            let motion: Vec<Vector> = boundary.iter().map(|&v| stretch(mesh.points()[v as usize])).collect();
+            let motion: Vec<Vector> =
+                boundary.iter().map(|&v| stretch(mesh.points()[v as usize])).collect();
             let solution = operator.solve(&motion).unwrap();
             for (value, &point) in solution.displacement.iter().zip(mesh.points()) {
                 let exact = stretch(point);
-                assert!((0..3).all(|axis| (value[axis] - exact[axis]).abs() < 1e-9), "{name}, {method:?}: {value:?}");
+                assert!(
+                    (0..3).all(|axis| (value[axis] - exact[axis]).abs() < 1e-9),
+                    "{name}, {method:?}: {value:?}"
+                );
             }
             for sliding in &sliding {
                 let value = solution.displacement[sliding.vertex as usize];
-                assert!(crate::vector::dot(value, sliding.normal).abs() < 1e-14, "{name}, {method:?}: {value:?}");
+                assert!(
+                    crate::vector::dot(value, sliding.normal).abs() < 1e-14,
+                    "{name}, {method:?}: {value:?}"
+                );
             }
         }
     }
@@ -366,7 +415,8 @@ fn sliding_sides_follow_a_stretch() {
 fn sliding_sides_may_move() {
     let (mesh, sides) = (jiggled(&cube(6), 0.02), [(1, 0.0), (2, 1.0)]);
     let (boundary, sliding) = split_boundary(&mesh, &sides);
-    let operator = VolumeOperator::with_sliding(&mesh, &boundary, &sliding, &Deform::default()).unwrap();
+    let operator =
+        VolumeOperator::with_sliding(&mesh, &boundary, &sliding, &Deform::default()).unwrap();
     let turn = |[x, y, z]: Vector| [0.2 * y - 0.1 * z, -0.2 * x + 0.4 * z + 1.0, 0.1 * x - 0.4 * y];
     let at = |vertex: u32| turn(mesh.points()[vertex as usize]);
     let motion: Vec<Vector> = boundary.iter().map(|&vertex| at(vertex)).collect();
@@ -381,10 +431,12 @@ fn sliding_sides_may_move() {
         Err(VolumeError::SlidingCount { found: 0, expected: sliding.len() })
     );
     let zero = [Sliding { vertex: sliding[0].vertex, normal: [0.0; 3] }];
-    let error = VolumeOperator::with_sliding(&mesh, &boundary, &zero, &Deform::default()).unwrap_err();
+    let error =
+        VolumeOperator::with_sliding(&mesh, &boundary, &zero, &Deform::default()).unwrap_err();
     assert!(matches!(error, VolumeError::SlidingNormal { .. }), "{error}");
     let held = [Sliding { vertex: boundary[0], normal: [1.0; 3] }];
-    let error = VolumeOperator::with_sliding(&mesh, &boundary, &held, &Deform::default()).unwrap_err();
+    let error =
+        VolumeOperator::with_sliding(&mesh, &boundary, &held, &Deform::default()).unwrap_err();
     assert_eq!(error, VolumeError::BoundaryTwice { vertex: boundary[0] });
 }
 
@@ -392,14 +444,16 @@ fn sliding_sides_may_move() {
 fn an_updated_operator_is_that_of_the_moved_mesh() {
     let mesh = jiggled(&cube(10), 0.01);
     let boundary = cube_boundary(&mesh);
-    let motion: Vec<Vector> = boundary.iter().map(|&vertex| [noise(vertex as usize), 0.0, 0.3]).collect();
+    let motion: Vec<Vector> =
+        boundary.iter().map(|&vertex| [noise(vertex as usize), 0.0, 0.3]).collect();
     for method in [Method::Elasticity, Method::Harmonic] {
         let settings = Deform { method, tolerance: 1e-11, ..Deform::default() };
         let operator = VolumeOperator::new(&mesh, &boundary, &settings).unwrap();
         // Where nothing moved it is the same to the bit.
         assert_eq!(operator.updated(&mesh).unwrap().solve(&motion), operator.solve(&motion));
         let moved = jiggled(&mesh, 0.015);
-        let fresh = VolumeOperator::new(&moved, &boundary, &settings).unwrap().solve(&motion).unwrap();
+        let fresh =
+            VolumeOperator::new(&moved, &boundary, &settings).unwrap().solve(&motion).unwrap();
         let updated = operator.updated(&moved).unwrap().solve(&motion).unwrap();
         for (a, b) in fresh.displacement.iter().zip(&updated.displacement) {
             assert!((0..3).all(|axis| (a[axis] - b[axis]).abs() < 1e-8), "{a:?} {b:?}");
@@ -421,13 +475,15 @@ fn a_nearly_degenerate_mesh_is_solved() {
     assert!(ratio > 1e8, "{ratio:e}");
     let field = |[x, y, z]: Vector| [0.3 * x - 0.2 * y, 0.5 * y + 0.4 * z, 0.2 * x - 0.7 * z];
     let boundary = cube_boundary(&mesh);
-    let motion: Vec<Vector> = boundary.iter().map(|&vertex| field(mesh.points()[vertex as usize])).collect();
+    let motion: Vec<Vector> =
+        boundary.iter().map(|&vertex| field(mesh.points()[vertex as usize])).collect();
     for method in [Method::Elasticity, Method::Harmonic] {
         let error = error_of(&mesh, &Deform { method, tolerance: 1e-10, ..TIGHT }, field);
         assert!(error < 1e-4, "{method:?}: off by {error:e}");
         // With stiffness in proportion to the volumes' inverse as well: a residual is all that can be asked for.
         let settings = Deform { method, tolerance: 1e-12, ..Deform::default() };
-        let solution = VolumeOperator::new(&mesh, &boundary, &settings).unwrap().solve(&motion).unwrap();
+        let solution =
+            VolumeOperator::new(&mesh, &boundary, &settings).unwrap().solve(&motion).unwrap();
         assert!(solution.residual <= 1e-12, "{method:?}: {:e}", solution.residual);
     }
 }
@@ -438,11 +494,16 @@ fn a_nearly_degenerate_mesh_is_solved() {
 fn soft_cells_beside_stiff_ones_are_as_exact_as_was_asked_for() {
     let mesh = cube(12);
     let squeeze = |z: f64| if z > 0.0 && z < 1.0 { z.powi(9) } else { z };
-    let mesh = mesh.with_points(mesh.points().iter().map(|&[x, y, z]| [x, y, squeeze(z)]).collect()).unwrap();
+    let mesh = mesh
+        .with_points(mesh.points().iter().map(|&[x, y, z]| [x, y, squeeze(z)]).collect())
+        .unwrap();
     let boundary = cube_boundary(&mesh);
     let bend = |[x, y, z]: Vector| [0.3 * (3.0 * z).sin() * x, 0.2 * x * y, 0.1 * x * x - 0.2 * z];
-    let motion: Vec<Vector> = boundary.iter().map(|&vertex| bend(mesh.points()[vertex as usize])).collect();
-    let operator = VolumeOperator::new(&mesh, &boundary, &Deform { stiffening: 1.0, ..Deform::default() }).unwrap();
+    let motion: Vec<Vector> =
+        boundary.iter().map(|&vertex| bend(mesh.points()[vertex as usize])).collect();
+    let operator =
+        VolumeOperator::new(&mesh, &boundary, &Deform { stiffening: 1.0, ..Deform::default() })
+            .unwrap();
     let (matrix, right_side) = operator.coupled_equations(&motion).unwrap();
     let tight = Tolerance { relative: 1e-13, absolute: 0.0 };
     let mut exact = vec![[0.0; 3]; right_side.len()];
@@ -452,14 +513,19 @@ fn soft_cells_beside_stiff_ones_are_as_exact_as_was_asked_for() {
     let solvers: [Box<dyn LinearSolver<3>>; 2] = [
         Box::new(Multigrid::new(matrix.clone(), MultigridSettings::default()).unwrap()),
         Box::new(
-            Multigrid::with_rigid_bodies(matrix.clone(), operator.unknown_points(), MultigridSettings::default())
-                .unwrap(),
+            Multigrid::with_rigid_bodies(
+                matrix.clone(),
+                operator.unknown_points(),
+                MultigridSettings::default(),
+            )
+            .unwrap(),
         ),
     ];
     for solver in &solvers {
         let mut solution = vec![[0.0; 3]; right_side.len()];
         let convergence = solver.solve(&right_side, &mut solution, asked).unwrap();
-        let error = solution.as_flattened().iter().zip(exact.as_flattened()).map(|(a, b)| (a - b).abs());
+        let error =
+            solution.as_flattened().iter().zip(exact.as_flattened()).map(|(a, b)| (a - b).abs());
         let error = error.fold(0.0, f64::max) / largest;
         assert!(error < 1e-4, "off by {error:e} after {convergence:?}");
     }
@@ -469,14 +535,16 @@ fn soft_cells_beside_stiff_ones_are_as_exact_as_was_asked_for() {
 #[test]
 fn rigid_bodies_save_iterations_where_little_is_held() {
     let mesh = shapes::box_of_tets([48, 6, 6], [0.0; 3], [1.0, 0.12, 0.12]);
-    let end: Vec<u32> = (0..).zip(mesh.points()).filter(|(_, p)| p[0] == 0.0).map(|(vertex, _)| vertex).collect();
+    let end: Vec<u32> =
+        (0..).zip(mesh.points()).filter(|(_, p)| p[0] == 0.0).map(|(vertex, _)| vertex).collect();
     let operator = VolumeOperator::new(&mesh, &end, &TIGHT).unwrap();
     let (matrix, _) = operator.coupled_equations(&vec![[0.0; 3]; end.len()]).unwrap();
     let weight = vec![[0.0, 0.0, -1.0]; matrix.rows()];
     let tolerance = Tolerance { relative: 1e-8, absolute: 0.0 };
     let settings = MultigridSettings::default();
     let plain = Multigrid::new(matrix.clone(), settings).unwrap();
-    let bodies = Multigrid::with_rigid_bodies(matrix.clone(), operator.unknown_points(), settings).unwrap();
+    let bodies =
+        Multigrid::with_rigid_bodies(matrix.clone(), operator.unknown_points(), settings).unwrap();
     let [(plain, first), (bodies, second)] = [plain, bodies].map(|solver| {
         let mut solution = vec![[0.0; 3]; weight.len()];
         let convergence = solver.solve(&weight, &mut solution, tolerance).unwrap();
@@ -496,19 +564,31 @@ fn a_solve_from_a_like_motion_is_shorter() {
     let mesh = jiggled(&cube(14), 0.01);
     let boundary = cube_boundary(&mesh);
     let motion = |amount: f64| -> Vec<Vector> {
-        boundary.iter().map(|&v| mesh.points()[v as usize].map(|x| amount * (4.0 * x).sin())).collect()
+        boundary
+            .iter()
+            .map(|&v| mesh.points()[v as usize].map(|x| amount * (4.0 * x).sin()))
+            .collect()
     };
     for method in [Method::Elasticity, Method::Harmonic] {
-        let operator = VolumeOperator::new(&mesh, &boundary, &Deform { method, ..Deform::default() }).unwrap();
+        let operator =
+            VolumeOperator::new(&mesh, &boundary, &Deform { method, ..Deform::default() }).unwrap();
         let like = operator.solve(&motion(0.1)).unwrap();
         let fresh = operator.solve(&motion(0.1001)).unwrap();
         let warm = operator.solve_from(&motion(0.1001), &like.displacement).unwrap();
-        assert!(warm.iterations < fresh.iterations, "{method:?}: {} {}", warm.iterations, fresh.iterations);
+        assert!(
+            warm.iterations < fresh.iterations,
+            "{method:?}: {} {}",
+            warm.iterations,
+            fresh.iterations
+        );
         for (a, b) in fresh.displacement.iter().zip(&warm.displacement) {
             assert!((0..3).all(|axis| (a[axis] - b[axis]).abs() < 1e-7), "{method:?}: {a:?} {b:?}");
         }
         let expected = mesh.points().len();
-        assert_eq!(operator.solve_from(&motion(0.1), &[]), Err(VolumeError::StartCount { found: 0, expected }));
+        assert_eq!(
+            operator.solve_from(&motion(0.1), &[]),
+            Err(VolumeError::StartCount { found: 0, expected })
+        );
     }
 }
 
@@ -526,8 +606,16 @@ fn the_same_bits_whatever_the_number_of_threads() {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
                 let settings = Deform { method, ..Deform::default() };
-                let solution = VolumeOperator::new(&mesh, &boundary, &settings).unwrap().solve(&motion).unwrap();
-                let bits: Vec<u64> = solution.displacement.as_flattened().iter().map(|value| value.to_bits()).collect();
+                let solution = VolumeOperator::new(&mesh, &boundary, &settings)
+                    .unwrap()
+                    .solve(&motion)
+                    .unwrap();
+                let bits: Vec<u64> = solution
+                    .displacement
+                    .as_flattened()
+                    .iter()
+                    .map(|value| value.to_bits())
+                    .collect();
                 (bits, solution.iterations)
             })
         };
@@ -541,8 +629,12 @@ fn the_same_bits_whatever_the_number_of_threads() {
 fn bad_input_is_named() {
     let mesh = cube(2);
     let boundary = cube_boundary(&mesh);
-    let new = |mesh: &Mesh, boundary: &[u32]| VolumeOperator::new(mesh, boundary, &Deform::default());
-    assert_eq!(new(&mesh, &[99]).unwrap_err(), VolumeError::BoundaryVertex { vertex: 99, vertex_count: 27 });
+    let new =
+        |mesh: &Mesh, boundary: &[u32]| VolumeOperator::new(mesh, boundary, &Deform::default());
+    assert_eq!(
+        new(&mesh, &[99]).unwrap_err(),
+        VolumeError::BoundaryVertex { vertex: 99, vertex_count: 27 }
+    );
     assert_eq!(new(&mesh, &[3, 4, 3]).unwrap_err(), VolumeError::BoundaryTwice { vertex: 3 });
     assert_eq!(new(&mesh, &[]).unwrap_err(), VolumeError::Unattached { vertex: 0, count: 27 });
     let operator = new(&mesh, &boundary).unwrap();
@@ -554,7 +646,10 @@ fn bad_input_is_named() {
     let mut motion = vec![[0.0; 3]; boundary.len()];
     motion[5][1] = f64::NAN;
     let error = operator.solve(&motion).unwrap_err();
-    assert!(matches!(error, VolumeError::NotFinite { vertex, .. } if vertex == boundary[5]), "{error}");
+    assert!(
+        matches!(error, VolumeError::NotFinite { vertex, .. } if vertex == boundary[5]),
+        "{error}"
+    );
 
     // The one inner vertex pushed out of the box turns cells inside out.
     let mut points = mesh.points().to_vec();
@@ -562,7 +657,10 @@ fn bad_input_is_named() {
     let inverted = mesh.with_points(points).unwrap();
     let error = new(&inverted, &boundary).unwrap_err();
     let expected = crate::quality::quality(inverted.cells(), inverted.points()).inverted;
-    assert!(matches!(error, VolumeError::InvertedCell { count, .. } if count == expected), "{error}");
+    assert!(
+        matches!(error, VolumeError::InvertedCell { count, .. } if count == expected),
+        "{error}"
+    );
     assert!(error.to_string().contains("tetra"), "{error}");
 }
 

@@ -4,14 +4,15 @@ use std::sync::{Arc, OnceLock};
 
 use super::{Improver, foldover};
 use crate::linear::{
-    ConjugateGradients, DistributedMultigrid, LinearError, Multigrid, MultigridSettings, SparseMatrix, Tolerance,
-    reverse_cuthill_mckee,
+    ConjugateGradients, DistributedMultigrid, LinearError, Multigrid, MultigridSettings,
+    SparseMatrix, Tolerance, reverse_cuthill_mckee,
 };
 use crate::mesh::{CellType, Mesh, Numbering, Ordered, Vector};
 use crate::parallel;
 use crate::partition::{Partition, Reduction, Shares, Solver, all, any, whole};
 use crate::quality::{
-    HEXAHEDRON_CORNERS, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, quality_in_parts, tet_determinant,
+    HEXAHEDRON_CORNERS, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, quality_in_parts,
+    tet_determinant,
 };
 use crate::vector::{add, cross, dot, scale, subtract};
 
@@ -132,21 +133,33 @@ impl Untangler {
         let (near, numbering) = Ordered::new(mesh).into_parts();
         let corners = corners(&near);
         let mut free = vec![true; mesh.points().len()];
-        boundary.iter().filter_map(|&vertex| numbering.place(vertex)).for_each(|place| free[place as usize] = false);
+        boundary
+            .iter()
+            .filter_map(|&vertex| numbering.place(vertex))
+            .for_each(|place| free[place as usize] = false);
         let mut pairs = Vec::with_capacity(12 * corners.len());
         let mut used = vec![false; free.len()];
         for corner in &corners {
             for &a in &corner.vertices {
                 used[a as usize] = true;
                 if free[a as usize] {
-                    pairs.extend(corner.vertices.iter().filter(|&&b| free[b as usize] && a != b).map(|&b| (a, b)));
+                    pairs.extend(
+                        corner
+                            .vertices
+                            .iter()
+                            .filter(|&&b| free[b as usize] && a != b)
+                            .map(|&b| (a, b)),
+                    );
                 }
             }
         }
         pairs.sort_unstable();
         pairs.dedup();
-        let vertices: Vec<u32> =
-            (0..).zip(free.iter().zip(&used)).filter(|(_, (free, used))| **free && **used).map(|(v, _)| v).collect();
+        let vertices: Vec<u32> = (0..)
+            .zip(free.iter().zip(&used))
+            .filter(|(_, (free, used))| **free && **used)
+            .map(|(v, _)| v)
+            .collect();
         let mut slots = vec![NONE; free.len()];
         for (slot, &vertex) in (0..).zip(&vertices) {
             slots[vertex as usize] = slot;
@@ -162,18 +175,22 @@ impl Untangler {
         starts.push(place);
         let neighbours: Vec<u32> = pairs.iter().map(|pair| slots[pair.1 as usize]).collect();
         drop(pairs);
-        let order =
-            reverse_cuthill_mckee(vertices.len(), |row| &neighbours[starts[row as usize]..starts[row as usize + 1]]);
+        let order = reverse_cuthill_mckee(vertices.len(), |row| {
+            &neighbours[starts[row as usize]..starts[row as usize + 1]]
+        });
         let mut new = vec![0u32; order.len()];
         for (place, &old) in (0..).zip(&order) {
             new[old as usize] = place;
         }
-        let (mut offsets, mut columns) = (vec![0], Vec::with_capacity(neighbours.len() + order.len()));
+        let (mut offsets, mut columns) =
+            (vec![0], Vec::with_capacity(neighbours.len() + order.len()));
         for (row, &old) in (0..).zip(&order) {
             let from = columns.len();
             columns.push(row);
             columns.extend(
-                neighbours[starts[old as usize]..starts[old as usize + 1]].iter().map(|&slot| new[slot as usize]),
+                neighbours[starts[old as usize]..starts[old as usize + 1]]
+                    .iter()
+                    .map(|&slot| new[slot as usize]),
             );
             columns[from..].sort_unstable();
             offsets.push(columns.len());
@@ -207,7 +224,9 @@ impl Untangler {
     /// `mesh` is the reference mesh.
     pub fn untangle(&self, mesh: &Mesh, points: &mut [Vector], floor: f64) -> bool {
         let partition = &*self.partition;
-        if all(partition, self.unknowns.is_empty()) || any(partition, points.len() != self.slots.len()) {
+        if all(partition, self.unknowns.is_empty())
+            || any(partition, points.len() != self.slots.len())
+        {
             return false;
         }
         let mut near = self.numbering.gather(points).into_owned();
@@ -216,7 +235,8 @@ impl Untangler {
         let floor = floor.min(self.least);
         let mut quality = quality_in_parts(mesh.cells(), points, partition);
         for _ in 0..ROUNDS {
-            let improver = || Improver::of_part(mesh, &self.boundary, &self.partition).lifting_to(LIFTED);
+            let improver =
+                || Improver::of_part(mesh, &self.boundary, &self.partition).lifting_to(LIFTED);
             if quality.inverted > 0
                 || quality.min >= floor
                 || !self.improver.get_or_init(improver).improve(points, SWEEPS)
@@ -236,7 +256,11 @@ impl Untangler {
         for step in 0..STEPS {
             let least = self.state(points, 1.0).least;
             // As Garanzha et al.: the regularisation follows the worst determinant; a valid mesh has none.
-            epsilon = if least > 0.0 { (0.01 * least).min(epsilon) } else { lower_bound.hypot(0.2 * least) };
+            epsilon = if least > 0.0 {
+                (0.01 * least).min(epsilon)
+            } else {
+                lower_bound.hypot(0.2 * least)
+            };
             lower_bound = LEAST_EPSILON.max(FALLING * lower_bound);
             let before = self.state(points, epsilon).energy;
             let Some(slope) = self.direction(points, epsilon, None, &mut direction) else { break };
@@ -270,7 +294,9 @@ impl Untangler {
         arrives: &mut dyn FnMut(&[Vector]) -> bool,
     ) -> bool {
         let partition = &*self.partition;
-        if all(partition, self.unknowns.is_empty()) || any(partition, points.len() != self.slots.len()) {
+        if all(partition, self.unknowns.is_empty())
+            || any(partition, points.len() != self.slots.len())
+        {
             return false;
         }
         let mut points = points.to_vec();
@@ -293,16 +319,22 @@ impl Untangler {
                 self.numbering.scatter(next, &mut moved);
                 goes(&points, &moved)
             };
-            let energy = |points: &[Vector]| self.state(points, epsilon).energy + self.pulled(points, &pull);
+            let energy =
+                |points: &[Vector]| self.state(points, epsilon).energy + self.pulled(points, &pull);
             let before = energy(&near);
-            let after = self.direction(&near, epsilon, Some(&pull), &mut direction).and_then(|slope| {
-                // Where the way to a shape would be broken, that is no shape to go to.
-                let energy = |next: &[Vector]| {
-                    let energy = energy(next);
-                    if all(partition, energy < before) && valid(next) { energy } else { f64::INFINITY }
-                };
-                self.descend(&mut near, &direction, &energy, before, slope)
-            });
+            let after =
+                self.direction(&near, epsilon, Some(&pull), &mut direction).and_then(|slope| {
+                    // Where the way to a shape would be broken, that is no shape to go to.
+                    let energy = |next: &[Vector]| {
+                        let energy = energy(next);
+                        if all(partition, energy < before) && valid(next) {
+                            energy
+                        } else {
+                            f64::INFINITY
+                        }
+                    };
+                    self.descend(&mut near, &direction, &energy, before, slope)
+                });
             if after.is_some() {
                 self.numbering.scatter(&near, &mut points);
                 if arrives(&points) {
@@ -349,25 +381,33 @@ impl Untangler {
     }
 
     /// Newton's direction, and the slope of the energy along it; `None` where there is none downwards.
-    fn direction(&self, points: &[Vector], epsilon: f64, pull: Option<&Pull>, direction: &mut [Vector]) -> Option<f64> {
+    fn direction(
+        &self,
+        points: &[Vector],
+        epsilon: f64,
+        pull: Option<&Pull>,
+        direction: &mut [Vector],
+    ) -> Option<f64> {
         let partition = &*self.partition;
         let (mut matrix, mut right_side) = self.assemble(points, epsilon);
         if let Some(pull) = pull {
             let (offsets, columns, values) = matrix.offsets_and_values_mut();
             for (row, &vertex) in self.unknowns.iter().enumerate() {
                 let weight = pull.weights[row];
-                let place =
-                    offsets[row] + columns[offsets[row]..offsets[row + 1]].partition_point(|&c| (c as usize) < row);
+                let place = offsets[row]
+                    + columns[offsets[row]..offsets[row + 1]]
+                        .partition_point(|&c| (c as usize) < row);
                 (0..3).for_each(|axis| values[place][axis][axis] += weight);
                 let off = subtract(pull.places[row], points[vertex as usize]);
                 right_side[row] = add(right_side[row], scale(off, weight));
             }
         }
         let relative = if pull.is_some() { RETURNING_TOLERANCE } else { TOLERANCE };
-        let places = pull.map(|_| self.unknowns.iter().map(|&vertex| points[vertex as usize]).collect());
-        let solved = self
-            .solver(matrix, places)
-            .and_then(|solver| solver.solve(&right_side, direction, Tolerance { relative, absolute: 0.0 }));
+        let places =
+            pull.map(|_| self.unknowns.iter().map(|&vertex| points[vertex as usize]).collect());
+        let solved = self.solver(matrix, places).and_then(|solver| {
+            solver.solve(&right_side, direction, Tolerance { relative, absolute: 0.0 })
+        });
         // The right side is the sum of the ranks', the direction the same on all.
         let slope = -sum(partition, inner(&right_side, direction));
         // Conjugate gradients that were stopped early lead downwards too.
@@ -380,14 +420,23 @@ impl Untangler {
     fn solver(&self, matrix: SparseMatrix<3>, places: Option<Vec<Vector>>) -> Solver<3> {
         if self.partition.ranks() == 1 {
             return match places {
-                Some(places) => {
-                    Ok(Box::new(Multigrid::with_rigid_bodies(matrix, places, MultigridSettings::default())?))
+                Some(places) => Ok(Box::new(Multigrid::with_rigid_bodies(
+                    matrix,
+                    places,
+                    MultigridSettings::default(),
+                )?)),
+                None => {
+                    Ok(Box::new(ConjugateGradients::new(matrix)?.with_max_iterations(ITERATIONS)))
                 }
-                None => Ok(Box::new(ConjugateGradients::new(matrix)?.with_max_iterations(ITERATIONS))),
             };
         }
         let shares = self.shares.clone();
-        Ok(Box::new(DistributedMultigrid::with_shares(Arc::clone(&self.partition), shares, Arc::new(matrix), None)?))
+        Ok(Box::new(DistributedMultigrid::with_shares(
+            Arc::clone(&self.partition),
+            shares,
+            Arc::new(matrix),
+            None,
+        )?))
     }
 
     /// Goes along `direction` as far as the energy falls enough (Armijo); the energy there.
@@ -399,7 +448,8 @@ impl Untangler {
         before: f64,
         slope: f64,
     ) -> Option<f64> {
-        let start: Vec<Vector> = self.unknowns.iter().map(|&vertex| points[vertex as usize]).collect();
+        let start: Vec<Vector> =
+            self.unknowns.iter().map(|&vertex| points[vertex as usize]).collect();
         let mut length = 1.0;
         for _ in 0..30 {
             for ((&vertex, &from), &by) in self.unknowns.iter().zip(&start).zip(direction) {
@@ -448,7 +498,9 @@ impl Untangler {
             let locals = parallel::map_chunks(corners.len(), CHUNK, |range| {
                 corners[range]
                     .iter()
-                    .map(|corner| foldover::local(&corner.jacobian(points), epsilon, &corner.gradients))
+                    .map(|corner| {
+                        foldover::local(&corner.jacobian(points), epsilon, &corner.gradients)
+                    })
                     .collect::<Vec<_>>()
             });
             for (corner, local) in corners.iter().zip(locals.iter().flatten()) {
@@ -465,7 +517,8 @@ impl Untangler {
                     }
                     let mut put = |row: u32, column: u32, transposed: bool| {
                         let (start, end) = (offsets[row as usize], offsets[row as usize + 1]);
-                        let place = start + columns[start..end].partition_point(|&other| other < column);
+                        let place =
+                            start + columns[start..end].partition_point(|&other| other < column);
                         for (p, entries) in values[place].iter_mut().enumerate() {
                             for (q, entry) in entries.iter_mut().enumerate() {
                                 *entry += if transposed { block[q][p] } else { block[p][q] };
@@ -509,9 +562,14 @@ pub(super) fn corners(mesh: &Mesh) -> Vec<Corner> {
         let (u, v, w) = (subtract(q, p), subtract(r, p), subtract(s, p));
         let determinant = tet_determinant([p, q, r, s]);
         if determinant > 0.0 {
-            let [g, h, k] = [cross(v, w), cross(w, u), cross(u, v)].map(|face| scale(face, 1.0 / determinant));
+            let [g, h, k] =
+                [cross(v, w), cross(w, u), cross(u, v)].map(|face| scale(face, 1.0 / determinant));
             #[expect(clippy::cast_possible_truncation, reason = "fewer cells than 2^32")]
-            corners.push(Corner { vertices, cell: cell as u32, gradients: [scale(add(add(g, h), k), -1.0), g, h, k] });
+            corners.push(Corner {
+                vertices,
+                cell: cell as u32,
+                gradients: [scale(add(add(g, h), k), -1.0), g, h, k],
+            });
         }
     };
     for (cell, (cell_type, vertices)) in cells.iter().enumerate() {
@@ -524,7 +582,10 @@ pub(super) fn corners(mesh: &Mesh) -> Vec<Corner> {
             CellType::Tetra => take_all(&[[0, 1, 2, 3]]),
             CellType::Hexahedron => take_all(&HEXAHEDRON_CORNERS),
             CellType::Voxel => {
-                take_all(&HEXAHEDRON_CORNERS.map(|corner| corner.map(|local| VOXEL_AS_HEXAHEDRON[local])));
+                take_all(
+                    &HEXAHEDRON_CORNERS
+                        .map(|corner| corner.map(|local| VOXEL_AS_HEXAHEDRON[local])),
+                );
             }
             CellType::Wedge => take_all(&WEDGE_CORNERS),
             CellType::Pyramid => take_all(&PYRAMID_CORNERS),
@@ -604,7 +665,10 @@ mod tests {
         assert!(!untangler.untangle(&mesh, &mut mirrored, 0.0));
         assert!(!untangler.untangle(&mesh, &mut mesh.points()[1..].to_vec(), 0.0));
         let all: Vec<u32> = (0..mesh.points().len() as u32).collect();
-        assert!(!Untangler::new(&mesh, &all).untangle(&mesh, &mut mesh.points().to_vec(), 0.0), "nothing is free");
+        assert!(
+            !Untangler::new(&mesh, &all).untangle(&mesh, &mut mesh.points().to_vec(), 0.0),
+            "nothing is free"
+        );
     }
 
     #[cfg(feature = "parallel")]

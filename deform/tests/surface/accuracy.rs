@@ -33,14 +33,21 @@ fn amounts(kind: usize, amount: f64) -> Edit {
     let body = match kind {
         0 => format!(r#"{{"translate": {{"by": [{amount}, 0, 0.5]"#),
         1 => format!(r#"{{"rotate": {{"axis": [0, {amount}, 1], "degrees": {}"#, 20.0 * amount),
-        2 => format!(r#"{{"scale_direction": {{"factors": [1, {}, {}]"#, 1.0 + amount, 1.0 + 0.5 * amount),
+        2 => format!(
+            r#"{{"scale_direction": {{"factors": [1, {}, {}]"#,
+            1.0 + amount,
+            1.0 + 0.5 * amount
+        ),
         3 => format!(r#"{{"scale_normals": {{"distance": {}"#, 0.1 * amount),
         _ => format!(
             r#"{{"affine": {{"matrix": [[1, {amount}, 0], [0, 1, 0], [0, 0, 1]], "translation": [0, 0, {}]"#,
             amount.floor()
         ),
     };
-    serde_json::from_str(&format!(r#"{body}, "features": ["feature-0"], "fixed": ["feature-1"]}}}}"#)).unwrap()
+    serde_json::from_str(&format!(
+        r#"{body}, "features": ["feature-0"], "fixed": ["feature-1"]}}}}"#
+    ))
+    .unwrap()
 }
 
 #[test]
@@ -48,7 +55,8 @@ fn a_drag_gives_the_bits_of_a_first_answer() {
     let mesh = torus([24, 10]);
     let mut kept = editor(&mesh);
     let mut memory = Vec::new();
-    let below = translate(&["feature-1"], &["feature-0"], [0.0, 0.3, 0.0], HarmonicOrder::Triharmonic);
+    let below =
+        translate(&["feature-1"], &["feature-0"], [0.0, 0.3, 0.0], HarmonicOrder::Triharmonic);
     for kind in 0..5 {
         for amount in [0.5, 0.0, -0.25, 1.5, 0.5] {
             for stack in [vec![amounts(kind, amount)], vec![below.clone(), amounts(kind, amount)]] {
@@ -75,7 +83,9 @@ fn a_drag_gives_the_bits_of_a_first_answer() {
 #[test]
 fn an_amount_that_is_not_finite_is_refused_in_a_drag_too() {
     let mut editor = editor(&torus([12, 6]));
-    let by = |z: f64| [translate(&["feature-0"], &["feature-1"], [0.0, 0.0, z], HarmonicOrder::Biharmonic)];
+    let by = |z: f64| {
+        [translate(&["feature-0"], &["feature-1"], [0.0, 0.0, z], HarmonicOrder::Biharmonic)]
+    };
     let first = editor.displacement(&by(1.0)).unwrap();
     assert!(matches!(editor.displacement(&by(f64::NAN)), Err(EditError::Invalid { edit: 0, .. })));
     assert_eq!(editor.displacement(&by(1.0)).unwrap(), first);
@@ -86,7 +96,8 @@ fn without_a_fixed_feature_the_component_goes_with_its_handle() {
     let mut editor = editor(&torus([24, 10]));
     for order in ORDERS {
         let by = [0.25, -3.0, 1e-3];
-        let displacement = editor.displacement(&[translate(&["feature-0"], &[], by, order)]).unwrap();
+        let displacement =
+            editor.displacement(&[translate(&["feature-0"], &[], by, order)]).unwrap();
         assert!(displacement.iter().all(|&moved| moved == by));
     }
 }
@@ -133,12 +144,16 @@ fn a_seam_that_an_edit_would_open_is_named() {
     ];
     let mesh = triangles(&points, &[0, 1, 2, 0, 2, 3, 4, 6, 7, 4, 7, 5]);
     let tags = vec![0, 0, 0, 0, 1, 1, 1, 1];
-    let mesh = Mesh::new(mesh.points().to_vec(), mesh.cells().clone(), FeatureSource::Vertices(tags)).unwrap();
+    let mesh =
+        Mesh::new(mesh.points().to_vec(), mesh.cells().clone(), FeatureSource::Vertices(tags))
+            .unwrap();
     let mut editor = editor(&mesh);
     let order = HarmonicOrder::Harmonic;
     let open = translate(&["feature-1"], &["feature-0"], [0.0, 0.0, 1.0], order);
     match editor.displacement(&[open]).unwrap_err() {
-        EditError::OpensSeam { edit: 0, vertices, .. } => assert!([[1, 4], [2, 5]].contains(&vertices)),
+        EditError::OpensSeam { edit: 0, vertices, .. } => {
+            assert!([[1, 4], [2, 5]].contains(&vertices))
+        }
         other => panic!("{other}"),
     }
     let both = translate(&["feature-0", "feature-1"], &[], [0.0, 0.0, 1.0], order);
@@ -146,15 +161,21 @@ fn a_seam_that_an_edit_would_open_is_named() {
 }
 
 /// What becomes of a strip one square high whose ends are `rings` squares wide, against the profile of the continuous problem.
-fn profile_error(columns: usize, rings: usize, order: HarmonicOrder, profile: impl Fn(f64) -> f64) -> f64 {
+fn profile_error(
+    columns: usize,
+    rings: usize,
+    order: HarmonicOrder,
+    profile: impl Fn(f64) -> f64,
+) -> f64 {
     let step = 1.0 / columns as f64;
     let out = (rings - 1) as f64 * step;
-    let mesh =
-        tagged(&shapes::plate([columns + 2 * (rings - 1), 3], [-out, 0.0], [1.0 + out, 3.0 * step]), |[x, ..]| {
-            i64::from(x > 0.5)
-        });
-    let region =
-        |lower: f64, upper: f64| format!(r#"{{"box": {{"lower": [{lower}, -1, -1], "upper": [{upper}, 9, 1]}}}}"#);
+    let mesh = tagged(
+        &shapes::plate([columns + 2 * (rings - 1), 3], [-out, 0.0], [1.0 + out, 3.0 * step]),
+        |[x, ..]| i64::from(x > 0.5),
+    );
+    let region = |lower: f64, upper: f64| {
+        format!(r#"{{"box": {{"lower": [{lower}, -1, -1], "upper": [{upper}, 9, 1]}}}}"#)
+    };
     let edit: Edit = serde_json::from_str(&format!(
         r#"{{"translate": {{"by": [0, 0, 1], "harmonic_order": {order}, "region": {}, "fixed_region": {}}}}}"#,
         region(1.0, 9.0),
@@ -164,7 +185,9 @@ fn profile_error(columns: usize, rings: usize, order: HarmonicOrder, profile: im
     let mut editor = editor(&mesh);
     let displacement = editor.displacement(&[edit]).unwrap();
     let points = editor.surface().points().iter().zip(&displacement);
-    points.map(|(point, moved)| (moved[2] - profile(point[0].clamp(0.0, 1.0))).abs()).fold(0.0, f64::max)
+    points
+        .map(|(point, moved)| (moved[2] - profile(point[0].clamp(0.0, 1.0))).abs())
+        .fold(0.0, f64::max)
 }
 
 /// As many rings of prescribed vertices as the order clamp as many derivatives, and an open rim is a mirror: it doubles the rings
@@ -187,7 +210,10 @@ fn each_ring_of_prescribed_vertices_clamps_one_derivative_more() {
         (4, HarmonicOrder::Triharmonic, &quintic),
     ] {
         let [coarse, fine] = [16, 32].map(|columns| profile_error(columns, rings, order, profile));
-        assert!(fine < 1e-8 || (1.6..4.6).contains(&(coarse / fine)), "{rings} rings, order {order}: {coarse} {fine}");
+        assert!(
+            fine < 1e-8 || (1.6..4.6).contains(&(coarse / fine)),
+            "{rings} rings, order {order}: {coarse} {fine}"
+        );
     }
 }
 
@@ -200,7 +226,8 @@ fn a_vertex_with_too_many_neighbours_is_refused_before_memory_is_asked_for() {
         let angle = std::f64::consts::TAU * f64::from(place) / f64::from(count);
         [angle.cos(), angle.sin(), 0.0]
     }));
-    let corners: Vec<u32> = (0..count).flat_map(|place| [0, 1 + place, 1 + (place + 1) % count]).collect();
+    let corners: Vec<u32> =
+        (0..count).flat_map(|place| [0, 1 + place, 1 + (place + 1) % count]).collect();
     let mut editor = editor(&triangles(&points, &corners));
     let edit = |order| [translate(&["feature-1"], &[], [0.0, 0.0, 1.0], order)];
     let error = editor.displacement(&edit(HarmonicOrder::Biharmonic)).unwrap_err();
@@ -218,7 +245,14 @@ fn no_bit_depends_on_the_number_of_threads() {
         pool.install(|| {
             let mut editor = editor(&mesh);
             ORDERS.map(|order| {
-                editor.displacement(&[translate(&["feature-0"], &["feature-1"], [0.1, 0.2, 0.3], order)]).unwrap()
+                editor
+                    .displacement(&[translate(
+                        &["feature-0"],
+                        &["feature-1"],
+                        [0.1, 0.2, 0.3],
+                        order,
+                    )])
+                    .unwrap()
             })
         })
     };

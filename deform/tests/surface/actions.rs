@@ -12,7 +12,12 @@ fn edit(json: serde_json::Value) -> Edit {
 fn turned(axis: Vector, degrees: f64, point: Vector) -> Vector {
     let length = axis.iter().map(|part| part * part).sum::<f64>().sqrt();
     let half = degrees.to_radians() / 2.0;
-    let q = [half.cos(), axis[0] / length * half.sin(), axis[1] / length * half.sin(), axis[2] / length * half.sin()];
+    let q = [
+        half.cos(),
+        axis[0] / length * half.sin(),
+        axis[1] / length * half.sin(),
+        axis[2] / length * half.sin(),
+    ];
     let times = |a: [f64; 4], b: [f64; 4]| {
         [
             a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
@@ -21,7 +26,8 @@ fn turned(axis: Vector, degrees: f64, point: Vector) -> Vector {
             a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
         ]
     };
-    let [_, x, y, z] = times(times(q, [0.0, point[0], point[1], point[2]]), [q[0], -q[1], -q[2], -q[3]]);
+    let [_, x, y, z] =
+        times(times(q, [0.0, point[0], point[1], point[2]]), [q[0], -q[1], -q[2], -q[3]]);
     [x, y, z]
 }
 
@@ -69,9 +75,12 @@ fn quarter_turns_are_exact_and_whole_turns_are_nothing() {
     };
     // The centre is that of the box, (0.5, 0.5, 0.5).
     let quarter: Vec<Vector> = surface.points().iter().map(|&[x, y, z]| [1.0 - y, x, z]).collect();
-    let half: Vec<Vector> = surface.points().iter().map(|&[x, y, z]| [1.0 - x, 1.0 - y, z]).collect();
+    let half: Vec<Vector> =
+        surface.points().iter().map(|&[x, y, z]| [1.0 - x, 1.0 - y, z]).collect();
     let back: Vec<Vector> = surface.points().iter().map(|&[x, y, z]| [y, 1.0 - x, z]).collect();
-    for (degrees, expected) in [(90.0, &quarter), (450.0, &quarter), (-180.0, &half), (-90.0, &back), (270.0, &back)] {
+    for (degrees, expected) in
+        [(90.0, &quarter), (450.0, &quarter), (-180.0, &half), (-90.0, &back), (270.0, &back)]
+    {
         assert_eq!(&turn(degrees), expected, "{degrees}");
     }
     for degrees in [0.0, 360.0, -720.0, 3.6e10] {
@@ -109,7 +118,8 @@ fn an_affine_map_is_made_as_it_is_written() {
     for &vertex in &handle {
         let point = surface.points()[vertex as usize];
         let expected = [0, 1, 2].map(|row| {
-            let turned: f64 = (0..3).map(|column| matrix[row][column] * (point[column] - center[column])).sum();
+            let turned: f64 =
+                (0..3).map(|column| matrix[row][column] * (point[column] - center[column])).sum();
             turned + center[row] + translation[row]
         });
         assert!(difference(shape[vertex as usize], expected) < 1e-14);
@@ -117,7 +127,9 @@ fn an_affine_map_is_made_as_it_is_written() {
 
     // A diagonal matrix is a scaling, to the bit; a singular one flattens onto the centre of the handle's box.
     let diagonal = |matrix: serde_json::Value| {
-        edit(serde_json::json!({"affine": {"features": ["x-max"], "fixed": ["x-min"], "matrix": matrix}}))
+        edit(
+            serde_json::json!({"affine": {"features": ["x-max"], "fixed": ["x-min"], "matrix": matrix}}),
+        )
     };
     let scaled = scale(&["x-max"], &["x-min"], [1.5, 0.25, -2.0], HarmonicOrder::Biharmonic);
     let same = diagonal(serde_json::json!([[1.5, 0, 0], [0, 0.25, 0], [0, 0, -2]]));
@@ -134,7 +146,9 @@ fn a_rigid_motion_of_the_whole_surface_keeps_its_shape() {
     let mut editor = editor(&shapes::torus(2.0, 0.5, [24, 12]));
     let surface = Arc::clone(editor.surface());
     let stack = [
-        edit(serde_json::json!({"rotate": {"region": everything(), "axis": [1, 2, 3], "degrees": 50}})),
+        edit(
+            serde_json::json!({"rotate": {"region": everything(), "axis": [1, 2, 3], "degrees": 50}}),
+        ),
         edit(serde_json::json!({"translate": {"region": everything(), "by": [5, -3, 0.5]}})),
     ];
     let shape = moved(&surface, &editor.displacement(&stack).unwrap());
@@ -154,12 +168,18 @@ fn a_closed_surface_grows_evenly_along_its_normals() {
         .map(|fine| {
             let mut editor = editor(&shapes::torus(2.0, 0.5, [32 * fine, 16 * fine]));
             let surface = Arc::clone(editor.surface());
-            let grow = edit(serde_json::json!({"scale_normals": {"region": everything(), "distance": 0.2}}));
+            let grow = edit(
+                serde_json::json!({"scale_normals": {"region": everything(), "distance": 0.2}}),
+            );
             let displacement = editor.displacement(&[grow]).unwrap();
-            assert!(displacement.iter().all(|moved| (difference(*moved, [0.0; 3]) - 0.2).abs() < 1e-15));
+            assert!(
+                displacement.iter().all(|moved| (difference(*moved, [0.0; 3]) - 0.2).abs() < 1e-15)
+            );
             let shape = moved(&surface, &displacement);
             let off = |&[x, y, z]: &Vector| ((x.hypot(y) - 2.0).hypot(z) - 0.7).abs();
-            assert!(enclosed_volume(&surface, &shape) > enclosed_volume(&surface, surface.points()));
+            assert!(
+                enclosed_volume(&surface, &shape) > enclosed_volume(&surface, surface.points())
+            );
             shape.iter().map(off).fold(0.0, f64::max)
         })
         .to_vec();
@@ -186,7 +206,8 @@ fn regions_are_measured_on_the_reference_surface() {
         }),
     ];
     for (region, inside) in cases {
-        let away = edit(serde_json::json!({"translate": {"region": everything(), "by": [100, 0, 0]}}));
+        let away =
+            edit(serde_json::json!({"translate": {"region": everything(), "by": [100, 0, 0]}}));
         let lift = edit(serde_json::json!({"translate": {
             "region": region, "fixed": ["x-min"], "by": [0, 0, 1], "harmonic_order": 1
         }}));
@@ -267,8 +288,13 @@ fn a_muted_layer_does_nothing_and_is_still_checked() {
     assert_eq!(with, without);
     let zeros = editor.displacement(&[layer(0.1, true), layer(0.7, true)]).unwrap();
     assert!(zeros.iter().flatten().all(|value| value.to_bits() == 0));
-    let wrong = edit(serde_json::json!({"translate": {"features": ["x-mix"], "by": [1, 0, 0], "muted": true}}));
-    assert!(matches!(editor.displacement(&[turn, wrong]), Err(EditError::UnknownFeature { edit: 1, .. })));
+    let wrong = edit(
+        serde_json::json!({"translate": {"features": ["x-mix"], "by": [1, 0, 0], "muted": true}}),
+    );
+    assert!(matches!(
+        editor.displacement(&[turn, wrong]),
+        Err(EditError::UnknownFeature { edit: 1, .. })
+    ));
 
     let layers = editor.layers(&[layer(0.4, false), layer(0.7, true)]).unwrap();
     assert_eq!((layers[0].handle_vertices, layers[0].largest_displacement), (16, 0.5));
@@ -291,20 +317,29 @@ fn an_imported_displacement_is_added_exactly() {
     let expected = |takes: &dyn Fn(Vector) -> bool, factor: f64| -> Vec<Vector> {
         let given = |vertex: u32| vertices.iter().position(|given| *given == vertex);
         let points = surface.vertices().iter().zip(surface.points());
-        let value = |(vertex, point): (&u32, &Vector)| match given(*vertex).filter(|_| takes(*point)) {
-            Some(place) => values[place].map(|part| part * factor),
-            None => [0.0; 3],
-        };
+        let value =
+            |(vertex, point): (&u32, &Vector)| match given(*vertex).filter(|_| takes(*point)) {
+                Some(place) => values[place].map(|part| part * factor),
+                None => [0.0; 3],
+            };
         points.map(value).collect()
     };
-    assert_eq!(editor.displacement(&[import(serde_json::json!({}))]).unwrap(), expected(&|_| true, 1.0));
-    assert_eq!(editor.displacement(&[import(serde_json::json!({"scale": -2.5}))]).unwrap(), expected(&|_| true, -2.5));
+    assert_eq!(
+        editor.displacement(&[import(serde_json::json!({}))]).unwrap(),
+        expected(&|_| true, 1.0)
+    );
+    assert_eq!(
+        editor.displacement(&[import(serde_json::json!({"scale": -2.5}))]).unwrap(),
+        expected(&|_| true, -2.5)
+    );
     let part = import(serde_json::json!({"features": ["x-max", "y-max"], "fixed": ["z-min"]}));
     let takes = |p: Vector| (p[0] == 1.0 || p[1] == 1.0) && p[2] > 0.0;
     assert_eq!(editor.displacement(&[part]).unwrap(), expected(&takes, 1.0));
 
     let inside = (0..).find(|vertex| surface.vertices().binary_search(vertex).is_err()).unwrap();
-    let wrong = edit(serde_json::json!({"displacement": {"vertices": [0, inside], "values": [[0, 0, 1], [0, 0, 1]]}}));
+    let wrong = edit(
+        serde_json::json!({"displacement": {"vertices": [0, inside], "values": [[0, 0, 1], [0, 0, 1]]}}),
+    );
     let error = editor.displacement(&[wrong]).unwrap_err();
     assert_eq!(
         error.to_string(),
@@ -317,7 +352,8 @@ fn an_imported_displacement_is_added_exactly() {
 #[test]
 fn regions_that_hold_nothing_are_named_with_what_is_near() {
     let mut editor = editor(&shapes::box_of_hexahedra([2, 2, 2], [0.0; 3], [1.0; 3]));
-    let mut refused = |json: serde_json::Value| editor.displacement(&[edit(json)]).unwrap_err().to_string();
+    let mut refused =
+        |json: serde_json::Value| editor.displacement(&[edit(json)]).unwrap_err().to_string();
     let translate = |body: serde_json::Value| {
         let mut whole = serde_json::json!({"by": [1, 0, 0]});
         whole.as_object_mut().unwrap().extend(body.as_object().unwrap().clone());
@@ -329,9 +365,17 @@ fn regions_that_hold_nothing_are_named_with_what_is_near() {
         error,
         "edit 0 (translate): region.faces[1]: there is no face 24; the surface has 24 faces, numbered from 0"
     );
-    let error = refused(translate(serde_json::json!({"region": {"sphere": {"center": [4, 1, 1], "radius": 1}}})));
-    assert!(error.starts_with("edit 0 (translate): region: no vertex of the surface lies in it"), "{error}");
-    assert!(error.contains("at (1, 1, 1), is 2 away") && error.contains("from (0, 0, 0) to (1, 1, 1)"), "{error}");
+    let error = refused(translate(
+        serde_json::json!({"region": {"sphere": {"center": [4, 1, 1], "radius": 1}}}),
+    ));
+    assert!(
+        error.starts_with("edit 0 (translate): region: no vertex of the surface lies in it"),
+        "{error}"
+    );
+    assert!(
+        error.contains("at (1, 1, 1), is 2 away") && error.contains("from (0, 0, 0) to (1, 1, 1)"),
+        "{error}"
+    );
     let far = serde_json::json!({"half_space": {"origin": [0, 0, 1.5], "normal": [0, 0, 1e-300]}});
     let error = refused(translate(serde_json::json!({"features": ["x-max"], "fixed_region": far})));
     assert!(error.contains("fixed_region: no vertex") && error.contains("is 0.5 away"), "{error}");
@@ -346,7 +390,10 @@ fn regions_that_hold_nothing_are_named_with_what_is_near() {
 fn what_makes_no_sense_is_named_by_its_field() {
     let mut editor = editor(&shapes::box_of_hexahedra([2, 2, 2], [0.0; 3], [1.0; 3]));
     let cases = [
-        (r#"{"rotate": {"features": ["x-max"], "axis": [0, 0, 0], "degrees": 3}}"#, "axis: expected a direction"),
+        (
+            r#"{"rotate": {"features": ["x-max"], "axis": [0, 0, 0], "degrees": 3}}"#,
+            "axis: expected a direction",
+        ),
         (r#"{"rotate": {"axis": [0, 0, 1], "degrees": 3}}"#, "features: there is no handle"),
         (
             r#"{"translate": {"by": [0, 0, 1], "region": {"box": {"lower": [0, 2, 0], "upper": [1, 1, 1]}}}}"#,
@@ -360,11 +407,23 @@ fn what_makes_no_sense_is_named_by_its_field() {
             r#"{"translate": {"by": [0, 0, 1], "features": ["x-max"], "fixed_region": {"half_space": {"origin": [0, 2, 0], "normal": [0, 0, 0]}}}}"#,
             "fixed_region.half_space.normal: expected a direction",
         ),
-        (r#"{"translate": {"by": [0, 0, 1], "region": {"faces": []}}}"#, "region.faces: the list is empty"),
-        (r#"{"translate": {"by": [0, 0, 1], "features": ["x-max"], "name": " "}}"#, "name: expected 1 to 200"),
+        (
+            r#"{"translate": {"by": [0, 0, 1], "region": {"faces": []}}}"#,
+            "region.faces: the list is empty",
+        ),
+        (
+            r#"{"translate": {"by": [0, 0, 1], "features": ["x-max"], "name": " "}}"#,
+            "name: expected 1 to 200",
+        ),
         (r#"{"displacement": {}}"#, "vertices: expected either `file` or both"),
-        (r#"{"displacement": {"file": "a.txt", "vertices": [1]}}"#, "file: expected either `file` or both"),
-        (r#"{"displacement": {"vertices": [1], "values": []}}"#, "values: found 0 values for 1 vertices"),
+        (
+            r#"{"displacement": {"file": "a.txt", "vertices": [1]}}"#,
+            "file: expected either `file` or both",
+        ),
+        (
+            r#"{"displacement": {"vertices": [1], "values": []}}"#,
+            "values: found 0 values for 1 vertices",
+        ),
         (
             r#"{"displacement": {"vertices": [5, 1, 5], "values": [[0, 0, 0], [0, 0, 0], [0, 0, 0]]}}"#,
             "vertices[2]: vertex 5 is also vertices[0]",
@@ -385,7 +444,9 @@ fn what_makes_no_sense_is_named_by_its_field() {
         matrix: [[1.0; 3], [1.0, f64::NAN, 1.0], [1.0; 3]],
         ..Default::default()
     });
-    assert!(matches!(infinite.validate(), Err(InvalidEdit::NotFinite { field, .. }) if field == "matrix[1][1]"));
+    assert!(
+        matches!(infinite.validate(), Err(InvalidEdit::NotFinite { field, .. }) if field == "matrix[1][1]")
+    );
 }
 
 #[test]

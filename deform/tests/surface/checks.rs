@@ -20,9 +20,12 @@ fn two_plates(height: f64) -> Surface {
     let count = one.points().len() as u32;
     let mut points = one.points().to_vec();
     // Turned a little, so that no edges lie on each other.
-    points.extend(one.points().iter().map(|[x, y, _]| [0.9 * x + 0.1 * y, 0.9 * y - 0.1 * x, height]));
+    points.extend(
+        one.points().iter().map(|[x, y, _]| [0.9 * x + 0.1 * y, 0.9 * y - 0.1 * x, height]),
+    );
     let corners = one.triangles().iter().flatten();
-    let corners: Vec<u32> = corners.clone().copied().chain(corners.map(|vertex| vertex + count)).collect();
+    let corners: Vec<u32> =
+        corners.clone().copied().chain(corners.map(|vertex| vertex + count)).collect();
     let cells = Cells::uniform(CellType::Triangle, corners).expect("triangles");
     extract(&Mesh::new(points, cells, FeatureSource::SharpEdges).expect("a mesh"))
 }
@@ -40,7 +43,11 @@ fn rigid([a, b, c, d]: [f64; 4], shift: Vector) -> impl Fn(Vector) -> Vector {
         [2.0 * (b * c + a * d), a * a - b * b + c * c - d * d, 2.0 * (c * d - a * b)],
         [2.0 * (b * d - a * c), 2.0 * (c * d + a * b), a * a - b * b - c * c + d * d],
     ];
-    move |[x, y, z]| std::array::from_fn(|row| rows[row][0] * x + rows[row][1] * y + rows[row][2] * z + shift[row])
+    move |[x, y, z]| {
+        std::array::from_fn(|row| {
+            rows[row][0] * x + rows[row][1] * y + rows[row][2] * z + shift[row]
+        })
+    }
 }
 
 proptest! {
@@ -114,7 +121,8 @@ fn parts_that_turn_against_each_other_are_no_folds() {
 #[test]
 fn a_vertex_drawn_over_its_neighbours_folds_the_faces_behind_it() {
     let surface = plate();
-    let middle = surface.points().iter().position(|point| *point == [0.5, 0.5, 0.0]).expect("a vertex");
+    let middle =
+        surface.points().iter().position(|point| *point == [0.5, 0.5, 0.0]).expect("a vertex");
     for tilt in [0.0, 0.7] {
         let motion = rigid([1.0, tilt, 0.3 * tilt, 0.0], [0.0; 3]);
         let mut moved = surface.points().to_vec();
@@ -122,11 +130,20 @@ fn a_vertex_drawn_over_its_neighbours_folds_the_faces_behind_it() {
         let shape: Vec<Vector> = moved.into_iter().map(motion).collect();
         let report = check(&surface, surface.points(), &shape);
         // Off the axes rounding lifts the faces out of their plane, some of them clear of each other.
-        assert!(report.flipped.count > 0 && (tilt != 0.0 || report.intersections.count > 0), "{report}");
+        assert!(
+            report.flipped.count > 0 && (tilt != 0.0 || report.intersections.count > 0),
+            "{report}"
+        );
         let around = |face: u32| surface.faces().vertices(face as usize).contains(&(middle as u32));
-        assert!(report.flipped.first.iter().all(|flawed| around(flawed.face)), "only faces at the vertex are folded");
+        assert!(
+            report.flipped.first.iter().all(|flawed| around(flawed.face)),
+            "only faces at the vertex are folded"
+        );
         let refused = require_sound(&surface, surface.points(), &shape).unwrap_err();
-        assert!(refused.to_string().contains("fold over") && refused.to_string().contains("feasible"), "{refused}");
+        assert!(
+            refused.to_string().contains("fold over") && refused.to_string().contains("feasible"),
+            "{refused}"
+        );
         // The faces behind lose their area where the vertex meets the next one, after 0.125 of the 0.2.
         if tilt == 0.0 {
             assert!((refused.sound_fraction - 0.625).abs() < 2e-3, "{}", refused.sound_fraction);
@@ -144,11 +161,19 @@ fn plates_that_pass_each_other_meet_where_and_when_they_should() {
         point[2] = 0.4 * (point[0] - 0.5);
     }
     let report = check(&surface, surface.points(), &shape);
-    assert!(report.intersections.count > 0 && report.degenerate.count + report.flipped.count == 0, "{report}");
+    assert!(
+        report.intersections.count > 0 && report.degenerate.count + report.flipped.count == 0,
+        "{report}"
+    );
     assert_eq!(report.intersections.first.len(), report.intersections.count.min(16));
     for pair in &report.intersections.first {
-        assert!(pair.place[2].abs() < 1e-12 && (pair.place[0] - 0.5).abs() < 1e-9, "{:?}", pair.place);
-        let [a, b] = pair.faces.map(|face| surface.faces().vertices(face as usize)[0] as usize >= count);
+        assert!(
+            pair.place[2].abs() < 1e-12 && (pair.place[0] - 0.5).abs() < 1e-9,
+            "{:?}",
+            pair.place
+        );
+        let [a, b] =
+            pair.faces.map(|face| surface.faces().vertices(face as usize)[0] as usize >= count);
         assert!(!a && b, "one face of each plate");
     }
     // Straight down: contact after 0.25 of 1, and touching is meeting.
@@ -182,7 +207,9 @@ fn faces_without_area_are_named() {
     shape[a as usize] = shape[b as usize];
     let report = check(&surface, surface.points(), &shape);
     let expected: Vec<u32> = (0..surface.triangles().len() as u32)
-        .filter(|&face| [a, b].iter().all(|vertex| surface.triangles()[face as usize].contains(vertex)))
+        .filter(|&face| {
+            [a, b].iter().all(|vertex| surface.triangles()[face as usize].contains(vertex))
+        })
         .collect();
     let found: Vec<u32> = report.degenerate.first.iter().map(|flawed| flawed.face).collect();
     assert_eq!((found, report.degenerate.count), (expected, 2));

@@ -12,7 +12,8 @@ fn strip(columns: usize) -> Mesh {
     let plate = shapes::plate([columns + 6, 4], [-width, 0.0], [1.0 + width, 4.0 / columns as f64]);
     let mut face_tags = Vec::new();
     for (_, triangle) in plate.cells().iter() {
-        let x = triangle.iter().map(|&vertex| plate.points()[vertex as usize][0]).sum::<f64>() / 3.0;
+        let x =
+            triangle.iter().map(|&vertex| plate.points()[vertex as usize][0]).sum::<f64>() / 3.0;
         face_tags.push(if x < 0.0 {
             0
         } else if x > 1.0 {
@@ -39,8 +40,9 @@ fn interpolate(nodes: &[(f64, f64)], at: f64) -> f64 {
 fn strip_errors(columns: usize, order: HarmonicOrder) -> (f64, f64) {
     let mesh = strip(columns);
     let mut editor = editor(&mesh);
-    let displacement =
-        editor.displacement(&[translate(&["feature-2"], &["feature-0"], [0.0, 0.0, 1.0], order)]).unwrap();
+    let displacement = editor
+        .displacement(&[translate(&["feature-2"], &["feature-0"], [0.0, 0.0, 1.0], order)])
+        .unwrap();
     let step = 1.0 / columns as f64;
     let mut nodes = Vec::new();
     for ring in 0..order as usize {
@@ -83,17 +85,27 @@ fn a_strip_bends_as_the_closed_form_of_each_order() {
 #[test]
 fn the_side_of_a_box_follows_its_end_linearly_or_by_the_smooth_step() {
     let error = |columns: usize, order: HarmonicOrder| {
-        let mesh = shapes::box_of_tets([columns, columns / 5, columns / 5], [0.0; 3], [1.0, 0.2, 0.2]);
+        let mesh =
+            shapes::box_of_tets([columns, columns / 5, columns / 5], [0.0; 3], [1.0, 0.2, 0.2]);
         let mut editor = editor(&mesh);
-        let displacement = editor.displacement(&[translate(&["x-max"], &["x-min"], [0.0, 1.0, 0.0], order)]).unwrap();
-        let expected = |x: f64| if order == HarmonicOrder::Harmonic { x } else { x * x * (3.0 - 2.0 * x) };
+        let displacement = editor
+            .displacement(&[translate(&["x-max"], &["x-min"], [0.0, 1.0, 0.0], order)])
+            .unwrap();
+        let expected =
+            |x: f64| if order == HarmonicOrder::Harmonic { x } else { x * x * (3.0 - 2.0 * x) };
         let points = editor.surface().points().iter();
-        points.zip(&displacement).map(|(point, moved)| (moved[1] - expected(point[0])).abs()).fold(0.0, f64::max)
+        points
+            .zip(&displacement)
+            .map(|(point, moved)| (moved[1] - expected(point[0])).abs())
+            .fold(0.0, f64::max)
     };
     assert!(error(20, HarmonicOrder::Harmonic) < 1e-12);
     let errors = [10, 20, 40].map(|columns| error(columns, HarmonicOrder::Biharmonic));
     // The ring of faces beyond the rim holds the slope: first order, as on the strip.
-    assert!(errors[0] / errors[1] > 1.5 && errors[1] / errors[2] > 1.7 && errors[2] < 0.01, "{errors:?}");
+    assert!(
+        errors[0] / errors[1] > 1.5 && errors[1] / errors[2] > 1.7 && errors[2] < 0.01,
+        "{errors:?}"
+    );
 }
 
 /// A flat plate whose inner vertices are shifted at random, so that no two triangles are alike.
@@ -105,7 +117,8 @@ fn rough_plate(count: usize) -> Mesh {
         .points()
         .iter()
         .map(|&[x, y, z]| {
-            let inner = (step / 2.0..1.0 - step / 2.0).contains(&x) && (step / 2.0..1.0 - step / 2.0).contains(&y);
+            let inner = (step / 2.0..1.0 - step / 2.0).contains(&x)
+                && (step / 2.0..1.0 - step / 2.0).contains(&y);
             let by = if inner { 0.7 * step } else { 0.0 };
             [x + by * (random() - 0.5), y + by * (random() - 0.5), z]
         })
@@ -121,13 +134,18 @@ fn affine_motion_is_reproduced_on_flat_pieces() {
     let mut editor = editor(&mesh);
     let factors = [1.3, 0.6, 1.0];
     for (order, tolerance) in ORDERS.into_iter().zip([1e-13, 1e-12, 1e-12]) {
-        let displacement = editor.displacement(&[scale(&["feature-0"], &[], factors, order)]).unwrap();
+        let displacement =
+            editor.displacement(&[scale(&["feature-0"], &[], factors, order)]).unwrap();
         let handle = editor.surface().features().vertices(0);
         assert!(handle.len() < displacement.len() - 20);
         for (point, moved) in editor.surface().points().iter().zip(&displacement) {
             for axis in 0..2 {
                 let expected = (factors[axis] - 1.0) * (point[axis] - 0.5);
-                assert!((moved[axis] - expected).abs() < tolerance, "order {order}: {:e}", moved[axis] - expected);
+                assert!(
+                    (moved[axis] - expected).abs() < tolerance,
+                    "order {order}: {:e}",
+                    moved[axis] - expected
+                );
             }
             assert_eq!(moved[2], 0.0);
         }
@@ -140,7 +158,8 @@ fn one_translation_of_every_handle_moves_the_whole_surface_with_it() {
     let mut editor = editor(&mesh);
     for order in ORDERS {
         let by = [0.1, -20.3, 1e-5];
-        let displacement = editor.displacement(&[translate(&["x-min", "z-max"], &[], by, order)]).unwrap();
+        let displacement =
+            editor.displacement(&[translate(&["x-min", "z-max"], &[], by, order)]).unwrap();
         assert!(displacement.iter().all(|&moved| moved == by), "order {order}");
     }
 }
@@ -150,14 +169,19 @@ fn an_empty_stack_gives_exact_zeros_and_a_stack_taken_back_its_old_bits() {
     let mesh = shapes::torus(2.0, 0.7, [24, 12]);
     let mut editor = editor(&mesh);
     assert!(editor.displacement(&[]).unwrap().iter().flatten().all(|value| value.to_bits() == 0));
-    let first = translate(&["feature-0"], &["feature-2"], [0.0, 0.0, 1.0], HarmonicOrder::Biharmonic);
+    let first =
+        translate(&["feature-0"], &["feature-2"], [0.0, 0.0, 1.0], HarmonicOrder::Biharmonic);
     let second = scale(&["feature-1"], &["feature-3"], [1.0, 2.0, 0.5], HarmonicOrder::Triharmonic);
     let one = editor.displacement(std::slice::from_ref(&first)).unwrap();
     let two = editor.displacement(&[first.clone(), second.clone()]).unwrap();
     assert_ne!(one, two);
     assert_eq!(editor.displacement(std::slice::from_ref(&first)).unwrap(), one);
     assert_eq!(editor.displacement(&[first.clone(), second.clone()]).unwrap(), two);
-    assert_eq!(super::editor(&mesh).displacement(&[first, second]).unwrap(), two, "from nothing: the same bits");
+    assert_eq!(
+        super::editor(&mesh).displacement(&[first, second]).unwrap(),
+        two,
+        "from nothing: the same bits"
+    );
     assert!(editor.displacement(&[]).unwrap().iter().flatten().all(|value| value.to_bits() == 0));
 }
 
@@ -190,7 +214,10 @@ fn a_pinched_throat_has_half_its_thickness_and_moves_along_z_only() {
             }
         }
         let extreme = displacement.iter().map(|moved| moved[2].abs()).fold(0.0, f64::max);
-        assert!(extreme < 0.0251 + if order == HarmonicOrder::Harmonic { 0.0 } else { 0.005 }, "{extreme}");
+        assert!(
+            extreme < 0.0251 + if order == HarmonicOrder::Harmonic { 0.0 } else { 0.005 },
+            "{extreme}"
+        );
     }
 }
 
@@ -206,8 +233,11 @@ fn assert_independent_of_numbers(counts: [usize; 2], roughness: f64) {
     });
     // Irregular, so that triangles are obtuse and edges flip.
     let mut random = noise(3);
-    let points: Vec<Vector> =
-        mesh.points().iter().map(|point| point.map(|value| value + roughness * (random() - 0.5))).collect();
+    let points: Vec<Vector> = mesh
+        .points()
+        .iter()
+        .map(|point| point.map(|value| value + roughness * (random() - 0.5)))
+        .collect();
     let mesh = mesh.with_points(points).unwrap();
     let count = mesh.points().len();
     let mut order: Vec<usize> = (0..count).collect();
@@ -222,7 +252,9 @@ fn assert_independent_of_numbers(counts: [usize; 2], roughness: f64) {
     let mut triangles: Vec<Vec<u32>> = mesh
         .cells()
         .iter()
-        .map(|(_, triangle)| (1..4).map(|corner| new_number[triangle[corner % 3] as usize]).collect())
+        .map(|(_, triangle)| {
+            (1..4).map(|corner| new_number[triangle[corner % 3] as usize]).collect()
+        })
         .collect();
     triangles.reverse();
     let shuffled = Mesh::new(
@@ -335,8 +367,17 @@ fn components_on_which_nothing_is_prescribed_stay() {
     let mut points = mesh.points().to_vec();
     points.extend(mesh.points().iter().map(|point| [point[0] + 5.0, point[1], point[2]]));
     let connectivity = mesh.cells().connectivity();
-    let both = connectivity.iter().copied().chain(connectivity.iter().map(|vertex| vertex + count)).collect();
-    let two = Mesh::new(points, Cells::uniform(CellType::Tetra, both).unwrap(), FeatureSource::SharpEdges).unwrap();
+    let both = connectivity
+        .iter()
+        .copied()
+        .chain(connectivity.iter().map(|vertex| vertex + count))
+        .collect();
+    let two = Mesh::new(
+        points,
+        Cells::uniform(CellType::Tetra, both).unwrap(),
+        FeatureSource::SharpEdges,
+    )
+    .unwrap();
     let mut editor = editor(&two);
     assert_eq!(editor.surface().features().names().len(), 12);
     for order in ORDERS {
@@ -353,8 +394,11 @@ fn components_on_which_nothing_is_prescribed_stay() {
 fn triangles_without_area_do_no_harm() {
     // Columns of a plate drawn together until whole rows of triangles have no area.
     let plate = shapes::plate([10, 4], [0.0, 0.0], [10.0, 4.0]);
-    let points: Vec<Vector> = plate.points().iter().map(|&[x, y, z]| [if x == 5.0 { 4.0 } else { x }, y, z]).collect();
-    let mesh = tagged(&plate.with_points(points).unwrap(), |[x, ..]| if x < 2.5 { 0 } else { 1 + i64::from(x > 7.5) });
+    let points: Vec<Vector> =
+        plate.points().iter().map(|&[x, y, z]| [if x == 5.0 { 4.0 } else { x }, y, z]).collect();
+    let mesh = tagged(&plate.with_points(points).unwrap(), |[x, ..]| {
+        if x < 2.5 { 0 } else { 1 + i64::from(x > 7.5) }
+    });
     let mut editor = editor(&mesh);
     for order in ORDERS {
         let edit = translate(&["feature-2"], &["feature-0"], [0.0, 0.0, 1.0], order);
@@ -378,10 +422,18 @@ pub fn moebius_strip() -> Mesh {
     for place in 0..count as u32 {
         let next = |row: u32| if place + 1 == count as u32 { 2 - row } else { 3 * place + 3 + row };
         for row in 0..2 {
-            cells.push(CellType::Quad, &[3 * place + row, next(row), next(row + 1), 3 * place + row + 1]).unwrap();
+            cells
+                .push(
+                    CellType::Quad,
+                    &[3 * place + row, next(row), next(row + 1), 3 * place + row + 1],
+                )
+                .unwrap();
         }
     }
-    let tags = points.iter().map(|point| if point[0] > 1.0 { 0 } else { 1 + i64::from(point[0] < -1.0) }).collect();
+    let tags = points
+        .iter()
+        .map(|point| if point[0] > 1.0 { 0 } else { 1 + i64::from(point[0] < -1.0) })
+        .collect();
     Mesh::new(points, cells, FeatureSource::Vertices(tags)).unwrap()
 }
 
@@ -390,8 +442,9 @@ fn a_surface_with_one_side_only_can_be_edited() {
     let mesh = moebius_strip();
     let mut editor = editor(&mesh);
     for order in ORDERS {
-        let displacement =
-            editor.displacement(&[translate(&["feature-2"], &["feature-0"], [0.0, 0.0, 1.0], order)]).unwrap();
+        let displacement = editor
+            .displacement(&[translate(&["feature-2"], &["feature-0"], [0.0, 0.0, 1.0], order)])
+            .unwrap();
         assert!(displacement.iter().all(|moved| (-0.5..1.5).contains(&moved[2])), "order {order}");
     }
 }
@@ -400,11 +453,17 @@ fn a_surface_with_one_side_only_can_be_edited() {
 fn lengths_and_places_of_any_size_do_no_harm() {
     let reference = shapes::box_of_tets([6, 2, 2], [0.0; 3], [3.0, 1.0, 1.0]);
     let answer = |size: f64| {
-        let points = reference.points().iter().map(|point| point.map(|value| value * size)).collect();
+        let points =
+            reference.points().iter().map(|point| point.map(|value| value * size)).collect();
         let mut editor = editor(&reference.with_points(points).unwrap());
         let by = [0.0, 0.0, size];
         let edit = translate(&["x-max"], &["x-min"], by, HarmonicOrder::Triharmonic);
-        editor.displacement(&[edit]).unwrap().into_iter().map(|moved| moved[2] / size).collect::<Vec<_>>()
+        editor
+            .displacement(&[edit])
+            .unwrap()
+            .into_iter()
+            .map(|moved| moved[2] / size)
+            .collect::<Vec<_>>()
     };
     let one = answer(1.0);
     for size in [1e-150, 1e-6, 1e9, 1e200] {
@@ -420,10 +479,13 @@ fn more_choices_than_are_kept_give_the_same_answers() {
     let mut editor = editor(&mesh);
     let edits: Vec<Edit> = shapes::BOX_FEATURES
         .iter()
-        .flat_map(|feature| ORDERS.map(|order| translate(&[feature], &["x-min", "y-min"], [0.1, 0.2, 0.3], order)))
+        .flat_map(|feature| {
+            ORDERS.map(|order| translate(&[feature], &["x-min", "y-min"], [0.1, 0.2, 0.3], order))
+        })
         .filter(|edit| !["x-min", "y-min"].contains(&edit.features()[0].as_str()))
         .collect();
-    let once: Vec<_> = edits.iter().map(|edit| editor.displacement(std::slice::from_ref(edit)).unwrap()).collect();
+    let once: Vec<_> =
+        edits.iter().map(|edit| editor.displacement(std::slice::from_ref(edit)).unwrap()).collect();
     for (edit, expected) in edits.iter().zip(&once).rev() {
         assert_eq!(&editor.displacement(std::slice::from_ref(edit)).unwrap(), expected);
     }
@@ -444,11 +506,9 @@ fn every_mistake_is_named_and_changes_nothing() {
 
     let error = refused(translate(&["x-maxi"], &[], [0.0; 3], order));
     assert!(matches!(&error, EditError::UnknownFeature { edit: 1, field: "features", .. }));
-    assert!(
-        error
-            .to_string()
-            .starts_with("edit 1 (translate): features: there is no feature 'x-maxi'; did you mean 'x-max'")
-    );
+    assert!(error.to_string().starts_with(
+        "edit 1 (translate): features: there is no feature 'x-maxi'; did you mean 'x-max'"
+    ));
     let error = refused(scale(&["x-max"], &["inlet"], [1.0; 3], order));
     assert!(matches!(&error, EditError::UnknownFeature { edit: 1, field: "fixed", .. }), "{error}");
     assert!(error.to_string().contains("the features are x-min, x-max"));
@@ -466,10 +526,14 @@ fn every_mistake_is_named_and_changes_nothing() {
     // A displacement of vertices that are all fixed, or none of which lies in what may move.
     let top = surface_vertices(&mesh, "x-max");
     let values: Vec<[f64; 3]> = top.iter().map(|_| [0.1, 0.0, 0.0]).collect();
-    for (parts, moves) in
-        [(r#""fixed": ["x-max"]"#, false), (r#""features": ["x-min"]"#, false), (r#""fixed": ["y-max"]"#, true)]
-    {
-        let edit = format!(r#"{{"displacement": {{{parts}, "vertices": {top:?}, "values": {values:?}}}}}"#);
+    for (parts, moves) in [
+        (r#""fixed": ["x-max"]"#, false),
+        (r#""features": ["x-min"]"#, false),
+        (r#""fixed": ["y-max"]"#, true),
+    ] {
+        let edit = format!(
+            r#"{{"displacement": {{{parts}, "vertices": {top:?}, "values": {values:?}}}}}"#
+        );
         let edit: Edit = serde_json::from_str(&edit).unwrap();
         if moves {
             assert!(editor.displacement(&[edit]).is_ok());
@@ -485,7 +549,12 @@ fn every_mistake_is_named_and_changes_nothing() {
 fn surface_vertices(mesh: &Mesh, feature: &str) -> Vec<u32> {
     let surface = extract(mesh);
     let feature = surface.features().index(feature).unwrap();
-    surface.features().vertices(feature).iter().map(|&vertex| surface.vertices()[vertex as usize]).collect()
+    surface
+        .features()
+        .vertices(feature)
+        .iter()
+        .map(|&vertex| surface.vertices()[vertex as usize])
+        .collect()
 }
 
 #[test]
@@ -497,7 +566,8 @@ fn what_overflows_or_has_no_normal_is_refused() {
     let error = editor.displacement(&[far.clone(), far]).unwrap_err();
     assert!(matches!(error, EditError::OutOfRange { edit: 1, .. }), "{error}");
     let flat = scale(&["x-max"], &["x-min"], [1.0, 0.0, 0.0], order);
-    let error = editor.displacement(&[flat, scale_normals(&["x-max"], &["x-min"], 1.0)]).unwrap_err();
+    let error =
+        editor.displacement(&[flat, scale_normals(&["x-max"], &["x-min"], 1.0)]).unwrap_err();
     assert!(matches!(error, EditError::NoNormal { edit: 1, .. }), "{error}");
 }
 

@@ -18,7 +18,8 @@ fn is_closed(surface: &Surface) -> bool {
     let mut sides: HashMap<(u32, u32), i32> = HashMap::new();
     for &[a, b, c] in surface.triangles() {
         for (from, to) in [(a, b), (b, c), (c, a)] {
-            *sides.entry((from.min(to), from.max(to))).or_default() += if from < to { 1 } else { 10 };
+            *sides.entry((from.min(to), from.max(to))).or_default() +=
+                if from < to { 1 } else { 10 };
         }
     }
     sides.values().all(|&count| count == 11)
@@ -29,7 +30,10 @@ fn the_surface_of_one_cell_of_each_type_is_its_faces_outward() {
     for cell_type in CellType::ALL {
         let mesh = shapes::single_cell(cell_type);
         if cell_type.dimension() < 2 {
-            assert_eq!(refused(&mesh), SurfaceError::NoFaces { cells: 1, dimension: cell_type.dimension() });
+            assert_eq!(
+                refused(&mesh),
+                SurfaceError::NoFaces { cells: 1, dimension: cell_type.dimension() }
+            );
             continue;
         }
         let surface = extract(&mesh);
@@ -48,11 +52,17 @@ fn the_surface_of_one_cell_of_each_type_is_its_faces_outward() {
         };
         assert_eq!(surface.faces().len(), faces, "{cell_type}");
         assert_eq!(is_closed(&surface), cell_type.dimension() == 3, "{cell_type}");
-        assert!((enclosed_volume(&surface, surface.points()) - volume).abs() < 1e-12, "{cell_type}");
+        assert!(
+            (enclosed_volume(&surface, surface.points()) - volume).abs() < 1e-12,
+            "{cell_type}"
+        );
         if cell_type.dimension() == 2 {
             for triangle in surface.triangles() {
                 let [a, b, c] = triangle.map(|vertex| surface.points()[vertex as usize]);
-                assert!((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0, "{cell_type}");
+                assert!(
+                    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0,
+                    "{cell_type}"
+                );
             }
         }
     }
@@ -89,7 +99,9 @@ fn boxes_have_the_surface_of_the_box() {
         }
         for (face, (_, vertices)) in surface.faces().iter().enumerate() {
             let cell = mesh.cells().vertices(surface.owner_cells()[face] as usize);
-            assert!(vertices.iter().all(|&vertex| cell.contains(&surface.vertices()[vertex as usize])));
+            assert!(
+                vertices.iter().all(|&vertex| cell.contains(&surface.vertices()[vertex as usize]))
+            );
         }
     }
 }
@@ -184,11 +196,17 @@ fn duplicate_cells_are_named() {
     cells.push(CellType::Tetra, &[0, 1, 2, 4]).unwrap();
     cells.push(CellType::Tetra, &[1, 2, 4, 7]).unwrap();
     cells.push(CellType::Tetra, &[4, 2, 1, 0]).unwrap();
-    assert_eq!(refused(&mesh(points.clone(), cells)), SurfaceError::DuplicateCells { first: 0, second: 2 });
+    assert_eq!(
+        refused(&mesh(points.clone(), cells)),
+        SurfaceError::DuplicateCells { first: 0, second: 2 }
+    );
     let mut cells = Cells::new();
     cells.push(CellType::Tetra, &[0, 1, 2, 4]).unwrap();
     cells.push(CellType::Tetra, &[0, 1, 2, 4]).unwrap();
-    assert_eq!(refused(&mesh(points.clone(), cells)), SurfaceError::DuplicateCells { first: 0, second: 1 });
+    assert_eq!(
+        refused(&mesh(points.clone(), cells)),
+        SurfaceError::DuplicateCells { first: 0, second: 1 }
+    );
     let mut cells = Cells::new();
     cells.push(CellType::Triangle, &[0, 1, 2]).unwrap();
     cells.push(CellType::Triangle, &[2, 0, 1]).unwrap();
@@ -235,7 +253,10 @@ fn an_edge_of_four_faces_can_be_seen_but_not_edited() {
 
 #[test]
 fn meshes_without_a_surface_are_refused() {
-    assert_eq!(refused(&mesh(vec![], Cells::new())), SurfaceError::NoFaces { cells: 0, dimension: 0 });
+    assert_eq!(
+        refused(&mesh(vec![], Cells::new())),
+        SurfaceError::NoFaces { cells: 0, dimension: 0 }
+    );
     let mut cells = Cells::new();
     cells.push(CellType::Tetra, &[0, 0, 0, 0]).unwrap();
     assert_eq!(refused(&mesh(vec![[0.0; 3]], cells)), SurfaceError::NoBoundary);

@@ -29,7 +29,8 @@ fn closed_surfaces_face_outward_however_they_were_given() {
     let patchwork: Vec<bool> = (0..torus.cells().len()).map(|_| random() < 0.45).collect();
     let grow = scale_normals(&["feature-0", "feature-1", "feature-2", "feature-3"], &[], 0.1);
     let expected = editor(&torus).displacement(std::slice::from_ref(&grow)).unwrap();
-    for mesh in [with_turned(&torus, |_| true), with_turned(&torus, |triangle| patchwork[triangle])] {
+    for mesh in [with_turned(&torus, |_| true), with_turned(&torus, |triangle| patchwork[triangle])]
+    {
         let mut editor = editor(&mesh);
         assert!(runs_one_way(editor.surface()));
         assert!(enclosed_volume(editor.surface(), mesh.points()) > 0.0);

@@ -3,7 +3,9 @@
 use super::*;
 use proptest::prelude::*;
 use tombolo_deform::shapes;
-use tombolo_deform::surface::{Affine, BoxRegion, Displacement, HalfSpaceRegion, Region, Rotate, SphereRegion};
+use tombolo_deform::surface::{
+    Affine, BoxRegion, Displacement, HalfSpaceRegion, Region, Rotate, SphereRegion,
+};
 
 fn absurd() -> BoxedStrategy<f64> {
     prop_oneof![
@@ -48,100 +50,124 @@ fn edit() -> impl Strategy<Value = Edit> {
     let features = || proptest::collection::vec(feature(), 0..3);
     let order = (0..3usize).prop_map(|which| ORDERS[which]);
     let vector = || [absurd(), absurd(), absurd()];
-    let regions = (proptest::option::weighted(0.2, region()), proptest::option::weighted(0.1, region()));
+    let regions =
+        (proptest::option::weighted(0.2, region()), proptest::option::weighted(0.1, region()));
     let import = proptest::collection::vec((0..100u32, vector()), 0..4);
-    let numbers = (vector(), [vector(), vector(), vector()], absurd(), proptest::option::of(vector()));
-    (features(), features(), regions, order, numbers, import, proptest::bool::weighted(0.2), 0..6).prop_map(
-        |(features, fixed, (region, fixed_region), harmonic_order, numbers, import, muted, kind)| {
-            let (vector, matrix, number, center) = numbers;
-            let name = None;
-            match kind {
-                0 => Edit::Translate(Translate {
-                    features,
-                    region,
-                    fixed,
-                    fixed_region,
-                    by: vector,
-                    harmonic_order,
-                    muted,
-                    name,
-                }),
-                1 => Edit::ScaleNormals(ScaleNormals {
-                    features,
-                    region,
-                    fixed,
-                    fixed_region,
-                    distance: number,
-                    harmonic_order,
-                    muted,
-                    name,
-                }),
-                2 => Edit::ScaleDirection(ScaleDirection {
-                    features,
-                    region,
-                    fixed,
-                    fixed_region,
-                    factors: vector,
-                    center,
-                    harmonic_order,
-                    muted,
-                    name,
-                }),
-                3 => Edit::Rotate(Rotate {
-                    features,
-                    region,
-                    fixed,
-                    fixed_region,
-                    axis: vector,
-                    degrees: number,
-                    center,
-                    harmonic_order,
-                    muted,
-                    name,
-                }),
-                4 => Edit::Affine(Affine {
-                    features,
-                    region,
-                    fixed,
-                    fixed_region,
-                    matrix,
-                    translation: vector,
-                    center,
-                    harmonic_order,
-                    muted,
-                    name,
-                }),
-                _ => {
-                    let (vertices, values) = import.into_iter().unzip();
-                    Edit::Displacement(Displacement {
+    let numbers =
+        (vector(), [vector(), vector(), vector()], absurd(), proptest::option::of(vector()));
+    (features(), features(), regions, order, numbers, import, proptest::bool::weighted(0.2), 0..6)
+        .prop_map(
+            |(
+                features,
+                fixed,
+                (region, fixed_region),
+                harmonic_order,
+                numbers,
+                import,
+                muted,
+                kind,
+            )| {
+                let (vector, matrix, number, center) = numbers;
+                let name = None;
+                match kind {
+                    0 => Edit::Translate(Translate {
                         features,
                         region,
                         fixed,
                         fixed_region,
-                        file: None,
-                        vertices,
-                        values,
-                        scale: number,
+                        by: vector,
+                        harmonic_order,
                         muted,
                         name,
-                    })
+                    }),
+                    1 => Edit::ScaleNormals(ScaleNormals {
+                        features,
+                        region,
+                        fixed,
+                        fixed_region,
+                        distance: number,
+                        harmonic_order,
+                        muted,
+                        name,
+                    }),
+                    2 => Edit::ScaleDirection(ScaleDirection {
+                        features,
+                        region,
+                        fixed,
+                        fixed_region,
+                        factors: vector,
+                        center,
+                        harmonic_order,
+                        muted,
+                        name,
+                    }),
+                    3 => Edit::Rotate(Rotate {
+                        features,
+                        region,
+                        fixed,
+                        fixed_region,
+                        axis: vector,
+                        degrees: number,
+                        center,
+                        harmonic_order,
+                        muted,
+                        name,
+                    }),
+                    4 => Edit::Affine(Affine {
+                        features,
+                        region,
+                        fixed,
+                        fixed_region,
+                        matrix,
+                        translation: vector,
+                        center,
+                        harmonic_order,
+                        muted,
+                        name,
+                    }),
+                    _ => {
+                        let (vertices, values) = import.into_iter().unzip();
+                        Edit::Displacement(Displacement {
+                            features,
+                            region,
+                            fixed,
+                            fixed_region,
+                            file: None,
+                            vertices,
+                            values,
+                            scale: number,
+                            muted,
+                            name,
+                        })
+                    }
                 }
-            }
-        },
-    )
+            },
+        )
 }
 
 /// A layer that moves a box of [4, 2, 2] cells and 2 by 1 by 1 in size.
 fn layer() -> BoxedStrategy<Edit> {
     let vector = || [-1.0..1.0f64, -1.0..1.0, -1.0..1.0];
     let plane = proptest::option::weighted(0.3, 0.1..1.9f64);
-    (0..6usize, 0..6usize, 0..3usize, 0..5, (vector(), -180.0..180.0f64), plane, proptest::bool::weighted(0.2))
+    (
+        0..6usize,
+        0..6usize,
+        0..3usize,
+        0..5,
+        (vector(), -180.0..180.0f64),
+        plane,
+        proptest::bool::weighted(0.2),
+    )
         .prop_filter("a handle that is not fixed", |(handle, fixed, ..)| handle != fixed)
         .prop_map(|(handle, fixed, order, kind, (vector, number), plane, muted)| {
             let features = names(&[shapes::BOX_FEATURES[handle]]);
             let fixed = names(&[shapes::BOX_FEATURES[fixed]]);
-            let fixed_region =
-                plane.map(|x| Region::HalfSpace(HalfSpaceRegion { origin: [x, 0.0, 0.0], normal: [1.0, 0.0, 0.0] }));
+            let fixed_region = plane.map(|x| {
+                Region::HalfSpace(HalfSpaceRegion {
+                    origin: [x, 0.0, 0.0],
+                    normal: [1.0, 0.0, 0.0],
+                })
+            });
             let harmonic_order = ORDERS[order];
             let (region, name, center) = (None, None, None);
             match kind {
@@ -220,11 +246,15 @@ fn set_muted(edit: &mut Edit, muted: bool) {
 fn random_mesh() -> impl Strategy<Value = Mesh> {
     let counts = [1..5usize, 1..5, 1..5];
     let size = prop_oneof![Just(0.0), Just(1e-300), Just(1e-9), Just(1.0), Just(1e12), Just(1e300)];
-    (0..4, counts, size.clone(), size.clone(), size).prop_map(|(kind, [i, j, k], x, y, z)| match kind {
-        0 => shapes::box_of_tets([i, j, k], [0.0; 3], [x, y, z]),
-        1 => shapes::box_of_hexahedra([i, j, k], [-x, y, 0.0], [x, 2.0 * y, z]),
-        2 => shapes::torus(x, y, [3 * i, 3 * j]),
-        _ => tagged(&shapes::plate([i, j], [0.0, 0.0], [x, y]), |point| (point[0] / x.max(1e-300) * 4.0) as i64),
+    (0..4, counts, size.clone(), size.clone(), size).prop_map(|(kind, [i, j, k], x, y, z)| {
+        match kind {
+            0 => shapes::box_of_tets([i, j, k], [0.0; 3], [x, y, z]),
+            1 => shapes::box_of_hexahedra([i, j, k], [-x, y, 0.0], [x, 2.0 * y, z]),
+            2 => shapes::torus(x, y, [3 * i, 3 * j]),
+            _ => tagged(&shapes::plate([i, j], [0.0, 0.0], [x, y]), |point| {
+                (point[0] / x.max(1e-300) * 4.0) as i64
+            }),
+        }
     })
 }
 

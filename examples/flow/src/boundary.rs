@@ -134,20 +134,24 @@ pub(crate) struct Boundary {
 impl Boundary {
     /// The boundary of one rank's part. Its patches hold all triangles of the whole boundary that belong to a cell of the part.
     /// Normals and areas are not known before [`Boundary::measure`].
-    pub fn new(topology: &Topology, mut patches: Vec<Patch>, halo: &Halo) -> Result<Self, SolverError> {
+    pub fn new(
+        topology: &Topology,
+        mut patches: Vec<Patch>,
+        halo: &Halo,
+    ) -> Result<Self, SolverError> {
         let vertex_count = topology.vertex_count();
         for patch in &mut patches {
             for vertex in patch.triangles.iter_mut().flatten() {
-                *vertex = *topology
-                    .vertex_rank
-                    .get(*vertex as usize)
-                    .ok_or_else(|| SolverError::PatchVertex { patch: patch.name.clone(), vertex: *vertex })?;
+                *vertex = *topology.vertex_rank.get(*vertex as usize).ok_or_else(|| {
+                    SolverError::PatchVertex { patch: patch.name.clone(), vertex: *vertex }
+                })?;
             }
         }
         let mut counted = Vec::with_capacity(patches.len());
         for patch in &mut patches {
             let triangles = std::mem::take(&mut patch.triangles).into_iter();
-            let (mut own, others): (Vec<_>, Vec<_>) = triangles.partition(|triangle| halo.counts(triangle));
+            let (mut own, others): (Vec<_>, Vec<_>) =
+                triangles.partition(|triangle| halo.counts(triangle));
             counted.push(own.len());
             own.extend(others);
             patch.triangles = own;
@@ -175,7 +179,15 @@ impl Boundary {
             }
         }
         let held = vec![[false; 3]; vertex_count];
-        Ok(Self { patches, rules, held, outlets: Vec::new(), open: false, counted, slip: Vec::new() })
+        Ok(Self {
+            patches,
+            rules,
+            held,
+            outlets: Vec::new(),
+            open: false,
+            counted,
+            slip: Vec::new(),
+        })
     }
 
     /// Brings normals and areas up to date with the coordinates. Collective.
@@ -207,7 +219,9 @@ impl Boundary {
                 }
             }
             let first_outlet = self.outlets.len();
-            let is_free = |vertex: u32| (vertex as usize) < halo.rows() && self.rules[vertex as usize] == Rule::Free;
+            let is_free = |vertex: u32| {
+                (vertex as usize) < halo.rows() && self.rules[vertex as usize] == Rule::Free
+            };
             for &vertex in vertices.iter().filter(|&&vertex| is_free(vertex)) {
                 let area = areas[vertex as usize];
                 let size = dot(area, area).sqrt();
@@ -216,7 +230,12 @@ impl Boundary {
                 }
                 if let Condition::Pressure(_) = patch.condition {
                     #[expect(clippy::cast_possible_truncation, reason = "a mesh has few features")]
-                    self.outlets.push(OutletVertex { vertex, patch: index as u32, area, yield_rate: 0.0 });
+                    self.outlets.push(OutletVertex {
+                        vertex,
+                        patch: index as u32,
+                        area,
+                        yield_rate: 0.0,
+                    });
                 } else {
                     let normal = area.map(|value| value / size);
                     if let Some(axis) = (0..3).find(|&axis| normal[axis].abs() > 1.0 - 1e-12) {
@@ -241,11 +260,19 @@ impl Boundary {
     /// Where a prescribed velocity meets no-slip walls, it rules, but not through the walls: what flows in then flows out,
     /// also where a wall slopes away from the inlet. `areas` is memory, zero before and after.
     fn measure_rims(&mut self, points: &[Vector], areas: &mut [Vector], halo: &Halo) {
-        let is_rim =
-            |vertex: u32| (vertex as usize) < halo.rows() && matches!(self.rules[vertex as usize], Rule::Prescribed(_));
+        let is_rim = |vertex: u32| {
+            (vertex as usize) < halo.rows()
+                && matches!(self.rules[vertex as usize], Rule::Prescribed(_))
+        };
         let mut rims = Vec::new();
-        for patch in self.patches.iter().filter(|patch| matches!(patch.condition, Condition::NoSlip)) {
-            for triangle in patch.triangles.iter().filter(|triangle| triangle.iter().any(|&vertex| is_rim(vertex))) {
+        for patch in
+            self.patches.iter().filter(|patch| matches!(patch.condition, Condition::NoSlip))
+        {
+            for triangle in patch
+                .triangles
+                .iter()
+                .filter(|triangle| triangle.iter().any(|&vertex| is_rim(vertex)))
+            {
                 let area = triangle_area(points, *triangle);
                 for &vertex in triangle.iter().filter(|&&vertex| is_rim(vertex)) {
                     rims.push(vertex);
@@ -298,7 +325,8 @@ impl Boundary {
     /// Takes the part of the velocity through walls, where it is not prescribed to be the wall's, from the mesh.
     pub fn impose_slip(&self, velocity: &mut [Vector], mesh_velocity: &[Vector]) {
         for slip in &self.slip {
-            let (own, wall) = (&mut velocity[slip.vertex as usize], mesh_velocity[slip.vertex as usize]);
+            let (own, wall) =
+                (&mut velocity[slip.vertex as usize], mesh_velocity[slip.vertex as usize]);
             let through = dot(minus(*own, wall), slip.normal);
             for axis in 0..3 {
                 own[axis] -= through * slip.normal[axis];
@@ -307,7 +335,13 @@ impl Boundary {
     }
 
     /// The prescribed pressure at an outlet vertex.
-    pub fn outlet_pressure(&self, outlet: &OutletVertex, points: &[Vector], time: f64, parameters: &[f64]) -> f64 {
+    pub fn outlet_pressure(
+        &self,
+        outlet: &OutletVertex,
+        points: &[Vector],
+        time: f64,
+        parameters: &[f64],
+    ) -> f64 {
         match &self.patches[outlet.patch as usize].condition {
             Condition::Pressure(value) => {
                 value.at(&Place { position: points[outlet.vertex as usize], time, parameters })
@@ -322,7 +356,8 @@ impl Boundary {
             let area = triangle_area(points, *triangle);
             triangle.iter().map(|&vertex| dot(field[vertex as usize], area)).sum::<f64>() / 3.0
         };
-        let mut fluxes: Vec<f64> = self.counted_triangles().map(|patch| patch.iter().map(outward).sum()).collect();
+        let mut fluxes: Vec<f64> =
+            self.counted_triangles().map(|patch| patch.iter().map(outward).sum()).collect();
         halo.add(&mut fluxes);
         fluxes
     }
@@ -335,13 +370,15 @@ impl Boundary {
             for triangle in triangles {
                 let area = triangle_area(points, *triangle);
                 let size = dot(area, area).sqrt();
-                total += size * triangle.iter().map(|&vertex| field[vertex as usize]).sum::<f64>() / 3.0;
+                total +=
+                    size * triangle.iter().map(|&vertex| field[vertex as usize]).sum::<f64>() / 3.0;
                 whole += size;
             }
             sums.extend([total, whole]);
         }
         halo.add(&mut sums);
-        let mean = |&[total, whole]: &[f64; 2]| (if whole > 0.0 { total / whole } else { 0.0 }, whole);
+        let mean =
+            |&[total, whole]: &[f64; 2]| (if whole > 0.0 { total / whole } else { 0.0 }, whole);
         sums.as_chunks().0.iter().map(mean).collect()
     }
 

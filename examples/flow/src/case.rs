@@ -10,7 +10,9 @@ use tombolo::Parameter;
 use tombolo_deform::number;
 use tombolo_deform::surface::Surface;
 use tombolo_pipelines::expression::Expression;
-use tombolo_pipelines::language::{LanguageError, Problem, ReadError, Validate, nearest, parse_valid, read_text};
+use tombolo_pipelines::language::{
+    LanguageError, Problem, ReadError, Validate, nearest, parse_valid, read_text,
+};
 use tombolo_pipelines::limits::DOCUMENT;
 
 use crate::boundary::{Condition, Patch, Place, Value};
@@ -177,7 +179,10 @@ impl Case {
     #[must_use]
     pub fn fluid(&self, parameters: &[f64]) -> Fluid {
         let place = Place { position: [0.0; 3], time: 0.0, parameters };
-        Fluid { density: self.value(&self.density).at(&place), viscosity: self.value(&self.viscosity).at(&place) }
+        Fluid {
+            density: self.value(&self.density).at(&place),
+            viscosity: self.value(&self.viscosity).at(&place),
+        }
     }
 
     /// The velocity and the pressure at time 0.
@@ -197,17 +202,18 @@ impl Case {
                 return Err(CaseError::UnknownFeature {
                     file: file.into(),
                     feature: feature.clone(),
-                    near: nearest(feature, features.names().iter().map(String::as_str)).map(str::to_owned),
+                    near: nearest(feature, features.names().iter().map(String::as_str))
+                        .map(str::to_owned),
                     features: features.names().to_vec(),
                 });
             }
         }
         let mut patches = Vec::with_capacity(features.names().len());
         for name in features.names() {
-            let condition = self
-                .boundary
-                .get(name)
-                .ok_or_else(|| CaseError::NoCondition { file: file.into(), feature: name.clone() })?;
+            let condition = self.boundary.get(name).ok_or_else(|| CaseError::NoCondition {
+                file: file.into(),
+                feature: name.clone(),
+            })?;
             let condition = match condition {
                 BoundaryCondition::Velocity(velocity) => Condition::Velocity(self.vector(velocity)),
                 BoundaryCondition::Pressure(pressure) => Condition::Pressure(self.value(pressure)),
@@ -218,7 +224,9 @@ impl Case {
         }
         for (triangle, &face) in surface.triangles().iter().zip(surface.triangle_faces()) {
             let feature = features.face_features()[face as usize];
-            patches[feature as usize].triangles.push(triangle.map(|vertex| surface.vertices()[vertex as usize]));
+            patches[feature as usize]
+                .triangles
+                .push(triangle.map(|vertex| surface.vertices()[vertex as usize]));
         }
         Ok(patches)
     }
@@ -233,7 +241,9 @@ impl Case {
             Number::Formula(formula) => formula,
         };
         // Formulas were parsed once when the case was read; one that still fails is no number, which the solver tells.
-        let Ok(expression) = Expression::parse(formula, &self.names()) else { return Value::Uniform(f64::NAN) };
+        let Ok(expression) = Expression::parse(formula, &self.names()) else {
+            return Value::Uniform(f64::NAN);
+        };
         Value::Function(Arc::new(move |place| {
             let [x, y, z] = place.position;
             let mut values = vec![x, y, z, place.time];
@@ -273,7 +283,9 @@ impl Case {
         }
         let elsewhere = at([0.37, -1.9, 5.3], 7.1);
         if elsewhere.to_bits() != found.to_bits() {
-            return Err(Problem::new("the fluid is the same everywhere and always; found a formula of x, y, z or t"));
+            return Err(Problem::new(
+                "the fluid is the same everywhere and always; found a formula of x, y, z or t",
+            ));
         }
         Ok(())
     }
@@ -288,7 +300,8 @@ impl Validate for Case {
                     "`{name}` is a place or the time, and cannot name a parameter"
                 ))));
             }
-            Expression::parse(name, &[name]).map_err(|error| inside(Problem::new(format!("not a name: {error}"))))?;
+            Expression::parse(name, &[name])
+                .map_err(|error| inside(Problem::new(format!("not a name: {error}"))))?;
             if !(range.minimum <= range.value && range.value <= range.maximum) {
                 let message = format!(
                     "found {}, expected a number from {} to {}",
@@ -314,11 +327,16 @@ impl Validate for Case {
             checked.map_err(|problem| problem.within(feature).within("boundary"))?;
         }
         let initial = |problem: Problem, key| problem.within(key).within("initial");
-        self.check_vector(&self.initial.velocity).map_err(|problem| initial(problem, "velocity"))?;
-        self.check_number(&self.initial.pressure).map_err(|problem| initial(problem, "pressure"))?;
+        self.check_vector(&self.initial.velocity)
+            .map_err(|problem| initial(problem, "velocity"))?;
+        self.check_number(&self.initial.pressure)
+            .map_err(|problem| initial(problem, "pressure"))?;
         if self.time_step <= 0.0 {
-            return Err(Problem::new(format!("found {}, expected a positive number", number::Number(self.time_step)))
-                .within("time_step"));
+            return Err(Problem::new(format!(
+                "found {}, expected a positive number",
+                number::Number(self.time_step)
+            ))
+            .within("time_step"));
         }
         Ok(())
     }

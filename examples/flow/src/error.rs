@@ -16,7 +16,9 @@ pub enum SolverError {
         found: CellType,
     },
     /// A mesh without volume.
-    #[error("the mesh has no tetrahedron; the flow solver needs a mesh of the volume, not of its surface")]
+    #[error(
+        "the mesh has no tetrahedron; the flow solver needs a mesh of the volume, not of its surface"
+    )]
     NoCells,
     /// A vertex with too many neighbours.
     #[error("vertex {vertex} has more than 65535 neighbours")]

@@ -23,7 +23,8 @@ impl Element {
         let (bc, ca, ab) = (cross(b, c), cross(c, a), cross(a, b));
         let determinant = dot(a, bc);
         let others = [bc, ca, ab].map(|area| area.map(|value| value / determinant));
-        let first = std::array::from_fn(|axis| -(others[0][axis] + others[1][axis] + others[2][axis]));
+        let first =
+            std::array::from_fn(|axis| -(others[0][axis] + others[1][axis] + others[2][axis]));
         Self { gradients: [first, others[0], others[1], others[2]], volume: determinant / 6.0 }
     }
 

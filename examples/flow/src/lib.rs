@@ -29,7 +29,10 @@
 //! - Momentum is not conserved to rounding: the convective form is used.
 //! - No turbulence model, and no shock capturing: at cell Reynolds numbers far above one a jet's edges may overshoot.
 #![warn(missing_docs)]
-#![expect(clippy::needless_range_loop, reason = "loops over rows and components index several arrays at once")]
+#![expect(
+    clippy::needless_range_loop,
+    reason = "loops over rows and components index several arrays at once"
+)]
 
 mod boundary;
 pub mod case;

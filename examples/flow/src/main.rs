@@ -76,12 +76,16 @@ fn main() -> ExitCode {
 
 /// Whether this process was started by mpirun, together with others or alone.
 fn under_mpirun() -> bool {
-    ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK"].into_iter().any(|name| std::env::var_os(name).is_some())
+    ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK"]
+        .into_iter()
+        .any(|name| std::env::var_os(name).is_some())
 }
 
 /// Does the work on the ranks that mpirun started, or on this process. The message is empty where the first rank has said what is wrong.
 #[cfg(feature = "distributed")]
-fn on_ranks(work: impl FnOnce(Ranks, Option<Solvers>) -> Result<(), Box<dyn std::error::Error>>) -> Result<(), String> {
+fn on_ranks(
+    work: impl FnOnce(Ranks, Option<Solvers>) -> Result<(), Box<dyn std::error::Error>>,
+) -> Result<(), String> {
     use tombolo::{
         comm::{
             Alarm,
@@ -109,7 +113,9 @@ fn on_ranks(work: impl FnOnce(Ranks, Option<Solvers>) -> Result<(), Box<dyn std:
 }
 
 #[cfg(not(feature = "distributed"))]
-fn on_ranks(work: impl FnOnce(Ranks, Option<Solvers>) -> Result<(), Box<dyn std::error::Error>>) -> Result<(), String> {
+fn on_ranks(
+    work: impl FnOnce(Ranks, Option<Solvers>) -> Result<(), Box<dyn std::error::Error>>,
+) -> Result<(), String> {
     let ranks = std::env::var("OMPI_COMM_WORLD_SIZE").or_else(|_| std::env::var("PMI_SIZE"));
     if under_mpirun() && ranks.is_ok_and(|ranks| ranks != "1") {
         return Err(
@@ -119,10 +125,15 @@ fn on_ranks(work: impl FnOnce(Ranks, Option<Solvers>) -> Result<(), Box<dyn std:
     work(Arc::new(Solo), None).map_err(|error| error.to_string())
 }
 
-fn run(arguments: Arguments, ranks: Ranks, solvers: Option<Solvers>) -> Result<(), Box<dyn std::error::Error>> {
+fn run(
+    arguments: Arguments,
+    ranks: Ranks,
+    solvers: Option<Solvers>,
+) -> Result<(), Box<dyn std::error::Error>> {
     let is_first = ranks.rank() == 0;
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-    let threads = arguments.threads.or_else(|| (ranks.size() > 1).then(|| (cores() / ranks.size()).max(1)));
+    let threads =
+        arguments.threads.or_else(|| (ranks.size() > 1).then(|| (cores() / ranks.size()).max(1)));
     if let Some(threads) = threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
     }

@@ -38,7 +38,12 @@ pub(crate) struct Known<'a> {
 }
 
 /// Gathers each element's state.
-pub(crate) fn element_states(topology: &Topology, geometry: &Geometry, known: &Known, states: &mut Vec<ElementState>) {
+pub(crate) fn element_states(
+    topology: &Topology,
+    geometry: &Geometry,
+    known: &Known,
+    states: &mut Vec<ElementState>,
+) {
     (&topology.elements, &geometry.elements)
         .into_par_iter()
         .with_min_len(1024)
@@ -57,7 +62,8 @@ pub(crate) fn element_states(topology: &Topology, geometry: &Geometry, known: &K
 
 /// The intrinsic time of an element (Tezduyar 2003): what is fastest of the step, the flow across and diffusion rules.
 fn intrinsic_time(element: &Element, convecting: Vector, known: &Known) -> f64 {
-    let across: f64 = element.gradients.iter().map(|&gradient| dot(convecting, gradient).abs()).sum();
+    let across: f64 =
+        element.gradients.iter().map(|&gradient| dot(convecting, gradient).abs()).sum();
     let inverse_size: f64 = element.gradients.iter().map(|&gradient| dot(gradient, gradient)).sum();
     let diffusion = 3.0 * known.fluid.viscosity / known.fluid.density * inverse_size;
     let step = 2.0 / known.time_step;
@@ -65,7 +71,9 @@ fn intrinsic_time(element: &Element, convecting: Vector, known: &Known) -> f64 {
 }
 
 fn mean(corners: [Vector; 4]) -> Vector {
-    std::array::from_fn(|axis| 0.25 * (corners[0][axis] + corners[1][axis] + corners[2][axis] + corners[3][axis]))
+    std::array::from_fn(|axis| {
+        0.25 * (corners[0][axis] + corners[1][axis] + corners[2][axis] + corners[3][axis])
+    })
 }
 
 /// Fills the matrix of one velocity component, which all three share, and the right-hand sides.
@@ -82,37 +90,47 @@ pub(crate) fn assemble(
 ) {
     let Fluid { density, viscosity } = known.fluid;
     let rows = row_slices(&topology.pattern.starts, &mut matrix.values);
-    rows.into_par_iter().zip(right.par_iter_mut()).enumerate().with_min_len(512).for_each(|(row, (values, right))| {
-        values.fill(0.0);
-        let mut total = [0.0; 3];
-        let (own_convecting, own_history) = (known.convecting[row], known.history[row]);
-        for incidence in topology.around(row) {
-            let (local, element) = (incidence.local as usize, incidence.element as usize);
-            let (shape, state) = (&geometry.elements[element], &states[element]);
-            let volume = shape.volume;
-            let own = shape.gradients[local];
-            let weight = state.intrinsic_time * dot(state.convecting, own);
-            let galerkin: Vector =
-                std::array::from_fn(|axis| 0.05 * (4.0 * state.convecting[axis] + own_convecting[axis]));
-            for (other, gradient) in shape.gradients.iter().enumerate() {
-                let mass = if other == local { 0.1 } else { 0.05 };
-                let inertia = known.rate * mass
-                    + dot(galerkin, *gradient)
-                    + weight * (0.25 * known.rate + dot(state.convecting, *gradient));
-                values[incidence.slots[other] as usize] +=
-                    volume * (density * inertia + viscosity * dot(own, *gradient));
+    rows.into_par_iter().zip(right.par_iter_mut()).enumerate().with_min_len(512).for_each(
+        |(row, (values, right))| {
+            values.fill(0.0);
+            let mut total = [0.0; 3];
+            let (own_convecting, own_history) = (known.convecting[row], known.history[row]);
+            for incidence in topology.around(row) {
+                let (local, element) = (incidence.local as usize, incidence.element as usize);
+                let (shape, state) = (&geometry.elements[element], &states[element]);
+                let volume = shape.volume;
+                let own = shape.gradients[local];
+                let weight = state.intrinsic_time * dot(state.convecting, own);
+                let galerkin: Vector = std::array::from_fn(|axis| {
+                    0.05 * (4.0 * state.convecting[axis] + own_convecting[axis])
+                });
+                for (other, gradient) in shape.gradients.iter().enumerate() {
+                    let mass = if other == local { 0.1 } else { 0.05 };
+                    let inertia = known.rate * mass
+                        + dot(galerkin, *gradient)
+                        + weight * (0.25 * known.rate + dot(state.convecting, *gradient));
+                    values[incidence.slots[other] as usize] +=
+                        volume * (density * inertia + viscosity * dot(own, *gradient));
+                }
+                for axis in 0..3 {
+                    let history = 0.05 * (4.0 * state.history[axis] + own_history[axis])
+                        + weight * state.history[axis];
+                    total[axis] += volume
+                        * (density * history - (0.25 + weight) * state.pressure_gradient[axis]);
+                }
             }
-            for axis in 0..3 {
-                let history = 0.05 * (4.0 * state.history[axis] + own_history[axis]) + weight * state.history[axis];
-                total[axis] += volume * (density * history - (0.25 + weight) * state.pressure_gradient[axis]);
-            }
-        }
-        *right = total;
-    });
+            *right = total;
+        },
+    );
 }
 
 /// The integral of each shape function times the divergence of the velocity.
-pub(crate) fn divergence(topology: &Topology, geometry: &Geometry, velocity: &[Vector], result: &mut [f64]) {
+pub(crate) fn divergence(
+    topology: &Topology,
+    geometry: &Geometry,
+    velocity: &[Vector],
+    result: &mut [f64],
+) {
     for_each_chunk(result, |start, chunk| {
         for (offset, value) in chunk.iter_mut().enumerate() {
             *value = topology
@@ -134,13 +152,19 @@ pub(crate) fn divergence(topology: &Topology, geometry: &Geometry, velocity: &[V
 }
 
 /// The integral of each shape function times the gradient of a scalar field.
-pub(crate) fn gradient(topology: &Topology, geometry: &Geometry, field: &[f64], result: &mut [Vector]) {
+pub(crate) fn gradient(
+    topology: &Topology,
+    geometry: &Geometry,
+    field: &[f64],
+    result: &mut [Vector],
+) {
     for_each_chunk(result, |start, chunk| {
         for (offset, value) in chunk.iter_mut().enumerate() {
             let mut total = [0.0; 3];
             for incidence in topology.around(start + offset) {
                 let element = &geometry.elements[incidence.element as usize];
-                let corners = topology.elements[incidence.element as usize].map(|vertex| field[vertex as usize]);
+                let corners = topology.elements[incidence.element as usize]
+                    .map(|vertex| field[vertex as usize]);
                 let own = element.gradient(corners);
                 for axis in 0..3 {
                     total[axis] += 0.25 * element.volume * own[axis];
@@ -169,7 +193,9 @@ pub(crate) fn subtract_pressure_stabilisation(
             for incidence in topology.around(start + offset) {
                 let element = incidence.element as usize;
                 for axis in 0..3 {
-                    total[axis] += 0.25 * geometry.elements[element].volume * states[element].pressure_gradient[axis];
+                    total[axis] += 0.25
+                        * geometry.elements[element].volume
+                        * states[element].pressure_gradient[axis];
                 }
             }
             let volume = geometry.vertex_volumes[start + offset];
@@ -183,8 +209,10 @@ pub(crate) fn subtract_pressure_stabilisation(
             for incidence in topology.around(start + offset) {
                 let element = incidence.element as usize;
                 let (shape, state) = (&geometry.elements[element], &states[element]);
-                let smooth = mean(topology.elements[element].map(|vertex| projected[vertex as usize]));
-                let rough = std::array::from_fn(|axis| state.pressure_gradient[axis] - smooth[axis]);
+                let smooth =
+                    mean(topology.elements[element].map(|vertex| projected[vertex as usize]));
+                let rough =
+                    std::array::from_fn(|axis| state.pressure_gradient[axis] - smooth[axis]);
                 *value -= state.intrinsic_time / density
                     * shape.volume
                     * dot(shape.gradients[incidence.local as usize], rough);

@@ -24,8 +24,13 @@ pub fn partition(mesh: &Mesh, ranks: usize) -> Result<Vec<usize>, PartitionError
     }
     let failed = |error: &dyn std::fmt::Display| PartitionError::Metis(error.to_string());
     let number = |value: usize| metis::Idx::try_from(value).map_err(|error| failed(&error));
-    let starts = cells.offsets().iter().map(|&start| number(start)).collect::<Result<Vec<_>, _>>()?;
-    let vertices = cells.connectivity().iter().map(|&vertex| number(vertex as usize)).collect::<Result<Vec<_>, _>>()?;
+    let starts =
+        cells.offsets().iter().map(|&start| number(start)).collect::<Result<Vec<_>, _>>()?;
+    let vertices = cells
+        .connectivity()
+        .iter()
+        .map(|&vertex| number(vertex as usize))
+        .collect::<Result<Vec<_>, _>>()?;
     // Cells are neighbours where they share a face.
     let mut dual = metis::mesh_to_dual(&starts, &vertices, 3).map_err(|error| failed(&error))?;
     let (neighbours_starts, neighbours) = dual.as_mut();
@@ -53,10 +58,13 @@ fn bisected(mesh: &Mesh, ranks: usize) -> Vec<usize> {
     #[expect(clippy::cast_precision_loss, reason = "a few vertices")]
     let centre = |cell: usize| -> Vector {
         let vertices = cells.vertices(cell);
-        let sum = |axis: usize| vertices.iter().map(|&vertex| mesh.points()[vertex as usize][axis]).sum::<f64>();
+        let sum = |axis: usize| {
+            vertices.iter().map(|&vertex| mesh.points()[vertex as usize][axis]).sum::<f64>()
+        };
         [0, 1, 2].map(|axis: usize| sum(axis) / vertices.len().max(1) as f64)
     };
-    let mut centres: Vec<(Vector, usize)> = (0..cells.len()).map(|cell| (centre(cell), cell)).collect();
+    let mut centres: Vec<(Vector, usize)> =
+        (0..cells.len()).map(|cell| (centre(cell), cell)).collect();
     let mut of_cells = vec![0; cells.len()];
     bisect(&mut centres, 0, ranks, &mut of_cells);
     of_cells

@@ -75,15 +75,24 @@ impl Share {
             let part = Part::of(&mesh.into())?;
             let shared = SharedVertices::find(communicator, &part)?;
             let own = part.cells.clone();
-            return Ok((Self { mesh: mesh.clone(), part, shared, own, without_numbers: true }, patches));
+            return Ok((
+                Self { mesh: mesh.clone(), part, shared, own, without_numbers: true },
+                patches,
+            ));
         }
         // One rank says who gets what, so that all are sure to mean the same.
         let dealt = if rank == 0 { deal(mesh, ranks, dealing) } else { Ok(Vec::new()) };
-        let mut bytes: Vec<u8> =
-            agree(communicator, dealt)?.into_iter().flat_map(|rank| (rank as u64).to_le_bytes()).collect();
+        let mut bytes: Vec<u8> = agree(communicator, dealt)?
+            .into_iter()
+            .flat_map(|rank| (rank as u64).to_le_bytes())
+            .collect();
         communicator.broadcast(0, &mut bytes);
-        let of_cells: Vec<usize> =
-            bytes.as_chunks().0.iter().map(|eight| usize::try_from(u64::from_le_bytes(*eight)).unwrap_or(0)).collect();
+        let of_cells: Vec<usize> = bytes
+            .as_chunks()
+            .0
+            .iter()
+            .map(|eight| usize::try_from(u64::from_le_bytes(*eight)).unwrap_or(0))
+            .collect();
         let cut = Part::cut(mesh, &of_cells, rank, true).and_then(|part| match dealing.shuffle {
             Some(seed) => shuffled(&part, seed + rank as u64),
             None => Ok(part),
@@ -150,7 +159,8 @@ impl Share {
         for entry in gathered.iter().flat_map(|message| message.as_chunks::<32>().0) {
             let (number, value) = entry.split_at(8);
             let number = number.first_chunk().map_or(u64::MAX, |eight| u64::from_le_bytes(*eight));
-            if let Some(place) = usize::try_from(number).ok().and_then(|number| all.get_mut(number)) {
+            if let Some(place) = usize::try_from(number).ok().and_then(|number| all.get_mut(number))
+            {
                 *place = Vector::read(value);
             }
         }
@@ -164,7 +174,10 @@ fn deal(mesh: &Mesh, ranks: usize, dealing: Dealing) -> Result<Vec<usize>, DealE
     if empty >= ranks || ranks == 1 {
         return Err(DealError::EmptyRank { rank: empty, ranks });
     }
-    Ok(partition(mesh, ranks - 1)?.into_iter().map(|rank| rank + usize::from(rank >= empty)).collect())
+    Ok(partition(mesh, ranks - 1)?
+        .into_iter()
+        .map(|rank| rank + usize::from(rank >= empty))
+        .collect())
 }
 
 /// The triangles of the whole boundary that belong to a cell of the part, in the part's numbers.
@@ -186,8 +199,10 @@ fn own_patches(part: &Part, surface: &Surface, mesh: &Mesh, patches: Vec<Patch>)
         .map(|(triangle, _)| sorted(triangle.map(|vertex| surface.vertices()[vertex as usize])))
         .collect();
     let own = |patch: Patch| {
-        let triangles = patch.triangles.iter().filter(|triangle| here.contains(&sorted(**triangle)));
-        let triangles = triangles.map(|triangle| triangle.map(|vertex| numbers[vertex as usize])).collect();
+        let triangles =
+            patch.triangles.iter().filter(|triangle| here.contains(&sorted(**triangle)));
+        let triangles =
+            triangles.map(|triangle| triangle.map(|vertex| numbers[vertex as usize])).collect();
         Patch { triangles, ..patch }
     };
     patches.into_iter().map(own).collect()
@@ -204,26 +219,36 @@ fn shuffled(part: &Part, seed: u64) -> Result<Part, MeshError> {
     let cells = order(part.cells.len(), seed ^ 0x5DEE_CE66);
     let mut numbers = vec![0_u32; vertices.len()];
     (0..).zip(&vertices).for_each(|(number, &vertex)| numbers[vertex] = number);
-    let renumbered = |of: &[u32]| of.iter().map(|&vertex| numbers[vertex as usize]).collect::<Vec<u32>>();
+    let renumbered =
+        |of: &[u32]| of.iter().map(|&vertex| numbers[vertex as usize]).collect::<Vec<u32>>();
     let mut own = Cells::new();
     for &cell in &cells {
         match part.cells.polyhedron_faces(cell) {
             [] => own.push(part.cells.cell_type(cell), &renumbered(part.cells.vertices(cell)))?,
-            faces => own.push_polyhedron(&faces.iter().map(|face| renumbered(face)).collect::<Vec<_>>())?,
+            faces => {
+                own.push_polyhedron(&faces.iter().map(|face| renumbered(face)).collect::<Vec<_>>())?
+            }
         }
     }
     let features = match &part.features {
         FeatureSource::SharpEdges => FeatureSource::SharpEdges,
-        FeatureSource::Vertices(tags) => FeatureSource::Vertices(vertices.iter().map(|&vertex| tags[vertex]).collect()),
+        FeatureSource::Vertices(tags) => {
+            FeatureSource::Vertices(vertices.iter().map(|&vertex| tags[vertex]).collect())
+        }
         FeatureSource::Faces(tagged) => {
             let mut faces = Cells::new();
             for (cell_type, vertices) in tagged.faces.iter() {
                 faces.push(cell_type, &renumbered(vertices))?;
             }
-            FeatureSource::Faces(TaggedFaces { faces, tags: tagged.tags.clone(), names: tagged.names.clone() })
+            FeatureSource::Faces(TaggedFaces {
+                faces,
+                tags: tagged.tags.clone(),
+                names: tagged.names.clone(),
+            })
         }
     };
-    let picked = |numbers: &Vec<u64>, order: &[usize]| order.iter().map(|&place| numbers[place]).collect();
+    let picked =
+        |numbers: &Vec<u64>, order: &[usize]| order.iter().map(|&place| numbers[place]).collect();
     Ok(Part {
         points: vertices.iter().map(|&vertex| part.points[vertex]).collect(),
         cells: own,

@@ -6,13 +6,17 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use tombolo::comm::{Communicator, RankError, Solo, agree_on};
-use tombolo::{Adaptor, ExecuteError, FinalizeError, InitializeError, JournalError, Settings, Solvers, Step};
+use tombolo::{
+    Adaptor, ExecuteError, FinalizeError, InitializeError, JournalError, Settings, Solvers, Step,
+};
 use tombolo_deform::mesh::{ArrayView, Mesh, MeshError, NumberType, Vector};
 use tombolo_deform::surface::{FeatureSettings, Surface, SurfaceError};
 use tombolo_pipelines::distributed::DistributedError;
 use tombolo_pipelines::extract::{Association, Channel, Field, FieldView};
 use tombolo_pipelines::files::{self, Compression, FileError};
-use tombolo_pipelines::language::{self, Config, LanguageError, ReadError, StreamServer, TimedCommand};
+use tombolo_pipelines::language::{
+    self, Config, LanguageError, ReadError, StreamServer, TimedCommand,
+};
 use tombolo_pipelines::limits::{DOCUMENT, WAITING_BYTES};
 
 use crate::case::{Case, CaseError};
@@ -159,7 +163,10 @@ impl Run {
     ///
     /// # Errors
     /// [`ProgramError`], on several ranks the same on all of them.
-    pub fn on(communicator: Arc<dyn Communicator>, options: &Options) -> Result<Self, ProgramError> {
+    pub fn on(
+        communicator: Arc<dyn Communicator>,
+        options: &Options,
+    ) -> Result<Self, ProgramError> {
         Self::solved_by(communicator, None, options)
     }
 
@@ -175,7 +182,8 @@ impl Run {
         let is_first = communicator.rank() == 0;
         let read = agreed(&*communicator, Read::new(options, is_first))?;
         let Read { case, config, orders, mesh, surface, patches, history } = read;
-        let (share, patches) = Share::of(&*communicator, &mesh, &surface, patches, options.dealing)?;
+        let (share, patches) =
+            Share::of(&*communicator, &mesh, &surface, patches, options.dealing)?;
         let whole = (is_first && options.out.is_some()).then_some(mesh);
         let declared = case.declared_parameters();
         let parameters: Vec<f64> = declared.iter().map(|parameter| parameter.value).collect();
@@ -245,7 +253,9 @@ impl Run {
         let adaptor = match self.adaptor.finalize() {
             Ok(report) => report,
             Err(FinalizeError::Files { report, first, count }) => {
-                eprintln!("flow: {count} file(s) of the pipelines could not be written; the first: {first}");
+                eprintln!(
+                    "flow: {count} file(s) of the pipelines could not be written; the first: {first}"
+                );
                 *report
             }
             Err(error) => return Err(error.into()),
@@ -269,11 +279,20 @@ impl Run {
         while self.steps.is_none_or(|steps| self.solver.cycle() < steps) {
             let step = Step { cycle: self.solver.cycle(), time: self.solver.time(), time_step };
             let fields = [
-                FieldView { name: "velocity", association: Association::Vertex, values: ArrayView::vectors(&velocity) },
-                FieldView { name: "pressure", association: Association::Vertex, values: ArrayView::scalars(&pressure) },
+                FieldView {
+                    name: "velocity",
+                    association: Association::Vertex,
+                    values: ArrayView::vectors(&velocity),
+                },
+                FieldView {
+                    name: "pressure",
+                    association: Association::Vertex,
+                    values: ArrayView::scalars(&pressure),
+                },
             ];
             let mesh = self.share.view(&self.points);
-            let steering = self.adaptor.execute(&step, &[Channel { name: "fluid", mesh, fields: &fields }])?;
+            let steering =
+                self.adaptor.execute(&step, &[Channel { name: "fluid", mesh, fields: &fields }])?;
             if steering.stop {
                 break;
             }
@@ -298,15 +317,19 @@ impl Run {
             if moved {
                 let shape = self.share.measure(&*self.communicator, &self.points);
                 self.worst.inverted = self.worst.inverted.max(shape.inverted);
-                self.worst.min_scaled_jacobian = self.worst.min_scaled_jacobian.min(shape.min_scaled_jacobian);
+                self.worst.min_scaled_jacobian =
+                    self.worst.min_scaled_jacobian.min(shape.min_scaled_jacobian);
             }
             let motion = moved.then_some(Motion { points: &self.points });
             let outcome = self.solver.step(time_step, motion)?;
             self.flow.count(&outcome, &self.solver);
             if self.has_history {
-                let (cycle, time, through) = (self.solver.cycle(), self.solver.time(), Through::now(&self.solver));
+                let (cycle, time, through) =
+                    (self.solver.cycle(), self.solver.time(), Through::now(&self.solver));
                 let seconds = begun.elapsed().as_secs_f64();
-                let add = |history: &mut History| history.add(cycle, time, through, seconds).map_err(unwritten);
+                let add = |history: &mut History| {
+                    history.add(cycle, time, through, seconds).map_err(unwritten)
+                };
                 let added = self.history.as_mut().map_or(Ok(()), add);
                 agreed(&*self.communicator, added)?;
             }
@@ -322,13 +345,15 @@ impl Run {
         let communicator = &*self.communicator;
         let before = || self.whole.as_ref().map_or(Vec::new(), |mesh| mesh.points().to_vec());
         let none = || vec![[0.0; 3]; self.whole.as_ref().map_or(0, |mesh| mesh.points().len())];
-        let pressure: Vec<Vector> = self.solver.pressure().into_iter().map(|value| [value, 0.0, 0.0]).collect();
+        let pressure: Vec<Vector> =
+            self.solver.pressure().into_iter().map(|value| [value, 0.0, 0.0]).collect();
         let gathered = [
             self.share.gather(communicator, &self.points, before()),
             self.share.gather(communicator, &self.solver.velocity(), none()),
             self.share.gather(communicator, &pressure, none()),
         ];
-        let (Some(whole), [Some(points), Some(velocity), Some(pressure)]) = (&self.whole, gathered) else {
+        let (Some(whole), [Some(points), Some(velocity), Some(pressure)]) = (&self.whole, gathered)
+        else {
             return Ok(());
         };
         let velocity = Field {
@@ -351,7 +376,10 @@ impl Run {
 }
 
 /// On one process the outcome as it is; on several, where it failed on one, an error on all.
-fn agreed<T>(communicator: &dyn Communicator, mine: Result<T, ProgramError>) -> Result<T, ProgramError> {
+fn agreed<T>(
+    communicator: &dyn Communicator,
+    mine: Result<T, ProgramError>,
+) -> Result<T, ProgramError> {
     if communicator.size() == 1 { mine } else { Ok(agree_on(communicator, mine)?) }
 }
 
@@ -362,7 +390,9 @@ fn unwritten((file, source): (PathBuf, std::io::Error)) -> ProgramError {
 fn config(options: &Options, case: &Case) -> Result<Config, ProgramError> {
     let mut config = match options.pipelines.as_ref().or(case.pipelines.as_ref()) {
         None => Settings::default().config,
-        Some(file) => language::parse(&language::read_text(file, DOCUMENT)?, &file.display().to_string())?,
+        Some(file) => {
+            language::parse(&language::read_text(file, DOCUMENT)?, &file.display().to_string())?
+        }
     };
     if options.headless {
         config.stream = None;
@@ -378,8 +408,9 @@ fn config(options: &Options, case: &Case) -> Result<Config, ProgramError> {
 fn orders(options: &Options, case: &Case) -> Result<Vec<TimedCommand>, ProgramError> {
     match options.orders.as_ref().or(case.orders.as_ref()) {
         None => Ok(Vec::new()),
-        Some(file) => {
-            Ok(language::parse_orders(&language::read_text(file, WAITING_BYTES)?, &file.display().to_string())?)
-        }
+        Some(file) => Ok(language::parse_orders(
+            &language::read_text(file, WAITING_BYTES)?,
+            &file.display().to_string(),
+        )?),
     }
 }

@@ -95,13 +95,17 @@ impl FlowReport {
         let steps = self.steps.max(1) as f64;
         self.momentum_iterations /= steps;
         self.pressure_iterations /= steps;
-        for ((patch, flux), (pressure, _)) in solver.patches().iter().zip(solver.fluxes()).zip(solver.mean_pressures())
+        for ((patch, flux), (pressure, _)) in
+            solver.patches().iter().zip(solver.fluxes()).zip(solver.mean_pressures())
         {
             self.fluxes.insert(patch.name.clone(), flux);
             self.mean_pressures.insert(patch.name.clone(), pressure);
         }
-        Through { mass_in: self.mass_in, mass_out: self.mass_out, pressure_drop: self.pressure_drop } =
-            Through::now(solver);
+        Through {
+            mass_in: self.mass_in,
+            mass_out: self.mass_out,
+            pressure_drop: self.pressure_drop,
+        } = Through::now(solver);
         self.max_velocity = solver.max_velocity();
         self.courant = solver.courant(time_step);
     }

@@ -10,7 +10,8 @@ use crate::SolverError;
 use crate::boundary::{Boundary, Patch, Place, Rule, Value};
 use crate::geometry::{Geometry, dot};
 use crate::linear::{
-    BiCgStab, BlockIncompleteLu, ConjugateGradients, Halo, Matrix, Outcome, Pattern, Schwarz, for_each_chunk, sum,
+    BiCgStab, BlockIncompleteLu, ConjugateGradients, Halo, Matrix, Outcome, Pattern, Schwarz,
+    for_each_chunk, sum,
 };
 use crate::momentum::{self, ElementState, Known};
 use crate::topology::Topology;
@@ -125,7 +126,12 @@ impl Solver {
     ///
     /// # Errors
     /// [`SolverError`] for a mesh that is not of tetrahedra, that has an inverted one, or for a fluid that is none.
-    pub fn new(mesh: &Mesh, patches: Vec<Patch>, fluid: Fluid, settings: Settings) -> Result<Self, SolverError> {
+    pub fn new(
+        mesh: &Mesh,
+        patches: Vec<Patch>,
+        fluid: Fluid,
+        settings: Settings,
+    ) -> Result<Self, SolverError> {
         check_fluid(fluid)?;
         let topology = Topology::new(mesh)?;
         let halo = Halo::alone(topology.vertex_count());
@@ -173,11 +179,13 @@ impl Solver {
                 .ok_or(SolverError::NoCells)?;
             Ok((topology, geometry, boundary, momentum))
         });
-        let (topology, geometry, mut boundary, (momentum_diagonal, momentum_preconditioner)) = halo.agree(own)?;
+        let (topology, geometry, mut boundary, (momentum_diagonal, momentum_preconditioner)) =
+            halo.agree(own)?;
         boundary.measure(&geometry, &halo);
         let (vertices, rows) = (topology.vertex_count(), topology.rows());
         let momentum = Matrix::zeros(Arc::clone(&topology.pattern));
-        let projection = Projection::new(&topology, &geometry, &boundary, &halo, momentum_diagonal.clone());
+        let projection =
+            Projection::new(&topology, &geometry, &boundary, &halo, momentum_diagonal.clone());
         Ok(Self {
             settings,
             fluid,
@@ -246,7 +254,11 @@ impl Solver {
     /// # Errors
     /// [`SolverError::Inverted`] for a motion that turns an element inside out, and [`SolverError::Length`]: the solver then
     /// is as before. [`SolverError::Diverged`] where the solution is no longer finite: there is no going on from there.
-    pub fn step(&mut self, time_step: f64, motion: Option<Motion>) -> Result<StepOutcome, SolverError> {
+    pub fn step(
+        &mut self,
+        time_step: f64,
+        motion: Option<Motion>,
+    ) -> Result<StepOutcome, SolverError> {
         if !(time_step > 0.0 && time_step.is_finite()) {
             return Err(SolverError::NotPositive { what: "the time step", value: time_step });
         }
@@ -255,7 +267,13 @@ impl Solver {
         let impulse = self.jump || moves != self.moving;
         let mut pressure_outcome = None;
         if impulse {
-            self.boundary.impose(&mut self.velocity, &self.mesh_velocity, &self.geometry.points, end, &self.parameters);
+            self.boundary.impose(
+                &mut self.velocity,
+                &self.mesh_velocity,
+                &self.geometry.points,
+                end,
+                &self.parameters,
+            );
             self.halo.update(&mut self.velocity);
             pressure_outcome = Some(self.apply_impulse());
         }
@@ -334,7 +352,11 @@ impl Solver {
     fn moved(&self, motion: Motion) -> Result<Geometry, SolverError> {
         let vertices = self.topology.vertex_count();
         if motion.points.len() != vertices {
-            return Err(SolverError::Length { what: "coordinates", found: motion.points.len(), expected: vertices });
+            return Err(SolverError::Length {
+                what: "coordinates",
+                found: motion.points.len(),
+                expected: vertices,
+            });
         }
         let geometry = Geometry::new(&self.topology, self.topology.to_solver(motion.points));
         check_elements(&self.topology, &geometry, self.cycle)?;
@@ -349,7 +371,9 @@ impl Solver {
         for_each_chunk(&mut self.history, |start, chunk| {
             for (offset, value) in chunk.iter_mut().enumerate() {
                 let (now, before) = (now[start + offset], before[start + offset]);
-                *value = std::array::from_fn(|c| (weights[0] * now[c] + weights[1] * before[c]) / time_step);
+                *value = std::array::from_fn(|c| {
+                    (weights[0] * now[c] + weights[1] * before[c]) / time_step
+                });
             }
         });
         for_each_chunk(&mut self.scratch, |start, chunk| {
@@ -379,18 +403,34 @@ impl Solver {
             fluid: self.fluid,
         };
         momentum::element_states(&self.topology, &self.geometry, &known, &mut self.states);
-        momentum::assemble(&self.topology, &self.geometry, &known, &self.states, &mut self.momentum, &mut self.right);
+        momentum::assemble(
+            &self.topology,
+            &self.geometry,
+            &known,
+            &self.states,
+            &mut self.momentum,
+            &mut self.right,
+        );
         for outlet in &self.boundary.outlets {
             let vertex = outlet.vertex as usize;
-            let given = self.boundary.outlet_pressure(outlet, &self.geometry.points, end, &self.parameters);
+            let given =
+                self.boundary.outlet_pressure(outlet, &self.geometry.points, end, &self.parameters);
             for axis in 0..3 {
                 self.right[vertex][axis] += outlet.area[axis] * (self.pressure[vertex] - given);
             }
             // Inflow both through space and through the mesh: a stream that leaves is not damped because the outlet moves.
-            let outward = dot(self.convecting[vertex], outlet.area).max(dot(self.scratch[vertex], outlet.area));
-            self.momentum.values[self.momentum_diagonal[vertex]] -= BACKFLOW * self.fluid.density * outward.min(0.0);
+            let outward = dot(self.convecting[vertex], outlet.area)
+                .max(dot(self.scratch[vertex], outlet.area));
+            self.momentum.values[self.momentum_diagonal[vertex]] -=
+                BACKFLOW * self.fluid.density * outward.min(0.0);
         }
-        self.boundary.impose(&mut self.scratch, &self.mesh_velocity, &self.geometry.points, end, &self.parameters);
+        self.boundary.impose(
+            &mut self.scratch,
+            &self.mesh_velocity,
+            &self.geometry.points,
+            end,
+            &self.parameters,
+        );
         for (vertex, rule) in self.boundary.rules.iter().enumerate().take(self.topology.rows()) {
             if *rule != Rule::Free {
                 self.momentum.values[self.topology.pattern.row(vertex)].fill(0.0);
@@ -431,7 +471,12 @@ impl Solver {
     /// Makes the velocity satisfy continuity: solves for the potential and subtracts its gradient. With a density, continuity is
     /// stabilised by the states of the present step.
     fn project(&mut self, stabilised: Option<f64>) -> Outcome {
-        momentum::divergence(&self.topology, &self.geometry, &self.velocity, &mut self.projection.right);
+        momentum::divergence(
+            &self.topology,
+            &self.geometry,
+            &self.velocity,
+            &mut self.projection.right,
+        );
         self.projection.right.iter_mut().for_each(|value| *value = -*value);
         if let Some(density) = stabilised {
             momentum::subtract_pressure_stabilisation(
@@ -455,14 +500,20 @@ impl Solver {
         );
         self.scratch.resize(self.velocity.len(), [0.0; 3]);
         let rows = self.topology.rows();
-        momentum::gradient(&self.topology, &self.geometry, &self.potential, &mut self.scratch[..rows]);
+        momentum::gradient(
+            &self.topology,
+            &self.geometry,
+            &self.potential,
+            &mut self.scratch[..rows],
+        );
         // At an outlet, the part normal to it is that which the pressure equation took into its balance.
         for outlet in &self.boundary.outlets {
             let vertex = outlet.vertex as usize;
             let (own, area) = (&mut self.scratch[vertex], outlet.area);
             let size = dot(area, area).sqrt();
             let normal = area.map(|value| value / size);
-            let driven = self.geometry.vertex_volumes[vertex] * outlet.yield_rate * self.potential[vertex];
+            let driven =
+                self.geometry.vertex_volumes[vertex] * outlet.yield_rate * self.potential[vertex];
             let along = dot(*own, normal) + driven;
             for axis in 0..3 {
                 own[axis] -= along * normal[axis];
@@ -501,7 +552,9 @@ impl Solver {
     fn check_finite(&self) -> Result<(), SolverError> {
         let (velocity, pressure) = (&self.velocity, &self.pressure);
         let total = sum(pressure.len(), |range| {
-            [range.map(|v| (velocity[v][0] + velocity[v][1] + velocity[v][2] + pressure[v]) * 0.0).sum()]
+            [range
+                .map(|v| (velocity[v][0] + velocity[v][1] + velocity[v][2] + pressure[v]) * 0.0)
+                .sum()]
         });
         if self.halo.sum(total) == [0.0] {
             return Ok(());
@@ -511,7 +564,12 @@ impl Solver {
 
     fn first_non_finite(&self) -> Result<(), SolverError> {
         for (rank, &vertex) in self.topology.vertex_order.iter().enumerate() {
-            let values = [self.velocity[rank][0], self.velocity[rank][1], self.velocity[rank][2], self.pressure[rank]];
+            let values = [
+                self.velocity[rank][0],
+                self.velocity[rank][1],
+                self.velocity[rank][2],
+                self.pressure[rank],
+            ];
             if let Some(component) = values.iter().position(|value| !value.is_finite()) {
                 return Err(SolverError::Diverged {
                     cycle: self.cycle,
@@ -599,7 +657,13 @@ impl Solver {
     /// The greatest velocity of any vertex.
     #[must_use]
     pub fn max_velocity(&self) -> f64 {
-        self.halo.maximum(self.velocity.iter().map(|&velocity| dot(velocity, velocity)).fold(0.0, f64::max).sqrt())
+        self.halo.maximum(
+            self.velocity
+                .iter()
+                .map(|&velocity| dot(velocity, velocity))
+                .fold(0.0, f64::max)
+                .sqrt(),
+        )
     }
 
     /// The largest Courant number of any element for a time step: how many elements the fluid crosses in it.
@@ -607,9 +671,13 @@ impl Solver {
     pub fn courant(&self, time_step: f64) -> f64 {
         let across = |(vertices, element): (&[u32; 4], &crate::geometry::Element)| {
             let mean: Vector = std::array::from_fn(|axis| {
-                0.25 * vertices.iter().map(|&vertex| self.velocity[vertex as usize][axis]).sum::<f64>()
+                0.25 * vertices
+                    .iter()
+                    .map(|&vertex| self.velocity[vertex as usize][axis])
+                    .sum::<f64>()
             });
-            0.5 * time_step * element.gradients.iter().map(|&gradient| dot(mean, gradient).abs()).sum::<f64>()
+            0.5 * time_step
+                * element.gradients.iter().map(|&gradient| dot(mean, gradient).abs()).sum::<f64>()
         };
         let elements = self.topology.elements.iter().zip(&self.geometry.elements);
         self.halo.maximum(elements.map(across).fold(0.0, f64::max))
@@ -617,7 +685,13 @@ impl Solver {
 }
 
 impl Projection {
-    fn new(topology: &Topology, geometry: &Geometry, boundary: &Boundary, halo: &Halo, diagonal: Vec<usize>) -> Self {
+    fn new(
+        topology: &Topology,
+        geometry: &Geometry,
+        boundary: &Boundary,
+        halo: &Halo,
+        diagonal: Vec<usize>,
+    ) -> Self {
         let matrix = pressure_matrix(topology, geometry, boundary, &diagonal);
         Self {
             preconditioner: Schwarz::new(&matrix, halo),
@@ -658,14 +732,23 @@ impl Projection {
         for row in (0..rows).filter(|&row| topology.around(row).is_empty()) {
             self.right[row] = 0.0;
         }
-        let [square] = sum(rows, |range| [self.right[range].iter().map(|value| value * value).sum()]);
+        let [square] =
+            sum(rows, |range| [self.right[range].iter().map(|value| value * value).sum()]);
         #[expect(clippy::cast_precision_loss, reason = "a count of vertices")]
         let [square, vertices] = halo.sum([square, rows as f64]);
         let small = 1e-9 * through / vertices.sqrt();
         let tolerance = (settings.pressure_tolerance * square.sqrt()).max(small);
         let solve = |this: &mut Self, potential: &mut [f64], limit| {
             let (matrix, preconditioner) = (&this.matrix, &mut this.preconditioner);
-            this.solver.solve(matrix, preconditioner, halo, &this.right, potential, tolerance, limit)
+            this.solver.solve(
+                matrix,
+                preconditioner,
+                halo,
+                &this.right,
+                potential,
+                tolerance,
+                limit,
+            )
         };
         // An old preconditioner still serves a mesh that has moved a little; conjugate gradients have the true matrix.
         if self.stale {
@@ -693,7 +776,12 @@ fn diagonal_of(pattern: &Pattern) -> Option<Vec<usize>> {
 }
 
 /// The Laplacian, and at outlets the flux that a potential drives out of each vertex.
-fn pressure_matrix(topology: &Topology, geometry: &Geometry, boundary: &Boundary, diagonal: &[usize]) -> Matrix {
+fn pressure_matrix(
+    topology: &Topology,
+    geometry: &Geometry,
+    boundary: &Boundary,
+    diagonal: &[usize],
+) -> Matrix {
     let mut matrix = geometry.laplacian(topology);
     for outlet in &boundary.outlets {
         let vertex = outlet.vertex as usize;
@@ -720,7 +808,9 @@ fn check_elements(topology: &Topology, geometry: &Geometry, cycle: u64) -> Resul
     Err(SolverError::Inverted {
         cycle,
         cell: topology.element_order[element] as usize,
-        place: std::array::from_fn(|axis| 0.25 * corners.iter().map(|corner| corner[axis]).sum::<f64>()),
+        place: std::array::from_fn(|axis| {
+            0.25 * corners.iter().map(|corner| corner[axis]).sum::<f64>()
+        }),
         volume: geometry.elements[element].volume,
     })
 }

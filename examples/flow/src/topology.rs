@@ -66,7 +66,8 @@ impl Topology {
             }
         }
         let vertex_count = mesh.points().len();
-        let natural = adjacency(vertex_count, vertex_count, cells.iter().map(|(vertices, _)| vertices));
+        let natural =
+            adjacency(vertex_count, vertex_count, cells.iter().map(|(vertices, _)| vertices));
         let (mut vertex_order, others): (Vec<u32>, Vec<u32>) =
             reverse_cuthill_mckee(&natural).into_iter().partition(|&vertex| owns(vertex));
         let rows = vertex_order.len();
@@ -90,19 +91,24 @@ impl Topology {
             incidence_starts[vertex + 1] += incidence_starts[vertex];
         }
         let mut next = incidence_starts.clone();
-        let mut incidences = vec![Incidence { element: 0, local: 0, slots: [0; 4] }; elements.len() * 4];
+        let mut incidences =
+            vec![Incidence { element: 0, local: 0, slots: [0; 4] }; elements.len() * 4];
         for (element, vertices) in elements.iter().enumerate() {
             for (local, &vertex) in vertices.iter().enumerate() {
-                let row = if (vertex as usize) < rows { pattern.row(vertex as usize) } else { 0..0 };
+                let row =
+                    if (vertex as usize) < rows { pattern.row(vertex as usize) } else { 0..0 };
                 let row = &pattern.columns[row];
                 let slots = vertices.map(|column| {
                     let slot = row.partition_point(|&entry| entry < column);
                     u16::try_from(slot).unwrap_or(u16::MAX)
                 });
                 if slots.contains(&u16::MAX) {
-                    return Err(SolverError::Valence { vertex: vertex_order[vertex as usize] as usize });
+                    return Err(SolverError::Valence {
+                        vertex: vertex_order[vertex as usize] as usize,
+                    });
                 }
-                incidences[next[vertex as usize]] = Incidence { element: number(element), local: local as u8, slots };
+                incidences[next[vertex as usize]] =
+                    Incidence { element: number(element), local: local as u8, slots };
                 next[vertex as usize] += 1;
             }
         }
@@ -211,8 +217,11 @@ fn reverse_cuthill_mckee(pattern: &Pattern) -> Vec<u32> {
         visited[root as usize] = true;
         while let Some(row) = queue.pop_front() {
             order.push(row);
-            let mut next: Vec<u32> =
-                pattern.columns[pattern.row(row as usize)].iter().copied().filter(|&c| !visited[c as usize]).collect();
+            let mut next: Vec<u32> = pattern.columns[pattern.row(row as usize)]
+                .iter()
+                .copied()
+                .filter(|&c| !visited[c as usize])
+                .collect();
             next.sort_by_key(|&column| (degree(column), column));
             for column in next {
                 visited[column as usize] = true;

@@ -39,7 +39,8 @@ fn mean_square(mesh: &Mesh, velocity: &[Vector], exact: impl Fn(Vector) -> Vecto
     let (mut total, mut whole) = (0.0, 0.0);
     for (_, vertices) in mesh.cells().iter() {
         let corner = |local: usize| mesh.points()[vertices[local] as usize];
-        let edge = |local| -> Vector { std::array::from_fn(|axis| corner(local)[axis] - corner(0)[axis]) };
+        let edge =
+            |local| -> Vector { std::array::from_fn(|axis| corner(local)[axis] - corner(0)[axis]) };
         let (a, b, c) = (edge(1), edge(2), edge(3));
         let volume = (a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
             + a[2] * (b[0] * c[1] - b[1] * c[0]))
@@ -52,7 +53,8 @@ fn mean_square(mesh: &Mesh, velocity: &[Vector], exact: impl Fn(Vector) -> Vecto
                 };
                 let weight = volume * if first == second { -0.05 } else { 0.2 };
                 let (found, wanted) = (middle(velocity), exact(middle(mesh.points())));
-                total += weight * length(std::array::from_fn(|axis| found[axis] - wanted[axis])).powi(2);
+                total +=
+                    weight * length(std::array::from_fn(|axis| found[axis] - wanted[axis])).powi(2);
                 whole += weight;
             }
         }
@@ -91,8 +93,10 @@ fn poiseuille(counts: [usize; 3], shake: f64) -> (Mesh, Solver) {
     let mesh = mesh.with_points(mesh.points().iter().map(move_inside).collect()).unwrap();
     let profile = || Value::function(|place, _| 4.0 * place[1] * (1.0 - place[1]));
     let inlet = Condition::Velocity([profile(), Value::Uniform(0.0), Value::Uniform(0.0)]);
-    let patches =
-        sides(&mesh, [inlet, outlet(), Condition::NoSlip, Condition::NoSlip, Condition::Slip, Condition::Slip]);
+    let patches = sides(
+        &mesh,
+        [inlet, outlet(), Condition::NoSlip, Condition::NoSlip, Condition::Slip, Condition::Slip],
+    );
     let fluid = Fluid { density: 1.0, viscosity: 0.1 };
     let mut solver = Solver::new(&mesh, patches, fluid, Settings::default()).unwrap();
     solver.initialise(
@@ -119,7 +123,10 @@ fn poiseuille_flow_converges_with_second_order() {
     for pair in errors.windows(2) {
         let order = (pair[0].0 / pair[1].0).log2();
         assert!(order > 1.8, "velocity errors {errors:?}");
-        assert!(pair[1].1 < 0.5 * pair[0].1, "errors of the pressure drop, which is 1.6: {errors:?}");
+        assert!(
+            pair[1].1 < 0.5 * pair[0].1,
+            "errors of the pressure drop, which is 1.6: {errors:?}"
+        );
     }
 }
 
@@ -129,10 +136,17 @@ fn mass_in_is_mass_out_in_every_step() {
     solver.initialise(&[0.0; 3].map(Value::Uniform), &Value::Uniform(0.0));
     for step in 0..20 {
         let outcome = solver.step(0.02, None).unwrap();
-        assert!(outcome.momentum.converged && outcome.pressure.converged, "step {step}: {outcome:?}");
+        assert!(
+            outcome.momentum.converged && outcome.pressure.converged,
+            "step {step}: {outcome:?}"
+        );
         let inward = -solver.fluxes()[0];
         assert!(inward > 0.15, "{inward}");
-        assert!(outcome.imbalance.abs() < 1e-5 * inward, "step {step}: {} of {inward}", outcome.imbalance);
+        assert!(
+            outcome.imbalance.abs() < 1e-5 * inward,
+            "step {step}: {} of {inward}",
+            outcome.imbalance
+        );
     }
 }
 
@@ -140,11 +154,14 @@ fn mass_in_is_mass_out_in_every_step() {
 fn uniform_stream_stays_uniform_whatever_the_mesh_does() {
     let mesh = box_of_tets([6, 5, 4], [0.0; 3], [1.5, 1.0, 0.8]);
     let stream = [1.0, -0.4, 0.3];
-    let conditions = [uniform(stream), outlet(), outlet(), uniform(stream), uniform(stream), uniform(stream)];
-    let mut solver = Solver::new(&mesh, sides(&mesh, conditions), WATERY, Settings::default()).unwrap();
+    let conditions =
+        [uniform(stream), outlet(), outlet(), uniform(stream), uniform(stream), uniform(stream)];
+    let mut solver =
+        Solver::new(&mesh, sides(&mesh, conditions), WATERY, Settings::default()).unwrap();
     solver.initialise(&stream.map(Value::Uniform), &Value::Uniform(0.0));
-    let inside =
-        |point: Vector| [1.5, 1.0, 0.8].iter().zip(point).all(|(upper, value)| value > 1e-9 && value < upper - 1e-9);
+    let inside = |point: Vector| {
+        [1.5, 1.0, 0.8].iter().zip(point).all(|(upper, value)| value > 1e-9 && value < upper - 1e-9)
+    };
     let mut number = random(7);
     for step in 0..60 {
         // Up to the largest random motion that keeps every element; now and then the mesh rests, or the whole box is
@@ -155,8 +172,9 @@ fn uniform_stream_stays_uniform_whatever_the_mesh_does() {
             .points()
             .iter()
             .map(|&point| {
-                let shake: Vector =
-                    std::array::from_fn(|_| amplitude * number() * if inside(point) { 1.0 } else { 0.0 });
+                let shake: Vector = std::array::from_fn(|_| {
+                    amplitude * number() * if inside(point) { 1.0 } else { 0.0 }
+                });
                 [
                     point[0] + shake[0] + shear * point[1],
                     (point[1] + shake[1]) * (1.0 + 0.5 * shear),
@@ -182,21 +200,38 @@ fn uniform_stream_stays_uniform_whatever_the_mesh_does() {
 #[test]
 fn piston_accelerates_the_fluid_with_the_pressure_of_newton() {
     let mesh = box_of_tets([10, 3, 3], [0.0; 3], [1.0, 0.3, 0.3]);
-    let conditions = [Condition::NoSlip, outlet(), Condition::Slip, Condition::Slip, Condition::Slip, Condition::Slip];
+    let conditions = [
+        Condition::NoSlip,
+        outlet(),
+        Condition::Slip,
+        Condition::Slip,
+        Condition::Slip,
+        Condition::Slip,
+    ];
     let fluid = Fluid { density: 2.0, viscosity: 0.01 };
-    let mut solver = Solver::new(&mesh, sides(&mesh, conditions), fluid, Settings::default()).unwrap();
+    let mut solver =
+        Solver::new(&mesh, sides(&mesh, conditions), fluid, Settings::default()).unwrap();
     let (time_step, acceleration) = (0.01, 0.8);
     let place = |time: f64| 0.5 * acceleration * time * time;
     for step in 1..=60 {
         let shift = place(f64::from(step) * time_step);
-        let points: Vec<Vector> = mesh.points().iter().map(|&[x, y, z]| [x + shift * (1.0 - x), y, z]).collect();
+        let points: Vec<Vector> =
+            mesh.points().iter().map(|&[x, y, z]| [x + shift * (1.0 - x), y, z]).collect();
         solver.step(time_step, Some(Motion { points: &points })).unwrap();
     }
     let speed = (place(0.6) - place(0.59)) / time_step;
-    for (velocity, (pressure, point)) in solver.velocity().iter().zip(solver.pressure().iter().zip(solver.points())) {
-        assert!(length([velocity[0] - speed, velocity[1], velocity[2]]) < 1e-3 * speed, "{velocity:?}, {speed}");
+    for (velocity, (pressure, point)) in
+        solver.velocity().iter().zip(solver.pressure().iter().zip(solver.points()))
+    {
+        assert!(
+            length([velocity[0] - speed, velocity[1], velocity[2]]) < 1e-3 * speed,
+            "{velocity:?}, {speed}"
+        );
         let exact = fluid.density * acceleration * (1.0 - point[0]);
-        assert!((pressure - exact).abs() < 2e-2 * fluid.density * acceleration, "{pressure} {exact} at {point:?}");
+        assert!(
+            (pressure - exact).abs() < 2e-2 * fluid.density * acceleration,
+            "{pressure} {exact} at {point:?}"
+        );
     }
 }
 
@@ -204,15 +239,22 @@ fn piston_accelerates_the_fluid_with_the_pressure_of_newton() {
 fn vortex_error(n: usize, time_step: f64, amplitude: f64) -> f64 {
     let mesh = box_of_tets([n, n, 2], [0.0; 3], [1.0, 1.0, 2.0 / n as f64]);
     let slip = || Condition::Slip;
-    let mut solver =
-        Solver::new(&mesh, sides(&mesh, [slip(), slip(), slip(), slip(), slip(), slip()]), WATERY, Settings::default())
-            .unwrap();
+    let mut solver = Solver::new(
+        &mesh,
+        sides(&mesh, [slip(), slip(), slip(), slip(), slip(), slip()]),
+        WATERY,
+        Settings::default(),
+    )
+    .unwrap();
     let start = [
         Value::function(|p, _| (PI * p[0]).sin() * (PI * p[1]).cos()),
         Value::function(|p, _| -(PI * p[0]).cos() * (PI * p[1]).sin()),
         Value::Uniform(0.0),
     ];
-    solver.initialise(&start, &Value::function(|p, _| 0.25 * ((2.0 * PI * p[0]).cos() + (2.0 * PI * p[1]).cos())));
+    solver.initialise(
+        &start,
+        &Value::function(|p, _| 0.25 * ((2.0 * PI * p[0]).cos() + (2.0 * PI * p[1]).cos())),
+    );
     let steps = (0.5 / time_step).round() as usize;
     for step in 1..=steps {
         let time = step as f64 * time_step;
@@ -251,13 +293,17 @@ fn threads_do_not_change_a_bit() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let (mesh, mut solver) = poiseuille([40, 20, 10], 0.0);
-            let points: Vec<Vector> =
-                mesh.points().iter().map(|&[x, y, z]| [x, y * (1.0 - 0.2 * (PI * x / 2.0).sin()), z]).collect();
+            let points: Vec<Vector> = mesh
+                .points()
+                .iter()
+                .map(|&[x, y, z]| [x, y * (1.0 - 0.2 * (PI * x / 2.0).sin()), z])
+                .collect();
             for step in 0..6 {
                 let motion = (step == 3).then_some(Motion { points: &points });
                 solver.step(0.05, motion).unwrap();
             }
-            let bits: Vec<[u64; 3]> = solver.velocity().iter().map(|v| v.map(f64::to_bits)).collect();
+            let bits: Vec<[u64; 3]> =
+                solver.velocity().iter().map(|v| v.map(f64::to_bits)).collect();
             (bits, solver.pressure().iter().map(|p| p.to_bits()).collect::<Vec<_>>())
         })
     };
@@ -270,20 +316,29 @@ fn threads_do_not_change_a_bit() {
 fn survives_a_wall_that_jumps() {
     let mesh = box_of_tets([40, 8, 4], [0.0; 3], [4.0, 1.0, 0.5]);
     let inlet = uniform([1.0, 0.0, 0.0]);
-    let conditions = [inlet, outlet(), Condition::NoSlip, Condition::NoSlip, Condition::Slip, Condition::Slip];
+    let conditions =
+        [inlet, outlet(), Condition::NoSlip, Condition::NoSlip, Condition::Slip, Condition::Slip];
     let fluid = Fluid { density: 1.0, viscosity: 1e-3 };
-    let mut solver = Solver::new(&mesh, sides(&mesh, conditions), fluid, Settings::default()).unwrap();
+    let mut solver =
+        Solver::new(&mesh, sides(&mesh, conditions), fluid, Settings::default()).unwrap();
     let time_step = 0.05;
     for _ in 0..40 {
         solver.step(time_step, None).unwrap();
     }
     let before = -solver.fluxes()[0];
-    let pinched: Vec<Vector> =
-        mesh.points().iter().map(|&[x, y, z]| [x, y * (1.0 - 0.25 * (1.0 - (PI * x / 2.0).cos())), z]).collect();
+    let pinched: Vec<Vector> = mesh
+        .points()
+        .iter()
+        .map(|&[x, y, z]| [x, y * (1.0 - 0.25 * (1.0 - (PI * x / 2.0).cos())), z])
+        .collect();
     let outcome = solver.step(time_step, Some(Motion { points: &pinched })).unwrap();
     // What the wall displaces leaves with the stream: half of the closing volume's 0.25 * 4 * 0.5 per step.
     let displaced = 0.5 / time_step;
-    assert!((solver.fluxes()[1] - before - displaced).abs() < 0.03 * displaced, "{} {before}", solver.fluxes()[1]);
+    assert!(
+        (solver.fluxes()[1] - before - displaced).abs() < 0.03 * displaced,
+        "{} {before}",
+        solver.fluxes()[1]
+    );
     assert!(outcome.imbalance.abs() < 1e-5 * displaced, "{outcome:?}");
     for _ in 0..120 {
         solver.step(time_step, None).unwrap();
@@ -306,7 +361,10 @@ fn refuses_what_it_cannot_solve() {
     let refused = solver.step(0.1, Some(Motion { points: &points }));
     assert!(matches!(refused, Err(SolverError::Inverted { cycle: 0, .. })), "{refused:?}");
     assert_eq!(solver.points(), before);
-    assert!(matches!(solver.step(0.1, Some(Motion { points: &points[1..] })), Err(SolverError::Length { .. })));
+    assert!(matches!(
+        solver.step(0.1, Some(Motion { points: &points[1..] })),
+        Err(SolverError::Length { .. })
+    ));
     assert!(matches!(solver.step(f64::NAN, None), Err(SolverError::NotPositive { .. })));
     assert!(solver.set_fluid(Fluid { density: -1.0, viscosity: 1.0 }).is_err());
 
@@ -326,7 +384,8 @@ fn refuses_what_it_cannot_solve() {
         Condition::Slip,
         Condition::Slip,
     ];
-    let mut solver = Solver::new(&mesh, sides(&mesh, conditions), WATERY, Settings::default()).unwrap();
+    let mut solver =
+        Solver::new(&mesh, sides(&mesh, conditions), WATERY, Settings::default()).unwrap();
     solver.step(0.1, None).unwrap();
     solver.step(0.1, None).unwrap();
     match solver.step(0.1, None) {
@@ -339,28 +398,38 @@ fn refuses_what_it_cannot_solve() {
 /// while all of the mesh moves; and in a closed box that is squeezed without losing volume.
 #[test]
 fn ranks_solve_the_same_equations() {
-    let settings = Settings { momentum_tolerance: 1e-12, pressure_tolerance: 1e-10, iteration_limit: 500 };
+    let settings =
+        Settings { momentum_tolerance: 1e-12, pressure_tolerance: 1e-10, iteration_limit: 500 };
     let mesh = box_of_tets([9, 5, 4], [0.0; 3], [2.0, 1.0, 0.8]);
     let inlet = || {
         let profile = Value::function(|place, time| place[1] * (1.0 - place[1]) * (1.0 + time));
         Condition::Velocity([profile, Value::Uniform(0.0), Value::Uniform(0.0)])
     };
-    let open = || [inlet(), outlet(), Condition::NoSlip, Condition::Slip, Condition::NoSlip, outlet()];
-    let closed = || std::array::from_fn(|side| if side < 4 { Condition::NoSlip } else { Condition::Slip });
+    let open =
+        || [inlet(), outlet(), Condition::NoSlip, Condition::Slip, Condition::NoSlip, outlet()];
+    let closed =
+        || std::array::from_fn(|side| if side < 4 { Condition::NoSlip } else { Condition::Slip });
     let waved = |points: &[Vector], step: usize, is_open: bool| -> Vec<Vector> {
         let by = 0.03 * (1.0 + step as f64);
         let squeezed = |&[x, y, z]: &Vector| {
-            if is_open { [x, y - by * x * (2.0 - x) * y, z] } else { [x * (1.0 + by), y / (1.0 + by), z] }
+            if is_open {
+                [x, y - by * x * (2.0 - x) * y, z]
+            } else {
+                [x * (1.0 + by), y / (1.0 + by), z]
+            }
         };
         points.iter().map(squeezed).collect()
     };
-    let of_cells: Vec<usize> = (0..mesh.cells().len()).map(|cell| cell * 3 / mesh.cells().len()).collect();
+    let of_cells: Vec<usize> =
+        (0..mesh.cells().len()).map(|cell| cell * 3 / mesh.cells().len()).collect();
     for is_open in [true, false] {
         let conditions = || if is_open { open() } else { closed() };
         let advance = |solver: &mut Solver, points: &[Vector]| {
             for step in 0..6 {
                 let points = waved(points, step, is_open);
-                let outcome = solver.step(0.05, (step % 3 > 0).then_some(Motion { points: &points })).unwrap();
+                let outcome = solver
+                    .step(0.05, (step % 3 > 0).then_some(Motion { points: &points }))
+                    .unwrap();
                 assert!(outcome.momentum.converged && outcome.pressure.converged, "{outcome:?}");
             }
         };
@@ -376,19 +445,34 @@ fn ranks_solve_the_same_equations() {
             let shared = SharedVertices::find(&*communicator, &part).unwrap();
             let own = part.view().to_mesh().unwrap();
             let patches = sides(&own, conditions());
-            let mut solver = Solver::of_part(&communicator, &shared, &own, patches, WATERY, settings).unwrap();
+            let mut solver =
+                Solver::of_part(&communicator, &shared, &own, patches, WATERY, settings).unwrap();
             advance(&mut solver, own.points());
             let numbers = part.global_vertices.unwrap();
             let mut apart = [0.0_f64; 2];
-            for ((number, own), own_pressure) in numbers.iter().zip(solver.velocity()).zip(solver.pressure()) {
+            for ((number, own), own_pressure) in
+                numbers.iter().zip(solver.velocity()).zip(solver.pressure())
+            {
                 let (velocity, pressure) = (velocity[*number as usize], pressure[*number as usize]);
-                apart[0] = apart[0].max(length(std::array::from_fn(|axis| own[axis] - velocity[axis])) / largest);
+                apart[0] = apart[0]
+                    .max(length(std::array::from_fn(|axis| own[axis] - velocity[axis])) / largest);
                 apart[1] = apart[1].max((own_pressure - pressure).abs() / steepest);
             }
-            (apart, solver.fluxes().iter().zip(whole.fluxes()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max))
+            (
+                apart,
+                solver
+                    .fluxes()
+                    .iter()
+                    .zip(whole.fluxes())
+                    .map(|(a, b)| (a - b).abs())
+                    .fold(0.0, f64::max),
+            )
         });
         for (apart, flux) in apart {
-            assert!(apart[0] < 1e-8 && apart[1] < 1e-7 && flux < 1e-9, "open: {is_open}: {apart:?} {flux:e}");
+            assert!(
+                apart[0] < 1e-8 && apart[1] < 1e-7 && flux < 1e-9,
+                "open: {is_open}: {apart:?} {flux:e}"
+            );
         }
     }
 }

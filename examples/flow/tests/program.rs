@@ -44,11 +44,15 @@ fn folder(case: &str) -> (tempfile::TempDir, PathBuf) {
     if let FeatureSource::Faces(tagged) = mesh.features() {
         let mut tagged = tagged.clone();
         tagged.names = (1..).zip(BOX_FEATURES.map(str::to_owned)).collect();
-        mesh =
-            tombolo_deform::mesh::Mesh::new(mesh.points().to_vec(), mesh.cells().clone(), FeatureSource::Faces(tagged))
-                .unwrap();
+        mesh = tombolo_deform::mesh::Mesh::new(
+            mesh.points().to_vec(),
+            mesh.cells().clone(),
+            FeatureSource::Faces(tagged),
+        )
+        .unwrap();
     }
-    files::write_mesh(folder.path().join("channel.vtu"), &mesh, &[], Compression::default()).unwrap();
+    files::write_mesh(folder.path().join("channel.vtu"), &mesh, &[], Compression::default())
+        .unwrap();
     let file = folder.path().join("case.json");
     std::fs::write(&file, case).unwrap();
     (folder, file)
@@ -83,8 +87,12 @@ fn runs_a_case_with_orders_and_undoes_them_bit_for_bit() {
     assert_eq!((report.cycles, report.mesh.inverted, report.error.as_deref()), (12, 0, None));
     assert!((report.time - 0.6).abs() < 1e-12);
     let json = serde_json::to_value(&report).unwrap();
-    let statuses: Vec<&str> =
-        json["orders"].as_array().unwrap().iter().map(|order| order["status"].as_str().unwrap()).collect();
+    let statuses: Vec<&str> = json["orders"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|order| order["status"].as_str().unwrap())
+        .collect();
     assert_eq!(statuses, ["applied", "rejected", "applied"], "{json:#}");
     assert_eq!(json["orders"][0]["cycle_applied"], 2);
     assert!(json["orders"][1]["reason"].as_str().unwrap().len() > 20);
@@ -98,7 +106,11 @@ fn runs_a_case_with_orders_and_undoes_them_bit_for_bit() {
         assert!(json["stream"][key].is_number());
     }
     assert!(report.flow.mass_in > 0.1);
-    assert!((report.flow.mass_in - report.flow.mass_out).abs() < 1e-5 * report.flow.mass_in, "{:?}", report.flow);
+    assert!(
+        (report.flow.mass_in - report.flow.mass_out).abs() < 1e-5 * report.flow.mass_in,
+        "{:?}",
+        report.flow
+    );
     assert!(report.flow.worst_imbalance < 1e-5);
 
     let restored = files::read_mesh(folder.path().join("out/final.vtu")).unwrap();
@@ -134,14 +146,23 @@ fn names_what_is_wrong_in_a_case() {
         }
     };
     expect(failure("\"x-min\"", "\"x-mni\""), &["x-mni", "did you mean 'x-min'", "z-max"]);
-    expect(failure(r#""z-max": { "wall": "slip" }"#, r#""z-min": { "wall": "slip" }"#), &["case.json:", "z-min"]);
+    expect(
+        failure(r#""z-max": { "wall": "slip" }"#, r#""z-min": { "wall": "slip" }"#),
+        &["case.json:", "z-min"],
+    );
     expect(failure(",\n    \"z-max\": { \"wall\": \"slip\" }", ""), &["z-max", "no condition"]);
     expect(
         failure("viscosity\": \"0.01 * thickness\"", "viscosity\": \"0.01 * thicknes\""),
         &["case.json:4:", "thickness"],
     );
-    expect(failure("viscosity\": \"0.01 * thickness\"", "viscosity\": \"0.01 * x\""), &["viscosity"]);
-    expect(failure("\"density\": 1.0", "\"density\": -1.0"), &["case.json:3:", "density", "positive"]);
+    expect(
+        failure("viscosity\": \"0.01 * thickness\"", "viscosity\": \"0.01 * x\""),
+        &["viscosity"],
+    );
+    expect(
+        failure("\"density\": 1.0", "\"density\": -1.0"),
+        &["case.json:3:", "density", "positive"],
+    );
     expect(failure("\"density\"", "\"densty\""), &["case.json:3:", "density"]);
     expect(failure("no_slip", "no_slipp"), &["no_slip"]);
     expect(failure("0.05", "0"), &["time_step", "positive"]);
@@ -160,11 +181,17 @@ fn every_case_that_comes_with_the_program_is_well_formed() {
     for file in files("cases") {
         let case = Case::read(&file).unwrap_or_else(|error: CaseError| panic!("{error}"));
         assert!(case.pipelines.unwrap().is_file());
-        assert!(case.mesh.extension().is_some_and(|extension| extension == "msh"), "scripts/demo makes .msh files");
+        assert!(
+            case.mesh.extension().is_some_and(|extension| extension == "msh"),
+            "scripts/demo makes .msh files"
+        );
     }
     for file in files("pipelines") {
-        tombolo_pipelines::language::parse(&std::fs::read_to_string(&file).unwrap(), &file.display().to_string())
-            .unwrap_or_else(|error| panic!("{error}"));
+        tombolo_pipelines::language::parse(
+            &std::fs::read_to_string(&file).unwrap(),
+            &file.display().to_string(),
+        )
+        .unwrap_or_else(|error| panic!("{error}"));
     }
     for file in files("orders") {
         tombolo_pipelines::language::parse_orders(
@@ -201,7 +228,9 @@ fn a_uniform_stream_stays_uniform_through_any_schedule() {
         r#"{ "steps": 3, "every": { "time": 0.13 }, "ease": "smooth" }"#,
     ];
     let first = |schedule: &str| {
-        format!(r#"{{ "at": {{ "cycle": 1 }}, "order": {{ "edits": {EDITS}, "schedule": {schedule} }} }}"#)
+        format!(
+            r#"{{ "at": {{ "cycle": 1 }}, "order": {{ "edits": {EDITS}, "schedule": {schedule} }} }}"#
+        )
     };
     let then = |change: &str, schedule: &str| {
         format!(r#"{{ "at": {{ "cycle": 5 }}, "order": {{ {change}, "schedule": {schedule} }} }}"#)
@@ -209,7 +238,8 @@ fn a_uniform_stream_stays_uniform_through_any_schedule() {
     let mut runs: Vec<(String, usize)> =
         schedules.iter().map(|schedule| (format!("[{}]", first(schedule)), 1)).collect();
     // In the midst of one schedule another begins: more edits, or those of the first taken back.
-    for (under_way, next) in [(schedules[1], schedules[2]), (schedules[2], schedules[4]), (schedules[4], schedules[0])]
+    for (under_way, next) in
+        [(schedules[1], schedules[2]), (schedules[2], schedules[4]), (schedules[4], schedules[0])]
     {
         for change in [format!(r#""edits": {FURTHER}"#), r#""undo": 1"#.to_owned()] {
             runs.push((format!("[{}, {}]", first(under_way), then(&change, next)), 2));
@@ -226,10 +256,17 @@ fn a_uniform_stream_stays_uniform_through_any_schedule() {
             history: Some(folder.path().join("history.csv")),
             ..headless(&case)
         });
-        assert_eq!((report.cycles, report.error.as_deref()), (16, None), "not uniform any more: {text}");
+        assert_eq!(
+            (report.cycles, report.error.as_deref()),
+            (16, None),
+            "not uniform any more: {text}"
+        );
         let json = serde_json::to_value(&report.orders).unwrap();
         let orders = json.as_array().unwrap();
-        assert!(orders.len() == count && orders.iter().all(|order| order["status"] == "applied"), "{json:#}");
+        assert!(
+            orders.len() == count && orders.iter().all(|order| order["status"] == "applied"),
+            "{json:#}"
+        );
         let end = files::read_mesh(folder.path().join("final.vtu")).unwrap();
         assert_eq!(report.mesh.inverted, 0);
         let velocity = end.fields.iter().find(|field| field.name == "velocity").unwrap();
@@ -242,7 +279,9 @@ fn a_uniform_stream_stays_uniform_through_any_schedule() {
         let table = std::fs::read_to_string(folder.path().join("history.csv")).unwrap();
         let lines: Vec<&str> = table.lines().collect();
         assert!(
-            lines.len() == 17 && lines[0].starts_with("cycle,time,pressure_drop,") && lines[16].starts_with("16,0.8"),
+            lines.len() == 17
+                && lines[0].starts_with("cycle,time,pressure_drop,")
+                && lines[16].starts_with("16,0.8"),
             "{table}"
         );
     }
@@ -250,8 +289,9 @@ fn a_uniform_stream_stays_uniform_through_any_schedule() {
 
 /// The same run on several ranks, which are threads here; the report of the first.
 fn run_on(ranks: usize, options: &Options) -> Report {
-    let reports =
-        threads::run(ranks, |communicator| Run::on(Arc::new(communicator), options).unwrap().finish().unwrap());
+    let reports = threads::run(ranks, |communicator| {
+        Run::on(Arc::new(communicator), options).unwrap().finish().unwrap()
+    });
     reports.into_iter().next().unwrap()
 }
 
@@ -261,10 +301,13 @@ fn difference(a: &Path, b: &Path) -> Vec<(String, f64)> {
     assert_eq!(a.mesh.cells(), b.mesh.cells());
     let apart = |a: &[f64], b: &[f64]| {
         let largest = a.iter().map(|value| value.abs()).fold(0.0, f64::max);
-        a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / largest.max(f64::MIN_POSITIVE)
+        a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+            / largest.max(f64::MIN_POSITIVE)
     };
-    let mut apart_by =
-        vec![("coordinates".to_owned(), apart(a.mesh.points().as_flattened(), b.mesh.points().as_flattened()))];
+    let mut apart_by = vec![(
+        "coordinates".to_owned(),
+        apart(a.mesh.points().as_flattened(), b.mesh.points().as_flattened()),
+    )];
     for field in &a.fields {
         let other = b.fields.iter().find(|other| other.name == field.name).unwrap();
         apart_by.push((field.name.clone(), apart(&field.values, &other.values)));
@@ -286,17 +329,29 @@ fn ranks_solve_what_one_process_solves() {
         let options = Options { out: Some(folder.path().join("ranks")), dealing, ..alone.clone() };
         let report = run_on(ranks, &options);
         assert_eq!((report.cycles, report.error.as_deref()), (12, None));
-        assert_eq!((report.mesh.vertices, report.mesh.cells), (expected.mesh.vertices, expected.mesh.cells));
-        assert_eq!((report.mesh.inverted, report.mesh.min_scaled_jacobian), (0, expected.mesh.min_scaled_jacobian));
+        assert_eq!(
+            (report.mesh.vertices, report.mesh.cells),
+            (expected.mesh.vertices, expected.mesh.cells)
+        );
+        assert_eq!(
+            (report.mesh.inverted, report.mesh.min_scaled_jacobian),
+            (0, expected.mesh.min_scaled_jacobian)
+        );
         assert_eq!(report.flow.unconverged, 0);
-        for (name, apart) in difference(&folder.path().join("alone/final.vtu"), &folder.path().join("ranks/final.vtu"))
-        {
+        for (name, apart) in difference(
+            &folder.path().join("alone/final.vtu"),
+            &folder.path().join("ranks/final.vtu"),
+        ) {
             // The solves stop at residuals of 1e-6 and 1e-7; `ranks_solve_the_same_equations` asks for more.
             let tolerance = if name == "coordinates" { 1e-8 } else { 5e-5 };
             assert!(apart <= tolerance, "{ranks} ranks, {dealing:?}: {name} is {apart:e} apart");
         }
         for (name, flux) in &expected.flow.fluxes {
-            assert!((flux - report.flow.fluxes[name]).abs() < 1e-6, "{name}: {flux} {}", report.flow.fluxes[name]);
+            assert!(
+                (flux - report.flow.fluxes[name]).abs() < 1e-6,
+                "{name}: {flux} {}",
+                report.flow.fluxes[name]
+            );
         }
         // Preconditioners that are worse, but not by much.
         let [few, many] = [&expected, &report].map(|report| report.flow.pressure_iterations);
@@ -309,16 +364,25 @@ fn ranks_fail_together() {
     let diverging = CASE.replace("\"y * (1 - y)\"", "\"1 / max(0, 0.22 - t)\"");
     let (_folder, case) = folder(&diverging);
     let reports = threads::run(3, |communicator| {
-        Run::on(Arc::new(communicator), &headless(&case)).unwrap().finish().map(|report| report.error)
+        Run::on(Arc::new(communicator), &headless(&case))
+            .unwrap()
+            .finish()
+            .map(|report| report.error)
     });
     let errors: Vec<String> = reports.into_iter().map(|report| report.unwrap().unwrap()).collect();
     assert!(errors.iter().all(|error| *error == errors[0]), "{errors:?}");
-    assert!(errors[0].starts_with("rank ") && errors[0].contains("cycle 5, time 0.25"), "{}", errors[0]);
+    assert!(
+        errors[0].starts_with("rank ") && errors[0].contains("cycle 5, time 0.25"),
+        "{}",
+        errors[0]
+    );
     let refused = threads::run(3, |communicator| {
         let dealing = Dealing { empty_rank: Some(3), ..Dealing::default() };
-        Run::on(Arc::new(communicator), &Options { dealing, ..headless(&case) }).err().map(|error| error.to_string())
+        Run::on(Arc::new(communicator), &Options { dealing, ..headless(&case) })
+            .err()
+            .map(|error| error.to_string())
     });
-    assert!(
-        refused.iter().all(|error| error.as_ref().is_some_and(|text| text.contains("rank 3 cannot be left empty")))
-    );
+    assert!(refused.iter().all(|error| {
+        error.as_ref().is_some_and(|text| text.contains("rank 3 cannot be left empty"))
+    }));
 }

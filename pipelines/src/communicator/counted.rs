@@ -160,7 +160,11 @@ impl<C: Communicator> Communicator for Counted<C> {
         self.counted(messages, |messages| self.communicator.exchange(messages))
     }
 
-    fn exchange_with(&self, messages: Vec<(usize, Vec<u8>)>, from: &[usize]) -> Vec<(usize, Vec<u8>)> {
+    fn exchange_with(
+        &self,
+        messages: Vec<(usize, Vec<u8>)>,
+        from: &[usize],
+    ) -> Vec<(usize, Vec<u8>)> {
         self.counted(messages, |messages| self.communicator.exchange_with(messages, from))
     }
 

@@ -120,9 +120,11 @@ impl Communicator for Threads {
 
     fn reduce(&self, reduction: Reduction, values: &mut [f64]) {
         let own: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
-        let read =
-            |bytes: &[u8]| -> Vec<f64> { bytes.as_chunks().0.iter().map(|eight| f64::from_le_bytes(*eight)).collect() };
-        let parts: Vec<Vec<f64>> = self.meet_all("reduce", &own).iter().map(|bytes| read(bytes)).collect();
+        let read = |bytes: &[u8]| -> Vec<f64> {
+            bytes.as_chunks().0.iter().map(|eight| f64::from_le_bytes(*eight)).collect()
+        };
+        let parts: Vec<Vec<f64>> =
+            self.meet_all("reduce", &own).iter().map(|bytes| read(bytes)).collect();
         values.copy_from_slice(&combine(reduction, parts));
     }
 
@@ -136,7 +138,12 @@ impl Communicator for Threads {
 
     /// The others panic where they wait for this one, now or later.
     fn abort(&self) {
-        self.board.state.lock().unwrap_or_else(PoisonError::into_inner).gone.get_or_insert(self.rank);
+        self.board
+            .state
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .gone
+            .get_or_insert(self.rank);
         self.board.met.notify_all();
     }
 }
@@ -217,7 +224,10 @@ mod tests {
         ranks.broadcast(size - 1, &mut bytes);
         assert_eq!(bytes, [7; 1000]);
         let gathered = ranks.gather(0, &vec![rank as u8; rank]);
-        assert_eq!(gathered, (rank == 0).then(|| (0..size).map(|rank| vec![rank as u8; rank]).collect()));
+        assert_eq!(
+            gathered,
+            (rank == 0).then(|| (0..size).map(|rank| vec![rank as u8; rank]).collect())
+        );
         let mut values = [rank as f64, -(rank as f64)];
         ranks.reduce(Reduction::Minimum, &mut values);
         assert_eq!(values, [0.0, -(size as f64 - 1.0)]);
@@ -230,8 +240,10 @@ mod tests {
             let before = (rank + size - 1) % size;
             let mut expected = vec![(before, 1), (rank, 2), (before, 3)];
             expected.sort_by_key(|(from, _)| *from);
-            let expected: Vec<_> =
-                expected.into_iter().map(|(from, what)| (from, vec![from as u8, what, round])).collect();
+            let expected: Vec<_> = expected
+                .into_iter()
+                .map(|(from, what)| (from, vec![from as u8, what, round]))
+                .collect();
             assert_eq!(heard, expected);
         }
         assert_eq!(ranks.exchange(Vec::new()), []);
@@ -263,10 +275,19 @@ mod tests {
     #[test]
     fn calls_that_do_not_fit_together_are_found() {
         let caught = std::panic::catch_unwind(|| {
-            run(2, |ranks| if ranks.rank() == 0 { ranks.barrier() } else { ranks.reduce(Reduction::Sum, &mut [1.0]) });
+            run(2, |ranks| {
+                if ranks.rank() == 0 {
+                    ranks.barrier()
+                } else {
+                    ranks.reduce(Reduction::Sum, &mut [1.0])
+                }
+            });
         });
         assert!(
-            caught.unwrap_err().downcast_ref::<String>().is_some_and(|said| said.contains("where another one calls"))
+            caught
+                .unwrap_err()
+                .downcast_ref::<String>()
+                .is_some_and(|said| said.contains("where another one calls"))
         );
     }
 }

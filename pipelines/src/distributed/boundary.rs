@@ -57,13 +57,19 @@ pub(crate) struct Root {
 }
 
 /// The faces of the part's own cells that belong to one of them only, in the dimension of the whole mesh. Collective.
-pub(super) fn outer_faces(communicator: &dyn Communicator, part: &Part) -> Result<BoundaryFaces, DistributedError> {
+pub(super) fn outer_faces(
+    communicator: &dyn Communicator,
+    part: &Part,
+) -> Result<BoundaryFaces, DistributedError> {
     faces_of_one_cell(communicator, part, part.ghosts.as_deref())
 }
 
 /// The faces that are drawn of the part's own cells. On several ranks the owner of a ghost brings the face before it too, so that the
 /// ranks find it to lie inside; one process has to look at its ghosts for that. Collective.
-fn drawn_faces(communicator: &dyn Communicator, part: &Part) -> Result<BoundaryFaces, DistributedError> {
+fn drawn_faces(
+    communicator: &dyn Communicator,
+    part: &Part,
+) -> Result<BoundaryFaces, DistributedError> {
     if communicator.size() > 1 {
         return outer_faces(communicator, part);
     }
@@ -150,9 +156,14 @@ impl PartBoundary {
         faces.faces.connectivity().iter().for_each(|&vertex| marks[vertex as usize] = true);
         shared.any(communicator, &mut marks);
         let numbers = shared.numbers();
-        let mut vertices: Vec<u32> = (0..).zip(&marks).filter(|(_, mark)| **mark).map(|(vertex, _)| vertex).collect();
+        let mut vertices: Vec<u32> =
+            (0..).zip(&marks).filter(|(_, mark)| **mark).map(|(vertex, _)| vertex).collect();
         vertices.sort_unstable_by_key(|&vertex| numbers[vertex as usize]);
-        let owned = (0..).zip(&vertices).filter(|(_, vertex)| shared.owns(**vertex)).map(|(place, _)| place).collect();
+        let owned = (0..)
+            .zip(&vertices)
+            .filter(|(_, vertex)| shared.owns(**vertex))
+            .map(|(place, _)| place)
+            .collect();
         let mut boundary = Self { vertices, owned, faces, root: None };
         let message = boundary.described(part, shared);
         let gathered = communicator.gather(0, &message);
@@ -207,7 +218,9 @@ impl PartBoundary {
         if let (Some(root), Some(values)) = (&self.root, values) {
             for (rank, held) in root.held.iter().enumerate().filter(|(_, held)| !held.is_empty()) {
                 let mut message = Writer::with_capacity(24 * held.len());
-                held.iter().filter_map(|&vertex| values.get(vertex as usize)).for_each(|value| message.f64s(value));
+                held.iter()
+                    .filter_map(|&vertex| values.get(vertex as usize))
+                    .for_each(|value| message.f64s(value));
                 messages.push((rank, message.into_bytes()));
             }
         }
@@ -232,7 +245,9 @@ impl PartBoundary {
         values: &[Vector],
     ) -> Result<Option<Vec<Vector>>, DistributedError> {
         let mut message = Writer::with_capacity(24 * self.owned.len());
-        self.owned_vertices().filter_map(|vertex| values.get(vertex as usize)).for_each(|value| message.f64s(value));
+        self.owned_vertices()
+            .filter_map(|vertex| values.get(vertex as usize))
+            .for_each(|value| message.f64s(value));
         let gathered = communicator.gather(0, &message.into_bytes());
         let (Some(root), Some(messages)) = (&self.root, gathered) else { return Ok(None) };
         let mut whole = vec![[0.0; 3]; root.surface.points().len()];
@@ -247,17 +262,21 @@ impl PartBoundary {
 
     /// What rank 0 is told of this rank's piece.
     fn described(&self, part: &Part, shared: &SharedVertices) -> Vec<u8> {
-        let mut message = Writer::with_capacity(64 + 40 * self.vertices.len() + 32 * self.faces.cells.len());
+        let mut message =
+            Writer::with_capacity(64 + 40 * self.vertices.len() + 32 * self.faces.cells.len());
         message.u64(part.cells.len() as u64);
         message.u8(u8::from(self.faces.may_run_either_way));
-        let numbers: Vec<u32> = self.vertices.iter().map(|&vertex| shared.numbers()[vertex as usize]).collect();
+        let numbers: Vec<u32> =
+            self.vertices.iter().map(|&vertex| shared.numbers()[vertex as usize]).collect();
         message.u32s(&numbers);
         message.u32s(&self.owned);
         self.owned_vertices().for_each(|vertex| message.f64s(&part.points[vertex as usize]));
         let mut places = vec![0; part.points.len()];
         (0..).zip(&self.vertices).for_each(|(place, &vertex)| places[vertex as usize] = place);
-        let sizes: Vec<u32> = self.faces.faces.offsets().windows(2).map(|row| (row[1] - row[0]) as u32).collect();
-        let corners: Vec<u32> = self.faces.faces.connectivity().iter().map(|&vertex| places[vertex as usize]).collect();
+        let sizes: Vec<u32> =
+            self.faces.faces.offsets().windows(2).map(|row| (row[1] - row[0]) as u32).collect();
+        let corners: Vec<u32> =
+            self.faces.faces.connectivity().iter().map(|&vertex| places[vertex as usize]).collect();
         message.u32s(&self.faces.cells);
         message.u32s(&self.faces.places);
         message.u32s(&sizes);
@@ -355,9 +374,15 @@ impl Piece {
 }
 
 impl Root {
-    fn assembled(messages: &[Vec<u8>], settings: &FeatureSettings) -> Result<Self, DistributedError> {
-        let pieces: Vec<Piece> =
-            messages.iter().enumerate().map(|(rank, bytes)| Piece::read(rank, bytes)).collect::<Result<_, _>>()?;
+    fn assembled(
+        messages: &[Vec<u8>],
+        settings: &FeatureSettings,
+    ) -> Result<Self, DistributedError> {
+        let pieces: Vec<Piece> = messages
+            .iter()
+            .enumerate()
+            .map(|(rank, bytes)| Piece::read(rank, bytes))
+            .collect::<Result<_, _>>()?;
         // Each vertex once, by its owner.
         let mut owned: Vec<(u32, usize, usize)> = Vec::new();
         for (rank, piece) in pieces.iter().enumerate() {
@@ -366,21 +391,27 @@ impl Root {
         }
         owned.sort_unstable();
         let vertices: Vec<u32> = owned.iter().map(|&(number, ..)| number).collect();
-        let points: Vec<Vector> = owned.iter().map(|&(_, rank, place)| pieces[rank].points[place]).collect();
+        let points: Vec<Vector> =
+            owned.iter().map(|&(_, rank, place)| pieces[rank].points[place]).collect();
         let held: Vec<Vec<u32>> = pieces
             .iter()
             .enumerate()
-            .map(|(rank, piece)| places_in(&vertices, &piece.numbers).ok_or(DistributedError::Garbled { rank }))
+            .map(|(rank, piece)| {
+                places_in(&vertices, &piece.numbers).ok_or(DistributedError::Garbled { rank })
+            })
             .collect::<Result<_, _>>()?;
         let owned = pieces.iter().zip(&held);
-        let owned =
-            owned.map(|(piece, held)| piece.owned.iter().map(|&place| held[place as usize]).collect()).collect();
+        let owned = owned
+            .map(|(piece, held)| piece.owned.iter().map(|&place| held[place as usize]).collect())
+            .collect();
 
         // The faces in the order of their cells' global numbers, or else of the ranks.
         let known = |piece: &Piece| {
             let numbers = piece.global_cells.as_ref();
             piece.face_cells.is_empty()
-                || numbers.is_some_and(|numbers| numbers.iter().all(|&number| number < u64::from(u32::MAX)))
+                || numbers.is_some_and(|numbers| {
+                    numbers.iter().all(|&number| number < u64::from(u32::MAX))
+                })
         };
         let all_known = pieces.iter().all(known);
         let mut order: Vec<(u32, u32, usize, usize, usize)> = Vec::new();
@@ -388,7 +419,8 @@ impl Root {
         for (rank, piece) in pieces.iter().enumerate() {
             let mut start = 0;
             for face in 0..piece.face_cells.len() {
-                let global = piece.global_cells.as_ref().filter(|_| all_known).map(|numbers| numbers[face]);
+                let global =
+                    piece.global_cells.as_ref().filter(|_| all_known).map(|numbers| numbers[face]);
                 let cell = global.unwrap_or(first_cell + u64::from(piece.face_cells[face]));
                 let cell = u32::try_from(cell).unwrap_or(u32::MAX);
                 order.push((cell, piece.face_places[face], rank, face, start));
@@ -397,7 +429,8 @@ impl Root {
             first_cell += piece.cells;
         }
         order.sort_unstable();
-        let either_way = pieces.iter().any(|piece| piece.may_run_either_way && !piece.face_cells.is_empty());
+        let either_way =
+            pieces.iter().any(|piece| piece.may_run_either_way && !piece.face_cells.is_empty());
         let tagged = pieces.iter().any(|piece| piece.tags.is_some());
         let mut tags = FaceTags::default();
         for piece in &pieces {
@@ -405,7 +438,8 @@ impl Root {
         }
         let mut faces = Cells::new();
         let mut owner_cells = Vec::with_capacity(order.len());
-        let mut of_ranks: Vec<Vec<u32>> = pieces.iter().map(|piece| vec![0; piece.face_cells.len()]).collect();
+        let mut of_ranks: Vec<Vec<u32>> =
+            pieces.iter().map(|piece| vec![0; piece.face_cells.len()]).collect();
         let mut corners = Vec::new();
         for (number, &(cell, _, rank, face, start)) in (0..).zip(&order) {
             let piece = &pieces[rank];
@@ -424,8 +458,15 @@ impl Root {
                 tags.tags.push(piece.tags.as_ref().and_then(|tags| tags.tags[face]));
             }
         }
-        let surface =
-            Surface::assemble(points, vertices, faces, owner_cells, either_way, tagged.then_some(&tags), settings)?;
+        let surface = Surface::assemble(
+            points,
+            vertices,
+            faces,
+            owner_cells,
+            either_way,
+            tagged.then_some(&tags),
+            settings,
+        )?;
         Ok(Self { surface: Arc::new(surface), held, owned, faces: of_ranks })
     }
 }
@@ -433,7 +474,9 @@ impl Root {
 /// Where each of some rising numbers stands among all, which rise too.
 fn places_in(all: &[u32], some: &[u32]) -> Option<Vec<u32>> {
     let mut places = (0..).zip(all);
-    some.iter().map(|number| places.find(|(_, other)| *other == number).map(|(place, _)| place)).collect()
+    some.iter()
+        .map(|number| places.find(|(_, other)| *other == number).map(|(place, _)| place))
+        .collect()
 }
 
 /// Of the faces that belong to one cell of the part those that belong to one cell of the whole mesh. Faces whose corners several
@@ -466,7 +509,8 @@ fn boundary_faces(
         message.u32(face as u32);
         message.u32s(&corners);
     }
-    let messages = messages.into_iter().map(|(rank, message)| (rank, message.into_bytes())).collect();
+    let messages =
+        messages.into_iter().map(|(rank, message)| (rank, message.into_bytes())).collect();
     let mut met: Vec<(Vec<u32>, usize, u32)> = Vec::new();
     for (from, bytes) in communicator.exchange(messages) {
         let mut reader = Reader::new(from, &bytes);
@@ -485,7 +529,11 @@ fn boundary_faces(
             more => {
                 let ranks = more.iter().map(|(_, rank, _)| *rank).collect();
                 let vertices = more[0].0.clone();
-                fault.get_or_insert(DistributedError::SharedFace { vertices, ranks, count: more.len() });
+                fault.get_or_insert(DistributedError::SharedFace {
+                    vertices,
+                    ranks,
+                    count: more.len(),
+                });
             }
         }
     }
@@ -495,14 +543,19 @@ fn boundary_faces(
         let mut reader = Reader::new(from, &bytes);
         while !reader.is_empty() {
             let face = reader.u32()?;
-            *is_boundary.get_mut(face as usize).ok_or(DistributedError::Garbled { rank: from })? = true;
+            *is_boundary
+                .get_mut(face as usize)
+                .ok_or(DistributedError::Garbled { rank: from })? = true;
         }
     }
     if is_boundary.iter().all(|&is| is) {
         return Ok(outer);
     }
-    let mut kept = BoundaryFaces { may_run_either_way: outer.may_run_either_way, ..BoundaryFaces::default() };
-    for (face, (cell_type, vertices)) in outer.faces.iter().enumerate().filter(|(face, _)| is_boundary[*face]) {
+    let mut kept =
+        BoundaryFaces { may_run_either_way: outer.may_run_either_way, ..BoundaryFaces::default() };
+    for (face, (cell_type, vertices)) in
+        outer.faces.iter().enumerate().filter(|(face, _)| is_boundary[*face])
+    {
         kept.faces.push(cell_type, vertices)?;
         kept.cells.push(outer.cells[face]);
         kept.places.push(outer.places[face]);

@@ -21,7 +21,12 @@ impl Part {
     ///
     /// # Errors
     /// [`MeshError::ArrayLength`] where there is not one rank for each cell.
-    pub fn cut(mesh: &Mesh, of_cells: &[usize], rank: usize, ghosts: bool) -> Result<Self, MeshError> {
+    pub fn cut(
+        mesh: &Mesh,
+        of_cells: &[usize],
+        rank: usize,
+        ghosts: bool,
+    ) -> Result<Self, MeshError> {
         let (cells, points) = (mesh.cells(), mesh.points());
         if of_cells.len() != cells.len() {
             let (found, expected) = (of_cells.len(), cells.len());
@@ -31,15 +36,21 @@ impl Part {
         for (cell, _) in of_cells.iter().enumerate().filter(|(_, of)| **of == rank) {
             cells.vertices(cell).iter().for_each(|&vertex| touched[vertex as usize] = true);
         }
-        let touches = |cell: usize| cells.vertices(cell).iter().any(|&vertex| touched[vertex as usize]);
-        let taken: Vec<usize> =
-            (0..cells.len()).filter(|&cell| of_cells[cell] == rank || ghosts && touches(cell)).collect();
+        let touches =
+            |cell: usize| cells.vertices(cell).iter().any(|&vertex| touched[vertex as usize]);
+        let taken: Vec<usize> = (0..cells.len())
+            .filter(|&cell| of_cells[cell] == rank || ghosts && touches(cell))
+            .collect();
         let mut used = vec![false; points.len()];
-        taken.iter().flat_map(|&cell| cells.vertices(cell)).for_each(|&vertex| used[vertex as usize] = true);
+        taken
+            .iter()
+            .flat_map(|&cell| cells.vertices(cell))
+            .for_each(|&vertex| used[vertex as usize] = true);
         let vertices: Vec<usize> = (0..points.len()).filter(|&vertex| used[vertex]).collect();
         let mut numbers = vec![u32::MAX; points.len()];
         (0..).zip(&vertices).for_each(|(number, &vertex)| numbers[vertex] = number);
-        let renumbered = |of: &[u32]| of.iter().map(|&vertex| numbers[vertex as usize]).collect::<Vec<u32>>();
+        let renumbered =
+            |of: &[u32]| of.iter().map(|&vertex| numbers[vertex as usize]).collect::<Vec<u32>>();
         let own = cells.subset(taken.iter().copied()).with_vertices(&numbers);
         let features = match mesh.features() {
             FeatureSource::SharpEdges => FeatureSource::SharpEdges,
@@ -47,7 +58,11 @@ impl Part {
                 FeatureSource::Vertices(vertices.iter().map(|&vertex| tags[vertex]).collect())
             }
             FeatureSource::Faces(tagged) => {
-                let mut mine = TaggedFaces { faces: Cells::new(), tags: Vec::new(), names: tagged.names.clone() };
+                let mut mine = TaggedFaces {
+                    faces: Cells::new(),
+                    tags: Vec::new(),
+                    names: tagged.names.clone(),
+                };
                 for ((cell_type, vertices), &tag) in tagged.faces.iter().zip(&tagged.tags) {
                     if vertices.iter().all(|&vertex| used[vertex as usize]) {
                         mine.faces.push(cell_type, &renumbered(vertices))?;

@@ -120,12 +120,24 @@ impl<'a> Reader<'a> {
 
     pub(crate) fn f64s(&mut self, count: usize) -> Result<Vec<f64>, DistributedError> {
         let length = count.checked_mul(8).ok_or(self.garbled())?;
-        Ok(self.take(length)?.as_chunks().0.iter().map(|eight| f64::from_le_bytes(*eight)).collect())
+        Ok(self
+            .take(length)?
+            .as_chunks()
+            .0
+            .iter()
+            .map(|eight| f64::from_le_bytes(*eight))
+            .collect())
     }
 
     pub(crate) fn u32s(&mut self) -> Result<Vec<u32>, DistributedError> {
         let count = self.count(4)?;
-        Ok(self.take(4 * count)?.as_chunks().0.iter().map(|four| u32::from_le_bytes(*four)).collect())
+        Ok(self
+            .take(4 * count)?
+            .as_chunks()
+            .0
+            .iter()
+            .map(|four| u32::from_le_bytes(*four))
+            .collect())
     }
 
     pub(crate) fn text(&mut self) -> Result<String, DistributedError> {

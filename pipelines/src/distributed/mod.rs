@@ -66,15 +66,26 @@ impl Part {
         let mesh = view.to_mesh()?;
         let (vertices, cells) = (mesh.points().len(), mesh.cells().len());
         let fits = |name: &str, found: usize, expected: usize| {
-            if found == expected { Ok(()) } else { Err(MeshError::ArrayLength { name: name.into(), found, expected }) }
+            if found == expected {
+                Ok(())
+            } else {
+                Err(MeshError::ArrayLength { name: name.into(), found, expected })
+            }
         };
         let numbers = |name: &str, indices: &tombolo_deform::mesh::Indices, expected: usize| {
             fits(name, indices.len(), expected)?;
             Ok((0..expected).map(|index| indices.get(index)).collect::<Vec<u64>>())
         };
-        let global_vertices =
-            view.global_vertices.as_ref().map(|ids| numbers("global vertices", ids, vertices)).transpose()?;
-        let global_cells = view.global_cells.as_ref().map(|ids| numbers("global cells", ids, cells)).transpose()?;
+        let global_vertices = view
+            .global_vertices
+            .as_ref()
+            .map(|ids| numbers("global vertices", ids, vertices))
+            .transpose()?;
+        let global_cells = view
+            .global_cells
+            .as_ref()
+            .map(|ids| numbers("global cells", ids, cells))
+            .transpose()?;
         if let Some(ghosts) = view.ghost_cells {
             fits("ghost cells", ghosts.len(), cells)?;
         }
@@ -129,7 +140,9 @@ pub enum DistributedError {
         other: usize,
     },
     /// A rank has two vertices of one global number.
-    #[error("vertices {vertices:?} have the same global number {number}; expected each number once on a rank")]
+    #[error(
+        "vertices {vertices:?} have the same global number {number}; expected each number once on a rank"
+    )]
     NumberTwice {
         /// The number.
         number: u64,

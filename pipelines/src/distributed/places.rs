@@ -84,7 +84,11 @@ pub(super) fn by_number(
     for same in told.chunk_by(|a, b| a.name == b.name).filter(|same| same.len() > 1) {
         let twins: Vec<Twin> = same.iter().map(|told| told.twin).collect();
         for twin in &twins {
-            answer(&mut answers[twin.rank as usize], *twin, twins.iter().filter(|other| *other != twin));
+            answer(
+                &mut answers[twin.rank as usize],
+                *twin,
+                twins.iter().filter(|other| *other != twin),
+            );
         }
     }
     let twins = heard(communicator.exchange(addressed(answers)))?;
@@ -92,7 +96,10 @@ pub(super) fn by_number(
     for (vertex, twins) in &twins {
         if let Some(twice) = twins.iter().find(|twin| twin.rank as usize == rank) {
             let vertices = [*vertex.min(&twice.vertex), *vertex.max(&twice.vertex)];
-            return Err(DistributedError::NumberTwice { number: numbers[*vertex as usize], vertices });
+            return Err(DistributedError::NumberTwice {
+                number: numbers[*vertex as usize],
+                vertices,
+            });
         }
     }
     Ok(twins)
@@ -134,9 +141,14 @@ pub(super) fn by_place(
     let width = (diagonal / 1024.0).max(8.0 * near);
     let box_of = |point: Vector, shift: [f64; 3]| -> [u16; 3] {
         std::array::from_fn(|axis| {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 1025")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "from 0 to 1025"
+            )]
             {
-                (((point[axis] + shift[axis] * near - lower[axis]) / width).floor() + 1.0).clamp(0.0, 65535.0) as u16
+                (((point[axis] + shift[axis] * near - lower[axis]) / width).floor() + 1.0)
+                    .clamp(0.0, 65535.0) as u16
             }
         })
     };
@@ -151,7 +163,9 @@ pub(super) fn by_place(
         boxes.push(own);
         if low != high {
             for corner in 0..8_usize {
-                let place = std::array::from_fn(|axis| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] });
+                let place = std::array::from_fn(|axis| {
+                    if corner >> axis & 1 == 0 { low[axis] } else { high[axis] }
+                });
                 if !boxes.contains(&place) {
                     boxes.push(place);
                 }
@@ -198,10 +212,15 @@ pub(super) fn by_place(
             }
         }
         // Of each vertex all matches are known where it lies itself.
-        for (vertex, mut others) in pairs.into_iter().filter(|(vertex, _)| !in_box[*vertex].is_copy) {
+        for (vertex, mut others) in pairs.into_iter().filter(|(vertex, _)| !in_box[*vertex].is_copy)
+        {
             others.sort_unstable_by_key(|&other| in_box[other].twin);
             let own = in_box[vertex].twin;
-            answer(&mut answers[own.rank as usize], own, others.iter().map(|&other| &in_box[other].twin));
+            answer(
+                &mut answers[own.rank as usize],
+                own,
+                others.iter().map(|&other| &in_box[other].twin),
+            );
         }
     }
     let mut twins = heard(communicator.exchange(addressed(answers)))?;
@@ -219,7 +238,10 @@ pub(super) fn by_place(
             return Err(DistributedError::Ambiguous { place, vertices });
         }
         if let Some(pair) = others.windows(2).find(|pair| pair[0].rank == pair[1].rank) {
-            return Err(DistributedError::Ambiguous { place, vertices: [pair[0].vertex, pair[1].vertex] });
+            return Err(DistributedError::Ambiguous {
+                place,
+                vertices: [pair[0].vertex, pair[1].vertex],
+            });
         }
     }
     twins.retain(|(_, others)| !others.is_empty());

@@ -42,7 +42,11 @@ impl Ranks {
 impl fmt::Debug for Ranks {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (rank, ranks) = (self.communicator.rank(), self.communicator.size());
-        formatter.debug_struct("Ranks").field("rank", &rank).field("ranks", &ranks).finish_non_exhaustive()
+        formatter
+            .debug_struct("Ranks")
+            .field("rank", &rank)
+            .field("ranks", &ranks)
+            .finish_non_exhaustive()
     }
 }
 
@@ -79,7 +83,11 @@ impl Partition for Ranks {
         heard.into_iter().map(|(from, bytes)| (from, from_bytes(&bytes))).collect()
     }
 
-    fn exchange_with(&self, messages: Vec<(usize, Vec<f64>)>, from: &[usize]) -> Vec<(usize, Vec<f64>)> {
+    fn exchange_with(
+        &self,
+        messages: Vec<(usize, Vec<f64>)>,
+        from: &[usize],
+    ) -> Vec<(usize, Vec<f64>)> {
         let messages = messages.into_iter().map(|(to, values)| (to, to_bytes(&values))).collect();
         let heard = self.communicator.exchange_with(messages, from);
         heard.into_iter().map(|(from, bytes)| (from, from_bytes(&bytes))).collect()

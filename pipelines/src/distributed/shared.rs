@@ -58,9 +58,16 @@ impl SharedVertices {
     ///
     /// # Errors
     /// [`DistributedError`], the same on all ranks.
-    pub fn find_within(communicator: &dyn Communicator, part: &Part, tolerance: f64) -> Result<Self, DistributedError> {
-        let tolerable =
-            if (0.0..=0.01).contains(&tolerance) { Ok(()) } else { Err(DistributedError::Tolerance(tolerance)) };
+    pub fn find_within(
+        communicator: &dyn Communicator,
+        part: &Part,
+        tolerance: f64,
+    ) -> Result<Self, DistributedError> {
+        let tolerable = if (0.0..=0.01).contains(&tolerance) {
+            Ok(())
+        } else {
+            Err(DistributedError::Tolerance(tolerance))
+        };
         agree(communicator, tolerable)?;
         let outer = super::boundary::outer_faces(communicator, part)?;
         Self::beside(communicator, part, &outer, tolerance, Doubt::Refused)
@@ -81,7 +88,10 @@ impl SharedVertices {
         }
         // Which ranks number their vertices; whether any has ghosts.
         let numbers = part.global_vertices.as_deref().filter(|_| count > 0);
-        #[expect(clippy::cast_precision_loss, reason = "ranks below 2^53; numbers are compared with 2^32")]
+        #[expect(
+            clippy::cast_precision_loss,
+            reason = "ranks below 2^53; numbers are compared with 2^32"
+        )]
         let mut sums = [
             if numbers.is_some() { -(rank as f64) } else { f64::NEG_INFINITY },
             f64::from(u8::from(part.ghosts.as_ref().is_some_and(|ghosts| ghosts.contains(&true)))),
@@ -101,11 +111,15 @@ impl SharedVertices {
             // as particles, are each their own, wherever they are.
             let mut used = vec![false; count];
             let connected = part.cells.iter().filter(|(cell_type, _)| cell_type.dimension() > 0);
-            connected.for_each(|(_, vertices)| vertices.iter().for_each(|&vertex| used[vertex as usize] = true));
+            connected.for_each(|(_, vertices)| {
+                vertices.iter().for_each(|&vertex| used[vertex as usize] = true)
+            });
             candidates.retain(|&(vertex, _)| used[vertex as usize]);
         }
         let twins = match (by_number, numbers) {
-            (true, numbers) => places::by_number(communicator, numbers.unwrap_or_default(), &candidates),
+            (true, numbers) => {
+                places::by_number(communicator, numbers.unwrap_or_default(), &candidates)
+            }
             (false, _) => places::by_place(communicator, part, &candidates, tolerance, doubt),
         };
         let twins = agree(communicator, twins)?;
@@ -113,7 +127,8 @@ impl SharedVertices {
         let mut owners = vec![rank as u32; count];
         for (vertex, twins) in &twins {
             let own = (!held[*vertex as usize], owners[*vertex as usize]);
-            let best = twins.iter().map(|twin| (!twin.held, twin.rank)).fold(own, std::cmp::Ord::min);
+            let best =
+                twins.iter().map(|twin| (!twin.held, twin.rank)).fold(own, std::cmp::Ord::min);
             owners[*vertex as usize] = best.1;
         }
         let owned = owners.iter().filter(|&&owner| owner as usize == rank).count();
@@ -127,7 +142,9 @@ impl SharedVertices {
         }
         #[expect(clippy::cast_possible_truncation, reason = "checked: the highest is below")]
         let numbers: Vec<u32> = match numbers {
-            Some(numbers) if highest < f64::from(u32::MAX) => numbers.iter().map(|&number| number as u32).collect(),
+            Some(numbers) if highest < f64::from(u32::MAX) => {
+                numbers.iter().map(|&number| number as u32).collect()
+            }
             _ if by_number && highest < f64::from(u32::MAX) => Vec::new(),
             _ => consecutive(communicator, &owners, owned, &twins)?,
         };
@@ -140,8 +157,10 @@ impl SharedVertices {
         let count = part.points.len();
         let (rank, owners, neighbours) = (0, vec![0; count], Vec::new());
         let number = |number: u64| u32::try_from(number).ok();
-        let given: Option<Vec<u32>> =
-            part.global_vertices.as_ref().and_then(|ids| ids.iter().map(|&id| number(id)).collect());
+        let given: Option<Vec<u32>> = part
+            .global_vertices
+            .as_ref()
+            .and_then(|ids| ids.iter().map(|&id| number(id)).collect());
         let vertices = count as u64;
         if vertices >= u64::from(u32::MAX) {
             return Err(DistributedError::TooLarge { vertices });
@@ -192,9 +211,14 @@ impl SharedVertices {
     ///
     /// # Errors
     /// [`DistributedError::Garbled`].
-    pub fn sum(&self, communicator: &dyn Communicator, values: &mut [Vector]) -> Result<(), DistributedError> {
+    pub fn sum(
+        &self,
+        communicator: &dyn Communicator,
+        values: &mut [Vector],
+    ) -> Result<(), DistributedError> {
         let others = self.swap(communicator, values, |_, _| true)?;
-        let own: Vec<(u32, Vector)> = self.shared().map(|vertex| (vertex, values[vertex as usize])).collect();
+        let own: Vec<(u32, Vector)> =
+            self.shared().map(|vertex| (vertex, values[vertex as usize])).collect();
         own.iter().for_each(|&(vertex, _)| values[vertex as usize] = [0.0; 3]);
         let add = |values: &mut [Vector], vertex: u32, more: Vector| {
             let value = &mut values[vertex as usize];
@@ -220,7 +244,9 @@ impl SharedVertices {
         communicator: &dyn Communicator,
         values: &mut [Vector],
     ) -> Result<(), DistributedError> {
-        let owners = self.swap(communicator, values, |from, vertex| self.owners[vertex as usize] as usize == from)?;
+        let owners = self.swap(communicator, values, |from, vertex| {
+            self.owners[vertex as usize] as usize == from
+        })?;
         for (_, theirs) in owners {
             theirs.into_iter().for_each(|(vertex, value)| values[vertex as usize] = value);
         }
@@ -235,7 +261,10 @@ impl SharedVertices {
         });
         let messages = messages.collect();
         for (rank, bytes) in communicator.exchange(messages) {
-            let Some(neighbour) = self.neighbours.iter().find(|neighbour| neighbour.rank == rank) else { continue };
+            let Some(neighbour) = self.neighbours.iter().find(|neighbour| neighbour.rank == rank)
+            else {
+                continue;
+            };
             for (&vertex, mark) in neighbour.vertices.iter().zip(bytes) {
                 marks[vertex as usize] |= mark != 0;
             }
@@ -244,8 +273,11 @@ impl SharedVertices {
 
     /// The vertices that other ranks have too, each once, rising.
     pub fn shared(&self) -> impl Iterator<Item = u32> {
-        let mut all: Vec<u32> =
-            self.neighbours.iter().flat_map(|neighbour| neighbour.vertices.iter().copied()).collect();
+        let mut all: Vec<u32> = self
+            .neighbours
+            .iter()
+            .flat_map(|neighbour| neighbour.vertices.iter().copied())
+            .collect();
         all.sort_unstable();
         all.dedup();
         all.into_iter()
@@ -264,7 +296,10 @@ impl SharedVertices {
         let mut ranks = vec![0; starts[self.owners.len()]];
         for neighbour in &self.neighbours {
             for &vertex in &neighbour.vertices {
-                #[expect(clippy::cast_possible_truncation, reason = "ranks are numbered with 32 bits")]
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    reason = "ranks are numbered with 32 bits"
+                )]
                 {
                     ranks[next[vertex as usize]] = neighbour.rank as u32;
                 }
@@ -292,9 +327,12 @@ impl SharedVertices {
         let heard: BTreeMap<usize, Vec<u8>> = communicator.exchange(messages).into_iter().collect();
         let mut others = Vec::with_capacity(self.neighbours.len());
         for neighbour in &self.neighbours {
-            let bytes = heard.get(&neighbour.rank).ok_or(DistributedError::Garbled { rank: neighbour.rank })?;
+            let bytes = heard
+                .get(&neighbour.rank)
+                .ok_or(DistributedError::Garbled { rank: neighbour.rank })?;
             let mut reader = Reader::new(neighbour.rank, bytes);
-            let vertices = neighbour.vertices.iter().filter(|&&vertex| wanted(neighbour.rank, vertex));
+            let vertices =
+                neighbour.vertices.iter().filter(|&&vertex| wanted(neighbour.rank, vertex));
             let theirs: Result<Vec<(u32, Vector)>, DistributedError> =
                 vertices.map(|&vertex| Ok((vertex, reader.vector()?))).collect();
             others.push((neighbour.rank, theirs?));
@@ -325,7 +363,12 @@ fn candidates(part: &Part, outer: &BoundaryFaces, held: &[bool], ghosts: bool) -
         }
         outer.faces.connectivity().iter().for_each(|&vertex| inside[vertex as usize] = false);
     }
-    (0..).zip(held).zip(inside).filter(|(_, inside)| !inside).map(|((vertex, &held), _)| (vertex, held)).collect()
+    (0..)
+        .zip(held)
+        .zip(inside)
+        .filter(|(_, inside)| !inside)
+        .map(|((vertex, &held), _)| (vertex, held))
+        .collect()
 }
 
 /// Numbers that count through the ranks.
@@ -356,19 +399,23 @@ fn consecutive(
         *number = next;
     }
     let mut messages: BTreeMap<u32, Writer> = BTreeMap::new();
-    for (vertex, twins) in twins.iter().filter(|(vertex, _)| owners[*vertex as usize] as usize == rank) {
+    for (vertex, twins) in
+        twins.iter().filter(|(vertex, _)| owners[*vertex as usize] as usize == rank)
+    {
         for twin in twins {
             let message = messages.entry(twin.rank).or_default();
             message.u32(twin.vertex);
             message.u32(numbers[*vertex as usize]);
         }
     }
-    let messages = messages.into_iter().map(|(rank, message)| (rank as usize, message.into_bytes())).collect();
+    let messages =
+        messages.into_iter().map(|(rank, message)| (rank as usize, message.into_bytes())).collect();
     for (from, bytes) in communicator.exchange(messages) {
         let mut reader = Reader::new(from, &bytes);
         while !reader.is_empty() {
             let (vertex, number) = (reader.u32()?, reader.u32()?);
-            *numbers.get_mut(vertex as usize).ok_or(DistributedError::Garbled { rank: from })? = number;
+            *numbers.get_mut(vertex as usize).ok_or(DistributedError::Garbled { rank: from })? =
+                number;
         }
     }
     Ok(numbers)

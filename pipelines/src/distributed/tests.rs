@@ -23,7 +23,8 @@ fn shuffled(count: usize, seed: u64) -> Vec<usize> {
     let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
     let mut order: Vec<usize> = (0..count).collect();
     for place in (1..count).rev() {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         order.swap(place, (state >> 33) as usize % (place + 1));
     }
     order
@@ -43,10 +44,15 @@ pub(crate) fn renumbered(part: &Part, seed: u64) -> Part {
     let features = match &part.features {
         FeatureSource::Faces(tagged) => {
             let mut faces = Cells::new();
-            tagged.faces.iter().for_each(|(cell_type, face)| faces.push(cell_type, &renumber(face)).unwrap());
+            tagged
+                .faces
+                .iter()
+                .for_each(|(cell_type, face)| faces.push(cell_type, &renumber(face)).unwrap());
             FeatureSource::Faces(TaggedFaces { faces, ..tagged.clone() })
         }
-        FeatureSource::Vertices(tags) => FeatureSource::Vertices(vertices.iter().map(|&old| tags[old]).collect()),
+        FeatureSource::Vertices(tags) => {
+            FeatureSource::Vertices(vertices.iter().map(|&old| tags[old]).collect())
+        }
         FeatureSource::SharpEdges => FeatureSource::SharpEdges,
     };
     let pick = |numbers: &Option<Vec<u64>>, order: &[usize]| {
@@ -69,22 +75,32 @@ pub(crate) fn dealt(mesh: &Mesh, ranks: usize, empty: Option<usize>) -> Vec<usiz
         .cells()
         .iter()
         .map(|(_, vertices)| {
-            let sum = |axis: usize| vertices.iter().map(|&vertex| mesh.points()[vertex as usize][axis]).sum::<f64>();
+            let sum = |axis: usize| {
+                vertices.iter().map(|&vertex| mesh.points()[vertex as usize][axis]).sum::<f64>()
+            };
             (sum(0) + 0.3 * sum(1) + 0.2 * sum(2)) / vertices.len() as f64
         })
         .collect();
-    let (low, high) = places.iter().fold((f64::MAX, f64::MIN), |(low, high), &x| (low.min(x), high.max(x)));
-    let slab = |place: f64| (((place - low) / (high - low) * ranks.len() as f64) as usize).min(ranks.len() - 1);
+    let (low, high) =
+        places.iter().fold((f64::MAX, f64::MIN), |(low, high), &x| (low.min(x), high.max(x)));
+    let slab = |place: f64| {
+        (((place - low) / (high - low) * ranks.len() as f64) as usize).min(ranks.len() - 1)
+    };
     places.into_iter().map(|place| ranks[slab(place)]).collect()
 }
 
 fn meshes() -> Vec<Mesh> {
     let tets = box_of_tets([5, 4, 3], [0.0; 3], [2.0, 1.0, 1.0]);
-    let sharp = Mesh::new(tets.points().to_vec(), tets.cells().clone(), FeatureSource::SharpEdges).unwrap();
+    let sharp =
+        Mesh::new(tets.points().to_vec(), tets.cells().clone(), FeatureSource::SharpEdges).unwrap();
     let tags = tets.points().iter().map(|point| i64::from(point[0] > 1.0)).collect();
-    let by_vertex = Mesh::new(tets.points().to_vec(), tets.cells().clone(), FeatureSource::Vertices(tags)).unwrap();
+    let by_vertex =
+        Mesh::new(tets.points().to_vec(), tets.cells().clone(), FeatureSource::Vertices(tags))
+            .unwrap();
     let surface = Surface::extract(&tets, &FeatureSettings::default()).unwrap();
-    let plane = Mesh::new(surface.points().to_vec(), surface.faces().clone(), FeatureSource::SharpEdges).unwrap();
+    let plane =
+        Mesh::new(surface.points().to_vec(), surface.faces().clone(), FeatureSource::SharpEdges)
+            .unwrap();
     vec![tets, sharp, by_vertex, box_of_hexahedra([4, 3, 3], [-1.0; 3], [1.0; 3]), plane]
 }
 
@@ -92,7 +108,8 @@ fn meshes() -> Vec<Mesh> {
 fn by_place(surface: &Surface) -> BTreeSet<BTreeSet<Vec<[u64; 3]>>> {
     let place = |vertex: u32| surface.points()[vertex as usize].map(f64::to_bits);
     let face = |face: u32| {
-        let mut corners: Vec<_> = surface.faces().vertices(face as usize).iter().map(|&vertex| place(vertex)).collect();
+        let mut corners: Vec<_> =
+            surface.faces().vertices(face as usize).iter().map(|&vertex| place(vertex)).collect();
         let lowest = (0..corners.len()).min_by_key(|&corner| corners[corner]).unwrap();
         corners.rotate_left(lowest);
         corners
@@ -107,9 +124,13 @@ fn the_surface_is_that_of_one_process() {
         let serial = Surface::extract(&mesh, &FeatureSettings::default()).unwrap();
         for (ranks, empty) in [(1, None), (2, None), (3, Some(1)), (4, None), (4, Some(0))] {
             let of_cells = dealt(&mesh, ranks, empty);
-            for (ghosts, shuffle, numbers) in
-                [(false, 0, true), (true, 0, true), (true, 7, true), (false, 3, false), (true, 5, false)]
-            {
+            for (ghosts, shuffle, numbers) in [
+                (false, 0, true),
+                (true, 0, true),
+                (true, 7, true),
+                (false, 3, false),
+                (true, 5, false),
+            ] {
                 let outcomes = threads::run(ranks, |ranks| {
                     let mut part = Part::cut(&mesh, &of_cells, ranks.rank(), ghosts).unwrap();
                     if shuffle > 0 {
@@ -118,18 +139,25 @@ fn the_surface_is_that_of_one_process() {
                     if !numbers {
                         (part.global_vertices, part.global_cells) = (None, None);
                     }
-                    let (shared, boundary) = PartBoundary::find(&ranks, &part, &FeatureSettings::default()).unwrap();
+                    let (shared, boundary) =
+                        PartBoundary::find(&ranks, &part, &FeatureSettings::default()).unwrap();
                     assert_eq!(shared.count(), mesh.points().len() as u64);
                     // Out and back: each vertex of the boundary hears its own place.
                     let places = boundary.surface().map(|surface| surface.points().to_vec());
                     let mine = boundary.scatter(&ranks, places.as_deref()).unwrap();
-                    let expected: Vec<Vector> =
-                        boundary.vertices().iter().map(|&vertex| part.points[vertex as usize]).collect();
+                    let expected: Vec<Vector> = boundary
+                        .vertices()
+                        .iter()
+                        .map(|&vertex| part.points[vertex as usize])
+                        .collect();
                     assert_eq!(mine, expected);
                     assert_eq!(boundary.gather(&ranks, &part.points).unwrap(), places);
                     (shared.owned(), boundary.surface().cloned())
                 });
-                assert_eq!(outcomes.iter().map(|(owned, _)| owned).sum::<usize>(), mesh.points().len());
+                assert_eq!(
+                    outcomes.iter().map(|(owned, _)| owned).sum::<usize>(),
+                    mesh.points().len()
+                );
                 let surface = outcomes[0].1.clone().unwrap();
                 if numbers {
                     assert_eq!(*surface, serial);
@@ -152,7 +180,10 @@ fn values_at_shared_vertices_are_the_same_everywhere() {
         count
     };
     threads::run(4, |ranks| {
-        let part = renumbered(&Part::cut(&mesh, &of_cells, ranks.rank(), true).unwrap(), 11 + ranks.rank() as u64);
+        let part = renumbered(
+            &Part::cut(&mesh, &of_cells, ranks.rank(), true).unwrap(),
+            11 + ranks.rank() as u64,
+        );
         let shared = SharedVertices::find(&ranks, &part).unwrap();
         // How many cells each vertex has, each rank counting its own.
         let mut counts = vec![[0.0; 3]; part.points.len()];
@@ -165,7 +196,11 @@ fn values_at_shared_vertices_are_the_same_everywhere() {
         }
         // Only the owner knows; all hear it.
         let mut known: Vec<Vector> = (0..part.points.len() as u32)
-            .map(|vertex| if shared.owns(vertex) { part.points[vertex as usize] } else { [f64::NAN; 3] })
+            .map(
+                |vertex| {
+                    if shared.owns(vertex) { part.points[vertex as usize] } else { [f64::NAN; 3] }
+                },
+            )
             .collect();
         shared.take_from_owners(&ranks, &mut known).unwrap();
         assert_eq!(known, part.points);
@@ -182,13 +217,18 @@ fn what_is_wrong_on_one_rank_is_known_to_all() {
             if ranks.rank() == 1 {
                 break_it(&mut part);
             }
-            PartBoundary::find(&ranks, &part, &FeatureSettings::default()).map(drop).unwrap_err().to_string()
+            PartBoundary::find(&ranks, &part, &FeatureSettings::default())
+                .map(drop)
+                .unwrap_err()
+                .to_string()
         });
         assert!(outcomes.iter().all(|outcome| *outcome == outcomes[0]), "{outcomes:?}");
         outcomes[0].clone()
     };
-    let said =
-        fault(&|part| part.cells = Cells::uniform(tombolo_deform::mesh::CellType::Tetra, vec![0, 1, 2, 9999]).unwrap());
+    let said = fault(&|part| {
+        part.cells =
+            Cells::uniform(tombolo_deform::mesh::CellType::Tetra, vec![0, 1, 2, 9999]).unwrap()
+    });
     assert!(said.starts_with("rank 1: ") && said.contains("vertex 9999"), "{said}");
     let said = fault(&|part| part.global_vertices = None);
     assert!(said.starts_with("rank 1: ") && said.contains("global numbers"), "{said}");
@@ -209,14 +249,17 @@ fn a_rank_hears_of_its_neighbours_alone() {
         let of_cells: Vec<usize> = (0..mesh.cells().len())
             .map(|cell| {
                 let vertices = mesh.cells().vertices(cell);
-                let x = vertices.iter().map(|&vertex| mesh.points()[vertex as usize][0]).sum::<f64>() / 4.0;
+                let x =
+                    vertices.iter().map(|&vertex| mesh.points()[vertex as usize][0]).sum::<f64>()
+                        / 4.0;
                 (x as usize).min(ranks - 1)
             })
             .collect();
         let counts = threads::run(ranks, |ranks| {
             let ranks = Counted::new(ranks);
             let part = Part::cut(&mesh, &of_cells, ranks.rank(), false).unwrap();
-            let (shared, _) = PartBoundary::find(&ranks, &part, &FeatureSettings::default()).unwrap();
+            let (shared, _) =
+                PartBoundary::find(&ranks, &part, &FeatureSettings::default()).unwrap();
             assert!(shared.neighbours().len() <= 2);
             let before = ranks.traffic();
             shared.sum(&ranks, &mut vec![[1.0; 3]; part.points.len()]).unwrap();
@@ -249,7 +292,8 @@ fn rounded(values: &[f64]) -> Rounded {
 fn content(extract: &Extract) -> (usize, BTreeSet<(Vec<Rounded>, Rounded)>) {
     let corner = |point: u32| {
         let mut all = extract.points[point as usize].to_vec();
-        for field in extract.fields.iter().filter(|field| field.association == Association::Vertex) {
+        for field in extract.fields.iter().filter(|field| field.association == Association::Vertex)
+        {
             all.extend(&field.values[point as usize * field.components..][..field.components]);
         }
         rounded(&all)
@@ -258,7 +302,8 @@ fn content(extract: &Extract) -> (usize, BTreeSet<(Vec<Rounded>, Rounded)>) {
         let mut corners: Vec<Rounded> = points.iter().map(|&point| corner(point)).collect();
         corners.sort();
         let mut values = Vec::new();
-        for field in extract.fields.iter().filter(|field| field.association == Association::Element) {
+        for field in extract.fields.iter().filter(|field| field.association == Association::Element)
+        {
             values.extend(&field.values[cell * field.components..][..field.components]);
         }
         (corners, rounded(&values))
@@ -272,13 +317,24 @@ type Made = (BTreeMap<String, Arc<Extract>>, Vec<(String, f64)>);
 /// What the pipelines make of a part.
 fn made(part: &Part, communicator: Arc<dyn Communicator>) -> Made {
     let speed: Vec<f64> = part.points.iter().map(|[x, y, z]| x + y * z).collect();
-    let number = |cell: usize| part.global_cells.as_ref().map_or(cell as f64, |numbers| numbers[cell] as f64);
+    let number = |cell: usize| {
+        part.global_cells.as_ref().map_or(cell as f64, |numbers| numbers[cell] as f64)
+    };
     // What stands in ghosts is nobody's business.
-    let load: Vec<f64> =
-        (0..part.cells.len()).map(|cell| if part.is_ghost(cell) { f64::NAN } else { number(cell) }).collect();
+    let load: Vec<f64> = (0..part.cells.len())
+        .map(|cell| if part.is_ghost(cell) { f64::NAN } else { number(cell) })
+        .collect();
     let fields = [
-        FieldView { name: "speed", association: Association::Vertex, values: ArrayView::scalars(&speed) },
-        FieldView { name: "load", association: Association::Element, values: ArrayView::scalars(&load) },
+        FieldView {
+            name: "speed",
+            association: Association::Vertex,
+            values: ArrayView::scalars(&speed),
+        },
+        FieldView {
+            name: "load",
+            association: Association::Element,
+            values: ArrayView::scalars(&load),
+        },
     ];
     let shown = if part.points.is_empty() { &fields[..0] } else { &fields[..] };
     let channels = [Channel { name: "fluid", mesh: part.view(), fields: shown }];
@@ -289,8 +345,12 @@ fn made(part: &Part, communicator: Arc<dyn Communicator>) -> Made {
     for cycle in 0..2 {
         for output in runner.run(&Snapshot { cycle, time: 0.0, channels: &channels }) {
             match output {
-                Output::Frame(frame) => drop(extracts.insert(frame.pipeline.to_string(), frame.extract)),
-                Output::Write { pipeline, extract, .. } => drop(extracts.insert(pipeline.to_string(), extract)),
+                Output::Frame(frame) => {
+                    drop(extracts.insert(frame.pipeline.to_string(), frame.extract))
+                }
+                Output::Write { pipeline, extract, .. } => {
+                    drop(extracts.insert(pipeline.to_string(), extract))
+                }
                 Output::Monitor(monitor) => values.extend(monitor.values),
                 Output::Pause { .. } => pauses += 1,
                 other => panic!("{other:?}"),
@@ -328,7 +388,10 @@ fn extracts_are_those_of_one_process() {
             assert_eq!(values.len(), monitors.len());
             for ((name, value), (expected_name, expected)) in values.iter().zip(&monitors) {
                 assert_eq!(name, expected_name);
-                assert!((value - expected).abs() <= 1e-12 * expected.abs(), "{name}: {value}, {expected}");
+                assert!(
+                    (value - expected).abs() <= 1e-12 * expected.abs(),
+                    "{name}: {value}, {expected}"
+                );
             }
         }
     }
@@ -347,25 +410,41 @@ fn a_field_that_is_wrong_on_one_rank_stops_nobody() {
         }
         // Rank 1 lacks one field.
         let fields = [
-            FieldView { name: "speed", association: Association::Vertex, values: ArrayView::scalars(&speed) },
-            FieldView { name: "other", association: Association::Vertex, values: ArrayView::scalars(&speed) },
+            FieldView {
+                name: "speed",
+                association: Association::Vertex,
+                values: ArrayView::scalars(&speed),
+            },
+            FieldView {
+                name: "other",
+                association: Association::Vertex,
+                values: ArrayView::scalars(&speed),
+            },
         ];
         let shown = &fields[..if rank == 1 { 1 } else { 2 }];
         let channels = [Channel { name: "fluid", mesh: part.view(), fields: shown }];
         let text = r#"{"version": 1, "pipelines": [{"name": "all", "every": {"steps": 1}, "stages": [
             {"surface": {}}, {"statistics": {"field": "other"}}, {"statistics": {"field": "speed"}}, {"stream": {}}]}]}"#;
-        let mut runner =
-            Runner::with_communicator(&crate::language::parse(text, "test.json").unwrap(), Arc::new(ranks)).unwrap();
+        let mut runner = Runner::with_communicator(
+            &crate::language::parse(text, "test.json").unwrap(),
+            Arc::new(ranks),
+        )
+        .unwrap();
         let outputs = runner.run(&Snapshot { cycle: 0, time: 0.0, channels: &channels });
         let mut said = Vec::new();
         for output in outputs {
             match output {
                 Output::Error { message, .. } => said.push(message),
                 Output::Frame(frame) => {
-                    assert!(frame.extract.fields.is_empty(), "a field with NaN, and one that is missing")
+                    assert!(
+                        frame.extract.fields.is_empty(),
+                        "a field with NaN, and one that is missing"
+                    )
                 }
                 Output::Monitor(monitor) => {
-                    let value = |name: &str| monitor.values.iter().find(|(other, _)| other == name).unwrap().1;
+                    let value = |name: &str| {
+                        monitor.values.iter().find(|(other, _)| other == name).unwrap().1
+                    };
                     assert!(value("other.max").is_nan());
                     assert_eq!((value("speed.max"), value("speed.non_finite")), (2.0, 1.0));
                 }
@@ -414,7 +493,12 @@ fn points_alone_are_never_merged() {
 
 /// The largest difference of a displacement of parts from that of one process, and the iterations that it took: solved from the
 /// reference, and by an operator that was renewed.
-fn deformed_in_parts(mesh: &Mesh, method: Method, ranks: usize, of_cells: &[usize]) -> (f64, usize) {
+fn deformed_in_parts(
+    mesh: &Mesh,
+    method: Method,
+    ranks: usize,
+    of_cells: &[usize],
+) -> (f64, usize) {
     let settings = Deform { method, tolerance: 1e-10, ..Deform::default() };
     let wave = |[x, y, z]: Vector| [0.1 * (3.0 * y).sin(), 0.2 * x * z, -0.1 * (4.0 * x).cos()];
     let on = |mesh: &Mesh, vertices: &[u32]| -> Vec<Vector> {
@@ -426,12 +510,17 @@ fn deformed_in_parts(mesh: &Mesh, method: Method, ranks: usize, of_cells: &[usiz
     let found = threads::run(ranks, |ranks| {
         let part = Part::cut(mesh, of_cells, ranks.rank(), false).unwrap();
         let ranks: Arc<dyn Communicator> = Arc::new(ranks);
-        let (shared, boundary) = PartBoundary::find(&*ranks, &part, &FeatureSettings::default()).unwrap();
-        let partition: Arc<dyn Partition> = Arc::new(Ranks::new(ranks, Arc::new(shared), &boundary, Vec::new()));
-        let own = Mesh::new(part.points.clone(), part.cells.clone(), FeatureSource::SharpEdges).unwrap();
-        let operator = VolumeOperator::of_part(&own, boundary.vertices(), &[], &settings, &partition).unwrap();
+        let (shared, boundary) =
+            PartBoundary::find(&*ranks, &part, &FeatureSettings::default()).unwrap();
+        let partition: Arc<dyn Partition> =
+            Arc::new(Ranks::new(ranks, Arc::new(shared), &boundary, Vec::new()));
+        let own =
+            Mesh::new(part.points.clone(), part.cells.clone(), FeatureSource::SharpEdges).unwrap();
+        let operator =
+            VolumeOperator::of_part(&own, boundary.vertices(), &[], &settings, &partition).unwrap();
         let again = operator.updated(&own).unwrap();
-        let numbers: Vec<usize> = part.global_vertices.iter().flatten().map(|&number| number as usize).collect();
+        let numbers: Vec<usize> =
+            part.global_vertices.iter().flatten().map(|&number| number as usize).collect();
         [&operator, &again].map(|operator| {
             let found = operator.solve(&on(&own, boundary.vertices())).unwrap();
             let off = found.displacement.iter().zip(&numbers).flat_map(|(value, &number)| {
@@ -442,7 +531,10 @@ fn deformed_in_parts(mesh: &Mesh, method: Method, ranks: usize, of_cells: &[usiz
         })
     });
     let found = found.as_flattened();
-    assert!(found.iter().all(|(_, iterations)| *iterations == found[0].1), "all ranks iterate together");
+    assert!(
+        found.iter().all(|(_, iterations)| *iterations == found[0].1),
+        "all ranks iterate together"
+    );
     (found.iter().fold(0.0, |most: f64, (off, _)| most.max(*off)), found[0].1)
 }
 
@@ -453,9 +545,13 @@ fn multigrid_over_ranks_takes_the_iterations_of_one_process() {
     for method in [Method::Elasticity, Method::Harmonic] {
         let (_, alone) = deformed_in_parts(&mesh, method, 1, &vec![0; mesh.cells().len()]);
         for (ranks, empty) in [(2, None), (3, None), (4, Some(1)), (5, None)] {
-            let (off, iterations) = deformed_in_parts(&mesh, method, ranks, &dealt(&mesh, ranks, empty));
+            let (off, iterations) =
+                deformed_in_parts(&mesh, method, ranks, &dealt(&mesh, ranks, empty));
             assert!(off < 1e-8, "{method:?} on {ranks} ranks: {off:e}");
-            assert!(iterations <= alone + 3, "{method:?} on {ranks} ranks: {iterations} iterations, alone {alone}");
+            assert!(
+                iterations <= alone + 3,
+                "{method:?} on {ranks} ranks: {iterations} iterations, alone {alone}"
+            );
         }
     }
 }

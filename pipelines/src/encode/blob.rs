@@ -46,7 +46,8 @@ fn store(bytes: &[u8]) -> Result<Vec<u8>, std::io::Error> {
 #[cfg(feature = "compression")]
 pub(super) fn decompress(blob: &[u8], expected: usize) -> Result<Vec<u8>, String> {
     use std::io::Read;
-    let decoder = zstd::stream::read::Decoder::with_buffer(blob).map_err(|error| error.to_string())?;
+    let decoder =
+        zstd::stream::read::Decoder::with_buffer(blob).map_err(|error| error.to_string())?;
     let mut bytes = Vec::new();
     decoder.take(expected as u64 + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
     check(bytes, expected)
@@ -56,7 +57,8 @@ pub(super) fn decompress(blob: &[u8], expected: usize) -> Result<Vec<u8>, String
 #[cfg(all(not(feature = "compression"), feature = "decompression"))]
 pub(super) fn decompress(blob: &[u8], expected: usize) -> Result<Vec<u8>, String> {
     use std::io::Read;
-    let decoder = ruzstd::decoding::StreamingDecoder::new(blob).map_err(|error| error.to_string())?;
+    let decoder =
+        ruzstd::decoding::StreamingDecoder::new(blob).map_err(|error| error.to_string())?;
     let mut bytes = Vec::with_capacity(expected);
     decoder.take(expected as u64 + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
     check(bytes, expected)
@@ -72,7 +74,11 @@ pub(super) fn decompress(blob: &[u8], expected: usize) -> Result<Vec<u8>, String
 fn unstore(blob: &[u8], expected: usize) -> Result<Vec<u8>, String> {
     const COMPRESSED: &str = "the blob is compressed, and this build has no zstd";
     let mut rest = blob.strip_prefix(&ZSTD_MAGIC).ok_or("the blob is no zstd frame")?;
-    rest = rest.strip_prefix(&[0b1010_0000]).ok_or(COMPRESSED)?.get(4..).ok_or("the blob is truncated")?;
+    rest = rest
+        .strip_prefix(&[0b1010_0000])
+        .ok_or(COMPRESSED)?
+        .get(4..)
+        .ok_or("the blob is truncated")?;
     let mut bytes = Vec::new();
     loop {
         let (header, after) = rest.split_first_chunk::<3>().ok_or("the blob is truncated")?;
@@ -80,7 +86,8 @@ fn unstore(blob: &[u8], expected: usize) -> Result<Vec<u8>, String> {
         if header >> 1 & 3 != 0 {
             return Err(COMPRESSED.into());
         }
-        let (part, after) = after.split_at_checked((header >> 3) as usize).ok_or("the blob is truncated")?;
+        let (part, after) =
+            after.split_at_checked((header >> 3) as usize).ok_or("the blob is truncated")?;
         bytes.extend(part);
         rest = after;
         if header & 1 == 1 || bytes.len() > expected {

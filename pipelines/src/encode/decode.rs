@@ -6,7 +6,8 @@ use tombolo_deform::surface::Surface;
 use super::blob::{MOST_BYTES, decompress};
 use super::surface;
 use super::wire::{
-    Array, DATA, DataHeader, Kind, MAGIC, PREAMBLE, SURFACE, TOPOLOGY, TopologyHeader, VERSION, integers,
+    Array, DATA, DataHeader, Kind, MAGIC, PREAMBLE, SURFACE, TOPOLOGY, TopologyHeader, VERSION,
+    integers,
 };
 use crate::extract::{Association, Field};
 
@@ -74,8 +75,9 @@ pub(super) fn error(place: impl Into<String>, message: impl Into<String>) -> Dec
 /// # Errors
 /// [`DecodeError`].
 pub fn decode(bytes: &[u8]) -> Result<Decoded, DecodeError> {
-    let (preamble, rest) =
-        bytes.split_first_chunk::<PREAMBLE>().ok_or_else(|| error("preamble", "the frame is truncated"))?;
+    let (preamble, rest) = bytes
+        .split_first_chunk::<PREAMBLE>()
+        .ok_or_else(|| error("preamble", "the frame is truncated"))?;
     let [m0, m1, m2, m3, version, kind, zero, another_zero, l0, l1, l2, l3] = *preamble;
     if [m0, m1, m2, m3] != MAGIC {
         return Err(error("preamble", "the frame does not begin with TMBL"));
@@ -84,10 +86,12 @@ pub fn decode(bytes: &[u8]) -> Result<Decoded, DecodeError> {
         return Err(error("preamble", format!("found version {version}, expected {VERSION}")));
     }
     let length = u32::from_le_bytes([l0, l1, l2, l3]) as usize;
-    let (header, blobs) = rest.split_at_checked(length).ok_or_else(|| error("header", "the frame is truncated"))?;
+    let (header, blobs) =
+        rest.split_at_checked(length).ok_or_else(|| error("header", "the frame is truncated"))?;
     let bad_header = |failure: serde_json::Error| error("header", failure.to_string());
     match kind {
-        TOPOLOGY => topology(serde_json::from_slice(header).map_err(bad_header)?, blobs).map(Decoded::Topology),
+        TOPOLOGY => topology(serde_json::from_slice(header).map_err(bad_header)?, blobs)
+            .map(Decoded::Topology),
         DATA => data(serde_json::from_slice(header).map_err(bad_header)?, blobs).map(Decoded::Data),
         SURFACE => {
             let header = serde_json::from_slice(header).map_err(bad_header)?;
@@ -98,7 +102,10 @@ pub fn decode(bytes: &[u8]) -> Result<Decoded, DecodeError> {
 }
 
 /// Each array with its bytes, decompressed.
-pub(super) fn arrays(headers: Vec<Array>, mut blobs: &[u8]) -> Result<Vec<(Array, Vec<u8>)>, DecodeError> {
+pub(super) fn arrays(
+    headers: Vec<Array>,
+    mut blobs: &[u8],
+) -> Result<Vec<(Array, Vec<u8>)>, DecodeError> {
     let mut total = 0usize;
     let mut arrays = Vec::new();
     for array in headers {
@@ -112,7 +119,9 @@ pub(super) fn arrays(headers: Vec<Array>, mut blobs: &[u8]) -> Result<Vec<(Array
         let Some(size) = size.filter(|_| total <= MOST_BYTES) else {
             return Err(place(format!("more than {MOST_BYTES} bytes in one frame")));
         };
-        let (blob, rest) = blobs.split_at_checked(array.bytes).ok_or_else(|| place("the frame is truncated".into()))?;
+        let (blob, rest) = blobs
+            .split_at_checked(array.bytes)
+            .ok_or_else(|| place("the frame is truncated".into()))?;
         blobs = rest;
         let bytes = decompress(blob, size).map_err(place)?;
         arrays.push((array, bytes));
@@ -127,7 +136,8 @@ fn topology(header: TopologyHeader, blobs: &[u8]) -> Result<TopologyFrame, Decod
     let (mut triangles, mut lines, mut triangle_features) = (Vec::new(), Vec::new(), None);
     for (array, bytes) in arrays(header.arrays, blobs)? {
         let place = format!("array `{:.60}`", array.name);
-        let values = integers(&bytes, array.kind, array.filter).ok_or_else(|| error(&place, "expected integers"))?;
+        let values = integers(&bytes, array.kind, array.filter)
+            .ok_or_else(|| error(&place, "expected integers"))?;
         let expected = match array.name.as_str() {
             "triangles" => 3,
             "lines" => 2,
@@ -135,7 +145,10 @@ fn topology(header: TopologyHeader, blobs: &[u8]) -> Result<TopologyFrame, Decod
             _ => continue,
         };
         if array.components != expected {
-            return Err(error(place, format!("{} components, expected {expected}", array.components)));
+            return Err(error(
+                place,
+                format!("{} components, expected {expected}", array.components),
+            ));
         }
         let outside = values.iter().find(|&&point| point as usize >= header.points);
         if let (2.., Some(point)) = (expected, outside) {
@@ -164,7 +177,10 @@ fn data(header: DataHeader, blobs: &[u8]) -> Result<DataFrame, DecodeError> {
         let values = values(&array, &bytes)?;
         if array.name == "points" {
             if array.components != 3 {
-                return Err(error("array `points`", format!("{} components, expected 3", array.components)));
+                return Err(error(
+                    "array `points`",
+                    format!("{} components, expected 3", array.components),
+                ));
             }
             points = values.as_chunks().0.to_vec();
         } else {
@@ -185,13 +201,17 @@ fn data(header: DataHeader, blobs: &[u8]) -> Result<DataFrame, DecodeError> {
 /// The values of an array, tuple after tuple.
 pub(super) fn values(array: &Array, bytes: &[u8]) -> Result<Vec<f64>, DecodeError> {
     let planar: Vec<f64> = match array.kind {
-        Kind::F32 => bytes.as_chunks().0.iter().map(|&chunk| f64::from(f32::from_le_bytes(chunk))).collect(),
+        Kind::F32 => {
+            bytes.as_chunks().0.iter().map(|&chunk| f64::from(f32::from_le_bytes(chunk))).collect()
+        }
         Kind::F64 => bytes.as_chunks().0.iter().map(|&chunk| f64::from_le_bytes(chunk)).collect(),
         kind => {
             let place = || format!("array `{:.60}`", array.name);
             let per_component = |numbers: &Option<Vec<f64>>, name: &str| {
                 let numbers = numbers.clone().filter(|numbers| numbers.len() == array.components);
-                numbers.ok_or_else(|| error(place(), format!("expected {} values of `{name}`", array.components)))
+                numbers.ok_or_else(|| {
+                    error(place(), format!("expected {} values of `{name}`", array.components))
+                })
             };
             let quantum = per_component(&array.quantum, "quantum")?;
             let offset = per_component(&array.offset, "offset")?;
@@ -204,5 +224,7 @@ pub(super) fn values(array: &Array, bytes: &[u8]) -> Result<Vec<f64>, DecodeErro
         }
     };
     let (count, components) = (array.count, array.components);
-    Ok((0..planar.len()).map(|index| planar[index % components * count + index / components]).collect())
+    Ok((0..planar.len())
+        .map(|index| planar[index % components * count + index / components])
+        .collect())
 }

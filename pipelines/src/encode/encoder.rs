@@ -6,7 +6,9 @@ use tombolo_deform::mesh::{CellType, Cells};
 
 use super::blob::compress;
 use super::quantize::{pack, range};
-use super::wire::{Array, DATA, DataHeader, Filter, Kind, MAGIC, TOPOLOGY, TopologyHeader, VERSION, delta};
+use super::wire::{
+    Array, DATA, DataHeader, Filter, Kind, MAGIC, TOPOLOGY, TopologyHeader, VERSION, delta,
+};
 use crate::extract::{Association, Extract, ExtractFeatures};
 use crate::language::ErrorBound;
 use crate::run::Frame;
@@ -116,12 +118,20 @@ impl Encoder {
             let components = field.components;
             let of_triangles;
             let (count, values) = match field.association {
-                Association::Vertex | Association::Mesh => (extract.points.len(), field.values.as_slice()),
+                Association::Vertex | Association::Mesh => {
+                    (extract.points.len(), field.values.as_slice())
+                }
                 Association::Element => {
-                    check_length(&field.name, field.values.len(), extract.cells.len() * components)?;
+                    check_length(
+                        &field.name,
+                        field.values.len(),
+                        extract.cells.len() * components,
+                    )?;
                     let cells = topology.cells.iter().map(|&cell| cell as usize * components);
-                    of_triangles =
-                        cells.flat_map(|start| &field.values[start..start + components]).copied().collect::<Vec<_>>();
+                    of_triangles = cells
+                        .flat_map(|start| &field.values[start..start + components])
+                        .copied()
+                        .collect::<Vec<_>>();
                     (topology.cells.len(), of_triangles.as_slice())
                 }
             };
@@ -136,14 +146,29 @@ impl Encoder {
         let raw_bytes = message.raw_bytes;
         let data = message.finish(DATA, |arrays| {
             let topology = format!("{:016x}", topology.id);
-            serde_json::to_vec(&DataHeader { view: pipeline.to_string(), topology, cycle: *cycle, time: *time, arrays })
+            serde_json::to_vec(&DataHeader {
+                view: pipeline.to_string(),
+                topology,
+                cycle: *cycle,
+                time: *time,
+                arrays,
+            })
         })?;
-        Ok(Encoded { topology_id: topology.id, topology: Arc::clone(&topology.message), data, raw_bytes })
+        Ok(Encoded {
+            topology_id: topology.id,
+            topology: Arc::clone(&topology.message),
+            data,
+            raw_bytes,
+        })
     }
 }
 
 fn check_length(array: &str, found: usize, expected: usize) -> Result<(), EncodeError> {
-    if found == expected { Ok(()) } else { Err(EncodeError::Length { array: array.into(), found, expected }) }
+    if found == expected {
+        Ok(())
+    } else {
+        Err(EncodeError::Length { array: array.into(), found, expected })
+    }
 }
 
 /// A topology that was encoded.
@@ -165,7 +190,9 @@ impl Topology {
             (Some(a), Some(b)) => Arc::ptr_eq(a, b),
             _ => false,
         };
-        Arc::ptr_eq(&self.of_cells, &extract.cells) && same_features && self.points == extract.points.len()
+        Arc::ptr_eq(&self.of_cells, &extract.cells)
+            && same_features
+            && self.points == extract.points.len()
     }
 
     fn new(view: &str, extract: &Extract) -> Result<Self, EncodeError> {
@@ -189,7 +216,10 @@ impl Topology {
                         });
                     }
                 }
-                (CellType::Triangle | CellType::Quad | CellType::Polygon, &[first, ref rest @ ..]) => {
+                (
+                    CellType::Triangle | CellType::Quad | CellType::Polygon,
+                    &[first, ref rest @ ..],
+                ) => {
                     triangles.extend(rest.windows(2).map(|edge| [first, edge[0], edge[1]]));
                 }
                 _ => return Err(EncodeError::VolumeCell { cell, cell_type }),
@@ -205,7 +235,11 @@ impl Topology {
         });
 
         let mut hash = Hash(extract.points.len() as u64);
-        for part in [triangles.as_flattened(), features.as_deref().unwrap_or_default(), lines.as_flattened()] {
+        for part in [
+            triangles.as_flattened(),
+            features.as_deref().unwrap_or_default(),
+            lines.as_flattened(),
+        ] {
             hash.add(part);
         }
         let id = hash.finish();
@@ -240,7 +274,8 @@ struct Hash(u64);
 
 impl Hash {
     fn add(&mut self, numbers: &[u32]) {
-        let mut word = |word: u64| self.0 = (self.0.rotate_left(5) ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let mut word =
+            |word: u64| self.0 = (self.0.rotate_left(5) ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         word(numbers.len() as u64);
         numbers.iter().for_each(|&number| word(u64::from(number)));
     }
@@ -272,9 +307,15 @@ impl Message {
         Ok(())
     }
 
-    pub(super) fn integers(&mut self, name: &str, values: &[u32], components: usize) -> Result<(), EncodeError> {
+    pub(super) fn integers(
+        &mut self,
+        name: &str,
+        values: &[u32],
+        components: usize,
+    ) -> Result<(), EncodeError> {
         let count = values.len() / components;
-        let planar = (0..values.len()).map(|index| values[index % count * components + index / count]);
+        let planar =
+            (0..values.len()).map(|index| values[index % count * components + index / count]);
         let bytes = delta(planar, Kind::U32);
         let array = Array {
             name: name.to_owned(),
@@ -302,7 +343,11 @@ impl Message {
     ) -> Result<(), EncodeError> {
         if let Some(index) = values.iter().position(|value| !value.is_finite()) {
             let entity = index / components.max(1);
-            return Err(EncodeError::NotFinite { array: name.into(), entity, value: values[index] });
+            return Err(EncodeError::NotFinite {
+                array: name.into(),
+                entity,
+                value: values[index],
+            });
         }
         let packed = pack(values, components, bound, extent);
         self.raw_bytes += size_of_val(values);
@@ -346,9 +391,14 @@ fn magnitudes(values: &[f64], components: usize) -> [f64; 2] {
     let magnitudes = values.chunks_exact(components.max(1)).map(|tuple| {
         let squares: f64 = tuple.iter().map(|value| value * value).sum();
         // Where the squares over- or underflow, the slower way around them.
-        if squares.is_normal() { squares.sqrt() } else { tuple.iter().fold(0.0_f64, |sum, x| sum.hypot(*x)) }
+        if squares.is_normal() {
+            squares.sqrt()
+        } else {
+            tuple.iter().fold(0.0_f64, |sum, x| sum.hypot(*x))
+        }
     });
-    let [least, largest] =
-        magnitudes.fold([f64::INFINITY, 0.0], |[least, largest], value| [value.min(least), value.max(largest)]);
+    let [least, largest] = magnitudes.fold([f64::INFINITY, 0.0], |[least, largest], value| {
+        [value.min(least), value.max(largest)]
+    });
     if least > largest { [0.0, 0.0] } else { [least.min(f64::MAX), largest.min(f64::MAX)] }
 }

@@ -35,7 +35,8 @@ pub(super) fn pack(values: &[f64], components: usize, bound: ErrorBound, extent:
 
 /// Component after component.
 fn planar(values: &[f64], components: usize) -> impl Iterator<Item = f64> {
-    (0..components).flat_map(move |component| values.iter().skip(component).step_by(components).copied())
+    (0..components)
+        .flat_map(move |component| values.iter().skip(component).step_by(components).copied())
 }
 
 fn quantized(values: &[f64], components: usize, bound: f64) -> Option<Packed> {
@@ -48,7 +49,9 @@ fn quantized(values: &[f64], components: usize, bound: f64) -> Option<Packed> {
         // A little under twice the bound: rounding to the nearest leaves half a quantum, and rounding of the numbers themselves
         // a trace more.
         let quantum = if least == largest { 0.0 } else { 2.0 * bound * (1.0 - 1e-9) };
-        if least != largest && !(quantum.is_normal() && ((largest - least) / quantum) < f64::from(u32::MAX)) {
+        if least != largest
+            && !(quantum.is_normal() && ((largest - least) / quantum) < f64::from(u32::MAX))
+        {
             return None;
         }
         for index in 0..count {
@@ -58,7 +61,8 @@ fn quantized(values: &[f64], components: usize, bound: f64) -> Option<Packed> {
                 clippy::cast_sign_loss,
                 reason = "checked against the range above"
             )]
-            let integer = if quantum == 0.0 { 0 } else { ((value - least) / quantum).round() as u32 };
+            let integer =
+                if quantum == 0.0 { 0 } else { ((value - least) / quantum).round() as u32 };
             let decoded = least + quantum * f64::from(integer);
             // Not `>`: a NaN must not pass.
             if !((decoded - value).abs() <= bound || decoded == value) {
@@ -76,7 +80,13 @@ fn quantized(values: &[f64], components: usize, bound: f64) -> Option<Packed> {
         _ => Kind::U32,
     };
     let bytes = delta(integers.into_iter(), kind);
-    Some(Packed { kind, quantum: Some(quanta), offset: Some(offsets), filter: Filter::Delta, bytes })
+    Some(Packed {
+        kind,
+        quantum: Some(quanta),
+        offset: Some(offsets),
+        filter: Filter::Delta,
+        bytes,
+    })
 }
 
 /// In single precision where that is within the bound, else in double.
@@ -84,11 +94,15 @@ fn exact(values: &[f64], components: usize, bound: f64) -> Packed {
     #[expect(clippy::cast_possible_truncation, reason = "what is lost is measured")]
     let fits = |value: f64| {
         let single = f64::from(value as f32);
-        single.to_bits() == value.to_bits() || (single.is_finite() && (single - value).abs() <= bound)
+        single.to_bits() == value.to_bits()
+            || (single.is_finite() && (single - value).abs() <= bound)
     };
     let (kind, bytes) = if values.iter().all(|&value| fits(value)) {
         #[expect(clippy::cast_possible_truncation, reason = "measured above")]
-        (Kind::F32, planar(values, components).flat_map(|value| (value as f32).to_le_bytes()).collect())
+        (
+            Kind::F32,
+            planar(values, components).flat_map(|value| (value as f32).to_le_bytes()).collect(),
+        )
     } else {
         (Kind::F64, planar(values, components).flat_map(f64::to_le_bytes).collect())
     };
@@ -103,10 +117,19 @@ mod tests {
 
     fn unpack(packed: &Packed, components: usize, count: usize) -> Vec<f64> {
         let planar: Vec<f64> = match packed.kind {
-            Kind::F32 => packed.bytes.as_chunks().0.iter().map(|&chunk| f64::from(f32::from_le_bytes(chunk))).collect(),
-            Kind::F64 => packed.bytes.as_chunks().0.iter().map(|&chunk| f64::from_le_bytes(chunk)).collect(),
+            Kind::F32 => packed
+                .bytes
+                .as_chunks()
+                .0
+                .iter()
+                .map(|&chunk| f64::from(f32::from_le_bytes(chunk)))
+                .collect(),
+            Kind::F64 => {
+                packed.bytes.as_chunks().0.iter().map(|&chunk| f64::from_le_bytes(chunk)).collect()
+            }
             kind => {
-                let (quantum, offset) = (packed.quantum.as_ref().unwrap(), packed.offset.as_ref().unwrap());
+                let (quantum, offset) =
+                    (packed.quantum.as_ref().unwrap(), packed.offset.as_ref().unwrap());
                 let integers = integers(&packed.bytes, kind, packed.filter).unwrap();
                 let value = |(index, integer)| {
                     let component: usize = index / count.max(1);
@@ -115,7 +138,9 @@ mod tests {
                 integers.into_iter().enumerate().map(value).collect()
             }
         };
-        (0..count * components).map(|index| planar[index % components * count + index / components]).collect()
+        (0..count * components)
+            .map(|index| planar[index % components * count + index / components])
+            .collect()
     }
 
     fn check(values: &[f64], components: usize, bound: ErrorBound) -> Kind {
@@ -129,7 +154,9 @@ mod tests {
             ErrorBound::Absolute(bound) => bound,
             ErrorBound::Lossless => 0.0,
         };
-        for (sent, received) in values.iter().zip(unpack(&packed, components, values.len() / components)) {
+        for (sent, received) in
+            values.iter().zip(unpack(&packed, components, values.len() / components))
+        {
             assert!(
                 *sent == received || received.is_finite() && (sent - received).abs() <= allowed,
                 "{sent:e} became {received:e}, {bound:?}"
@@ -141,8 +168,9 @@ mod tests {
     #[test]
     fn the_bound_holds_where_numbers_are_unkind() {
         let relative = ErrorBound::Relative(1e-3);
-        let ramp =
-            |scale: f64, offset: f64| (0..1000).map(|i| offset + scale * f64::from(i * i % 997)).collect::<Vec<_>>();
+        let ramp = |scale: f64, offset: f64| {
+            (0..1000).map(|i| offset + scale * f64::from(i * i % 997)).collect::<Vec<_>>()
+        };
         assert_eq!(check(&[], 1, relative), Kind::U8);
         assert_eq!(check(&[-0.1; 9], 3, relative), Kind::U8, "a constant field needs no bits");
         assert_eq!(check(&ramp(1.0, 0.0), 1, relative), Kind::U16);
@@ -151,7 +179,11 @@ mod tests {
         check(&ramp(1.0, 1e16), 1, ErrorBound::Absolute(1e-3));
         assert_eq!(check(&ramp(1e-310, 0.0), 1, relative), Kind::F64, "the quantum is denormal");
         assert_eq!(check(&[5e-324, 0.0, -5e-324], 1, relative), Kind::F64);
-        assert_eq!(check(&[f64::MAX, -f64::MAX, 1.0], 1, relative), Kind::F64, "the range overflows");
+        assert_eq!(
+            check(&[f64::MAX, -f64::MAX, 1.0], 1, relative),
+            Kind::F64,
+            "the range overflows"
+        );
         check(&[1e300, 2e300, -1e300, 1.5e300], 1, relative);
         check(&[1e300, 1e-300, 0.0, -1.0], 1, relative);
         check(&[1e300, 0.0, 0.0, 1e-300, 1.0, 5.0], 3, relative);

@@ -35,7 +35,9 @@ pub fn encode_surface(surface: &Surface) -> Result<Vec<u8>, EncodeError> {
     message.integers("face_sizes", &sizes, 1)?;
     message.integers("face_points", faces.connectivity(), 1)?;
     message.integers("face_features", features.face_features(), 1)?;
-    message.finish(SURFACE, |arrays| serde_json::to_vec(&SurfaceHeader { features: features.names().to_vec(), arrays }))
+    message.finish(SURFACE, |arrays| {
+        serde_json::to_vec(&SurfaceHeader { features: features.names().to_vec(), arrays })
+    })
 }
 
 pub(super) fn decode(header: SurfaceHeader, blobs: &[u8]) -> Result<Surface, DecodeError> {
@@ -52,12 +54,15 @@ pub(super) fn decode(header: SurfaceHeader, blobs: &[u8]) -> Result<Surface, Dec
             _ => continue,
         };
         if array.components != components {
-            return Err(error(place, format!("{} components, expected {components}", array.components)));
+            return Err(error(
+                place,
+                format!("{} components, expected {components}", array.components),
+            ));
         }
         match target {
             Some(target) => {
-                *target =
-                    integers(&bytes, array.kind, array.filter).ok_or_else(|| error(place, "expected integers"))?;
+                *target = integers(&bytes, array.kind, array.filter)
+                    .ok_or_else(|| error(place, "expected integers"))?;
             }
             None => points = values(&array, &bytes)?.as_chunks().0.to_vec(),
         }
@@ -71,7 +76,8 @@ pub(super) fn decode(header: SurfaceHeader, blobs: &[u8]) -> Result<Surface, Dec
 fn faces(sizes: &[u32], mut corners: &[u32]) -> Result<Cells, String> {
     let mut faces = Cells::new();
     for &size in sizes {
-        let (face, rest) = corners.split_at_checked(size as usize).ok_or("more points than `face_points` has")?;
+        let (face, rest) =
+            corners.split_at_checked(size as usize).ok_or("more points than `face_points` has")?;
         corners = rest;
         let cell_type = match size {
             3 => CellType::Triangle,
@@ -80,7 +86,11 @@ fn faces(sizes: &[u32], mut corners: &[u32]) -> Result<Cells, String> {
         };
         faces.push(cell_type, face).map_err(|failure| failure.to_string())?;
     }
-    if corners.is_empty() { Ok(faces) } else { Err(format!("fewer points than `face_points`, by {}", corners.len())) }
+    if corners.is_empty() {
+        Ok(faces)
+    } else {
+        Err(format!("fewer points than `face_points`, by {}", corners.len()))
+    }
 }
 
 #[cfg(test)]
@@ -114,13 +124,18 @@ mod tests {
     fn every_bit_comes_back() {
         let box_ = shapes::box_of_tets([5, 4, 3], [0.0; 3], [1.0, 0.3, 0.7]);
         for surface in [mixed(), Surface::extract(&box_, &FeatureSettings::default()).unwrap()] {
-            let Decoded::Surface(copy) = decode(&encode_surface(&surface).unwrap()).unwrap() else { panic!() };
+            let Decoded::Surface(copy) = decode(&encode_surface(&surface).unwrap()).unwrap() else {
+                panic!()
+            };
             let bits = |surface: &Surface| -> Vec<u64> {
                 surface.points().as_flattened().iter().map(|value| value.to_bits()).collect()
             };
             assert_eq!(bits(&copy), bits(&surface));
             assert_eq!((copy.vertices(), copy.faces()), (surface.vertices(), surface.faces()));
-            assert_eq!((copy.triangles(), copy.triangle_faces()), (surface.triangles(), surface.triangle_faces()));
+            assert_eq!(
+                (copy.triangles(), copy.triangle_faces()),
+                (surface.triangles(), surface.triangle_faces())
+            );
             assert_eq!(copy.features(), surface.features());
         }
     }
@@ -138,7 +153,13 @@ mod tests {
                 damaged[place] ^= 1 << bit;
                 // Whatever it says: no panic, and nothing that is no surface.
                 if let Ok(Decoded::Surface(surface)) = decode(&damaged) {
-                    assert!(surface.triangles().as_flattened().iter().all(|&v| (v as usize) < surface.points().len()));
+                    assert!(
+                        surface
+                            .triangles()
+                            .as_flattened()
+                            .iter()
+                            .all(|&v| (v as usize) < surface.points().len())
+                    );
                 }
             }
         }

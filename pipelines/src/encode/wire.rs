@@ -92,7 +92,11 @@ pub(super) enum Filter {
 pub(super) fn delta(integers: impl ExactSizeIterator<Item = u32>, kind: Kind) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(integers.len() * kind.size());
     let mut previous = 0u32;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "wrap-around in the array's type")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        reason = "wrap-around in the array's type"
+    )]
     for integer in integers {
         let difference = integer.wrapping_sub(previous);
         match kind {
@@ -118,7 +122,9 @@ pub(super) fn delta(integers: impl ExactSizeIterator<Item = u32>, kind: Kind) ->
 pub(super) fn integers(bytes: &[u8], kind: Kind, filter: Filter) -> Option<Vec<u32>> {
     let mut values: Vec<u32> = match kind {
         Kind::U8 => bytes.iter().map(|&byte| u32::from(byte)).collect(),
-        Kind::U16 => bytes.as_chunks().0.iter().map(|&chunk| u32::from(u16::from_le_bytes(chunk))).collect(),
+        Kind::U16 => {
+            bytes.as_chunks().0.iter().map(|&chunk| u32::from(u16::from_le_bytes(chunk))).collect()
+        }
         Kind::U32 => bytes.as_chunks().0.iter().map(|&chunk| u32::from_le_bytes(chunk)).collect(),
         Kind::F32 | Kind::F64 => return None,
     };

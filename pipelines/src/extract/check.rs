@@ -48,8 +48,9 @@ pub enum ChannelError {
 /// # Errors
 /// [`ChannelError::Twice`].
 pub fn check_names(channels: &[Channel<'_>]) -> Result<(), ChannelError> {
-    let is_known =
-        |(index, channel): &(usize, &Channel<'_>)| channels[..*index].iter().any(|other| other.name == channel.name);
+    let is_known = |(index, channel): &(usize, &Channel<'_>)| {
+        channels[..*index].iter().any(|other| other.name == channel.name)
+    };
     match channels.iter().enumerate().find(is_known) {
         None => Ok(()),
         Some((_, channel)) => Err(ChannelError::Twice { channel: channel.name.into() }),

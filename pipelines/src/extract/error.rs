@@ -10,7 +10,9 @@ use super::Association;
 #[non_exhaustive]
 pub enum ExtractError {
     /// A field holds NaN or an infinity.
-    #[error("cycle {cycle}: field `{field}` is {value} at {association} {entity}; it is left out of the extract")]
+    #[error(
+        "cycle {cycle}: field `{field}` is {value} at {association} {entity}; it is left out of the extract"
+    )]
     FieldNotFinite {
         /// The field.
         field: String,
@@ -34,7 +36,9 @@ pub enum ExtractError {
         cycle: u64,
     },
     /// A field has another number of tuples than its mesh has vertices or cells.
-    #[error("field `{field}` has {found} tuples, the mesh has {expected} for the association {association}")]
+    #[error(
+        "field `{field}` has {found} tuples, the mesh has {expected} for the association {association}"
+    )]
     FieldLength {
         /// The field.
         field: String,
@@ -61,7 +65,8 @@ impl ExtractError {
     #[must_use]
     pub fn field(&self) -> Option<&str> {
         match self {
-            ExtractError::FieldNotFinite { field, .. } | ExtractError::FieldLength { field, .. } => Some(field),
+            ExtractError::FieldNotFinite { field, .. }
+            | ExtractError::FieldLength { field, .. } => Some(field),
             _ => None,
         }
     }

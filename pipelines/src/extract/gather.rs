@@ -24,7 +24,11 @@ pub(super) enum Owners<'a> {
 }
 
 /// The coordinates of these vertices.
-pub(super) fn points(points: &ArrayView, vertices: &[u32], cycle: u64) -> Result<Vec<Vector>, ExtractError> {
+pub(super) fn points(
+    points: &ArrayView,
+    vertices: &[u32],
+    cycle: u64,
+) -> Result<Vec<Vector>, ExtractError> {
     vertices.iter().map(|&vertex| point(points, vertex as usize, cycle)).collect()
 }
 
@@ -102,9 +106,15 @@ fn field(
     };
     match (view.association, points, owners) {
         (Association::Vertex, Points::All, _) => copy(&mut (0..view.values.len()))?,
-        (Association::Vertex, Points::Vertices(vertices), _) => copy(&mut vertices.iter().map(|&v| v as usize))?,
-        (Association::Mesh, ..) | (Association::Element, _, Owners::All) => copy(&mut (0..view.values.len()))?,
-        (Association::Element, _, Owners::Cells(cells)) => copy(&mut cells.iter().map(|&cell| cell as usize))?,
+        (Association::Vertex, Points::Vertices(vertices), _) => {
+            copy(&mut vertices.iter().map(|&v| v as usize))?
+        }
+        (Association::Mesh, ..) | (Association::Element, _, Owners::All) => {
+            copy(&mut (0..view.values.len()))?
+        }
+        (Association::Element, _, Owners::Cells(cells)) => {
+            copy(&mut cells.iter().map(|&cell| cell as usize))?
+        }
         (Association::Vertex, Points::Crossings(crossings), _) => {
             values.reserve(crossings.len() * components);
             // Between whole numbers there are others.
@@ -113,12 +123,22 @@ fn field(
                 for component in 0..components {
                     let [a, b] = crossing.edge.map(|vertex| read(vertex as usize, component));
                     let (a, b) = (a?, b?);
-                    values.push(if is_absent(a) || is_absent(b) { ABSENT } else { crossing.between(a, b) });
+                    values.push(if is_absent(a) || is_absent(b) {
+                        ABSENT
+                    } else {
+                        crossing.between(a, b)
+                    });
                 }
             }
         }
     }
-    let mut field = Field { name: view.name.to_owned(), association: view.association, components, number, values };
+    let mut field = Field {
+        name: view.name.to_owned(),
+        association: view.association,
+        components,
+        number,
+        values,
+    };
     field.settle();
     Ok(field)
 }

@@ -52,7 +52,9 @@ fn on_boundary(
     owned.iter().for_each(|&place| message.f64s(&extract.points[place]));
     write_fields(&mut message, &extract.fields, &mut owned.iter().copied());
     let gathered = communicator.gather(0, &message.into_bytes());
-    let (Some(root), Some(surface), Some(messages)) = (whole.boundary.root(), &whole.surface, gathered) else {
+    let (Some(root), Some(surface), Some(messages)) =
+        (whole.boundary.root(), &whole.surface, gathered)
+    else {
         return Ok(None);
     };
     let mut points = vec![[0.0; 3]; surface.vertices.len()];
@@ -110,14 +112,17 @@ fn anywhere(
         let first_cell = cells.len();
         let mut renumbered = Vec::new();
         for (cell, (cell_type, of_cell)) in piece.cells.iter().enumerate() {
-            let renumber = |of: &[u32]| of.iter().map(|&point| numbers[point as usize]).collect::<Vec<u32>>();
+            let renumber =
+                |of: &[u32]| of.iter().map(|&point| numbers[point as usize]).collect::<Vec<u32>>();
             match piece.cells.polyhedron_faces(cell) {
                 [] => {
                     renumbered.clear();
                     renumbered.extend(of_cell.iter().map(|&point| numbers[point as usize]));
                     cells.push(cell_type, &renumbered)?;
                 }
-                faces => cells.push_polyhedron(&faces.iter().map(|face| renumber(face)).collect::<Vec<_>>())?,
+                faces => cells.push_polyhedron(
+                    &faces.iter().map(|face| renumber(face)).collect::<Vec<_>>(),
+                )?,
             }
         }
         #[expect(clippy::cast_possible_truncation, reason = "cells are numbered with 32 bits")]
@@ -150,7 +155,8 @@ fn described(whole: &Whole, piece: &Extracted) -> Vec<u8> {
     };
     let named = (0..extract.points.len()).filter_map(|place| Some((place, name(place)?)));
     let named: Vec<(usize, ([u32; 2], bool))> = named.collect();
-    let mut message = Writer::with_capacity(32 * extract.points.len() + 4 * extract.cells.connectivity().len());
+    let mut message =
+        Writer::with_capacity(32 * extract.points.len() + 4 * extract.cells.connectivity().len());
     message.u64(extract.points.len() as u64);
     extract.points.iter().for_each(|point| message.f64s(point));
     message.u64(named.len() as u64);
@@ -183,14 +189,19 @@ impl Piece {
         let count = reader.count(24)?;
         let points = (0..count).map(|_| reader.vector()).collect::<Result<Vec<_>, _>>()?;
         let count = reader.count(13)?;
-        let named = (0..count).map(|_| Ok((reader.u32()?, [reader.u32()?, reader.u32()?], reader.u8()? != 0)));
+        let named = (0..count)
+            .map(|_| Ok((reader.u32()?, [reader.u32()?, reader.u32()?], reader.u8()? != 0)));
         let named = named.collect::<Result<Vec<_>, DistributedError>>()?;
         let mut cells = Cells::new();
         for _ in 0..reader.count(1)? {
             match CellType::from_vtk(reader.u8()?).ok_or_else(garbled)? {
                 CellType::Polyhedron => {
                     let faces = reader.count(8)?;
-                    cells.push_polyhedron(&(0..faces).map(|_| reader.u32s()).collect::<Result<Vec<_>, _>>()?)?;
+                    cells.push_polyhedron(&(0..faces).map(|_| reader.u32s()).collect::<Result<
+                        Vec<_>,
+                        _,
+                    >>(
+                    )?)?;
                 }
                 cell_type => cells.push(cell_type, &reader.u32s()?)?,
             }
@@ -202,7 +213,11 @@ impl Piece {
 }
 
 /// The fields, of the points only these.
-fn write_fields(message: &mut Writer, fields: &[Field], points: &mut (dyn ExactSizeIterator<Item = usize> + '_)) {
+fn write_fields(
+    message: &mut Writer,
+    fields: &[Field],
+    points: &mut (dyn ExactSizeIterator<Item = usize> + '_),
+) {
     let points: Vec<usize> = points.collect();
     message.u64(fields.len() as u64);
     for field in fields {
@@ -218,14 +233,17 @@ fn write_fields(message: &mut Writer, fields: &[Field], points: &mut (dyn ExactS
             Association::Element => message.f64s(&field.values),
             Association::Vertex => {
                 for &point in &points {
-                    message.f64s(&field.values[point * field.components..(point + 1) * field.components]);
+                    message.f64s(
+                        &field.values[point * field.components..(point + 1) * field.components],
+                    );
                 }
             }
         }
     }
 }
 
-const ASSOCIATIONS: [Association; 3] = [Association::Vertex, Association::Element, Association::Mesh];
+const ASSOCIATIONS: [Association; 3] =
+    [Association::Vertex, Association::Element, Association::Mesh];
 
 fn association_code(association: Association) -> u8 {
     (0..).zip(ASSOCIATIONS).find(|(_, known)| *known == association).map_or(0, |(code, _)| code)
@@ -235,11 +253,16 @@ fn number_code(number: NumberType) -> u8 {
     (0..).zip(NumberType::ALL).find(|(_, known)| *known == number).map_or(0, |(code, _)| code)
 }
 
-fn read_fields(reader: &mut Reader, points: usize, cells: usize) -> Result<Vec<Field>, DistributedError> {
+fn read_fields(
+    reader: &mut Reader,
+    points: usize,
+    cells: usize,
+) -> Result<Vec<Field>, DistributedError> {
     (0..reader.count(18)?)
         .map(|_| {
             let name = reader.text()?;
-            let association = *ASSOCIATIONS.get(usize::from(reader.u8()?)).ok_or(reader.garbled())?;
+            let association =
+                *ASSOCIATIONS.get(usize::from(reader.u8()?)).ok_or(reader.garbled())?;
             let number = *NumberType::ALL.get(usize::from(reader.u8()?)).ok_or(reader.garbled())?;
             let components = usize::try_from(reader.u64()?).unwrap_or(usize::MAX);
             let count = match association {
@@ -282,13 +305,20 @@ impl Fields {
                 continue;
             }
             let same = |(known, _): &(Field, usize)| {
-                (&known.name, known.association, known.components) == (&field.name, field.association, field.components)
+                (&known.name, known.association, known.components)
+                    == (&field.name, field.association, field.components)
             };
             let known = match self.fields.iter().position(same) {
                 Some(known) => known,
                 None => {
                     let Field { ref name, association, components, number, .. } = field;
-                    let empty = Field { name: name.clone(), association, components, number, values: Vec::new() };
+                    let empty = Field {
+                        name: name.clone(),
+                        association,
+                        components,
+                        number,
+                        values: Vec::new(),
+                    };
                     self.fields.push((empty, 0));
                     self.fields.len() - 1
                 }

@@ -118,10 +118,15 @@ impl<'a> Channel<'a> {
         };
         found.ok_or_else(|| {
             let known: Vec<&str> = channels.iter().map(|channel| channel.name).collect();
-            let Some(name) = name.filter(|_| !known.is_empty()) else { return "the solver has no channel".to_owned() };
-            let hint =
-                nearest(name, known.iter().copied()).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-            format!("the solver has no channel `{name}`; its channels are {}{hint}", known.join(", "))
+            let Some(name) = name.filter(|_| !known.is_empty()) else {
+                return "the solver has no channel".to_owned();
+            };
+            let hint = nearest(name, known.iter().copied())
+                .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            format!(
+                "the solver has no channel `{name}`; its channels are {}{hint}",
+                known.join(", ")
+            )
         })
     }
 }

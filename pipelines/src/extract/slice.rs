@@ -89,7 +89,12 @@ pub(super) fn cut(
         numbers: HashMap::new(),
         segments: Vec::new(),
         polygon: Vec::new(),
-        cut: Cut { points: Vec::new(), crossings: Vec::new(), cells: Cells::new(), owners: Vec::new() },
+        cut: Cut {
+            points: Vec::new(),
+            crossings: Vec::new(),
+            cells: Cells::new(),
+            owners: Vec::new(),
+        },
     };
     for cell in (0..cells.len()).filter(|&cell| counts(cell)) {
         let vertices = cells.vertices(cell);
@@ -130,7 +135,9 @@ impl Cutter<'_> {
             2 => {
                 match (cell_type, vertices) {
                     (CellType::Pixel, &[a, b, c, d]) => self.face(&[a, b, d, c]),
-                    (CellType::TriangleStrip, _) => vertices.windows(3).for_each(|triangle| self.face(triangle)),
+                    (CellType::TriangleStrip, _) => {
+                        vertices.windows(3).for_each(|triangle| self.face(triangle))
+                    }
                     _ => self.face(vertices),
                 }
                 for (from, to) in std::mem::take(&mut self.segments) {
@@ -147,7 +154,8 @@ impl Cutter<'_> {
     /// The segments of one face: one for each run of its corners on the normal's side.
     fn face(&mut self, face: &[u32]) {
         let ahead = |corner: usize| is_ahead(self.distances[face[corner % face.len()] as usize]);
-        let Some(start) = (0..face.len()).find(|&corner| !ahead(corner) && ahead(corner + 1)) else {
+        let Some(start) = (0..face.len()).find(|&corner| !ahead(corner) && ahead(corner + 1))
+        else {
             return;
         };
         let mut enter = None;
@@ -175,11 +183,19 @@ impl Cutter<'_> {
             _ => [a, b],
         };
         let next = self.cut.points.len();
-        #[expect(clippy::cast_possible_truncation, reason = "a crossing for each edge of a mesh numbered with 32 bits")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "a crossing for each edge of a mesh numbered with 32 bits"
+        )]
         *self.numbers.entry(edge).or_insert_with(|| {
-            let crossing = Crossing { edge, fraction: if edge[0] == edge[1] { 0.0 } else { at_a / (at_a - at_b) } };
+            let crossing = Crossing {
+                edge,
+                fraction: if edge[0] == edge[1] { 0.0 } else { at_a / (at_a - at_b) },
+            };
             let [from, to] = edge.map(|vertex| self.coordinates.vector(vertex as usize));
-            self.cut.points.push(std::array::from_fn(|axis| crossing.between(from[axis], to[axis])));
+            self.cut
+                .points
+                .push(std::array::from_fn(|axis| crossing.between(from[axis], to[axis])));
             self.cut.crossings.push(crossing);
             next as u32
         })
@@ -193,7 +209,9 @@ impl Cutter<'_> {
             self.polygon.push(start);
             while end != start {
                 self.polygon.push(end);
-                let Some(next) = segments.iter().position(|segment| segment.0 == end) else { break };
+                let Some(next) = segments.iter().position(|segment| segment.0 == end) else {
+                    break;
+                };
                 end = segments.swap_remove(next).1;
             }
             self.polygon.dedup();
@@ -221,9 +239,12 @@ impl Cutter<'_> {
         let origin = at(0);
         let mut turn = 0.0;
         for index in 1..polygon.len() - 1 {
-            let [u, v] = [at(index), at(index + 1)].map(|p| [p[0] - origin[0], p[1] - origin[1], p[2] - origin[2]]);
-            let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-            turn += cross[0] * self.normal[0] + cross[1] * self.normal[1] + cross[2] * self.normal[2];
+            let [u, v] = [at(index), at(index + 1)]
+                .map(|p| [p[0] - origin[0], p[1] - origin[1], p[2] - origin[2]]);
+            let cross =
+                [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+            turn +=
+                cross[0] * self.normal[0] + cross[1] * self.normal[1] + cross[2] * self.normal[2];
         }
         turn < 0.0
     }

@@ -8,7 +8,9 @@ use tombolo_deform::quality::{Quality, quality, scaled_jacobians};
 use tombolo_deform::surface::{FeatureSettings, Surface, SurfaceError};
 
 use super::gather::{self, Owners, Points};
-use super::{Association, Channel, Extract, ExtractError, ExtractFeatures, Field, GHOST_FIELD, slice};
+use super::{
+    Association, Channel, Extract, ExtractError, ExtractFeatures, Field, GHOST_FIELD, slice,
+};
 use crate::communicator::{Communicator, agree};
 use crate::distributed::{DistributedError, Part, PartBoundary, SharedVertices};
 use crate::language::Slice;
@@ -42,7 +44,9 @@ pub(crate) enum Origin {
 impl Extracted {
     /// Adds an element field given for each cell of the solver's mesh. Cells without a value (NaN) have 0.
     pub fn add_element_field(&mut self, name: &str, of_cells: &[f64]) {
-        let value = |&cell: &u32| of_cells.get(cell as usize).copied().filter(|value| value.is_finite()).unwrap_or(0.0);
+        let value = |&cell: &u32| {
+            of_cells.get(cell as usize).copied().filter(|value| value.is_finite()).unwrap_or(0.0)
+        };
         let fields = &mut Arc::make_mut(&mut self.extract).fields;
         fields.retain(|field| field.name != name);
         fields.push(Field {
@@ -126,8 +130,10 @@ pub(crate) struct Boundary {
 impl Boundary {
     fn new(surface: Arc<Surface>) -> Self {
         let features = surface.features();
-        let features =
-            ExtractFeatures { names: features.names().to_vec(), of_cells: features.face_features().to_vec() };
+        let features = ExtractFeatures {
+            names: features.names().to_vec(),
+            of_cells: features.face_features().to_vec(),
+        };
         Self {
             cells: Arc::new(surface.faces().clone()),
             vertices: surface.vertices().into(),
@@ -156,10 +162,16 @@ impl Whole {
         let (vertices, faces) = (self.boundary.vertices(), self.boundary.faces());
         let points = gather::points(&channel.mesh.points, vertices, cycle)?;
         let from = Points::Vertices(vertices);
-        let (fields, errors) = gather::fields(channel, cycle, wanted, &from, &Owners::Cells(&faces.cells));
+        let (fields, errors) =
+            gather::fields(channel, cycle, wanted, &from, &Owners::Cells(&faces.cells));
         let cells = Cells::new();
-        let extract =
-            Extract { points, vertices: Some(vertices.into()), cells: Arc::new(cells), features: None, fields };
+        let extract = Extract {
+            points,
+            vertices: Some(vertices.into()),
+            cells: Arc::new(cells),
+            features: None,
+            fields,
+        };
         let owners = faces.cells.as_slice().into();
         Ok(Extracted { extract: Arc::new(extract), owners, errors, origin: Origin::Boundary })
     }
@@ -172,20 +184,39 @@ impl Whole {
         wanted: &dyn Fn(&str) -> bool,
         cells: &Arc<Cells>,
     ) -> Result<Extracted, ExtractError> {
-        #[expect(clippy::cast_possible_truncation, reason = "vertices and cells are numbered with 32 bits")]
-        let owners: Vec<u32> = (0..cells.len()).filter(|&cell| !self.is_ghost(cell)).map(|cell| cell as u32).collect();
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "vertices and cells are numbered with 32 bits"
+        )]
+        let owners: Vec<u32> =
+            (0..cells.len()).filter(|&cell| !self.is_ghost(cell)).map(|cell| cell as u32).collect();
         // Vertices of ghosts alone, and what no cell has, are somebody else's.
         let mut places = vec![u32::MAX; channel.mesh.points.len()];
         self.own.connectivity().iter().for_each(|&vertex| places[vertex as usize] = 0);
-        let vertices: Vec<u32> =
-            (0..).zip(&places).filter(|(_, place)| **place == 0).map(|(vertex, _)| vertex).collect();
+        let vertices: Vec<u32> = (0..)
+            .zip(&places)
+            .filter(|(_, place)| **place == 0)
+            .map(|(vertex, _)| vertex)
+            .collect();
         (0..).zip(&vertices).for_each(|(place, &vertex)| places[vertex as usize] = place);
         let own = self.own.as_given().with_vertices(&places);
         let points = gather::points(&channel.mesh.points, &vertices, cycle)?;
         let from = Points::Vertices(&vertices);
-        let (fields, errors) = gather::fields(channel, cycle, wanted, &from, &Owners::Cells(&owners));
-        let extract = Extract { points, vertices: Some(vertices.into()), cells: Arc::new(own), features: None, fields };
-        Ok(Extracted { extract: Arc::new(extract), owners: owners.into(), errors, origin: Origin::Vertices })
+        let (fields, errors) =
+            gather::fields(channel, cycle, wanted, &from, &Owners::Cells(&owners));
+        let extract = Extract {
+            points,
+            vertices: Some(vertices.into()),
+            cells: Arc::new(own),
+            features: None,
+            fields,
+        };
+        Ok(Extracted {
+            extract: Arc::new(extract),
+            owners: owners.into(),
+            errors,
+            origin: Origin::Vertices,
+        })
     }
 }
 
@@ -206,7 +237,10 @@ impl Source {
     ///
     /// # Errors
     /// [`ExtractError::Distributed`], the same on all ranks; on one process as [`new`](Self::new).
-    pub fn distributed(channel: &Channel, communicator: &dyn Communicator) -> Result<Self, ExtractError> {
+    pub fn distributed(
+        channel: &Channel,
+        communicator: &dyn Communicator,
+    ) -> Result<Self, ExtractError> {
         let is_part = communicator.size() > 1;
         if !is_part && !channel.mesh.ghost_cells.is_some_and(|ghosts| ghosts.contains(&true)) {
             return Self::new(channel);
@@ -221,11 +255,22 @@ impl Source {
         let no_surface = error.filter(|_| communicator.rank() == 0);
         let mut is_ghostly = vec![false; part.points.len()];
         let of_ghosts = part.cells.iter().enumerate().filter(|(cell, _)| part.is_ghost(*cell));
-        of_ghosts.for_each(|(_, (_, vertices))| vertices.iter().for_each(|&vertex| is_ghostly[vertex as usize] = true));
+        of_ghosts.for_each(|(_, (_, vertices))| {
+            vertices.iter().for_each(|&vertex| is_ghostly[vertex as usize] = true)
+        });
         own.connectivity().iter().for_each(|&vertex| is_ghostly[vertex as usize] = false);
         let is_first = communicator.rank() == 0;
-        let whole =
-            Whole { is_first, ghosts: part.ghosts, is_ghostly, own, shared, is_shared, boundary, surface, no_surface };
+        let whole = Whole {
+            is_first,
+            ghosts: part.ghosts,
+            is_ghostly,
+            own,
+            shared,
+            is_shared,
+            boundary,
+            surface,
+            no_surface,
+        };
         let given = part.cells.as_given().into_owned();
         let key = MeshKey::of(&channel.mesh);
         Ok(Self::of(key, given, Arc::new(part.cells).into(), Some(Box::new(whole)), is_part))
@@ -289,7 +334,8 @@ impl Source {
             Some(boundary) => boundary,
             None => {
                 let points = channel.mesh.points.to_vectors();
-                let mesh = Mesh::new(points, Cells::clone(&self.cells), channel.mesh.features.clone())?;
+                let mesh =
+                    Mesh::new(points, Cells::clone(&self.cells), channel.mesh.features.clone())?;
                 Boundary::new(Arc::new(Surface::extract(&mesh, &FeatureSettings::default())?))
             }
         };
@@ -313,7 +359,8 @@ impl Source {
         let boundary = self.boundary(channel)?;
         let points = gather::points(&channel.mesh.points, &boundary.vertices, cycle)?;
         let from = Points::Vertices(&boundary.vertices);
-        let (fields, errors) = gather::fields(channel, cycle, wanted, &from, &Owners::Cells(&boundary.owners));
+        let (fields, errors) =
+            gather::fields(channel, cycle, wanted, &from, &Owners::Cells(&boundary.owners));
         let extract = Extract {
             points,
             vertices: Some(Arc::clone(&boundary.vertices)),
@@ -340,11 +387,18 @@ impl Source {
         furthest_of_all: &dyn Fn(f64) -> f64,
     ) -> Result<Extracted, ExtractError> {
         let counts = |cell: usize| self.counts(Association::Element, cell);
-        let cut = slice::cut(&self.cells, &channel.mesh.points, plane, cycle, &counts, furthest_of_all)?;
+        let cut =
+            slice::cut(&self.cells, &channel.mesh.points, plane, cycle, &counts, furthest_of_all)?;
         let from = Points::Crossings(&cut.crossings);
-        let (fields, errors) = gather::fields(channel, cycle, wanted, &from, &Owners::Cells(&cut.owners));
-        let extract =
-            Extract { points: cut.points, vertices: None, cells: Arc::new(cut.cells), features: None, fields };
+        let (fields, errors) =
+            gather::fields(channel, cycle, wanted, &from, &Owners::Cells(&cut.owners));
+        let extract = Extract {
+            points: cut.points,
+            vertices: None,
+            cells: Arc::new(cut.cells),
+            features: None,
+            fields,
+        };
         let origin = Origin::Edges(cut.crossings.iter().map(|crossing| crossing.edge).collect());
         Ok(Extracted { extract: Arc::new(extract), owners: cut.owners.into(), errors, origin })
     }
@@ -363,11 +417,14 @@ impl Source {
             return whole.piece(channel, cycle, wanted, &self.cells);
         }
         let view = &channel.mesh.points;
-        let points: Result<Vec<_>, _> = (0..view.len()).map(|vertex| gather::point(view, vertex, cycle)).collect();
+        let points: Result<Vec<_>, _> =
+            (0..view.len()).map(|vertex| gather::point(view, vertex, cycle)).collect();
         let wanted = |name: &str| name == GHOST_FIELD || wanted(name);
-        let (mut fields, errors) = gather::fields(channel, cycle, &wanted, &Points::All, &Owners::All);
+        let (mut fields, errors) =
+            gather::fields(channel, cycle, &wanted, &Points::All, &Owners::All);
         let ghosts = channel.mesh.ghost_cells.filter(|ghosts| ghosts.contains(&true));
-        let is_told = |field: &Field| field.name == GHOST_FIELD && field.association == Association::Element;
+        let is_told =
+            |field: &Field| field.name == GHOST_FIELD && field.association == Association::Element;
         if let Some(ghosts) = ghosts.filter(|_| !fields.iter().any(is_told)) {
             fields.push(Field {
                 name: GHOST_FIELD.to_owned(),
@@ -377,7 +434,10 @@ impl Source {
                 values: ghosts.iter().map(|&is_ghost| f64::from(u8::from(is_ghost))).collect(),
             });
         }
-        #[expect(clippy::cast_possible_truncation, reason = "vertices and cells are numbered with 32 bits")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "vertices and cells are numbered with 32 bits"
+        )]
         let numbers = |count: usize| (0..count as u32).collect::<Arc<[u32]>>();
         let extract = Extract {
             points: points?,

@@ -50,7 +50,9 @@ pub fn statistics_of(
     let mut first_non_finite = None;
     let measure = |tuple: usize| match values.components() {
         1 => values.get(tuple, 0),
-        components => (0..components).fold(0.0_f64, |sum, component| sum.hypot(values.get(tuple, component))),
+        components => {
+            (0..components).fold(0.0_f64, |sum, component| sum.hypot(values.get(tuple, component)))
+        }
     };
     // The squares of large values would overflow: they are taken of the values over the largest.
     let mut scale = 0.0_f64;
@@ -73,8 +75,8 @@ pub fn statistics_of(
             if !value.is_finite() {
                 non_finite += 1.0;
                 let found = (0..values.components()).map(|component| values.get(tuple, component));
-                first_non_finite =
-                    first_non_finite.or(Some((tuple, found.into_iter().find(|x| !x.is_finite()).unwrap_or(value))));
+                first_non_finite = first_non_finite
+                    .or(Some((tuple, found.into_iter().find(|x| !x.is_finite()).unwrap_or(value))));
                 continue;
             }
             least = least.min(value);

@@ -29,10 +29,13 @@ pub(super) struct Parts {
 impl Parts {
     /// The cells of the highest dimension make the mesh, those of dimension 2 with a tag make its features.
     pub fn assemble(self) -> Result<MeshFile, Flaw> {
-        let Parts { points, cells, cell_tags, point_tags, names, left_out, mut fields, mut notes } = self;
+        let Parts { points, cells, cell_tags, point_tags, names, left_out, mut fields, mut notes } =
+            self;
         cells.validate(points.len())?;
-        let is_left_out = |cell: usize| left_out.as_ref().is_some_and(|out| out.get(cell) == Some(&true));
-        let tag = |cell: usize| cell_tags.as_ref().and_then(|tags| tags.get(cell).copied().flatten());
+        let is_left_out =
+            |cell: usize| left_out.as_ref().is_some_and(|out| out.get(cell) == Some(&true));
+        let tag =
+            |cell: usize| cell_tags.as_ref().and_then(|tags| tags.get(cell).copied().flatten());
         let dimension = (0..cells.len())
             .filter(|&cell| !is_left_out(cell))
             .map(|cell| cells.cell_type(cell).dimension())
@@ -46,10 +49,15 @@ impl Parts {
             .filter_map(|cell| Some((cell, tag(cell)?)))
             .collect();
         if left_out.is_some() {
-            note_count(&mut notes, (0..cells.len()).filter(|&cell| is_left_out(cell)).count(), "ghost or hidden cells");
+            note_count(
+                &mut notes,
+                (0..cells.len()).filter(|&cell| is_left_out(cell)).count(),
+                "ghost or hidden cells",
+            );
         }
         let faces_count = if dimension == 2 { 0 } else { tagged.len() };
-        let lower = (0..cells.len()).filter(|&cell| !is_left_out(cell)).count() - kept.len() - faces_count;
+        let lower =
+            (0..cells.len()).filter(|&cell| !is_left_out(cell)).count() - kept.len() - faces_count;
         note_count(&mut notes, lower, "cells of lower dimension that carry no feature");
 
         // Vertices that no cell uses would be unknowns without an equation.
@@ -94,7 +102,9 @@ impl Parts {
             let names = names.into_iter().filter(|(number, _)| tags.contains(number)).collect();
             FeatureSource::Faces(TaggedFaces { faces, tags, names })
         } else if let Some(tags) = point_tags {
-            FeatureSource::Vertices(vertices.iter().filter_map(|&vertex| tags.get(vertex).copied()).collect())
+            FeatureSource::Vertices(
+                vertices.iter().filter_map(|&vertex| tags.get(vertex).copied()).collect(),
+            )
         } else {
             FeatureSource::SharpEdges
         };
@@ -106,7 +116,8 @@ impl Parts {
         } else {
             mesh_cells = cells;
         }
-        let mesh_points = vertices.iter().filter_map(|&vertex| points.get(vertex).copied()).collect();
+        let mesh_points =
+            vertices.iter().filter_map(|&vertex| points.get(vertex).copied()).collect();
         let mesh = Mesh::new(mesh_points, mesh_cells, features)?;
         notes.extend(mesh.cells().handedness_note());
         Ok(MeshFile { mesh, fields, notes })
@@ -129,7 +140,8 @@ impl Renumber<'_> {
     /// Appends a cell with its vertices' new numbers; false where one of them has none.
     fn push(&self, from: &Cells, cell: usize, to: &mut Cells) -> Result<bool, Flaw> {
         if from.cell_type(cell) == CellType::Polyhedron {
-            let faces: Option<Vec<Vec<u32>>> = from.polyhedron_faces(cell).iter().map(|face| self.row(face)).collect();
+            let faces: Option<Vec<Vec<u32>>> =
+                from.polyhedron_faces(cell).iter().map(|face| self.row(face)).collect();
             let Some(faces) = faces else { return Ok(false) };
             to.push_polyhedron(&faces)?;
         } else {

@@ -30,7 +30,9 @@ use tombolo_deform::mesh::{NumberType, Vector};
 use tombolo_deform::surface::{Edit, FeatureSettings, Surface};
 
 use super::error::{Flaw, Place};
-use super::{FileError, Problem, extension, parse_mesh, unknown_extension, write, write_atomically};
+use super::{
+    FileError, Problem, extension, parse_mesh, unknown_extension, write, write_atomically,
+};
 use crate::extract::{Association, Extract, ExtractFeatures, Field};
 
 /// How far a point of a file may lie from the vertex that it stands for, in diagonals of the surface's bounding box or in the
@@ -72,7 +74,10 @@ pub struct SurfaceDisplacement {
 /// assert_eq!(read_displacement(&file, &surface)?.values, all);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn read_displacement(path: impl AsRef<Path>, surface: &Surface) -> Result<SurfaceDisplacement, FileError> {
+pub fn read_displacement(
+    path: impl AsRef<Path>,
+    surface: &Surface,
+) -> Result<SurfaceDisplacement, FileError> {
     let path = path.as_ref();
     is_text(path)?;
     let bytes = std::fs::read(path).map_err(|error| Flaw::from(error).in_file(path))?;
@@ -83,7 +88,11 @@ pub fn read_displacement(path: impl AsRef<Path>, surface: &Surface) -> Result<Su
 ///
 /// # Errors
 /// As [`read_displacement`].
-pub fn parse_displacement(name: &Path, bytes: &[u8], surface: &Surface) -> Result<SurfaceDisplacement, FileError> {
+pub fn parse_displacement(
+    name: &Path,
+    bytes: &[u8],
+    surface: &Surface,
+) -> Result<SurfaceDisplacement, FileError> {
     let found = if is_text(name)? {
         parse_text(bytes, surface)
     } else {
@@ -99,7 +108,11 @@ pub fn parse_displacement(name: &Path, bytes: &[u8], surface: &Surface) -> Resul
 /// # Errors
 /// [`FileError`] for another extension, where `displacement` has not one value for each surface vertex, and where the file cannot be
 /// written.
-pub fn write_displacement(path: impl AsRef<Path>, surface: &Surface, displacement: &[Vector]) -> Result<(), FileError> {
+pub fn write_displacement(
+    path: impl AsRef<Path>,
+    surface: &Surface,
+    displacement: &[Vector],
+) -> Result<(), FileError> {
     let path = path.as_ref();
     if displacement.len() != surface.points().len() {
         let what = "the values of the displacement".to_owned();
@@ -135,7 +148,8 @@ pub fn read_displacements(edits: &mut [Edit], surface: &Surface) -> Result<(), U
         if let Edit::Displacement(import) = what
             && let Some(file) = &import.file
         {
-            let found = read_displacement(file, surface).map_err(|source| UnreadFile { edit, source })?;
+            let found =
+                read_displacement(file, surface).map_err(|source| UnreadFile { edit, source })?;
             (import.file, import.vertices, import.values) = (None, found.vertices, found.values);
         }
     }
@@ -169,16 +183,24 @@ enum Column {
     Other,
 }
 
-const BY_POINT: [Column; 6] =
-    [Column::Point(0), Column::Point(1), Column::Point(2), Column::Value(0), Column::Value(1), Column::Value(2)];
-const BY_VERTEX: [Column; 4] = [Column::Vertex, Column::Value(0), Column::Value(1), Column::Value(2)];
+const BY_POINT: [Column; 6] = [
+    Column::Point(0),
+    Column::Point(1),
+    Column::Point(2),
+    Column::Value(0),
+    Column::Value(1),
+    Column::Value(2),
+];
+const BY_VERTEX: [Column; 4] =
+    [Column::Vertex, Column::Value(0), Column::Value(1), Column::Value(2)];
 
 fn parse_text(bytes: &[u8], surface: &Surface) -> Result<SurfaceDisplacement, Flaw> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let before = bytes.get(..error.valid_up_to()).unwrap_or(bytes);
         let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
-        let problem = Problem::unexpected(bytes.get(error.valid_up_to()..).unwrap_or(&[]), "text (UTF-8)");
+        let problem =
+            Problem::unexpected(bytes.get(error.valid_up_to()..).unwrap_or(&[]), "text (UTF-8)");
         Flaw { place: Place::Line(line), problem }
     })?;
     let mut matcher = Matcher::new(surface);
@@ -186,8 +208,10 @@ fn parse_text(bytes: &[u8], surface: &Surface) -> Result<SurfaceDisplacement, Fl
     for (number, line) in text.lines().enumerate() {
         let words = words(line);
         let Some(&(first_at, first)) = words.first() else { continue };
-        let flaw =
-            |at: usize, problem: Problem| Flaw { place: Place::Column { line: number + 1, column: at }, problem };
+        let flaw = |at: usize, problem: Problem| Flaw {
+            place: Place::Column { line: number + 1, column: at },
+            problem,
+        };
         let columns = match &columns {
             Some(columns) => columns,
             None if first.parse::<f64>().is_err()
@@ -200,8 +224,13 @@ fn parse_text(bytes: &[u8], surface: &Surface) -> Result<SurfaceDisplacement, Fl
                 6 => BY_POINT.to_vec(),
                 4 => BY_VERTEX.to_vec(),
                 found => {
-                    let expected = "6 (x y z dx dy dz), 4 (vertex dx dy dz), or a line that names them".to_owned();
-                    return Err(flaw(first_at, Problem::Unexpected { found: format!("{found} columns"), expected }));
+                    let expected =
+                        "6 (x y z dx dy dz), 4 (vertex dx dy dz), or a line that names them"
+                            .to_owned();
+                    return Err(flaw(
+                        first_at,
+                        Problem::Unexpected { found: format!("{found} columns"), expected },
+                    ));
                 }
             }),
         };
@@ -209,7 +238,10 @@ fn parse_text(bytes: &[u8], surface: &Surface) -> Result<SurfaceDisplacement, Fl
             // The first word too many, or the end of the line.
             let at = words.get(columns.len()).map_or(line.chars().count() + 1, |(at, _)| *at);
             let expected = format!("{} as in the lines before", columns.len());
-            return Err(flaw(at, Problem::Unexpected { found: format!("{} columns", words.len()), expected }));
+            return Err(flaw(
+                at,
+                Problem::Unexpected { found: format!("{} columns", words.len()), expected },
+            ));
         }
         let (mut vertex, mut point, mut value) = (None, None, [0.0; 3]);
         for (&(at, word), column) in words.iter().zip(columns) {
@@ -221,7 +253,10 @@ fn parse_text(bytes: &[u8], surface: &Surface) -> Result<SurfaceDisplacement, Fl
                 Column::Vertex => {
                     let expected = "a mesh vertex number, counted from 0";
                     let number = word.parse::<u32>();
-                    vertex = Some(number.map_err(|_| flaw(at, Problem::unexpected(word.as_bytes(), expected)))?);
+                    vertex =
+                        Some(number.map_err(|_| {
+                            flaw(at, Problem::unexpected(word.as_bytes(), expected))
+                        })?);
                 }
                 Column::Point(axis) => point.get_or_insert([0.0; 3])[axis] = number()?,
                 Column::Value(axis) => value[axis] = number()?,
@@ -287,14 +322,18 @@ fn column(word: &str) -> Column {
     if word == VERTEX {
         return Column::Vertex;
     }
-    for (prefix, axes) in [("", ["x", "y", "z"]), ("points:", ["0", "1", "2"]), ("points_", ["0", "1", "2"])] {
+    for (prefix, axes) in
+        [("", ["x", "y", "z"]), ("points:", ["0", "1", "2"]), ("points_", ["0", "1", "2"])]
+    {
         if let Some(axis) = axis(prefix, axes) {
             return Column::Point(axis);
         }
     }
-    for (prefix, axes) in
-        [("d", ["x", "y", "z"]), ("displacement:", ["0", "1", "2"]), ("displacement_", ["0", "1", "2"])]
-    {
+    for (prefix, axes) in [
+        ("d", ["x", "y", "z"]),
+        ("displacement:", ["0", "1", "2"]),
+        ("displacement_", ["0", "1", "2"]),
+    ] {
         if let Some(axis) = axis(prefix, axes) {
             return Column::Value(axis);
         }
@@ -309,18 +348,26 @@ fn from_mesh(
 ) -> Result<SurfaceDisplacement, Flaw> {
     let find = |name: &str, components: usize| {
         let fits = |field: &&Field| {
-            field.name == name && field.association == Association::Vertex && field.components == components
+            field.name == name
+                && field.association == Association::Vertex
+                && field.components == components
         };
         fields.iter().find(fits)
     };
     let Some(values) = find(DISPLACEMENT, 3) else {
         let listed = fields
             .iter()
-            .map(|field| format!("{} ({} of {} components)", field.name, field.association, field.components))
+            .map(|field| {
+                format!("{} ({} of {} components)", field.name, field.association, field.components)
+            })
             .collect::<Vec<_>>()
             .join(", ");
         return Err(Flaw::from(Problem::Unexpected {
-            found: if listed.is_empty() { "no arrays".into() } else { format!("the arrays {listed}") },
+            found: if listed.is_empty() {
+                "no arrays".into()
+            } else {
+                format!("the arrays {listed}")
+            },
             expected: "a point array `displacement` of 3 components".into(),
         }));
     };
@@ -328,7 +375,10 @@ fn from_mesh(
     // Of a volume, what lies inside has no vertex of the surface to stand for.
     let outside = if mesh.cells().dimension() == 3 {
         let outer = Surface::extract(mesh, &FeatureSettings::default()).map_err(|error| {
-            Flaw::from(Problem::Unexpected { found: error.to_string(), expected: "a mesh with a surface".into() })
+            Flaw::from(Problem::Unexpected {
+                found: error.to_string(),
+                expected: "a mesh with a surface".into(),
+            })
         })?;
         let mut outside = vec![false; mesh.points().len()];
         outer.vertices().iter().for_each(|&vertex| outside[vertex as usize] = true);
@@ -344,9 +394,10 @@ fn from_mesh(
             continue;
         }
         let in_point = |problem: Problem| match problem {
-            Problem::Unexpected { found, expected } => {
-                Flaw::from(Problem::Unexpected { found: format!("at point {index}: {found}"), expected })
-            }
+            Problem::Unexpected { found, expected } => Flaw::from(Problem::Unexpected {
+                found: format!("at point {index}: {found}"),
+                expected,
+            }),
             other => Flaw::from(other),
         };
         let value = [value[0], value[1], value[2]];
@@ -356,12 +407,17 @@ fn from_mesh(
         }
         let vertex = match numbers.and_then(|numbers| numbers.values.get(index)) {
             None => None,
-            Some(&number) if number >= 0.0 && number <= f64::from(u32::MAX) && number.fract() == 0.0 => {
+            Some(&number)
+                if number >= 0.0 && number <= f64::from(u32::MAX) && number.fract() == 0.0 =>
+            {
                 Some(number as u32)
             }
             Some(number) => {
                 let found = format!("the vertex {number}");
-                return Err(in_point(Problem::Unexpected { found, expected: "a mesh vertex number".into() }));
+                return Err(in_point(Problem::Unexpected {
+                    found,
+                    expected: "a mesh vertex number".into(),
+                }));
             }
         };
         matcher.take(vertex, Some(*point), value).map_err(in_point)?;
@@ -390,8 +446,10 @@ impl<'a> Matcher<'a> {
             }
         }
         let diagonal = (0..3).fold(0.0f64, |length, axis| length.hypot(upper[axis] - lower[axis]));
-        let largest = lower.iter().chain(&upper).fold(0.0f64, |largest, value| largest.max(value.abs()));
-        let tolerance = (TOLERANCE * diagonal.max(largest)).clamp(f64::MIN_POSITIVE, f64::MAX / 4.0);
+        let largest =
+            lower.iter().chain(&upper).fold(0.0f64, |largest, value| largest.max(value.abs()));
+        let tolerance =
+            (TOLERANCE * diagonal.max(largest)).clamp(f64::MIN_POSITIVE, f64::MAX / 4.0);
         let taken = vec![false; surface.points().len()];
         Self { surface, tolerance, cubes: None, taken, found: SurfaceDisplacement::default() }
     }
@@ -414,7 +472,9 @@ impl<'a> Matcher<'a> {
         for offset in 0..27 {
             let steps = [offset % 3 - 1, offset / 3 % 3 - 1, offset / 9 - 1];
             let cube = [0, 1, 2].map(|axis| center[axis].saturating_add(steps[axis]));
-            for &vertex in self.cubes.as_ref().and_then(|cubes| cubes.get(&cube)).into_iter().flatten() {
+            for &vertex in
+                self.cubes.as_ref().and_then(|cubes| cubes.get(&cube)).into_iter().flatten()
+            {
                 let distance = distance(self.surface.points()[vertex as usize], point);
                 if distance <= self.tolerance && !near.contains(&(distance, vertex)) {
                     near.push((distance, vertex));
@@ -425,15 +485,24 @@ impl<'a> Matcher<'a> {
         near
     }
 
-    fn take(&mut self, vertex: Option<u32>, point: Option<Vector>, value: Vector) -> Result<(), Problem> {
+    fn take(
+        &mut self,
+        vertex: Option<u32>,
+        point: Option<Vector>,
+        value: Vector,
+    ) -> Result<(), Problem> {
         let local = match (vertex, point) {
             (Some(vertex), point) => {
                 let Ok(local) = self.surface.vertices().binary_search(&vertex) else {
                     let found = format!("vertex {vertex}");
-                    return Err(Problem::Unexpected { found, expected: "a mesh vertex on the surface".into() });
+                    return Err(Problem::Unexpected {
+                        found,
+                        expected: "a mesh vertex on the surface".into(),
+                    });
                 };
                 let there = self.surface.points()[local];
-                if let Some(point) = point.filter(|point| distance(*point, there) > self.tolerance) {
+                if let Some(point) = point.filter(|point| distance(*point, there) > self.tolerance)
+                {
                     let found = format!("vertex {vertex} at {point:?}");
                     return Err(Problem::Unexpected {
                         found,
@@ -446,10 +515,16 @@ impl<'a> Matcher<'a> {
                 Some(&(_, local)) => local as usize,
                 None => {
                     let points = self.surface.points().iter();
-                    let nearest = points.map(|at| distance(*at, point)).fold(f64::INFINITY, f64::min);
+                    let nearest =
+                        points.map(|at| distance(*at, point)).fold(f64::INFINITY, f64::min);
                     return Err(Problem::Unexpected {
-                        found: format!("the point {point:?}, which is {nearest:e} from the nearest vertex"),
-                        expected: format!("a vertex of the reference surface, within {:e}", self.tolerance),
+                        found: format!(
+                            "the point {point:?}, which is {nearest:e} from the nearest vertex"
+                        ),
+                        expected: format!(
+                            "a vertex of the reference surface, within {:e}",
+                            self.tolerance
+                        ),
                     });
                 }
             },
@@ -486,13 +561,20 @@ fn to_text(surface: &Surface, displacement: &[Vector], comma: &str) -> String {
     use std::fmt::Write as _;
     let mut matcher = Matcher::new(surface);
     let alone = surface.points().iter().all(|&point| matcher.near(point).len() == 1);
-    let mut text = String::from("# displacement of the vertices of a surface, from the reference mesh\n");
-    let names: &[&str] = if alone { &["x", "y", "z", "dx", "dy", "dz"] } else { &["vertex", "dx", "dy", "dz"] };
+    let mut text =
+        String::from("# displacement of the vertices of a surface, from the reference mesh\n");
+    let names: &[&str] =
+        if alone { &["x", "y", "z", "dx", "dy", "dz"] } else { &["vertex", "dx", "dy", "dz"] };
     text.push_str(&names.join(comma));
     text.push('\n');
-    for ((point, vertex), value) in surface.points().iter().zip(surface.vertices()).zip(displacement) {
-        let place: Vec<String> =
-            if alone { point.iter().map(|part| format!("{part:?}")).collect() } else { vec![vertex.to_string()] };
+    for ((point, vertex), value) in
+        surface.points().iter().zip(surface.vertices()).zip(displacement)
+    {
+        let place: Vec<String> = if alone {
+            point.iter().map(|part| format!("{part:?}")).collect()
+        } else {
+            vec![vertex.to_string()]
+        };
         let value = value.iter().map(|part| format!("{part:?}"));
         let row: Vec<String> = place.into_iter().chain(value).collect();
         // Writing to a string cannot fail.

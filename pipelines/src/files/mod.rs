@@ -43,8 +43,8 @@ use std::path::Path;
 use tombolo_deform::mesh::{Cells, Mesh};
 
 pub use displacement::{
-    SurfaceDisplacement, TOLERANCE, UnreadFile, check_displacement_name, parse_displacement, read_displacement,
-    read_displacements, write_displacement,
+    SurfaceDisplacement, TOLERANCE, UnreadFile, check_displacement_name, parse_displacement,
+    read_displacement, read_displacements, write_displacement,
 };
 pub use error::{FileError, Place, Problem};
 pub use vtk::{Compression, Series};
@@ -103,7 +103,9 @@ fn parser(path: &Path) -> Result<Parser, FileError> {
 }
 
 fn extension(path: &Path) -> String {
-    path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
+    path.extension()
+        .map(|extension| extension.to_string_lossy().to_ascii_lowercase())
+        .unwrap_or_default()
 }
 
 fn unknown_extension(found: &str, expected: &'static str) -> Flaw {
@@ -130,13 +132,19 @@ pub fn write(path: impl AsRef<Path>, extract: &Extract) -> Result<(), FileError>
 ///
 /// # Errors
 /// As [`write`](fn@write).
-pub fn write_compressed(path: impl AsRef<Path>, extract: &Extract, compression: Compression) -> Result<(), FileError> {
+pub fn write_compressed(
+    path: impl AsRef<Path>,
+    extract: &Extract,
+    compression: Compression,
+) -> Result<(), FileError> {
     let path = path.as_ref();
     let index = vtk::Index::of(&extension(path));
     let piece = index.map(|index| index.piece(path));
-    let data = piece.as_ref().map_or_else(|| path.to_path_buf(), |piece| path.with_file_name(piece));
+    let data =
+        piece.as_ref().map_or_else(|| path.to_path_buf(), |piece| path.with_file_name(piece));
     let polygonal = is_polygonal(&data)?;
-    let bytes = vtk::from_extract(extract, polygonal, compression).map_err(|error| Flaw::from(error).in_file(path))?;
+    let bytes = vtk::from_extract(extract, polygonal, compression)
+        .map_err(|error| Flaw::from(error).in_file(path))?;
     write_atomically(&data, |file| file.write_all(&bytes))?;
     match (index, piece) {
         (Some(index), Some(piece)) => {
@@ -162,8 +170,8 @@ pub fn write_mesh(
     let path = path.as_ref();
     check_mesh_name(path, mesh.cells())?;
     let polygonal = is_polygonal(path)?;
-    let bytes =
-        vtk::from_mesh(mesh, fields, polygonal, compression).map_err(|error| Flaw::from(error).in_file(path))?;
+    let bytes = vtk::from_mesh(mesh, fields, polygonal, compression)
+        .map_err(|error| Flaw::from(error).in_file(path))?;
     write_atomically(path, |file| file.write_all(&bytes))
 }
 

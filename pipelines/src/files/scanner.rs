@@ -91,10 +91,14 @@ impl<'a> Scanner<'a> {
     /// The next `count` bytes.
     pub fn take(&mut self, count: u64, what: &str) -> Result<&'a [u8], Flaw> {
         let rest = self.rest();
-        let taken = usize::try_from(count)
-            .ok()
-            .and_then(|count| rest.get(..count))
-            .ok_or_else(|| self.flaw(Problem::Truncated { what: what.to_owned(), needed: count, left: rest.len() }))?;
+        let taken =
+            usize::try_from(count).ok().and_then(|count| rest.get(..count)).ok_or_else(|| {
+                self.flaw(Problem::Truncated {
+                    what: what.to_owned(),
+                    needed: count,
+                    left: rest.len(),
+                })
+            })?;
         self.position += taken.len();
         Ok(taken)
     }
@@ -103,10 +107,9 @@ impl<'a> Scanner<'a> {
     pub fn check_count(&self, count: u64, bytes_each: usize, what: &str) -> Result<usize, Flaw> {
         let left = self.rest().len();
         let needed = count.saturating_mul(bytes_each as u64);
-        usize::try_from(count)
-            .ok()
-            .filter(|_| needed <= left as u64 + 1)
-            .ok_or_else(|| self.flaw(Problem::Truncated { what: format!("{count} {what}"), needed, left }))
+        usize::try_from(count).ok().filter(|_| needed <= left as u64 + 1).ok_or_else(|| {
+            self.flaw(Problem::Truncated { what: format!("{count} {what}"), needed, left })
+        })
     }
 
     /// Goes behind the next line that is `marker`; whether there is one.

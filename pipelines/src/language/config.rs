@@ -10,7 +10,9 @@ use serde::{Deserialize, Serialize};
 use tombolo_deform::mesh::Vector;
 use tombolo_deform::quality::Guard;
 use tombolo_deform::schedule::{Every, Schedule};
-use tombolo_deform::surface::{Affine, Displacement, Edit, Rotate, ScaleDirection, ScaleNormals, Skeleton, Translate};
+use tombolo_deform::surface::{
+    Affine, Displacement, Edit, Rotate, ScaleDirection, ScaleNormals, Skeleton, Translate,
+};
 
 /// A whole configuration file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -172,7 +174,11 @@ impl TryFrom<PipelineFields> for Pipeline {
             (Some(every), None, None) => Due::Every(every),
             (None, Some(at), None) => Due::At(at),
             (None, None, Some(Event::Order)) => Due::OnOrder,
-            _ => return Err("found more than one of `every`, `at` and `on`, expected at most one".into()),
+            _ => {
+                return Err(
+                    "found more than one of `every`, `at` and `on`, expected at most one".into()
+                );
+            }
         };
         let PipelineFields { name, channel, stages, when, then, .. } = fields;
         Ok(Self { name, channel, due, stages, when, then })

@@ -123,7 +123,8 @@ impl Default for Fields {
 
 impl From<Fields> for DeformStage {
     fn from(fields: Fields) -> Self {
-        let Fields { method, stiffening, poisson_ratio, tolerance, improve, sliding, free } = fields;
+        let Fields { method, stiffening, poisson_ratio, tolerance, improve, sliding, free } =
+            fields;
         let (method, surface_only) = match method {
             Following::Elasticity => (Method::Elasticity, false),
             Following::Harmonic => (Method::Harmonic, false),
@@ -142,7 +143,15 @@ impl From<DeformStage> for Fields {
             Method::Elasticity => Following::Elasticity,
             Method::Harmonic => Following::Harmonic,
         };
-        Self { method, stiffening, poisson_ratio, tolerance, improve, sliding: stage.sliding, free: stage.free }
+        Self {
+            method,
+            stiffening,
+            poisson_ratio,
+            tolerance,
+            improve,
+            sliding: stage.sliding,
+            free: stage.free,
+        }
     }
 }
 

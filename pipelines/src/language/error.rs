@@ -77,7 +77,9 @@ impl Problem {
     pub fn within_path(mut self, path: &str) -> Self {
         for part in path.rsplit('.') {
             let (key, indices) = part.split_once('[').unwrap_or((part, ""));
-            for index in indices.rsplit('[').filter_map(|index| index.trim_end_matches(']').parse().ok()) {
+            for index in
+                indices.rsplit('[').filter_map(|index| index.trim_end_matches(']').parse().ok())
+            {
                 self.path.push(Step::Index(index));
             }
             self.path.push(Step::Key(key.to_owned()));
@@ -174,10 +176,13 @@ pub(super) fn from_serde(
     let message = failure.inner().to_string();
     let (node, key) = walk(root, &steps);
 
-    if let Some(rest) = message.strip_prefix("unknown field ").or_else(|| message.strip_prefix("unknown variant ")) {
+    if let Some(rest) =
+        message.strip_prefix("unknown field ").or_else(|| message.strip_prefix("unknown variant "))
+    {
         let is_field = message.starts_with("unknown field");
         let names = backticked(rest);
-        let (name, known) = names.split_first().map_or(("", &[][..]), |(name, known)| (*name, known));
+        let (name, known) =
+            names.split_first().map_or(("", &[][..]), |(name, known)| (*name, known));
         let suggestion = nearest(name, known.iter().copied()).map(str::to_owned);
         let expected = match known {
             [] => "no key at all".to_owned(),
@@ -204,11 +209,15 @@ pub(super) fn from_serde(
 
     let message = if let Some(rest) = message.strip_prefix("missing field ") {
         format!("the key {rest} is missing")
-    } else if let Some((_, expected)) =
-        message.strip_prefix("invalid type: ").or(message.strip_prefix("invalid value: ")).and_then(split_expected)
+    } else if let Some((_, expected)) = message
+        .strip_prefix("invalid type: ")
+        .or(message.strip_prefix("invalid value: "))
+        .and_then(split_expected)
     {
         format!("found {}, expected {}", describe(node, text), humane(expected))
-    } else if let Some((length, expected)) = message.strip_prefix("invalid length ").and_then(split_expected) {
+    } else if let Some((length, expected)) =
+        message.strip_prefix("invalid length ").and_then(split_expected)
+    {
         format!("found {length} values, expected {}", humane(expected))
     } else {
         message
@@ -251,15 +260,20 @@ fn humane(expected: &str) -> String {
         "a string" | "a borrowed string" | "string or map" => "a string",
         "a sequence" => "an array",
         "unit" => "null",
-        "struct variant" | "newtype variant" | "tuple variant" => "an object with this key and its settings",
+        "struct variant" | "newtype variant" | "tuple variant" => {
+            "an object with this key and its settings"
+        }
         other if other.starts_with("struct ") || other == "a map" || other == "map" => "an object",
         other if other.starts_with("enum ") || other.starts_with("variant identifier") => {
             "a name, or an object with one key"
         }
-        other => match other.strip_prefix("an array of length ").and_then(|rest| rest.split(' ').next()) {
-            Some(length) => return format!("an array of {length} values"),
-            None => other,
-        },
+        other => {
+            match other.strip_prefix("an array of length ").and_then(|rest| rest.split(' ').next())
+            {
+                Some(length) => return format!("an array of {length} values"),
+                None => other,
+            }
+        }
     };
     plain.to_owned()
 }

@@ -54,7 +54,9 @@ pub fn parse_message(text: &str) -> (Option<String>, Result<Message, LanguageErr
 fn take_id(document: &mut Document<'_>) -> Result<Option<String>, LanguageError> {
     let Some(member) = document.root.member("id") else { return Ok(None) };
     let id = match &member.node.value {
-        Value::String(id) if !id.is_empty() && id.chars().count() <= ID && !id.chars().any(char::is_control) => {
+        Value::String(id)
+            if !id.is_empty() && id.chars().count() <= ID && !id.chars().any(char::is_control) =>
+        {
             id.clone()
         }
         _ => {
@@ -70,7 +72,9 @@ fn take_id(document: &mut Document<'_>) -> Result<Option<String>, LanguageError>
 
 fn message(document: &Document<'_>) -> Result<Message, LanguageError> {
     let key = match &document.root.value {
-        Value::Object(members) if members.len() == 1 => members.first().map_or("", |member| member.key.as_str()),
+        Value::Object(members) if members.len() == 1 => {
+            members.first().map_or("", |member| member.key.as_str())
+        }
         _ => "",
     };
     match key {

@@ -31,13 +31,16 @@ mod validate;
 
 pub use beside::place_beside;
 pub use config::{
-    Action, At, Config, Due, ErrorBound, OrderStage, Pipeline, Select, Slice, Stage, Statistics, Steering,
-    StreamServer, StreamStage, Write,
+    Action, At, Config, Due, ErrorBound, OrderStage, Pipeline, Select, Slice, Stage, Statistics,
+    Steering, StreamServer, StreamStage, Write,
 };
 pub use deform::DeformStage;
 pub use error::{LanguageError, Problem, nearest};
 pub use message::{Message, parse_message};
-pub use order::{Change, Command, JournalEntry, Order, OrderStatus, Parameter, Question, TimedCommand, parse_orders};
+pub use order::{
+    Change, Command, JournalEntry, Order, OrderStatus, Parameter, Question, TimedCommand,
+    parse_orders,
+};
 pub use parse::{ReadError, Validate, parse_json, parse_valid, read_text, text};
 pub(crate) use validate::monitor_names;
 pub use validate::{check_stack, file_pattern};

@@ -86,8 +86,15 @@ impl TryFrom<OrderFields> for Order {
             (Some(edits), None, None) => Change::Edits(edits),
             (None, Some(stack), None) => Change::Stack(stack),
             (None, None, Some(undo)) => Change::Undo(undo),
-            (None, None, None) => return Err("found none of `edits`, `stack` and `undo`, expected exactly one".into()),
-            _ => return Err("found more than one of `edits`, `stack` and `undo`, expected exactly one".into()),
+            (None, None, None) => {
+                return Err("found none of `edits`, `stack` and `undo`, expected exactly one".into());
+            }
+            _ => {
+                return Err(
+                    "found more than one of `edits`, `stack` and `undo`, expected exactly one"
+                        .into(),
+                );
+            }
         };
         Ok(Self { change, schedule: fields.schedule, deform: fields.deform, guard: fields.guard })
     }
@@ -241,7 +248,9 @@ impl TryFrom<TimedFields> for TimedCommand {
     type Error = String;
 
     fn try_from(mut fields: TimedFields) -> Result<Self, String> {
-        let command = fields.take_command()?.ok_or(format!("found no command, expected one of {COMMANDS}"))?;
+        let command = fields
+            .take_command()?
+            .ok_or(format!("found no command, expected one of {COMMANDS}"))?;
         Ok(Self { at: fields.at, id: fields.id, command })
     }
 }
@@ -364,7 +373,9 @@ impl From<JournalEntry> for JournalFields {
 impl Validate for Vec<TimedCommand> {
     fn validate(&self) -> Result<(), Problem> {
         WAITING.check(self.len())?;
-        self.iter().enumerate().try_for_each(|(index, timed)| timed.validate().map_err(|problem| problem.at(index)))
+        self.iter()
+            .enumerate()
+            .try_for_each(|(index, timed)| timed.validate().map_err(|problem| problem.at(index)))
     }
 }
 
@@ -411,7 +422,9 @@ fn parse_commands(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageE
         return parse_valid(text, file);
     }
     match Document::read(text, file) {
-        Ok(document) if !is_of_journal(&document) => document.valid::<TimedCommand>().map(|timed| vec![timed]),
+        Ok(document) if !is_of_journal(&document) => {
+            document.valid::<TimedCommand>().map(|timed| vec![timed])
+        }
         _ => parse_lines(text, file),
     }
 }
@@ -430,7 +443,8 @@ fn parse_lines(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageErro
         if content.trim_start_matches('\u{feff}').trim().is_empty() {
             continue;
         }
-        let moved = |failure: LanguageError| LanguageError { line: failure.line + number, ..failure };
+        let moved =
+            |failure: LanguageError| LanguageError { line: failure.line + number, ..failure };
         let line = match Document::read(content, file) {
             Err(_) if number + 1 == count && number > 0 && !ends_whole => break,
             line => line.map_err(moved)?,
@@ -450,7 +464,9 @@ fn parse_lines(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageErro
             }
             (OrderStatus::Applied, command) => match (places.get(&entry.id), command) {
                 (Some(&place), _) => commands[place].at = at,
-                (None, Some(command)) => commands.push(TimedCommand { at, id: Some(entry.id), command }),
+                (None, Some(command)) => {
+                    commands.push(TimedCommand { at, id: Some(entry.id), command })
+                }
                 (None, None) => {}
             },
             (OrderStatus::Rejected, _) => {

@@ -70,7 +70,9 @@ pub fn read_text(file: &Path, limit: Limit) -> Result<String, ReadError> {
 
 /// Refuses a text that is too long.
 pub(super) fn check_length(found: usize, file: &str, limit: Limit) -> Result<(), LanguageError> {
-    limit.check(found).map_err(|exceeded| error("", file, 0, String::new(), exceeded.to_string(), None))
+    limit
+        .check(found)
+        .map_err(|exceeded| error("", file, 0, String::new(), exceeded.to_string(), None))
 }
 
 /// Reads one value of any type from JSON.
@@ -101,7 +103,10 @@ pub fn parse_json<T: DeserializeOwned>(text: &str, file: &str) -> Result<T, Lang
 ///
 /// # Errors
 /// As [`parse_json`]; the first [`Problem`] at its place.
-pub fn parse_valid<T: DeserializeOwned + Validate>(text: &str, file: &str) -> Result<T, LanguageError> {
+pub fn parse_valid<T: DeserializeOwned + Validate>(
+    text: &str,
+    file: &str,
+) -> Result<T, LanguageError> {
     Document::read(text, file)?.valid()
 }
 
@@ -116,7 +121,8 @@ impl<'a> Document<'a> {
     pub(super) fn read(text: &'a str, file: &'a str) -> Result<Self, LanguageError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         check_length(text.len(), file, DOCUMENT)?;
-        let root = scan(text).map_err(|syntax| error(text, file, syntax.at, syntax.path, syntax.message, None))?;
+        let root = scan(text)
+            .map_err(|syntax| error(text, file, syntax.at, syntax.path, syntax.message, None))?;
         Ok(Self { root, text, file })
     }
 

@@ -183,7 +183,9 @@ impl Scanner<'_> {
         let shown: String = word.chars().take(40).collect();
         let message = match word.to_ascii_lowercase().as_str() {
             "nan" | "infinity" | "inf" => format!("found {shown}, expected a finite number"),
-            "true" | "false" | "null" => format!("found {shown}, expected {}", word.to_ascii_lowercase()),
+            "true" | "false" | "null" => {
+                format!("found {shown}, expected {}", word.to_ascii_lowercase())
+            }
             _ => format!("found {shown}, expected a value (a string stands in double quotes)"),
         };
         Err(self.error(message))
@@ -204,7 +206,8 @@ impl Scanner<'_> {
         }
         let leading_zero = self.peek() == Some(b'0');
         let whole = self.digits();
-        let not_a_number = |scanner: &Self| scanner.error(format!("found {}, expected a digit", scanner.found()));
+        let not_a_number =
+            |scanner: &Self| scanner.error(format!("found {}, expected a digit", scanner.found()));
         if whole == 0 {
             let negative_infinity = self.text[self.at..].starts_with(['I', 'i']);
             return Err(match negative_infinity {
@@ -263,7 +266,9 @@ impl Scanner<'_> {
             match self.peek() {
                 None => {
                     self.at = start;
-                    return Err(self.error("found a string that does not end, expected a closing '\"'".into()));
+                    return Err(self.error(
+                        "found a string that does not end, expected a closing '\"'".into(),
+                    ));
                 }
                 Some(b'"') => break,
                 Some(b'\\') => {
@@ -272,7 +277,10 @@ impl Scanner<'_> {
                     is_plain = false;
                 }
                 Some(0..=0x1f) => {
-                    return Err(self.error(format!("found {} in a string, expected its escape", self.found())));
+                    return Err(self.error(format!(
+                        "found {} in a string, expected its escape",
+                        self.found()
+                    )));
                 }
                 Some(_) => self.at += 1,
             }
@@ -283,8 +291,9 @@ impl Scanner<'_> {
         if is_plain {
             return Ok(inside.to_owned());
         }
-        serde_json::from_str(&self.text[start..self.at])
-            .map_err(|_| self.error_at(start, "found a string with an escape that JSON does not know".into()))
+        serde_json::from_str(&self.text[start..self.at]).map_err(|_| {
+            self.error_at(start, "found a string with an escape that JSON does not know".into())
+        })
     }
 
     /// Goes into an array or object.
@@ -342,7 +351,10 @@ impl Scanner<'_> {
             let (key, key_span) = self.outside(|scanner| {
                 scanner.skip_space();
                 if scanner.peek() != Some(b'"') {
-                    return Err(scanner.error(format!("found {}, expected a key in double quotes", scanner.found())));
+                    return Err(scanner.error(format!(
+                        "found {}, expected a key in double quotes",
+                        scanner.found()
+                    )));
                 }
                 let start = scanner.at;
                 let key = scanner.string()?;
@@ -380,7 +392,10 @@ impl Scanner<'_> {
     }
 
     /// Reads what belongs to an object itself: what is wrong there is wrong with the object.
-    fn outside<T>(&mut self, read: impl FnOnce(&mut Self) -> Result<T, SyntaxError>) -> Result<T, SyntaxError> {
+    fn outside<T>(
+        &mut self,
+        read: impl FnOnce(&mut Self) -> Result<T, SyntaxError>,
+    ) -> Result<T, SyntaxError> {
         let step = self.way.pop();
         let done = read(self)?;
         self.way.extend(step);

@@ -3,7 +3,9 @@
 //! Differs from serde_json's own reader in two ways, both so that what is likely a slip is not taken for something else: an array
 //! is never a struct, and an object with several keys is never an enum.
 
-use serde::de::value::{BorrowedStrDeserializer, MapAccessDeserializer, MapDeserializer, SeqDeserializer};
+use serde::de::value::{
+    BorrowedStrDeserializer, MapAccessDeserializer, MapDeserializer, SeqDeserializer,
+};
 use serde::de::{Deserializer, Error as _, IntoDeserializer, Unexpected, Visitor};
 use serde::forward_to_deserialize_any;
 
@@ -72,7 +74,11 @@ impl<'de> Deserializer<'de> for &'de Node {
         }
     }
 
-    fn deserialize_newtype_struct<V: Visitor<'de>>(self, _: &'static str, visitor: V) -> Result<V::Value, Error> {
+    fn deserialize_newtype_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        visitor: V,
+    ) -> Result<V::Value, Error> {
         visitor.visit_newtype_struct(self)
     }
 
@@ -96,14 +102,20 @@ impl<'de> Deserializer<'de> for &'de Node {
     ) -> Result<V::Value, Error> {
         match &self.value {
             Value::String(name) => visitor.visit_enum(BorrowedStrDeserializer::new(name)),
-            Value::Object(members) if members.len() == 1 => {
-                visitor.visit_enum(MapAccessDeserializer::new(MapDeserializer::new(members.iter().map(pair))))
-            }
+            Value::Object(members) if members.len() == 1 => visitor.visit_enum(
+                MapAccessDeserializer::new(MapDeserializer::new(members.iter().map(pair))),
+            ),
             Value::Object(members) => {
-                let keys: Vec<String> = members.iter().map(|member| format!("`{}`", member.key)).collect();
-                let found =
-                    if keys.is_empty() { "an empty object".into() } else { format!("the keys {}", keys.join(", ")) };
-                Err(Error::custom(format!("found {found}, expected an object with exactly one key")))
+                let keys: Vec<String> =
+                    members.iter().map(|member| format!("`{}`", member.key)).collect();
+                let found = if keys.is_empty() {
+                    "an empty object".into()
+                } else {
+                    format!("the keys {}", keys.join(", "))
+                };
+                Err(Error::custom(format!(
+                    "found {found}, expected an object with exactly one key"
+                )))
             }
             _ => Err(Error::invalid_type(self.unexpected(), &visitor)),
         }

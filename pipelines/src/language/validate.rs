@@ -7,7 +7,9 @@ use tombolo_deform::quality::Guard;
 use tombolo_deform::schedule::Schedule;
 use tombolo_deform::surface::Edit;
 
-use super::config::{Action, Config, Due, ErrorBound, OrderStage, Pipeline, Stage, StreamStage, Write};
+use super::config::{
+    Action, Config, Due, ErrorBound, OrderStage, Pipeline, Stage, StreamStage, Write,
+};
 use super::order::{Change, Command, Order, Question, TimedCommand};
 use super::parse::Validate;
 use super::{At, DeformStage, Problem, nearest};
@@ -74,14 +76,20 @@ impl Validate for Pipeline {
         }
         let mut state = State::default();
         for (index, stage) in self.stages.iter().enumerate() {
-            state.check(stage, self.due).map_err(|problem| problem.within(stage.name()).at(index).within("stages"))?;
+            state
+                .check(stage, self.due)
+                .map_err(|problem| problem.within(stage.name()).at(index).within("stages"))?;
         }
         if self.due == Due::OnOrder {
             if self.when.is_some() {
-                return Err(Problem::new("a pipeline that runs on orders has no condition").within("when"));
+                return Err(
+                    Problem::new("a pipeline that runs on orders has no condition").within("when")
+                );
             }
             if !self.then.is_empty() {
-                return Err(Problem::new("a pipeline that runs on orders has no `then`").within("then"));
+                return Err(
+                    Problem::new("a pipeline that runs on orders has no `then`").within("then")
+                );
             }
         }
         if let Some(when) = &self.when {
@@ -118,10 +126,14 @@ pub(crate) fn monitor_names(pipeline: &Pipeline) -> Vec<String> {
     let mut names = vec!["cycle".to_owned(), "time".to_owned()];
     for stage in &pipeline.stages {
         match stage {
-            Stage::Quality {} => names.extend(["min", "mean", "max", "inverted"].map(|name| format!("quality.{name}"))),
+            Stage::Quality {} => names
+                .extend(["min", "mean", "max", "inverted"].map(|name| format!("quality.{name}"))),
             Stage::Statistics(statistics) => {
                 let field = &statistics.field;
-                names.extend(["min", "max", "mean", "l2", "non_finite"].map(|name| format!("{field}.{name}")));
+                names.extend(
+                    ["min", "max", "mean", "l2", "non_finite"]
+                        .map(|name| format!("{field}.{name}")),
+                );
             }
             _ => {}
         }
@@ -167,14 +179,17 @@ impl State {
                 self.source()?;
                 let length = slice.normal.iter().fold(0.0_f64, |sum, x| sum.hypot(*x));
                 if !(length.is_normal()) {
-                    return Err(Problem::new("expected a direction, whose length is not 0").within("normal"));
+                    return Err(Problem::new("expected a direction, whose length is not 0")
+                        .within("normal"));
                 }
                 Ok(())
             }
             Stage::Select(select) => {
                 let mut known = HashSet::new();
                 match select.fields.iter().position(|field| !known.insert(field)) {
-                    Some(index) => Err(Problem::new("found the same field twice").at(index).within("fields")),
+                    Some(index) => {
+                        Err(Problem::new("found the same field twice").at(index).within("fields"))
+                    }
                     None => Ok(()),
                 }
             }
@@ -184,8 +199,11 @@ impl State {
             Stage::Statistics(statistics) if !self.measured.insert(statistics.field.clone()) => {
                 Err(Problem::new("this field is measured twice").within("field"))
             }
-            Stage::Statistics(statistics) if ["quality", "cycle", "time"].contains(&statistics.field.as_str()) => {
-                Err(Problem::new("a field of this name cannot be told from other monitors").within("field"))
+            Stage::Statistics(statistics)
+                if ["quality", "cycle", "time"].contains(&statistics.field.as_str()) =>
+            {
+                Err(Problem::new("a field of this name cannot be told from other monitors")
+                    .within("field"))
             }
             Stage::Stream(stream) => self.stream(stream),
             Stage::Write(write) => self.write(write),
@@ -199,8 +217,11 @@ impl State {
 
     fn source(&mut self) -> Result<(), Problem> {
         if self.stages > 1 {
-            let message =
-                if self.extract { "a pipeline has one source stage" } else { "a source stage must come first" };
+            let message = if self.extract {
+                "a pipeline has one source stage"
+            } else {
+                "a source stage must come first"
+            };
             return Err(Problem::new(message));
         }
         self.extract = true;
@@ -209,7 +230,9 @@ impl State {
 
     fn stream(&self, stream: &StreamStage) -> Result<(), Problem> {
         if !self.extract {
-            return Err(Problem::new("nothing to stream, expected a `surface` or `slice` stage first"));
+            return Err(Problem::new(
+                "nothing to stream, expected a `surface` or `slice` stage first",
+            ));
         }
         check_bound(stream.error).map_err(|problem| problem.within("error"))?;
         match stream.positions {
@@ -236,7 +259,11 @@ impl State {
 }
 
 fn finite(value: f64) -> Result<(), Problem> {
-    if value.is_finite() { Ok(()) } else { Err(Problem::new(format!("found {value}, expected a finite number"))) }
+    if value.is_finite() {
+        Ok(())
+    } else {
+        Err(Problem::new(format!("found {value}, expected a finite number")))
+    }
 }
 
 fn check_bound(bound: ErrorBound) -> Result<(), Problem> {
@@ -255,7 +282,10 @@ fn check_bound(bound: ErrorBound) -> Result<(), Problem> {
 fn check_edit(edit: &Edit) -> Result<(), Problem> {
     edit.validate().map_err(|error| {
         let (field, message) = (error.field(), error.to_string());
-        let message = message.strip_prefix(&field).and_then(|rest| rest.strip_prefix(": ")).unwrap_or(&message);
+        let message = message
+            .strip_prefix(&field)
+            .and_then(|rest| rest.strip_prefix(": "))
+            .unwrap_or(&message);
         Problem::new(message).within_path(&field)
     })
 }
@@ -264,7 +294,8 @@ fn check_guard(guard: &Guard) -> Result<(), Problem> {
     if (0.0..=1.0).contains(&guard.min_scaled_jacobian) {
         return Ok(());
     }
-    let message = format!("found {}, expected a number from 0 to 1", Number(guard.min_scaled_jacobian));
+    let message =
+        format!("found {}, expected a number from 0 to 1", Number(guard.min_scaled_jacobian));
     Err(Problem::new(message).within("min_scaled_jacobian"))
 }
 
@@ -285,7 +316,9 @@ fn check_settings(
 /// Checks edits one by one, and what all of them come to.
 fn check_edits(edits: &[Edit]) -> Result<(), Problem> {
     check_stack(edits)?;
-    let located = |index: usize, edit: &Edit| check_edit(edit).map_err(|problem| problem.within(edit.name()).at(index));
+    let located = |index: usize, edit: &Edit| {
+        check_edit(edit).map_err(|problem| problem.within(edit.name()).at(index))
+    };
     edits.iter().enumerate().try_for_each(|(index, edit)| located(index, edit))
 }
 
@@ -310,7 +343,8 @@ fn check_file(pattern: &str) -> Result<(), Problem> {
         let message = format!(
             "found the file `{pattern}`, expected one that ends in `.vtu`, `.vtp`, `.vtpd`, `.pvtu` or `.pvtp`"
         );
-        return Err(Problem::new(message).suggest(nearest(extension, extensions).filter(|_| !extension.is_empty())));
+        return Err(Problem::new(message)
+            .suggest(nearest(extension, extensions).filter(|_| !extension.is_empty())));
     }
     file_pattern(pattern, 0, 0.0).map(|_| ())
 }
@@ -336,7 +370,8 @@ pub fn file_pattern(pattern: &str, cycle: u64, time: f64) -> Result<String, Prob
         let Some((inside, after)) = after.split_once('}') else {
             return Err(Problem::new("found '{' without its '}'"));
         };
-        let (name, digits) = inside.split_once(':').map_or((inside, None), |(name, digits)| (name, Some(digits)));
+        let (name, digits) =
+            inside.split_once(':').map_or((inside, None), |(name, digits)| (name, Some(digits)));
         let digits = digits.map(|digits| file_digits(inside, digits)).transpose()?;
         match name {
             "cycle" => file.push_str(&format!("{cycle:0width$}", width = digits.unwrap_or(6))),
@@ -345,7 +380,9 @@ pub fn file_pattern(pattern: &str, cycle: u64, time: f64) -> Result<String, Prob
                 None => file.push_str(&time.to_string()),
             },
             _ => {
-                let message = format!("found `{{{name}}}` in a file's name, expected `{{cycle}}` or `{{time}}`");
+                let message = format!(
+                    "found `{{{name}}}` in a file's name, expected `{{cycle}}` or `{{time}}`"
+                );
                 return Err(Problem::new(message).suggest(nearest(name, ["cycle", "time"])));
             }
         }
@@ -393,9 +430,8 @@ impl Validate for Command {
     fn validate(&self) -> Result<(), Problem> {
         match self {
             Command::Order(order) => order.validate().map_err(|problem| problem.within("order")),
-            Command::Parameter(parameter) => {
-                finite(parameter.value).map_err(|problem| problem.within("value").within("parameter"))
-            }
+            Command::Parameter(parameter) => finite(parameter.value)
+                .map_err(|problem| problem.within("value").within("parameter")),
             Command::Pause {} | Command::Resume {} | Command::Stop {} => Ok(()),
         }
     }

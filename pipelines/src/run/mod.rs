@@ -59,7 +59,10 @@ impl Runner {
     ///
     /// # Errors
     /// As [`new`](Self::new).
-    pub fn with_communicator(config: &Config, communicator: Arc<dyn Communicator>) -> Result<Self, Problem> {
+    pub fn with_communicator(
+        config: &Config,
+        communicator: Arc<dyn Communicator>,
+    ) -> Result<Self, Problem> {
         config.validate()?;
         let pipelines = config.pipelines.iter().filter(|pipeline| pipeline.due != Due::OnOrder);
         let pipelines: Result<Vec<_>, _> = pipelines.map(Prepared::new).collect();
@@ -95,7 +98,10 @@ impl Runner {
     #[must_use]
     pub fn reads(&self, cycle: u64, time: f64, channel: &str, is_first: bool) -> bool {
         let reads = |name: Option<&str>| name.map_or(is_first, |name| name == channel);
-        let due = self.pipelines.iter().filter(|prepared| prepared.is_chosen && prepared.due.is_due(cycle, time));
+        let due = self
+            .pipelines
+            .iter()
+            .filter(|prepared| prepared.is_chosen && prepared.due.is_due(cycle, time));
         due.map(|prepared| prepared.pipeline.channel.as_deref()).any(reads)
     }
 
@@ -123,7 +129,9 @@ impl Runner {
                 Ok((channel, source)) => {
                     prepared.run(snapshot, channel, source, &*self.communicator, &mut outputs);
                 }
-                Err(message) => prepared.report(snapshot.cycle, vec![("channel".into(), message)], &mut outputs),
+                Err(message) => {
+                    prepared.report(snapshot.cycle, vec![("channel".into(), message)], &mut outputs)
+                }
             }
         }
         outputs
@@ -134,7 +142,11 @@ impl Runner {
     ///
     /// # Errors
     /// A text that names the channel or what is wrong with its mesh.
-    pub fn surface(&mut self, channels: &[Channel], name: Option<&str>) -> Result<Arc<Surface>, String> {
+    pub fn surface(
+        &mut self,
+        channels: &[Channel],
+        name: Option<&str>,
+    ) -> Result<Arc<Surface>, String> {
         let (channel, source) = source(&mut self.sources, channels, name, &*self.communicator)?;
         source.surface_of(channel).map_err(|error| error.to_string())
     }

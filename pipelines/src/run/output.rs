@@ -25,7 +25,10 @@ impl Default for Encoding {
 
 impl From<StreamStage> for Encoding {
     fn from(stage: StreamStage) -> Self {
-        Self { fields: stage.error, positions: stage.positions.unwrap_or(ErrorBound::Relative(1e-5)) }
+        Self {
+            fields: stage.error,
+            positions: stage.positions.unwrap_or(ErrorBound::Relative(1e-5)),
+        }
     }
 }
 

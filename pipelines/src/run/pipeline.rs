@@ -10,12 +10,12 @@ use super::output::{Frame, MonitorValues, Output};
 use crate::communicator::{Communicator, Reduction, agree};
 use crate::expression::Expression;
 use crate::extract::{
-    Association, Channel, Extract, Extracted, Field, FieldView, Snapshot, Source, check_length, is_absent, merged,
-    statistics_of,
+    Association, Channel, Extract, Extracted, Field, FieldView, Snapshot, Source, check_length,
+    is_absent, merged, statistics_of,
 };
 use crate::language::{
-    Action, Change, Order, OrderStage, Pipeline, Problem, Slice, Stage, StreamStage, Write, file_pattern,
-    monitor_names, nearest,
+    Action, Change, Order, OrderStage, Pipeline, Problem, Slice, Stage, StreamStage, Write,
+    file_pattern, monitor_names, nearest,
 };
 
 /// The name of the element field that a `quality` stage adds.
@@ -135,7 +135,13 @@ impl Prepared {
             self.stage(stage, &mut progress);
         }
         if self.monitors.len() > 2 {
-            let values = self.monitors.iter().cloned().zip(progress.values.iter().copied()).skip(2).collect();
+            let values = self
+                .monitors
+                .iter()
+                .cloned()
+                .zip(progress.values.iter().copied())
+                .skip(2)
+                .collect();
             progress.outputs.push(Output::Monitor(MonitorValues {
                 pipeline: Arc::clone(&self.name),
                 cycle: snapshot.cycle,
@@ -169,8 +175,10 @@ impl Prepared {
             return;
         }
         let known = || progress.channel.fields.iter().map(|field| field.name);
-        let mut missing: Vec<&String> =
-            selected.iter().filter(|name| *name != QUALITY_FIELD && known().all(|known| known != *name)).collect();
+        let mut missing: Vec<&String> = selected
+            .iter()
+            .filter(|name| *name != QUALITY_FIELD && known().all(|known| known != *name))
+            .collect();
         missing.sort();
         for name in missing {
             let message = unknown_field(name, known());
@@ -221,17 +229,26 @@ impl Prepared {
         self.keep(taken, progress);
     }
 
-    fn keep(&self, taken: Result<Extracted, crate::extract::ExtractError>, progress: &mut Progress) {
+    fn keep(
+        &self,
+        taken: Result<Extracted, crate::extract::ExtractError>,
+        progress: &mut Progress,
+    ) {
         match taken {
             Ok(mut extracted) => {
                 for error in std::mem::take(&mut extracted.errors) {
                     let key = format!("field {}", error.field().unwrap_or_default());
                     progress.errors.push((key, error.to_string()));
                 }
-                let named = self.selected.as_ref().is_some_and(|selected| selected.contains(QUALITY_FIELD));
-                let offered = progress.channel.fields.iter().any(|field| field.name == QUALITY_FIELD);
+                let named =
+                    self.selected.as_ref().is_some_and(|selected| selected.contains(QUALITY_FIELD));
+                let offered =
+                    progress.channel.fields.iter().any(|field| field.name == QUALITY_FIELD);
                 if named && !offered {
-                    extracted.add_element_field(QUALITY_FIELD, &progress.source.scaled_jacobians(progress.channel));
+                    extracted.add_element_field(
+                        QUALITY_FIELD,
+                        &progress.source.scaled_jacobians(progress.channel),
+                    );
                 }
                 progress.extracted = Some(extracted);
             }
@@ -257,7 +274,10 @@ impl Prepared {
         progress.values.extend([min, mean, max, inverted]);
         let wanted = self.wants(QUALITY_FIELD);
         if let Some(extracted) = progress.extracted.as_mut().filter(|_| wanted) {
-            extracted.add_element_field(QUALITY_FIELD, &progress.source.scaled_jacobians(progress.channel));
+            extracted.add_element_field(
+                QUALITY_FIELD,
+                &progress.source.scaled_jacobians(progress.channel),
+            );
         }
     }
 
@@ -266,13 +286,17 @@ impl Prepared {
         let known = || progress.channel.fields.iter().map(|field| field.name);
         let found = progress.channel.fields.iter().find(|view| view.name == field);
         // A rank with nothing of the mesh need not have its fields.
-        let none = FieldView { name: field, association: Association::Vertex, values: ArrayView::scalars(&[]) };
+        let none = FieldView {
+            name: field,
+            association: Association::Vertex,
+            values: ArrayView::scalars(&[]),
+        };
         let view = match found {
             None if progress.is_bare() => Ok(&none),
             None => Err(format!("statistics: {}", unknown_field(field, known()))),
-            Some(view) => {
-                check_length(progress.channel, view).map(|()| view).map_err(|error| format!("statistics: {error}"))
-            }
+            Some(view) => check_length(progress.channel, view)
+                .map(|()| view)
+                .map_err(|error| format!("statistics: {error}")),
         };
         // Where one rank has nothing to measure, none measures.
         let may_measure = agree(progress.communicator, view.as_ref().map(|_| ()));
@@ -295,17 +319,26 @@ impl Prepared {
                 }
                 #[expect(clippy::cast_precision_loss, reason = "a count below 2^53")]
                 let non_finite = measured.non_finite as f64;
-                progress.values.extend([measured.min, measured.max, measured.mean, measured.l2, non_finite]);
+                progress.values.extend([
+                    measured.min,
+                    measured.max,
+                    measured.mean,
+                    measured.l2,
+                    non_finite,
+                ]);
             }
         }
     }
 
     /// The extract to hand out; the whole mesh where no stage has taken one. Of several ranks rank 0 alone has one.
     fn finished(&self, progress: &mut Progress) -> Option<Arc<Extract>> {
-        let has_source = matches!(self.pipeline.stages.first(), Some(Stage::Surface {} | Stage::Slice(_)));
+        let has_source =
+            matches!(self.pipeline.stages.first(), Some(Stage::Surface {} | Stage::Slice(_)));
         if progress.extracted.is_none() && !has_source {
             let taken =
-                progress.source.whole(progress.channel, progress.snapshot.cycle, &|field: &str| self.wants(field));
+                progress.source.whole(progress.channel, progress.snapshot.cycle, &|field: &str| {
+                    self.wants(field)
+                });
             self.keep(taken, progress);
         }
         let Some(whole) = progress.source.whole_mesh() else {
@@ -320,7 +353,10 @@ impl Prepared {
         let lacks = |field: &Field| field.values.iter().any(|&value| is_absent(value));
         if extract.fields.iter().any(lacks) {
             for field in Arc::make_mut(&mut extract).fields.extract_if(.., |field| lacks(field)) {
-                let message = format!("field `{}` is not on all of the mesh; it is not sent to viewers", field.name);
+                let message = format!(
+                    "field `{}` is not on all of the mesh; it is not sent to viewers",
+                    field.name
+                );
                 progress.errors.push((format!("absent {}", field.name), message));
             }
         }
@@ -360,11 +396,15 @@ impl Prepared {
     }
 
     fn pause(&self, progress: &mut Progress) {
-        progress.outputs.push(Output::Pause { pipeline: Arc::clone(&self.name), reason: self.reason() });
+        progress
+            .outputs
+            .push(Output::Pause { pipeline: Arc::clone(&self.name), reason: self.reason() });
     }
 
     fn stop(&self, progress: &mut Progress) {
-        progress.outputs.push(Output::Stop { pipeline: Arc::clone(&self.name), reason: self.reason() });
+        progress
+            .outputs
+            .push(Output::Stop { pipeline: Arc::clone(&self.name), reason: self.reason() });
     }
 }
 
@@ -382,13 +422,16 @@ fn errors_of_all(communicator: &dyn Communicator, mut errors: Vec<Keyed>) -> Vec
     let told = communicator.gather(0, &serde_json::to_vec(&own).unwrap_or_default());
     for (rank, bytes) in told.unwrap_or_default().into_iter().enumerate() {
         let theirs: Vec<Keyed> = serde_json::from_slice(&bytes).unwrap_or_default();
-        errors.extend(theirs.into_iter().map(|(key, message)| (key, format!("rank {rank}: {message}"))));
+        errors.extend(
+            theirs.into_iter().map(|(key, message)| (key, format!("rank {rank}: {message}"))),
+        );
     }
     errors
 }
 
 fn unknown_field<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -> String {
-    let hint = nearest(name, known.clone()).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+    let hint = nearest(name, known.clone())
+        .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
     let known: Vec<&str> = known.collect();
     if known.is_empty() {
         return format!("the channel has no field `{name}`, nor any other");

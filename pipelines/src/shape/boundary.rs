@@ -30,7 +30,10 @@ pub(super) struct Parts {
 
 impl fmt::Debug for Boundary {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.debug_struct("Boundary").field("partition", &self.partition).finish_non_exhaustive()
+        formatter
+            .debug_struct("Boundary")
+            .field("partition", &self.partition)
+            .finish_non_exhaustive()
     }
 }
 
@@ -52,7 +55,8 @@ impl fmt::Display for Elsewhere {
 
 impl Elsewhere {
     fn of(refused: &Refused, rank: usize) -> Self {
-        let message = if rank == 0 { refused.to_string() } else { format!("rank {rank}: {refused}") };
+        let message =
+            if rank == 0 { refused.to_string() } else { format!("rank {rank}: {refused}") };
         Self {
             message,
             is_surface: refused.is_surface(),
@@ -73,9 +77,13 @@ impl Elsewhere {
     }
 
     fn read(bytes: &[u8]) -> Self {
-        let (flags, rest) = bytes.split_first().map_or((0, &[][..]), |(flags, rest)| (*flags, rest));
+        let (flags, rest) =
+            bytes.split_first().map_or((0, &[][..]), |(flags, rest)| (*flags, rest));
         let number = |at: usize| {
-            let value = rest.get(8 * at..).and_then(|rest| rest.first_chunk()).map(|bytes| f64::from_le_bytes(*bytes));
+            let value = rest
+                .get(8 * at..)
+                .and_then(|rest| rest.first_chunk())
+                .map(|bytes| f64::from_le_bytes(*bytes));
             value.filter(|value| !value.is_nan())
         };
         Self {
@@ -147,7 +155,11 @@ impl Boundary {
             return mine;
         }
         let failing = lowest % size;
-        let told = mine.as_ref().err().filter(|_| rank == failing).map(|refused| Elsewhere::of(refused, rank));
+        let told = mine
+            .as_ref()
+            .err()
+            .filter(|_| rank == failing)
+            .map(|refused| Elsewhere::of(refused, rank));
         let mut bytes = told.map_or_else(Vec::new, Elsewhere::into_bytes);
         communicator.broadcast(failing, &mut bytes);
         match mine {
@@ -157,7 +169,10 @@ impl Boundary {
     }
 
     /// What rank 0 says of the vertices of the surface, for the boundary's vertices on this process.
-    pub(super) fn scatter(&self, of_surface: Result<Vec<Vector>, Refused>) -> Result<Vec<Vector>, Refused> {
+    pub(super) fn scatter(
+        &self,
+        of_surface: Result<Vec<Vector>, Refused>,
+    ) -> Result<Vec<Vector>, Refused> {
         let of_surface = self.agree(of_surface)?;
         let Some(parts) = &self.ranks else { return Ok(of_surface) };
         let values = self.surface.is_some().then_some(&of_surface[..]);

@@ -28,15 +28,28 @@ pub(super) struct Carrier {
 
 impl Carrier {
     /// Sets up the operator of the reference mesh `mesh` with this boundary. Collective.
-    pub(super) fn new(mesh: &Mesh, boundary: &Arc<Boundary>, deform: &DeformStage) -> Result<Self, Refused> {
-        let (held, sliding) = if deform.lets_go() { roles(boundary, deform)? } else { (None, Vec::new()) };
+    pub(super) fn new(
+        mesh: &Mesh,
+        boundary: &Arc<Boundary>,
+        deform: &DeformStage,
+    ) -> Result<Self, Refused> {
+        let (held, sliding) =
+            if deform.lets_go() { roles(boundary, deform)? } else { (None, Vec::new()) };
         let vertices = boundary.vertices();
         let prescribed: Option<Vec<u32>> =
             held.as_ref().map(|held| held.iter().map(|&place| vertices[place as usize]).collect());
-        let slides: Vec<Sliding> =
-            sliding.iter().map(|&(place, normal)| Sliding { vertex: vertices[place as usize], normal }).collect();
+        let slides: Vec<Sliding> = sliding
+            .iter()
+            .map(|&(place, normal)| Sliding { vertex: vertices[place as usize], normal })
+            .collect();
         let prescribed = prescribed.as_deref().unwrap_or(vertices);
-        let operator = VolumeOperator::of_part(mesh, prescribed, &slides, &deform.equation, boundary.partition());
+        let operator = VolumeOperator::of_part(
+            mesh,
+            prescribed,
+            &slides,
+            &deform.equation,
+            boundary.partition(),
+        );
         let operator = if deform.lets_go() {
             held_somewhere(mesh, boundary, deform, operator)?
         } else {
@@ -58,7 +71,9 @@ impl Carrier {
 
     /// The displacement of the volume for one of its boundary's vertices. Collective.
     pub(super) fn solve(&self, displacement: &[Vector]) -> Result<VolumeSolution, Refused> {
-        let of = |places: &[u32]| -> Vec<Vector> { places.iter().map(|&place| displacement[place as usize]).collect() };
+        let of = |places: &[u32]| -> Vec<Vector> {
+            places.iter().map(|&place| displacement[place as usize]).collect()
+        };
         let solution = match &self.held {
             None => self.operator.solve(displacement),
             Some(held) => self.operator.solve_sliding(&of(held), &of(&self.sliding)),
@@ -69,7 +84,9 @@ impl Carrier {
     /// Where the boundary comes to lie when it is told to move like this: as it was told, but for what slides or is free.
     /// Collective.
     pub(super) fn settle(&self, displacement: Vec<Vector>) -> Result<Vec<Vector>, Refused> {
-        if !self.lets_go() || self.boundary.all(displacement.iter().all(|displacement| *displacement == [0.0; 3])) {
+        if !self.lets_go()
+            || self.boundary.all(displacement.iter().all(|displacement| *displacement == [0.0; 3]))
+        {
             return Ok(displacement);
         }
         let mut volume = self.solve(&displacement)?.displacement;
@@ -93,13 +110,16 @@ fn held_somewhere(
         return Ok(operator.map_err(Refused::from));
     }
     // One process may have the vertices and another the features' names.
-    let body = loose.map_or_else(|| vec![false; mesh.points().len()], |vertex| connected(mesh, vertex));
-    let marks: Vec<Vector> = body.into_iter().map(|inside| [f64::from(u8::from(inside)), 0.0, 0.0]).collect();
+    let body =
+        loose.map_or_else(|| vec![false; mesh.points().len()], |vertex| connected(mesh, vertex));
+    let marks: Vec<Vector> =
+        body.into_iter().map(|inside| [f64::from(u8::from(inside)), 0.0, 0.0]).collect();
     let marks = boundary.gather(&marks)?;
     let let_go = boundary.surface().map_or(Ok(()), |surface| {
         let features = surface.features();
         let touches = |name: &&String| {
-            let of_body = |vertices: &[u32]| vertices.iter().any(|&vertex| marks[vertex as usize][0] > 0.0);
+            let of_body =
+                |vertices: &[u32]| vertices.iter().any(|&vertex| marks[vertex as usize][0] > 0.0);
             features.index(name).is_ok_and(|feature| of_body(features.vertices(feature)))
         };
         let of = |names: &[String]| names.iter().filter(touches).cloned().collect::<Vec<_>>();
@@ -129,7 +149,8 @@ fn connected(mesh: &Mesh, vertex: usize) -> Vec<bool> {
             parents[a.max(b) as usize] = a.min(b);
         }
     }
-    let roots: Vec<u32> = (0..).take(mesh.points().len()).map(|vertex| root(&mut parents, vertex)).collect();
+    let roots: Vec<u32> =
+        (0..).take(mesh.points().len()).map(|vertex| root(&mut parents, vertex)).collect();
     roots.iter().map(|of| *of == roots[vertex]).collect()
 }
 
@@ -162,7 +183,8 @@ fn spread(boundary: &Boundary, split: Result<Split, Refused>) -> Result<Split, R
     let mut layer = 1;
     #[expect(clippy::cast_precision_loss, reason = "the faces around a vertex")]
     while (layer as f64) < layer_count {
-        let normals = boundary.scatter(Ok(layers.get_mut(layer).map(std::mem::take).unwrap_or_default()))?;
+        let normals =
+            boundary.scatter(Ok(layers.get_mut(layer).map(std::mem::take).unwrap_or_default()))?;
         sliding.extend((0..).zip(normals).filter(|(_, normal)| *normal != [0.0; 3]));
         layer += 1;
     }
@@ -185,9 +207,12 @@ fn split(surface: &Surface, deform: &DeformStage) -> Result<Split, Refused> {
     }
     let features = surface.features();
     let mut roles = vec![Role::Held; features.names().len()];
-    for (field, names, role) in [("sliding", &deform.sliding, Role::Slides), ("free", &deform.free, Role::Free)] {
+    for (field, names, role) in
+        [("sliding", &deform.sliding, Role::Slides), ("free", &deform.free, Role::Free)]
+    {
         for name in names {
-            let feature = features.index(name).map_err(|source| Refused::Feature { field, source })?;
+            let feature =
+                features.index(name).map_err(|source| Refused::Feature { field, source })?;
             roles[feature as usize] = role;
         }
     }
@@ -196,7 +221,8 @@ fn split(surface: &Surface, deform: &DeformStage) -> Result<Split, Refused> {
     let mut normals: Vec<(u32, Vector)> = Vec::new();
     for (triangle, &face) in surface.triangles().iter().zip(surface.triangle_faces()) {
         let role = roles[features.face_features()[face as usize] as usize];
-        let normal = (role == Role::Slides).then(|| normal(triangle.map(|vertex| surface.points()[vertex as usize])));
+        let normal = (role == Role::Slides)
+            .then(|| normal(triangle.map(|vertex| surface.points()[vertex as usize])));
         for &vertex in triangle {
             held[vertex as usize] |= role == Role::Held;
             touched[vertex as usize] = true;
@@ -205,7 +231,8 @@ fn split(surface: &Surface, deform: &DeformStage) -> Result<Split, Refused> {
     }
     // A vertex of no face belongs to nothing that could let go of it.
     let all = (0_u32..).zip(held.iter().zip(&touched));
-    let kept = all.filter(|(_, (held, touched))| **held || !**touched).map(|(vertex, _)| vertex).collect();
+    let kept =
+        all.filter(|(_, (held, touched))| **held || !**touched).map(|(vertex, _)| vertex).collect();
     normals.retain(|(vertex, _)| !held[*vertex as usize]);
     normals.sort_by_key(|(vertex, _)| *vertex);
     let mut sliding = Vec::new();
@@ -218,14 +245,20 @@ fn split(surface: &Surface, deform: &DeformStage) -> Result<Split, Refused> {
             }
         }
         let vertex = around[0].0;
-        sliding.extend(surfaces.into_iter().filter(|normal| *normal != [0.0; 3]).map(|normal| (vertex, normal)));
+        sliding.extend(
+            surfaces
+                .into_iter()
+                .filter(|normal| *normal != [0.0; 3])
+                .map(|normal| (vertex, normal)),
+        );
     }
     Ok((Some(kept), sliding))
 }
 
 /// Twice the area of a triangle, along its normal.
 fn normal([a, b, c]: [Vector; 3]) -> Vector {
-    let (u, v): (Vector, Vector) = (std::array::from_fn(|k| b[k] - a[k]), std::array::from_fn(|k| c[k] - a[k]));
+    let (u, v): (Vector, Vector) =
+        (std::array::from_fn(|k| b[k] - a[k]), std::array::from_fn(|k| c[k] - a[k]));
     [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
 }
 

@@ -107,7 +107,8 @@ impl Shaper {
             shapes: plan.shapes(),
             sub_steps: target.sub_steps,
             quality: volume.then(|| quality_in_parts(cells, plan.end(), partition)),
-            change: volume.then(|| change_in_parts(cells, self.mesh.points(), plan.end(), partition)),
+            change: volume
+                .then(|| change_in_parts(cells, self.mesh.points(), plan.end(), partition)),
             seconds: plan.seconds(),
         }
     }

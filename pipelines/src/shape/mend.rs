@@ -55,13 +55,21 @@ impl BoundaryMotion for OnReference<'_> {
             *last = self.edit.scaled(to);
         }
         let editor = self.editor.as_deref_mut();
-        let displacement = displacement(editor, &self.boundary, &self.stack, self.carrier.as_deref())?;
+        let displacement =
+            displacement(editor, &self.boundary, &self.stack, self.carrier.as_deref())?;
         Ok(match &self.ground {
-            None => self.places.iter().zip(&displacement).map(|(&point, &by)| moved(point, by)).collect(),
+            None => self
+                .places
+                .iter()
+                .zip(&displacement)
+                .map(|(&point, &by)| moved(point, by))
+                .collect(),
             Some((places, ground)) => places
                 .iter()
                 .zip(ground.iter().zip(&displacement))
-                .map(|(&place, (ground, by))| moved(place, std::array::from_fn(|axis| by[axis] - ground[axis])))
+                .map(|(&place, (ground, by))| {
+                    moved(place, std::array::from_fn(|axis| by[axis] - ground[axis]))
+                })
                 .collect(),
         })
     }
@@ -88,7 +96,9 @@ impl BoundaryMotion for OnShape<'_> {
         let now = boundary.gather(shape)?;
         let mut wanted = boundary.gather(&with_boundary(boundary, shape, &places))?;
         let carried = match &self.advance {
-            Some(advance) => advance.carry(&now, &mut wanted).map(|()| wanted).map_err(Refused::from),
+            Some(advance) => {
+                advance.carry(&now, &mut wanted).map(|()| wanted).map_err(Refused::from)
+            }
             None => Ok(Vec::new()),
         };
         boundary.scatter(carried)
@@ -179,7 +189,13 @@ impl Shaper {
     ///
     /// # Errors
     /// [`Refused::Guard`], [`Refused::Limit`].
-    pub fn go(&mut self, start: &Place, target: &Target, schedule: &Schedule, guard: &Guard) -> Result<Plan, Refused> {
+    pub fn go(
+        &mut self,
+        start: &Place,
+        target: &Target,
+        schedule: &Schedule,
+        guard: &Guard,
+    ) -> Result<Plan, Refused> {
         schedule.check()?;
         let watch = Stopwatch::start();
         if target.surface_only || start.surface_only {
@@ -200,17 +216,25 @@ impl Shaper {
 
     /// The shape of a stack: of one linear solve from the reference where the guard lets that through, else the shape of the
     /// edits below the last one, from which the last one is followed in sub-steps.
-    fn settled(&mut self, stack: &[Edit], deform: &DeformStage, guard: &Guard) -> Result<Target, Refused> {
+    fn settled(
+        &mut self,
+        stack: &[Edit],
+        deform: &DeformStage,
+        guard: &Guard,
+    ) -> Result<Target, Refused> {
         let mut lower = stack.len();
         let mut target = loop {
-            let known =
-                |mended: &&Mended| mended.stack == stack[..lower] && mended.deform == *deform && mended.guard == *guard;
+            let known = |mended: &&Mended| {
+                mended.stack == stack[..lower] && mended.deform == *deform && mended.guard == *guard
+            };
             if let Some(found) = self.mended.iter().find(known) {
                 break Target { seconds: ShapeSeconds::default(), ..found.target.clone() };
             }
             let mut linear = match self.target(&stack[..lower], deform, guard.surface) {
                 // Followed in sub-steps, the surface may come out sound, and a solve that broke down may be smaller ones that do not.
-                Err(refused) if (refused.is_surface() || self.breaks_down(&refused)) && lower > 0 => {
+                Err(refused)
+                    if (refused.is_surface() || self.breaks_down(&refused)) && lower > 0 =>
+                {
                     lower -= 1;
                     continue;
                 }
@@ -232,14 +256,20 @@ impl Shaper {
                 self.mended.remove(0);
             }
             let stack = stack[..=place].to_vec();
-            self.mended.push(Mended { stack, deform: deform.clone(), guard: *guard, target: target.clone() });
+            self.mended.push(Mended {
+                stack,
+                deform: deform.clone(),
+                guard: *guard,
+                target: target.clone(),
+            });
         }
         Ok(target)
     }
 
     /// Whether a linear system could not be solved. Of several ranks each may have another reason, and none can go on alone.
     fn breaks_down(&self, refused: &Refused) -> bool {
-        self.boundary.partition().ranks() == 1 && matches!(refused, Refused::Volume(VolumeError::Linear(_)))
+        self.boundary.partition().ranks() == 1
+            && matches!(refused, Refused::Volume(VolumeError::Linear(_)))
     }
 
     /// The shape of a stack whose edits below the last one make the shape `base`.
@@ -250,7 +280,9 @@ impl Shaper {
         deform: &DeformStage,
         guard: &Guard,
     ) -> Result<Target, Refused> {
-        let Some((edit, below)) = stack.split_last().filter(|(edit, _)| !edit.muted()) else { return Ok(base) };
+        let Some((edit, below)) = stack.split_last().filter(|(edit, _)| !edit.muted()) else {
+            return Ok(base);
+        };
         let watch = Stopwatch::start();
         let boundary = Arc::clone(&self.boundary);
         let places = boundary.places(&base.points);
@@ -261,13 +293,20 @@ impl Shaper {
         let carrier = deform.lets_go().then_some(set_up);
         let known = self.untangler.clone().map_or_else(OnceCell::new, OnceCell::from);
         let untangler = || {
-            let made = || Arc::new(Untangler::of_part(&self.mesh, boundary.vertices(), boundary.partition()));
+            let made = || {
+                Arc::new(Untangler::of_part(&self.mesh, boundary.vertices(), boundary.partition()))
+            };
             Arc::clone(known.get_or_init(made))
         };
         let ground = displacement(self.editor.as_mut(), &boundary, below, carrier.as_deref())?;
         let reference = boundary.places(&self.reference);
-        let as_stated = boundary
-            .all(reference.iter().zip(&ground).zip(&places).all(|((&point, &by), place)| moved(point, by) == *place));
+        let as_stated = boundary.all(
+            reference
+                .iter()
+                .zip(&ground)
+                .zip(&places)
+                .all(|((&point, &by), place)| moved(point, by) == *place),
+        );
         let mut motion = OnReference {
             editor: self.editor.as_mut(),
             carrier,
@@ -283,14 +322,25 @@ impl Shaper {
             partition: boundary.partition(),
             operator: operator.as_ref(),
         };
-        let mut route = follow(domain, &base.points, &mut motion, &deform.equation, guard, Some(&untangler));
+        let mut route =
+            follow(domain, &base.points, &mut motion, &deform.equation, guard, Some(&untangler));
         // No volume can follow a surface that folds or shrinks to nothing: it is asked for in another way.
         if matches!(route, Err(FollowError::Stalled(_))) && !deform.lets_go() {
-            let advance = boundary.surface().map(|surface| Advance::new(surface, edit, stack.len() - 1)).transpose();
+            let advance = boundary
+                .surface()
+                .map(|surface| Advance::new(surface, edit, stack.len() - 1))
+                .transpose();
             let advance = boundary.agree(advance.map_err(Refused::from))?.flatten();
             if boundary.of_root(f64::from(u8::from(advance.is_some()))) > 0.0 {
                 let mut motion = OnShape { on_reference: motion, advance };
-                let second = follow(domain, &base.points, &mut motion, &deform.equation, guard, Some(&untangler));
+                let second = follow(
+                    domain,
+                    &base.points,
+                    &mut motion,
+                    &deform.equation,
+                    guard,
+                    Some(&untangler),
+                );
                 if further(&second) > further(&route) {
                     route = second;
                 }
@@ -329,17 +379,25 @@ impl Shaper {
     ) -> Result<Plan, Refused> {
         let whole = self.target(stack, deform, guard.surface);
         let refused = match whole.and_then(|whole| self.go(start, &whole, schedule, guard)) {
-            Err(refused) if (refused.is_quality() || refused.is_surface()) && kept < stack.len() => refused,
+            Err(refused)
+                if (refused.is_quality() || refused.is_surface()) && kept < stack.len() =>
+            {
+                refused
+            }
             other => return other,
         };
         let mut part = |fraction: f64| -> Result<Option<Plan>, Refused> {
             let scaled: Vec<Edit> = stack
                 .iter()
                 .enumerate()
-                .map(|(place, edit)| if place < kept { edit.clone() } else { edit.scaled(fraction) })
+                .map(
+                    |(place, edit)| if place < kept { edit.clone() } else { edit.scaled(fraction) },
+                )
                 .collect();
             let target = self.target(&scaled, deform, guard.surface);
-            match target.and_then(|target| self.go(start, &Target { fraction, ..target }, schedule, guard)) {
+            match target
+                .and_then(|target| self.go(start, &Target { fraction, ..target }, schedule, guard))
+            {
                 Ok(plan) => Ok(Some(plan)),
                 Err(refused) if refused.is_quality() || refused.is_surface() => Ok(None),
                 Err(other) => Err(other),

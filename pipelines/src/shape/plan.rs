@@ -148,8 +148,12 @@ impl Plan {
     /// Whether the way from one shape to another, counted from 1 with 0 for the start, is a piece of a straight one.
     #[must_use]
     pub fn is_straight(&self, from: u32, to: u32) -> bool {
-        let piece =
-            |shape: u32| (shape as usize).checked_sub(1).and_then(|index| self.shapes.get(index)).map(|at| at.piece);
+        let piece = |shape: u32| {
+            (shape as usize)
+                .checked_sub(1)
+                .and_then(|index| self.shapes.get(index))
+                .map(|at| at.piece)
+        };
         let end = piece(to);
         // The end of a piece is the start of the next.
         let begins = |shape: u32| {
@@ -197,7 +201,10 @@ impl Plan {
         if shape >= self.shapes() && !self.target.way.is_empty() {
             return self.target.place();
         }
-        let piece = (shape as usize).checked_sub(1).and_then(|index| self.shapes.get(index)).map_or(0, |at| at.piece);
+        let piece = (shape as usize)
+            .checked_sub(1)
+            .and_then(|index| self.shapes.get(index))
+            .map_or(0, |at| at.piece);
         let mut back: Vec<_> = self.way[..=piece].iter().rev().cloned().collect();
         back.extend(self.back.iter().cloned());
         // The way back ends at the reference, or nothing is known of it.
@@ -219,7 +226,12 @@ fn write(start: &[Vector], end: &[Vector], fraction: f64, points: &mut [Vector])
 }
 
 /// The straight plan from `start` to `end`, of which only the surface was judged.
-pub(super) fn of_surface(start: &Place, end: Arc<[Vector]>, target: &Target, schedule: &Schedule) -> Plan {
+pub(super) fn of_surface(
+    start: &Place,
+    end: Arc<[Vector]>,
+    target: &Target,
+    schedule: &Schedule,
+) -> Plan {
     Plan {
         way: vec![Arc::clone(&start.points), end],
         shapes: schedule.fractions().iter().map(|&fraction| Shape { piece: 0, fraction }).collect(),
@@ -242,7 +254,13 @@ pub(super) struct Body<'a> {
 }
 
 impl Body<'_> {
-    fn judge(self, start: &[Vector], end: &[Vector], fractions: &[f64], guard: &Guard) -> Result<PathQuality, Refusal> {
+    fn judge(
+        self,
+        start: &[Vector],
+        end: &[Vector],
+        fractions: &[f64],
+        guard: &Guard,
+    ) -> Result<PathQuality, Refusal> {
         judge_in_parts(self.mesh, start, end, fractions, guard, &**self.boundary.partition())
     }
 
@@ -286,24 +304,38 @@ pub(super) fn travel(
 }
 
 /// A way over known shapes.
-fn around(body: Body<'_>, start: &Place, target: &Target, guard: &Guard) -> Option<Vec<Arc<[Vector]>>> {
+fn around(
+    body: Body<'_>,
+    start: &Place,
+    target: &Target,
+    guard: &Guard,
+) -> Option<Vec<Arc<[Vector]>>> {
     let reference = &target.reference;
-    let at_reference = body.boundary.all(Arc::ptr_eq(&start.points, reference) || *start.points == **reference);
-    let leaving: Vec<&Arc<[Vector]>> =
-        if at_reference { vec![reference] } else { std::iter::once(&start.points).chain(&start.back).collect() };
-    let arriving: Vec<&Arc<[Vector]>> =
-        if target.way.is_empty() { vec![&target.points] } else { target.way.iter().rev().chain([reference]).collect() };
+    let at_reference =
+        body.boundary.all(Arc::ptr_eq(&start.points, reference) || *start.points == **reference);
+    let leaving: Vec<&Arc<[Vector]>> = if at_reference {
+        vec![reference]
+    } else {
+        std::iter::once(&start.points).chain(&start.back).collect()
+    };
+    let arriving: Vec<&Arc<[Vector]>> = if target.way.is_empty() {
+        vec![&target.points]
+    } else {
+        target.way.iter().rev().chain([reference]).collect()
+    };
     let join = |from: usize, to: usize| {
-        let mut way: Vec<Arc<[Vector]>> = leaving[..=from].iter().map(|&shape| Arc::clone(shape)).collect();
+        let mut way: Vec<Arc<[Vector]>> =
+            leaving[..=from].iter().map(|&shape| Arc::clone(shape)).collect();
         let same = Arc::ptr_eq(leaving[from], arriving[to]);
-        way.extend(arriving[..=to].iter().rev().skip(usize::from(same)).map(|&shape| Arc::clone(shape)));
+        way.extend(
+            arriving[..=to].iter().rev().skip(usize::from(same)).map(|&shape| Arc::clone(shape)),
+        );
         way
     };
     // What both ways have in common costs nothing.
-    let common = leaving
-        .iter()
-        .enumerate()
-        .find_map(|(from, shape)| arriving.iter().position(|other| Arc::ptr_eq(shape, other)).map(|to| (from, to)));
+    let common = leaving.iter().enumerate().find_map(|(from, shape)| {
+        arriving.iter().position(|other| Arc::ptr_eq(shape, other)).map(|to| (from, to))
+    });
     // Straight steps between them, the shortest ways first.
     let limit = common.map_or(leaving.len() + arriving.len(), |(from, to)| from + to);
     let mut pairs: Vec<(usize, usize)> = (0..leaving.len())
@@ -311,7 +343,10 @@ fn around(body: Body<'_>, start: &Place, target: &Target, guard: &Guard) -> Opti
         .filter(|&(from, to)| from + to > 0 && from + to < limit)
         .collect();
     pairs.sort_by_key(|&(from, to)| (from + to, from));
-    let straight = pairs.into_iter().take(SHORTCUTS).find(|&(from, to)| body.keeps(leaving[from], arriving[to], guard));
+    let straight = pairs
+        .into_iter()
+        .take(SHORTCUTS)
+        .find(|&(from, to)| body.keeps(leaving[from], arriving[to], guard));
     straight.or(common).map(|(from, to)| join(from, to)).filter(|way| way.len() > 1)
 }
 
@@ -343,7 +378,8 @@ fn along(
     let locate = |fraction: f64| {
         let piece = corners[1..last].partition_point(|&corner| corner < fraction);
         let (from, to) = (corners[piece], corners[piece + 1]);
-        let within = if fraction >= to { 1.0 } else { ((fraction - from) / (to - from)).clamp(0.0, 1.0) };
+        let within =
+            if fraction >= to { 1.0 } else { ((fraction - from) / (to - from)).clamp(0.0, 1.0) };
         Shape { piece, fraction: within }
     };
     let asked: Vec<f64> = schedule.fractions();
@@ -359,7 +395,10 @@ fn along(
             (shapes, fractions, quality)
         }
     };
-    let steps = u32::try_from(fractions.len()).ok().and_then(std::num::NonZeroU32::new).unwrap_or(schedule.steps);
+    let steps = u32::try_from(fractions.len())
+        .ok()
+        .and_then(std::num::NonZeroU32::new)
+        .unwrap_or(schedule.steps);
     Ok(Plan {
         way,
         shapes,

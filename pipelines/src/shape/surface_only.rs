@@ -13,7 +13,11 @@ use super::{Refused, ShapeSeconds, Shaper, Target, moved};
 
 impl Shaper {
     /// The reference with its boundary displaced.
-    pub(super) fn of_surface(&self, displacement: &[Vector], seconds: ShapeSeconds) -> Result<Target, Refused> {
+    pub(super) fn of_surface(
+        &self,
+        displacement: &[Vector],
+        seconds: ShapeSeconds,
+    ) -> Result<Target, Refused> {
         let mut points = self.reference.to_vec();
         for (&vertex, &by) in self.boundary.vertices().iter().zip(displacement) {
             points[vertex as usize] = moved(points[vertex as usize], by);

@@ -47,12 +47,15 @@ fn on_ranks<T: Send>(
         if deal.shuffle > 0 {
             part = renumbered(&part, deal.shuffle + ranks.rank() as u64);
         }
-        let numbers: Vec<usize> = part.global_vertices.iter().flatten().map(|&number| number as usize).collect();
+        let numbers: Vec<usize> =
+            part.global_vertices.iter().flatten().map(|&number| number as usize).collect();
         if !deal.numbers {
             (part.global_vertices, part.global_cells) = (None, None);
         }
         let ranks: Arc<dyn Communicator> = Arc::new(ranks);
-        let mut shaper = Shaper::of_part(ranks, &part, &FeatureSettings::default(), |ranks| Arc::new(ranks)).unwrap();
+        let mut shaper =
+            Shaper::of_part(ranks, &part, &FeatureSettings::default(), |ranks| Arc::new(ranks))
+                .unwrap();
         work(&mut shaper, &numbers)
     })
 }
@@ -66,7 +69,9 @@ fn alone(mesh: &Mesh) -> Shaper {
 /// The largest difference of a coordinate.
 fn apart(part: &[Vector], numbers: &[usize], whole: &[Vector]) -> f64 {
     let pairs = part.iter().zip(numbers);
-    pairs.flat_map(|(a, &number)| (0..3).map(move |k| (a[k] - whole[number][k]).abs())).fold(0.0, f64::max)
+    pairs
+        .flat_map(|(a, &number)| (0..3).map(move |k| (a[k] - whole[number][k]).abs()))
+        .fold(0.0, f64::max)
 }
 
 fn tight(deform: serde_json::Value) -> DeformStage {
@@ -77,13 +82,20 @@ fn tight(deform: serde_json::Value) -> DeformStage {
 #[test]
 fn shapes_are_those_of_one_process() {
     let lowered = json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.05, 0.02, -0.3]}}]);
-    let stretched =
-        json!([{"scale_direction": {"features": ["z-max"], "fixed": ["z-min"], "factors": [1.2, 0.9, 1.0]}}]);
+    let stretched = json!([{"scale_direction": {"features": ["z-max"], "fixed": ["z-min"], "factors": [1.2, 0.9, 1.0]}}]);
     for (mesh, edits, deform) in [
         (box_of_tets([9, 8, 7], [0.0; 3], [1.0; 3]), &lowered, json!({})),
         (box_of_tets([9, 8, 7], [0.0; 3], [1.0; 3]), &stretched, json!({"method": "harmonic"})),
-        (box_of_hexahedra([5, 5, 5], [0.0; 3], [1.0; 3]), &lowered, json!({"method": "harmonic", "improve": 0})),
-        (box_of_hexahedra([5, 6, 5], [0.0; 3], [1.0; 3]), &lowered, json!({"sliding": ["x-min", "y-max"]})),
+        (
+            box_of_hexahedra([5, 5, 5], [0.0; 3], [1.0; 3]),
+            &lowered,
+            json!({"method": "harmonic", "improve": 0}),
+        ),
+        (
+            box_of_hexahedra([5, 6, 5], [0.0; 3], [1.0; 3]),
+            &lowered,
+            json!({"sliding": ["x-min", "y-max"]}),
+        ),
         (
             box_of_tets([6, 6, 5], [0.0; 3], [1.0; 3]),
             &lowered,
@@ -93,27 +105,42 @@ fn shapes_are_those_of_one_process() {
         let (edits, deform) = (stack(edits.clone()), tight(deform));
         let mut serial = alone(&mesh);
         let plan = serial
-            .plan(&edits, Arc::clone(serial.reference()), &deform, &Schedule::default(), &Guard::default())
+            .plan(
+                &edits,
+                Arc::clone(serial.reference()),
+                &deform,
+                &Schedule::default(),
+                &Guard::default(),
+            )
             .unwrap();
         let forecast = serial.outlook(&plan);
         for deal in DEALS {
             let of_cells = dealt(&mesh, deal.ranks, deal.empty);
             on_ranks(&mesh, &of_cells, deal, |shaper, numbers| {
                 let start = Arc::clone(shaper.reference());
-                let found = shaper.plan(&edits, start, &deform, &Schedule::default(), &Guard::default()).unwrap();
+                let found = shaper
+                    .plan(&edits, start, &deform, &Schedule::default(), &Guard::default())
+                    .unwrap();
                 let off = apart(found.end(), numbers, plan.end());
                 assert!(off <= 1e-8 * 0.3, "{} ranks, {deform:?}: {off:e}", deal.ranks);
-                assert!((found.quality().min_scaled_jacobian - plan.quality().min_scaled_jacobian).abs() < 1e-7);
+                assert!(
+                    (found.quality().min_scaled_jacobian - plan.quality().min_scaled_jacobian)
+                        .abs()
+                        < 1e-7
+                );
                 assert!((found.largest_displacement() - plan.largest_displacement()).abs() < 1e-8);
                 let outlook = shaper.outlook(&found);
-                let (quality, expected) = (outlook.quality.unwrap(), forecast.quality.clone().unwrap());
+                let (quality, expected) =
+                    (outlook.quality.unwrap(), forecast.quality.clone().unwrap());
                 assert_eq!((quality.cells, quality.inverted), (expected.cells, 0));
                 assert!((quality.mean - expected.mean).abs() < 1e-7);
                 let (change, expected) = (outlook.change.unwrap(), forecast.change.unwrap());
                 assert!((change.volume_ratio.mean - expected.volume_ratio.mean).abs() < 1e-7);
                 // Back: exactly.
                 let place = found.place(found.shapes(), Arc::clone(found.end()));
-                let back = shaper.reach(&[], 0, &place, &deform, &Schedule::default(), &Guard::default()).unwrap();
+                let back = shaper
+                    .reach(&[], 0, &place, &deform, &Schedule::default(), &Guard::default())
+                    .unwrap();
                 assert_eq!(back.end(), shaper.reference());
             });
         }
@@ -125,7 +152,11 @@ fn shapes_are_those_of_one_process() {
 fn quality_is_that_of_one_process() {
     let mesh = box_of_tets([6, 5, 4], [0.0; 3], [1.0; 3]);
     let wave = |p: &Vector, size: f64| {
-        [p[0] + size * (7.0 * p[1]).sin(), p[1] + size * (9.0 * p[2]).sin(), p[2] + size * (8.0 * p[0]).cos()]
+        [
+            p[0] + size * (7.0 * p[1]).sin(),
+            p[1] + size * (9.0 * p[2]).sin(),
+            p[2] + size * (8.0 * p[0]).cos(),
+        ]
     };
     let guard = Guard { min_scaled_jacobian: 0.05, ..Guard::default() };
     for size in [0.02, 0.3] {
@@ -139,20 +170,29 @@ fn quality_is_that_of_one_process() {
                 let partition = Arc::clone(shaper.partition());
                 let found = quality_in_parts(shaper.mesh().cells(), &points, &*partition);
                 assert_eq!((found.cells, found.inverted), (serial.cells, serial.inverted));
-                assert_eq!((found.min, found.max, found.histogram), (serial.min, serial.max, serial.histogram));
+                assert_eq!(
+                    (found.min, found.max, found.histogram),
+                    (serial.min, serial.max, serial.histogram)
+                );
                 assert!((found.mean - serial.mean).abs() < 1e-12);
                 let measured = |quality: &tombolo_deform::quality::Quality| {
                     quality.worst.iter().map(|worst| worst.scaled_jacobian).collect::<Vec<f64>>()
                 };
                 assert_eq!(measured(&found), measured(&serial));
                 let start = shaper.reference();
-                match (judge_in_parts(shaper.mesh(), start, &points, &[0.5, 1.0], &guard, &*partition), &verdict) {
+                match (
+                    judge_in_parts(shaper.mesh(), start, &points, &[0.5, 1.0], &guard, &*partition),
+                    &verdict,
+                ) {
                     (Ok(found), Ok(verdict)) => {
                         assert_eq!(found.min_scaled_jacobian, verdict.min_scaled_jacobian);
                         assert!((found.shapes[0].mean - verdict.shapes[0].mean).abs() < 1e-12);
                     }
                     (Err(Refusal::Quality(found)), Err(Refusal::Quality(verdict))) => {
-                        assert_eq!((found.failing, found.inverted), (verdict.failing, verdict.inverted));
+                        assert_eq!(
+                            (found.failing, found.inverted),
+                            (verdict.failing, verdict.inverted)
+                        );
                         assert_eq!(found.feasible_fraction, verdict.feasible_fraction);
                         assert_eq!(found.folded_faces, verdict.folded_faces);
                         assert_eq!(found.worst[0].cell, verdict.worst[0].cell);
@@ -169,17 +209,24 @@ fn quality_is_that_of_one_process() {
 fn a_rank_without_boundary_follows_the_others() {
     let mesh = box_of_tets([8, 8, 8], [0.0; 3], [1.0; 3]);
     let is_core = |vertices: &[u32]| {
-        vertices.iter().all(|&vertex| mesh.points()[vertex as usize].iter().all(|&x| (0.2..=0.8).contains(&x)))
+        vertices
+            .iter()
+            .all(|&vertex| mesh.points()[vertex as usize].iter().all(|&x| (0.2..=0.8).contains(&x)))
     };
-    let of_cells: Vec<usize> = mesh.cells().iter().map(|(_, vertices)| usize::from(is_core(vertices))).collect();
-    let edits = stack(json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -0.3]}}]));
+    let of_cells: Vec<usize> =
+        mesh.cells().iter().map(|(_, vertices)| usize::from(is_core(vertices))).collect();
+    let edits = stack(
+        json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -0.3]}}]),
+    );
     let deform = tight(json!({}));
     let mut serial = alone(&mesh);
     let start = Arc::clone(serial.reference());
-    let plan = serial.plan(&edits, start, &deform, &Schedule::default(), &Guard::default()).unwrap();
+    let plan =
+        serial.plan(&edits, start, &deform, &Schedule::default(), &Guard::default()).unwrap();
     let vertices = on_ranks(&mesh, &of_cells, PLAIN, |shaper, numbers| {
         let start = Arc::clone(shaper.reference());
-        let found = shaper.plan(&edits, start, &deform, &Schedule::default(), &Guard::default()).unwrap();
+        let found =
+            shaper.plan(&edits, start, &deform, &Schedule::default(), &Guard::default()).unwrap();
         let off = apart(found.end(), numbers, plan.end());
         assert!(off <= 1e-8 * 0.3, "{off:e}");
         shaper.boundary_vertices().len()
@@ -191,8 +238,9 @@ fn a_rank_without_boundary_follows_the_others() {
 #[test]
 fn what_one_solve_does_not_reach_is_mended_alike() {
     let mesh = box_of_tets([4, 4, 8], [0.0; 3], [1.0, 1.0, 2.0]);
-    let turned =
-        stack(json!([{"rotate": {"features": ["z-max"], "fixed": ["z-min"], "axis": [0, 0, 1], "degrees": 130}}]));
+    let turned = stack(
+        json!([{"rotate": {"features": ["z-max"], "fixed": ["z-min"], "axis": [0, 0, 1], "degrees": 130}}]),
+    );
     for otherwise in [Otherwise::Untangle, Otherwise::Clamp, Otherwise::Reject] {
         let guard = Guard { min_scaled_jacobian: 0.05, otherwise, surface: SurfaceRule::Allow };
         let reach = |shaper: &mut Shaper| {
@@ -203,20 +251,31 @@ fn what_one_solve_does_not_reach_is_mended_alike() {
         let serial = reach(&mut alone(&mesh));
         for deal in [PLAIN, Deal { ranks: 3, ghosts: true, ..PLAIN }] {
             let of_cells = dealt(&mesh, deal.ranks, deal.empty);
-            let outcomes = on_ranks(&mesh, &of_cells, deal, |shaper, numbers| match (reach(shaper), &serial) {
-                (Ok(found), Ok(plan)) => {
-                    assert_eq!(found.target().sub_steps, plan.target().sub_steps);
-                    assert_eq!(found.shapes(), plan.shapes());
-                    assert!((found.target().fraction - plan.target().fraction).abs() < 1e-6);
-                    let off = apart(found.end(), numbers, plan.end());
-                    assert!(off <= 1e-5, "{otherwise:?} {} ranks: {off:e}", deal.ranks);
-                    "done".to_owned()
+            let outcomes = on_ranks(&mesh, &of_cells, deal, |shaper, numbers| {
+                match (reach(shaper), &serial) {
+                    (Ok(found), Ok(plan)) => {
+                        assert_eq!(found.target().sub_steps, plan.target().sub_steps);
+                        assert_eq!(found.shapes(), plan.shapes());
+                        assert!((found.target().fraction - plan.target().fraction).abs() < 1e-6);
+                        let off = apart(found.end(), numbers, plan.end());
+                        assert!(off <= 1e-5, "{otherwise:?} {} ranks: {off:e}", deal.ranks);
+                        "done".to_owned()
+                    }
+                    (Err(found), Err(refused)) => {
+                        assert!(
+                            (found.feasible_fraction().unwrap()
+                                - refused.feasible_fraction().unwrap())
+                            .abs()
+                                < 1e-5
+                        );
+                        found.to_string()
+                    }
+                    (found, refused) => panic!(
+                        "{otherwise:?}: {:?} {:?}",
+                        found.map(drop),
+                        refused.as_ref().map(drop)
+                    ),
                 }
-                (Err(found), Err(refused)) => {
-                    assert!((found.feasible_fraction().unwrap() - refused.feasible_fraction().unwrap()).abs() < 1e-5);
-                    found.to_string()
-                }
-                (found, refused) => panic!("{otherwise:?}: {:?} {:?}", found.map(drop), refused.as_ref().map(drop)),
             });
             assert!(outcomes.iter().all(|outcome| *outcome == outcomes[0]), "{outcomes:?}");
         }
@@ -233,9 +292,14 @@ fn an_error_of_one_rank_is_that_of_all() {
     points[middle][0] = 0.9;
     let broken = mesh.with_points(points).unwrap();
     let of_cells = dealt(&mesh, 3, None);
-    let down = stack(json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -0.1]}}]));
+    let down = stack(
+        json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -0.1]}}]),
+    );
     let plan = |shaper: &mut Shaper, edits: &[Edit], method: Method| {
-        let deform = DeformStage { equation: Deform { method, ..Deform::default() }, ..DeformStage::default() };
+        let deform = DeformStage {
+            equation: Deform { method, ..Deform::default() },
+            ..DeformStage::default()
+        };
         let start = Arc::clone(shaper.reference());
         shaper
             .plan(edits, start, &deform, &Schedule::default(), &Guard::default())
@@ -243,7 +307,9 @@ fn an_error_of_one_rank_is_that_of_all() {
             .map_err(|refused| refused.to_string())
     };
     for method in [Method::Elasticity, Method::Harmonic] {
-        let told = on_ranks(&broken, &of_cells, Deal { ranks: 3, ..PLAIN }, |shaper, _| plan(shaper, &down, method));
+        let told = on_ranks(&broken, &of_cells, Deal { ranks: 3, ..PLAIN }, |shaper, _| {
+            plan(shaper, &down, method)
+        });
         let message = told[0].clone().unwrap_err();
         assert!(message.contains("no positive volume"), "{message}");
         assert!(told.iter().all(|told| told.as_ref() == Err(&message)), "{told:?}");

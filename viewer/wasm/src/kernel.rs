@@ -144,8 +144,11 @@ impl Kernel {
         let answer = self.surface(surface).map(|open| {
             let surface = open.editor.surface();
             let features = surface.features();
-            let of_triangles =
-                surface.triangle_faces().iter().map(|&face| features.face_features()[face as usize]).collect();
+            let of_triangles = surface
+                .triangle_faces()
+                .iter()
+                .map(|&face| features.face_features()[face as usize])
+                .collect();
             vec![
                 Array::Vectors(surface.points().to_vec()),
                 Array::Triangles(surface.triangles().to_vec()),
@@ -160,11 +163,12 @@ impl Kernel {
     /// See [`displacement`](crate::displacement).
     pub fn displacement(&mut self, surface: u32) -> bool {
         let input = std::mem::take(&mut self.input);
-        let answer = serde_json::from_slice::<Vec<Edit>>(&input).map_err(Failure::from).and_then(|stack| {
-            let open = self.surface(surface)?;
-            open.displacement = open.editor.displacement(&stack)?;
-            Ok(vec![Array::Vectors(open.displacement.clone())])
-        });
+        let answer =
+            serde_json::from_slice::<Vec<Edit>>(&input).map_err(Failure::from).and_then(|stack| {
+                let open = self.surface(surface)?;
+                open.displacement = open.editor.displacement(&stack)?;
+                Ok(vec![Array::Vectors(open.displacement.clone())])
+            });
         self.settle(answer)
     }
 
@@ -259,7 +263,8 @@ impl Kernel {
     fn settle(&mut self, answer: Result<Vec<Array>, Failure>) -> bool {
         self.input = Vec::new();
         let done = answer.is_ok();
-        self.answer = answer.unwrap_or_else(|failure| vec![Array::Text(format!("{}\n{failure}", failure.kind()))]);
+        self.answer = answer
+            .unwrap_or_else(|failure| vec![Array::Text(format!("{}\n{failure}", failure.kind()))]);
         done
     }
 }
@@ -277,20 +282,35 @@ fn singles(values: &[f64]) -> Array {
     Array::Singles(values.iter().map(|&value| value as f32).collect())
 }
 
-fn surface_of_arrays(input: &[u8], points: usize, faces: usize, corners: usize) -> Result<Surface, Failure> {
+fn surface_of_arrays(
+    input: &[u8],
+    points: usize,
+    faces: usize,
+    corners: usize,
+) -> Result<Surface, Failure> {
     let mut rest = input;
     let mut expected = 0_usize;
     let mut take = |count: usize, size: usize| {
         let bytes = count.saturating_mul(size);
         expected = expected.saturating_add(bytes);
-        let (taken, after) = rest.split_at_checked(bytes).ok_or(Failure::Input { found: input.len(), expected })?;
+        let (taken, after) =
+            rest.split_at_checked(bytes).ok_or(Failure::Input { found: input.len(), expected })?;
         rest = after;
         Ok::<_, Failure>(taken)
     };
-    let coordinates: Vec<f64> =
-        take(points, size_of::<Vector>())?.as_chunks().0.iter().map(|&bytes| f64::from_le_bytes(bytes)).collect();
+    let coordinates: Vec<f64> = take(points, size_of::<Vector>())?
+        .as_chunks()
+        .0
+        .iter()
+        .map(|&bytes| f64::from_le_bytes(bytes))
+        .collect();
     let mut numbers = |count: usize| -> Result<Vec<u32>, Failure> {
-        Ok(take(count, size_of::<u32>())?.as_chunks().0.iter().map(|&bytes| u32::from_le_bytes(bytes)).collect())
+        Ok(take(count, size_of::<u32>())?
+            .as_chunks()
+            .0
+            .iter()
+            .map(|&bytes| u32::from_le_bytes(bytes))
+            .collect())
     };
     let (vertices, sizes, connectivity, features) =
         (numbers(points)?, numbers(faces)?, numbers(corners)?, numbers(faces)?);
@@ -299,7 +319,9 @@ fn surface_of_arrays(input: &[u8], points: usize, faces: usize, corners: usize) 
     let mut start = 0_usize;
     for &size in &sizes {
         let end = start.saturating_add(size as usize);
-        let face = connectivity.get(start..end).ok_or(Failure::Input { found: connectivity.len(), expected: end })?;
+        let face = connectivity
+            .get(start..end)
+            .ok_or(Failure::Input { found: connectivity.len(), expected: end })?;
         let cell_type = match size {
             3 => CellType::Triangle,
             4 => CellType::Quad,

@@ -19,7 +19,8 @@ pub fn rehearse() -> Vec<[f64; 3]> {
     let torus = shapes::torus(1.0, 0.4, FACES);
     let (points, faces) = (torus.points().to_vec(), torus.cells().clone());
     let (vertices, features) = ((0..).take(points.len()).collect(), vec![0; faces.len()]);
-    let Ok(surface) = Surface::from_faces(points, vertices, faces, vec!["torus".into()], features) else {
+    let Ok(surface) = Surface::from_faces(points, vertices, faces, vec!["torus".into()], features)
+    else {
         return Vec::new();
     };
     let Ok(mut editor) = Editor::new(Arc::new(surface)) else { return Vec::new() };

@@ -13,8 +13,8 @@ use tombolo::{
     },
     pipelines::{
         files::{
-            Compression, check_displacement_name, check_mesh_name, read_displacements, read_mesh, write_displacement,
-            write_mesh,
+            Compression, check_displacement_name, check_mesh_name, read_displacements, read_mesh,
+            write_displacement, write_mesh,
         },
         language::{Change, Order, Validate, parse_valid, place_beside},
         shape::{Forecast, Outcome as Expected, Place, Refused, Shaper},
@@ -129,8 +129,11 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
         layers: Vec::new(),
         seconds,
     };
-    let (deform, guard, schedule) =
-        (order.deform.unwrap_or_default(), order.guard.unwrap_or_default(), order.schedule.unwrap_or_default());
+    let (deform, guard, schedule) = (
+        order.deform.unwrap_or_default(),
+        order.guard.unwrap_or_default(),
+        order.schedule.unwrap_or_default(),
+    );
 
     if options.forecast {
         let here = Place::from(Arc::clone(shaper.reference()));
@@ -141,7 +144,8 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
     let spent = shaper.spent();
     (outcome.seconds.surface, outcome.seconds.volume, outcome.seconds.guard) =
         (spent.surface, spent.volume, spent.guard);
-    outcome.layers = shaper.editor().and_then(|editor| editor.layers(&edits).ok()).unwrap_or_default();
+    outcome.layers =
+        shaper.editor().and_then(|editor| editor.layers(&edits).ok()).unwrap_or_default();
     let plan = match plan {
         Ok(plan) => plan,
         Err(refused) => {
@@ -165,7 +169,9 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
     outcome.inverted = Some(after.inverted);
     outcome.after = Some(after);
     if let Some(out) = &options.out {
-        timed(&mut outcome.seconds.write, || write_mesh(out, &shaped, &mesh_file.fields, Compression::None))?;
+        timed(&mut outcome.seconds.write, || {
+            write_mesh(out, &shaped, &mesh_file.fields, Compression::None)
+        })?;
     }
     if let Some(file) = &options.displacement {
         let whole = shaper.editor().filter(|_| target.fraction == 1.0);
@@ -174,7 +180,8 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
         } else {
             // Clamped: what was reached, and not what was asked for.
             let reached = |&vertex: &u32| {
-                let [reference, end] = [mesh.points(), plan.end()].map(|points| points[vertex as usize]);
+                let [reference, end] =
+                    [mesh.points(), plan.end()].map(|points| points[vertex as usize]);
                 [0, 1, 2].map(|axis| end[axis] - reference[axis])
             };
             surface.vertices().iter().map(reached).collect()
@@ -217,7 +224,9 @@ fn read_order(options: &Options) -> Result<(Vec<Edit>, Order), Failure> {
             place_beside(&mut edits, &name);
             Ok((edits, order))
         }
-        Change::Undo(_) => Err(Failure::Wrong(format!("{name}: undo: a mesh from a file has no orders to take back"))),
+        Change::Undo(_) => Err(Failure::Wrong(format!(
+            "{name}: undo: a mesh from a file has no orders to take back"
+        ))),
     }
 }
 
@@ -246,7 +255,9 @@ fn with_options(mut order: Order, options: &Options) -> Result<Order, Failure> {
     if let Some(steps) = options.steps {
         order.schedule.get_or_insert_default().steps = steps;
     }
-    order.validate().map_err(|problem| Failure::Wrong(format!("with the options that are given, {problem}")))?;
+    order
+        .validate()
+        .map_err(|problem| Failure::Wrong(format!("with the options that are given, {problem}")))?;
     Ok(order)
 }
 
@@ -264,14 +275,20 @@ fn line(quality: &Quality) -> String {
 fn foretell(forecast: &Forecast, before: &Quality) -> Result<(), Failure> {
     match (forecast.outcome, &forecast.reason) {
         (Expected::Rejected, reason) => {
-            say(format_args!("would be rejected: {}", reason.as_deref().unwrap_or("no reason given")))?;
+            say(format_args!(
+                "would be rejected: {}",
+                reason.as_deref().unwrap_or("no reason given")
+            ))?;
             if let Some(fraction) = forecast.fraction {
                 say(format_args!("{:.2} % of the amounts would pass", 100.0 * fraction))?;
             }
         }
         (Expected::Clamped, _) => {
             let fraction = forecast.fraction.unwrap_or_default();
-            say(format_args!("would be clamped to {:.2} % of the edits' amounts", 100.0 * fraction))?;
+            say(format_args!(
+                "would be clamped to {:.2} % of the edits' amounts",
+                100.0 * fraction
+            ))?;
         }
         (Expected::Applied, _) => say(format_args!("would be applied"))?,
     }
@@ -295,11 +312,17 @@ fn tell(outcome: &Outcome, options: &Options) -> Result<(), Failure> {
         say(format_args!("scaled Jacobian after:  {}", line(after)))?;
     }
     for (place, layer) in outcome.layers.iter().enumerate() {
-        let Layer { edit, name, muted, handle_vertices, fixed_vertices, largest_displacement } = layer;
+        let Layer { edit, name, muted, handle_vertices, fixed_vertices, largest_displacement } =
+            layer;
         let name = name.as_ref().map_or_else(String::new, |name| format!(" \"{name}\""));
-        let does =
-            if *muted { "muted".to_owned() } else { format!("moves the surface by at most {largest_displacement:.6}") };
-        say(format_args!("edit {place} ({edit}){name}: {handle_vertices} vertices in the handle, {does}"))?;
+        let does = if *muted {
+            "muted".to_owned()
+        } else {
+            format!("moves the surface by at most {largest_displacement:.6}")
+        };
+        say(format_args!(
+            "edit {place} ({edit}){name}: {handle_vertices} vertices in the handle, {does}"
+        ))?;
         // Those that say of each vertex where it goes move no others.
         if *fixed_vertices == 0 && !muted && !["displacement", "skeleton"].contains(edit) {
             say(format_args!(

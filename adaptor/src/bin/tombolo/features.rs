@@ -60,7 +60,8 @@ pub(crate) fn features(options: &Options) -> Result<(), Failure> {
     let found = Found {
         file: options.mesh.display().to_string(),
         source: if by_angle { "sharp edges" } else { "mesh" },
-        angle: by_angle.then(|| options.angle.unwrap_or(FeatureSettings::default().sharp_angle_degrees)),
+        angle: by_angle
+            .then(|| options.angle.unwrap_or(FeatureSettings::default().sharp_angle_degrees)),
         features: surface.feature_sizes(),
         faces,
     };
@@ -74,7 +75,9 @@ pub(crate) fn features(options: &Options) -> Result<(), Failure> {
 pub(crate) fn surface(mesh: &Mesh, angle: Option<f64>) -> Result<Surface, SurfaceError> {
     let surface = Surface::extract(mesh, &FeatureSettings::default())?;
     match angle {
-        Some(sharp_angle_degrees) => surface.with_sharp_features(&FeatureSettings { sharp_angle_degrees }),
+        Some(sharp_angle_degrees) => {
+            surface.with_sharp_features(&FeatureSettings { sharp_angle_degrees })
+        }
         None => Ok(surface),
     }
 }
@@ -90,7 +93,9 @@ fn as_mesh(surface: &Surface) -> Result<Mesh, Failure> {
 
 fn tell(found: &Found, options: &Options) -> Result<(), Failure> {
     match found.angle {
-        Some(angle) => say(format_args!("{}: features between edges of {angle} degrees or more", found.file))?,
+        Some(angle) => {
+            say(format_args!("{}: features between edges of {angle} degrees or more", found.file))?
+        }
         None => say(format_args!("{}: the mesh's own features", found.file))?,
     }
     for FeatureSize { name, faces, vertices, area, bounds: [lower, upper] } in &found.features {

@@ -15,8 +15,7 @@ use std::{
 use clap::{Parser, Subcommand};
 use tombolo::pipelines::{language, limits};
 
-const EXIT_CODES: &str =
-    "Exit codes: 0 done; 1 something is wrong with what was given; 2 the shape that was asked for is refused.";
+const EXIT_CODES: &str = "Exit codes: 0 done; 1 something is wrong with what was given; 2 the shape that was asked for is refused.";
 
 /// Checks configurations, looks at meshes, and gives them other shapes without a solver.
 #[derive(Debug, Parser)]

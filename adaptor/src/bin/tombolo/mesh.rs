@@ -60,7 +60,9 @@ pub(crate) fn info(file: &Path, as_json: bool) -> Result<(), Failure> {
         say(format_args!("  {name}: {faces} faces, {vertices} vertices"))?;
     }
     let Quality { min, mean, inverted, .. } = info.quality;
-    say(format_args!("scaled Jacobian: least {min:.4}, mean {mean:.4}; {inverted} inverted cell(s)"))?;
+    say(format_args!(
+        "scaled Jacobian: least {min:.4}, mean {mean:.4}; {inverted} inverted cell(s)"
+    ))?;
     info.notes.iter().try_for_each(|note| say(format_args!("note: {note}")))
 }
 
@@ -84,8 +86,15 @@ fn bounds(points: &[Vector]) -> [Vector; 2] {
 
 fn features(surface: &Surface) -> Vec<Feature> {
     let features = surface.features();
-    let faces = |feature: u32| features.face_features().iter().filter(|&&other| other == feature).count();
+    let faces =
+        |feature: u32| features.face_features().iter().filter(|&&other| other == feature).count();
     let vertices = |feature: u32| features.vertices(feature).len();
     let named = features.names().iter().zip(0..);
-    named.map(|(name, index)| Feature { name: name.clone(), faces: faces(index), vertices: vertices(index) }).collect()
+    named
+        .map(|(name, index)| Feature {
+            name: name.clone(),
+            faces: faces(index),
+            vertices: vertices(index),
+        })
+        .collect()
 }

@@ -70,8 +70,12 @@ pub(crate) fn skeleton(options: &Options) -> Result<(), Failure> {
         return json(&summary);
     }
     let Summary { file, vertices, nodes, curves, branches, ends, loops, components, .. } = &summary;
-    say(format_args!("{file}: {vertices} surface vertices on {nodes} nodes in {components} connected piece(s)"))?;
-    say(format_args!("{curves} curve(s), {branches} branch node(s), {ends} end(s), {loops} loop(s); {seconds:.3} s"))?;
+    say(format_args!(
+        "{file}: {vertices} surface vertices on {nodes} nodes in {components} connected piece(s)"
+    ))?;
+    say(format_args!(
+        "{curves} curve(s), {branches} branch node(s), {ends} end(s), {loops} loop(s); {seconds:.3} s"
+    ))?;
     match &options.out {
         Some(out) => say(format_args!("wrote {}", out.display())),
         None => Ok(()),
@@ -100,7 +104,11 @@ fn polylines(skeleton: &Skeleton, surface: &Surface) -> Result<Extract, Failure>
     };
     let fields = vec![
         field("node", Association::Vertex, (0..nodes).map(|node| node as f64).collect()),
-        field("degree", Association::Vertex, (0..nodes).map(|node| skeleton.degree(node) as f64).collect()),
+        field(
+            "degree",
+            Association::Vertex,
+            (0..nodes).map(|node| skeleton.degree(node) as f64).collect(),
+        ),
         field("radius", Association::Vertex, skeleton.radii(surface.points())),
         field("curve", Association::Element, curve),
     ];

@@ -59,31 +59,62 @@ fn symbol(handle: *mut c_void, name: &CStr) -> Result<*mut c_void, String> {
 
 impl Catalyst {
     fn find() -> Result<Self, String> {
-        let beside = env::current_exe().ok().and_then(|path| Some(path.parent()?.join("../lib/libcatalyst.so.3")));
+        let beside = env::current_exe()
+            .ok()
+            .and_then(|path| Some(path.parent()?.join("../lib/libcatalyst.so.3")));
         let handle = beside
             .and_then(|path| open(&path))
             .or_else(|| open(Path::new("libcatalyst.so.3")))
-            .ok_or("ERROR: libcatalyst.so.3 is not found; put its directory into LD_LIBRARY_PATH")?;
+            .ok_or(
+                "ERROR: libcatalyst.so.3 is not found; put its directory into LD_LIBRARY_PATH",
+            )?;
         // SAFETY: the library of this name exports these functions with these signatures.
         unsafe {
             Ok(Self {
-                make: std::mem::transmute::<*mut c_void, Make>(symbol(handle, c"catalyst_conduit_node_create")?),
-                unmake: std::mem::transmute::<*mut c_void, Unmake>(symbol(handle, c"catalyst_conduit_node_destroy")?),
-                load: std::mem::transmute::<*mut c_void, Load>(symbol(handle, c"catalyst_conduit_node_load")?),
+                make: std::mem::transmute::<*mut c_void, Make>(symbol(
+                    handle,
+                    c"catalyst_conduit_node_create",
+                )?),
+                unmake: std::mem::transmute::<*mut c_void, Unmake>(symbol(
+                    handle,
+                    c"catalyst_conduit_node_destroy",
+                )?),
+                load: std::mem::transmute::<*mut c_void, Load>(symbol(
+                    handle,
+                    c"catalyst_conduit_node_load",
+                )?),
                 count: std::mem::transmute::<*mut c_void, Count>(symbol(
                     handle,
                     c"catalyst_conduit_node_number_of_children",
                 )?),
-                child: std::mem::transmute::<*mut c_void, Child>(symbol(handle, c"catalyst_conduit_node_child")?),
-                has: std::mem::transmute::<*mut c_void, Has>(symbol(handle, c"catalyst_conduit_node_has_path")?),
+                child: std::mem::transmute::<*mut c_void, Child>(symbol(
+                    handle,
+                    c"catalyst_conduit_node_child",
+                )?),
+                has: std::mem::transmute::<*mut c_void, Has>(symbol(
+                    handle,
+                    c"catalyst_conduit_node_has_path",
+                )?),
                 remove: std::mem::transmute::<*mut c_void, Remove>(symbol(
                     handle,
                     c"catalyst_conduit_node_remove_path",
                 )?),
-                set: std::mem::transmute::<*mut c_void, Set>(symbol(handle, c"catalyst_conduit_node_set_path_uint64")?),
-                initialize: std::mem::transmute::<*mut c_void, Call>(symbol(handle, c"catalyst_initialize")?),
-                execute: std::mem::transmute::<*mut c_void, Call>(symbol(handle, c"catalyst_execute")?),
-                finalize: std::mem::transmute::<*mut c_void, Call>(symbol(handle, c"catalyst_finalize")?),
+                set: std::mem::transmute::<*mut c_void, Set>(symbol(
+                    handle,
+                    c"catalyst_conduit_node_set_path_uint64",
+                )?),
+                initialize: std::mem::transmute::<*mut c_void, Call>(symbol(
+                    handle,
+                    c"catalyst_initialize",
+                )?),
+                execute: std::mem::transmute::<*mut c_void, Call>(symbol(
+                    handle,
+                    c"catalyst_execute",
+                )?),
+                finalize: std::mem::transmute::<*mut c_void, Call>(symbol(
+                    handle,
+                    c"catalyst_finalize",
+                )?),
             })
         }
     }
@@ -110,8 +141,8 @@ impl Catalyst {
     }
 
     fn play(&self, path: &Path, call: Call) -> Result<(), String> {
-        let file =
-            CString::new(path.as_os_str().as_bytes()).map_err(|_| "ERROR: a path with a nul in it".to_owned())?;
+        let file = CString::new(path.as_os_str().as_bytes())
+            .map_err(|_| "ERROR: a path with a nul in it".to_owned())?;
         // SAFETY: the node is made, filled, used and destroyed here; the path is a C string.
         let status = unsafe {
             let node = (self.make)();
@@ -121,7 +152,11 @@ impl Catalyst {
             (self.unmake)(node);
             status
         };
-        if status == 0 { Ok(()) } else { Err(format!("ERROR: '{}' was answered with status {status}", path.display())) }
+        if status == 0 {
+            Ok(())
+        } else {
+            Err(format!("ERROR: '{}' was answered with status {status}", path.display()))
+        }
     }
 }
 
@@ -134,7 +169,10 @@ fn start_mpi() -> Option<unsafe extern "C" fn() -> c_int> {
     let (begin, end) = (symbol(handle, c"MPI_Init").ok()?, symbol(handle, c"MPI_Finalize").ok()?);
     // SAFETY: MPI's C interface gives these functions these signatures; null arguments are allowed since MPI 2.
     unsafe {
-        let begin = std::mem::transmute::<*mut c_void, unsafe extern "C" fn(*mut c_int, *mut c_void) -> c_int>(begin);
+        let begin = std::mem::transmute::<
+            *mut c_void,
+            unsafe extern "C" fn(*mut c_int, *mut c_void) -> c_int,
+        >(begin);
         if begin(ptr::null_mut(), ptr::null_mut()) != 0 {
             return None;
         }
@@ -145,8 +183,8 @@ fn start_mpi() -> Option<unsafe extern "C" fn() -> c_int> {
 fn replay(directory: &Path) -> Result<(), String> {
     let world = ranks::rank_and_size();
     // All ranks read the same directory: one tells for all what is wrong with it.
-    let executions =
-        dump::check(directory, world.1).map_err(|message| if world.0 == 0 { message } else { String::new() })?;
+    let executions = dump::check(directory, world.1)
+        .map_err(|message| if world.0 == 0 { message } else { String::new() })?;
     let catalyst = Catalyst::find()?;
     catalyst.play(&dump::path(directory, Stage::Initialize, world), catalyst.initialize)?;
     for number in 0..executions {

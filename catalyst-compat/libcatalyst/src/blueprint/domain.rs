@@ -24,7 +24,8 @@ impl Element {
 
     fn polyhedron(faces: Vec<Vec<usize>>) -> Self {
         let mut seen = HashSet::new();
-        let vertices = faces.iter().flatten().copied().filter(|vertex| seen.insert(*vertex)).collect();
+        let vertices =
+            faces.iter().flatten().copied().filter(|vertex| seen.insert(*vertex)).collect();
         Self { shape: "polyhedral".into(), vertices, faces }
     }
 }
@@ -70,7 +71,9 @@ impl<'a> Domain<'a> {
             _ => None,
         };
         let corners = cells.and_then(|cells| {
-            cells.iter().try_fold(1_usize, |product, cells| product.checked_mul(cells.checked_add(1)?))
+            cells
+                .iter()
+                .try_fold(1_usize, |product, cells| product.checked_mul(cells.checked_add(1)?))
         });
         if cells.is_some() && corners.is_none_or(|corners| corners > count) {
             return Err(Error::new(format!(
@@ -83,20 +86,30 @@ impl<'a> Domain<'a> {
             (_, Some(cells)) => grid(cells),
             _ => unstructured(found)?,
         };
-        if let Some(wrong) = elements.iter().flat_map(|element| &element.vertices).find(|vertex| **vertex >= count) {
+        if let Some(wrong) =
+            elements.iter().flat_map(|element| &element.vertices).find(|vertex| **vertex >= count)
+        {
             return Err(Error::new(format!("{}: vertex {wrong} of {count} points", found.place())));
         }
         let mut fields = Vec::new();
         for (field, node) in mesh.get("fields").into_iter().flat_map(Node::children) {
             let association = node.get("association").and_then(Node::text).unwrap_or_default();
             let here = node.get("topology").and_then(Node::text).as_deref() == Some(name.as_str());
-            let Some(values) = node.get("values").filter(|_| here && !association.is_empty()) else {
+            let Some(values) = node.get("values").filter(|_| here && !association.is_empty())
+            else {
                 continue;
             };
             let wanted = if association == "vertex" { count } else { elements.len() };
             let fits = |leaf: &Node| usize::try_from(leaf.datatype().elements) == Ok(wanted);
-            if !(if values.count() == 0 { fits(values) } else { values.children().all(|(_, leaf)| fits(leaf)) }) {
-                return Err(Error::new(format!("{}: {wanted} values are expected", values.place())));
+            if !(if values.count() == 0 {
+                fits(values)
+            } else {
+                values.children().all(|(_, leaf)| fits(leaf))
+            }) {
+                return Err(Error::new(format!(
+                    "{}: {wanted} values are expected",
+                    values.place()
+                )));
             }
             fields.push((field.to_owned(), association == "vertex", node));
         }
@@ -113,8 +126,9 @@ impl<'a> Domain<'a> {
 /// The numbers of the domains: what each says of itself in `state/domain_id`, or its place where one says nothing.
 #[must_use]
 pub fn numbers_of(domains: &[&Node]) -> Vec<i64> {
-    let said =
-        |domain: &&Node| domain.find("state/domain_id").filter(|id| id.kind().is_integer()).and_then(Node::integer);
+    let said = |domain: &&Node| {
+        domain.find("state/domain_id").filter(|id| id.kind().is_integer()).and_then(Node::integer)
+    };
     let said: Option<Vec<i64>> = domains.iter().map(said).collect();
     said.unwrap_or_else(|| (0..).take(domains.len()).collect())
 }
@@ -130,7 +144,9 @@ fn dims(node: &Node) -> Result<[usize; 3]> {
     for (dim, name) in dims.iter_mut().zip(["i", "j", "k"]) {
         if let Some(value) = node.get(name) {
             let count = value.integer().and_then(|count| usize::try_from(count).ok());
-            *dim = count.ok_or_else(|| Error::new(format!("{} is no number of points or elements", value.place())))?;
+            *dim = count.ok_or_else(|| {
+                Error::new(format!("{} is no number of points or elements", value.place()))
+            })?;
         }
     }
     if node.get("j").is_none() {
@@ -150,13 +166,24 @@ fn points(coordset: &Node) -> Result<(Vec<Axis>, [usize; 3])> {
         "uniform" => {
             let dims = dims(coordset.existing("dims")?)?;
             let number = |path: String, otherwise: f64| {
-                coordset.find(&path).and_then(|node| node.number(0)).map_or(otherwise, |number| number.as_f64())
+                coordset
+                    .find(&path)
+                    .and_then(|node| node.number(0))
+                    .map_or(otherwise, |number| number.as_f64())
             };
             let named = crate::blueprint::index::axes(coordset);
             let axis = |(index, count): (usize, &usize)| {
                 let name = named.get(index).copied().unwrap_or(NAMES[index]);
-                let (first, step) = (number(format!("origin/{name}"), 0.0), number(format!("spacing/d{name}"), 1.0));
-                (name.to_owned(), (0..(*count).min(MOST_POINTS)).map(|point| first + step * point as f64).collect())
+                let (first, step) = (
+                    number(format!("origin/{name}"), 0.0),
+                    number(format!("spacing/d{name}"), 1.0),
+                );
+                (
+                    name.to_owned(),
+                    (0..(*count).min(MOST_POINTS))
+                        .map(|point| first + step * point as f64)
+                        .collect(),
+                )
             };
             dims.iter().enumerate().filter(|(_, count)| **count > 0).map(axis).collect()
         }
@@ -164,12 +191,20 @@ fn points(coordset: &Node) -> Result<(Vec<Axis>, [usize; 3])> {
             let values = coordset.existing("values")?;
             let axes: Vec<_> = values
                 .children()
-                .map(|(name, leaf)| (name.to_owned(), leaf.numbers().map(|number| number.as_f64()).collect::<Vec<_>>()))
+                .map(|(name, leaf)| {
+                    (
+                        name.to_owned(),
+                        leaf.numbers().map(|number| number.as_f64()).collect::<Vec<_>>(),
+                    )
+                })
                 .collect();
             if kind == "explicit" {
                 let count = axes.first().map_or(0, |(_, values)| values.len());
                 if axes.iter().any(|(_, values)| values.len() != count) {
-                    return Err(Error::new(format!("{}: components of different lengths", values.place())));
+                    return Err(Error::new(format!(
+                        "{}: components of different lengths",
+                        values.place()
+                    )));
                 }
                 return Ok((axes, [count, 1, 1]));
             }
@@ -181,7 +216,8 @@ fn points(coordset: &Node) -> Result<(Vec<Axis>, [usize; 3])> {
         *count = values.len();
     }
     let total = counts.iter().try_fold(1_usize, |product, count| product.checked_mul(*count));
-    let total = total.filter(|total| *total <= MOST_POINTS).ok_or_else(|| Error::new("too many points"))?;
+    let total =
+        total.filter(|total| *total <= MOST_POINTS).ok_or_else(|| Error::new("too many points"))?;
     let stride = [1, counts[0], counts[0] * counts[1]];
     let spread = |(axis, (name, values)): (usize, (String, Vec<f64>))| {
         let all = (0..total).map(|point| values[point / stride[axis] % counts[axis]]).collect();
@@ -203,7 +239,8 @@ fn grid(cells: [usize; 3]) -> Vec<Element> {
         for j in 0..many[1] {
             for i in 0..many[0] {
                 let first = i + j * row + k * layer;
-                let vertices = corners.iter().take(1 << dimension).map(|corner| first + corner).collect();
+                let vertices =
+                    corners.iter().take(1 << dimension).map(|corner| first + corner).collect();
                 elements.push(Element::new(shape, vertices));
             }
         }
@@ -220,7 +257,8 @@ fn unstructured(topology: &Node) -> Result<Vec<Element>> {
     }
     let mut all = Vec::new();
     for (index, (name, member)) in elements.children().enumerate() {
-        let of_member = faces.and_then(|faces| if name.is_empty() { faces.child(index) } else { faces.get(name) });
+        let of_member = faces
+            .and_then(|faces| if name.is_empty() { faces.child(index) } else { faces.get(name) });
         all.extend(group(member, of_member)?);
     }
     Ok(all)
@@ -231,7 +269,9 @@ fn group(elements: &Node, faces: Option<&Node>) -> Result<Vec<Element>> {
     let integers = |name: &str| -> Result<Vec<i64>> {
         let node = elements.existing(name)?;
         let all: Option<Vec<i64>> = node.numbers().map(|number| number.as_i64()).collect();
-        all.ok_or_else(|| Error::new(format!("{} holds something else than integers", node.place())))
+        all.ok_or_else(|| {
+            Error::new(format!("{} holds something else than integers", node.place()))
+        })
     };
     let shape = text(elements, "shape")?;
     let connectivity = integers("connectivity")?;
@@ -239,10 +279,14 @@ fn group(elements: &Node, faces: Option<&Node>) -> Result<Vec<Element>> {
         let end = from.checked_add(count);
         let range = usize::try_from(from).ok().zip(end.and_then(|end| usize::try_from(end).ok()));
         let found = range.and_then(|(from, end)| connectivity.get(from..end));
-        let found = found
-            .ok_or_else(|| Error::new(format!("{}: an element reaches beyond the connectivity", elements.place())))?;
-        let all: Option<Vec<usize>> = found.iter().map(|entry| usize::try_from(*entry).ok()).collect();
-        all.ok_or_else(|| Error::new(format!("{}: the connectivity has a negative entry", elements.place())))
+        let found = found.ok_or_else(|| {
+            Error::new(format!("{}: an element reaches beyond the connectivity", elements.place()))
+        })?;
+        let all: Option<Vec<usize>> =
+            found.iter().map(|entry| usize::try_from(*entry).ok()).collect();
+        all.ok_or_else(|| {
+            Error::new(format!("{}: the connectivity has a negative entry", elements.place()))
+        })
     };
     if let Some(size) = vertices_of(&shape) {
         let count = i64::try_from(connectivity.len()).unwrap_or(i64::MAX);
@@ -252,25 +296,37 @@ fn group(elements: &Node, faces: Option<&Node>) -> Result<Vec<Element>> {
                 elements.place()
             )));
         }
-        return (0..count / size).map(|index| Ok(Element::new(shape.clone(), entries(index * size, size)?))).collect();
+        return (0..count / size)
+            .map(|index| Ok(Element::new(shape.clone(), entries(index * size, size)?)))
+            .collect();
     }
     let sizes = integers("sizes")?;
     let offsets = match elements.get("offsets") {
         Some(_) => integers("offsets")?,
-        None => sizes.iter().scan(0_i64, |sum, size| Some(std::mem::replace(sum, sum.saturating_add(*size)))).collect(),
+        None => sizes
+            .iter()
+            .scan(0_i64, |sum, size| Some(std::mem::replace(sum, sum.saturating_add(*size))))
+            .collect(),
     };
     let shapes: Vec<String> = if shape == "mixed" {
         let map: Vec<_> = elements.existing("shape_map")?.children().collect();
         let name = |number: &i64| {
-            map.iter().find(|(_, value)| value.integer() == Some(*number)).map(|(name, _)| (*name).to_owned())
+            map.iter()
+                .find(|(_, value)| value.integer() == Some(*number))
+                .map(|(name, _)| (*name).to_owned())
         };
         let named: Option<Vec<_>> = integers("shapes")?.iter().map(name).collect();
-        named.ok_or_else(|| Error::new(format!("{}: a shape is not in the shape map", elements.place())))?
+        named.ok_or_else(|| {
+            Error::new(format!("{}: a shape is not in the shape map", elements.place()))
+        })?
     } else {
         vec![shape; sizes.len()]
     };
     if shapes.len() != sizes.len() || offsets.len() != sizes.len() {
-        return Err(Error::new(format!("{}: sizes, offsets and shapes of different lengths", elements.place())));
+        return Err(Error::new(format!(
+            "{}: sizes, offsets and shapes of different lengths",
+            elements.place()
+        )));
     }
     let known = match faces.filter(|_| shapes.iter().any(|shape| shape == "polyhedral")) {
         Some(faces) => group(faces, None)?,
@@ -279,7 +335,11 @@ fn group(elements: &Node, faces: Option<&Node>) -> Result<Vec<Element>> {
     let face = |index: usize| {
         let found = known.get(index).map(|face| face.vertices.clone());
         found.ok_or_else(|| {
-            Error::new(format!("{}: face {index} of {} in 'subelements'", elements.place(), known.len()))
+            Error::new(format!(
+                "{}: face {index} of {} in 'subelements'",
+                elements.place(),
+                known.len()
+            ))
         })
     };
     let each = shapes.into_iter().zip(offsets.iter().zip(&sizes));
@@ -324,7 +384,8 @@ pub fn gather_values(rows: &[(&Node, usize)]) -> Result<Node> {
     }
     let mut gathered = Node::new();
     for (name, _) in first.children() {
-        let components: Result<Vec<_>> = rows.iter().map(|(values, row)| Ok((values.existing(name)?, *row))).collect();
+        let components: Result<Vec<_>> =
+            rows.iter().map(|(values, row)| Ok((values.existing(name)?, *row))).collect();
         gathered.child_named(name)?.take(gather(&components?)?)?;
     }
     Ok(gathered)

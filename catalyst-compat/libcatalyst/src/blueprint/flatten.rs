@@ -19,13 +19,15 @@ use crate::node::Node;
 pub fn flatten(mesh: &Node, options: &Node) -> Result<Node> {
     let wanted = Wanted::read(options)?;
     let sources = domains(mesh);
-    let read: Result<Vec<_>> = sources.iter().map(|domain| Domain::read(domain, wanted.topology.as_deref())).collect();
+    let read: Result<Vec<_>> =
+        sources.iter().map(|domain| Domain::read(domain, wanted.topology.as_deref())).collect();
     let read = read?;
     let mut tables = Node::new();
     let (Some(source), Some(first)) = (sources.first(), read.first()) else {
         return Ok(tables);
     };
-    let names = |domain: &Domain<'_>| domain.axes.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
+    let names =
+        |domain: &Domain<'_>| domain.axes.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
     if let Some(other) = read.iter().position(|domain| names(domain) != names(first)) {
         let place = sources[other].place();
         return Err(Error::new(format!(
@@ -36,7 +38,8 @@ pub fn flatten(mesh: &Node, options: &Node) -> Result<Node> {
     let coordset = source.get("coordsets").and_then(|coordsets| coordsets.get(&first.coordset));
     let numbers = numbers_of(&sources);
     for (of_vertices, table) in [(true, "vertex_data"), (false, "element_data")] {
-        let count = |domain: &Domain<'_>| if of_vertices { domain.points() } else { domain.elements.len() };
+        let count =
+            |domain: &Domain<'_>| if of_vertices { domain.points() } else { domain.elements.len() };
         let mut columns = Node::new();
         if of_vertices && wanted.locations || !of_vertices && wanted.centers {
             let (group, kind) = if of_vertices {
@@ -46,7 +49,11 @@ pub fn flatten(mesh: &Node, options: &Node) -> Result<Node> {
             };
             for (axis, (name, _)) in first.axes.iter().enumerate() {
                 let values = read.iter().flat_map(|domain| coordinates(domain, axis, of_vertices));
-                fill(columns.child_named(group)?.child_named(name)?, kind, values.map(Number::Double))?;
+                fill(
+                    columns.child_named(group)?.child_named(name)?,
+                    kind,
+                    values.map(Number::Double),
+                )?;
             }
         }
         for name in wanted.fields_of(&read) {
@@ -55,11 +62,17 @@ pub fn flatten(mesh: &Node, options: &Node) -> Result<Node> {
                 continue;
             };
             let kind = widest(&mut leaves(reference)).unwrap_or(Kind::Float64);
-            let otherwise = if kind.is_floating() { Number::Double(wanted.float) } else { Number::Signed(wanted.int) };
+            let otherwise = if kind.is_floating() {
+                Number::Double(wanted.float)
+            } else {
+                Number::Signed(wanted.int)
+            };
             let rows = |component: Option<usize>| {
                 read.iter().flat_map(move |domain| {
                     let leaf = of(domain).and_then(|values| match component {
-                        Some(index) if reference.kind() == Kind::Object => values.get(reference.name_of(index)),
+                        Some(index) if reference.kind() == Kind::Object => {
+                            values.get(reference.name_of(index))
+                        }
                         Some(index) => values.child(index),
                         None => Some(values),
                     });
@@ -72,8 +85,11 @@ pub fn flatten(mesh: &Node, options: &Node) -> Result<Node> {
                 fill(column, kind, rows(None))?;
             }
             for (index, (component, _)) in reference.children().enumerate() {
-                let target =
-                    if reference.kind() == Kind::List { column.append()? } else { column.child_named(component)? };
+                let target = if reference.kind() == Kind::List {
+                    column.append()?
+                } else {
+                    column.child_named(component)?
+                };
                 fill(target, kind, rows(Some(index)))?;
             }
         }
@@ -81,12 +97,19 @@ pub fn flatten(mesh: &Node, options: &Node) -> Result<Node> {
             continue;
         }
         if wanted.domain_info {
-            let row = |domain: &Domain<'_>| (0..count(domain)).map(|row| i64::try_from(row).unwrap_or(i64::MAX));
-            let of_domains: Vec<i64> =
-                read.iter().zip(&numbers).flat_map(|(domain, number)| row(domain).map(|_| *number)).collect();
+            let row = |domain: &Domain<'_>| {
+                (0..count(domain)).map(|row| i64::try_from(row).unwrap_or(i64::MAX))
+            };
+            let of_domains: Vec<i64> = read
+                .iter()
+                .zip(&numbers)
+                .flat_map(|(domain, number)| row(domain).map(|_| *number))
+                .collect();
             let rows: Vec<i64> = read.iter().flat_map(row).collect();
             columns.child_named("domain_id")?.set_numbers(&of_domains)?;
-            columns.child_named(if of_vertices { "vertex_id" } else { "element_id" })?.set_numbers(&rows)?;
+            columns
+                .child_named(if of_vertices { "vertex_id" } else { "element_id" })?
+                .set_numbers(&rows)?;
         }
         tables.child_named(table)?.child_named("values")?.take(columns)?;
     }
@@ -106,16 +129,24 @@ struct Wanted {
 
 impl Wanted {
     fn read(options: &Node) -> Result<Self> {
-        let text = |node: &Node| node.text().ok_or_else(|| Error::new(format!("{} is no text", node.place())));
-        let number = |node: &Node| node.number(0).ok_or_else(|| Error::new(format!("{} is no number", node.place())));
+        let text = |node: &Node| {
+            node.text().ok_or_else(|| Error::new(format!("{} is no text", node.place())))
+        };
+        let number = |node: &Node| {
+            node.number(0).ok_or_else(|| Error::new(format!("{} is no number", node.place())))
+        };
         let flag = |name: &str| {
-            options.get(name).map_or(Ok(true), |node| number(node).map(|value| value.as_f64().abs() >= 1.0))
+            options
+                .get(name)
+                .map_or(Ok(true), |node| number(node).map(|value| value.as_f64().abs() >= 1.0))
         };
         let fields = match options.get("field_names") {
             Some(names) if names.kind() != Kind::List => {
                 return Err(Error::new(format!("{} is no list of names", names.place())));
             }
-            names => names.map(|names| names.children().map(|(_, name)| text(name)).collect::<Result<Vec<_>>>()),
+            names => names.map(|names| {
+                names.children().map(|(_, name)| text(name)).collect::<Result<Vec<_>>>()
+            }),
         };
         let of_kind = |name: &str| match options.get("fill_value") {
             Some(each) if each.kind() == Kind::Object => each.get(name).map(number).transpose(),
@@ -149,7 +180,8 @@ impl Wanted {
 
 /// The values of a field that belongs to vertices, or to elements.
 fn values_of<'a>(domain: &Domain<'a>, name: &str, of_vertices: bool) -> Option<&'a Node> {
-    let (.., field) = domain.fields.iter().find(|(known, at, _)| known == name && *at == of_vertices)?;
+    let (.., field) =
+        domain.fields.iter().find(|(known, at, _)| known == name && *at == of_vertices)?;
     field.get("values")
 }
 
@@ -181,7 +213,8 @@ fn coordinates(domain: &Domain<'_>, axis: usize, of_vertices: bool) -> Vec<f64> 
         return values.clone();
     }
     let mean = |vertices: &mut dyn Iterator<Item = &usize>| {
-        let (sum, count) = vertices.fold((0.0, 0_usize), |(sum, count), vertex| (sum + values[*vertex], count + 1));
+        let (sum, count) = vertices
+            .fold((0.0, 0_usize), |(sum, count), vertex| (sum + values[*vertex], count + 1));
         sum / count.max(1) as f64
     };
     // A vertex of a polyhedron counts as often as faces have it.
@@ -204,17 +237,33 @@ fn integer(number: Number) -> i64 {
     reason = "the type is the widest of the first domain's"
 )]
 fn fill(target: &mut Node, kind: Kind, values: impl Iterator<Item = Number>) -> Result<()> {
-    let unsigned = |number: Number| if let Number::Unsigned(value) = number { value } else { integer(number) as u64 };
+    let unsigned = |number: Number| {
+        if let Number::Unsigned(value) = number { value } else { integer(number) as u64 }
+    };
     match kind {
-        Kind::Int8 => target.set_numbers(&values.map(|value| integer(value) as i8).collect::<Vec<_>>()),
-        Kind::Int16 => target.set_numbers(&values.map(|value| integer(value) as i16).collect::<Vec<_>>()),
-        Kind::Int32 => target.set_numbers(&values.map(|value| integer(value) as i32).collect::<Vec<_>>()),
+        Kind::Int8 => {
+            target.set_numbers(&values.map(|value| integer(value) as i8).collect::<Vec<_>>())
+        }
+        Kind::Int16 => {
+            target.set_numbers(&values.map(|value| integer(value) as i16).collect::<Vec<_>>())
+        }
+        Kind::Int32 => {
+            target.set_numbers(&values.map(|value| integer(value) as i32).collect::<Vec<_>>())
+        }
         Kind::Int64 => target.set_numbers(&values.map(integer).collect::<Vec<_>>()),
-        Kind::Uint8 => target.set_numbers(&values.map(|value| unsigned(value) as u8).collect::<Vec<_>>()),
-        Kind::Uint16 => target.set_numbers(&values.map(|value| unsigned(value) as u16).collect::<Vec<_>>()),
-        Kind::Uint32 => target.set_numbers(&values.map(|value| unsigned(value) as u32).collect::<Vec<_>>()),
+        Kind::Uint8 => {
+            target.set_numbers(&values.map(|value| unsigned(value) as u8).collect::<Vec<_>>())
+        }
+        Kind::Uint16 => {
+            target.set_numbers(&values.map(|value| unsigned(value) as u16).collect::<Vec<_>>())
+        }
+        Kind::Uint32 => {
+            target.set_numbers(&values.map(|value| unsigned(value) as u32).collect::<Vec<_>>())
+        }
         Kind::Uint64 => target.set_numbers(&values.map(unsigned).collect::<Vec<_>>()),
-        Kind::Float32 => target.set_numbers(&values.map(|value| value.as_f64() as f32).collect::<Vec<_>>()),
+        Kind::Float32 => {
+            target.set_numbers(&values.map(|value| value.as_f64() as f32).collect::<Vec<_>>())
+        }
         _ => target.set_numbers(&values.map(Number::as_f64).collect::<Vec<_>>()),
     }
 }

@@ -20,10 +20,11 @@ pub fn generate(mesh: &Node, path: &str, count: i64) -> Result<Node> {
     let under = |group: &str, name: &str| {
         if path.is_empty() { format!("{group}/{name}") } else { format!("{path}/{group}/{name}") }
     };
-    let copy_text = |from: &Node, name: &str, to: &mut Node| match from.get(name).and_then(Node::text) {
-        Some(text) => to.at(name)?.set_text(text),
-        None => Ok(()),
-    };
+    let copy_text =
+        |from: &Node, name: &str, to: &mut Node| match from.get(name).and_then(Node::text) {
+            Some(text) => to.at(name)?.set_text(text),
+            None => Ok(()),
+        };
     for mesh in &domains {
         if let Some(state) = mesh.get("state") {
             for name in ["cycle", "time"] {
@@ -52,7 +53,8 @@ pub fn generate(mesh: &Node, path: &str, count: i64) -> Result<Node> {
         for (name, field) in mesh.get("fields").into_iter().flat_map(Node::children) {
             let entry = index.at("fields")?.child_named(name)?;
             let by_material = || field.get("matset_values").and_then(|values| values.child(0));
-            let components = field.get("values").or_else(by_material).map_or(1, |values| values.count().max(1));
+            let components =
+                field.get("values").or_else(by_material).map_or(1, |values| values.count().max(1));
             entry.at("number_of_components")?.set_number(i64::try_from(components).unwrap_or(1))?;
             for text in ["association", "basis", "topology", "matset", "volume_dependent"] {
                 copy_text(field, text, entry)?;
@@ -98,7 +100,10 @@ pub fn axes(coordset: &Node) -> Vec<&str> {
         return named.children().map(|(name, _)| name).collect();
     }
     if let Some(spacing) = coordset.get("spacing").filter(|spacing| spacing.count() > 0) {
-        return spacing.children().map(|(name, _)| name.strip_prefix('d').unwrap_or(name)).collect();
+        return spacing
+            .children()
+            .map(|(name, _)| name.strip_prefix('d').unwrap_or(name))
+            .collect();
     }
     ["x", "y", "z"].into_iter().take(coordset.get("dims").map_or(3, Node::count)).collect()
 }
@@ -154,7 +159,8 @@ pub fn coord_system(node: &Node, report: &mut Report) {
     };
     if let Some(axes) = report.object(node, "axes") {
         for (name, axis) in axes.children().filter(|(name, _)| !allowed.contains(name)) {
-            report.wrong(axis, &format!("'{name}' is no axis here; axes are {}", allowed.join(", ")));
+            report
+                .wrong(axis, &format!("'{name}' is no axis here; axes are {}", allowed.join(", ")));
         }
     }
 }

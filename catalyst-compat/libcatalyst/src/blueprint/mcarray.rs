@@ -9,7 +9,8 @@ use crate::node::Node;
 /// Verifies a multi-component array.
 pub fn verify(node: &Node, report: &mut Report) {
     if !matches!(node.kind(), Kind::Object | Kind::List) || node.count() == 0 {
-        return report.wrong(node, &format!("an object of arrays is expected, not {}", described(node)));
+        return report
+            .wrong(node, &format!("an object of arrays is expected, not {}", described(node)));
     }
     let length = node.child(0).map_or(0, |first| first.datatype().elements);
     for (_, component) in node.children() {
@@ -17,7 +18,10 @@ pub fn verify(node: &Node, report: &mut Report) {
             report.wrong(component, &format!("numbers are expected, not {}", described(component)));
         } else if component.datatype().elements != length {
             let found = component.datatype().elements;
-            report.wrong(component, &format!("{found} elements, where the first component has {length}"));
+            report.wrong(
+                component,
+                &format!("{found} elements, where the first component has {length}"),
+            );
         }
     }
 }
@@ -42,8 +46,8 @@ pub fn is_interleaved(node: &Node) -> bool {
     report.is_valid()
         && count > 1
         && node.children().enumerate().all(|(index, (_, component))| {
-            let ahead =
-                isize::try_from(index).unwrap_or(0) * isize::try_from(first.datatype().element_bytes).unwrap_or(0);
+            let ahead = isize::try_from(index).unwrap_or(0)
+                * isize::try_from(first.datatype().element_bytes).unwrap_or(0);
             component.kind() == first.kind()
                 && component.datatype().stride == stride
                 && component.element(0) == first.element(0).wrapping_offset(ahead)
@@ -79,8 +83,13 @@ pub fn arranged(node: &Node, arrangement: Arrangement) -> Result<Option<Node>> {
     let mut offset = 0;
     for (name, component) in node.children() {
         let kind = component.kind();
-        let layout = Datatype { offset, stride: row, ..Datatype::compact(kind, component.datatype().elements) };
-        let target = if node.kind() == Kind::Object { copy.child_named(name)? } else { copy.append()? };
+        let layout = Datatype {
+            offset,
+            stride: row,
+            ..Datatype::compact(kind, component.datatype().elements)
+        };
+        let target =
+            if node.kind() == Kind::Object { copy.child_named(name)? } else { copy.append()? };
         target.within(layout, block.clone());
         target.write_from(component)?;
         offset += kind.bytes();

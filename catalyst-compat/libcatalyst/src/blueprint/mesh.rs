@@ -10,13 +10,19 @@ use crate::node::Node;
 #[must_use]
 pub fn is_multi_domain(node: &Node) -> bool {
     let holds = |part: &str| node.get(part).is_some();
-    matches!(node.kind(), Kind::Empty | Kind::Object | Kind::List) && !holds("coordsets") && !holds("topologies")
+    matches!(node.kind(), Kind::Empty | Kind::Object | Kind::List)
+        && !holds("coordsets")
+        && !holds("topologies")
 }
 
 /// The domains of a mesh: itself, or its children.
 #[must_use]
 pub fn domains(node: &Node) -> Vec<&Node> {
-    if is_multi_domain(node) { node.children().map(|(_, domain)| domain).collect() } else { vec![node] }
+    if is_multi_domain(node) {
+        node.children().map(|(_, domain)| domain).collect()
+    } else {
+        vec![node]
+    }
 }
 
 /// Verifies a mesh of one domain, several, or none: a rank may have nothing.
@@ -53,7 +59,9 @@ fn verify_domain(mesh: &Node, report: &mut Report) {
         ("adjsets", "adjset", sets::adjset),
         ("nestsets", "nestset", sets::nestset),
     ];
-    for (group, protocol, check) in optional.into_iter().filter(|(group, ..)| mesh.get(group).is_some()) {
+    for (group, protocol, check) in
+        optional.into_iter().filter(|(group, ..)| mesh.get(group).is_some())
+    {
         if let Some(children) = report.object(mesh, group) {
             each(children, group, protocol, check, report);
         }
@@ -94,8 +102,14 @@ fn refer(mesh: &Node, group: &str, reference: &str, target: &str, report: &mut R
             continue;
         };
         if mesh.get(target).is_none_or(|targets| targets.get(&named).is_none()) {
-            let known: Vec<_> = mesh.get(target).into_iter().flat_map(Node::children).map(|(name, _)| name).collect();
-            let message = format!("there is no '{named}' in '{target}'; there are [{}]", known.join(", "));
+            let known: Vec<_> = mesh
+                .get(target)
+                .into_iter()
+                .flat_map(Node::children)
+                .map(|(name, _)| name)
+                .collect();
+            let message =
+                format!("there is no '{named}' in '{target}'; there are [{}]", known.join(", "));
             let place = member.get(reference).unwrap_or(member);
             report.below(group, "mesh").below(name, "mesh").wrong(place, &message);
         }
@@ -123,7 +137,9 @@ pub fn verify_part(protocol: &str, node: &Node, report: &mut Report) {
         "topology/shape" => |node, report| parts::word(node, &parts::SHAPES, report),
         "topology/shape_map" => parts::shape_map,
         "field" => parts::field,
-        "field/association" | "association" => |node, report| parts::word(node, &parts::ASSOCIATIONS, report),
+        "field/association" | "association" => {
+            |node, report| parts::word(node, &parts::ASSOCIATIONS, report)
+        }
         "field/basis" => |node, report| {
             if node.text().is_none() {
                 report.wrong(node, &format!("a text is expected, not {}", described(node)));

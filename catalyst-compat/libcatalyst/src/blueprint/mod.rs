@@ -19,7 +19,8 @@ use report::Report;
 pub const PROTOCOLS: [&str; 5] = ["mesh", "mcarray", "table", "zfparray", "o2mrelation"];
 
 /// The parts of a mesh that can be verified by themselves.
-pub const MESH_PARTS: [&str; 8] = ["coordset", "topology", "field", "matset", "specset", "adjset", "nestset", "index"];
+pub const MESH_PARTS: [&str; 8] =
+    ["coordset", "topology", "field", "matset", "specset", "adjset", "nestset", "index"];
 
 /// Verifies a tree and fills `info` with what was found.
 ///
@@ -35,8 +36,13 @@ pub fn verify(protocol: &str, node: &Node, info: &mut Node) -> Result<bool> {
         ("table", "") => table::verify(node, &mut report),
         ("zfparray", "") => table::verify_compressed(node, &mut report),
         ("o2mrelation", "") => sets::verify_relation(node, &mut report),
-        _ if PROTOCOLS.contains(&first) => report.wrong(node, &format!("'{first}' has no protocol '{rest}' below it")),
-        _ => report.wrong(node, &format!("there is no protocol '{protocol}'; there are {}", PROTOCOLS.join(", "))),
+        _ if PROTOCOLS.contains(&first) => {
+            report.wrong(node, &format!("'{first}' has no protocol '{rest}' below it"))
+        }
+        _ => report.wrong(
+            node,
+            &format!("there is no protocol '{protocol}'; there are {}", PROTOCOLS.join(", ")),
+        ),
     }
     let valid = report.is_valid();
     info.replace(report.into_node()?);

@@ -43,12 +43,16 @@ type Selected = Vec<(Option<i64>, Piece)>;
 pub fn partition(mesh: &Node, options: &Node) -> Result<Node> {
     let topology = options.get("topology").and_then(Node::text);
     let sources = domains(mesh);
-    let read: Result<Vec<_>> = sources.iter().map(|domain| Domain::read(domain, topology.as_deref())).collect();
+    let read: Result<Vec<_>> =
+        sources.iter().map(|domain| Domain::read(domain, topology.as_deref())).collect();
     let numbers = numbers_of(&sources);
     let mut source = Source { domains: read?, numbers };
     if let Some(wanted) = options.get("fields").filter(|fields| fields.kind() == Kind::List) {
         let wanted: Vec<_> = wanted.children().filter_map(|(_, name)| name.text()).collect();
-        source.domains.iter_mut().for_each(|domain| domain.fields.retain(|(name, ..)| wanted.contains(name)));
+        source
+            .domains
+            .iter_mut()
+            .for_each(|domain| domain.fields.retain(|(name, ..)| wanted.contains(name)));
     }
     let mut selected = Selected::new();
     match options.get("selections").filter(|selections| selections.count() > 0) {
@@ -64,23 +68,37 @@ pub fn partition(mesh: &Node, options: &Node) -> Result<Node> {
     }
     let mut groups: BTreeMap<i64, Vec<Piece>> = BTreeMap::new();
     let mut pieces = Vec::new();
-    for (destination, piece) in selected.into_iter().filter(|(_, (_, elements))| !elements.is_empty()) {
+    for (destination, piece) in
+        selected.into_iter().filter(|(_, (_, elements))| !elements.is_empty())
+    {
         match destination {
             Some(number) => groups.entry(number).or_default().push(piece),
             None => pieces.push(piece),
         }
     }
-    let target = options.get("target").and_then(Node::integer).and_then(|target| usize::try_from(target).ok());
-    let target = target.filter(|target| *target > 0).map(|target| target.saturating_sub(groups.len()).max(1));
+    let target = options
+        .get("target")
+        .and_then(Node::integer)
+        .and_then(|target| usize::try_from(target).ok());
+    let target = target
+        .filter(|target| *target > 0)
+        .map(|target| target.saturating_sub(groups.len()).max(1));
     let free = arranged(pieces, target);
-    let mut unused =
-        (0..).filter(|number| !groups.contains_key(number)).take(free.len()).collect::<Vec<_>>().into_iter();
+    let mut unused = (0..)
+        .filter(|number| !groups.contains_key(number))
+        .take(free.len())
+        .collect::<Vec<_>>()
+        .into_iter();
     groups.extend(free.into_iter().filter_map(|group| Some((unused.next()?, group))));
     let mapping = options.get("mapping").and_then(Node::integer) != Some(0);
     let count = groups.len();
     let mut output = Node::new();
     for (number, group) in &groups {
-        let domain = if count == 1 { &mut output } else { output.child_named(&format!("domain_{number:05}"))? };
+        let domain = if count == 1 {
+            &mut output
+        } else {
+            output.child_named(&format!("domain_{number:05}"))?
+        };
         let origins = write(group, &source.domains, domain)?;
         if mapping {
             origins.write(group, &source, options, domain)?;
@@ -94,7 +112,8 @@ pub fn partition(mesh: &Node, options: &Node) -> Result<Node> {
 fn arranged(mut pieces: Vec<Piece>, target: Option<usize>) -> Vec<Vec<Piece>> {
     let target = target.unwrap_or(pieces.len());
     while pieces.len() < target {
-        let largest = (0..pieces.len()).max_by_key(|index| (pieces[*index].1.len(), usize::MAX - index));
+        let largest =
+            (0..pieces.len()).max_by_key(|index| (pieces[*index].1.len(), usize::MAX - index));
         let Some(index) = largest.filter(|index| pieces[*index].1.len() > 1) else {
             break;
         };
@@ -124,8 +143,16 @@ struct Origins {
 }
 
 impl Origins {
-    fn write(&self, group: &[Piece], source: &Source<'_>, options: &Node, output: &mut Node) -> Result<()> {
-        let elements = group.iter().flat_map(|(domain, elements)| elements.iter().map(|element| (*domain, *element)));
+    fn write(
+        &self,
+        group: &[Piece],
+        source: &Source<'_>,
+        options: &Node,
+        output: &mut Node,
+    ) -> Result<()> {
+        let elements = group
+            .iter()
+            .flat_map(|(domain, elements)| elements.iter().map(|element| (*domain, *element)));
         for (name, association, rows) in [
             ("original_element_ids", "element", elements.collect::<Vec<_>>()),
             ("original_vertex_ids", "vertex", self.vertices.clone()),
@@ -134,8 +161,10 @@ impl Origins {
             let ids = output.at("fields")?.child_named(&named)?;
             ids.at("association")?.set_text(association)?;
             ids.at("topology")?.set_text(&self.topology)?;
-            let of_domains: Vec<i64> = rows.iter().map(|(domain, _)| source.numbers[*domain]).collect();
-            let numbers: Vec<i64> = rows.iter().map(|(_, row)| i64::try_from(*row).unwrap_or(i64::MAX)).collect();
+            let of_domains: Vec<i64> =
+                rows.iter().map(|(domain, _)| source.numbers[*domain]).collect();
+            let numbers: Vec<i64> =
+                rows.iter().map(|(_, row)| i64::try_from(*row).unwrap_or(i64::MAX)).collect();
             ids.at("values/domains")?.set_numbers(&of_domains)?;
             ids.at("values/ids")?.set_numbers(&numbers)?;
         }
@@ -144,9 +173,12 @@ impl Origins {
 }
 
 fn indices(node: &Node) -> Result<Vec<usize>> {
-    let values = node.numbers().map(|number| number.as_i64().and_then(|value| usize::try_from(value).ok()));
+    let values =
+        node.numbers().map(|number| number.as_i64().and_then(|value| usize::try_from(value).ok()));
     let all: Option<Vec<_>> = values.collect();
-    all.ok_or_else(|| Error::new(format!("{} holds something else than numbers of elements", node.place())))
+    all.ok_or_else(|| {
+        Error::new(format!("{} holds something else than numbers of elements", node.place()))
+    })
 }
 
 fn select(selection: &Node, source: &Source<'_>, selected: &mut Selected) -> Result<()> {
@@ -178,10 +210,12 @@ fn choose(
             ranges.chunks_exact(2).flat_map(|range| range[0]..=range[1].min(count)).collect()
         }
         "logical" => {
-            let cells =
-                domain.cells.ok_or_else(|| Error::new(format!("{}: the domain is no grid", selection.place())))?;
+            let cells = domain.cells.ok_or_else(|| {
+                Error::new(format!("{}: the domain is no grid", selection.place()))
+            })?;
             let many = cells.map(|cells| cells.max(1));
-            let (start, end) = (indices(selection.existing("start")?)?, indices(selection.existing("end")?)?);
+            let (start, end) =
+                (indices(selection.existing("start")?)?, indices(selection.existing("end")?)?);
             let range = |axis: usize| {
                 let first = start.get(axis).copied().unwrap_or(0);
                 first..=end.get(axis).copied().unwrap_or(first).min(many[axis] - 1)
@@ -198,15 +232,20 @@ fn choose(
             let name = selection.existing("field")?.text().unwrap_or_default();
             let field = domain.fields.iter().find(|(known, vertex, _)| *known == name && !*vertex);
             let values = field.and_then(|(_, _, field)| field.get("values"));
-            let values = values.ok_or_else(|| Error::new(format!("there is no element field '{name}'")))?;
+            let values =
+                values.ok_or_else(|| Error::new(format!("there is no element field '{name}'")))?;
             let mut by_value: BTreeMap<i64, Vec<usize>> = BTreeMap::new();
             for (element, value) in values.numbers().enumerate() {
                 by_value.entry(value.as_i64().unwrap_or(0)).or_default().push(element);
             }
-            selected.extend(by_value.into_iter().map(|(value, elements)| (Some(value), (number, elements))));
+            selected.extend(
+                by_value.into_iter().map(|(value, elements)| (Some(value), (number, elements))),
+            );
             return Ok(());
         }
-        _ => return Err(Error::new(format!("'{kind}' is none of explicit, ranges, logical, field"))),
+        _ => {
+            return Err(Error::new(format!("'{kind}' is none of explicit, ranges, logical, field")));
+        }
     };
     if let Some(wrong) = chosen.iter().find(|element| **element >= count) {
         return Err(Error::new(format!("{}: element {wrong} of {count}", selection.place())));
@@ -232,7 +271,8 @@ impl Vertices {
         let Self { joined, by_place, .. } = self;
         let new = *self.by_vertex.entry((number, vertex)).or_insert_with(|| {
             // Zero has two signs but is one place.
-            let place = || domain.axes.iter().map(|(_, values)| (values[vertex] + 0.0).to_bits()).collect();
+            let place =
+                || domain.axes.iter().map(|(_, values)| (values[vertex] + 0.0).to_bits()).collect();
             if *joined { *by_place.entry(place()).or_insert(next) } else { next }
         });
         if new == next {
@@ -264,7 +304,8 @@ impl Runs {
         if mixed {
             let mut numbers = Vec::new();
             for shape in shapes {
-                let number = NUMBERS.iter().find(|(name, _)| name == shape).map_or(0, |(_, number)| *number);
+                let number =
+                    NUMBERS.iter().find(|(name, _)| name == shape).map_or(0, |(_, number)| *number);
                 output.at("shape_map")?.child_named(shape)?.set_number(number)?;
                 numbers.push(number);
             }
@@ -323,7 +364,10 @@ fn write(group: &[Piece], domains: &[Domain<'_>], output: &mut Node) -> Result<O
         let value = |(number, vertex): &(usize, usize)| {
             domains[*number].axes.get(axis).map_or(0.0, |(_, values)| values[*vertex])
         };
-        coordset.at("values")?.child_named(name)?.set_numbers(&vertices.iter().map(value).collect::<Vec<_>>())?;
+        coordset
+            .at("values")?
+            .child_named(name)?
+            .set_numbers(&vertices.iter().map(value).collect::<Vec<_>>())?;
     }
     let topology = output.at("topologies")?.child_named(&first.topology)?;
     topology.at("type")?.set_text("unstructured")?;
@@ -336,10 +380,14 @@ fn write(group: &[Piece], domains: &[Domain<'_>], output: &mut Node) -> Result<O
     for (name, at_vertices, field) in &first.fields {
         let rows = if *at_vertices { &vertices } else { &elements };
         let values = |number: usize| {
-            let found = domains[number].fields.iter().find(|(known, vertex, _)| known == name && vertex == at_vertices);
+            let found = domains[number]
+                .fields
+                .iter()
+                .find(|(known, vertex, _)| known == name && vertex == at_vertices);
             found.and_then(|(_, _, field)| field.get("values"))
         };
-        let found: Option<Vec<_>> = rows.iter().map(|(number, row)| Some((values(*number)?, *row))).collect();
+        let found: Option<Vec<_>> =
+            rows.iter().map(|(number, row)| Some((values(*number)?, *row))).collect();
         // A field that one of the joined domains lacks is left out.
         let Some(found) = found else {
             continue;

@@ -8,10 +8,22 @@ use crate::node::Node;
 /// The types of coordinate sets.
 pub const COORDSETS: [&str; 3] = ["uniform", "rectilinear", "explicit"];
 /// The types of topologies.
-pub const TOPOLOGIES: [&str; 5] = ["points", "uniform", "rectilinear", "structured", "unstructured"];
+pub const TOPOLOGIES: [&str; 5] =
+    ["points", "uniform", "rectilinear", "structured", "unstructured"];
 /// The shapes of elements.
-pub const SHAPES: [&str; 11] =
-    ["point", "line", "tri", "quad", "tet", "hex", "wedge", "pyramid", "polygonal", "polyhedral", "mixed"];
+pub const SHAPES: [&str; 11] = [
+    "point",
+    "line",
+    "tri",
+    "quad",
+    "tet",
+    "hex",
+    "wedge",
+    "pyramid",
+    "polygonal",
+    "polyhedral",
+    "mixed",
+];
 /// Where the values of a field are.
 pub const ASSOCIATIONS: [&str; 2] = ["vertex", "element"];
 /// The names of coordinates.
@@ -60,11 +72,15 @@ pub fn spacing(node: &Node, report: &mut Report) {
 
 fn along_axes(node: &Node, before: &str, report: &mut Report) {
     if !matches!(node.kind(), Kind::Object | Kind::Empty) {
-        return report.wrong(node, &format!("an object of numbers is expected, not {}", described(node)));
+        return report
+            .wrong(node, &format!("an object of numbers is expected, not {}", described(node)));
     }
     for (name, value) in node.children() {
         if !name.strip_prefix(before).is_some_and(|axis| AXES.contains(&axis)) {
-            report.remark(&format!("'{name}' is not read; axes are {}, after '{before}'", AXES.join(", ")));
+            report.remark(&format!(
+                "'{name}' is not read; axes are {}, after '{before}'",
+                AXES.join(", ")
+            ));
         } else if !value.kind().is_number() {
             report.wrong(value, &format!("a number is expected, not {}", described(value)));
         }
@@ -74,7 +90,8 @@ fn along_axes(node: &Node, before: &str, report: &mut Report) {
 /// Verifies numbers of points or elements by `i`, `j`, `k`.
 pub fn logical_dims(node: &Node, report: &mut Report) {
     if node.kind() != Kind::Object || node.get("i").is_none() {
-        return report.wrong(node, &format!("'i' (and 'j', 'k') is expected, not {}", described(node)));
+        return report
+            .wrong(node, &format!("'i' (and 'j', 'k') is expected, not {}", described(node)));
     }
     for (name, value) in node.children().filter(|(name, _)| ["i", "j", "k"].contains(name)) {
         match value.integer() {
@@ -82,7 +99,9 @@ pub fn logical_dims(node: &Node, report: &mut Report) {
                 report.wrong(value, &format!("an integer is expected, not {}", described(value)));
             }
             Some(count) if count >= 0 => {}
-            Some(count) => report.wrong(value, &format!("'{name}' is {count}; it cannot be negative")),
+            Some(count) => {
+                report.wrong(value, &format!("'{name}' is {count}; it cannot be negative"))
+            }
             None => report.wrong(value, "an integer is expected; there is none"),
         }
     }
@@ -94,7 +113,10 @@ pub fn rectilinear_coordset(node: &Node, report: &mut Report) {
         return;
     };
     if !matches!(values.kind(), Kind::Object | Kind::List) || values.count() == 0 {
-        return report.wrong(values, &format!("an array for each axis is expected, not {}", described(values)));
+        return report.wrong(
+            values,
+            &format!("an array for each axis is expected, not {}", described(values)),
+        );
     }
     for (_, value) in values.children().filter(|(_, value)| !value.kind().is_number()) {
         report.wrong(value, &format!("numbers are expected, not {}", described(value)));
@@ -166,7 +188,8 @@ fn unstructured(node: &Node, report: &mut Report) {
         return;
     };
     if !matches!(elements.kind(), Kind::Object | Kind::List) || elements.count() == 0 {
-        return report.wrong(elements, &format!("elements are expected, not {}", described(elements)));
+        return report
+            .wrong(elements, &format!("elements are expected, not {}", described(elements)));
     }
     let faces = node.get("subelements");
     if elements.get("shape").is_some() || elements.get("connectivity").is_some() {
@@ -218,9 +241,14 @@ fn elements_of(elements: &Node, report: &mut Report) {
             }
             let shapes = shapes.map(|shapes| shapes.datatype().elements);
             for name in ["sizes", "offsets"] {
-                let found = report.integers(elements, name).filter(|found| shapes != Some(found.datatype().elements));
+                let found = report
+                    .integers(elements, name)
+                    .filter(|found| shapes != Some(found.datatype().elements));
                 if let (Some(found), Some(shapes)) = (found, shapes) {
-                    report.wrong(found, &format!("{} entries for {shapes} shapes", found.datatype().elements));
+                    report.wrong(
+                        found,
+                        &format!("{} entries for {shapes} shapes", found.datatype().elements),
+                    );
                 }
             }
         }
@@ -228,10 +256,14 @@ fn elements_of(elements: &Node, report: &mut Report) {
             let size = vertices_of(shape).unwrap_or(1);
             let count = connectivity.map_or(0, |connectivity| connectivity.datatype().elements);
             if count % size != 0 {
-                report.remark(&format!("{count} vertices are no whole number of '{shape}', which has {size}"));
+                report.remark(&format!(
+                    "{count} vertices are no whole number of '{shape}', which has {size}"
+                ));
             }
             if elements.get("offsets").is_some() {
-                report.remark(&format!("'offsets' are not read: each '{shape}' has as many vertices"));
+                report.remark(&format!(
+                    "'offsets' are not read: each '{shape}' has as many vertices"
+                ));
             }
         }
         None => {}
@@ -248,7 +280,8 @@ fn sizes_and_offsets(elements: &Node, report: &mut Report) {
     if let (Some(sizes), Some(offsets)) = (sizes, offsets)
         && offsets.datatype().elements != sizes
     {
-        report.wrong(offsets, &format!("{} offsets for {sizes} sizes", offsets.datatype().elements));
+        report
+            .wrong(offsets, &format!("{} offsets for {sizes} sizes", offsets.datatype().elements));
     }
 }
 
@@ -265,7 +298,10 @@ fn faces_of(faces: &Node, report: &mut Report) {
 /// Verifies a map from the names of shapes to numbers.
 pub fn shape_map(node: &Node, report: &mut Report) {
     if node.kind() != Kind::Object || node.count() == 0 {
-        return report.wrong(node, &format!("shapes with their numbers are expected, not {}", described(node)));
+        return report.wrong(
+            node,
+            &format!("shapes with their numbers are expected, not {}", described(node)),
+        );
     }
     for (name, value) in node.children() {
         if !SHAPES.contains(&name) || name == "mixed" {
@@ -294,14 +330,20 @@ pub fn vertices_of(shape: &str) -> Option<i64> {
 /// Verifies a field.
 pub fn field(node: &Node, report: &mut Report) {
     whereabouts(node, report);
-    if node.get("volume_dependent").is_some_and(|flag| !matches!(flag.text().as_deref(), Some("true" | "false"))) {
+    if node
+        .get("volume_dependent")
+        .is_some_and(|flag| !matches!(flag.text().as_deref(), Some("true" | "false")))
+    {
         report.remark("'volume_dependent' is neither 'true' nor 'false'");
     }
     for (reference, values) in [("topology", "values"), ("matset", "matset_values")] {
         match (node.get(reference), node.get(values)) {
             (None, None) => {}
             (Some(_), None) | (None, Some(_)) => {
-                report.wrong(node, &format!("'{reference}' and '{values}' go together, but one is missing"));
+                report.wrong(
+                    node,
+                    &format!("'{reference}' and '{values}' go together, but one is missing"),
+                );
             }
             (Some(_), Some(found)) if values == "values" => {
                 report.text(node, reference);
@@ -337,7 +379,8 @@ fn by_material(node: &Node, depth: usize, report: &mut Report) {
         return;
     }
     if depth == 0 || !matches!(node.kind(), Kind::Object | Kind::List) || node.count() == 0 {
-        return report.wrong(node, &format!("values by material are expected, not {}", described(node)));
+        return report
+            .wrong(node, &format!("values by material are expected, not {}", described(node)));
     }
     for (_, child) in node.children() {
         by_material(child, depth - 1, report);

@@ -71,7 +71,10 @@ impl Report {
         if found.kind() == Kind::Object && found.count() > 0 {
             return Some(found);
         }
-        self.wrong(found, &format!("an object with children is expected, not {}", described(found)));
+        self.wrong(
+            found,
+            &format!("an object with children is expected, not {}", described(found)),
+        );
         None
     }
 

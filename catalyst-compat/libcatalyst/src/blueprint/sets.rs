@@ -36,7 +36,8 @@ pub fn matset(node: &Node, report: &mut Report) {
             }
         }
     } else {
-        return report.wrong(fractions, &format!("fractions are expected, not {}", described(fractions)));
+        return report
+            .wrong(fractions, &format!("fractions are expected, not {}", described(fractions)));
     }
     if let Some(ids) = node.get("element_ids") {
         element_ids(ids, fractions, report);
@@ -53,7 +54,8 @@ fn element_ids(ids: &Node, fractions: &Node, report: &mut Report) {
     if fractions.kind().is_number() {
         return integers(ids, report);
     }
-    let same = ids.count() == fractions.count() && ids.children().all(|(name, _)| fractions.get(name).is_some());
+    let same = ids.count() == fractions.count()
+        && ids.children().all(|(name, _)| fractions.get(name).is_some());
     if ids.kind() != Kind::Object || !same {
         return report.wrong(ids, "the materials of 'volume_fractions' are expected");
     }
@@ -83,7 +85,10 @@ pub fn specset(node: &Node, report: &mut Report) {
             let found = first.datatype().elements;
             let expected = *length.get_or_insert(found);
             if found != expected {
-                below.wrong(material, &format!("{found} values, where the first material has {expected}"));
+                below.wrong(
+                    material,
+                    &format!("{found} values, where the first material has {expected}"),
+                );
             }
         }
     }
@@ -108,7 +113,12 @@ pub fn adjset(node: &Node, report: &mut Report) {
             below.remark("neither 'values' nor 'windows' is there");
         } else if let Some(windows) = below.object(group, "windows") {
             for (name, of_domain) in windows.children() {
-                window(of_domain, &["origin", "dims", "ratio"], &[], below.below(name, "mesh/adjset"));
+                window(
+                    of_domain,
+                    &["origin", "dims", "ratio"],
+                    &[],
+                    below.below(name, "mesh/adjset"),
+                );
             }
             if group.get("orientation").is_some() {
                 below.integers(group, "orientation");
@@ -143,7 +153,10 @@ fn window(node: &Node, needed: &[&str], optional: &[&str], report: &mut Report) 
         logical_dims(part, report);
         let expected = *directions.get_or_insert(part.count());
         if part.count() != expected {
-            report.wrong(part, &format!("{} directions, where the first part has {expected}", part.count()));
+            report.wrong(
+                part,
+                &format!("{} directions, where the first part has {expected}", part.count()),
+            );
         }
     }
 }

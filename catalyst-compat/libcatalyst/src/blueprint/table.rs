@@ -8,7 +8,8 @@ use crate::node::Node;
 /// Verifies a table (`values` with columns of one length), or an object or list of tables.
 pub fn verify(node: &Node, report: &mut Report) {
     if !matches!(node.kind(), Kind::Object | Kind::List) || node.count() == 0 {
-        return report.wrong(node, &format!("a table, or several, is expected, not {}", described(node)));
+        return report
+            .wrong(node, &format!("a table, or several, is expected, not {}", described(node)));
     }
     if node.get("values").is_some() {
         return verify_one(node, report);
@@ -55,7 +56,8 @@ fn verify_one(table: &Node, report: &mut Report) {
 
 /// Verifies an array that zfp has compressed: `zfpa`, its stream.
 pub fn verify_compressed(node: &Node, report: &mut Report) {
-    if let Some(stream) = report.needed(node, "zfpa").filter(|stream| !stream.kind().is_unsigned()) {
+    if let Some(stream) = report.needed(node, "zfpa").filter(|stream| !stream.kind().is_unsigned())
+    {
         report.wrong(stream, &format!("unsigned integers are expected, not {}", described(stream)));
     }
 }

@@ -71,7 +71,9 @@ unsafe extern "C-unwind" fn catalyst_conduit_blueprint_about(target: *mut Node) 
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_blueprint_mcarray_is_interleaved(source: *const Node) -> c_int {
+unsafe extern "C-unwind" fn catalyst_conduit_blueprint_mcarray_is_interleaved(
+    source: *const Node,
+) -> c_int {
     // SAFETY: the caller keeps to `c_api`'s rules.
     run(0, || Ok(mcarray::is_interleaved(unsafe { node(source)? }).into()))
 }
@@ -118,7 +120,8 @@ unsafe extern "C-unwind" fn catalyst_conduit_blueprint_mesh_generate_index(
     run((), || {
         // SAFETY: the caller keeps to `c_api`'s rules; the index is built before the target is borrowed.
         unsafe {
-            let made = blueprint::index::generate(node(mesh)?, &string(path, "the path")?, domains)?;
+            let made =
+                blueprint::index::generate(node(mesh)?, &string(path, "the path")?, domains)?;
             node_mut(index)?.take(made)
         }
     });
@@ -126,7 +129,12 @@ unsafe extern "C-unwind" fn catalyst_conduit_blueprint_mesh_generate_index(
 
 /// # Safety
 /// As the functions of [`super`].
-unsafe fn transform(mesh: *const Node, options: *const Node, target: *mut Node, how: fn(&Node, &Node) -> Result<Node>) {
+unsafe fn transform(
+    mesh: *const Node,
+    options: *const Node,
+    target: *mut Node,
+    how: fn(&Node, &Node) -> Result<Node>,
+) {
     run((), || {
         // SAFETY: the caller keeps to `c_api`'s rules; the output is built before the target is borrowed.
         unsafe {

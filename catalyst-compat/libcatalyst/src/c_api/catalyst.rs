@@ -9,8 +9,12 @@ use crate::node::Node;
 use crate::stub;
 
 /// The implementation, or the status that says why there is none.
-fn implementation(find: impl FnOnce() -> Result<Implementation, Status>) -> Result<Implementation, c_int> {
-    catch_unwind(AssertUnwindSafe(find)).unwrap_or(Err(Status::NoImplementation)).map_err(|status| status as c_int)
+fn implementation(
+    find: impl FnOnce() -> Result<Implementation, Status>,
+) -> Result<Implementation, c_int> {
+    catch_unwind(AssertUnwindSafe(find))
+        .unwrap_or(Err(Status::NoImplementation))
+        .map_err(|status| status as c_int)
 }
 
 fn present() -> Result<Implementation, Status> {

@@ -4,7 +4,9 @@ use std::ffi::{c_char, c_int, c_void};
 use std::ptr;
 
 use super::{hand_out, run};
-use crate::datatype::{BIG_ENDIAN, DEFAULT_ENDIANNESS, Datatype, Kind, LITTLE_ENDIAN, MACHINE_ENDIANNESS};
+use crate::datatype::{
+    BIG_ENDIAN, DEFAULT_ENDIANNESS, Datatype, Kind, LITTLE_ENDIAN, MACHINE_ENDIANNESS,
+};
 use crate::error::{Error, Result};
 
 /// # Safety
@@ -77,16 +79,23 @@ answers! {
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_datatype_element_index(pointer: *const Datatype, index: i64) -> i64 {
+unsafe extern "C-unwind" fn catalyst_conduit_datatype_element_index(
+    pointer: *const Datatype,
+    index: i64,
+) -> i64 {
     run(0, || {
         // SAFETY: the caller keeps to `c_api`'s rules.
         let found = unsafe { datatype(pointer)? }.element_index(index);
-        found.ok_or_else(|| Error::new(format!("the offset of element {index} does not fit into 64 bits")))
+        found.ok_or_else(|| {
+            Error::new(format!("the offset of element {index} does not fit into 64 bits"))
+        })
     })
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_datatype_name(pointer: *const Datatype) -> *mut c_char {
+unsafe extern "C-unwind" fn catalyst_conduit_datatype_name(
+    pointer: *const Datatype,
+) -> *mut c_char {
     // SAFETY: the caller keeps to `c_api`'s rules.
     run(ptr::null_mut(), || Ok(hand_out(unsafe { datatype(pointer)? }.kind.name())))
 }

@@ -33,8 +33,11 @@ unsafe fn borrow(target: *mut Node, path: Option<*const c_char>, source: *const 
             }
             let (here, there) = (node(target)?, node(source)?);
             if here.holds(there) || there.holds(here) {
-                let message =
-                    format!("{} cannot borrow from {}, which it holds or lies in", here.place(), there.place());
+                let message = format!(
+                    "{} cannot borrow from {}, which it holds or lies in",
+                    here.place(),
+                    there.place()
+                );
                 return Err(Error::new(message));
             }
             node_mut(target)?.take(mirror)
@@ -69,7 +72,10 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_set_path_node(
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_set_external_node(target: *mut Node, source: *mut Node) {
+unsafe extern "C-unwind" fn catalyst_conduit_node_set_external_node(
+    target: *mut Node,
+    source: *mut Node,
+) {
     // SAFETY: the caller keeps to `c_api`'s rules.
     unsafe { borrow(target, None, source) }
 }
@@ -86,7 +92,11 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_set_path_external_node(
 
 /// # Safety
 /// As the functions of [`super`].
-unsafe fn change(target: *mut Node, source: *const Node, how: impl FnOnce(&mut Node, &Node) -> Result<()>) {
+unsafe fn change(
+    target: *mut Node,
+    source: *const Node,
+    how: impl FnOnce(&mut Node, &Node) -> Result<()>,
+) {
     run((), || {
         // SAFETY: the caller keeps to `c_api`'s rules; nodes that overlap are told apart by a copy.
         unsafe {
@@ -105,13 +115,19 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_update(target: *mut Node, sour
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_update_compatible(target: *mut Node, source: *const Node) {
+unsafe extern "C-unwind" fn catalyst_conduit_node_update_compatible(
+    target: *mut Node,
+    source: *const Node,
+) {
     // SAFETY: the caller keeps to `c_api`'s rules.
     unsafe { change(target, source, Node::update_compatible) }
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_update_external(target: *mut Node, source: *mut Node) {
+unsafe extern "C-unwind" fn catalyst_conduit_node_update_external(
+    target: *mut Node,
+    source: *mut Node,
+) {
     run((), || {
         // SAFETY: the caller keeps to `c_api`'s rules; nodes that overlap are refused.
         unsafe {
@@ -125,7 +141,10 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_update_external(target: *mut N
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_compact_to(source: *const Node, target: *mut Node) {
+unsafe extern "C-unwind" fn catalyst_conduit_node_compact_to(
+    source: *const Node,
+    target: *mut Node,
+) {
     run((), || {
         // SAFETY: the caller keeps to `c_api`'s rules; the copy is made before the target is borrowed.
         unsafe {
@@ -172,7 +191,13 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_move(target: *mut Node, source
 
 /// # Safety
 /// As the functions of [`super`].
-unsafe fn difference(a: *const Node, b: *const Node, info: *mut Node, epsilon: f64, how: Comparison) -> c_int {
+unsafe fn difference(
+    a: *const Node,
+    b: *const Node,
+    info: *mut Node,
+    epsilon: f64,
+    how: Comparison,
+) -> c_int {
     run(0, || {
         // SAFETY: the caller keeps to `c_api`'s rules; the report is built apart.
         unsafe {
@@ -207,7 +232,10 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_diff_compatible(
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_compatible(a: *const Node, b: *const Node) -> c_int {
+unsafe extern "C-unwind" fn catalyst_conduit_node_compatible(
+    a: *const Node,
+    b: *const Node,
+) -> c_int {
     // SAFETY: the caller keeps to `c_api`'s rules.
     run(0, || Ok(unsafe { node(a)?.compatible(node(b)?) }.into()))
 }
@@ -232,7 +260,10 @@ answers! {
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_contiguous_with_node(a: *const Node, b: *const Node) -> c_int {
+unsafe extern "C-unwind" fn catalyst_conduit_node_contiguous_with_node(
+    a: *const Node,
+    b: *const Node,
+) -> c_int {
     run(0, || {
         // SAFETY: the caller keeps to `c_api`'s rules.
         let (here, before) = unsafe { (node(a)?, node(b)?) };
@@ -242,9 +273,14 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_contiguous_with_node(a: *const
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_contiguous_with_address(a: *const Node, end: *mut c_void) -> c_int {
+unsafe extern "C-unwind" fn catalyst_conduit_node_contiguous_with_address(
+    a: *const Node,
+    end: *mut c_void,
+) -> c_int {
     // SAFETY: the caller keeps to `c_api`'s rules; the address is only compared.
-    run(0, || Ok((!end.is_null() && unsafe { node(a)? }.contiguous_from(end.cast()).is_some()).into()))
+    run(0, || {
+        Ok((!end.is_null() && unsafe { node(a)? }.contiguous_from(end.cast()).is_some()).into())
+    })
 }
 
 #[unsafe(no_mangle)]

@@ -36,9 +36,19 @@ unsafe fn fill(target: *mut Node, made: impl FnOnce() -> Result<Node>) {
 ///
 /// # Safety
 /// As the functions of [`super`]; the data are what the schema describes, for as long as the tree refers to them.
-unsafe fn laid_over(schema: *const c_char, protocol: *const c_char, data: *mut c_void) -> Result<Node> {
+unsafe fn laid_over(
+    schema: *const c_char,
+    protocol: *const c_char,
+    data: *mut c_void,
+) -> Result<Node> {
     // SAFETY: as the caller promises.
-    unsafe { schema::over(&string(schema, "the schema")?, Protocol::from_name(&optional(protocol)?)?, data.cast()) }
+    unsafe {
+        schema::over(
+            &string(schema, "the schema")?,
+            Protocol::from_name(&optional(protocol)?)?,
+            data.cast(),
+        )
+    }
 }
 
 exported! {
@@ -70,7 +80,9 @@ fn styled(options: Option<&Node>, mut style: Style, protocol: &str) -> Result<(S
         None => Ok(otherwise),
         Some(node) => match node.integer().and_then(|value| usize::try_from(value).ok()) {
             Some(value) => Ok(value),
-            None => Err(Error::new(format!("the option '{name}' is a number that is not negative"))),
+            None => {
+                Err(Error::new(format!("the option '{name}' is a number that is not negative")))
+            }
         },
     };
     // Summaries leave nothing out where a threshold is 0 or negative.
@@ -80,7 +92,9 @@ fn styled(options: Option<&Node>, mut style: Style, protocol: &str) -> Result<(S
     };
     let text = |name: &str, otherwise: &str| match options.get(name) {
         None => Ok(otherwise.to_owned()),
-        Some(node) => node.text().ok_or_else(|| Error::new(format!("the option '{name}' is a text"))),
+        Some(node) => {
+            node.text().ok_or_else(|| Error::new(format!("the option '{name}' is a text")))
+        }
     };
     style.indent = count("indent", style.indent)?.min(1 << 10);
     style.depth = count("depth", style.depth)?.min(1 << 10);

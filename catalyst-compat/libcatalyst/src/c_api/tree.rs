@@ -37,13 +37,19 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_reset(target: *mut Node) {
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_fetch(target: *mut Node, path: *const c_char) -> *mut Node {
+unsafe extern "C-unwind" fn catalyst_conduit_node_fetch(
+    target: *mut Node,
+    path: *const c_char,
+) -> *mut Node {
     // SAFETY: the caller keeps to `c_api`'s rules.
     run(ptr::null_mut(), || unsafe { node_mut(target)?.fetch(&string(path, "the path")?) })
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_fetch_existing(source: *mut Node, path: *const c_char) -> *mut Node {
+unsafe extern "C-unwind" fn catalyst_conduit_node_fetch_existing(
+    source: *mut Node,
+    path: *const c_char,
+) -> *mut Node {
     run(ptr::null_mut(), || {
         // SAFETY: the caller keeps to `c_api`'s rules.
         let found = unsafe { node(source)?.existing(&string(path, "the path")?)? };
@@ -58,13 +64,21 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_append(target: *mut Node) -> *
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_add_child(target: *mut Node, name: *const c_char) -> *mut Node {
+unsafe extern "C-unwind" fn catalyst_conduit_node_add_child(
+    target: *mut Node,
+    name: *const c_char,
+) -> *mut Node {
     // SAFETY: the caller keeps to `c_api`'s rules.
-    run(ptr::null_mut(), || unsafe { node_mut(target)?.child_named(&string(name, "the name")?).map(ptr::from_mut) })
+    run(ptr::null_mut(), || unsafe {
+        node_mut(target)?.child_named(&string(name, "the name")?).map(ptr::from_mut)
+    })
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_child(source: *mut Node, index: i64) -> *mut Node {
+unsafe extern "C-unwind" fn catalyst_conduit_node_child(
+    source: *mut Node,
+    index: i64,
+) -> *mut Node {
     run(ptr::null_mut(), || {
         // SAFETY: the caller keeps to `c_api`'s rules.
         let source = unsafe { node_mut(source)? };
@@ -78,11 +92,18 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_child(source: *mut Node, index
 
 #[track_caller]
 fn no_child(source: &Node, index: i64) -> Error {
-    Error::new(format!("{} has {} children, none of number {index}", source.place(), source.count()))
+    Error::new(format!(
+        "{} has {} children, none of number {index}",
+        source.place(),
+        source.count()
+    ))
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_child_by_name(source: *mut Node, name: *const c_char) -> *mut Node {
+unsafe extern "C-unwind" fn catalyst_conduit_node_child_by_name(
+    source: *mut Node,
+    name: *const c_char,
+) -> *mut Node {
     run(ptr::null_mut(), || {
         // SAFETY: the caller keeps to `c_api`'s rules.
         let (source, name) = unsafe { (node(source)?, string(name, "the name")?) };
@@ -106,7 +127,10 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_number_of_elements(source: *mu
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_remove_path(target: *mut Node, path: *const c_char) {
+unsafe extern "C-unwind" fn catalyst_conduit_node_remove_path(
+    target: *mut Node,
+    path: *const c_char,
+) {
     // SAFETY: the caller keeps to `c_api`'s rules.
     run((), || unsafe { node_mut(target)?.remove_path(&string(path, "the path")?) });
 }
@@ -121,7 +145,10 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_remove_child(target: *mut Node
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_remove_child_by_name(target: *mut Node, name: *const c_char) {
+unsafe extern "C-unwind" fn catalyst_conduit_node_remove_child_by_name(
+    target: *mut Node,
+    name: *const c_char,
+) {
     // SAFETY: the caller keeps to `c_api`'s rules.
     run((), || unsafe { node_mut(target)?.remove_named(&string(name, "the name")?) });
 }
@@ -133,7 +160,9 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_rename_child(
     new: *const c_char,
 ) {
     // SAFETY: the caller keeps to `c_api`'s rules.
-    run((), || unsafe { node_mut(target)?.rename(&string(old, "the name")?, &string(new, "the new name")?) });
+    run((), || unsafe {
+        node_mut(target)?.rename(&string(old, "the name")?, &string(new, "the new name")?)
+    });
 }
 
 #[unsafe(no_mangle)]
@@ -149,13 +178,19 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_path(source: *const Node) -> *
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_has_child(source: *const Node, name: *const c_char) -> c_int {
+unsafe extern "C-unwind" fn catalyst_conduit_node_has_child(
+    source: *const Node,
+    name: *const c_char,
+) -> c_int {
     // SAFETY: the caller keeps to `c_api`'s rules.
     run(0, || Ok(unsafe { node(source)?.get(&string(name, "the name")?) }.is_some().into()))
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_has_path(source: *const Node, path: *const c_char) -> c_int {
+unsafe extern "C-unwind" fn catalyst_conduit_node_has_path(
+    source: *const Node,
+    path: *const c_char,
+) -> c_int {
     // SAFETY: the caller keeps to `c_api`'s rules.
     run(0, || Ok(unsafe { node(source)?.find(&string(path, "the path")?) }.is_some().into()))
 }
@@ -185,7 +220,10 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_data_ptr(source: *mut Node) ->
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_element_ptr(source: *mut Node, index: i64) -> *mut c_void {
+unsafe extern "C-unwind" fn catalyst_conduit_node_element_ptr(
+    source: *mut Node,
+    index: i64,
+) -> *mut c_void {
     // SAFETY: the caller keeps to `c_api`'s rules.
     run(ptr::null_mut(), || Ok(unsafe { node(source)? }.element(index).cast()))
 }
@@ -196,7 +234,9 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_fetch_path_data_ptr(
     path: *const c_char,
 ) -> *mut c_void {
     // SAFETY: the caller keeps to `c_api`'s rules.
-    run(ptr::null_mut(), || Ok(unsafe { node(source)?.existing(&string(path, "the path")?)? }.data().cast()))
+    run(ptr::null_mut(), || {
+        Ok(unsafe { node(source)?.existing(&string(path, "the path")?)? }.data().cast())
+    })
 }
 
 #[unsafe(no_mangle)]
@@ -215,7 +255,9 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_fetch_path_element_ptr(
     index: i64,
 ) -> *mut c_void {
     // SAFETY: the caller keeps to `c_api`'s rules.
-    run(ptr::null_mut(), || Ok(unsafe { node(source)?.existing(&string(path, "the path")?)? }.element(index).cast()))
+    run(ptr::null_mut(), || {
+        Ok(unsafe { node(source)?.existing(&string(path, "the path")?)? }.element(index).cast())
+    })
 }
 
 #[unsafe(no_mangle)]
@@ -249,7 +291,8 @@ unsafe fn borrow_text(target: *mut Node, path: Option<*const c_char>, value: *mu
             if value.is_null() {
                 return Err(Error::new("the text is null"));
             }
-            let length = i64::try_from(libc::strlen(value) + 1).map_err(|_| Error::new("too long a text"))?;
+            let length = i64::try_from(libc::strlen(value) + 1)
+                .map_err(|_| Error::new("too long a text"))?;
             let layout = Datatype::compact(Kind::Text, length);
             node_mut(at(target, path)?)?.borrow_elements(Kind::Text, value.cast(), layout)
         }
@@ -267,7 +310,10 @@ unsafe fn at(target: *mut Node, path: Option<*const c_char>) -> Result<*mut Node
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_set_char8_str(target: *mut Node, value: *const c_char) {
+unsafe extern "C-unwind" fn catalyst_conduit_node_set_char8_str(
+    target: *mut Node,
+    value: *const c_char,
+) {
     // SAFETY: the caller keeps to `c_api`'s rules.
     unsafe { set_text(target, None, value) }
 }
@@ -283,7 +329,10 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_set_path_char8_str(
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C-unwind" fn catalyst_conduit_node_set_external_char8_str(target: *mut Node, value: *mut c_char) {
+unsafe extern "C-unwind" fn catalyst_conduit_node_set_external_char8_str(
+    target: *mut Node,
+    value: *mut c_char,
+) {
     // SAFETY: the caller keeps to `c_api`'s rules.
     unsafe { borrow_text(target, None, value) }
 }
@@ -315,5 +364,7 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_fetch_path_as_char8_str(
     path: *const c_char,
 ) -> *mut c_char {
     // SAFETY: the caller keeps to `c_api`'s rules.
-    run(ptr::null_mut(), || text_address(unsafe { node(source)?.existing(&string(path, "the path")?)? }))
+    run(ptr::null_mut(), || {
+        text_address(unsafe { node(source)?.existing(&string(path, "the path")?)? })
+    })
 }

@@ -1,7 +1,9 @@
 //! The mechanical families: for each type, setting (by value, by pointer, by pointer with a layout; here, at a path; copied,
 //! borrowed) and getting (the first element, the address; here, at a path).
 
-use std::ffi::{c_char, c_double, c_float, c_int, c_long, c_schar, c_short, c_uchar, c_uint, c_ulong, c_ushort};
+use std::ffi::{
+    c_char, c_double, c_float, c_int, c_long, c_schar, c_short, c_uchar, c_uint, c_ulong, c_ushort,
+};
 use std::ptr;
 
 use super::{exported, node, node_mut, run, string};
@@ -15,7 +17,12 @@ type Char = c_schar;
 
 /// # Safety
 /// As the functions of [`super`]; `data` is as long as `layout` says.
-unsafe fn set<T: Element>(target: *mut Node, path: Option<*const c_char>, data: *const T, layout: Datatype) {
+unsafe fn set<T: Element>(
+    target: *mut Node,
+    path: Option<*const c_char>,
+    data: *const T,
+    layout: Datatype,
+) {
     run((), || {
         // SAFETY: as the caller promises.
         unsafe {
@@ -40,7 +47,12 @@ unsafe fn set<T: Element>(target: *mut Node, path: Option<*const c_char>, data: 
 
 /// # Safety
 /// As the functions of [`super`]; `data` stays as long as `layout` says for as long as the node refers to it.
-unsafe fn borrow<T: Element>(target: *mut Node, path: Option<*const c_char>, data: *mut T, layout: Datatype) {
+unsafe fn borrow<T: Element>(
+    target: *mut Node,
+    path: Option<*const c_char>,
+    data: *mut T,
+    layout: Datatype,
+) {
     run((), || {
         // SAFETY: as the caller promises.
         unsafe {

@@ -63,7 +63,9 @@ impl<'r, 'a> Flow<'r, 'a> {
     fn colon(&self, index: usize) -> bool {
         let bytes = self.text.as_bytes();
         bytes.get(index) == Some(&b':')
-            && bytes.get(index + 1).is_none_or(|next| next.is_ascii_whitespace() || b",[]{}".contains(next))
+            && bytes
+                .get(index + 1)
+                .is_none_or(|next| next.is_ascii_whitespace() || b",[]{}".contains(next))
     }
 
     #[track_caller]
@@ -78,7 +80,11 @@ impl<'r, 'a> Flow<'r, 'a> {
     /// That nothing but a comment follows in the line.
     pub(super) fn end(&mut self) -> Result<()> {
         let rest = self.rest().trim_start();
-        if rest.is_empty() || rest.starts_with('#') { Ok(()) } else { Err(self.expected("the end of the line")) }
+        if rest.is_empty() || rest.starts_with('#') {
+            Ok(())
+        } else {
+            Err(self.expected("the end of the line"))
+        }
     }
 
     pub(super) fn value(&mut self) -> Result<Value> {
@@ -149,7 +155,9 @@ impl<'r, 'a> Flow<'r, 'a> {
             self.skip();
             // A name in a sequence begins a mapping of one entry.
             values.push(match value {
-                Value::Text(name) if self.take(b':') => Value::Object(vec![(name, self.value_or_nothing()?)]),
+                Value::Text(name) if self.take(b':') => {
+                    Value::Object(vec![(name, self.value_or_nothing()?)])
+                }
                 value => value,
             });
             self.skip();
@@ -170,7 +178,8 @@ impl<'r, 'a> Flow<'r, 'a> {
     /// An alias, an anchor or a tag.
     fn word(&mut self) -> &'a str {
         let rest = self.rest();
-        let length = rest.find(|character: char| character.is_whitespace() || ",[]{}".contains(character));
+        let length =
+            rest.find(|character: char| character.is_whitespace() || ",[]{}".contains(character));
         let word = &rest[..length.unwrap_or(rest.len())];
         self.at += word.len();
         word
@@ -181,7 +190,8 @@ impl<'r, 'a> Flow<'r, 'a> {
         loop {
             let bytes = self.text.as_bytes();
             let stops = |index: usize| {
-                let comment = bytes[index] == b'#' && index > 0 && bytes[index - 1].is_ascii_whitespace();
+                let comment =
+                    bytes[index] == b'#' && index > 0 && bytes[index - 1].is_ascii_whitespace();
                 b",[]{}".contains(&bytes[index]) || self.colon(index) || comment
             };
             let end = (self.at..bytes.len()).find(|index| stops(*index)).unwrap_or(bytes.len());
@@ -261,7 +271,9 @@ impl<'r, 'a> Flow<'r, 'a> {
 
     /// A character by its number of so many digits; one above 16 bits may be two numbers, as in JSON.
     fn code(&mut self, digits: usize) -> Result<char> {
-        let Some(high) = self.rest().get(..digits).and_then(|code| u32::from_str_radix(code, 16).ok()) else {
+        let Some(high) =
+            self.rest().get(..digits).and_then(|code| u32::from_str_radix(code, 16).ok())
+        else {
             return Err(self.expected(&format!("{digits} hexadecimal digits")));
         };
         self.at += digits;
@@ -269,7 +281,9 @@ impl<'r, 'a> Flow<'r, 'a> {
             0xd800..0xdc00 if self.rest().starts_with("\\u") => {
                 let low = self.rest().get(2..6).and_then(|code| u32::from_str_radix(code, 16).ok());
                 self.at += if low.is_some() { 6 } else { 0 };
-                low.map_or(high, |low| 0x10000 + ((high - 0xd800) << 10) + (low.wrapping_sub(0xdc00) & 0x3ff))
+                low.map_or(high, |low| {
+                    0x10000 + ((high - 0xd800) << 10) + (low.wrapping_sub(0xdc00) & 0x3ff)
+                })
             }
             _ => high,
         };

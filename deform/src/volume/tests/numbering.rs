@@ -22,14 +22,20 @@ fn displacements_are_those_of_the_same_vertices() {
     for (name, mesh) in [("tets", jiggled(&cube(9), 0.02)), ("mixed", mixed(7))] {
         let (other, number) = shuffled(&mesh);
         let (held, sliding) = split_boundary(&mesh, &[(2, 1.0)]);
-        let numbered = |vertices: &[u32]| vertices.iter().map(|&vertex| number[vertex as usize]).collect::<Vec<_>>();
-        let slides: Vec<Sliding> =
-            sliding.iter().map(|slide| Sliding { vertex: number[slide.vertex as usize], ..*slide }).collect();
-        let motion: Vec<Vector> = held.iter().map(|&vertex| bent(&mesh.points()[vertex as usize])).collect();
+        let numbered = |vertices: &[u32]| {
+            vertices.iter().map(|&vertex| number[vertex as usize]).collect::<Vec<_>>()
+        };
+        let slides: Vec<Sliding> = sliding
+            .iter()
+            .map(|slide| Sliding { vertex: number[slide.vertex as usize], ..*slide })
+            .collect();
+        let motion: Vec<Vector> =
+            held.iter().map(|&vertex| bent(&mesh.points()[vertex as usize])).collect();
         for method in [Method::Elasticity, Method::Harmonic] {
             let settings = Deform { method, stiffening: 0.5, ..TIGHT };
             let plain = VolumeOperator::with_sliding(&mesh, &held, &sliding, &settings).unwrap();
-            let shuffled = VolumeOperator::with_sliding(&other, &numbered(&held), &slides, &settings).unwrap();
+            let shuffled =
+                VolumeOperator::with_sliding(&other, &numbered(&held), &slides, &settings).unwrap();
             let expected = plain.solve(&motion).unwrap().displacement;
             let found = shuffled.solve(&motion).unwrap().displacement;
             let difference = largest_difference(&expected, &unshuffled(&found, &number));
@@ -37,13 +43,24 @@ fn displacements_are_those_of_the_same_vertices() {
 
             // Set up again on a shape of its own, and started from what was found.
             let moved = |mesh: &Mesh, by: &[Vector]| {
-                let points = mesh.points().iter().zip(by).map(|(&point, &by)| crate::vector::add(point, by)).collect();
+                let points = mesh
+                    .points()
+                    .iter()
+                    .zip(by)
+                    .map(|(&point, &by)| crate::vector::add(point, by))
+                    .collect();
                 mesh.with_points(points).unwrap()
             };
-            let [plain, shuffled] =
-                [(plain, &mesh, &expected), (shuffled, &other, &found)].map(|(operator, mesh, by)| {
-                    operator.updated(&moved(mesh, by)).unwrap().solve_from(&motion, by).unwrap().displacement
-                });
+            let [plain, shuffled] = [(plain, &mesh, &expected), (shuffled, &other, &found)].map(
+                |(operator, mesh, by)| {
+                    operator
+                        .updated(&moved(mesh, by))
+                        .unwrap()
+                        .solve_from(&motion, by)
+                        .unwrap()
+                        .displacement
+                },
+            );
             let difference = largest_difference(&plain, &unshuffled(&shuffled, &number));
             assert!(difference < 1e-10, "{name}: {difference}");
         }
@@ -60,12 +77,18 @@ fn errors_name_the_callers_vertices_and_cells() {
     let mut points = mesh.points().to_vec();
     points[inside as usize] = [0.95, 0.5, 0.5];
     let mesh = mesh.with_points(points).unwrap();
-    let Err(VolumeError::InvertedCell { cell, count, .. }) = VolumeOperator::new(&mesh, &boundary, &settings) else {
+    let Err(VolumeError::InvertedCell { cell, count, .. }) =
+        VolumeOperator::new(&mesh, &boundary, &settings)
+    else {
         panic!("an inverted cell was let through");
     };
     let is_inverted = |cell: usize| {
-        let corners: Vec<Vector> =
-            mesh.cells().vertices(cell).iter().map(|&vertex| mesh.points()[vertex as usize]).collect();
+        let corners: Vec<Vector> = mesh
+            .cells()
+            .vertices(cell)
+            .iter()
+            .map(|&vertex| mesh.points()[vertex as usize])
+            .collect();
         crate::quality::tet_determinant(corners.try_into().unwrap()) <= 0.0
     };
     let inverted: Vec<usize> = (0..mesh.cells().len()).filter(|&cell| is_inverted(cell)).collect();
@@ -88,13 +111,19 @@ fn untangling_and_improving_move_the_same_vertices() {
         let other_boundary = cube_boundary(&other);
         let spoiled = |amount: f64| {
             let mut points = mesh.points().to_vec();
-            for (vertex, point) in
-                points.iter_mut().enumerate().filter(|(vertex, _)| !boundary.contains(&(*vertex as u32)))
+            for (vertex, point) in points
+                .iter_mut()
+                .enumerate()
+                .filter(|(vertex, _)| !boundary.contains(&(*vertex as u32)))
             {
-                *point = std::array::from_fn(|axis| point[axis] + amount * noise(3 * vertex + axis));
+                *point =
+                    std::array::from_fn(|axis| point[axis] + amount * noise(3 * vertex + axis));
             }
             let mut shuffled = points.clone();
-            number.iter().zip(&points).for_each(|(&number, &point)| shuffled[number as usize] = point);
+            number
+                .iter()
+                .zip(&points)
+                .for_each(|(&number, &point)| shuffled[number as usize] = point);
             (points, shuffled)
         };
         let (mut expected, mut found) = spoiled(0.015);

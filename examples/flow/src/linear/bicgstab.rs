@@ -39,9 +39,13 @@ impl BiCgStab {
         limit: usize,
     ) -> Outcome {
         let rows = right.len();
-        for buffer in
-            [&mut self.residual, &mut self.shadow, &mut self.direction, &mut self.image, &mut self.second_image]
-        {
+        for buffer in [
+            &mut self.residual,
+            &mut self.shadow,
+            &mut self.direction,
+            &mut self.image,
+            &mut self.second_image,
+        ] {
             buffer.resize(rows, [0.0; 3]);
         }
         // What the matrix is applied to has values at the other ranks' vertices too.
@@ -59,7 +63,16 @@ impl BiCgStab {
             if !open.contains(&true) {
                 break;
             }
-            let done = self.run(matrix, preconditioner, halo, held, solution, tolerance, open, limit - iterations);
+            let done = self.run(
+                matrix,
+                preconditioner,
+                halo,
+                held,
+                solution,
+                tolerance,
+                open,
+                limit - iterations,
+            );
             iterations += done.max(1);
             if norms.iter().any(|norm| !norm.is_finite()) {
                 break;
@@ -97,7 +110,8 @@ impl BiCgStab {
                 for (offset, value) in chunk.iter_mut().enumerate() {
                     let row = start + offset;
                     for c in 0..3 {
-                        value[c] = residual[row][c] + beta[c] * (value[c] - omega[c] * image[row][c]);
+                        value[c] =
+                            residual[row][c] + beta[c] * (value[c] - omega[c] * image[row][c]);
                     }
                 }
             });
@@ -112,7 +126,10 @@ impl BiCgStab {
             preconditioner.apply(&self.residual, &mut self.second[..rows]);
             halo.update(&mut self.second);
             multiply(matrix, held, &self.second, &mut self.second_image);
-            let (top, bottom) = (dot(&self.second_image, &self.residual), dot(&self.second_image, &self.second_image));
+            let (top, bottom) = (
+                dot(&self.second_image, &self.residual),
+                dot(&self.second_image, &self.second_image),
+            );
             omega = quotient(open, |c| top[c], |c| bottom[c]);
             update(solution, omega, &self.second);
             update(&mut self.residual, omega.map(|value| -value), &self.second_image);
@@ -132,7 +149,11 @@ impl BiCgStab {
 }
 
 /// The quotient for the components that are still open; 0 for the others and where the divisor vanishes.
-fn quotient(open: [bool; 3], top: impl Fn(usize) -> f64, bottom: impl Fn(usize) -> f64) -> [f64; 3] {
+fn quotient(
+    open: [bool; 3],
+    top: impl Fn(usize) -> f64,
+    bottom: impl Fn(usize) -> f64,
+) -> [f64; 3] {
     std::array::from_fn(|c| {
         let divisor = bottom(c);
         if open[c] && divisor != 0.0 { top(c) / divisor } else { 0.0 }

@@ -45,7 +45,8 @@ impl ConjugateGradients {
             let preconditioned = &self.preconditioned;
             for_each_chunk(&mut self.direction[..rows], |start, chunk| {
                 for (offset, value) in chunk.iter_mut().enumerate() {
-                    *value = if beta == 0.0 { 0.0 } else { beta * *value } + preconditioned[start + offset];
+                    *value = if beta == 0.0 { 0.0 } else { beta * *value }
+                        + preconditioned[start + offset];
                 }
             });
             halo.update(&mut self.direction);
@@ -65,7 +66,8 @@ impl ConjugateGradients {
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let [total] = sum(a.len(), |range| [a[range.clone()].iter().zip(&b[range]).map(|(a, b)| a * b).sum()]);
+    let [total] =
+        sum(a.len(), |range| [a[range.clone()].iter().zip(&b[range]).map(|(a, b)| a * b).sum()]);
     total
 }
 

@@ -59,18 +59,31 @@ impl Halo {
     /// One process that owns `vertices` vertices.
     #[must_use]
     pub fn alone(vertices: usize) -> Self {
-        Self { communicator: Arc::new(Solo), owners: vec![0; vertices], rows: vertices, swaps: Vec::new() }
+        Self {
+            communicator: Arc::new(Solo),
+            owners: vec![0; vertices],
+            rows: vertices,
+            swaps: Vec::new(),
+        }
     }
 
     /// A rank whose vertices are `order` in the numbers of its part, those that it owns first.
     #[must_use]
-    pub fn new(communicator: Arc<dyn Communicator>, shared: &SharedVertices, order: &[u32]) -> Self {
+    pub fn new(
+        communicator: Arc<dyn Communicator>,
+        shared: &SharedVertices,
+        order: &[u32],
+    ) -> Self {
         let own = communicator.rank();
         let mut numbers = vec![0_u32; order.len()];
         (0..).zip(order).for_each(|(number, &vertex)| numbers[vertex as usize] = number);
         let owner = |vertex: u32| shared.owners()[vertex as usize] as usize;
         let owned_by = |rank: usize, vertices: &[u32]| -> Vec<u32> {
-            vertices.iter().filter(|&&vertex| owner(vertex) == rank).map(|&vertex| numbers[vertex as usize]).collect()
+            vertices
+                .iter()
+                .filter(|&&vertex| owner(vertex) == rank)
+                .map(|&vertex| numbers[vertex as usize])
+                .collect()
         };
         let swaps = shared.neighbours().iter().map(|neighbour| Swap {
             rank: neighbour.rank,
@@ -78,7 +91,9 @@ impl Halo {
             receive: owned_by(neighbour.rank, &neighbour.vertices),
         });
         Self {
-            swaps: swaps.filter(|swap| !(swap.send.is_empty() && swap.receive.is_empty())).collect(),
+            swaps: swaps
+                .filter(|swap| !(swap.send.is_empty() && swap.receive.is_empty()))
+                .collect(),
             owners: order.iter().map(|&vertex| shared.owners()[vertex as usize]).collect(),
             rows: shared.owned(),
             communicator,

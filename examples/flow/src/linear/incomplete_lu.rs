@@ -46,7 +46,8 @@ impl BlockIncompleteLu {
                     .map(|row| {
                         let range = pattern.row(row);
                         let columns = &pattern.columns[range.clone()];
-                        let first = columns.partition_point(|&column| (column as usize) < rows.start);
+                        let first =
+                            columns.partition_point(|&column| (column as usize) < rows.start);
                         let last = columns.partition_point(|&column| (column as usize) < rows.end);
                         (range.start + first, range.start + last)
                     })
@@ -113,12 +114,19 @@ impl Block {
         }
     }
 
-    fn apply(&self, pattern: &Pattern, diagonal: &[usize], vector: &[[f64; 3]], result: &mut [[f64; 3]]) {
+    fn apply(
+        &self,
+        pattern: &Pattern,
+        diagonal: &[usize],
+        vector: &[[f64; 3]],
+        result: &mut [[f64; 3]],
+    ) {
         let (first, base) = (self.rows.start, pattern.starts[self.rows.start]);
         for row in self.rows.clone() {
             let mut total = vector[row];
             for entry in self.inside[row - first].0..diagonal[row] {
-                let (value, known) = (self.values[entry - base], &result[pattern.columns[entry] as usize - first]);
+                let (value, known) =
+                    (self.values[entry - base], &result[pattern.columns[entry] as usize - first]);
                 for component in 0..3 {
                     total[component] -= value * known[component];
                 }
@@ -128,7 +136,8 @@ impl Block {
         for row in self.rows.clone().rev() {
             let mut total = result[row - first];
             for entry in diagonal[row] + 1..self.inside[row - first].1 {
-                let (value, known) = (self.values[entry - base], &result[pattern.columns[entry] as usize - first]);
+                let (value, known) =
+                    (self.values[entry - base], &result[pattern.columns[entry] as usize - first]);
                 for component in 0..3 {
                     total[component] -= value * known[component];
                 }

@@ -35,7 +35,8 @@ impl Pattern {
         (0..self.rows())
             .map(|row| {
                 let range = self.row(row);
-                let found = self.columns[range.clone()].binary_search(&u32::try_from(row).ok()?).ok()?;
+                let found =
+                    self.columns[range.clone()].binary_search(&u32::try_from(row).ok()?).ok()?;
                 Some(range.start + found)
             })
             .collect()
@@ -68,7 +69,8 @@ impl Matrix {
         let (mut columns, mut values) = (Vec::new(), Vec::new());
         for row in 0..rows {
             let range = self.pattern.row(row);
-            let inside = self.pattern.columns[range.clone()].partition_point(|&column| (column as usize) < rows);
+            let inside = self.pattern.columns[range.clone()]
+                .partition_point(|&column| (column as usize) < rows);
             columns.extend_from_slice(&self.pattern.columns[range.start..range.start + inside]);
             values.extend_from_slice(&self.values[range.start..range.start + inside]);
             starts.push(columns.len());
@@ -100,7 +102,8 @@ impl Matrix {
     pub fn row_times(&self, row: usize, vector: &[f64]) -> f64 {
         let range = self.pattern.row(row);
         let mut total = 0.0;
-        for (value, &column) in self.values[range.clone()].iter().zip(&self.pattern.columns[range]) {
+        for (value, &column) in self.values[range.clone()].iter().zip(&self.pattern.columns[range])
+        {
             total += value * vector[column as usize];
         }
         total
@@ -112,7 +115,8 @@ impl Matrix {
     pub fn row_times_tuples(&self, row: usize, vector: &[[f64; 3]]) -> [f64; 3] {
         let range = self.pattern.row(row);
         let mut total = [0.0; 3];
-        for (value, &column) in self.values[range.clone()].iter().zip(&self.pattern.columns[range]) {
+        for (value, &column) in self.values[range.clone()].iter().zip(&self.pattern.columns[range])
+        {
             let entry = &vector[column as usize];
             total[0] += value * entry[0];
             total[1] += value * entry[1];
@@ -137,7 +141,10 @@ impl Matrix {
         for row in 0..self.pattern.rows() {
             for entry in self.pattern.row(row) {
                 let slot = &mut next[self.pattern.columns[entry] as usize];
-                #[expect(clippy::cast_possible_truncation, reason = "rows are numbered as vertices are, in 32 bits")]
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    reason = "rows are numbered as vertices are, in 32 bits"
+                )]
                 {
                     columns[*slot] = row as u32;
                 }
@@ -145,7 +152,11 @@ impl Matrix {
                 *slot += 1;
             }
         }
-        Self { pattern: Arc::new(Pattern { starts, columns }), values, columns: self.pattern.rows() }
+        Self {
+            pattern: Arc::new(Pattern { starts, columns }),
+            values,
+            columns: self.pattern.rows(),
+        }
     }
 
     /// The product of two sparse matrices (Gustavson 1978).

@@ -51,7 +51,8 @@ impl Multigrid {
             }
             let largest_eigenvalue = largest_eigenvalue(&current, &inverse_diagonal);
             let tentative = tentative(&aggregates, count);
-            let prolongation = smoothed(&current, &inverse_diagonal, largest_eigenvalue, &tentative);
+            let prolongation =
+                smoothed(&current, &inverse_diagonal, largest_eigenvalue, &tentative);
             let restriction = prolongation.transpose();
             let coarse = restriction.times(&current.times(&prolongation));
             let rows = current.columns;
@@ -93,7 +94,8 @@ impl Multigrid {
         for index in (0..self.levels.len()).rev() {
             let (fine, coarser) = self.levels.split_at_mut(index + 1);
             let level = &mut fine[index];
-            let correction: &[f64] = coarser.first().map_or(&self.coarse_right, |next| &next.solution);
+            let correction: &[f64] =
+                coarser.first().map_or(&self.coarse_right, |next| &next.solution);
             let prolongation = &level.prolongation;
             for_each_chunk(&mut level.solution, |start, chunk| {
                 for (offset, value) in chunk.iter_mut().enumerate() {
@@ -167,8 +169,9 @@ fn inverse_diagonal(matrix: &Matrix) -> Vec<f64> {
 fn largest_eigenvalue(matrix: &Matrix, inverse_diagonal: &[f64]) -> f64 {
     // A vector of mixed signs that no symmetry of a mesh shares: the fractional parts of multiples of the golden ratio.
     #[expect(clippy::cast_precision_loss, reason = "a start vector, not a count")]
-    let mut vector: Vec<f64> =
-        (0..matrix.columns).map(|row| (row as f64 * 0.618_033_988_749_894_9).fract() - 0.5).collect();
+    let mut vector: Vec<f64> = (0..matrix.columns)
+        .map(|row| (row as f64 * 0.618_033_988_749_894_9).fract() - 0.5)
+        .collect();
     let mut image = vec![0.0; vector.len()];
     let mut estimate = 1.0;
     for _ in 0..12 {
@@ -192,7 +195,8 @@ fn aggregate(matrix: &Matrix, inverse_diagonal: &[f64]) -> (Vec<u32>, usize) {
         matrix.pattern.row(row).filter_map(move |entry| {
             let (column, value) = (matrix.pattern.columns[entry] as usize, matrix.values[entry]);
             let scaled = value * value * inverse_diagonal[row] * inverse_diagonal[column];
-            (column != row && value != 0.0 && scaled > STRENGTH * STRENGTH).then_some((column, scaled))
+            (column != row && value != 0.0 && scaled > STRENGTH * STRENGTH)
+                .then_some((column, scaled))
         })
     };
     let rows = matrix.columns;
@@ -257,13 +261,19 @@ fn tentative(aggregates: &[u32], count: usize) -> Matrix {
 }
 
 /// (I - 4/3 / λ D^-1 A) T.
-fn smoothed(matrix: &Matrix, inverse_diagonal: &[f64], eigenvalue: f64, tentative: &Matrix) -> Matrix {
+fn smoothed(
+    matrix: &Matrix,
+    inverse_diagonal: &[f64],
+    eigenvalue: f64,
+    tentative: &Matrix,
+) -> Matrix {
     let omega = 4.0 / 3.0 / eigenvalue.max(1e-300);
     let mut smoother = matrix.clone();
     for row in 0..matrix.columns {
         for entry in matrix.pattern.row(row) {
             let identity = if matrix.pattern.columns[entry] as usize == row { 1.0 } else { 0.0 };
-            smoother.values[entry] = identity - omega * inverse_diagonal[row] * matrix.values[entry];
+            smoother.values[entry] =
+                identity - omega * inverse_diagonal[row] * matrix.values[entry];
         }
     }
     smoother.times(tentative)
@@ -322,7 +332,10 @@ impl DenseCholesky {
     pub(super) fn solve(&self, values: &mut [f64]) {
         let size = self.size;
         if self.factor.is_empty() {
-            values.iter_mut().zip(&self.inverse_diagonal).for_each(|(value, inverse)| *value *= inverse);
+            values
+                .iter_mut()
+                .zip(&self.inverse_diagonal)
+                .for_each(|(value, inverse)| *value *= inverse);
             return;
         }
         for row in 0..size {

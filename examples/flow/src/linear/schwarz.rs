@@ -34,7 +34,10 @@ impl Schwarz {
         if halo.ranks() == 1 {
             return Self { own: Multigrid::new(matrix), coarse: None };
         }
-        Self { own: Multigrid::new(&matrix.leading_block(halo.rows())), coarse: Some(Coarse::new(matrix, halo)) }
+        Self {
+            own: Multigrid::new(&matrix.leading_block(halo.rows())),
+            coarse: Some(Coarse::new(matrix, halo)),
+        }
     }
 
     /// `result` = the preconditioner times `right`, on the rank's own rows. Collective.
@@ -60,7 +63,11 @@ impl Coarse {
         let mut dense = vec![0.0; size * size];
         for (row, aggregate) in aggregates.iter().enumerate() {
             for entry in matrix.pattern.row(row) {
-                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of an aggregate")]
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a number of an aggregate"
+                )]
                 let other = of_all[matrix.pattern.columns[entry] as usize] as usize;
                 dense[aggregate * size + other.min(size - 1)] += matrix.values[entry];
             }

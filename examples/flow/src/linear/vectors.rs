@@ -15,13 +15,19 @@ pub fn for_each_chunk<T: Send>(values: &mut [T], visit: impl Fn(usize, &mut [T])
             visit(chunk * CHUNK, slice);
         }
     } else {
-        values.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, slice)| visit(chunk * CHUNK, slice));
+        values
+            .par_chunks_mut(CHUNK)
+            .enumerate()
+            .for_each(|(chunk, slice)| visit(chunk * CHUNK, slice));
     }
 }
 
 /// The sum over `0..length` of several quantities at once; `part` sums over a range.
 #[must_use]
-pub fn sum<const N: usize>(length: usize, part: impl Fn(std::ops::Range<usize>) -> [f64; N] + Sync) -> [f64; N] {
+pub fn sum<const N: usize>(
+    length: usize,
+    part: impl Fn(std::ops::Range<usize>) -> [f64; N] + Sync,
+) -> [f64; N] {
     let range = |chunk: usize| chunk * CHUNK..((chunk + 1) * CHUNK).min(length);
     let chunks = length.div_ceil(CHUNK);
     let add = |mut total: [f64; N], more: [f64; N]| {
@@ -33,13 +39,15 @@ pub fn sum<const N: usize>(length: usize, part: impl Fn(std::ops::Range<usize>) 
     if length <= SERIAL {
         return (0..chunks).map(|chunk| part(range(chunk))).fold([0.0; N], add);
     }
-    let parts: Vec<[f64; N]> = (0..chunks).into_par_iter().map(|chunk| part(range(chunk))).collect();
+    let parts: Vec<[f64; N]> =
+        (0..chunks).into_par_iter().map(|chunk| part(range(chunk))).collect();
     parts.into_iter().fold([0.0; N], add)
 }
 
 /// The Euclidean norm.
 #[must_use]
 pub fn norm(values: &[f64]) -> f64 {
-    let [square] = sum(values.len(), |range| [values[range].iter().map(|value| value * value).sum()]);
+    let [square] =
+        sum(values.len(), |range| [values[range].iter().map(|value| value * value).sum()]);
     square.sqrt()
 }

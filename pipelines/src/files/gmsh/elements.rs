@@ -37,7 +37,11 @@ pub(super) fn element(number: i32, reader: &Reader) -> Result<Element, Flaw> {
 }
 
 /// Appends a cell given by its nodes in Gmsh's order.
-pub(super) fn push(cells: &mut Cells, cell_type: CellType, vertices: &mut [u32]) -> Result<(), Flaw> {
+pub(super) fn push(
+    cells: &mut Cells,
+    cell_type: CellType,
+    vertices: &mut [u32],
+) -> Result<(), Flaw> {
     // Gmsh's first triangle of a prism looks inwards, VTK's outwards.
     if let (CellType::Wedge, [_, b, c, _, e, f]) = (cell_type, &mut *vertices) {
         std::mem::swap(b, c);

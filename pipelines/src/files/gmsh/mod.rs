@@ -28,7 +28,11 @@ pub(super) fn parse(bytes: &[u8]) -> Result<MeshFile, Flaw> {
         let section = match header.strip_prefix(b"$") {
             Some(section) => section,
             None if header.is_empty() => break,
-            None => return Err(reader.scanner.flaw(Problem::unexpected(header, "the '$' of a section"))),
+            None => {
+                return Err(reader
+                    .scanner
+                    .flaw(Problem::unexpected(header, "the '$' of a section")));
+            }
         };
         match section {
             b"PhysicalNames" => parts.names = reader.physical_names()?,
@@ -44,16 +48,22 @@ pub(super) fn parse(bytes: &[u8]) -> Result<MeshFile, Flaw> {
             }
             b"Elements" => {
                 let nodes = nodes.as_ref().ok_or_else(|| {
-                    reader.scanner.flaw(Problem::unexpected(b"$Elements", "$Nodes, which elements refer to,"))
+                    reader
+                        .scanner
+                        .flaw(Problem::unexpected(b"$Elements", "$Nodes, which elements refer to,"))
                 })?;
                 parts.cell_tags = Some(match reader.is_version_4 {
                     true => version4::elements(&mut reader, nodes, &entities, &mut parts.cells)?,
-                    false => version2::elements(&mut reader, nodes, &mut parts.cells, &mut parts.notes)?,
+                    false => {
+                        version2::elements(&mut reader, nodes, &mut parts.cells, &mut parts.notes)?
+                    }
                 });
                 elements = true;
             }
             b"Periodic" | b"Comments" | b"GhostElements" | b"Parametrizations" => {}
-            other => parts.notes.push(format!("left out: section ${}", String::from_utf8_lossy(other))),
+            other => {
+                parts.notes.push(format!("left out: section ${}", String::from_utf8_lossy(other)))
+            }
         }
         let end = [b"$End", section].concat();
         if !reader.scanner.skip_behind(&end) {
@@ -98,7 +108,10 @@ impl<'a> Reader<'a> {
         let size_width: usize = scanner.number("the size of a number in bytes")?;
         if kind > 1 || !matches!(size_width, 4 | 8) {
             let found = format!("{kind} {size_width}");
-            return Err(scanner.flaw(Problem::unexpected(found.as_bytes(), "file type 0 or 1 and data size 4 or 8")));
+            return Err(scanner.flaw(Problem::unexpected(
+                found.as_bytes(),
+                "file type 0 or 1 and data size 4 or 8",
+            )));
         }
         if kind == 1 && !is_version_4 && size_width != 8 {
             return Err(scanner.flaw(Problem::unexpected(b"4", "data size 8, of double precision")));
@@ -111,7 +124,12 @@ impl<'a> Reader<'a> {
             big_endian = match one {
                 [1, 0, 0, 0] => false,
                 [0, 0, 0, 1] => true,
-                other => return Err(scanner.flaw(Problem::unexpected(other, "the number 1 that tells the byte order"))),
+                other => {
+                    return Err(scanner.flaw(Problem::unexpected(
+                        other,
+                        "the number 1 that tells the byte order",
+                    )));
+                }
             };
         }
         let mut reader = Self { scanner, is_version_4, big_endian, size_width };
@@ -139,11 +157,19 @@ impl<'a> Reader<'a> {
     }
 
     fn int(&mut self, what: &str) -> Result<i32, Flaw> {
-        if self.scanner.binary { Ok(i32::from_le_bytes(self.bytes(what)?)) } else { self.scanner.number(what) }
+        if self.scanner.binary {
+            Ok(i32::from_le_bytes(self.bytes(what)?))
+        } else {
+            self.scanner.number(what)
+        }
     }
 
     fn double(&mut self, what: &str) -> Result<f64, Flaw> {
-        if self.scanner.binary { Ok(f64::from_le_bytes(self.bytes(what)?)) } else { self.scanner.number(what) }
+        if self.scanner.binary {
+            Ok(f64::from_le_bytes(self.bytes(what)?))
+        } else {
+            self.scanner.number(what)
+        }
     }
 
     fn size(&mut self, what: &str) -> Result<u64, Flaw> {
@@ -172,7 +198,9 @@ impl<'a> Reader<'a> {
             let quoted = quoted.trim();
             let name = quoted.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
             let Some(name) = name.filter(|name| !name.is_empty()) else {
-                return Err(self.scanner.flaw(Problem::unexpected(line, "a physical name in double quotes")));
+                return Err(self
+                    .scanner
+                    .flaw(Problem::unexpected(line, "a physical name in double quotes")));
             };
             if dimension == 2 {
                 names.insert(tag, name.to_owned());
@@ -195,19 +223,28 @@ impl NodeNumbers {
         let vertex = u32::try_from(self.0.len()).unwrap_or(u32::MAX);
         if vertex == u32::MAX || self.0.insert(tag, vertex).is_some() {
             let found = format!("node {tag} a second time");
-            return Err(reader.scanner.flaw(Problem::unexpected(found.as_bytes(), "a node tag of its own")));
+            return Err(reader
+                .scanner
+                .flaw(Problem::unexpected(found.as_bytes(), "a node tag of its own")));
         }
         Ok(())
     }
 
     fn vertex(&self, tag: u64, reader: &Reader) -> Result<u32, Flaw> {
         self.0.get(&tag).copied().ok_or_else(|| {
-            reader.scanner.flaw(Problem::unexpected(format!("node {tag}").as_bytes(), "a node listed in $Nodes"))
+            reader.scanner.flaw(Problem::unexpected(
+                format!("node {tag}").as_bytes(),
+                "a node listed in $Nodes",
+            ))
         })
     }
 }
 
 /// Three coordinates.
 fn point(reader: &mut Reader) -> Result<Vector, Flaw> {
-    Ok([reader.double("a coordinate")?, reader.double("a coordinate")?, reader.double("a coordinate")?])
+    Ok([
+        reader.double("a coordinate")?,
+        reader.double("a coordinate")?,
+        reader.double("a coordinate")?,
+    ])
 }

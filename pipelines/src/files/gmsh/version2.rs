@@ -24,8 +24,9 @@ pub(super) fn nodes(reader: &mut Reader) -> Result<(Vec<Vector>, NodeNumbers), F
 
 fn node_tag(reader: &mut Reader) -> Result<u64, Flaw> {
     let tag = reader.int("a node's number")?;
-    u64::try_from(tag)
-        .map_err(|_| reader.scanner.flaw(Problem::unexpected(tag.to_string().as_bytes(), "a node's number")))
+    u64::try_from(tag).map_err(|_| {
+        reader.scanner.flaw(Problem::unexpected(tag.to_string().as_bytes(), "a node's number"))
+    })
 }
 
 /// Appends the elements; returns the physical tag of each.
@@ -45,18 +46,29 @@ pub(super) fn elements(
     let mut done = 0;
     while done < count {
         let (cell_type, in_block, tag_count) = if reader.scanner.binary {
-            (reader.int("an element type")?, reader.int("a number of elements")?, reader.int("a number of tags")?)
+            (
+                reader.int("an element type")?,
+                reader.int("a number of elements")?,
+                reader.int("a number of tags")?,
+            )
         } else {
             reader.int("an element's number")?;
             (reader.int("an element type")?, 1, reader.int("a number of tags")?)
         };
         let kind = element(cell_type, reader)?;
-        let (Ok(in_block), Ok(tag_count)) = (u64::try_from(in_block), u64::try_from(tag_count)) else {
-            return Err(reader.scanner.flaw(Problem::unexpected(b"a negative count", "a count of elements and tags")));
+        let (Ok(in_block), Ok(tag_count)) = (u64::try_from(in_block), u64::try_from(tag_count))
+        else {
+            return Err(reader
+                .scanner
+                .flaw(Problem::unexpected(b"a negative count", "a count of elements and tags")));
         };
         if in_block == 0 || in_block > (count - done) as u64 {
             let what = "elements in a block".to_owned();
-            return Err(reader.scanner.flaw(Problem::Count { what, found: in_block, expected: (count - done) as u64 }));
+            return Err(reader.scanner.flaw(Problem::Count {
+                what,
+                found: in_block,
+                expected: (count - done) as u64,
+            }));
         }
         let tag_count = reader.count(tag_count, 4, 1, "tags of an element")?;
         for _ in 0..in_block {
@@ -86,7 +98,9 @@ pub(super) fn elements(
         }
     }
     if repeated > 0 {
-        notes.push(format!("left out: {repeated} elements given again for a further physical group"));
+        notes.push(format!(
+            "left out: {repeated} elements given again for a further physical group"
+        ));
     }
     Ok(tags)
 }

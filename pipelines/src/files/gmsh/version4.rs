@@ -91,7 +91,11 @@ pub(super) fn nodes(reader: &mut Reader) -> Result<(Vec<Vector>, NodeNumbers), F
     }
     if points.len() != count {
         let what = "nodes in the blocks of $Nodes".to_owned();
-        return Err(reader.scanner.flaw(Problem::Count { what, found: points.len() as u64, expected: count as u64 }));
+        return Err(reader.scanner.flaw(Problem::Count {
+            what,
+            found: points.len() as u64,
+            expected: count as u64,
+        }));
     }
     Ok((points, numbers))
 }
@@ -117,7 +121,12 @@ pub(super) fn elements(
         let kind = element(kind, reader)?;
         let in_block = reader.size("a number of elements")?;
         let tag = physical.0.get(&(dimension, entity)).copied();
-        for _ in 0..reader.count(in_block, (1 + kind.nodes) * reader.size_width, 1 + kind.nodes, "elements")? {
+        for _ in 0..reader.count(
+            in_block,
+            (1 + kind.nodes) * reader.size_width,
+            1 + kind.nodes,
+            "elements",
+        )? {
             reader.size("an element's tag")?;
             let mut vertices = [0; 8];
             let vertices = vertices.get_mut(..kind.nodes).unwrap_or(&mut []);
@@ -131,7 +140,11 @@ pub(super) fn elements(
     }
     if tags.len() != count {
         let what = "elements in the blocks of $Elements".to_owned();
-        return Err(reader.scanner.flaw(Problem::Count { what, found: tags.len() as u64, expected: count as u64 }));
+        return Err(reader.scanner.flaw(Problem::Count {
+            what,
+            found: tags.len() as u64,
+            expected: count as u64,
+        }));
     }
     Ok(tags)
 }

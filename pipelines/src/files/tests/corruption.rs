@@ -14,10 +14,18 @@ static SOUND: LazyLock<Vec<(&str, Vec<u8>)>> = LazyLock::new(|| {
         super::gmsh_files::all_forms().into_iter().map(|(_, bytes)| ("a.msh", bytes)).collect();
     for compression in [Compression::None, Compression::Zlib] {
         let volume = one_of_each(3);
-        files.push(("a.vtu", vtk::from_mesh(&volume, &fields(&volume), false, compression).unwrap()));
-        files.push(("a.vtp", vtk::from_extract(&extract(&one_of_each(2)), true, compression).unwrap()));
+        files.push((
+            "a.vtu",
+            vtk::from_mesh(&volume, &fields(&volume), false, compression).unwrap(),
+        ));
+        files.push((
+            "a.vtp",
+            vtk::from_extract(&extract(&one_of_each(2)), true, compression).unwrap(),
+        ));
     }
-    for (name, text) in [("a.vtk", LEGACY), ("a.vtk", LEGACY_NEW), ("a.vtu", INLINE), ("a.vtu", NEW_POLYHEDRA)] {
+    for (name, text) in
+        [("a.vtk", LEGACY), ("a.vtk", LEGACY_NEW), ("a.vtu", INLINE), ("a.vtu", NEW_POLYHEDRA)]
+    {
         files.push((name, text.as_bytes().to_vec()));
     }
     files

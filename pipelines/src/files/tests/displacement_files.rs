@@ -7,15 +7,19 @@ use tombolo_deform::mesh::{NumberType, Vector};
 use tombolo_deform::shapes::{box_of_hexahedra, box_of_tets, torus};
 use tombolo_deform::surface::{FeatureSettings, Surface};
 
-use super::super::{parse_displacement, read_displacement, read_mesh, write_displacement, write_mesh};
+use super::super::{
+    parse_displacement, read_displacement, read_mesh, write_displacement, write_mesh,
+};
 use super::{Association, Compression, Field, one_of_each};
 
 fn surface() -> Surface {
-    Surface::extract(&box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]), &FeatureSettings::default()).unwrap()
+    Surface::extract(&box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]), &FeatureSettings::default())
+        .unwrap()
 }
 
 fn waves(surface: &Surface) -> Vec<Vector> {
-    let wave = |&[x, y, z]: &Vector| [(7.0 * x + y).sin() / 3.0, -(z * 1e-9), 1e10 * (x - y * z).exp()];
+    let wave =
+        |&[x, y, z]: &Vector| [(7.0 * x + y).sin() / 3.0, -(z * 1e-9), 1e10 * (x - y * z).exp()];
     surface.points().iter().map(wave).collect()
 }
 
@@ -36,12 +40,17 @@ fn what_is_written_comes_back_to_the_bit() {
             let file = folder.path().join(name);
             write_displacement(&file, &surface, &waves).unwrap();
             let found = read_displacement(&file, &surface).unwrap();
-            assert_eq!((found.vertices.as_slice(), &found.values), (surface.vertices(), &waves), "{name}");
+            assert_eq!(
+                (found.vertices.as_slice(), &found.values),
+                (surface.vertices(), &waves),
+                "{name}"
+            );
         }
     }
     let error = write_displacement(folder.path().join("a.txt"), &surface(), &[]).unwrap_err();
     assert!(error.to_string().contains("0 where there must be 26"), "{error}");
-    let error = write_displacement(folder.path().join("a.vtu"), &surface(), &waves(&surface())).unwrap_err();
+    let error = write_displacement(folder.path().join("a.vtu"), &surface(), &waves(&surface()))
+        .unwrap_err();
     assert!(error.to_string().contains("known are .txt, .csv and .vtp"), "{error}");
 }
 
@@ -62,7 +71,8 @@ fn a_volume_and_a_surface_in_single_precision_are_matched_by_coordinates() {
     let folder = tempfile::tempdir().unwrap();
     let mesh = box_of_tets([3, 3, 3], [0.0; 3], [0.3; 3]);
     let surface = Surface::extract(&mesh, &FeatureSettings::default()).unwrap();
-    let rounded = mesh.points().iter().map(|point| point.map(|part| f64::from(part as f32))).collect();
+    let rounded =
+        mesh.points().iter().map(|point| point.map(|part| f64::from(part as f32))).collect();
     let mesh = mesh.with_points(rounded).unwrap();
     let values: Vec<f64> = mesh.points().iter().flat_map(|&[x, y, z]| [x + 1.0, y, z]).collect();
     let field = Field {
@@ -90,9 +100,11 @@ fn a_volume_and_a_surface_in_single_precision_are_matched_by_coordinates() {
 #[test]
 fn text_is_read_in_all_its_forms() {
     let surface = surface();
-    let read = |text: &str| parse_displacement(Path::new("a.txt"), text.as_bytes(), &surface).unwrap();
+    let read =
+        |text: &str| parse_displacement(Path::new("a.txt"), text.as_bytes(), &surface).unwrap();
     let first = |text: &str| (read(text).vertices[0], read(text).values[0]);
-    let corner = surface.vertices()[surface.points().iter().position(|point| *point == [1.0; 3]).unwrap()];
+    let corner =
+        surface.vertices()[surface.points().iter().position(|point| *point == [1.0; 3]).unwrap()];
     for text in [
         "1 1 1 0.5 -2 1e-3",
         "\u{feff}# made by hand\r\n\r\n  1.0,1.0000001, 1\t.5 -2.0 0.001  # the corner\r\n",
@@ -103,7 +115,10 @@ fn text_is_read_in_all_its_forms() {
         assert_eq!(first(text), (corner, [0.5, -2.0, 1e-3]), "{text}");
     }
     assert_eq!(first(&format!("{corner} 0.5 -2 1e-3")), (corner, [0.5, -2.0, 1e-3]));
-    assert_eq!(first(&format!("vertex,dx,dy,dz,x,y,z\n{corner},0.5,-2,1e-3,1,1,1")), (corner, [0.5, -2.0, 1e-3]));
+    assert_eq!(
+        first(&format!("vertex,dx,dy,dz,x,y,z\n{corner},0.5,-2,1e-3,1,1,1")),
+        (corner, [0.5, -2.0, 1e-3])
+    );
     assert_eq!(read("0 0 0 1 2 3\n1 0 0 4 5 6").values, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
 }
 
@@ -117,29 +132,53 @@ fn what_is_wrong_is_named_by_line_and_column() {
         ),
         ("0 0 0 0 inf 1", "a.txt, line 1, column 9: found \"inf\" where a finite number"),
         ("0 0 0 NaN 0 1", "line 1, column 7: found \"NaN\""),
-        ("1 2 3 4 5", "line 1, column 1: found 5 columns where 6 (x y z dx dy dz), 4 (vertex dx dy dz)"),
-        ("0 0 0 0 0 1\n1 0 0 0 0 1 7", "line 2, column 13: found 7 columns where 6 as in the lines before"),
+        (
+            "1 2 3 4 5",
+            "line 1, column 1: found 5 columns where 6 (x y z dx dy dz), 4 (vertex dx dy dz)",
+        ),
+        (
+            "0 0 0 0 0 1\n1 0 0 0 0 1 7",
+            "line 2, column 13: found 7 columns where 6 as in the lines before",
+        ),
         ("0 0 0 0 0 1\n1 0 0 0 0", "line 2, column 10: found 5 columns"),
-        ("x y z u v w\n", "line 1, column 1: found the columns x, y, z, u, v, w where each of dx, dy, dz"),
+        (
+            "x y z u v w\n",
+            "line 1, column 1: found the columns x, y, z, u, v, w where each of dx, dy, dz",
+        ),
         ("vertex dx dy\n", "found the columns vertex, dx, dy where"),
         ("vertex x dx dy dz\n", "found the columns vertex, x, dx, dy, dz where"),
         ("-1 0 0 0", "line 1, column 1: found \"-1\" where a mesh vertex number"),
         ("1.5 0 0 0", "found \"1.5\" where a mesh vertex number"),
         ("13 0 0 0", "line 1, column 1: found vertex 13 where a mesh vertex on the surface"),
-        ("0 0 0 0 0 1\n0 0 0 0 0 1", "line 2, column 1: found vertex 0 again where each vertex once"),
+        (
+            "0 0 0 0 0 1\n0 0 0 0 0 1",
+            "line 2, column 1: found vertex 0 again where each vertex once",
+        ),
         ("0.1 0 0 0 0 1", "found the point [0.1, 0.0, 0.0], which is 1e-1 from the nearest vertex"),
-        ("vertex x y z dx dy dz\n0 1 1 1 0 0 0", "found vertex 0 at [1.0, 1.0, 1.0] where its reference coordinates"),
+        (
+            "vertex x y z dx dy dz\n0 1 1 1 0 0 0",
+            "found vertex 0 at [1.0, 1.0, 1.0] where its reference coordinates",
+        ),
         ("", "a.txt: found no vertices where"),
         ("# nothing\n\n", "a.txt: found no vertices where"),
     ] {
-        let error = parse_displacement(Path::new("a.txt"), text.as_bytes(), &surface).unwrap_err().to_string();
+        let error = parse_displacement(Path::new("a.txt"), text.as_bytes(), &surface)
+            .unwrap_err()
+            .to_string();
         assert!(error.contains(expected), "{text:?}: {error}");
     }
-    let error = parse_displacement(Path::new("a.txt"), b"0 0 0 0 0 1\n1 0 \xff", &surface).unwrap_err().to_string();
+    let error = parse_displacement(Path::new("a.txt"), b"0 0 0 0 0 1\n1 0 \xff", &surface)
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("line 2") && error.contains("UTF-8"), "{error}");
     let error = read_displacement("lift.dat", &surface).unwrap_err().to_string();
     assert!(error.contains("known are .txt, .csv, .vtp, .vtu and .vtk"), "{error}");
-    assert!(read_displacement("no-such-file.txt", &surface).unwrap_err().to_string().contains("no-such-file.txt"));
+    assert!(
+        read_displacement("no-such-file.txt", &surface)
+            .unwrap_err()
+            .to_string()
+            .contains("no-such-file.txt")
+    );
 }
 
 proptest! {

@@ -25,7 +25,8 @@ const ELEMENTS: [(i32, i32, i32, &[u64]); 6] = [
 ];
 /// The physical tags of entities (dimension, entity), several for one.
 const PHYSICAL: [(i32, i32, &[i32]); 3] = [(2, 1, &[7, 8]), (3, 1, &[1]), (1, 1, &[5])];
-const NAMES: &[u8] = b"$PhysicalNames\n3\n2 7 \"bottom of it\"\n2 8 \"other\"\n3 1 \"volume\"\n$EndPhysicalNames\n";
+const NAMES: &[u8] =
+    b"$PhysicalNames\n3\n2 7 \"bottom of it\"\n2 8 \"other\"\n3 1 \"volume\"\n$EndPhysicalNames\n";
 
 /// Writes numbers as text or bytes.
 struct Writer {
@@ -56,7 +57,11 @@ impl Writer {
     }
 
     fn size(&mut self, value: u64) {
-        if self.wide { self.put(value.to_le_bytes(), &value) } else { self.put((value as u32).to_le_bytes(), &value) }
+        if self.wide {
+            self.put(value.to_le_bytes(), &value)
+        } else {
+            self.put((value as u32).to_le_bytes(), &value)
+        }
     }
 
     fn point(&mut self, point: Vector) {
@@ -76,7 +81,10 @@ impl Writer {
 }
 
 fn physical(dimension: i32, entity: i32) -> &'static [i32] {
-    PHYSICAL.iter().find(|(d, e, _)| (*d, *e) == (dimension, entity)).map_or(&[], |(_, _, tags)| tags)
+    PHYSICAL
+        .iter()
+        .find(|(d, e, _)| (*d, *e) == (dimension, entity))
+        .map_or(&[], |(_, _, tags)| tags)
 }
 
 pub(super) fn version_4(binary: bool, big_endian: bool, wide: bool) -> Vec<u8> {
@@ -116,7 +124,9 @@ pub(super) fn version_4(binary: bool, big_endian: bool, wide: bool) -> Vec<u8> {
         }
     }
     out.text("\n$EndNodes\n$Elements\n");
-    [ELEMENTS.len() as u64, ELEMENTS.len() as u64, 1, 6].into_iter().for_each(|value| out.size(value));
+    [ELEMENTS.len() as u64, ELEMENTS.len() as u64, 1, 6]
+        .into_iter()
+        .for_each(|value| out.size(value));
     for (tag, (dimension, entity, kind, nodes)) in (1..).zip(ELEMENTS) {
         [dimension, entity, kind].into_iter().for_each(|value| out.int(value));
         out.size(1);
@@ -158,8 +168,10 @@ pub(super) fn version_2(binary: bool, big_endian: bool) -> Vec<u8> {
 }
 
 pub(super) fn all_forms() -> Vec<(String, Vec<u8>)> {
-    let mut forms =
-        vec![("2.2 text".to_owned(), version_2(false, false)), ("4.1 text".to_owned(), version_4(false, false, true))];
+    let mut forms = vec![
+        ("2.2 text".to_owned(), version_2(false, false)),
+        ("4.1 text".to_owned(), version_4(false, false, true)),
+    ];
     for big_endian in [false, true] {
         forms.push((format!("2.2 binary, big endian {big_endian}"), version_2(true, big_endian)));
         for wide in [false, true] {
@@ -178,18 +190,29 @@ fn parse(bytes: &[u8]) -> Result<MeshFile, crate::files::FileError> {
 fn every_form_gives_the_same_mesh() {
     for (form, bytes) in all_forms() {
         let file = parse(&bytes).unwrap_or_else(|error| panic!("{form}: {error}"));
-        let points: Vec<Vector> = NODES.iter().filter(|(tag, _)| *tag != 22).map(|(_, point)| *point).collect();
+        let points: Vec<Vector> =
+            NODES.iter().filter(|(tag, _)| *tag != 22).map(|(_, point)| *point).collect();
         assert_eq!(file.mesh.points(), points, "{form}");
         let cells = file.mesh.cells().as_given();
         assert_eq!(cells.types(), [CellType::Wedge, CellType::Tetra], "{form}");
         // The first triangle of VTK's wedge looks outwards, Gmsh's inwards.
         assert_eq!(cells.vertices(0), [0, 2, 1, 3, 5, 4], "{form}");
         assert_eq!(cells.vertices(1), [3, 4, 5, 6], "{form}");
-        let FeatureSource::Faces(tagged) = file.mesh.features() else { panic!("{form}: no features") };
-        assert_eq!(tagged.tags, [7], "{form}: the first physical group; the untagged face has none");
+        let FeatureSource::Faces(tagged) = file.mesh.features() else {
+            panic!("{form}: no features")
+        };
+        assert_eq!(
+            tagged.tags,
+            [7],
+            "{form}: the first physical group; the untagged face has none"
+        );
         assert_eq!(tagged.faces.vertices(0), [0, 2, 1], "{form}");
         assert_eq!(tagged.names, [(7, "bottom of it".to_owned())], "{form}");
-        assert!(file.notes.iter().any(|note| note.contains("1 vertices")), "{form}: {:?}", file.notes);
+        assert!(
+            file.notes.iter().any(|note| note.contains("1 vertices")),
+            "{form}: {:?}",
+            file.notes
+        );
     }
 }
 
@@ -200,7 +223,8 @@ fn refusals_say_where_and_what() {
     let old = text(version_2(false, false));
     let new = text(version_4(false, false, true));
     let quadratic = old.replace("6 4 2 1 1 12 20 21 40", "6 11 2 1 1 12 20 21 40 3 10 11 3 10 11");
-    let quadratic = quadratic.replace("7 4 2 1 1 12 20 21 40", "7 11 2 1 1 12 20 21 40 3 10 11 3 10 11");
+    let quadratic =
+        quadratic.replace("7 4 2 1 1 12 20 21 40", "7 11 2 1 1 12 20 21 40 3 10 11 3 10 11");
     assert!(message(quadratic).contains("quadratic tetrahedron of 10 nodes"));
     assert!(message(old.replace("2.2 0 8", "4.0 0 8")).contains("version 4.0"));
     let missing = message(old.replace("12 20 21 40", "12 20 21 41"));

@@ -32,7 +32,9 @@ fn known(mesh: &Mesh) -> Mesh {
         CellType::Polyhedron,
     ];
     let mut cells = Cells::new();
-    for (cell_type, vertices) in mesh.cells().iter().filter(|(cell_type, _)| !unknown.contains(cell_type)) {
+    for (cell_type, vertices) in
+        mesh.cells().iter().filter(|(cell_type, _)| !unknown.contains(cell_type))
+    {
         cells.push(cell_type, vertices).unwrap();
     }
     Mesh::new(mesh.points().to_vec(), cells, FeatureSource::SharpEdges).unwrap()
@@ -41,8 +43,14 @@ fn known(mesh: &Mesh) -> Mesh {
 fn polyhedra() -> Mesh {
     let all = one_of_each(3);
     let mut cells = Cells::new();
-    let cell = all.cells().types().iter().position(|&cell_type| cell_type == CellType::Polyhedron).unwrap();
-    let faces: Vec<Vec<u32>> = all.cells().polyhedron_faces(cell).iter().map(|face| face.to_vec()).collect();
+    let cell = all
+        .cells()
+        .types()
+        .iter()
+        .position(|&cell_type| cell_type == CellType::Polyhedron)
+        .unwrap();
+    let faces: Vec<Vec<u32>> =
+        all.cells().polyhedron_faces(cell).iter().map(|face| face.to_vec()).collect();
     cells.push_polyhedron(&faces).unwrap();
     cells.push_polyhedron(&faces).unwrap();
     Mesh::new(all.points().to_vec(), cells, FeatureSource::SharpEdges).unwrap()
@@ -74,7 +82,12 @@ fn meshio_reads_what_is_written() {
                 &cells,
                 &[
                     ("point", "velocity", 3, velocity.values),
-                    ("cell", "features", 1, (0..cells.len()).map(|cell| (cell % 2) as f64).collect()),
+                    (
+                        "cell",
+                        "features",
+                        1,
+                        (0..cells.len()).map(|cell| (cell % 2) as f64).collect(),
+                    ),
                     ("cell", "p <rgh>", 1, pressure.values),
                     ("cell", "stress", 9, stress.values),
                     ("field", "even", 1, vec![0.0, 2.0]),

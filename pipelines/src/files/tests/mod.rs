@@ -17,7 +17,9 @@ use crate::extract::{Association, Extract, ExtractFeatures, Field};
 fn one_of_each(dimension: usize) -> Mesh {
     let mut points: Vec<Vector> = Vec::new();
     let mut cells = Cells::new();
-    for cell_type in CellType::ALL.into_iter().filter(|cell_type| cell_type.dimension() == dimension) {
+    for cell_type in
+        CellType::ALL.into_iter().filter(|cell_type| cell_type.dimension() == dimension)
+    {
         let first = points.len() as u32;
         let count = cell_type.vertex_count().unwrap_or(5) as u32;
         for k in 0..count {
@@ -48,7 +50,8 @@ fn one_of_each(dimension: usize) -> Mesh {
                     tags.push(if cell % 2 == 0 { 17 } else { 4 });
                 });
             }
-            let names = vec![(4, "side & \"end\" <of> Straße".to_owned()), (17, "inlet".to_owned())];
+            let names =
+                vec![(4, "side & \"end\" <of> Straße".to_owned()), (17, "inlet".to_owned())];
             FeatureSource::Faces(TaggedFaces { faces, tags, names })
         }
         2 => FeatureSource::Faces(TaggedFaces {
@@ -56,7 +59,9 @@ fn one_of_each(dimension: usize) -> Mesh {
             names: vec![(0, "first".into())],
             faces: cells.clone(),
         }),
-        _ => FeatureSource::Vertices((0..points.len() as i64).map(|vertex| vertex % 3 - 1).collect()),
+        _ => {
+            FeatureSource::Vertices((0..points.len() as i64).map(|vertex| vertex % 3 - 1).collect())
+        }
     };
     Mesh::new(points, cells, features).unwrap()
 }

@@ -36,7 +36,10 @@ fn numbers_keep_their_type() {
         let values = (0..2 * count).map(|k| least + step * k as f64).collect();
         Field { name: number.name().into(), association, components: 2, number, values }
     };
-    let all: Vec<Field> = counts.iter().flat_map(|count| NumberType::ALL.map(|number| field(number, *count))).collect();
+    let all: Vec<Field> = counts
+        .iter()
+        .flat_map(|count| NumberType::ALL.map(|number| field(number, *count)))
+        .collect();
     for compression in [Compression::None, Compression::Zlib] {
         let path = folder.path().join("mesh.vtu");
         write_mesh(&path, &mesh, &all, compression).unwrap();
@@ -59,7 +62,9 @@ fn an_extract_comes_back_with_its_features() {
     write(&path, &extract(&mesh)).unwrap();
     let back = read_mesh(&path).unwrap();
     assert_eq!(back.mesh.cells(), mesh.cells());
-    let FeatureSource::Faces(tagged) = back.mesh.features() else { panic!("{:?}", back.mesh.features()) };
+    let FeatureSource::Faces(tagged) = back.mesh.features() else {
+        panic!("{:?}", back.mesh.features())
+    };
     assert_eq!(tagged.tags, [0, 1, 0, 1, 0]);
     assert_eq!(tagged.names, [(0, "even".to_owned()), (1, "odd".to_owned())]);
 }
@@ -74,7 +79,9 @@ fn negative_tags_keep_their_names() {
     let mesh = Mesh::new(points, cells, FeatureSource::Faces(tagged)).unwrap();
     let path = folder.path().join("mesh.vtu");
     write_mesh(&path, &mesh, &[], Compression::None).unwrap();
-    let FeatureSource::Faces(back) = read_mesh(&path).unwrap().mesh.features().clone() else { panic!("no faces") };
+    let FeatureSource::Faces(back) = read_mesh(&path).unwrap().mesh.features().clone() else {
+        panic!("no faces")
+    };
     assert_eq!(back.names, [(back.tags[0], "feature--5".to_owned())]);
 }
 
@@ -93,7 +100,9 @@ fn names_as_text_are_read() {
     };
     let names = |field_data: &str| {
         let read = parse_mesh(Path::new("a.vtu"), text(field_data).as_bytes()).unwrap();
-        let FeatureSource::Faces(tagged) = read.mesh.features() else { panic!("{:?}", read.mesh.features()) };
+        let FeatureSource::Faces(tagged) = read.mesh.features() else {
+            panic!("{:?}", read.mesh.features())
+        };
         tagged.names.clone()
     };
     let old = "<Array type=\"String\" Name=\"feature_names\" NumberOfTuples=\"2\" format=\"ascii\">105 110 0 111 117 116 0</Array>\
@@ -116,7 +125,9 @@ fn refusals_name_the_file_and_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
     let message = |result: Result<(), crate::files::FileError>| result.unwrap_err().to_string();
     let mesh = one_of_each(3);
-    assert!(message(write(folder.path().join("a.vtp"), &extract(&mesh))).contains("write it as .vtu"));
+    assert!(
+        message(write(folder.path().join("a.vtp"), &extract(&mesh))).contains("write it as .vtu")
+    );
     assert!(message(write(folder.path().join("a.stl"), &extract(&mesh))).contains("'stl'"));
     let mut twice = extract(&mesh);
     twice.fields[1].name = "features".into();
@@ -124,8 +135,14 @@ fn refusals_name_the_file_and_what_to_do() {
     let mut short = extract(&mesh);
     short.fields[0].values.pop();
     assert!(message(write(folder.path().join("a.vtu"), &short)).contains("velocity"));
-    assert!(read_mesh(folder.path().join("none.vtu")).unwrap_err().to_string().contains("none.vtu"));
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "a refused file leaves nothing behind");
+    assert!(
+        read_mesh(folder.path().join("none.vtu")).unwrap_err().to_string().contains("none.vtu")
+    );
+    assert_eq!(
+        std::fs::read_dir(folder.path()).unwrap().count(),
+        0,
+        "a refused file leaves nothing behind"
+    );
 }
 
 #[test]
@@ -134,7 +151,9 @@ fn a_series_is_whole_after_every_entry() {
     let path = folder.path().join("run.pvd");
     let mut series = Series::create(&path).unwrap();
     for step in 0..3 {
-        series.push(f64::from(step) * 0.1, &folder.path().join(format!("run & {step}.vtu"))).unwrap();
+        series
+            .push(f64::from(step) * 0.1, &folder.path().join(format!("run & {step}.vtu")))
+            .unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
         assert_eq!(text.matches("<DataSet ").count(), step as usize + 1);
         assert!(text.contains(&format!("file=\"run &amp; {step}.vtu\"")), "{text}");
@@ -164,11 +183,15 @@ pub(super) fn described(
     arrays: &[(&str, &str, usize, Vec<f64>)],
 ) -> String {
     use std::fmt::Write;
-    let bits =
-        |values: &[f64]| values.iter().fold(String::new(), |text, value| text + &format!(" {:016x}", value.to_bits()));
+    let bits = |values: &[f64]| {
+        values
+            .iter()
+            .fold(String::new(), |text, value| text + &format!(" {:016x}", value.to_bits()))
+    };
     let mut text = format!("points{}\n", bits(points.as_flattened()));
     for (cell_type, vertices) in cells {
-        let vertices = vertices.iter().fold(String::new(), |text, vertex| text + &format!(" {vertex}"));
+        let vertices =
+            vertices.iter().fold(String::new(), |text, vertex| text + &format!(" {vertex}"));
         writeln!(text, "cell {cell_type}{vertices}").unwrap();
     }
     for (place, name, components, values) in arrays {
@@ -195,23 +218,32 @@ fn vtk_reads_what_is_written() {
                 // VTK's order of polygonal data, and its types there.
                 let mut order: Vec<usize> = (0..mesh.cells().len()).collect();
                 if polygonal {
-                    let strip = |&cell: &usize| mesh.cells().cell_type(cell) == CellType::TriangleStrip;
+                    let strip =
+                        |&cell: &usize| mesh.cells().cell_type(cell) == CellType::TriangleStrip;
                     if dimension == 2 {
                         order.sort_by_key(strip);
                     }
                 }
                 let cells: Vec<(u8, Vec<u32>)> = order
                     .iter()
-                    .map(|&cell| match (mesh.cells().cell_type(cell), mesh.cells().vertices(cell)) {
-                        (CellType::Pixel, &[a, b, c, d]) if polygonal => (CellType::Quad.vtk(), vec![a, b, d, c]),
-                        (cell_type, vertices) => (cell_type.vtk(), vertices.to_vec()),
+                    .map(|&cell| {
+                        match (mesh.cells().cell_type(cell), mesh.cells().vertices(cell)) {
+                            (CellType::Pixel, &[a, b, c, d]) if polygonal => {
+                                (CellType::Quad.vtk(), vec![a, b, d, c])
+                            }
+                            (cell_type, vertices) => (cell_type.vtk(), vertices.to_vec()),
+                        }
                     })
                     .collect();
                 let permuted = |values: Vec<f64>, components: usize| -> Vec<f64> {
-                    order.iter().flat_map(|&cell| values[cell * components..][..components].to_vec()).collect()
+                    order
+                        .iter()
+                        .flat_map(|&cell| values[cell * components..][..components].to_vec())
+                        .collect()
                 };
                 let tags = (0..cells.len()).map(|cell| (cell % 2) as f64).collect();
-                let [velocity, pressure, stress] = <[Field; 3]>::try_from(extract.fields.clone()).unwrap();
+                let [velocity, pressure, stress] =
+                    <[Field; 3]>::try_from(extract.fields.clone()).unwrap();
                 let expected = described(
                     mesh.points(),
                     &cells,
@@ -224,7 +256,10 @@ fn vtk_reads_what_is_written() {
                         ("field", "odd", 1, vec![1.0, 2.0]),
                     ],
                 );
-                assert_eq!(read, expected, "dimension {dimension}, polygonal {polygonal}, {compression:?}");
+                assert_eq!(
+                    read, expected,
+                    "dimension {dimension}, polygonal {polygonal}, {compression:?}"
+                );
             }
         }
     }
@@ -238,9 +273,12 @@ fn vtk_finds_the_data_that_an_index_names() {
         let kept = |line: &&str| !(line.starts_with("field ") || line.starts_with("text "));
         text.lines().filter(kept).map(str::to_owned).collect()
     };
-    for (name, piece, dimension) in
-        [("a & b.vtpd", "a & b_0.vtu", 3), ("c.pvtu", "c_0.vtu", 3), ("d.pvtp", "d_0.vtp", 2), ("e.vtpd", "e_0.vtu", 2)]
-    {
+    for (name, piece, dimension) in [
+        ("a & b.vtpd", "a & b_0.vtu", 3),
+        ("c.pvtu", "c_0.vtu", 3),
+        ("d.pvtp", "d_0.vtp", 2),
+        ("e.vtpd", "e_0.vtu", 2),
+    ] {
         let mesh = one_of_each(dimension);
         let mut extract = extract(&mesh);
         extract.fields[0].name = "velocity <m/s>".into();
@@ -251,7 +289,8 @@ fn vtk_finds_the_data_that_an_index_names() {
         assert_eq!(without_field_data(&found), without_field_data(&expected), "{name}");
         assert!(found.contains("velocity <m/s>"), "{found}");
     }
-    let refused = write(folder.path().join("f.pvtp"), &extract(&one_of_each(3))).unwrap_err().to_string();
+    let refused =
+        write(folder.path().join("f.pvtp"), &extract(&one_of_each(3))).unwrap_err().to_string();
     assert!(refused.contains(".vtu"), "{refused}");
     assert!(!folder.path().join("f.pvtp").exists() && !folder.path().join("f").exists());
 }
@@ -279,8 +318,13 @@ fn what_vtk_writes_is_read() {
     assert!(names.lines().count() >= 4, "{names}");
     for name in names.lines() {
         let back = read_mesh(folder.path().join(name)).unwrap_or_else(|error| panic!("{error}"));
-        let sizes: Vec<f64> = back.mesh.cells().iter().map(|(_, vertices)| vertices.len() as f64).collect();
-        assert_eq!(back.fields.iter().find(|field| field.name == "size").unwrap().values, sizes, "{name}");
+        let sizes: Vec<f64> =
+            back.mesh.cells().iter().map(|(_, vertices)| vertices.len() as f64).collect();
+        assert_eq!(
+            back.fields.iter().find(|field| field.name == "size").unwrap().values,
+            sizes,
+            "{name}"
+        );
         assert_eq!(sizes, [3.0, 4.0, 5.0], "{name}: the two polygons and the strip");
     }
 }

@@ -85,17 +85,24 @@ impl Scalar {
         });
         Ok(match self {
             #[expect(clippy::cast_possible_truncation, reason = "the word holds 4 bytes")]
-            Scalar::Float(4) => Numbers::Float(chunks.map(|word| f64::from(f32::from_bits(word as u32))).collect()),
+            Scalar::Float(4) => {
+                Numbers::Float(chunks.map(|word| f64::from(f32::from_bits(word as u32))).collect())
+            }
             Scalar::Float(_) => Numbers::Float(chunks.map(f64::from_bits).collect()),
             Scalar::Signed(width) => {
                 let unused = 64 - 8 * width;
-                Numbers::Integer(chunks.map(|word| (word << unused).cast_signed() >> unused).collect())
+                Numbers::Integer(
+                    chunks.map(|word| (word << unused).cast_signed() >> unused).collect(),
+                )
             }
             Scalar::Unsigned(_) => {
                 let values: Result<Vec<i64>, Problem> = chunks
                     .map(|word| {
                         i64::try_from(word).map_err(|_| {
-                            Problem::unexpected(word.to_string().as_bytes(), format!("a number up to {}", i64::MAX))
+                            Problem::unexpected(
+                                word.to_string().as_bytes(),
+                                format!("a number up to {}", i64::MAX),
+                            )
                         })
                     })
                     .collect();
@@ -105,10 +112,15 @@ impl Scalar {
     }
 
     /// Numbers from text: all words of it, or the first `count`.
-    pub fn read_text(self, scanner: &mut Scanner, count: Option<usize>) -> Result<Numbers, super::super::error::Flaw> {
+    pub fn read_text(
+        self,
+        scanner: &mut Scanner,
+        count: Option<usize>,
+    ) -> Result<Numbers, super::super::error::Flaw> {
         let count = count.unwrap_or(usize::MAX);
-        let more =
-            |scanner: &Scanner, done: usize| done < count && (count < usize::MAX || !scanner.peek_word().is_empty());
+        let more = |scanner: &Scanner, done: usize| {
+            done < count && (count < usize::MAX || !scanner.peek_word().is_empty())
+        };
         Ok(match self {
             Scalar::Float(_) => {
                 let mut values: Vec<f64> = Vec::new();
@@ -161,8 +173,13 @@ impl Array {
     pub fn into_floats(self) -> Option<Vec<f64>> {
         match self.numbers {
             Numbers::Float(values) => Some(values),
-            #[expect(clippy::cast_precision_loss, reason = "fields of large integers are shown, not computed with")]
-            Numbers::Integer(values) => Some(values.into_iter().map(|value| value as f64).collect()),
+            #[expect(
+                clippy::cast_precision_loss,
+                reason = "fields of large integers are shown, not computed with"
+            )]
+            Numbers::Integer(values) => {
+                Some(values.into_iter().map(|value| value as f64).collect())
+            }
             Numbers::Text(_) => None,
         }
     }
@@ -175,12 +192,17 @@ impl Array {
                 #[expect(clippy::cast_possible_truncation, reason = "whole and within 2^53")]
                 return Ok(value as i64);
             }
-            Err(Problem::unexpected(value.to_string().as_bytes(), format!("an integer in array '{}'", self.name)))
+            Err(Problem::unexpected(
+                value.to_string().as_bytes(),
+                format!("an integer in array '{}'", self.name),
+            ))
         };
         match &self.numbers {
             Numbers::Integer(values) => Ok(values.clone()),
             Numbers::Float(values) => values.iter().map(|&value| whole(value)).collect(),
-            Numbers::Text(_) => Err(Problem::unexpected(b"text", format!("integers in array '{}'", self.name))),
+            Numbers::Text(_) => {
+                Err(Problem::unexpected(b"text", format!("integers in array '{}'", self.name)))
+            }
         }
     }
 }

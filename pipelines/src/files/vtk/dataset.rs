@@ -42,9 +42,10 @@ impl Default for Dataset {
 
 impl Dataset {
     pub fn into_mesh_file(mut self) -> Result<MeshFile, Flaw> {
-        for (arrays, count, what) in
-            [(&self.point_arrays, self.points.len(), "points"), (&self.cell_arrays, self.cells.len(), "cells")]
-        {
+        for (arrays, count, what) in [
+            (&self.point_arrays, self.points.len(), "points"),
+            (&self.cell_arrays, self.cells.len(), "cells"),
+        ] {
             for array in arrays {
                 let expected = array.components.saturating_mul(count);
                 if array.numbers.len() != expected {
@@ -74,7 +75,8 @@ impl Dataset {
             (self.field_arrays, Association::Mesh),
         ] {
             for array in arrays {
-                let (name, components, number) = (array.name.clone(), array.components, array.number);
+                let (name, components, number) =
+                    (array.name.clone(), array.components, array.number);
                 if components == 0 || components > MOST_COMPONENTS {
                     self.notes.push(format!("left out: array '{name}' of {components} components"));
                 } else if let Some(values) = array.into_floats() {
@@ -101,7 +103,9 @@ impl Dataset {
         take(&mut self.point_arrays, "vtkGhostType");
         take(&mut self.point_arrays, "vtkGhostLevels");
         if let Some(array) = take(&mut self.cell_arrays, "vtkGhostType") {
-            return Ok(Some(array.integers()?.into_iter().map(|bits| bits & GHOST_OR_HIDDEN != 0).collect()));
+            return Ok(Some(
+                array.integers()?.into_iter().map(|bits| bits & GHOST_OR_HIDDEN != 0).collect(),
+            ));
         }
         match take(&mut self.cell_arrays, "vtkGhostLevels") {
             Some(array) => Ok(Some(array.integers()?.into_iter().map(|level| level > 0).collect())),
@@ -121,7 +125,10 @@ impl Dataset {
             return Ok(names);
         };
         let Numbers::Text(names) = names.numbers else {
-            return Err(Problem::unexpected(b"numbers", format!("text in array '{FEATURE_NAMES}'")));
+            return Err(Problem::unexpected(
+                b"numbers",
+                format!("text in array '{FEATURE_NAMES}'"),
+            ));
         };
         let numbers: Vec<i64> = match take(&mut self.field_arrays, FEATURE_NUMBERS) {
             Some(numbers) => numbers.integers()?,
@@ -129,7 +136,11 @@ impl Dataset {
         };
         if numbers.len() != names.len() {
             let what = format!("values of array '{FEATURE_NUMBERS}'");
-            return Err(Problem::Count { what, found: numbers.len() as u64, expected: names.len() as u64 });
+            return Err(Problem::Count {
+                what,
+                found: numbers.len() as u64,
+                expected: names.len() as u64,
+            });
         }
         Ok(numbers.into_iter().zip(names).collect())
     }
@@ -139,14 +150,18 @@ impl Dataset {
         let base = u32::try_from(self.points.len()).map_err(|_| too_large())?;
         for cell in 0..piece.cells.len() {
             let shift = |vertices: &[u32]| -> Result<Vec<u32>, Problem> {
-                vertices.iter().map(|&vertex| vertex.checked_add(base).ok_or_else(too_large)).collect()
+                vertices
+                    .iter()
+                    .map(|&vertex| vertex.checked_add(base).ok_or_else(too_large))
+                    .collect()
             };
             if piece.cells.cell_type(cell) == CellType::Polyhedron {
                 let faces: Result<Vec<_>, _> =
                     piece.cells.polyhedron_faces(cell).iter().map(|face| shift(face)).collect();
                 self.cells.push_polyhedron(&faces?)?;
             } else {
-                self.cells.push(piece.cells.cell_type(cell), &shift(piece.cells.vertices(cell))?)?;
+                self.cells
+                    .push(piece.cells.cell_type(cell), &shift(piece.cells.vertices(cell))?)?;
             }
         }
         self.points.extend(piece.points);
@@ -159,13 +174,20 @@ impl Dataset {
 
 fn append_arrays(first: &mut Vec<Array>, second: Vec<Array>, notes: &mut Vec<String>) {
     first.retain_mut(|array| {
-        let other = second.iter().find(|other| other.name == array.name && other.components == array.components);
+        let other = second
+            .iter()
+            .find(|other| other.name == array.name && other.components == array.components);
         match (&mut array.numbers, other.map(|other| &other.numbers)) {
             (Numbers::Float(values), Some(Numbers::Float(more))) => values.extend(more),
             (Numbers::Integer(values), Some(Numbers::Integer(more))) => values.extend(more),
-            (Numbers::Text(values), Some(Numbers::Text(more))) => values.extend(more.iter().cloned()),
+            (Numbers::Text(values), Some(Numbers::Text(more))) => {
+                values.extend(more.iter().cloned())
+            }
             _ => {
-                notes.push(format!("left out: array '{}', which not every piece has alike", array.name));
+                notes.push(format!(
+                    "left out: array '{}', which not every piece has alike",
+                    array.name
+                ));
                 return false;
             }
         }
@@ -202,7 +224,11 @@ pub(super) fn points(array: Array) -> Result<Vec<Vector>, Problem> {
     let (vectors, rest) = values.as_chunks::<3>();
     if !rest.is_empty() || vectors.len() * 3 != length {
         let what = "numbers of point coordinates".to_owned();
-        return Err(Problem::Count { what, found: length as u64, expected: length.next_multiple_of(3) as u64 });
+        return Err(Problem::Count {
+            what,
+            found: length as u64,
+            expected: length.next_multiple_of(3) as u64,
+        });
     }
     Ok(vectors.to_vec())
 }
@@ -215,9 +241,13 @@ pub(super) fn push_cell(cells: &mut Cells, number: i64, vertices: &[i64]) -> Res
             Some(name) => format!("cell {cell} of VTK type {number}, a {name},"),
             None => format!("cell {cell} of VTK type {number}"),
         };
-        Problem::Unsupported { what, instead: "write the mesh with linear cells, VTK types 1 to 16 and 42" }
+        Problem::Unsupported {
+            what,
+            instead: "write the mesh with linear cells, VTK types 1 to 16 and 42",
+        }
     })?;
-    let row: Result<Vec<u32>, Problem> = vertices.iter().map(|&vertex| vertex_number(cell, vertex)).collect();
+    let row: Result<Vec<u32>, Problem> =
+        vertices.iter().map(|&vertex| vertex_number(cell, vertex)).collect();
     Ok(cells.push(cell_type, &row?)?)
 }
 
@@ -226,8 +256,9 @@ pub(super) fn push_polyhedron(cells: &mut Cells, stream: &[i64]) -> Result<(), P
     let cell = cells.len();
     let mut rest = stream;
     let mut next = |what: &str| -> Result<i64, Problem> {
-        let (&first, tail) =
-            rest.split_first().ok_or_else(|| Problem::unexpected(b"", format!("{what} of polyhedron {cell}")))?;
+        let (&first, tail) = rest
+            .split_first()
+            .ok_or_else(|| Problem::unexpected(b"", format!("{what} of polyhedron {cell}")))?;
         rest = tail;
         Ok(first)
     };
@@ -255,7 +286,12 @@ fn vertex_number(cell: usize, vertex: i64) -> Result<u32, Problem> {
 }
 
 /// A row of a connectivity, by where it starts and ends.
-pub(super) fn row(connectivity: &[i64], cell: usize, start: i64, end: i64) -> Result<&[i64], Problem> {
+pub(super) fn row(
+    connectivity: &[i64],
+    cell: usize,
+    start: i64,
+    end: i64,
+) -> Result<&[i64], Problem> {
     let range = usize::try_from(start).ok().zip(usize::try_from(end).ok());
     range.and_then(|(start, end)| connectivity.get(start..end)).ok_or_else(|| {
         let unsigned = |number: i64| u64::try_from(number).unwrap_or(u64::MAX);

@@ -36,7 +36,11 @@ impl<'a> Wrapped<'a> {
             Wrapped::Base64(text) => std::borrow::Cow::Owned(decode_base64(text, count)?),
         };
         if (bytes.len() as u64) < count {
-            return Err(Problem::Truncated { what: "an array".into(), needed: count, left: bytes.len() });
+            return Err(Problem::Truncated {
+                what: "an array".into(),
+                needed: count,
+                left: bytes.len(),
+            });
         }
         Ok(bytes)
     }
@@ -60,7 +64,8 @@ impl<'a> Wrapped<'a> {
         let block_length = encoding.number(&header, 1)?;
         let last_length = encoding.number(&header, 2)?;
         // `first` has seen that a number is there for each block.
-        let sizes: Result<Vec<u64>, Problem> = (0..blocks).map(|block| encoding.number(&header, 3 + block)).collect();
+        let sizes: Result<Vec<u64>, Problem> =
+            (0..blocks).map(|block| encoding.number(&header, 3 + block)).collect();
         let sizes = sizes?;
         let total = sizes.iter().fold(header_length, |sum, &size| sum.saturating_add(size));
         let all = self.first(total)?;
@@ -68,7 +73,8 @@ impl<'a> Wrapped<'a> {
         let mut array = Vec::new();
         for (block, &size) in (0..blocks).zip(&sizes) {
             let packed = slice(&all, start, size)?;
-            let length = if block + 1 == blocks && last_length != 0 { last_length } else { block_length };
+            let length =
+                if block + 1 == blocks && last_length != 0 { last_length } else { block_length };
             let before = array.len() as u64;
             match encoding.compressor {
                 Compressor::None => array.extend_from_slice(packed),
@@ -76,7 +82,12 @@ impl<'a> Wrapped<'a> {
                     flate2::read::ZlibDecoder::new(packed)
                         .take(length)
                         .read_to_end(&mut array)
-                        .map_err(|error| Problem::unexpected(error.to_string().as_bytes(), "zlib-compressed data"))?;
+                        .map_err(|error| {
+                            Problem::unexpected(
+                                error.to_string().as_bytes(),
+                                "zlib-compressed data",
+                            )
+                        })?;
                 }
                 Compressor::Lz4 => {
                     // No byte of LZ4 stands for more than 255 bytes.
@@ -84,8 +95,9 @@ impl<'a> Wrapped<'a> {
                         .ok()
                         .filter(|&length| length / 255 <= packed.len())
                         .ok_or_else(|| short_block(packed.len() as u64, length))?;
-                    let plain = lz4_flex::block::decompress(packed, length)
-                        .map_err(|error| Problem::unexpected(error.to_string().as_bytes(), "LZ4-compressed data"))?;
+                    let plain = lz4_flex::block::decompress(packed, length).map_err(|error| {
+                        Problem::unexpected(error.to_string().as_bytes(), "LZ4-compressed data")
+                    })?;
                     array.extend_from_slice(&plain);
                 }
             }
@@ -103,7 +115,11 @@ impl Encoding {
         let width = self.header_width as u64;
         let bytes = slice(header, index.saturating_mul(width), width)?;
         let push = |number: u64, &byte: &u8| (number << 8) | u64::from(byte);
-        Ok(if self.big_endian { bytes.iter().fold(0, push) } else { bytes.iter().rev().fold(0, push) })
+        Ok(if self.big_endian {
+            bytes.iter().fold(0, push)
+        } else {
+            bytes.iter().rev().fold(0, push)
+        })
     }
 }
 
@@ -177,7 +193,9 @@ mod tests {
         for compressor in [Compressor::Zlib, Compressor::Lz4] {
             let packed = Encoding { compressor, ..plain };
             assert!(Wrapped::Raw(&[0xff; 60]).unwrap_array(&packed).is_err());
-            assert!(Wrapped::Raw(&[1, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff]).unwrap_array(&packed).is_err());
+            assert!(
+                Wrapped::Raw(&[1, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff]).unwrap_array(&packed).is_err()
+            );
         }
     }
 }

@@ -33,7 +33,8 @@ impl Index {
 
     /// Where the data lies, relative to the folder of the file itself: what VTK calls it, in a folder of the file's name.
     pub(in super::super) fn piece(self, path: &Path) -> PathBuf {
-        let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        let stem =
+            path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         let extension = if self == Self::Polygonal { "vtp" } else { "vtu" };
         Path::new(&stem).join(format!("{stem}_0.{extension}"))
     }
@@ -52,14 +53,20 @@ impl Index {
              header_type=\"UInt64\">\n"
         );
         if self == Self::Partitioned {
-            let _ = write!(text, "<{kind}>\n<DataSet index=\"0\" file=\"{piece}\"/>\n</{kind}>\n</VTKFile>\n");
+            let _ = write!(
+                text,
+                "<{kind}>\n<DataSet index=\"0\" file=\"{piece}\"/>\n</{kind}>\n</VTKFile>\n"
+            );
             return text;
         }
         let _ = writeln!(text, "<{kind} GhostLevel=\"0\">");
         let arrays = |association: Association| {
             let mut arrays = String::new();
             if association == Association::Element && extract.features.is_some() {
-                let _ = writeln!(arrays, "<PDataArray type=\"Int64\" Name=\"{FEATURES}\" NumberOfComponents=\"1\"/>");
+                let _ = writeln!(
+                    arrays,
+                    "<PDataArray type=\"Int64\" Name=\"{FEATURES}\" NumberOfComponents=\"1\"/>"
+                );
             }
             for field in extract.fields.iter().filter(|field| field.association == association) {
                 let (name, components, kind) =

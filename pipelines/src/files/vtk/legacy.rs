@@ -24,8 +24,13 @@ pub(in super::super) fn parse(bytes: &[u8]) -> Result<MeshFile, Flaw> {
         b"BINARY" => true,
         other => return Err(scanner.flaw(Problem::unexpected(other, "ASCII or BINARY"))),
     };
-    let mut legacy =
-        Legacy { scanner, dataset: Dataset::default(), rows: Vec::new(), types: Vec::new(), unstructured: false };
+    let mut legacy = Legacy {
+        scanner,
+        dataset: Dataset::default(),
+        rows: Vec::new(),
+        types: Vec::new(),
+        unstructured: false,
+    };
     legacy.sections()?;
     legacy.cells()?;
     legacy.dataset.into_mesh_file()
@@ -64,9 +69,16 @@ impl Legacy<'_> {
                 b"POINTS" => {
                     let count: u64 = self.scanner.number("the number of points")?;
                     let kind = self.scalar()?;
-                    let numbers = self.numbers(kind, count.saturating_mul(3), "point coordinates")?;
-                    let array = Array { name: "points".into(), components: 3, number: kind.number(), numbers };
-                    self.dataset.points = points(array).map_err(|problem| self.scanner.flaw(problem))?;
+                    let numbers =
+                        self.numbers(kind, count.saturating_mul(3), "point coordinates")?;
+                    let array = Array {
+                        name: "points".into(),
+                        components: 3,
+                        number: kind.number(),
+                        numbers,
+                    };
+                    self.dataset.points =
+                        points(array).map_err(|problem| self.scanner.flaw(problem))?;
                 }
                 b"CELLS" => self.rows(None)?,
                 b"VERTICES" => self.rows(Some(Kind::Vertices))?,
@@ -87,7 +99,9 @@ impl Legacy<'_> {
                 }
                 attribute => {
                     if !self.attribute(attribute, owner)? {
-                        return Err(self.scanner.flaw_at(start, Problem::unexpected(word, "a keyword of the format")));
+                        return Err(self
+                            .scanner
+                            .flaw_at(start, Problem::unexpected(word, "a keyword of the format")));
                     }
                 }
             }
@@ -117,8 +131,10 @@ impl Legacy<'_> {
     fn scalar(&mut self) -> Result<Scalar, Flaw> {
         let start = self.scanner.position();
         let name = self.scanner.text("a number type")?;
-        Scalar::from_legacy(name)
-            .ok_or_else(|| self.scanner.flaw_at(start, Problem::unexpected(name.as_bytes(), "a number type of VTK")))
+        Scalar::from_legacy(name).ok_or_else(|| {
+            self.scanner
+                .flaw_at(start, Problem::unexpected(name.as_bytes(), "a number type of VTK"))
+        })
     }
 
     /// So many numbers from the next line on.
@@ -136,7 +152,9 @@ impl Legacy<'_> {
     fn integers(&mut self, kind: Scalar, count: u64, what: &str) -> Result<Vec<i64>, Flaw> {
         match self.numbers(kind, count, what)? {
             Numbers::Integer(values) => Ok(values),
-            _ => Err(self.scanner.flaw(Problem::unexpected(b"other numbers", format!("integers for {what}")))),
+            _ => Err(self
+                .scanner
+                .flaw(Problem::unexpected(b"other numbers", format!("integers for {what}")))),
         }
     }
 
@@ -158,10 +176,15 @@ impl Legacy<'_> {
             let mut last = 0;
             for (cell, pair) in offsets.windows(2).enumerate() {
                 let &[start, end] = pair else { continue };
-                let vertices = row(&connectivity, cell, start, end).map_err(|problem| self.scanner.flaw(problem))?;
+                let vertices = row(&connectivity, cell, start, end)
+                    .map_err(|problem| self.scanner.flaw(problem))?;
                 if start != last {
                     let (found, expected) = (start.cast_unsigned(), last.cast_unsigned());
-                    return Err(self.scanner.flaw(Problem::Count { what: "start of a cell".into(), found, expected }));
+                    return Err(self.scanner.flaw(Problem::Count {
+                        what: "start of a cell".into(),
+                        found,
+                        expected,
+                    }));
                 }
                 last = end;
                 self.rows.push((kind, vertices.to_vec()));
@@ -172,9 +195,11 @@ impl Legacy<'_> {
         let mut start = 0;
         for cell in 0..first {
             let cell = usize::try_from(cell).unwrap_or(usize::MAX);
-            let count = row(&numbers, cell, start, start + 1).map_err(|problem| self.scanner.flaw(problem))?;
+            let count = row(&numbers, cell, start, start + 1)
+                .map_err(|problem| self.scanner.flaw(problem))?;
             let end = count.first().and_then(|&count| (start + 1).checked_add(count)).unwrap_or(-1);
-            let vertices = row(&numbers, cell, start + 1, end).map_err(|problem| self.scanner.flaw(problem))?;
+            let vertices = row(&numbers, cell, start + 1, end)
+                .map_err(|problem| self.scanner.flaw(problem))?;
             self.rows.push((kind, vertices.to_vec()));
             start = end;
         }
@@ -185,7 +210,11 @@ impl Legacy<'_> {
     fn cells(&mut self) -> Result<(), Flaw> {
         if self.unstructured && self.types.len() != self.rows.len() {
             let (found, expected) = (self.types.len() as u64, self.rows.len() as u64);
-            return Err(self.scanner.flaw(Problem::Count { what: "cell types".into(), found, expected }));
+            return Err(self.scanner.flaw(Problem::Count {
+                what: "cell types".into(),
+                found,
+                expected,
+            }));
         }
         // VTK numbers the cells of polygonal data by kind, in this order whatever the order of the file.
         let order = |kind: &Option<Kind>| match kind {
@@ -203,7 +232,11 @@ impl Legacy<'_> {
                 Some(kind) => kind.cell_type(vertices.len()),
                 None => self.types.get(cell).copied().unwrap_or(0),
             };
-            if cell_type == 42 { push_polyhedron(cells, vertices)? } else { push_cell(cells, cell_type, vertices)? }
+            if cell_type == 42 {
+                push_polyhedron(cells, vertices)?
+            } else {
+                push_cell(cells, cell_type, vertices)?
+            }
         }
         Ok(())
     }
@@ -232,7 +265,9 @@ impl Legacy<'_> {
             b"TENSORS" => (9, self.scalar()?),
             b"TENSORS6" => (6, self.scalar()?),
             b"GLOBAL_IDS" | b"PEDIGREE_IDS" | b"EDGE_FLAGS" => (1, self.scalar()?),
-            b"TEXTURE_COORDINATES" => (self.scanner.number("a number of components")?, self.scalar()?),
+            b"TEXTURE_COORDINATES" => {
+                (self.scanner.number("a number of components")?, self.scalar()?)
+            }
             // Colours are bytes in binary files, numbers from 0 to 1 in text files.
             b"COLOR_SCALARS" => (self.scanner.number("a number of components")?, self.colour()),
             b"LOOKUP_TABLE" => {

@@ -34,7 +34,11 @@ pub(in super::super) fn from_extract(
     if let Some(features) = &extract.features {
         check_length(FEATURES, features.of_cells.len(), grid.cells.len())?;
         let numbers = features.of_cells.iter().map(|&feature| i64::from(feature)).collect();
-        grid.cell_arrays.push(Array { name: FEATURES, components: 1, values: Values::Integers(numbers) });
+        grid.cell_arrays.push(Array {
+            name: FEATURES,
+            components: 1,
+            values: Values::Integers(numbers),
+        });
         grid.names = (0..).zip(features.names.iter().cloned()).collect();
     }
     grid.add_fields(&extract.fields)?;
@@ -53,7 +57,11 @@ pub(in super::super) fn from_mesh(
     match mesh.features() {
         FeatureSource::SharpEdges => {}
         FeatureSource::Vertices(tags) => {
-            grid.point_arrays.push(Array { name: FEATURES, components: 1, values: Values::Integers(tags.clone()) });
+            grid.point_arrays.push(Array {
+                name: FEATURES,
+                components: 1,
+                values: Values::Integers(tags.clone()),
+            });
         }
         FeatureSource::Faces(tagged) => {
             let (tags, names) = with_natural_numbers(tagged);
@@ -68,7 +76,9 @@ pub(in super::super) fn from_mesh(
                 // Only element fields ask whose a face is.
                 if fields.iter().any(|field| field.association == Association::Element) {
                     let by_face = owners_of_faces(mesh.cells());
-                    owners.extend(tagged.faces.iter().map(|(_, face)| by_face.get(&sorted(face)).copied()));
+                    owners.extend(
+                        tagged.faces.iter().map(|(_, face)| by_face.get(&sorted(face)).copied()),
+                    );
                 }
             } else {
                 // The faces are the cells themselves; any other face has no place in such a mesh.
@@ -78,7 +88,11 @@ pub(in super::super) fn from_mesh(
                     *number = by_face.get(&sorted(vertices)).copied().unwrap_or(-1);
                 }
             }
-            grid.cell_arrays.push(Array { name: FEATURES, components: 1, values: Values::Integers(numbers) });
+            grid.cell_arrays.push(Array {
+                name: FEATURES,
+                components: 1,
+                values: Values::Integers(numbers),
+            });
         }
     }
     let cell_count = mesh.cells().len();
@@ -90,7 +104,11 @@ pub(in super::super) fn from_mesh(
 }
 
 /// The field with values for the faces behind the cells: those of the cell that a face belongs to, NaN where there is none.
-fn with_faces(field: &Field, cell_count: usize, owners: &[Option<usize>]) -> Result<Field, Problem> {
+fn with_faces(
+    field: &Field,
+    cell_count: usize,
+    owners: &[Option<usize>],
+) -> Result<Field, Problem> {
     let mut field = field.clone();
     if field.association == Association::Element && !owners.is_empty() {
         let components = field.components;
@@ -98,7 +116,8 @@ fn with_faces(field: &Field, cell_count: usize, owners: &[Option<usize>]) -> Res
         for owner in owners {
             for component in 0..components {
                 let index = owner.map(|owner| owner * components + component);
-                let value = index.and_then(|index| field.values.get(index).copied()).unwrap_or(f64::NAN);
+                let value =
+                    index.and_then(|index| field.values.get(index).copied()).unwrap_or(f64::NAN);
                 field.values.push(value);
             }
         }
@@ -112,7 +131,13 @@ fn with_faces(field: &Field, cell_count: usize, owners: &[Option<usize>]) -> Res
 
 /// Tags and names, negative numbers put behind the others: in a file they say that a cell has no feature.
 fn with_natural_numbers(tagged: &TaggedFaces) -> (Vec<i64>, Vec<(i64, String)>) {
-    let highest = tagged.tags.iter().chain(tagged.names.iter().map(|(number, _)| number)).max().copied().unwrap_or(0);
+    let highest = tagged
+        .tags
+        .iter()
+        .chain(tagged.names.iter().map(|(number, _)| number))
+        .max()
+        .copied()
+        .unwrap_or(0);
     let mut natural: HashMap<i64, i64> = HashMap::new();
     let mut names = tagged.names.clone();
     for &tag in tagged.tags.iter().filter(|&&tag| tag < 0) {
@@ -220,7 +245,11 @@ impl<'a> Grid<'a> {
         file.line(format_args!("<{kind}>"));
         self.write_field_data(&mut file)?;
         let sections = if polygonal { Sections::new(&self.cells) } else { Sections::default() };
-        let counts = if polygonal { sections.counts() } else { format!(" NumberOfCells=\"{}\"", self.cells.len()) };
+        let counts = if polygonal {
+            sections.counts()
+        } else {
+            format!(" NumberOfCells=\"{}\"", self.cells.len())
+        };
         file.line(format_args!("<Piece NumberOfPoints=\"{}\"{counts}>", self.points.len()));
         file.section("PointData", &self.point_arrays)?;
         if polygonal {
@@ -253,7 +282,10 @@ impl<'a> Grid<'a> {
         }
         for (name, numbers) in names {
             let count = numbers.len();
-            file.array(&Array { name: &name, components: 1, values: Values::Integers(numbers) }, Some(count))?;
+            file.array(
+                &Array { name: &name, components: 1, values: Values::Integers(numbers) },
+                Some(count),
+            )?;
         }
         file.line(format_args!("</FieldData>"));
         Ok(())
@@ -283,11 +315,15 @@ impl Array<'_> {
     /// Puts the tuples into this order.
     fn permute(&mut self, order: &[usize]) {
         fn permuted<T: Copy>(values: &[T], components: usize, order: &[usize]) -> Vec<T> {
-            let tuple = |&tuple: &usize| values.get(tuple * components..(tuple + 1) * components).unwrap_or(&[]);
+            let tuple = |&tuple: &usize| {
+                values.get(tuple * components..(tuple + 1) * components).unwrap_or(&[])
+            };
             order.iter().flat_map(tuple).copied().collect()
         }
         match &mut self.values {
-            Values::Numbers(values, _) => *values = Cow::Owned(permuted(values, self.components, order)),
+            Values::Numbers(values, _) => {
+                *values = Cow::Owned(permuted(values, self.components, order))
+            }
             Values::Integers(values) => *values = permuted(values, self.components, order),
             Values::Bytes(values) => *values = permuted(values, self.components, order),
         }
@@ -318,7 +354,12 @@ impl Sections {
     }
 
     fn named(&self) -> [(&'static str, &[usize]); 4] {
-        [("Verts", &self.vertices), ("Lines", &self.lines), ("Polys", &self.polygons), ("Strips", &self.strips)]
+        [
+            ("Verts", &self.vertices),
+            ("Lines", &self.lines),
+            ("Polys", &self.polygons),
+            ("Strips", &self.strips),
+        ]
     }
 
     fn counts(&self) -> String {
@@ -444,12 +485,20 @@ impl File {
 
     fn array(&mut self, array: &Array, tuples: Option<usize>) -> Result<(), Problem> {
         let (kind, bytes): (_, Vec<u8>) = match &array.values {
-            Values::Numbers(values, number) => (number_name(*number), number_bytes(values, *number)),
-            Values::Integers(values) => ("Int64", values.iter().flat_map(|value| value.to_le_bytes()).collect()),
+            Values::Numbers(values, number) => {
+                (number_name(*number), number_bytes(values, *number))
+            }
+            Values::Integers(values) => {
+                ("Int64", values.iter().flat_map(|value| value.to_le_bytes()).collect())
+            }
             Values::Bytes(values) => ("UInt8", values.clone()),
         };
         // Control characters have no place in XML.
-        let name: String = array.name.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect();
+        let name: String = array
+            .name
+            .chars()
+            .map(|letter| if letter.is_control() { ' ' } else { letter })
+            .collect();
         let name = quick_xml::escape::escape(&name);
         // One component goes without saying: meshio makes columns of arrays that say it.
         let components = match array.components {
@@ -494,7 +543,8 @@ impl File {
 fn compressed(bytes: &[u8]) -> Result<Vec<u8>, Problem> {
     const BLOCK: usize = 1 << 20;
     let mut packed = Vec::new();
-    let mut header = vec![bytes.len().div_ceil(BLOCK) as u64, BLOCK as u64, (bytes.len() % BLOCK) as u64];
+    let mut header =
+        vec![bytes.len().div_ceil(BLOCK) as u64, BLOCK as u64, (bytes.len() % BLOCK) as u64];
     for block in bytes.chunks(BLOCK) {
         let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
         encoder.write_all(block)?;

@@ -29,7 +29,9 @@ pub(in super::super) fn parse(bytes: &[u8]) -> Result<MeshFile, Flaw> {
     whole.field_arrays = document.arrays(None, "FieldData")?;
     if document.pieces.len() > 1 {
         let count = document.pieces.len();
-        whole.notes.push(format!("{count} pieces put together; points on the borders of pieces stay separate"));
+        whole.notes.push(format!(
+            "{count} pieces put together; points on the borders of pieces stay separate"
+        ));
     }
     whole.into_mesh_file()
 }
@@ -77,8 +79,12 @@ fn at(position: usize) -> impl Fn(Problem) -> Flaw {
 
 /// The value of an attribute, if it is there.
 fn attribute(element: &BytesStart, name: &str) -> Result<Option<String>, Problem> {
-    let broken = |error: &dyn std::fmt::Display| Problem::unexpected(error.to_string().as_bytes(), "an XML attribute");
-    let Some(attribute) = element.try_get_attribute(name).map_err(|error| broken(&error))? else { return Ok(None) };
+    let broken = |error: &dyn std::fmt::Display| {
+        Problem::unexpected(error.to_string().as_bytes(), "an XML attribute")
+    };
+    let Some(attribute) = element.try_get_attribute(name).map_err(|error| broken(&error))? else {
+        return Ok(None);
+    };
     let value = attribute.unescape_value().map_err(|error| broken(&error))?;
     Ok(Some(value.into_owned()))
 }
@@ -87,7 +93,9 @@ fn attribute(element: &BytesStart, name: &str) -> Result<Option<String>, Problem
 fn count(element: &BytesStart, name: &str) -> Result<Option<u64>, Problem> {
     let Some(value) = attribute(element, name)? else { return Ok(None) };
     let number = value.trim().parse();
-    number.map(Some).map_err(|_| Problem::unexpected(value.as_bytes(), format!("a number in attribute {name}")))
+    number
+        .map(Some)
+        .map_err(|_| Problem::unexpected(value.as_bytes(), format!("a number in attribute {name}")))
 }
 
 impl<'a> Document<'a> {
@@ -104,18 +112,22 @@ impl<'a> Document<'a> {
         let mut root = false;
         loop {
             let position = usize::try_from(reader.buffer_position()).unwrap_or(bytes.len());
-            let event = reader
-                .read_event()
-                .map_err(|error| at(position)(Problem::unexpected(error.to_string().as_bytes(), "well-formed XML")))?;
+            let event = reader.read_event().map_err(|error| {
+                at(position)(Problem::unexpected(error.to_string().as_bytes(), "well-formed XML"))
+            })?;
             match event {
                 Event::Start(element) => {
                     let name = String::from_utf8_lossy(element.name().as_ref()).into_owned();
                     if !root && name != "VTKFile" {
-                        return Err(at(position)(Problem::unexpected(name.as_bytes(), "the element VTKFile")));
+                        return Err(at(position)(Problem::unexpected(
+                            name.as_bytes(),
+                            "the element VTKFile",
+                        )));
                     }
                     root = true;
                     if name == "AppendedData" {
-                        let start = usize::try_from(reader.buffer_position()).unwrap_or(bytes.len());
+                        let start =
+                            usize::try_from(reader.buffer_position()).unwrap_or(bytes.len());
                         let rest = bytes.get(start..).unwrap_or(&[]);
                         document.appended = Some(appended(&element, rest).map_err(at(position))?);
                         break;
@@ -132,18 +144,28 @@ impl<'a> Document<'a> {
                 }
                 Event::Text(text) => {
                     let parent = open.last().map(String::as_str);
-                    if let (Some("DataArray" | "Array"), Some(element)) = (parent, document.elements.last_mut()) {
+                    if let (Some("DataArray" | "Array"), Some(element)) =
+                        (parent, document.elements.last_mut())
+                    {
                         let std::borrow::Cow::Borrowed(text) = text.into_inner() else { continue };
                         match &mut element.form {
-                            Form::Text(data) | Form::Base64(data) if data.trim_ascii().is_empty() => *data = text,
+                            Form::Text(data) | Form::Base64(data)
+                                if data.trim_ascii().is_empty() =>
+                            {
+                                *data = text
+                            }
                             _ => {}
                         }
                     }
                 }
                 Event::Eof if open.is_empty() && root => break,
                 Event::Eof => {
-                    let expected = open.last().map_or("VTKFile".to_owned(), |name| format!("</{name}>"));
-                    return Err(at(position)(Problem::unexpected(b"the end of the file", expected)));
+                    let expected =
+                        open.last().map_or("VTKFile".to_owned(), |name| format!("</{name}>"));
+                    return Err(at(position)(Problem::unexpected(
+                        b"the end of the file",
+                        expected,
+                    )));
                 }
                 _ => {}
             }
@@ -151,7 +173,13 @@ impl<'a> Document<'a> {
         Ok(document)
     }
 
-    fn start(&mut self, element: &BytesStart, name: &str, open: &[String], position: usize) -> Result<(), Problem> {
+    fn start(
+        &mut self,
+        element: &BytesStart,
+        name: &str,
+        open: &[String],
+        position: usize,
+    ) -> Result<(), Problem> {
         match name {
             "VTKFile" => self.root(element)?,
             "Piece" => self.pieces.push(Piece {
@@ -165,7 +193,12 @@ impl<'a> Document<'a> {
                     "ascii" => Form::Text(&[]),
                     "binary" => Form::Base64(&[]),
                     "appended" => Form::Appended(count(element, "offset")?.unwrap_or(0)),
-                    other => return Err(Problem::unexpected(other.as_bytes(), "format ascii, binary or appended")),
+                    other => {
+                        return Err(Problem::unexpected(
+                            other.as_bytes(),
+                            "format ascii, binary or appended",
+                        ));
+                    }
                 };
                 let components = count(element, "NumberOfComponents")?.unwrap_or(1).max(1);
                 self.elements.push(Element {
@@ -195,11 +228,14 @@ impl<'a> Document<'a> {
                 });
             }
         };
-        self.encoding.big_endian = attribute(element, "byte_order")?.as_deref() == Some("BigEndian");
+        self.encoding.big_endian =
+            attribute(element, "byte_order")?.as_deref() == Some("BigEndian");
         self.encoding.header_width = match attribute(element, "header_type")?.as_deref() {
             Some("UInt64") => 8,
             Some("UInt32") | None => 4,
-            Some(other) => return Err(Problem::unexpected(other.as_bytes(), "header_type UInt32 or UInt64")),
+            Some(other) => {
+                return Err(Problem::unexpected(other.as_bytes(), "header_type UInt32 or UInt64"));
+            }
         };
         self.encoding.compressor = match attribute(element, "compressor")?.as_deref() {
             None | Some("") => Compressor::None,
@@ -225,8 +261,9 @@ impl<'a> Document<'a> {
     }
 
     fn array(&self, element: &Element) -> Result<Array, Flaw> {
-        let numbers =
-            self.numbers(element).map_err(|problem| Flaw { place: Place::Byte(element.position), problem })?;
+        let numbers = self
+            .numbers(element)
+            .map_err(|problem| Flaw { place: Place::Byte(element.position), problem })?;
         let number = Scalar::from_xml(&element.kind).map(Scalar::number).unwrap_or_default();
         Ok(Array { name: element.name.clone(), components: element.components, number, numbers })
     }
@@ -243,21 +280,29 @@ impl<'a> Document<'a> {
         };
         let wrapped = match element.form {
             Form::Text(text) => {
-                let numbers = scalar.read_text(&mut Scanner::new(text), None).map_err(|flaw| flaw.problem)?;
+                let numbers =
+                    scalar.read_text(&mut Scanner::new(text), None).map_err(|flaw| flaw.problem)?;
                 return if is_text { Ok(strings(&numbers)) } else { Ok(numbers) };
             }
             // An array of no values may be written as no text at all.
-            Form::Base64(text) if text.trim_ascii().is_empty() => return Ok(Numbers::Integer(Vec::new())),
+            Form::Base64(text) if text.trim_ascii().is_empty() => {
+                return Ok(Numbers::Integer(Vec::new()));
+            }
             Form::Base64(text) => Wrapped::Base64(text),
             Form::Appended(offset) => {
-                let from = |data: &'a [u8]| usize::try_from(offset).ok().and_then(|offset| data.get(offset..));
+                let from = |data: &'a [u8]| {
+                    usize::try_from(offset).ok().and_then(|offset| data.get(offset..))
+                };
                 let found = match self.appended {
                     Some(Appended::Raw(data)) => from(data).map(Wrapped::Raw),
                     Some(Appended::Base64(data)) => from(data).map(Wrapped::Base64),
                     None => None,
                 };
                 found.ok_or_else(|| {
-                    Problem::unexpected(format!("offset {offset}").as_bytes(), "an offset into the appended data")
+                    Problem::unexpected(
+                        format!("offset {offset}").as_bytes(),
+                        "an offset into the appended data",
+                    )
                 })?
             }
         };
@@ -283,9 +328,12 @@ impl<'a> Document<'a> {
         }
         if self.polygonal {
             // Cell data are in the order in which VTK numbers the cells, which is this one.
-            for (section, kind) in
-                [("Verts", Kind::Vertices), ("Lines", Kind::Lines), ("Polys", Kind::Polygons), ("Strips", Kind::Strips)]
-            {
+            for (section, kind) in [
+                ("Verts", Kind::Vertices),
+                ("Lines", Kind::Lines),
+                ("Polys", Kind::Polygons),
+                ("Strips", Kind::Strips),
+            ] {
                 let connectivity = self.integers(index, section, "connectivity")?;
                 let offsets = self.integers(index, section, "offsets")?;
                 let mut start = 0;
@@ -301,7 +349,9 @@ impl<'a> Document<'a> {
                 && dataset.cells.len() as u64 != expected
             {
                 let what = "cells of a piece".to_owned();
-                return Err(Problem::Count { what, found: dataset.cells.len() as u64, expected }.into());
+                return Err(
+                    Problem::Count { what, found: dataset.cells.len() as u64, expected }.into()
+                );
             }
         }
         Ok(dataset)
@@ -313,7 +363,12 @@ impl<'a> Document<'a> {
         let types = self.integers(piece, "Cells", "types")?;
         if types.len() != offsets.len() {
             let what = "cell types".to_owned();
-            return Err(Problem::Count { what, found: types.len() as u64, expected: offsets.len() as u64 }.into());
+            return Err(Problem::Count {
+                what,
+                found: types.len() as u64,
+                expected: offsets.len() as u64,
+            }
+            .into());
         }
         let polyhedra = Polyhedra {
             faces: self.integers(piece, "Cells", "faces")?,
@@ -325,8 +380,9 @@ impl<'a> Document<'a> {
         };
         let mut start = 0;
         // A face lies between two cells at most, so a file cannot make more of its faces than this.
-        let mut numbers_left =
-            2 * (polyhedra.face_connectivity.len() + polyhedra.to_faces.len() + types.len()) + polyhedra.faces.len();
+        let mut numbers_left = 2
+            * (polyhedra.face_connectivity.len() + polyhedra.to_faces.len() + types.len())
+            + polyhedra.faces.len();
         for (cell, (&end, &cell_type)) in offsets.iter().zip(&types).enumerate() {
             let vertices = row(&connectivity, cell, start, end)?;
             if cell_type == 42 {
@@ -344,7 +400,9 @@ impl<'a> Document<'a> {
     /// An array of integers; nothing where there is none.
     fn integers(&self, piece: usize, section: &str, name: &str) -> Result<Vec<i64>, Flaw> {
         let of_name = |element: &&Element| {
-            element.piece == Some(piece) && element.section == section && element.name.eq_ignore_ascii_case(name)
+            element.piece == Some(piece)
+                && element.section == section
+                && element.name.eq_ignore_ascii_case(name)
         };
         match self.elements.iter().find(of_name) {
             Some(element) => Ok(self.array(element)?.integers().map_err(at(element.position))?),
@@ -377,10 +435,14 @@ impl Polyhedra {
         let faces = row(&self.to_faces, cell, start, end)?;
         let mut stream = vec![faces.len() as i64];
         for &face in faces {
-            let (start, end) = ends(&self.face_offsets, usize::try_from(face).unwrap_or(usize::MAX));
+            let (start, end) =
+                ends(&self.face_offsets, usize::try_from(face).unwrap_or(usize::MAX));
             let vertices = row(&self.face_connectivity, cell, start, end)?;
             if stream.len() + vertices.len() >= most {
-                return Err(Problem::unexpected(b"faces used again", "each face in at most two polyhedra"));
+                return Err(Problem::unexpected(
+                    b"faces used again",
+                    "each face in at most two polyhedra",
+                ));
             }
             stream.push(vertices.len() as i64);
             stream.extend(vertices);
@@ -423,19 +485,24 @@ impl Kind {
 fn strings(numbers: &Numbers) -> Numbers {
     let Numbers::Integer(codes) = numbers else { return Numbers::Text(Vec::new()) };
     // VTK writes the codes of bytes beyond ASCII as negative numbers into text files.
-    let bytes: Vec<u8> = codes.iter().map(|&code| u8::try_from(code.rem_euclid(256)).unwrap_or(b'?')).collect();
+    let bytes: Vec<u8> =
+        codes.iter().map(|&code| u8::try_from(code.rem_euclid(256)).unwrap_or(b'?')).collect();
     let ended = bytes.strip_suffix(&[0]).unwrap_or(&bytes);
     if bytes.is_empty() {
         return Numbers::Text(Vec::new());
     }
-    Numbers::Text(ended.split(|&byte| byte == 0).map(|text| String::from_utf8_lossy(text).into_owned()).collect())
+    Numbers::Text(
+        ended
+            .split(|&byte| byte == 0)
+            .map(|text| String::from_utf8_lossy(text).into_owned())
+            .collect(),
+    )
 }
 
 fn appended<'a>(element: &BytesStart, rest: &'a [u8]) -> Result<Appended<'a>, Problem> {
-    let start = rest
-        .iter()
-        .position(|&byte| byte == b'_')
-        .ok_or_else(|| Problem::unexpected(b"no underscore", "the '_' in front of appended data"))?;
+    let start = rest.iter().position(|&byte| byte == b'_').ok_or_else(|| {
+        Problem::unexpected(b"no underscore", "the '_' in front of appended data")
+    })?;
     let data = rest.get(start + 1..).unwrap_or(&[]);
     match attribute(element, "encoding")?.as_deref() {
         Some("raw") => Ok(Appended::Raw(data)),
