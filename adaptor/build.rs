@@ -13,7 +13,8 @@ fn main() -> io::Result<()> {
     let mut files = Vec::new();
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-env-changed={WITHOUT_VIEWER}");
-    // A path that does not exist would make every build start from here, so the viewer is built first or this file touched.
+    // A path that does not exist would make every build start from here, so the viewer is built
+    // first or this file touched.
     if env::var_os(WITHOUT_VIEWER).is_none()
         && let Ok(viewer) = viewer.canonicalize()
     {

@@ -1,6 +1,7 @@
-//! Gives the shared library its soname: it is `libtombolo.so` for those who link to it.
+//! Gives the shared library its soname: that under which Catalyst looks for the implementation
+//! `tombolo`.
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
-    println!("cargo:rustc-cdylib-link-arg=-Wl,-soname,libtombolo.so.0");
+    println!("cargo:rustc-cdylib-link-arg=-Wl,-soname,libcatalyst-tombolo.so");
 }

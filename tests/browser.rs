@@ -1,4 +1,5 @@
-//! The demo in a headless browser: frames change, the throat is pinched, the order is reported applied, undo brings it back.
+//! The demo in a headless browser: frames change, the throat is pinched, the order is reported
+//! applied, undo brings it back.
 
 use std::path::Path;
 use std::process::Command;

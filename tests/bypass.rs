@@ -1,19 +1,20 @@
-//! The paper's edit of the bypass: the angle at which it comes back into the artery, made about 15 degrees less by one drag of the
-//! skeleton.
+//! The paper's edit of the bypass: the angle at which it comes back into the artery, made about 15
+//! degrees less by one drag of the skeleton.
 
 use std::process::Command;
 use std::sync::{Mutex, PoisonError};
 
 use serde_json::Value;
+use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::mesh::Vector;
-use tombolo_deform::surface::{FeatureSettings, Surface};
+use tombolo_deform::surface::Surface;
 use tombolo_pipelines::files::read_mesh;
 use tombolo_tests::{project, tombolo};
 
 const MESH: &str = "meshes/bypass-0.msh";
 
-/// The angle in degrees between the artery, along x, and the axis of the bypass where it comes back: the line through the
-/// centres of the cuts in the planes y = 8.5 to 13.5 mm.
+/// The angle in degrees between the artery, along x, and the axis of the bypass where it comes
+/// back: the line through the centres of the cuts in the planes y = 8.5 to 13.5 mm.
 fn outlet_angle(triangles: &[[u32; 3]], points: &[Vector]) -> f64 {
     let centres: Vec<[f64; 2]> = (0..=10)
         .map(|cut| 0.0085 + 0.0005 * f64::from(cut))

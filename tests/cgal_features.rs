@@ -2,9 +2,10 @@
 
 use std::f64::consts::PI;
 
+use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, Vector};
 use tombolo_deform::shapes;
-use tombolo_deform::surface::{FeatureSettings, Surface};
+use tombolo_deform::surface::Surface;
 use tombolo_pipelines::files::read_mesh;
 use tombolo_tests::{cgal, generated_surfaces, off};
 
@@ -120,7 +121,8 @@ fn wave([x, y, z]: Vector) -> Vector {
 
 #[test]
 fn where_edges_turn_by_exactly_the_angle() {
-    // Regular prisms: rounding alone decides which of their edges are over the threshold, and it must decide alike.
+    // Regular prisms: rounding alone decides which of their edges are over the threshold, and it
+    // must decide alike.
     for sides in [4, 6, 8, 9, 12, 18, 36, 72] {
         let angle = 360.0 / f64::from(sides);
         for [tilt, size] in [[0.0, 1.0], [0.3, 1.0], [1.1, 3e-5], [0.7, 2.5e4]] {
@@ -158,7 +160,8 @@ fn prism(sides: u32, tilt: f64, size: f64) -> Mesh {
 
 #[test]
 fn on_surfaces_that_are_open_or_no_manifold() {
-    // Three half-planes at one edge: CGAL cuts them apart there, as we do, at whatever angle they meet.
+    // Three half-planes at one edge: CGAL cuts them apart there, as we do, at whatever angle they
+    // meet.
     let points = vec![
         [0.0, 0.0, 0.0],
         [0.0, 0.0, 1.0],

@@ -1,11 +1,13 @@
 //! The self-intersections found are those that CGAL finds.
 
+use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, Vector};
 use tombolo_deform::shapes;
-use tombolo_deform::surface::{FeatureSettings, Surface, check};
+use tombolo_deform::surface::{Surface, check};
 use tombolo_tests::{cgal, off};
 
-/// The triangles of a mesh's surface, far apart from each other in the reference: so that every intersection is new.
+/// The triangles of a mesh's surface, far apart from each other in the reference: so that every
+/// intersection is new.
 fn triangles_of(mesh: &Mesh) -> Surface {
     let surface = Surface::extract(mesh, &FeatureSettings::default()).expect("a surface");
     let cells =
@@ -88,7 +90,8 @@ fn on_smooth_deformations() {
 
 #[test]
 fn on_contacts_and_overlaps_in_one_plane() {
-    // Coordinates with few digits, so that faces lie in exactly one plane, touch in a vertex, or share a line.
+    // Coordinates with few digits, so that faces lie in exactly one plane, touch in a vertex, or
+    // share a line.
     let block = triangles_of(&shapes::box_of_tets([4, 4, 4], [0.0; 3], [4.0; 3]));
     let mut met = 0;
     for seed in 0..12 {

@@ -1,16 +1,19 @@
-//! Skeletons against those of CGAL: the same pieces, loops and branches, and within 2 % of the bounding box of each other.
+//! Skeletons against those of CGAL: the same pieces, loops and branches, and within 2 % of the
+//! bounding box of each other.
 
+use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, Vector};
 use tombolo_deform::shapes;
 use tombolo_deform::skeleton::{Skeleton, SkeletonSettings};
-use tombolo_deform::surface::{FeatureSettings, Surface};
+use tombolo_deform::surface::Surface;
 use tombolo_pipelines::files::read_mesh;
 use tombolo_tests::{CurveGraph, PATIENCE, generated_surfaces};
 
 /// Branches shorter than this part of the diagonal are noise: CGAL has other ones in each run.
 const SPUR: f64 = 0.03;
 
-/// Asserts that both skeletons of a surface have these pieces, loops, branch nodes and ends, and lie close together.
+/// Asserts that both skeletons of a surface have these pieces, loops, branch nodes and ends, and
+/// lie close together.
 fn agree(name: &str, mesh: &Mesh, counts: [usize; 4]) {
     let surface = Surface::extract(mesh, &FeatureSettings::default()).expect("a surface");
     let ours = CurveGraph::of(
@@ -41,8 +44,8 @@ fn a_surface_of_genus_three() {
     agree("genus 3", &windows(3, 8, 30), [1, 3, 4, 0]);
 }
 
-/// A flat frame of unit cubes with some windows in a row, each square cut into `fine` by `fine`, and its corners rounded by moving each
-/// vertex `rounds` times to the middle of its neighbours.
+/// A flat frame of unit cubes with some windows in a row, each square cut into `fine` by `fine`,
+/// and its corners rounded by moving each vertex `rounds` times to the middle of its neighbours.
 fn windows(count: i32, fine: i32, rounds: usize) -> Mesh {
     let has = |[x, y, z]: [i32; 3]| {
         (0..=3 * count).contains(&x) && (0..=3).contains(&y) && z == 0 && (x % 3 == 0 || y % 3 == 0)

@@ -6,11 +6,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde_json::Value;
+use tombolo_deform::edit::{Edit, Editor};
+use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::shapes::box_of_tets;
-use tombolo_deform::surface::{Edit, Editor, FeatureSettings, Surface};
+use tombolo_deform::surface::Surface;
 use tombolo_pipelines::files::read_displacements;
 use tombolo_pipelines::language::{
-    Command, LanguageError, Validate, parse, parse_json, parse_orders, place_beside,
+    Command, LanguageError, Validate, parse, parse_json, parse_orders, resolve_files,
 };
 use tombolo_tests::project;
 
@@ -47,7 +49,8 @@ fn blocks(text: &str, language: &str) -> Vec<(usize, String)> {
     found
 }
 
-/// Reads a snippet as what it looks like: a configuration, a list of edits, or commands as viewers and files of orders say them.
+/// Reads a snippet as what it looks like: a configuration, a list of edits, or commands as viewers
+/// and files of orders say them.
 fn accept(block: &str, name: &str) -> Result<(), LanguageError> {
     let value: Value = parse_json(block, name)?;
     let first = value.get(0).unwrap_or(&value);
@@ -107,7 +110,7 @@ fn edits_of_the_book_are_carried_out() {
             edits.validate().expect("a valid edit");
             continue;
         }
-        place_beside(&mut edits, &list);
+        resolve_files(&mut edits, &list);
         read_displacements(&mut edits, &surface)
             .unwrap_or_else(|error| panic!("docs/edits.md:{line}: {error}"));
         let displacement = editor
@@ -136,7 +139,7 @@ fn snippets_of_other_languages_are_of_the_examples() {
             .collect()
     };
     let mut checked = 0;
-    for (language, folder) in [("c", "c"), ("cpp", "cxx"), ("fortran", "fortran")] {
+    for (language, folder) in [("c", "heat/c"), ("cpp", "heat/cxx"), ("fortran", "heat/fortran")] {
         let programs = read(folder);
         for page in pages() {
             let text = fs::read_to_string(&page).expect("a page can be read");

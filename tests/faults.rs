@@ -1,4 +1,5 @@
-//! Trouble of every kind, met by whole programs: a clear error, the solver runs on, nothing changes shape.
+//! Trouble of every kind, met by whole programs: a clear error, the solver runs on, nothing changes
+//! shape.
 
 use std::io::{Read, Write};
 use std::net::TcpListener;
@@ -64,7 +65,8 @@ fn undisturbed() -> Vec<u8> {
     small.bytes("out/last.vtu")
 }
 
-/// Runs a program that must refuse its input: the exit code is not 0, and its errors say all of this.
+/// Runs a program that must refuse its input: the exit code is not 0, and its errors say all of
+/// this.
 fn refused(name: &str, arguments: &[String], says: &[&str]) {
     let output = program(name).args(arguments).output().expect("the program starts");
     let errors = String::from_utf8_lossy(&output.stderr);
@@ -268,7 +270,8 @@ fn a_viewer_that_dies_in_mid_frame_costs_nothing() {
     // The wheel is free again a few seconds after its holder has gone.
     let mut driver = drive(&link);
     assert!(driver.frame().starts_with(b"TMBL"));
-    // Not before the run holds by itself: it would hold again after a pause and a resume that come earlier.
+    // Not before the run holds by itself: it would hold again after a pause and a resume that come
+    // earlier.
     driver.wait_for("status", |status| status["paused"] == true && status["cycle"] == 2);
     driver.send(&json!({"id": "after", "pause": {}}));
     finish(run, driver);
@@ -285,7 +288,8 @@ fn drive(link: &Link) -> Viewer {
         }
         std::thread::sleep(Duration::from_millis(500));
         viewer.send(&json!({"drive": {}}));
-        // Answered with a new hello when it is granted, with an error when not; a second connection asks again either way.
+        // Answered with a new hello when it is granted, with an error when not; a second connection
+        // asks again either way.
         let answer = viewer.next(Duration::from_secs(1));
         if matches!(answer, Some(Message::Text(answer)) if answer["hello"]["role"] == "driver") {
             return viewer;

@@ -1,5 +1,5 @@
-//! The main job, without a picture: the throat of a nozzle is pinched to half its height while the flow runs, on the schedules of
-//! the paper, and opened again.
+//! The main job, without a picture: the throat of a nozzle is pinched to half its height while the
+//! flow runs, on the schedules of the paper, and opened again.
 
 use serde_json::{Value, json};
 use tombolo_deform::mesh::{Mesh, Vector};
@@ -16,7 +16,8 @@ fn throat(mesh: &Mesh) -> Vec<usize> {
         .collect()
 }
 
-/// Runs 60 steps with an order at its schedule and an undo at cycle 45; the mesh is written at every cycle.
+/// Runs 60 steps with an order at its schedule and an undo at cycle 45; the mesh is written at
+/// every cycle.
 fn pinch(order: &Value) -> (Small, Value) {
     let small = Small::new();
     small.write(

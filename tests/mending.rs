@@ -1,21 +1,21 @@
-//! Orders that one linear solve cannot carry out: followed in sub-steps, untangled, clamped or refused.
+//! Orders that one linear solve cannot carry out: followed in sub-steps, untangled, clamped or
+//! refused.
 
 use std::{cell::RefCell, process::Command, sync::Arc};
 
 use proptest::{prelude::*, test_runner::TestRunner};
 use serde_json::{Value, json};
+use tombolo_deform::shape::{CurrentShape, Outcome, Plan, Refused, Request, Shaper};
 use tombolo_deform::{
+    edit::Edit,
+    features::FeatureSettings,
     mesh::{CellType, Cells, FeatureSource, Mesh, Vector},
     quality::{Guard, Otherwise, Refusal, keeps, quality, scaled_jacobians},
     schedule::Schedule,
     shapes,
-    surface::{Edit, FeatureSettings, Surface},
+    surface::Surface,
 };
-use tombolo_pipelines::{
-    files::{Compression, write_mesh},
-    language::DeformStage,
-    shape::{Outcome, Place, Plan, Refused, Shaper},
-};
+use tombolo_pipelines::files::{Compression, write_mesh};
 use tombolo_tests::project;
 
 fn shaper(mesh: Mesh) -> Shaper {
@@ -46,20 +46,25 @@ fn schedule(steps: u32) -> Schedule {
     serde_json::from_value(json!({"steps": steps})).unwrap()
 }
 
+fn asked(stack: &[Edit], start: &CurrentShape, steps: u32, guard: &Guard) -> Request {
+    Request { schedule: schedule(steps), guard: *guard, ..Request::new(stack, start.clone()) }
+}
+
 fn reach(
     shaper: &mut Shaper,
     stack: &[Edit],
-    start: &Place,
+    start: &CurrentShape,
     steps: u32,
     guard: &Guard,
 ) -> Result<Plan, Refused> {
-    shaper.reach(stack, 0, start, &DeformStage::default(), &schedule(steps), guard)
+    shaper.plan(&asked(stack, start, steps, guard))
 }
 
-/// Goes along a plan shape by shape as a solver does, and looks at every step; the place where it ends.
-fn walk(mesh: &Mesh, plan: &Plan, guard: &Guard) -> Place {
+/// Goes along a plan shape by shape as a solver does, and looks at every step; the place where it
+/// ends.
+fn walk(mesh: &Mesh, plan: &Plan, guard: &Guard) -> CurrentShape {
     let mut before: Arc<[Vector]> = Arc::clone(plan.start());
-    let mut place = Place::from(Arc::clone(&before));
+    let mut place = CurrentShape::from(Arc::clone(&before));
     assert_eq!(plan.quality().shapes.len(), plan.shapes() as usize);
     for shape in 1..=plan.shapes() {
         let mut points = vec![[0.0; 3]; before.len()];
@@ -69,21 +74,21 @@ fn walk(mesh: &Mesh, plan: &Plan, guard: &Guard) -> Place {
         assert_eq!(measured.inverted, 0);
         assert!((measured.min - plan.quality().shapes[shape as usize - 1].min).abs() < 1e-12);
         let points: Arc<[Vector]> = points.into();
-        place = plan.place(shape, Arc::clone(&points));
+        place = plan.reached(shape, Arc::clone(&points));
         before = points;
     }
     assert_eq!(before, *plan.end());
     place
 }
 
-fn here(shaper: &Shaper) -> Place {
+fn here(shaper: &Shaper) -> CurrentShape {
     Arc::clone(shaper.reference()).into()
 }
 
 #[test]
 fn a_half_turn_is_mended_and_taken_back_exactly() {
     let mut shaper = column();
-    let mesh = Arc::clone(shaper.mesh());
+    let mesh = shaper.mesh().clone();
     let start = here(&shaper);
     let (rejecting, mending) = (guard(Otherwise::Reject), guard(Otherwise::Untangle));
     let refused = reach(&mut shaper, &half_turn(), &start, 1, &rejecting).unwrap_err();
@@ -119,12 +124,13 @@ fn a_half_turn_is_mended_and_taken_back_exactly() {
     }
 }
 
-/// The shape is a function of the reference and the stack, not of the way there or of what was asked before.
+/// The shape is a function of the reference and the stack, not of the way there or of what was
+/// asked before.
 #[test]
 fn the_shape_does_not_depend_on_where_the_mesh_is() {
     let mending = guard(Otherwise::Untangle);
     let mut shaper = column();
-    let mesh = Arc::clone(shaper.mesh());
+    let mesh = shaper.mesh().clone();
     let start = here(&shaper);
     let first = reach(&mut shaper, &half_turn(), &start, 1, &mending).unwrap();
 
@@ -143,7 +149,7 @@ fn the_shape_does_not_depend_on_where_the_mesh_is() {
     let middle = second.shapes() / 2;
     let mut points = vec![[0.0; 3]; mesh.points().len()];
     second.write_shape(middle, &mut points);
-    let place = second.place(middle, points.into());
+    let place = second.reached(middle, points.into());
     let undone = reach(&mut other, &lift, &place, 3, &mending).unwrap();
     walk(&mesh, &undone, &mending);
     assert_eq!(undone.end(), lifted.end());
@@ -154,7 +160,7 @@ fn the_shape_does_not_depend_on_where_the_mesh_is() {
 fn edits_pile_up_on_a_mended_shape() {
     let mending = guard(Otherwise::Untangle);
     let mut shaper = column();
-    let mesh = Arc::clone(shaper.mesh());
+    let mesh = shaper.mesh().clone();
     let start = here(&shaper);
     let turned = reach(&mut shaper, &half_turn(), &start, 1, &mending).unwrap();
     let place = walk(&mesh, &turned, &mending);
@@ -184,7 +190,7 @@ fn the_largest_feasible_fraction_is_done_and_reported() {
         half_turn(),
     ] {
         let mut shaper = column();
-        let mesh = Arc::clone(shaper.mesh());
+        let mesh = shaper.mesh().clone();
         let start = here(&shaper);
         let plan = reach(&mut shaper, &stack, &start, 3, &clamping).unwrap();
         let fraction = plan.target().fraction;
@@ -199,8 +205,7 @@ fn the_largest_feasible_fraction_is_done_and_reported() {
             reach(&mut shaper, &scaled(fraction + 0.02), &start, 3, &guard(Otherwise::Reject))
                 .is_err()
         );
-        let forecast =
-            shaper.forecast(&stack, 0, &start, &DeformStage::default(), &schedule(3), &clamping);
+        let forecast = shaper.forecast(&asked(&stack, &start, 3, &clamping));
         assert_eq!((forecast.outcome, forecast.fraction), (Outcome::Clamped, Some(fraction)));
         assert_eq!(forecast.quality.unwrap().inverted, 0);
     }
@@ -215,22 +220,13 @@ fn edits_that_are_there_already_are_not_clamped() {
         {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -4.0]}}
     ]));
     let clamping = guard(Otherwise::Clamp);
-    let first = shaper
-        .plan(
-            &stack[..1],
-            Arc::clone(&start.points),
-            &DeformStage::default(),
-            &schedule(1),
-            &clamping,
-        )
-        .unwrap();
-    let place = first.place(1, Arc::clone(first.end()));
-    let plan =
-        shaper.reach(&stack, 1, &place, &DeformStage::default(), &schedule(1), &clamping).unwrap();
+    let first = shaper.plan(&asked(&stack[..1], &start, 1, &clamping)).unwrap();
+    let place = first.reached(1, Arc::clone(first.end()));
+    let plan = shaper.plan(&Request { kept: 1, ..asked(&stack, &place, 1, &clamping) }).unwrap();
     let fraction = plan.target().fraction;
     let top = plan.end().iter().map(|point| point[2]).fold(0.0, f64::max);
     assert!((top - (2.5 - 4.0 * fraction)).abs() < 1e-9 && fraction < 0.6, "{top} {fraction}");
-    let whole = shaper.reach(&stack, 2, &place, &DeformStage::default(), &schedule(1), &clamping);
+    let whole = shaper.plan(&Request { kept: 2, ..asked(&stack, &place, 1, &clamping) });
     assert!(
         matches!(whole, Err(Refused::Guard(_) | Refused::Surface(_))),
         "nothing is left to clamp"
@@ -261,11 +257,12 @@ fn what_cannot_be_mended_says_how_far_it_came() {
     assert_eq!(text.matches(" % ").count(), 1, "{text}");
 }
 
-/// Cells at an edge of the column have all their vertices on the surface, and would be inside out: that is said, and how far it can go.
+/// Cells at an edge of the column have all their vertices on the surface, and would be inside out:
+/// that is said, and how far it can go.
 #[test]
 fn what_no_mesh_can_do_is_proved() {
     let mut shaper = column();
-    let mesh = Arc::clone(shaper.mesh());
+    let mesh = shaper.mesh().clone();
     assert_eq!(mesh.points()[3], [1.0, 0.0, 0.0]);
     let pushed = |fraction: f64| {
         let by = [-0.9, 0.9, 0.9].map(|by| by * fraction);
@@ -315,7 +312,8 @@ fn any_edit() -> impl Strategy<Value = Value> {
     )
 }
 
-/// A box of prisms, two for each hexahedron of the box of these, in the order of VTK's manual or in that of its programs.
+/// A box of prisms, two for each hexahedron of the box of these, in the order of VTK's manual or in
+/// that of its programs.
 fn box_of_prisms(counts: [usize; 3], upper: Vector, manual: bool) -> Mesh {
     let hexahedra = shapes::box_of_hexahedra(counts, [0.0; 3], upper);
     let mut cells = Cells::new();
@@ -373,7 +371,7 @@ fn the_floor_of_prisms_is_that_of_their_worst_corner() {
     let mut reached = Vec::new();
     for manual in [true, false] {
         let mut shaper = shaper(box_of_prisms([3, 3, 3], [1.0, 1.0, 1.0], manual));
-        let mesh = Arc::clone(shaper.mesh());
+        let mesh = shaper.mesh().clone();
         let start = here(&shaper);
         let refused = reach(&mut shaper, &shear(2.0), &start, 2, &floor(0.5)).unwrap_err();
         let fraction = refused.feasible_fraction().unwrap();
@@ -390,7 +388,8 @@ fn the_floor_of_prisms_is_that_of_their_worst_corner() {
     assert!((reached[0] - reached[1]).abs() < 1e-9, "{reached:?}");
 }
 
-/// One of the meshes, two orders one after the other, what is to be done where they go too far, and in how many steps.
+/// One of the meshes, two orders one after the other, what is to be done where they go too far, and
+/// in how many steps.
 fn any_run() -> impl Strategy<Value = (usize, [Vec<Value>; 2], Otherwise, u32)> {
     let order = || prop::collection::vec(any_edit(), 1..3);
     let otherwise =
@@ -416,8 +415,8 @@ fn mesh(kind: usize) -> Mesh {
     }
 }
 
-/// Whatever is asked for: every shape on the way is valid, also to VTK, or it is refused with a reason and the mesh has not
-/// moved.
+/// Whatever is asked for: every shape on the way is valid, also to VTK, or it is refused with a
+/// reason and the mesh has not moved.
 #[test]
 fn nothing_broken_is_ever_handed_out() {
     let seen: RefCell<[Vec<Vec<Vector>>; MESHES]> = RefCell::default();
@@ -430,7 +429,7 @@ fn nothing_broken_is_ever_handed_out() {
     let mut runner = TestRunner::new(settings);
     let outcome = runner.run(&any_run(), |(kind, orders, otherwise, steps)| {
         let mut shaper = shaper(mesh(kind));
-        let mesh = Arc::clone(shaper.mesh());
+        let mesh = shaper.mesh().clone();
         let guard = guard(otherwise);
         let mut place = here(&shaper);
         let mut stack: Vec<Edit> = Vec::new();
@@ -438,14 +437,7 @@ fn nothing_broken_is_ever_handed_out() {
             let kept = stack.len();
             let mut wanted = stack.clone();
             wanted.extend(edits(Value::Array(order)));
-            match shaper.reach(
-                &wanted,
-                kept,
-                &place,
-                &DeformStage::default(),
-                &schedule(steps),
-                &guard,
-            ) {
+            match shaper.plan(&Request { kept, ..asked(&wanted, &place, steps, &guard) }) {
                 Ok(plan) => {
                     prop_assert_eq!(&plan.start()[..], &place.points[..]);
                     place = walk(&mesh, &plan, &guard);
@@ -464,7 +456,7 @@ fn nothing_broken_is_ever_handed_out() {
                 Err(refused) => prop_assert!(!refused.to_string().is_empty()),
             }
         }
-        let back = shaper.reach(&[], 0, &place, &DeformStage::default(), &schedule(steps), &guard);
+        let back = shaper.plan(&asked(&[], &place, steps, &guard));
         if let Ok(plan) = back {
             let home = walk(&mesh, &plan, &guard);
             prop_assert_eq!(&*home.points, mesh.points());

@@ -64,7 +64,8 @@ fn dealings() -> [(usize, &'static [&'static str]); 7] {
 /// A number of ranks, and the options that say how the mesh is dealt out to them.
 type Dealing<'a> = (usize, &'a [&'a str]);
 
-/// The same case on one process and dealt out in each way: the orders take effect at the same cycles, the meshes and fields agree.
+/// The same case on one process and dealt out in each way: the orders take effect at the same
+/// cycles, the meshes and fields agree.
 fn agrees(small: &Small, common: &[&str], dealings: &[Dealing<'_>]) {
     let (status, text) = Run::flow(&small.arguments(common)).finish(PATIENCE);
     assert!(status.success(), "{text}");
@@ -170,8 +171,8 @@ fn a_bypass_is_bent_alike_on_any_ranks() {
         "--steps",
         "5",
     ];
-    // A skeleton depends on how the surface is numbered, if little: where the ranks do not say which vertices are the same, one that is
-    // not dragged.
+    // A skeleton depends on how the surface is numbered, if little: where the ranks do not say
+    // which vertices are the same, one that is not dragged.
     let runs: [(&str, &[Dealing<'_>]); 2] = [
         ("bypass-angle", &[(2, &[]), (4, &["--empty-rank", "0", "--shuffle", "3"])]),
         ("bypass-widen", &[(4, &["--empty-rank", "1", "--shuffle", "3", "--without-numbers"])]),
@@ -187,7 +188,8 @@ fn a_bypass_is_bent_alike_on_any_ranks() {
     }
 }
 
-/// Viewers come and go, one of them killed, an order falls into another's schedule: all ranks go on and stop together.
+/// Viewers come and go, one of them killed, an order falls into another's schedule: all ranks go on
+/// and stop together.
 #[test]
 fn viewers_steer_three_ranks() {
     let small = Small::new();

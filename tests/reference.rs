@@ -1,6 +1,7 @@
 //! `docs/json-reference.md` is what the types say, rendered; it is never written by hand.
 //!
-//! `TOMBOLO_UPDATE=1 cargo test -p tombolo-tests --test reference` writes the page anew, and the viewer's copy of the schema.
+//! `TOMBOLO_UPDATE=1 cargo test -p tombolo-tests --test reference` writes the page anew, and the
+//! viewer's copy of the schema.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::fmt::Write as _;
@@ -75,7 +76,8 @@ impl Renderer {
         self.line("");
     }
 
-    /// Renders a schema and every definition it reaches that no schema before it did, in the order they are met.
+    /// Renders a schema and every definition it reaches that no schema before it did, in the order
+    /// they are met.
     fn render(&mut self, title: &str, schema: &Value) {
         self.definition(title, schema);
         while let Some(name) = self.queue.pop_front() {
@@ -91,7 +93,8 @@ impl Renderer {
 
     fn body(&mut self, definition: &Value) {
         if let Some(variants) = definition["oneOf"].as_array().or(definition["anyOf"].as_array()) {
-            // A variant without a type says only which keys go together; the description says it better.
+            // A variant without a type says only which keys go together; the description says it
+            // better.
             let variants: Vec<&Value> = variants
                 .iter()
                 .filter(|variant| {

@@ -5,16 +5,19 @@ use std::process::Command;
 use std::sync::Arc;
 
 use serde_json::{Value, json};
+use tombolo_deform::edit::{Edit, Editor};
+use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, TaggedFaces, Vector};
 use tombolo_deform::shapes;
-use tombolo_deform::surface::{Edit, Editor, FeatureSettings, Surface};
+use tombolo_deform::surface::Surface;
 use tombolo_pipelines::encode::encode_surface;
 use tombolo_tests::project;
 
 /// How far the two may be apart, in parts of the largest displacement.
 const AGREEMENT: f64 = 1e-12;
 
-/// A closed tube, bent into a ring, in three features along it: curved everywhere, with no symmetry that would hide a fault.
+/// A closed tube, bent into a ring, in three features along it: curved everywhere, with no symmetry
+/// that would hide a fault.
 fn ring() -> Mesh {
     let mesh = shapes::torus(1.0, 0.35, [48, 18]);
     let points = mesh

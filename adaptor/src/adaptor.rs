@@ -3,41 +3,39 @@
 mod commands;
 mod contract;
 mod description;
+mod steered;
 mod tagged;
 
 use std::{
     net::SocketAddr,
+    path::Path,
     sync::{Arc, OnceLock},
     time::Instant,
 };
 
 use commands::Intake;
 use contract::Lent;
-use description::features;
-use serde::{Serialize, de::DeserializeOwned};
-use serde_json::{Value, json};
+use serde_json::Value;
+use steered::SteeredMesh;
 use tombolo_deform::{
-    mesh::{Cells, Mesh},
-    surface::{FeatureSettings, Surface},
+    communicator::{Alarm, Communicator, Reduction, agree},
+    linear::Solvers,
 };
 use tombolo_pipelines::{
-    distributed::{Part, Ranks},
-    extract::{Channel, ChannelError},
-    language::{self, Config, Due, Stage, TimedCommand, Validate},
-    shape::Shaper,
+    extract::Channel,
+    language::{self, Config, Due, ReadError, Validate},
 };
 
 use crate::{
-    comm,
+    error::{ExecuteError, FinalizeError, InitializeError},
     journal::Journal,
+    meeting,
     report::{Durations, Report},
-    settings::{
-        ExecuteError, FinalizeError, InitializeError, MeshMotion, Settings, Solvers, Steering,
-        Step, SurfaceMotion,
-    },
+    settings::Settings,
     stages::Pipelines,
-    steering::{Defaults, Forecaster, Log, Moment, Parameters, Queue, Source, Steerer, Timed},
-    stream::{Hub, ReferenceSurface, Server},
+    steering::{Defaults, Forecaster, Log, Parameters, Queue, Source, Steering, Timed},
+    step::{Moment, Step},
+    stream::{Hub, Server},
 };
 
 /// Links a solver to its viewers and to the orders that change its shape.
@@ -45,8 +43,8 @@ use crate::{
 /// See the [crate's page](crate) for a whole solver.
 pub struct Adaptor {
     config: Config,
-    communicator: Arc<dyn comm::Communicator>,
-    solvers: Option<Solvers>,
+    communicator: Arc<dyn Communicator>,
+    solvers: Arc<dyn Solvers>,
     parameters: Parameters,
     defaults: Defaults,
     pipelines: Pipelines,
@@ -71,23 +69,11 @@ pub struct Adaptor {
 struct Meetings {
     /// Calls so far.
     calls: u64,
-    /// What was wrong here since the last meeting.
+    /// The fault of this rank since the last meeting.
     fault: Option<ExecuteError>,
 }
 
-/// The mesh that orders change: that of the channel which the pipeline that runs on orders names, or of the first.
-enum SteeredMesh {
-    /// The first call will take it over.
-    Unknown,
-    /// Nobody can give an order, so that no copy is made.
-    Unsteered,
-    /// Orders cannot be carried out, for this reason.
-    Refused(String),
-    /// With its surface, which on several ranks rank 0 has.
-    Steered(Box<Steerer>, Option<Arc<Surface>>),
-}
-
-/// What `hello` tells and what does not change from order to order.
+/// The part of `hello` that does not change from order to order.
 #[derive(Default)]
 struct Told {
     schema: Value,
@@ -110,23 +96,64 @@ struct Timing {
     paused: Durations,
 }
 
+impl Settings {
+    /// Starts the run: [`Adaptor::initialize`].
+    ///
+    /// # Errors
+    /// [`InitializeError`].
+    pub fn start(self) -> Result<Adaptor, InitializeError> {
+        Adaptor::initialize(self)
+    }
+}
+
 impl Adaptor {
+    /// The settings of a run whose configuration is in a file: to be completed, and started.
+    ///
+    /// ```
+    /// use tombolo::Adaptor;
+    ///
+    /// # let directory = tempfile::tempdir()?;
+    /// # let file = directory.path().join("pipelines.json");
+    /// # std::fs::write(&file, r#"{"version": 1}"#)?;
+    /// let adaptor = Adaptor::from_file(&file)?.parameter("heating", 1.0, 0.0..=10.0).start()?;
+    /// assert_eq!(adaptor.parameter("heating"), Some(1.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`ReadError`], which names the file, and the line and column of the first token that is
+    /// wrong.
+    pub fn from_file(file: impl AsRef<Path>) -> Result<Settings, ReadError> {
+        Settings::from_file(file)
+    }
+
+    /// The value of a parameter now; `None` where there is none of that name.
+    #[must_use]
+    pub fn parameter(&self, name: &str) -> Option<f64> {
+        self.parameters
+            .all()
+            .iter()
+            .find(|parameter| parameter.name == name)
+            .map(|parameter| parameter.value)
+    }
+
     /// Sets a run up: starts the server and the journal that the configuration asks for.
     ///
     /// # Errors
-    /// [`InitializeError`]: an address in use, a journal that cannot be written, a configuration, a parameter or a command that
-    /// makes no sense. On several ranks all have the same error, also where they were given different configurations.
+    /// [`InitializeError`]: an address in use, a journal that cannot be written, a configuration, a
+    /// parameter or a command that makes no sense. On several ranks all have the same error, also
+    /// where they were given different configurations.
     ///
     /// Collective, as the other two calls are.
     pub fn initialize(settings: Settings) -> Result<Self, InitializeError> {
         let communicator = Arc::clone(&settings.communicator);
-        let _alarm = comm::Alarm::among(&communicator);
+        let _alarm = Alarm::among(&communicator);
         let own = serde_json::to_vec(&(&settings.config, &settings.orders));
         let adaptor = Self::set_up(settings);
         if communicator.size() == 1 {
             return adaptor;
         }
-        let adaptor = comm::agree_on(&*communicator, adaptor)?;
+        let adaptor = agree(&*communicator, adaptor)?;
         let own = own.unwrap_or_default();
         let mut first = own.clone();
         communicator.broadcast(0, &mut first);
@@ -135,15 +162,15 @@ impl Adaptor {
         } else {
             Err("its configuration or its orders are not those of rank 0")
         };
-        comm::agree_on(&*communicator, same)?;
+        agree(&*communicator, same)?;
         Ok(adaptor)
     }
 
     fn set_up(settings: Settings) -> Result<Self, InitializeError> {
         let Settings { config, communicator, solvers, parameters, orders, output } = settings;
-        // What was built by hand is held to the same rules as what was read.
-        let config: Config = checked(&config, "configuration")?;
-        let orders: Vec<TimedCommand> = checked(&orders, "orders")?;
+        // A configuration built in Rust is held to the same rules as one read from a file.
+        config.validate().map_err(InitializeError::Configuration)?;
+        orders.validate().map_err(InitializeError::Orders)?;
         let parameters = Parameters::new(parameters)?;
         let first = communicator.rank() == 0;
         let journal = match config.journal.as_ref().filter(|_| first) {
@@ -168,7 +195,7 @@ impl Adaptor {
             _ => None,
         };
         let adaptor = Self {
-            defaults: defaults(&config),
+            defaults: Defaults::of(&config),
             pipelines: Pipelines::new(&config, Arc::clone(&communicator), &output)?,
             config,
             communicator,
@@ -209,35 +236,39 @@ impl Adaptor {
 
     /// Shows the solver's present state and says what to do in the step that follows.
     ///
-    /// `channels` are borrowed for the length of the call; the mesh that orders change is the first one's, or that of the
-    /// [`steered_channel`](Adaptor::steered_channel). As it is at the first call it is the reference from which all shapes are
-    /// measured. A motion is asked for, for the coming step; the coordinates lent at the next call say whether it was made.
+    /// `channels` are borrowed for the length of the call; the mesh that orders change is the first
+    /// one's, or that of the [`steered_channel`](Adaptor::steered_channel). As it is at the first
+    /// call it is the reference from which all shapes are measured. A motion is asked for, for the
+    /// coming step; the coordinates lent at the next call say whether it was made.
     ///
-    /// Where no pipeline is due, no command has arrived and no motion is under way, it costs one atomic load and a few
-    /// comparisons and allocates nothing; on several ranks also one reduction of six numbers, at every call or, where the
-    /// configuration says so (`steering.poll_steps`), at every so many. It waits for nobody, except while it is paused, and for the
-    /// plans of orders that take effect at a given cycle.
+    /// Where no pipeline is due, no command has arrived and no motion is under way, it costs one
+    /// atomic load and a few comparisons and allocates nothing; on several ranks also one reduction
+    /// of six numbers, at every call or, where the configuration says so (`steering.poll_steps`),
+    /// at every so many. It waits for nobody, except while it is paused, and for the plans of
+    /// orders that take effect at a given cycle.
     ///
     /// On several ranks it is collective: all call it for the same cycle and time.
     ///
     /// # Errors
-    /// [`ExecuteError`] for a mistake of the solver alone; nothing that a viewer, a file of orders or the network did ends up
-    /// here. Nothing has changed then, and the solver may call again. A mistake on one rank is an error on all of them.
+    /// [`ExecuteError`] for a mistake of the solver alone; nothing that a viewer, a file of orders
+    /// or the network did ends up here. Nothing has changed then, and the solver may call again. A
+    /// mistake on one rank is an error on all of them.
     ///
-    /// Lengths, associations and counts are compared in every call; the numbers of vertices and the coordinates are looked at
-    /// when a mesh is lent first or replaced, and the coordinates once more where a pipeline is due or an order is planned.
+    /// Lengths, associations and counts are compared in every call; the numbers of vertices and the
+    /// coordinates are looked at when a mesh is lent first or replaced, and the coordinates once
+    /// more where a pipeline is due or an order is planned.
     pub fn execute(
         &mut self,
         step: &Step,
         channels: &[Channel<'_>],
-    ) -> Result<Steering<'_>, ExecuteError> {
+    ) -> Result<Steering, ExecuteError> {
         let entered = Instant::now();
-        let _alarm = comm::Alarm::among(&self.communicator);
+        let _alarm = Alarm::among(&self.communicator);
         if let Some(left) = self.timing.left.take() {
             self.timing.steps.add(entered - left);
         }
         self.timing.cycles += 1;
-        let moment = Moment { cycle: step.cycle, time: step.time };
+        let moment = step.moment();
         if let Some(hub) = &self.hub {
             hub.clock.set(moment.cycle, moment.time);
         }
@@ -252,34 +283,26 @@ impl Adaptor {
         self.timing.execute.add(left - entered);
         self.timing.left = Some(left);
         let motion = match &self.mesh {
-            SteeredMesh::Steered(steerer, _) if moved => {
-                let (shape, coordinates) = steerer.present();
-                Some(MeshMotion {
-                    coordinates,
-                    displacement: &shape.displacement,
-                    velocity: &shape.velocity,
-                    surface: SurfaceMotion {
-                        vertices: steerer.boundary(),
-                        coordinates: &shape.surface.coordinates,
-                        displacement: &shape.surface.displacement,
-                        velocity: &shape.surface.velocity,
-                    },
-                    shape: shape.shape,
-                    order: &shape.order,
-                })
-            }
+            SteeredMesh::Steered(steerer, _) if moved => Some(steerer.motion().clone()),
             _ => None,
         };
-        Ok(Steering { motion, parameters: self.parameters.take_changed(), stop: self.stopped })
+        Ok(Steering {
+            motion,
+            parameters: self.parameters.take_changed().to_vec(),
+            stop: self.stopped,
+        })
     }
 
-    /// Whether `execute` will look at the mesh and the fields of this step, which a solver that would have to copy them first can
-    /// ask. Where it will not, it needs the number of the mesh's vertices all the same.
+    /// Whether `execute` will look at the mesh and the fields of this step.
     ///
-    /// The same on all ranks; of what a viewer has just asked for, several ranks learn inside `execute` alone.
+    /// A solver that would have to copy them first can ask before it does. Where the answer is no,
+    /// `execute` needs the number of the mesh's vertices all the same.
+    ///
+    /// All ranks get the same answer; of what a viewer has just asked for, several ranks learn
+    /// inside `execute` alone.
     #[must_use]
     pub fn looks_at(&self, step: &Step) -> bool {
-        let moment = Moment { cycle: step.cycle, time: step.time };
+        let moment = step.moment();
         let is_called = self.communicator.size() == 1 && self.queue.has_called();
         let by_orders = match &self.mesh {
             SteeredMesh::Unknown => true,
@@ -291,31 +314,15 @@ impl Adaptor {
         by_orders || self.pipelines.is_due(moment)
     }
 
-    /// Lets only those pipelines run from now on whose names are chosen, until this is called again; at first all are. Those that
-    /// wait are due once more when they are chosen. To be called on all ranks alike.
+    /// Runs only the chosen pipelines from now on; at first all run. A pipeline that was left out
+    /// is due once more when it is chosen again. To be called on all ranks alike.
     pub fn choose_pipelines(&mut self, is_chosen: impl Fn(&str) -> bool) {
         self.pipelines.choose(is_chosen);
     }
 
-    /// Stops changing the shape of the mesh, because the solver has made another one of it: views go on, orders are rejected with
-    /// this reason from now on. To be called on all ranks.
-    pub fn release_shape(&mut self, reason: &str) {
-        if matches!(self.mesh, SteeredMesh::Steered(..)) {
-            self.refuse(reason);
-        }
-    }
-
-    fn refuse(&mut self, reason: &str) {
-        if self.communicator.rank() == 0 {
-            self.complain(reason);
-        }
-        self.mesh = SteeredMesh::Refused(reason.to_owned());
-        self.describe();
-        self.tell_conditions();
-    }
-
-    /// The name of the channel whose mesh orders change, where the configuration names one: the `channel` of the pipeline with
-    /// `"on": "order"`. Without one it is the first that `execute` is shown.
+    /// The name of the channel whose mesh orders change, where the configuration names one: the
+    /// `channel` of the pipeline with `"on": "order"`. Without one it is the first that `execute`
+    /// is shown.
     #[must_use]
     pub fn steered_channel(&self) -> Option<&str> {
         let pipeline = self.config.pipelines.iter().find(|pipeline| pipeline.due == Due::OnOrder);
@@ -332,14 +339,18 @@ impl Adaptor {
     /// Ends the run: viewers are disconnected, and every thread has ended when it returns.
     ///
     /// # Errors
-    /// [`FinalizeError`] where a file that a pipeline asked for could not be written; it holds the report all the same.
+    /// [`FinalizeError`] where a file that a pipeline asked for could not be written; it holds the
+    /// report all the same.
     pub fn finalize(mut self) -> Result<Report, FinalizeError> {
-        let _alarm = comm::Alarm::among(&self.communicator);
+        let _alarm = Alarm::among(&self.communicator);
+        if let SteeredMesh::Steered(steerer, _) = &mut self.mesh {
+            steerer.end();
+        }
         self.mesh = SteeredMesh::Unknown;
         self.server = None;
         let faults = self.pipelines.finish();
         // Rank 0 writes: what was asked for is there before any rank goes on.
-        self.communicator.reduce(comm::Reduction::Maximum, &mut [0.0]);
+        self.communicator.reduce(Reduction::Maximum, &mut [0.0]);
         let parts = [
             ("execute", &self.timing.execute),
             ("reference", &self.timing.reference),
@@ -367,8 +378,9 @@ impl Adaptor {
         }
     }
 
-    /// Whether rank 0 was called to look at something; an error where any rank has one. `None` between two meetings of the ranks:
-    /// then nothing is done, and a fault waits for the next, so that all ranks have it at the same call.
+    /// Whether rank 0 was called to look at something; an error where any rank has one. `None`
+    /// between two meetings of the ranks: then nothing is done, and a fault waits for the next, so
+    /// that all ranks have it at the same call.
     #[inline]
     fn meet(
         &mut self,
@@ -383,14 +395,15 @@ impl Adaptor {
             self.meetings.calls.is_multiple_of(u64::from(self.config.steering.poll_steps.get()));
         self.meetings.calls += 1;
         let fault = self.meetings.fault.take().or(fault);
-        // All ranks know alike of a motion under way; what only the step's own numbers could tell is left for the next meeting.
+        // All ranks know alike of a motion under way; what only the step's own numbers could tell
+        // is left for the next meeting.
         let under_way = self.paused
             || matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if !steerer.is_at_rest());
         if !due && !under_way {
             self.meetings.fault = fault;
             return Ok(None);
         }
-        comm::meet(&*self.communicator, moment, fault, called).map(Some)
+        meeting::meet(&*self.communicator, moment, fault, called).map(Some)
     }
 
     /// Whether there is nothing to do in this call.
@@ -464,160 +477,4 @@ impl Adaptor {
         }
         Ok(moved)
     }
-
-    /// Copies the mesh as it is now as the reference of all shapes, if anybody could ask for one.
-    fn take_reference(
-        &mut self,
-        step: &Step,
-        channels: &[Channel<'_>],
-    ) -> Result<(), ExecuteError> {
-        let cycle = step.cycle;
-        let channel = match comm::agree_on(
-            &*self.communicator,
-            Channel::find(channels, self.steered_channel()),
-        ) {
-            Ok(channel) => channel,
-            // The configuration's mistake, not the solver's.
-            Err(comm::RankError { message, .. }) => {
-                self.refuse(&format!("no shape can be changed: {message}"));
-                return Ok(());
-            }
-        };
-        let of_channel = |source| {
-            let channel = channel.name.into();
-            ExecuteError::Channel { cycle, source: ChannelError::Mesh { channel, source } }
-        };
-        let checked = self.check_features(channel).map_err(of_channel);
-        if self.communicator.size() == 1 {
-            checked?;
-        } else {
-            comm::agree_on(&*self.communicator, checked)?;
-        }
-        self.mesh = if self.config.stream.is_none()
-            && self.timed.is_empty()
-            && !self.pipelines.can_order()
-        {
-            SteeredMesh::Unsteered
-        } else {
-            let taken = if self.communicator.size() > 1 {
-                let part = comm::agree_on(
-                    &*self.communicator,
-                    Part::of(&channel.mesh).map_err(of_channel),
-                )?;
-                self.tell_handedness(&part.cells);
-                self.take_over_part(&part)
-            } else {
-                let mesh = channel.mesh.to_mesh().map_err(of_channel)?;
-                self.tell_handedness(mesh.cells());
-                self.take_over(mesh)
-            };
-            match taken {
-                Ok(steerer) => {
-                    self.lent.take_reference(channel);
-                    let surface = steerer.surface();
-                    if let Some(surface) =
-                        surface.as_ref().filter(|_| self.communicator.size() == 1)
-                    {
-                        self.pipelines.share_surface(channels, channel.name, Arc::clone(surface));
-                    }
-                    SteeredMesh::Steered(Box::new(steerer), surface)
-                }
-                Err(reason) => {
-                    let reason = format!("the shape of this mesh cannot be changed: {reason}");
-                    self.complain(&reason);
-                    SteeredMesh::Refused(reason)
-                }
-            }
-        };
-        let fields = channel.fields.iter().map(
-            |field| json!({"name": field.name, "association": field.association, "components": field.values.components()}),
-        );
-        self.told.channel = channel.name.to_owned();
-        self.told.fields = fields.collect();
-        if let SteeredMesh::Steered(steerer, Some(surface)) = &self.mesh {
-            self.told.features = features(surface);
-            if let Some(hub) = &self.hub {
-                if let Some(forecaster) = steerer.forecaster() {
-                    let _ = self.forecaster.set(forecaster);
-                }
-                let surface = ReferenceSurface::new(Arc::clone(surface));
-                self.told.surface = surface.described();
-                hub.offer_surface(Arc::new(surface));
-            }
-        }
-        self.describe();
-        self.tell_conditions();
-        Ok(())
-    }
-
-    /// Says in the log which types of cells any rank has left-handed. Collective.
-    fn tell_handedness(&self, cells: &Cells) {
-        let note = cells.handedness_note().unwrap_or_default();
-        let notes = self.communicator.gather(0, note.as_bytes()).unwrap_or_default();
-        if let Some(note) = notes.iter().find(|note| !note.is_empty()) {
-            eprintln!("tombolo: {}", String::from_utf8_lossy(note));
-        }
-    }
-
-    fn take_over(&self, mesh: Mesh) -> Result<Steerer, String> {
-        let mesh = Arc::new(mesh);
-        let surface = Surface::extract(&mesh, &FeatureSettings::default())
-            .map_err(|error| error.to_string())?;
-        let shaper = Shaper::new(mesh, Arc::new(surface)).map_err(|error| error.to_string())?;
-        let steerer = Steerer::new(
-            shaper,
-            self.defaults.clone(),
-            Arc::clone(&self.log),
-            Arc::clone(&self.queue),
-            // Whoever drives can drag it at any time.
-            self.config.stream.is_some()
-                || self.timed.drags_skeleton()
-                || self.pipelines.drags_skeleton(),
-        );
-        steerer.map_err(|error| format!("a thread could not be started: {error}"))
-    }
-
-    /// The same of this rank's part of a mesh. Collective.
-    fn take_over_part(&self, part: &Part) -> Result<Steerer, String> {
-        let partition = |ranks: Ranks| match &self.solvers {
-            Some(solvers) => solvers(ranks, &part.points),
-            None => Arc::new(ranks),
-        };
-        let shaper = Shaper::of_part(
-            Arc::clone(&self.communicator),
-            part,
-            &FeatureSettings::default(),
-            partition,
-        )
-        .map_err(|error| error.to_string())?;
-        Ok(Steerer::of_part(shaper, self.defaults.clone(), Arc::clone(&self.log)))
-    }
-}
-
-/// Reads what was built by hand as if it had stood in a file, so that the same rules hold.
-fn checked<T: Serialize + DeserializeOwned + Validate>(
-    value: &T,
-    name: &str,
-) -> Result<T, InitializeError> {
-    let text = serde_json::to_string(value).map_err(InitializeError::Unwritable)?;
-    Ok(language::parse_valid(&text, name)?)
-}
-
-/// The settings of orders that bring none: those of the pipeline that waits for orders, else the kernel's.
-fn defaults(config: &Config) -> Defaults {
-    let mut defaults = Defaults::default();
-    let stages = config
-        .pipelines
-        .iter()
-        .filter(|pipeline| pipeline.due == Due::OnOrder)
-        .flat_map(|it| &it.stages);
-    for stage in stages {
-        match stage {
-            Stage::Deform(deform) => defaults.deform.clone_from(deform),
-            Stage::Guard(guard) => defaults.guard = *guard,
-            Stage::Schedule(schedule) => defaults.schedule = *schedule,
-            _ => {}
-        }
-    }
-    defaults
 }

@@ -1,18 +1,22 @@
-//! The journal: every command of a run and what became of it, one JSON object a line, each line flushed.
+//! The journal: every command of a run and what became of it, one JSON object a line, each line
+//! flushed.
 //!
-//! A journal is a valid file of orders: given to another run of the same solver it replays this one. The commands of pipelines
-//! stand in it without their text, because a replay's own pipelines will give them again.
+//! A journal is a valid file of orders: given to another run of the same solver it replays this
+//! one. The commands of pipelines stand in it without their text, because a replay's own pipelines
+//! will give them again.
 
 use std::{
     fs::File,
     io::{self, Write},
     path::{Path, PathBuf},
-    sync::{Mutex, PoisonError},
+    sync::Mutex,
 };
 
 use tombolo_pipelines::language::JournalEntry;
 
-/// Why there is no journal.
+use crate::lock::lock;
+
+/// Why the journal cannot be written.
 #[derive(Debug, thiserror::Error)]
 #[error("the journal {} cannot be written: {source}", path.display())]
 pub struct JournalError {
@@ -31,7 +35,8 @@ impl Journal {
         Self { file: Mutex::new(None) }
     }
 
-    /// Starts a journal, and the directory for it where there is none; one of the same name is replaced.
+    /// Starts a journal, and the directory for it where there is none; one of the same name is
+    /// replaced.
     pub(crate) fn create(path: &Path) -> Result<Self, JournalError> {
         let directory = path.parent().unwrap_or(Path::new(""));
         let made =
@@ -45,9 +50,10 @@ impl Journal {
     /// Writes one line.
     ///
     /// # Errors
-    /// Where the line could not be written; no further one will be tried, so that no line stands after a torn one.
+    /// Where the line could not be written; no further one will be tried, so that no line stands
+    /// after a torn one.
     pub(crate) fn write(&self, entry: &JournalEntry) -> Result<(), JournalError> {
-        let mut guard = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut guard = lock(&self.file);
         let Some((path, file)) = guard.as_mut() else { return Ok(()) };
         let written = serde_json::to_vec(entry).map_err(io::Error::other).and_then(|mut line| {
             line.push(b'\n');

@@ -1,57 +1,79 @@
-//! In situ adaptor: watch a running simulation in a browser and change the shape of its domain while it runs.
+//! In situ adaptor: watch a running simulation in a browser and change the shape of its domain
+//! while it runs.
 //!
-//! A solver makes three calls: [`Adaptor::initialize`], [`Adaptor::execute`] before each step, [`Adaptor::finalize`]. This is a
-//! whole one, whose mesh is squeezed by an order at cycle 2 and restored by another at cycle 4:
+//! A solver makes three calls: it starts an [`Adaptor`], calls [`Adaptor::execute`] before each
+//! step, and ends with [`Adaptor::finalize`]. This is a whole one, whose mesh is squeezed by an
+//! order at cycle 2 and restored by another at cycle 4:
 //!
 //! ```
-//! use tombolo::{Adaptor, Settings, Step, deform::{mesh::MeshView, shapes::box_of_tets}};
-//! use tombolo::pipelines::{extract::Channel, language::parse_orders};
-//!
-//! let orders = r#"[
-//!     {"at": {"cycle": 2}, "order": {"edits": [
-//!         {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -0.2]}}]}},
-//!     {"at": {"cycle": 4}, "order": {"undo": 1}}]"#;
-//! let mut mesh = box_of_tets([3, 3, 3], [0.0; 3], [1.0; 3]);
-//! let reference = mesh.clone();
-//! let mut adaptor = Adaptor::initialize(Settings { orders: parse_orders(orders, "orders.json")?, ..Settings::default() })?;
+//! use tombolo::{Adaptor, Channel, FieldView, MeshView, Step};
+//! # use tombolo::{deform::shapes::box_of_tets, pipelines::language::parse_orders};
+//! # let directory = tempfile::tempdir()?;
+//! # let [pipelines, orders] = ["pipelines.json", "orders.json"].map(|name| directory.path().join(name));
+//! # std::fs::write(&pipelines, r#"{"version": 1}"#)?;
+//! # std::fs::write(&orders, r#"[
+//! #     {"at": {"cycle": 2}, "order": {"edits": [
+//! #         {"translate": {"features": ["feature-6"], "fixed": ["feature-1"], "by": [0, 0, -0.2]}}]}},
+//! #     {"at": {"cycle": 4}, "order": {"undo": 1}}]"#)?;
+//! # let mesh = box_of_tets([3, 3, 3], [0.0; 3], [1.0; 3]);
+//! # let (mut points, tets) = (mesh.points().to_vec(), mesh.cells().connectivity().to_vec());
+//! # let reference = points.clone();
+//! let mut temperature = vec![0.0; points.len()];
+//! let settings = Adaptor::from_file(&pipelines)?.orders_from_file(&orders)?;
+//! let mut adaptor = settings.parameter("heating", 1.0, 0.0..=10.0).start()?;
 //! for cycle in 0..6 {
+//!     let fields = [FieldView::vertex("temperature", &temperature)];
+//!     let solid = Channel::new("solid", MeshView::tets(&points, &tets), &fields);
 //!     let step = Step { cycle, time: 0.01 * cycle as f64, time_step: 0.01 };
-//!     let channel = Channel { name: "fluid", mesh: MeshView::from(&mesh), fields: &[] };
-//!     let steering = adaptor.execute(&step, &[channel])?;
+//!     let steering = adaptor.execute(&step, &[solid])?;
 //!     if let Some(motion) = steering.motion {
 //!         // A real solver takes its step on the moving mesh here, with `motion.velocity`.
-//!         mesh = mesh.with_points(motion.coordinates.to_vec())?;
+//!         points.copy_from_slice(&motion.coordinates);
 //!     }
-//!     assert_eq!(mesh == reference, cycle < 2 || cycle >= 4);
+//!     let heating = adaptor.parameter("heating").unwrap_or(1.0);
+//!     temperature.iter_mut().for_each(|value| *value += 0.01 * heating);
+//! #   assert_eq!(points == reference, cycle < 2 || cycle >= 4);
 //! }
 //! let report = adaptor.finalize()?;
-//! assert!(report.orders.iter().all(|order| order.status == tombolo::OrderStatus::Applied));
+//! # assert!(report.orders.iter().all(|order| order.status == tombolo::OrderStatus::Applied));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! With `"stream": {}` in its configuration the same solver is steered from a browser: [`Adaptor::link`] is what to open.
+//! With `"stream": {}` in its configuration the same solver is steered from a browser:
+//! [`Adaptor::link`] is what to open.
 #![warn(missing_docs)]
 
 mod adaptor;
-pub mod comm;
-#[cfg(feature = "distributed")]
-pub mod distributed;
+mod error;
+pub mod foreign;
 mod journal;
+mod lock;
 pub mod logging;
+mod meeting;
+#[cfg(feature = "distributed")]
+pub mod mpi;
+#[cfg(feature = "distributed")]
+pub mod petsc;
 mod report;
 mod settings;
 mod stages;
 pub mod steering;
+mod step;
 pub mod stream;
 mod writer;
 
 pub use adaptor::Adaptor;
+pub use error::{ExecuteError, FinalizeError, InitializeError};
 pub use journal::JournalError;
-pub use report::{ORDERS_KEPT, OrderReport, OrderStatus, Report, Spread};
-pub use settings::{
-    ExecuteError, FinalizeError, InitializeError, MeshMotion, Settings, Solvers, Steering, Step,
-    SurfaceMotion,
+pub use report::{Report, Spread};
+pub use settings::Settings;
+pub use steering::{
+    MeshMotion, NotFollowed, ORDERS_KEPT, OrderReport, OrderStatus, Parameter, ParameterError,
+    Steering, SurfaceMotion,
 };
-pub use steering::{NotFollowed, Parameter, ParameterError};
+pub use step::Step;
 pub use tombolo_deform as deform;
+pub use tombolo_deform::communicator;
+pub use tombolo_deform::mesh::{ArrayView, MeshView};
 pub use tombolo_pipelines as pipelines;
+pub use tombolo_pipelines::extract::{Association, Channel, FieldView};

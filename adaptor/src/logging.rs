@@ -1,18 +1,21 @@
 //! Where messages go that belong to no call: what was passed over, what a pipeline could not do.
 //!
-//! The library logs through the crate `log`, so that a host's logger has its messages beside all others. A host that has no logger
-//! calls [`start`], as the programs do, and has the warnings on standard error.
+//! The library logs through the crate `log`, so that a host's logger has its messages beside all
+//! others. A host that has no logger calls [`start`], as the programs do, and has the warnings on
+//! standard error.
 
 use std::cell::Cell;
-use std::sync::{Mutex, Once, PoisonError};
+use std::sync::{Mutex, Once};
 
 pub use log::{Level, LevelFilter};
 use log::{Log, Metadata, Record};
 
+use crate::lock::lock;
+
 /// Takes messages, one at a time and from any thread.
 pub type Sink = Box<dyn Fn(Level, &str) + Send>;
 
-/// Why messages go where they went before.
+/// Why the destination of messages could not be changed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LoggingError {
@@ -45,7 +48,7 @@ impl Log for Logger {
         if !self.enabled(record.metadata()) || IS_IN_SINK.replace(true) {
             return;
         }
-        match &*self.sink.lock().unwrap_or_else(PoisonError::into_inner) {
+        match &*lock(&self.sink) {
             Some(sink) => sink(record.level(), &record.args().to_string()),
             None => eprintln!("tombolo: {}", record.args()),
         }
@@ -55,8 +58,8 @@ impl Log for Logger {
     fn flush(&self) {}
 }
 
-/// Logs warnings to standard error, unless the process has a logger or [`send_to`] was called before. Calls after the first change
-/// nothing.
+/// Logs warnings to standard error, unless the process has a logger or [`send_to`] was called
+/// before. Calls after the first change nothing.
 pub fn start() {
     static STARTED: Once = Once::new();
     STARTED.call_once(|| {
@@ -66,8 +69,8 @@ pub fn start() {
     });
 }
 
-/// Logs messages up to this level to `sink`; without one, to standard error. The sink before is not called any more once this
-/// returns.
+/// Logs messages up to this level to `sink`; without one, to standard error. The sink before is not
+/// called any more once this returns.
 ///
 /// ```
 /// use tombolo::logging::{LevelFilter, send_to};
@@ -77,7 +80,8 @@ pub fn start() {
 /// ```
 ///
 /// # Errors
-/// [`LoggingError::OtherLogger`] where the host has set a logger, [`LoggingError::WithinSink`] in a call of a sink.
+/// [`LoggingError::OtherLogger`] where the host has set a logger, [`LoggingError::WithinSink`] in a
+/// call of a sink.
 pub fn send_to(level: LevelFilter, sink: Option<Sink>) -> Result<(), LoggingError> {
     if IS_IN_SINK.get() {
         return Err(LoggingError::WithinSink);
@@ -86,8 +90,7 @@ pub fn send_to(level: LevelFilter, sink: Option<Sink>) -> Result<(), LoggingErro
     if !std::ptr::addr_eq(log::logger(), &raw const LOGGER) {
         return Err(LoggingError::OtherLogger);
     }
-    let before =
-        std::mem::replace(&mut *LOGGER.sink.lock().unwrap_or_else(PoisonError::into_inner), sink);
+    let before = std::mem::replace(&mut *lock(&LOGGER.sink), sink);
     log::set_max_level(level);
     drop(before);
     Ok(())

@@ -1,80 +1,27 @@
-//! What a run did, for people and for programs.
+//! The report of a run, for people and for programs.
 
 use std::{collections::BTreeMap, time::Duration};
 
 use serde::Serialize;
-use tombolo_pipelines::shape::{Judged, ShapeSeconds};
 
-use crate::{steering::NotFollowed, stream::StreamCounts};
+use crate::{steering::OrderReport, stream::StreamCounts};
 
-/// What [`Adaptor::finalize`](crate::Adaptor::finalize) hands back.
+/// The report that [`Adaptor::finalize`](crate::Adaptor::finalize) hands back.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     /// Calls of `execute`.
     pub cycles: u64,
-    /// The orders, in the order in which they came in; of more than [`ORDERS_KEPT`] only the newest.
+    /// The orders, in the order in which they came in; of more than
+    /// [`ORDERS_KEPT`](crate::ORDERS_KEPT) only the newest.
     pub orders: Vec<OrderReport>,
     /// Seconds between one `execute` and the next, the adaptor's own left out: the solver's step.
     pub step_seconds: Spread,
-    /// Seconds spent in the adaptor, by part: `execute` (all of it), `reference` (the copy of the mesh and its surface, once),
-    /// `pipelines`, `steering` (plans made inside `execute`, shapes handed out), `paused`.
+    /// Seconds spent in the adaptor, by part: `execute` (all of it), `reference` (the copy of the
+    /// mesh and its surface, once), `pipelines`, `steering` (plans made inside `execute`, shapes
+    /// handed out), `paused`.
     pub adaptor_seconds: BTreeMap<&'static str, Spread>,
-    /// What was streamed.
+    /// The frames and bytes that were streamed.
     pub stream: StreamCounts,
-}
-
-/// Orders that a report and a viewer's list keep.
-pub const ORDERS_KEPT: usize = 4096;
-
-/// What became of one order.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct OrderReport {
-    /// Its name, unique in the run.
-    pub id: String,
-    /// How far it has come.
-    pub status: OrderStatus,
-    /// Why it was rejected, or what else there is to know.
-    pub reason: Option<String>,
-    /// The cycle whose step was the first to move the mesh for it.
-    pub cycle_applied: Option<u64>,
-    /// Shapes handed out so far.
-    pub shape: u32,
-    /// Shapes in all.
-    pub shapes: u32,
-    /// The least scaled Jacobian of all shapes on its way; of an order that the guard rejected, what it would have come to.
-    pub min_scaled_jacobian: Option<f64>,
-    /// What the guard judged of every shape: the volume, or the surface alone where the volume is left to the solver.
-    pub judged: Option<Judged>,
-    /// That the solver did not move its mesh as it was asked to; the first shape that it did not follow.
-    pub not_followed: Option<NotFollowed>,
-    /// The largest distance between where a vertex was asked to be and where it was lent at the next call, in units of the mesh,
-    /// beyond rounding: the solver's own motion, or what it did not follow.
-    pub deviation: Option<f64>,
-    /// The longest way that a vertex of the surface goes for it, in units of the mesh.
-    pub largest_displacement: Option<f64>,
-    /// The fraction of its amounts that is done: below 1 where the guard clamped it; of one that was rejected, what would pass,
-    /// where that is known.
-    pub fraction: Option<f64>,
-    /// Seconds that its plan took.
-    pub seconds: ShapeSeconds,
-    /// Seconds that the solver waited inside `execute` for this order, in steps of the solver (their median).
-    pub added_steps: Option<f64>,
-}
-
-/// How far an order has come.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum OrderStatus {
-    /// Read, found valid, and waiting for its turn.
-    Accepted,
-    /// Its plan is being made.
-    Computing,
-    /// Its shapes are being handed to the solver.
-    Applying,
-    /// Its last shape was handed to the solver.
-    Applied,
-    /// It changed nothing.
-    Rejected,
 }
 
 /// How a duration was spread over its occurrences.

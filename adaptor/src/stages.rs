@@ -2,14 +2,14 @@
 
 use std::{
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex},
 };
 
 use axum::body::Bytes;
 use serde_json::{Map, Value, json};
+use tombolo_deform::communicator::Communicator;
 use tombolo_deform::surface::Surface;
 use tombolo_pipelines::{
-    communicator::Communicator,
     encode::Encoder,
     extract::{Channel, Snapshot},
     language::{Action, Command, Config, Stage},
@@ -17,8 +17,9 @@ use tombolo_pipelines::{
 };
 
 use crate::{
-    settings::InitializeError,
-    steering::Moment,
+    error::InitializeError,
+    lock::lock,
+    step::Moment,
     stream::{Frame as EncodedFrame, Hub},
     writer::Writer,
 };
@@ -35,12 +36,12 @@ pub(crate) struct Pipelines {
     writer: Writer,
 }
 
-/// What pipelines ask for besides what was sent and written.
+/// The requests of pipelines besides what was sent and written.
 #[derive(Default)]
 pub(crate) struct Asked {
     /// Commands, each with the pipeline that gives it.
     pub(crate) commands: Vec<(String, Command)>,
-    /// What could not be done.
+    /// The faults.
     pub(crate) faults: Vec<String>,
 }
 
@@ -51,7 +52,7 @@ impl Pipelines {
         output: &Path,
     ) -> Result<Self, InitializeError> {
         let runner = Runner::with_communicator(config, communicator)
-            .map_err(|problem| InitializeError::Pipelines(format!("{problem:?}")))?;
+            .map_err(InitializeError::Configuration)?;
         let views = runner.views();
         let can_order = config.pipelines.iter().any(|pipeline| {
             pipeline.stages.iter().any(|stage| matches!(stage, Stage::Order(_)))
@@ -69,7 +70,7 @@ impl Pipelines {
         })
     }
 
-    /// What `hello` tells of the views.
+    /// The description of the views in `hello`.
     pub(crate) fn views(&self) -> &Value {
         &self.description
     }
@@ -89,7 +90,7 @@ impl Pipelines {
         &mut self,
         channels: &[Channel<'_>],
         channel: &str,
-        surface: Arc<Surface>,
+        surface: &Surface,
     ) {
         // Where it does not fit, the pipelines work out their own and say what is wrong.
         let _ = self.runner.set_surface(channels, Some(channel), surface);
@@ -134,14 +135,8 @@ impl Pipelines {
                         hub.monitor(&monitor(&values));
                     }
                 }
-                Output::Pause { pipeline, .. } => {
-                    asked.commands.push((pipeline.to_string(), Command::Pause {}))
-                }
-                Output::Stop { pipeline, .. } => {
-                    asked.commands.push((pipeline.to_string(), Command::Stop {}))
-                }
-                Output::Order { pipeline, order } => {
-                    asked.commands.push((pipeline.to_string(), Command::Order(order)));
+                Output::Command { pipeline, command } => {
+                    asked.commands.push((pipeline.to_string(), command))
                 }
                 Output::Error { pipeline, cycle, message } => {
                     asked.faults.push(format!("cycle {cycle}, pipeline '{pipeline}': {message}"));
@@ -160,7 +155,7 @@ impl Pipelines {
         };
         let encoder = Arc::clone(&self.views[view].1);
         let encode = move || {
-            let mut encoder = encoder.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut encoder = lock(&encoder);
             let encoded = encoder.encode(&frame).map_err(|error| error.to_string())?;
             Ok(EncodedFrame {
                 topology_id: encoded.topology_id,

@@ -4,7 +4,7 @@ use std::{
     collections::HashMap,
     path::{Path, PathBuf},
     sync::{
-        Arc, Mutex, PoisonError,
+        Arc, Mutex,
         mpsc::{Receiver, SyncSender, sync_channel},
     },
     thread::JoinHandle,
@@ -14,6 +14,8 @@ use tombolo_pipelines::{
     extract::Extract,
     files::{self, Series},
 };
+
+use crate::lock::lock;
 
 /// Extracts that may wait to be written; the solver waits where the disk is slower than this.
 const WAITING: usize = 2;
@@ -71,7 +73,7 @@ impl Writer {
 
     /// Faults that were not told yet.
     pub(crate) fn faults(&mut self) -> Vec<String> {
-        let faults = self.faults.lock().unwrap_or_else(PoisonError::into_inner);
+        let faults = lock(&self.faults);
         let new = faults.get(self.told..).unwrap_or_default().to_vec();
         self.told = faults.len();
         new
@@ -83,18 +85,18 @@ impl Writer {
         if self.thread.take().is_some_and(|thread| thread.join().is_err()) {
             note(&self.faults, "the thread that writes files has failed".into());
         }
-        self.faults.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        lock(&self.faults).clone()
     }
 }
 
 fn note(faults: &Mutex<Vec<String>>, fault: String) {
-    let mut faults = faults.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut faults = lock(faults);
     if faults.len() < FAULTS {
         faults.push(fault);
     }
 }
 
-/// What a pipeline has written: its first file, and the series once there is a second.
+/// The files that a pipeline has written: its first file, and the series once there is a second.
 enum Written {
     One(PathBuf, f64),
     Many(Series),
@@ -110,12 +112,8 @@ fn work(jobs: &Receiver<Job>, faults: &Mutex<Vec<String>>) {
 }
 
 fn write(job: &Job, written: &mut HashMap<Arc<str>, Written>) -> Result<(), String> {
-    if let Some(directory) = job.path.parent() {
-        std::fs::create_dir_all(directory)
-            .map_err(|error| format!("{}: {error}", directory.display()))?;
-    }
-    files::write(&job.path, &job.extract).map_err(|error| error.to_string())?;
     let told = |error: files::FileError| error.to_string();
+    files::write(&job.path, &job.extract).map_err(told)?;
     match written.get_mut(&job.pipeline) {
         None => {
             written.insert(Arc::clone(&job.pipeline), Written::One(job.path.clone(), job.time));

@@ -1,5 +1,5 @@
-//! A mistake of the solver is an error of the call that made it, wherever it is made; nothing has changed then, and the solver may
-//! go on.
+//! A mistake of the solver is an error of the call that made it, wherever it is made; nothing has
+//! changed then, and the solver may go on.
 
 mod common;
 
@@ -9,7 +9,7 @@ use common::{config, squeeze};
 use serde_json::json;
 use tombolo::{
     Adaptor, ExecuteError, OrderStatus, Settings, Step,
-    comm::{Communicator, threads},
+    communicator::{Communicator, threads},
     deform::{
         mesh::{ArrayView, CellsView, FeatureSource, Indices, MeshView, Values},
         shapes::box_of_tets,
@@ -30,7 +30,7 @@ struct Lent {
     types: Vec<u8>,
     offsets: Vec<i32>,
     connectivity: Vec<i32>,
-    ghosts: Vec<bool>,
+    ghosts: Vec<u8>,
     numbers: Vec<i64>,
     cell_numbers: Vec<i64>,
     features: FeatureSource,
@@ -54,7 +54,7 @@ impl Lent {
             types: vec![10; cells],
             offsets: (0..=cells as i32).map(|cell| 4 * cell).collect(),
             connectivity,
-            ghosts: vec![false; cells],
+            ghosts: vec![0; cells],
             // Neighbours share the face between them.
             numbers: mesh
                 .points()
@@ -80,11 +80,10 @@ impl Lent {
                 association: self.temperature_on,
                 values: ArrayView::scalars(&self.temperature),
             },
-            FieldView {
-                name: "stress",
-                association: Association::Element,
-                values: ArrayView::interleaved(Values::F64(&self.stress), 6).expect("whole tuples"),
-            },
+            FieldView::element(
+                "stress",
+                ArrayView::interleaved(Values::F64(&self.stress), 6).expect("whole tuples"),
+            ),
         ];
         let cells = CellsView::Mixed {
             types: &self.types,

@@ -1,15 +1,17 @@
-//! Features that a solver names by faces: those that the mesh does not have are its mistake, those inside it are told.
+//! Features that a solver names by faces: those that the mesh does not have are its mistake, those
+//! inside it are told.
 
 use std::sync::{Arc, Mutex};
 
-use tombolo::comm::threads;
+use tombolo::communicator::threads;
 use tombolo::deform::mesh::{CellType, Cells, FeatureSource, MeshView, TaggedFaces};
 use tombolo::deform::shapes::box_of_tets;
 use tombolo::logging::{self, LevelFilter};
 use tombolo::pipelines::extract::Channel;
 use tombolo::{Adaptor, Settings, Step};
 
-/// What the call says on a rank whose box, one beside the other, has these faces with features besides its own.
+/// Executes once on a box of its own for each rank, the boxes side by side, after `change` has
+/// added tagged faces to those of the box.
 fn call(
     settings: Settings,
     rank: usize,
@@ -46,7 +48,7 @@ fn on_ranks(change: impl Fn(&mut TaggedFaces, &Cells) + Sync) -> [Result<(), Str
     [alone, three[0].clone()]
 }
 
-fn threads_rank(ranks: &impl tombolo::comm::Communicator) -> usize {
+fn threads_rank(ranks: &impl tombolo::communicator::Communicator) -> usize {
     ranks.rank()
 }
 

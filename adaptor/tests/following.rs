@@ -1,18 +1,19 @@
-//! The mesh is the solver's: what is handed out is asked for, and what is lent at the next call says whether it was done.
+//! The mesh is the solver's: what is handed out is asked for, and what is lent at the next call
+//! says whether it was done.
 
 use std::sync::Arc;
 
 use serde_json::{Value, json};
 use tombolo::{
     Adaptor, MeshMotion, OrderReport, OrderStatus, Settings, Step,
-    comm::{Communicator, threads},
+    communicator::{Communicator, threads},
+    deform::distributed::Part,
     deform::{
         mesh::{ArrayView, Mesh, MeshView, Values, Vector},
         quality::quality,
         shapes::box_of_tets,
     },
     pipelines::{
-        distributed::Part,
         extract::Channel,
         language::{parse, parse_orders},
     },
@@ -40,8 +41,9 @@ fn settings(orders: &Value, method: &str) -> Settings {
     }
 }
 
-/// How a solver moves its mesh in one step: from the coordinates it has, the cycle, and what it is asked for.
-type Move<'a> = &'a mut dyn FnMut(&mut Vec<Vector>, u64, Option<&MeshMotion<'_>>);
+/// How a solver moves its mesh in one step: from the coordinates it has, the cycle, and what it is
+/// asked for.
+type Move<'a> = &'a mut dyn FnMut(&mut Vec<Vector>, u64, Option<&MeshMotion>);
 
 /// Runs a solver; the coordinates before each step, and what became of the orders.
 fn run(settings: Settings, moves: Move<'_>) -> (Vec<Vec<Vector>>, Vec<OrderReport>) {
@@ -63,7 +65,7 @@ fn run(settings: Settings, moves: Move<'_>) -> (Vec<Vec<Vector>>, Vec<OrderRepor
     (before, adaptor.finalize().expect("finalize").orders)
 }
 
-fn starts_where_it_was_lent(motion: &MeshMotion<'_>, lent: &[Vector], time_step: f64) {
+fn starts_where_it_was_lent(motion: &MeshMotion, lent: &[Vector], time_step: f64) {
     for (vertex, point) in lent.iter().enumerate() {
         for (axis, from) in point.iter().enumerate() {
             assert_eq!(motion.displacement[vertex][axis], motion.coordinates[vertex][axis] - from);
@@ -94,7 +96,7 @@ fn a_solver_that_ignores_its_motion_is_found_out() {
     let mut asked = Vec::new();
     let (_, orders) = run(settings(&orders, "elasticity"), &mut |_, cycle, motion| {
         asked.extend(
-            motion.map(|motion| (cycle, largest(motion.displacement, &vec![[0.0; 3]; 125]))),
+            motion.map(|motion| (cycle, largest(&motion.displacement, &vec![[0.0; 3]; 125]))),
         );
     });
     let not = orders[0].not_followed.expect("not followed");
@@ -123,13 +125,14 @@ fn a_shape_that_was_left_out_is_made_up_for() {
     assert_eq!(before.last(), all.last());
 }
 
-fn follow(points: &mut Vec<Vector>, _: u64, motion: Option<&MeshMotion<'_>>) {
+fn follow(points: &mut Vec<Vector>, _: u64, motion: Option<&MeshMotion>) {
     if let Some(motion) = motion {
         *points = motion.coordinates.to_vec();
     }
 }
 
-/// One that follows gets the bits it always got: those of the shapes, and those of the reference in the end.
+/// One that follows gets the bits it always got: those of the shapes, and those of the reference in
+/// the end.
 #[test]
 fn a_solver_that_follows_gets_the_shapes_bit_for_bit() {
     let orders = json!([at(2, &squeeze(0.4), 4), at(10, &json!({"undo": 1}), 3)]);
@@ -141,7 +144,8 @@ fn a_solver_that_follows_gets_the_shapes_bit_for_bit() {
     let bits =
         |points: &[Vector]| points.iter().map(|point| point.map(f64::to_bits)).collect::<Vec<_>>();
     assert_eq!(bits(&before[15]), bits(&before[0]));
-    // Adding the displacement, or a velocity, rounds: that is following too, and what is rounded does not add up.
+    // Adding the displacement, or a velocity, rounds: that is following too, and what is rounded
+    // does not add up.
     for by_velocity in [false, true] {
         let given = json!([at(2, &squeeze(0.4), 4), at(10, &json!({"undo": 1}), 3)]);
         let mut handed = Vec::new();
@@ -192,7 +196,8 @@ fn single_precision_is_rounding_and_no_motion() {
     assert_eq!(points, reference);
 }
 
-/// A rotor, or a structure that moves in the flow: its motion is kept, and an undo takes back what the order did and no more.
+/// A rotor, or a structure that moves in the flow: its motion is kept, and an undo takes back what
+/// the order did and no more.
 #[test]
 fn a_motion_of_the_solvers_own_is_carried() {
     let own = |cycle: u64, [x, y, _]: Vector| -> Vector {
@@ -207,7 +212,7 @@ fn a_motion_of_the_solvers_own_is_carried() {
         };
         points.iter().zip(&reference).map(sum).collect()
     };
-    let step = |points: &mut Vec<Vector>, cycle: u64, motion: Option<&MeshMotion<'_>>| {
+    let step = |points: &mut Vec<Vector>, cycle: u64, motion: Option<&MeshMotion>| {
         if let Some(motion) = motion {
             *points = motion.coordinates.to_vec();
         }
@@ -252,7 +257,8 @@ fn the_guard_judges_the_mesh_that_will_be_there() {
     assert_eq!(run(settings(&orders, "elasticity"), &mut follow).1[0].status, OrderStatus::Applied);
 }
 
-/// A solver that takes the boundary alone: its own volume, here each vertex between the bottom and the top, comes back as it was lent.
+/// A solver that takes the boundary alone: its own volume, here each vertex between the bottom and
+/// the top, comes back as it was lent.
 fn elastic(points: &mut [Vector], reference: &[Vector], boundary: &[u32], surface: &[Vector]) {
     for (&vertex, &place) in boundary.iter().zip(surface) {
         points[vertex as usize] = place;
@@ -283,7 +289,7 @@ fn the_surface_moves_and_the_volume_is_the_solvers() {
                 inside = inside.max(by.iter().fold(0.0, |most, x| most.max(x.abs())));
             }
         }
-        elastic(points, &reference, surface.vertices, surface.coordinates);
+        elastic(points, &reference, &surface.vertices, &surface.coordinates);
     });
     assert_eq!(inside, 0.0, "what is inside is handed back as it was lent");
     let order = &reports[0];
@@ -369,6 +375,80 @@ fn three_ranks_find_out_what_one_does() {
                 .map(|not| not.map(|it| (it.cycle, it.shape)));
             assert_eq!(not, expected);
             assert_eq!(not.is_some(), !does_follow && order.shapes == 4, "{method}");
+        }
+    }
+}
+
+/// The lines of a journal, as id and status.
+fn journalled(file: &std::path::Path) -> Vec<(String, Value)> {
+    let text = std::fs::read_to_string(file).expect("a journal");
+    let line = |line: &str| serde_json::from_str::<Value>(line).expect("a line of JSON");
+    text.lines()
+        .map(line)
+        .map(|line| (line["status"].as_str().expect("a status").to_owned(), line))
+        .collect()
+}
+
+#[test]
+fn what_was_not_followed_stands_in_the_journal_and_replays() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("run.jsonl");
+    let orders = json!([at(2, &squeeze(0.4), 4)]);
+    let with_journal = |settings: Settings| {
+        let mut config = serde_json::to_value(&settings.config).expect("JSON");
+        config["journal"] = json!(file);
+        Settings {
+            config: parse(&config.to_string(), "test.json").expect("a configuration"),
+            ..settings
+        }
+    };
+    run(with_journal(settings(&orders, "elasticity")), &mut |_, _, _| {});
+    let lines = journalled(&file);
+    let statuses: Vec<&str> = lines.iter().map(|(status, _)| status.as_str()).collect();
+    assert_eq!(statuses, ["accepted", "applied", "not_followed"]);
+    let (_, line) = &lines[2];
+    assert_eq!((&line["cycle"], &line["id"]), (&json!(2), &lines[0].1["id"]));
+    assert!(
+        line["reason"].as_str().is_some_and(|reason| reason.starts_with("shape 1 of 4")),
+        "{line}"
+    );
+    // Played back to a solver that follows, it is the order.
+    let text = std::fs::read_to_string(&file).expect("a journal");
+    let replayed = Settings {
+        orders: parse_orders(&text, "run.jsonl").expect("a journal is a file of orders"),
+        ..settings(&json!([]), "elasticity")
+    };
+    let (before, reports) = run(replayed, &mut follow);
+    assert_eq!((reports.len(), reports[0].not_followed, reports[0].not_confirmed), (1, None, None));
+    let (all, _) = run(settings(&orders, "elasticity"), &mut follow);
+    assert_eq!(before.last(), all.last());
+}
+
+#[test]
+fn the_last_motion_of_a_run_is_not_confirmed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (cycle, steps, shape) in [
+        (STEPS - 1, 1, Some(1)),
+        (STEPS - 1, 4, Some(1)),
+        (STEPS - 3, 3, Some(3)),
+        (STEPS - 4, 3, None),
+    ] {
+        let file = folder.path().join(format!("{cycle}-{steps}.jsonl"));
+        let given = settings(&json!([at(cycle, &squeeze(0.4), steps)]), "elasticity");
+        let mut config = serde_json::to_value(&given.config).expect("JSON");
+        config["journal"] = json!(file);
+        let config = parse(&config.to_string(), "test.json").expect("a configuration");
+        let (_, orders) = run(Settings { config, ..given }, &mut follow);
+        assert_eq!(
+            (orders[0].not_confirmed, orders[0].not_followed),
+            (shape, None),
+            "{cycle}, {steps}"
+        );
+        let last = journalled(&file).pop().expect("lines");
+        let expected = if shape.is_some() { "not_confirmed" } else { "applied" };
+        assert_eq!(last.0, expected, "{cycle}, {steps}: {}", last.1);
+        if shape.is_some() {
+            assert_eq!(last.1["cycle"], json!(STEPS - 1));
         }
     }
 }

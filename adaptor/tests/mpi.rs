@@ -9,19 +9,17 @@ use std::{
 };
 
 use tombolo::{
-    comm::{
-        Alarm, Communicator, Counted, Reduction,
-        mpi::{Mpi, MpiError, rsmpi},
-        threads,
-    },
+    communicator::{Alarm, Communicator, Counted, Reduction, threads},
     deform::{
-        mesh::{FeatureSource, Mesh, Vector},
+        distributed::{Part, PartBoundary, domain},
+        features::FeatureSettings,
+        mesh::{Mesh, Vector},
         shapes::box_of_tets,
-        surface::{FeatureSettings, Surface},
+        surface::Surface,
         volume::{Deform, Method, VolumeOperator},
     },
-    distributed::{Petsc, Preconditioning},
-    pipelines::distributed::{Part, PartBoundary, Ranks},
+    mpi::{Mpi, MpiError, rsmpi},
+    petsc::{Petsc, Preconditioning},
 };
 
 unsafe extern "C" {
@@ -99,9 +97,10 @@ fn launch() -> ExitCode {
     if failed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// One rank fails in itself, and who called it goes on as if nothing were wrong; the others wait for it. Ends with success
-/// where nobody ends it.
+/// One rank fails in itself, and who called it goes on as if nothing were wrong; the others wait
+/// for it. Ends with success where nobody ends it.
 fn as_failing_ranks() -> ExitCode {
+    tombolo::logging::start();
     let universe = rsmpi::initialize().unwrap();
     let ranks: Arc<dyn Communicator> = Arc::new(Mpi::new(&universe.world()).unwrap());
     let failed = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
@@ -145,7 +144,8 @@ fn as_rank() {
     solved(&universe.world(), Some(Preconditioning::Multigrid), [17, 13, 12]);
     // A solver that has PETSc itself keeps it.
     let mut finalized = 1;
-    // SAFETY: MPI is there; PETSc was finalized with the last of the above, and is initialized and finalized once more here.
+    // SAFETY: MPI is there; PETSc was finalized with the last of the above, and is initialized and
+    // finalized once more here.
     unsafe {
         assert_eq!(PetscInitializeNoArguments(), 0);
         solved(&half, Some(Preconditioning::Multigrid), [4, 4, 4]);
@@ -163,7 +163,7 @@ fn as_rank() {
     // SAFETY: the null handle.
     let none = unsafe { Mpi::from_raw(rsmpi::ffi::RSMPI_COMM_NULL) };
     assert_eq!(none.err(), Some(MpiError::Null));
-    partitioned(&world);
+    partitioned(Mpi::new(&universe.world()).unwrap());
 }
 
 /// Every call, against what threads make of it.
@@ -210,7 +210,8 @@ fn everything(ranks: &dyn Communicator) {
         assert_eq!(ranks.exchange(messages), expected);
     }
     for round in 0..200_u8 {
-        // As neighbours do, each of whom knows the others; now and then something else comes between.
+        // As neighbours do, each of whom knows the others; now and then something else comes
+        // between.
         let hears = |to: usize, from: usize| !(from + to + round as usize).is_multiple_of(3);
         let message = |from: usize, to: usize| vec![round; 7 * from + to];
         let messages =
@@ -239,7 +240,8 @@ const PRECONDITIONINGS: [Option<Preconditioning>; 5] = [
     Some(Preconditioning::Jacobi),
 ];
 
-/// PETSc moves the volume as one process does, again on cells that have moved, and says why it cannot.
+/// PETSc moves the volume as one process does, again on cells that have moved, and says why it
+/// cannot.
 fn solved(
     world: &rsmpi::topology::SimpleCommunicator,
     preconditioning: Option<Preconditioning>,
@@ -252,13 +254,8 @@ fn solved(
     let (count, parts) = (mesh.cells().len(), (ranks.size() - 1).max(1));
     let of_cells: Vec<usize> = (0..count).map(|cell| cell * parts / count).collect();
     let part = Part::cut(&mesh, &of_cells, ranks.rank(), false).unwrap();
-    let (shared, boundary) =
-        PartBoundary::find(&*ranks, &part, &FeatureSettings::default()).unwrap();
-    let partition =
-        solvers(Ranks::new(ranks, Arc::new(shared), &boundary, Vec::new()), &part.points);
-    drop(solvers);
-    let own =
-        Mesh::new(part.points.clone(), part.cells.clone(), FeatureSource::SharpEdges).unwrap();
+    let (domain, boundary) = domain(&ranks, &part, &FeatureSettings::default()).unwrap();
+    let own = domain.mesh();
     let numbers: Vec<usize> =
         part.global_vertices.iter().flatten().map(|&number| number as usize).collect();
     let wave = |[x, y, z]: Vector| [0.1 * (3.0 * y).sin(), 0.2 * x * z, -0.1 * (4.0 * x).cos()];
@@ -271,10 +268,11 @@ fn solved(
         let serial = VolumeOperator::new(&mesh, surface.vertices(), &settings).unwrap();
         let expected = serial.solve(&on(&mesh, surface.vertices())).unwrap().displacement;
         let operator =
-            VolumeOperator::of_part(&own, boundary.vertices(), &[], &settings, &partition).unwrap();
-        let again = operator.updated(&own).unwrap();
+            VolumeOperator::with_sliding(&domain, boundary.vertices(), &[], &settings, &*solvers)
+                .unwrap();
+        let again = operator.updated(own).unwrap();
         for operator in [&operator, &again] {
-            let found = operator.solve(&on(&own, boundary.vertices())).unwrap();
+            let found = operator.solve(&on(own, boundary.vertices())).unwrap();
             for (value, &number) in found.displacement.iter().zip(&numbers) {
                 let off = (0..3)
                     .map(|axis| (value[axis] - expected[number][axis]).abs())
@@ -288,7 +286,7 @@ fn solved(
         }
         let still = operator.solve(&vec![[0.0; 3]; boundary.vertices().len()]).unwrap();
         assert!(still.displacement.iter().all(|value| *value == [0.0; 3]));
-        let mut bad = on(&own, boundary.vertices());
+        let mut bad = on(own, boundary.vertices());
         if let Some(first) = bad.first_mut() {
             first[1] = f64::NAN;
         }
@@ -297,8 +295,9 @@ fn solved(
 }
 
 /// The surface of a mesh in parts is that of the whole.
-fn partitioned(ranks: &Mpi) {
-    let ranks = Counted::new(ranks);
+fn partitioned(ranks: Mpi) {
+    let counted = Arc::new(Counted::new(ranks));
+    let ranks: Arc<dyn Communicator> = counted.clone();
     let mesh = box_of_tets([6, 5, 4], [0.0; 3], [1.0; 3]);
     let of_cells: Vec<usize> =
         (0..mesh.cells().len()).map(|cell| cell * ranks.size() / mesh.cells().len()).collect();
@@ -308,5 +307,5 @@ fn partitioned(ranks: &Mpi) {
         assert_eq!(**surface, Surface::extract(&mesh, &FeatureSettings::default()).unwrap());
     }
     assert_eq!(ranks.rank() == 0, boundary.surface().is_some());
-    assert!(ranks.size() == 1 || ranks.traffic().bytes_sent > 0);
+    assert!(ranks.size() == 1 || counted.traffic().bytes_sent > 0);
 }

@@ -157,8 +157,12 @@ fn edit_tells_what_is_wrong_with_the_surface() {
     );
     let broken = &outcome["surface"];
     assert!(broken["report"]["intersections"]["count"].as_u64() > Some(0), "{outcome}");
-    assert_eq!(broken["report"]["intersections"]["first"][0]["place"].as_array().unwrap().len(), 3);
-    // The walls fold in their own planes where the profile is steepest, and the lid goes through the floor.
+    assert_eq!(
+        broken["report"]["intersections"]["first"][0]["position"].as_array().unwrap().len(),
+        3
+    );
+    // The walls fold in their own planes where the profile is steepest, and the lid goes through
+    // the floor.
     let fraction = broken["sound_fraction"].as_f64().unwrap();
     assert!((0.5..0.85).contains(&fraction), "{fraction}");
 }
@@ -329,7 +333,8 @@ fn surfaces_that_cannot_be_edited_are_named_to_the_user() {
     assert!(text.contains("feature-1"), "{text}");
 }
 
-/// A mesh in a mirror has left-handed cells: it is edited, and the file has the cells as they were in the file that was read.
+/// A mesh in a mirror has left-handed cells: it is edited, and the file has the cells as they were
+/// in the file that was read.
 #[test]
 fn a_left_handed_mesh_keeps_its_order_of_vertices() {
     let upper = [1.0, 1.0, 2.0];

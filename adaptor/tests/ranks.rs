@@ -1,4 +1,5 @@
-//! Runs on several ranks, which are threads here: they do the same at the same cycle, whatever viewers or one of them do.
+//! Runs on several ranks, which are threads here: they do the same at the same cycle, whatever
+//! viewers or one of them do.
 
 mod common;
 
@@ -8,15 +9,15 @@ use common::{LINK_TO_ALL, Viewer, config, squeeze};
 use serde_json::json;
 use tombolo::{
     Adaptor, Parameter, Settings, Step,
-    comm::{Communicator, Counted, threads},
+    communicator::{Communicator, Counted, threads},
+    deform::distributed::Part,
     deform::{
-        mesh::{ArrayView, CellType, FeatureSource, Mesh},
+        mesh::{CellType, FeatureSource, Mesh},
         shapes::{BOX_FEATURES, box_of_tets},
     },
     pipelines::{
-        distributed::Part,
         encode::{Decoded, decode},
-        extract::{Association, Channel, FieldView},
+        extract::{Channel, FieldView},
         language::parse_orders,
     },
 };
@@ -53,11 +54,7 @@ fn what_viewers_ask_for_happens_at_the_same_cycle() {
         .expect("initialize");
         assert_eq!(adaptor.link().is_some(), rank == 0);
         let speed = speed(&part);
-        let fields = [FieldView {
-            name: "speed",
-            association: Association::Vertex,
-            values: ArrayView::scalars(&speed),
-        }];
+        let fields = [FieldView::vertex("speed", &speed)];
         let channels = [Channel { name: "fluid", mesh: part.view(), fields: &fields }];
         let (mut first, mut second) = (None::<Viewer>, None::<Viewer>);
         let (mut cycle, mut changes) = (0, Vec::new());
@@ -213,7 +210,8 @@ fn ranks_come_together_as_often_as_they_are_told() {
     }
 }
 
-/// A rank whose mesh makes no sense takes no other with it: the error is named, with its rank, and the run goes on.
+/// A rank whose mesh makes no sense takes no other with it: the error is named, with its rank, and
+/// the run goes on.
 #[test]
 fn a_bad_cell_on_one_rank_holds_nobody_up() {
     let mesh = box_of_tets([3, 3, 3], [0.0; 3], [1.0; 3]);
@@ -225,7 +223,7 @@ fn a_bad_cell_on_one_rank_holds_nobody_up() {
             for _ in 0..2 {
                 part.cells.push(CellType::Tetra, &vertices).expect("a cell");
                 part.global_cells.iter_mut().for_each(|numbers| numbers.push(9999));
-                part.ghosts.iter_mut().for_each(|ghosts| ghosts.push(false));
+                part.ghosts.iter_mut().for_each(|ghosts| ghosts.push(0));
             }
         },
         |part: &mut Part| {
@@ -246,11 +244,7 @@ fn a_bad_cell_on_one_rank_holds_nobody_up() {
             };
             let mut adaptor = Adaptor::initialize(settings).expect("initialize");
             let speed = speed(&part);
-            let fields = [FieldView {
-                name: "speed",
-                association: Association::Vertex,
-                values: ArrayView::scalars(&speed),
-            }];
+            let fields = [FieldView::vertex("speed", &speed)];
             let channels = [Channel { name: "fluid", mesh: part.view(), fields: &fields }];
             let said: Vec<_> = (0..4)
                 .map(|cycle| {
@@ -273,8 +267,9 @@ fn a_bad_cell_on_one_rank_holds_nobody_up() {
     }
 }
 
-/// An order falls into the schedule of another, and one cannot be done: at each cycle all ranks are handed the same shape, and vertices
-/// that several of them have, ghosts too, go to the same place. The same as on one process.
+/// An order falls into the schedule of another, and one cannot be done: at each cycle all ranks are
+/// handed the same shape as one process is, and vertices that several of them have, ghosts too, go to
+/// the same place.
 #[test]
 fn orders_take_effect_on_all_ranks_at_the_same_cycle() {
     const ORDERS: &str = r#"[
@@ -406,8 +401,9 @@ fn a_run_does_not_begin_with_different_configurations() {
     assert_eq!(outcomes, [expected.clone(), expected]);
 }
 
-/// Orders take effect at the same cycle on all ranks, and give what they give on one; undone, every rank has its own coordinates
-/// back bit for bit. The second order comes in the middle of the first one's schedule, the third makes no sense.
+/// Orders take effect at the same cycle on all ranks, and give what they give on one; undone, every
+/// rank has its own coordinates back bit for bit. The second order comes in the middle of the first
+/// one's schedule, the third makes no sense.
 #[test]
 fn orders_move_all_parts_at_the_same_cycle() {
     let mesh = box_of_tets([5, 5, 5], [0.0; 3], [1.0; 3]);
@@ -433,7 +429,7 @@ fn orders_move_all_parts_at_the_same_cycle() {
             let channels = [Channel { name: "fluid", mesh: moving.view(), fields: &[] }];
             if let Some(motion) = adaptor.execute(&step(cycle), &channels).expect("execute").motion
             {
-                points.copy_from_slice(motion.coordinates);
+                points.copy_from_slice(&motion.coordinates);
                 shapes.push((cycle, motion.shape, points.clone()));
             }
         }
@@ -441,7 +437,7 @@ fn orders_move_all_parts_at_the_same_cycle() {
         (numbers, shapes, adaptor.finalize().expect("finalize").orders)
     };
     let whole = Part::cut(&mesh, &vec![0; mesh.cells().len()], 0, false).expect("a part");
-    let (_, serial, told) = run(Arc::new(tombolo::comm::Solo), &whole);
+    let (_, serial, told) = run(Arc::new(tombolo::communicator::Solo), &whole);
     assert_eq!(
         serial.len(),
         2 + 3 + 1,

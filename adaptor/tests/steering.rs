@@ -13,7 +13,7 @@ use tombolo::{
     },
     pipelines::{
         extract::Channel,
-        language::{TimedCommand, parse_orders},
+        language::{At, Slice, Stage, TimedCommand, parse_orders},
     },
 };
 
@@ -266,6 +266,30 @@ fn the_solvers_own_mistakes_are_told_and_change_nothing() {
     assert!(motion.displacement.iter().any(|displacement| *displacement != [0.0; 3]));
 }
 
+/// The errors name the value where it stands, not a text that nobody has written.
+#[test]
+fn what_is_built_by_hand_is_refused_where_it_stands() {
+    let refused =
+        |settings: Settings| Adaptor::initialize(settings).err().expect("refused").to_string();
+    let mut cut = config(
+        r#"{"version": 1, "pipelines": [
+            {"name": "cut", "stages": [{"slice": {"origin": [0, 0, 0], "normal": [1, 0, 0]}}]}
+        ]}"#,
+    );
+    let Stage::Slice(Slice::Plane(plane)) = &mut cut.pipelines[0].stages[0] else { panic!() };
+    plane.origin[1] = f64::NAN;
+    assert_eq!(
+        refused(Settings { config: cut, ..Settings::default() }),
+        "the configuration: pipelines[0].stages[0].slice.origin[1]: found NaN, expected a finite number"
+    );
+    let mut late = orders(&json!([at(0, squeeze(0.1)), at(1, squeeze(0.2))]));
+    late[1].at = Some(At::Time(f64::INFINITY));
+    assert_eq!(
+        refused(Settings { orders: late, ..Settings::default() }),
+        "the orders given beforehand: [1].at.time: found inf, expected a finite number"
+    );
+}
+
 #[test]
 fn what_makes_no_sense_is_refused_before_the_run() {
     let twice = Parameter { name: "a".into(), value: 1.0, minimum: 0.0, maximum: 2.0 };
@@ -407,7 +431,8 @@ fn two_channels(named: &str) -> (Vec<(u64, usize)>, OrderStatus, String) {
 fn orders_change_the_channel_that_the_configuration_names() {
     assert_eq!(two_channels("fluid"), (vec![(1, 64)], OrderStatus::Applied, String::new()));
     assert_eq!(two_channels("particles").0, [(1, 27)]);
-    // A channel that is not there is no mistake of the solver's: it goes on, and orders are told why they are rejected.
+    // A channel that is not there is no mistake of the solver's: it goes on, and orders are told
+    // why they are rejected.
     let (motions, status, reason) = two_channels("fluids");
     assert_eq!((motions.len(), status), (0, OrderStatus::Rejected));
     assert!(
@@ -454,8 +479,8 @@ fn squeezed(
     Ok(reached)
 }
 
-/// A solver whose cells are left-handed, or whose mesh is mirrored, is steered as any other; one that has its cells in the order of
-/// another program hears of it.
+/// A solver whose cells are left-handed, or whose mesh is mirrored, is steered as any other; one
+/// that has its cells in the order of another program hears of it.
 #[test]
 fn the_order_of_a_solvers_vertices_is_its_own() {
     let tets = box_of_tets([3, 3, 3], [0.0; 3], [1.0; 3]);

@@ -1,4 +1,5 @@
-//! Viewers, good and bad: what they are shown, what they can do, and that none of it costs the solver.
+//! Viewers, good and bad: what they are shown, what they can do, and that none of it costs the
+//! solver.
 
 mod common;
 

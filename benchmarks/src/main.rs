@@ -9,27 +9,34 @@
 //! cargo run --release -p tombolo-benchmarks -- skeleton --json
 //! cargo run --release -p tombolo-benchmarks -- scaling --json
 //! cargo run --release -p tombolo-benchmarks -- catalyst --json
+//! cargo run --release -p tombolo-benchmarks -- untangle
+//! cargo run --release -p tombolo-benchmarks -- growth --json
 //! cargo run --release -p tombolo-benchmarks --features distributed -- volume --json
 //! ```
 
 mod catalyst;
+mod growth;
 mod measure;
 mod overhead;
 mod paper;
+mod peer;
 mod report;
 mod scaling;
 mod skeleton;
 mod stiffening;
 mod surface;
 mod surface_wasm;
+mod untangle;
 mod volume;
+mod volume_case;
 #[cfg(feature = "distributed")]
 mod volume_ranks;
 
+use std::error::Error;
 use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
-use report::Report;
+use report::{Line, Report};
 
 /// Measures Tombolo and prints what was measured against what it should be.
 #[derive(Parser)]
@@ -40,6 +47,12 @@ struct Arguments {
     /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
+    /// Be one of the processes that `growth` starts, for a box of so many cubes along an edge.
+    #[arg(long, hide = true)]
+    cubes: Option<usize>,
+    /// Have that process compute something else beside.
+    #[arg(long, hide = true, requires = "cubes")]
+    busy: bool,
     /// Be one of the ranks that `volume` starts for this mesh.
     #[cfg(feature = "distributed")]
     #[arg(long, hide = true, requires = "displacement")]
@@ -52,7 +65,7 @@ struct Arguments {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Name {
-    /// What `execute` costs with nothing to do, and what each stage costs against a step of the solver.
+    /// The cost of `execute` with nothing to do, and of each stage against a step of the solver.
     Overhead,
     /// Polyharmonic deformation of surfaces, beside libigl.
     Surface,
@@ -66,10 +79,15 @@ enum Name {
     Stiffening,
     /// Surfaces of meshes in parts: the time it takes, and what goes from rank to rank.
     Scaling,
-    /// What an attached Catalyst implementation costs when nothing is due, and the memory that it adds.
+    /// The cost of an attached Catalyst implementation when nothing is due, and the memory that it
+    /// adds.
     Catalyst,
+    /// Boundaries that the inside of a mesh cannot follow in a straight line.
+    Untangle,
     /// Volume motion at the sizes of the paper's meshes, beside the paper and PETSc.
     Volume,
+    /// The time and the memory of an order, from ten thousand cells to five million.
+    Growth,
 }
 
 fn main() -> ExitCode {
@@ -78,39 +96,33 @@ fn main() -> ExitCode {
     if let (Some(number), Some(displacement)) = (arguments.part_of, &arguments.displacement) {
         return said(volume_ranks::run(number, displacement).map(|()| String::new()));
     }
-    let result: Result<Report, Box<dyn std::error::Error>> = match arguments.name {
-        Name::Paper => {
-            return said(paper::run().map(|report| {
-                if arguments.json { report.json() + "\n" } else { report.to_string() }
-            }));
-        }
-        Name::Stiffening => {
-            return said(stiffening::run().map(|report| {
-                if arguments.json { report.json() + "\n" } else { report.to_string() }
-            }));
-        }
-        Name::Scaling => {
-            return said(scaling::run().map(|report| {
-                if arguments.json { report.json() + "\n" } else { report.to_string() }
-            }));
-        }
-        Name::Catalyst => {
-            return said(catalyst::run().map(|report| {
-                if arguments.json { report.json() + "\n" } else { report.to_string() }
-            }));
-        }
-        Name::Overhead => overhead::run(),
-        Name::Surface => surface::run(),
-        Name::SurfaceWasm => surface_wasm::run(),
-        Name::Skeleton => skeleton::run(),
-        Name::Volume => volume::run(),
-    };
-    said(
-        result.map(|report| if arguments.json { report.json() + "\n" } else { report.to_string() }),
-    )
+    if let Some(cubes) = arguments.cubes {
+        return said(growth::one(cubes, arguments.busy).map(|()| String::new()));
+    }
+    let json = arguments.json;
+    said(match arguments.name {
+        Name::Paper => text(paper::run(), json),
+        Name::Stiffening => text(stiffening::run(), json),
+        Name::Untangle => text(untangle::run(), json),
+        Name::Scaling => text(scaling::run(), json),
+        Name::Catalyst => text(catalyst::run(), json),
+        Name::Overhead => text(overhead::run(), json),
+        Name::Surface => text(surface::run(), json),
+        Name::SurfaceWasm => text(surface_wasm::run(), json),
+        Name::Skeleton => text(skeleton::run(), json),
+        Name::Volume => text(volume::run(), json),
+        Name::Growth => text(growth::run(), json),
+    })
 }
 
-fn said(result: Result<String, Box<dyn std::error::Error>>) -> ExitCode {
+fn text<R: Line>(
+    report: Result<Report<R>, Box<dyn Error>>,
+    json: bool,
+) -> Result<String, Box<dyn Error>> {
+    Ok(report?.text(json)?)
+}
+
+fn said(result: Result<String, Box<dyn Error>>) -> ExitCode {
     match result {
         Ok(text) => print!("{text}"),
         Err(error) => {

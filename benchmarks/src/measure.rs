@@ -1,9 +1,46 @@
-//! Time, measured.
+//! Time and memory, measured.
 
 use std::time::Instant;
 
 /// Runs of each measurement.
 pub const RUNS: usize = 7;
+
+/// The seconds that each of several runs took.
+#[derive(Debug, Clone)]
+pub struct Times(Vec<f64>);
+
+impl Times {
+    /// Seconds of no run yet.
+    pub const fn new() -> Self {
+        Self(Vec::new())
+    }
+
+    /// Runs something, and keeps the seconds that it takes.
+    pub fn of<T>(&mut self, run: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let result = run();
+        self.0.push(start.elapsed().as_secs_f64());
+        result
+    }
+
+    /// Keeps seconds that were measured otherwise.
+    pub fn add(&mut self, seconds: f64) {
+        self.0.push(seconds);
+    }
+
+    /// The median of the runs; NaN of none.
+    pub fn median(&self) -> f64 {
+        let mut sorted = self.0.clone();
+        sorted.sort_by(f64::total_cmp);
+        sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
+    }
+}
+
+impl FromIterator<f64> for Times {
+    fn from_iter<I: IntoIterator<Item = f64>>(seconds: I) -> Self {
+        Self(seconds.into_iter().collect())
+    }
+}
 
 /// The median of the seconds that `RUNS` runs take, after one that is not counted.
 ///
@@ -11,19 +48,11 @@ pub const RUNS: usize = 7;
 /// The first error of a run.
 pub fn median<E>(mut run: impl FnMut() -> Result<(), E>) -> Result<f64, E> {
     run()?;
-    let mut seconds = Vec::with_capacity(RUNS);
+    let mut times = Times::new();
     for _ in 0..RUNS {
-        let start = Instant::now();
-        run()?;
-        seconds.push(start.elapsed().as_secs_f64());
+        times.of(&mut run)?;
     }
-    Ok(middle(&mut seconds))
-}
-
-/// The median of values.
-pub fn middle(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+    Ok(times.median())
 }
 
 /// The most memory that this process has had, in bytes.
@@ -46,7 +75,8 @@ pub fn memory_peak() -> Result<f64, Box<dyn std::error::Error>> {
 /// Where the system does not say.
 pub fn processor_seconds() -> Result<f64, Box<dyn std::error::Error>> {
     let text = std::fs::read_to_string("/proc/self/stat")?;
-    // After the program's name, in brackets, the 12th and 13th values are ticks in the program and in the system.
+    // After the program's name, in brackets, the 12th and 13th values are ticks in the program and
+    // in the system.
     let after = text.rsplit(')').next().unwrap_or_default();
     let ticks =
         after.split_whitespace().skip(11).take(2).map(str::parse::<f64>).sum::<Result<f64, _>>()?;

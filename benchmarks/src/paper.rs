@@ -1,25 +1,28 @@
-//! `paper`: the paper's experiments on the quality of deformed meshes, its row beside ours, and a sphere in its boundary layer.
+//! `paper`: the paper's experiments on the quality of deformed meshes, its row beside ours, and a
+//! sphere in its boundary layer.
 //!
-//! The meshes have the paper's geometry and, within 5 %, its number of tetrahedra; they are not the paper's own.
+//! The meshes have the paper's geometry and, within 5 %, its number of tetrahedra; they are not the
+//! paper's own.
 
 use std::collections::BTreeMap;
 use std::error::Error;
-use std::fmt;
-use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::Arc;
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
+use tombolo::deform::edit::Edit;
+use tombolo::deform::features::FeatureSettings;
 use tombolo::deform::mesh::{Mesh, Vector};
 use tombolo::deform::quality::{Guard, Otherwise, SurfaceRule, change, quality};
-use tombolo::deform::schedule::Schedule;
-use tombolo::deform::surface::{Edit, FeatureSettings, Surface};
+use tombolo::deform::shape::{Request, Shaper};
+use tombolo::deform::surface::Surface;
 use tombolo::deform::volume::Deform;
 use tombolo::pipelines::files::read_mesh;
-use tombolo::pipelines::language::DeformStage;
-use tombolo::pipelines::shape::Shaper;
+use tombolo::pipelines::language::Deformation;
+
+use crate::peer::mesh_file;
+use crate::report::{Line, Report, Target};
 
 /// The paper's tables: amount, then mean, least and largest normalised scaled Jacobian.
 const TABLES: &str = include_str!("paper.json");
@@ -30,16 +33,9 @@ struct Table {
     rows: Vec<[f64; 4]>,
 }
 
-/// Everything measured.
-#[derive(Debug, Serialize)]
-pub struct Report {
-    rows: Vec<Row>,
-    targets: Vec<Target>,
-}
-
 /// One deformation.
 #[derive(Debug, Serialize)]
-struct Row {
+pub struct Row {
     case: String,
     /// Radii, percent or degrees.
     amount: f64,
@@ -48,7 +44,8 @@ struct Row {
     /// Sub-steps beyond one solve from the reference; 0 where that one was enough.
     sub_steps: usize,
     ours: Figures,
-    /// One linear solve from the reference and nothing else: with the default stiffening, the paper's own method on our mesh.
+    /// One linear solve from the reference and nothing else: with the default stiffening, the
+    /// paper's own method on our mesh.
     one_solve: Figures,
     #[serde(skip_serializing_if = "Option::is_none")]
     paper_tets: Option<usize>,
@@ -79,16 +76,8 @@ struct Paper {
     max: f64,
 }
 
-#[derive(Debug, Serialize)]
-struct Target {
-    name: String,
-    value: f64,
-    target: f64,
-    holds: bool,
-}
-
 /// Repeats the experiments. The meshes are those in `meshes/`, or are made there.
-pub fn run() -> Result<Report, Box<dyn Error>> {
+pub fn run() -> Result<Report<Row>, Box<dyn Error>> {
     let tables: BTreeMap<String, Table> = serde_json::from_str(TABLES)?;
     let mut rows = Vec::new();
     for (mesh, name) in [("cylinder-coarse", "shear, coarse"), ("cylinder-fine", "shear, fine")] {
@@ -143,14 +132,8 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
 }
 
 fn targets(rows: &[Row]) -> Vec<Target> {
-    #[expect(clippy::cast_precision_loss, reason = "few")]
     let count = |test: &dyn Fn(&&Row) -> bool| rows.iter().filter(test).count() as f64;
-    let none = |name: &str, value: f64| Target {
-        name: name.into(),
-        value,
-        target: 0.0,
-        holds: value == 0.0,
-    };
+    let none = |name: &str, value: f64| Target::at_most(name, value, 0.0);
     let below = |part: fn(&Figures, &Paper) -> bool| {
         count(&move |row| row.paper.as_ref().is_some_and(|paper| part(&row.ours, paper)))
     };
@@ -164,13 +147,7 @@ fn targets(rows: &[Row]) -> Vec<Target> {
         ),
     ];
     if let Some(large) = rows.iter().find(|row| row.tets > 600_000) {
-        let name = "sphere, moved by 10 radii, fine [s]".into();
-        targets.push(Target {
-            name,
-            value: large.seconds,
-            target: 15.0,
-            holds: large.seconds <= 15.0,
-        });
+        targets.push(Target::at_most("sphere, moved by 10 radii, fine [s]", large.seconds, 15.0));
     }
     targets
 }
@@ -191,13 +168,12 @@ fn measured(
     for &amount in amounts {
         let stack: Vec<Edit> = serde_json::from_value(edits(amount))?;
         let mut shaper = Shaper::new(Arc::clone(&mesh), Arc::clone(&surface))?;
-        let bare = DeformStage::from(Deform { improve: 0, ..Deform::default() });
+        let bare = Deformation::from(Deform { improve: 0, ..Deform::default() });
         let one_solve = figures(&mesh, &shaper.target(&stack, &bare, SurfaceRule::Allow)?.points);
         let mut shaper = Shaper::new(Arc::clone(&mesh), Arc::clone(&surface))?;
         let reference = Arc::clone(shaper.reference());
         let start = Instant::now();
-        let plan =
-            shaper.plan(&stack, reference, &DeformStage::default(), &Schedule::default(), &guard);
+        let plan = shaper.plan(&Request { guard, ..Request::new(stack, reference) });
         let seconds = start.elapsed().as_secs_f64();
         let (ours, sub_steps, rejected) = match &plan {
             Ok(plan) => (figures(&mesh, plan.end()), plan.target().sub_steps, None),
@@ -222,85 +198,47 @@ fn measured(
 
 /// The figures of a mesh whose vertices have moved to `points`.
 pub fn figures(mesh: &Mesh, points: &[Vector]) -> Figures {
-    let spread = change(mesh.cells(), mesh.points(), points).normalized_scaled_jacobian;
+    let spread = change(mesh, points).normalized_scaled_jacobian;
     let inverted = quality(mesh.cells(), points).inverted;
     Figures { mean: spread.mean, min: spread.min, max: spread.max, inverted }
 }
 
-/// A mesh of `scripts/meshes`, made where it is not there yet.
-pub fn mesh_file(name: &str) -> Result<PathBuf, Box<dyn Error>> {
-    let project =
-        Path::new(env!("CARGO_MANIFEST_DIR")).parent().ok_or("the project is not there")?;
-    let directory =
-        std::env::var_os("TOMBOLO_MESHES").map_or_else(|| project.join("meshes"), PathBuf::from);
-    let file = directory.join(format!("{name}.msh"));
-    if !file.exists() {
-        let python = project.join(".venv/bin/python");
-        let status = Command::new(&python)
-            .arg(project.join("scripts/meshes"))
-            .args([name, "--out"])
-            .arg(&directory)
-            .stdout(std::process::Stdio::null())
-            .status()
-            .map_err(|error| format!("{}: {error}; scripts/setup installs it", python.display()))?;
-        if !status.success() {
-            return Err(format!("scripts/meshes could not make {name}").into());
-        }
-    }
-    Ok(file)
-}
+impl Line for Row {
+    const HEADINGS: &'static [&'static str] = &[
+        "case",
+        "amount",
+        "tets",
+        "seconds",
+        "steps",
+        "mean",
+        "least",
+        "inv.",
+        "paper",
+        "least",
+        "one solve",
+        "least",
+        "inv.",
+        "rejected",
+    ];
 
-impl Report {
-    /// As one line of JSON.
-    pub fn json(&self) -> String {
-        serde_json::to_string(self).unwrap_or_else(|error| format!("{{\"error\": \"{error}\"}}"))
-    }
-}
-
-impl fmt::Display for Report {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            f,
-            "{:<36} {:>6} {:>8} {:>8} {:>5} {:>9} {:>9} {:>5} {:>9} {:>9} {:>9} {:>9}",
-            "case",
-            "amount",
-            "tets",
-            "seconds",
-            "steps",
-            "mean",
-            "least",
-            "inv.",
-            "paper",
-            "least",
-            "one solve",
-            "least"
-        )?;
-        for row in &self.rows {
-            let Row { case, amount, tets, seconds, sub_steps, ours, .. } = row;
-            let Figures { mean, min, inverted, .. } = ours;
-            write!(
-                f,
-                "{case:<36} {amount:>6} {tets:>8} {seconds:>8.2} {sub_steps:>5} {mean:>9.5} {min:>9.5} {inverted:>5}"
-            )?;
-            match row.paper {
-                Some(paper) => write!(f, " {:>9.5} {:>9.5}", paper.mean, paper.min)?,
-                None => write!(f, " {:>9} {:>9}", "", "")?,
-            }
-            let Figures { mean, min, inverted, .. } = row.one_solve;
-            writeln!(f, " {mean:>9.5} {min:>9.5} {inverted:>5} inv.")?;
-            if let Some(reason) = &row.rejected {
-                writeln!(f, "    rejected: {reason}")?;
-            }
-        }
-        writeln!(f, "\n{:<44} {:>12} {:>14}", "target", "value", "at most")?;
-        for target in &self.targets {
-            let verdict = if target.holds { "holds" } else { "does not hold" };
-            writeln!(
-                f,
-                "{:<44} {:>12.3e} {:>14.3e}  {verdict}",
-                target.name, target.value, target.target
-            )?;
-        }
-        Ok(())
+    fn cells(&self) -> Vec<String> {
+        let Row { case, amount, tets, seconds, sub_steps, rejected, .. } = self;
+        let figures = |Figures { mean, min, inverted, .. }: Figures| {
+            [format!("{mean:.5}"), format!("{min:.5}"), inverted.to_string()]
+        };
+        let paper = |paper: Paper| [format!("{:.5}", paper.mean), format!("{:.5}", paper.min)];
+        [
+            case.clone(),
+            amount.to_string(),
+            tets.to_string(),
+            format!("{seconds:.2}"),
+            sub_steps.to_string(),
+        ]
+        .into_iter()
+        .chain(figures(self.ours))
+        .chain(self.paper.map_or_else(Default::default, paper))
+        .chain(figures(self.one_solve))
+        .chain([rejected.clone().unwrap_or_default()])
+        .collect()
     }
 }

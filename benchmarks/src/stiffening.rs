@@ -1,33 +1,30 @@
-//! `stiffening`: the quality that one linear solve reaches, and how far sub-steps must help, at several exponents of the stiffening.
+//! `stiffening`: the quality that one linear solve reaches, and how far sub-steps must help, at
+//! several exponents of the stiffening.
 
 use std::error::Error;
-use std::fmt;
 use std::sync::Arc;
 
 use serde::Serialize;
 use serde_json::{Value, json};
+use tombolo::deform::edit::Edit;
+use tombolo::deform::features::FeatureSettings;
 use tombolo::deform::quality::{Guard, Otherwise, SurfaceRule};
-use tombolo::deform::schedule::Schedule;
-use tombolo::deform::surface::{Edit, FeatureSettings, Surface};
+use tombolo::deform::shape::{Request, Shaper};
+use tombolo::deform::surface::Surface;
 use tombolo::deform::volume::Deform;
 use tombolo::pipelines::files::read_mesh;
-use tombolo::pipelines::language::DeformStage;
-use tombolo::pipelines::shape::Shaper;
+use tombolo::pipelines::language::Deformation;
 
-use crate::paper::{Figures, figures, mesh_file};
+use crate::paper::{Figures, figures};
+use crate::peer::mesh_file;
+use crate::report::{Line, Report};
 
 /// The exponents that are compared.
 const EXPONENTS: [f64; 4] = [0.0, 0.5, 1.0, 1.5];
 
-/// Everything measured.
-#[derive(Debug, Serialize)]
-pub struct Report {
-    rows: Vec<Row>,
-}
-
 /// One deformation with one exponent.
 #[derive(Debug, Serialize)]
-struct Row {
+pub struct Row {
     case: &'static str,
     exponent: f64,
     /// One linear solve from the reference.
@@ -41,7 +38,7 @@ struct Row {
 }
 
 /// Each case with each exponent, on the meshes of `scripts/meshes`: some minutes.
-pub fn run() -> Result<Report, Box<dyn Error>> {
+pub fn run() -> Result<Report<Row>, Box<dyn Error>> {
     let sphere =
         |by: Value| json!([{"translate": {"features": ["sphere"], "fixed": ["walls"], "by": by}}]);
     let press = |by: f64| json!([{"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, by]}}]);
@@ -75,7 +72,7 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
         let guard =
             Guard { min_scaled_jacobian: 0.0, otherwise: Otherwise::Untangle, ..Guard::default() };
         for exponent in EXPONENTS {
-            let deform = DeformStage::from(Deform {
+            let deform = Deformation::from(Deform {
                 stiffening: exponent,
                 tolerance: 1e-6,
                 ..Deform::default()
@@ -86,7 +83,11 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
             let (mut followed, mut sub_steps, mut rejected) = (None, 0, None);
             if one_solve.inverted > 0 {
                 let start = Arc::clone(shaper.reference());
-                match shaper.plan(&stack, start, &deform, &Schedule::default(), &guard) {
+                match shaper.plan(&Request {
+                    deformation: deform.clone(),
+                    guard,
+                    ..Request::new(&stack[..], start)
+                }) {
                     Ok(plan) => {
                         followed = Some(figures(&mesh, plan.end()));
                         sub_steps = plan.target().sub_steps;
@@ -97,32 +98,26 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
             rows.push(Row { case, exponent, one_solve, followed, sub_steps, rejected });
         }
     }
-    Ok(Report { rows })
+    Ok(Report { rows, targets: Vec::new() })
 }
 
-impl Report {
-    /// As one line of JSON.
-    pub fn json(&self) -> String {
-        serde_json::to_string(self).unwrap_or_else(|error| format!("{{\"error\": \"{error}\"}}"))
-    }
-}
+impl Line for Row {
+    const HEADINGS: &'static [&'static str] =
+        &["case", "exponent", "mean", "least", "inv.", "steps", "mean", "least", "rejected"];
 
-impl fmt::Display for Report {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let heading = ["mean", "least", "inv.", "steps", "mean", "least"];
-        write!(f, "{:<28} {:>8}", "case", "exponent")?;
-        for name in heading {
-            write!(f, " {name:>9}")?;
-        }
-        writeln!(f)?;
-        for Row { case, exponent, one_solve, followed, sub_steps, rejected } in &self.rows {
-            let Figures { mean, min, inverted, .. } = one_solve;
-            write!(f, "{case:<28} {exponent:>8} {mean:>9.4} {min:>9.4} {inverted:>9}")?;
-            if let Some(Figures { mean, min, .. }) = followed {
-                write!(f, " {sub_steps:>9} {mean:>9.4} {min:>9.4}")?;
-            }
-            writeln!(f, " {}", rejected.as_deref().unwrap_or_default())?;
-        }
-        Ok(())
+    fn cells(&self) -> Vec<String> {
+        let Row { case, exponent, one_solve, followed, sub_steps, rejected } = self;
+        let after = followed.map_or_else(Default::default, |Figures { mean, min, .. }| {
+            [sub_steps.to_string(), format!("{mean:.4}"), format!("{min:.4}")]
+        });
+        let Figures { mean, min, inverted, .. } = one_solve;
+        let before = [
+            (*case).into(),
+            exponent.to_string(),
+            format!("{mean:.4}"),
+            format!("{min:.4}"),
+            inverted.to_string(),
+        ];
+        before.into_iter().chain(after).chain([rejected.clone().unwrap_or_default()]).collect()
     }
 }

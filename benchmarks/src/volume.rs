@@ -1,31 +1,32 @@
-//! Volume motion: seconds at the sizes of the paper's meshes, beside the paper's own and beside PETSc on the same matrix.
+//! Volume motion: seconds at the sizes of the paper's meshes, beside the paper's own and beside
+//! PETSc on the same matrix.
 
 use std::error::Error;
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
+use tombolo::deform::features::FeatureSettings;
 use tombolo::deform::linear::{
-    Cholesky, LinearSolver, Multigrid, MultigridSettings, SparseMatrix, Tolerance,
+    BuiltIn, Cholesky, LinearError, LinearSolver, Multigrid, MultigridSettings, SparseMatrix,
+    Tolerance,
 };
 use tombolo::deform::mesh::{Mesh, Vector};
-use tombolo::deform::shapes::box_of_tets;
-use tombolo::deform::surface::{FeatureSettings, Surface};
+use tombolo::deform::surface::Surface;
 use tombolo::deform::volume::{Deform, Method, Sliding, VolumeOperator};
-use tombolo::pipelines::files;
+use tombolo_tests::project;
 
-use crate::measure::{memory_peak, middle, processor_seconds};
+use crate::measure::{Times, memory_peak, processor_seconds};
+use crate::peer::{self, apart};
 use crate::report::{Report, Row, Target};
+use crate::volume_case::{THREADS, TOLERANCE, jiggled_box, mesh, motion};
 
 /// Runs of each of our own measurements.
 const RUNS: usize = 5;
 
-pub const TOLERANCE: f64 = 1e-6;
-
-/// The paper's table: elements, processes, milliseconds to allocate and assemble the matrix and to solve.
+/// The paper's table: elements, processes, milliseconds to allocate and assemble the matrix and to
+/// solve.
 const PAPER: [(&str, usize, f64, f64); 5] = [
     ("mesh 0", 12, 40.0 + 441.0, 23.0),
     ("mesh 1", 24, 71.0 + 573.0, 22.0),
@@ -34,13 +35,10 @@ const PAPER: [(&str, usize, f64, f64); 5] = [
     ("mesh 4", 256, 579.0 + 3925.0, 131.0),
 ];
 
-/// The threads of everything measured, as many as PETSc has ranks.
-pub const THREADS: usize = 2;
-
 /// Runs the benchmark: some minutes.
 ///
 /// # Errors
-/// Whatever the parts fail with; nothing is skipped.
+/// The first error of a part; nothing is skipped.
 pub fn run() -> Result<Report, Box<dyn Error>> {
     let threads = rayon::ThreadPoolBuilder::new().num_threads(THREADS).build()?;
     Ok(threads.install(|| measured().map_err(|error| error.to_string()))?)
@@ -57,7 +55,7 @@ fn measured() -> Result<Report, Box<dyn Error>> {
         let motion = motion(&mesh, surface.vertices());
         let case = |what: &str| format!("{name} ({source}, {tets} tets), {what}");
         let mut push = |what: &str, seconds: f64| {
-            report.rows.push(Row { case: case(what), seconds, steps: None });
+            report.rows.push(Row::new(case(what), seconds));
         };
         push(
             &format!("paper on {processes} processes, allocate and assemble"),
@@ -91,13 +89,13 @@ fn measured() -> Result<Report, Box<dyn Error>> {
                 &format!("PETSc {solver} on 2 ranks, solve, {} iterations", peer.iterations),
                 peer.solve,
             );
-            worst = worst.max(difference(&ours.solution, &peer.solution));
+            worst = worst.max(apart(ours.solution.as_flattened(), &peer.solution));
             quickest = quickest.min(peer.set_up + peer.solve);
         }
-        report.targets.push(Target::at_most(&case("difference from PETSc"), worst, 1e-5));
+        report.targets.push(Target::at_most(case("difference from PETSc"), worst, 1e-5));
         let ratio = (ours.set_up + ours.solve) / quickest;
         report.targets.push(Target::at_most(
-            &case("set-up and solve by PETSc's quickest"),
+            case("set-up and solve by PETSc's quickest"),
             ratio,
             1.0,
         ));
@@ -105,37 +103,33 @@ fn measured() -> Result<Report, Box<dyn Error>> {
         on_ranks(number, &case, folder.path(), &mut report)?;
         if number + 1 == PAPER.len() {
             let cold = ours.assembly + ours.set_up + ours.solve;
-            report.targets.push(Target::at_most(&case("elasticity, cold [s]"), cold, 2.0));
+            report.targets.push(Target::at_most(case("elasticity, cold [s]"), cold, 2.0));
             report.targets.push(Target::at_most(
-                &case("elasticity, cold, half the processor seconds"),
+                case("elasticity, cold, half the processor seconds"),
                 0.5 * ours.processor,
                 2.0,
             ));
             report.targets.push(Target::at_most(
-                &case("elasticity, set-up and solve [s]"),
+                case("elasticity, set-up and solve [s]"),
                 ours.set_up + ours.solve,
                 1.3,
             ));
             report.targets.push(Target::at_most(
-                &case("elasticity, later order [s]"),
+                case("elasticity, later order [s]"),
                 ours.later,
                 0.5,
             ));
             let later = harmonic.three;
             report.targets.push(Target::at_most(
-                &case("harmonic, later order, three components [s]"),
+                case("harmonic, later order, three components [s]"),
                 later,
                 0.4,
             ));
             let cold = harmonic.set_up + harmonic.one;
-            report.targets.push(Target::at_most(
-                &case("harmonic, set-up and solve [s]"),
-                cold,
-                0.4,
-            ));
+            report.targets.push(Target::at_most(case("harmonic, set-up and solve [s]"), cold, 0.4));
             let cold = harmonic.assembly + cold;
             report.targets.push(Target::at_most(
-                &case("harmonic, cold, with assembly [s]"),
+                case("harmonic, cold, with assembly [s]"),
                 cold,
                 0.4,
             ));
@@ -167,27 +161,23 @@ fn on_ranks(
                 ("later order".to_owned(), later),
             ];
             for (what, &seconds) in stages {
-                report.rows.push(Row {
-                    case: case(&format!("{on}, {what}")),
-                    seconds,
-                    steps: None,
-                });
+                report.rows.push(Row::new(case(&format!("{on}, {what}")), seconds));
             }
         }
         let worst = found.iter().map(|solver| solver.difference).fold(0.0, f64::max);
         let on = case(&format!("{ranks} rank(s), difference from the shared-memory solver"));
-        report.targets.push(Target::at_most(&on, worst, 1e-6));
+        report.targets.push(Target::at_most(on, worst, 1e-6));
         let cold = |solver: &OnRanks| solver.set_up + solver.first;
         let petsc = || found.iter().filter(|solver| solver.solver.starts_with("PETSc"));
         let quickest = petsc().map(cold).fold(f64::INFINITY, f64::min);
         let default = petsc().find(|solver| solver.is_default).map_or(f64::INFINITY, cold);
         let on = case(&format!("{ranks} rank(s), PETSc as it is by default by its quickest"));
-        report.targets.push(Target::at_most(&on, default / quickest, 1.0));
+        report.targets.push(Target::at_most(on, default / quickest, 1.0));
     }
     Ok(())
 }
 
-/// What elasticity took, and its equations.
+/// The seconds that elasticity took, and its equations.
 struct Elasticity {
     assembly: f64,
     set_up: f64,
@@ -208,33 +198,22 @@ fn elasticity(
     motion: &[Vector],
 ) -> Result<Elasticity, Box<dyn Error>> {
     let settings = Deform { tolerance: TOLERANCE, ..Deform::default() };
-    let (mut whole, mut set_up, mut first, mut later, mut updated) =
-        (vec![], vec![], vec![], vec![], vec![]);
-    let mut processor = vec![];
+    let [mut whole, mut set_up, mut first, mut later, mut updated, mut processor] =
+        [const { Times::new() }; 6];
     let mut kept = None;
     for _ in 0..RUNS {
         drop(kept.take());
-        let (start, before) = (Instant::now(), processor_seconds()?);
-        let operator = VolumeOperator::new(mesh, boundary, &settings)?;
-        whole.push(start.elapsed().as_secs_f64());
-        for times in [&mut first, &mut later] {
-            let start = Instant::now();
-            operator.solve(motion)?;
-            if times.len() == processor.len() {
-                processor.push(processor_seconds()? - before);
-            }
-            times.push(start.elapsed().as_secs_f64());
-        }
-        let start = Instant::now();
-        operator.updated(mesh)?;
-        updated.push(start.elapsed().as_secs_f64());
+        let before = processor_seconds()?;
+        let operator = whole.of(|| VolumeOperator::new(mesh, boundary, &settings))?;
+        first.of(|| operator.solve(motion))?;
+        processor.add(processor_seconds()? - before);
+        later.of(|| operator.solve(motion))?;
+        updated.of(|| operator.updated(mesh))?;
         // The solver once more, by itself, to tell its set-up from the assembly.
         let (matrix, _) =
             operator.coupled_equations(motion).ok_or("the operator is not elastic")?;
         let matrix = Arc::new(matrix.clone());
-        let start = Instant::now();
-        Multigrid::<3>::new(matrix, MultigridSettings::default())?;
-        set_up.push(start.elapsed().as_secs_f64());
+        set_up.of(|| Multigrid::<3>::new(matrix, MultigridSettings::default()))?;
         kept = Some(operator);
     }
     let operator = kept.ok_or("nothing was run")?;
@@ -247,14 +226,14 @@ fn elasticity(
         &mut solution,
         tolerance,
     )?;
-    let set_up = middle(&mut set_up);
+    let set_up = set_up.median();
     Ok(Elasticity {
-        assembly: middle(&mut whole) - set_up,
+        assembly: whole.median() - set_up,
         set_up,
-        solve: middle(&mut first),
-        later: middle(&mut later),
-        updated: middle(&mut updated),
-        processor: middle(&mut processor),
+        solve: first.median(),
+        later: later.median(),
+        updated: updated.median(),
+        processor: processor.median(),
         matrix: matrix.clone(),
         places: operator.unknown_points().to_vec(),
         right_side,
@@ -262,7 +241,7 @@ fn elasticity(
     })
 }
 
-/// What a harmonic displacement took.
+/// The seconds that a harmonic displacement took.
 struct Harmonic {
     assembly: f64,
     set_up: f64,
@@ -276,38 +255,30 @@ struct Harmonic {
 fn harmonic(mesh: &Mesh, boundary: &[u32], motion: &[Vector]) -> Result<Harmonic, Box<dyn Error>> {
     let settings = Deform { method: Method::Harmonic, tolerance: TOLERANCE, ..Deform::default() };
     let along: Vec<Vector> = motion.iter().map(|value| [0.0, 0.0, value[2]]).collect();
-    let (mut whole, mut set_up, mut one, mut three, mut processor) =
-        (vec![], vec![], vec![], vec![], vec![]);
+    let [mut whole, mut set_up, mut one, mut three, mut processor] = [const { Times::new() }; 5];
     for _ in 0..RUNS {
-        let (start, before) = (Instant::now(), processor_seconds()?);
-        let operator = VolumeOperator::new(mesh, boundary, &settings)?;
-        whole.push(start.elapsed().as_secs_f64());
-        for (times, motion) in [(&mut one, &along[..]), (&mut three, motion)] {
-            let start = Instant::now();
-            operator.solve(motion)?;
-            if times.len() == processor.len() {
-                processor.push(processor_seconds()? - before);
-            }
-            times.push(start.elapsed().as_secs_f64());
-        }
+        let before = processor_seconds()?;
+        let operator = whole.of(|| VolumeOperator::new(mesh, boundary, &settings))?;
+        one.of(|| operator.solve(&along))?;
+        processor.add(processor_seconds()? - before);
+        three.of(|| operator.solve(motion))?;
         // The solver once more, by itself, to tell its set-up from the assembly.
         let matrix = operator.separate_matrix().ok_or("the operator is not harmonic")?;
         let matrix = Arc::new(matrix.clone());
-        let start = Instant::now();
-        Multigrid::<1>::new(matrix, MultigridSettings::default())?;
-        set_up.push(start.elapsed().as_secs_f64());
+        set_up.of(|| Multigrid::<1>::new(matrix, MultigridSettings::default()))?;
     }
-    let set_up = middle(&mut set_up);
+    let set_up = set_up.median();
     Ok(Harmonic {
-        assembly: middle(&mut whole) - set_up,
+        assembly: whole.median() - set_up,
         set_up,
-        one: middle(&mut one),
-        three: middle(&mut three),
-        processor: middle(&mut processor),
+        one: one.median(),
+        three: three.median(),
+        processor: processor.median(),
     })
 }
 
-/// Small systems, factored and by multigrid: where one overtakes the other is where [`tombolo::deform::linear::solver`] changes over.
+/// Small systems, factored and by multigrid: where one overtakes the other is where
+/// [`tombolo::deform::linear::solver`] changes over.
 fn small_systems(report: &mut Report) -> Result<(), Box<dyn Error>> {
     for count in [7, 9, 11, 14, 17] {
         let mesh = jiggled_box(count)?;
@@ -321,23 +292,22 @@ fn small_systems(report: &mut Report) -> Result<(), Box<dyn Error>> {
         let tolerance = Tolerance { relative: 1e-8, absolute: 0.0 };
         let unknowns = 3 * right_side.len();
         for direct in [true, false] {
-            let (mut set_up, mut solve) = (vec![], vec![]);
+            let (mut set_up, mut solve) = (Times::new(), Times::new());
             for _ in 0..RUNS {
-                let start = Instant::now();
-                let solver: Box<dyn LinearSolver<3>> = if direct {
-                    Box::new(Cholesky::new(Arc::clone(&matrix))?)
-                } else {
-                    Box::new(Multigrid::new(Arc::clone(&matrix), MultigridSettings::default())?)
-                };
-                set_up.push(start.elapsed().as_secs_f64());
-                let start = Instant::now();
-                solver.solve(&right_side, &mut solution, tolerance)?;
-                solve.push(start.elapsed().as_secs_f64());
+                let solver = set_up.of(|| -> Result<Box<dyn LinearSolver<3>>, LinearError> {
+                    Ok(if direct {
+                        Box::new(Cholesky::new(Arc::clone(&matrix))?)
+                    } else {
+                        Box::new(Multigrid::new(Arc::clone(&matrix), MultigridSettings::default())?)
+                    })
+                })?;
+                solve.of(|| solver.solve(&right_side, &mut solution, tolerance))?;
             }
             let name = if direct { "Cholesky" } else { "multigrid" };
-            for (what, mut times) in [("set-up", set_up), ("solve", solve)] {
-                let case = format!("{unknowns} unknowns, {name}, {what}");
-                report.rows.push(Row { case, seconds: middle(&mut times), steps: None });
+            for (what, times) in [("set-up", set_up), ("solve", solve)] {
+                report
+                    .rows
+                    .push(Row::new(format!("{unknowns} unknowns, {name}, {what}"), times.median()));
             }
         }
     }
@@ -360,89 +330,40 @@ fn sliding_sides(report: &mut Report) -> Result<(), Box<dyn Error>> {
             sliding.push(Sliding { vertex, normal });
         }
     }
-    let operator = VolumeOperator::with_sliding(&mesh, &held, &sliding, &Deform::default())?;
+    let operator =
+        VolumeOperator::with_sliding(&mesh, &held, &sliding, &Deform::default(), &BuiltIn)?;
     let motion = motion(&mesh, &held);
     let (matrix, right_side) =
         operator.coupled_equations(&motion).ok_or("the operator is not elastic")?;
     let (matrix, tets) = (Arc::new(matrix.clone()), mesh.cells().len());
     let tolerance = Tolerance { relative: TOLERANCE, absolute: 0.0 };
     for bodies in [false, true] {
-        let (mut set_up, mut solve, mut iterations) = (vec![], vec![], 0);
+        let (mut set_up, mut solve, mut iterations) = (Times::new(), Times::new(), 0);
         for _ in 0..RUNS {
             let settings = MultigridSettings::default();
-            let start = Instant::now();
-            let solver = if bodies {
-                Multigrid::with_rigid_bodies(
+            let solver = set_up.of(|| match bodies {
+                true => Multigrid::with_rigid_bodies(
                     Arc::clone(&matrix),
                     operator.unknown_points(),
                     settings,
-                )?
-            } else {
-                Multigrid::new(Arc::clone(&matrix), settings)?
-            };
-            set_up.push(start.elapsed().as_secs_f64());
+                ),
+                false => Multigrid::new(Arc::clone(&matrix), settings),
+            })?;
             let mut solution = vec![[0.0; 3]; right_side.len()];
-            let start = Instant::now();
-            iterations = solver.solve(&right_side, &mut solution, tolerance)?.iterations;
-            solve.push(start.elapsed().as_secs_f64());
+            iterations =
+                solve.of(|| solver.solve(&right_side, &mut solution, tolerance))?.iterations;
         }
         let name = if bodies { "with rigid bodies" } else { "without rigid bodies" };
-        for (what, mut times) in
+        for (what, times) in
             [("set-up".into(), set_up), (format!("solve, {iterations} iterations"), solve)]
         {
-            let case = format!("sliding sides, {tets} tets, {name}, {what}");
-            report.rows.push(Row { case, seconds: middle(&mut times), steps: None });
+            report.rows.push(Row::new(
+                format!("sliding sides, {tets} tets, {name}, {what}"),
+                times.median(),
+            ));
         }
     }
     Ok(())
-}
-
-/// The paper's bypass where `scripts/meshes` has made it already (the largest takes it a quarter of an hour); else a box with as
-/// many tetrahedra, made in a moment.
-pub fn mesh(number: usize) -> Result<(String, Mesh), Box<dyn Error>> {
-    let name = format!("bypass-{number}");
-    let directory = std::env::var_os("TOMBOLO_MESHES")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../meshes"), PathBuf::from);
-    let file = directory.join(format!("{name}.msh"));
-    if file.exists() {
-        return Ok((name, files::read_mesh(&file)?.mesh));
-    }
-    let counts = [22, 27, 34, 43, 60];
-    Ok(("box".into(), jiggled_box(*counts.get(number).ok_or("the paper has five meshes")?)?))
-}
-
-/// A box of `6 count³` tetrahedra, its inner vertices moved about.
-fn jiggled_box(count: usize) -> Result<Mesh, Box<dyn Error>> {
-    let mesh = box_of_tets([count; 3], [0.0; 3], [1.0; 3]);
-    let mut state = 1u64;
-    #[expect(clippy::cast_precision_loss, reason = "31 bits")]
-    let mut noise = move || {
-        state =
-            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        0.3 / count as f64 * ((state >> 33) as f64 / (1u64 << 31) as f64 - 0.5)
-    };
-    let inside = |point: &Vector| point.iter().all(|&x| x > 0.0 && x < 1.0);
-    let points = mesh.points().iter();
-    let points = points
-        .map(|point| if inside(point) { point.map(|x| x + noise()) } else { *point })
-        .collect();
-    Ok(mesh.with_points(points)?)
-}
-
-/// A smooth motion by up to a tenth of the domain.
-pub fn motion(mesh: &Mesh, boundary: &[u32]) -> Vec<Vector> {
-    let points = || boundary.iter().map(|&vertex| mesh.points()[vertex as usize]);
-    let bound = |start: f64, pick: fn(f64, f64) -> f64| {
-        points().fold([start; 3], |a, b| std::array::from_fn(|axis| pick(a[axis], b[axis])))
-    };
-    let (lower, upper) = (bound(f64::INFINITY, f64::min), bound(f64::NEG_INFINITY, f64::max));
-    let size = (0..3).map(|axis| upper[axis] - lower[axis]).fold(0.0, f64::max);
-    points()
-        .map(|point| {
-            let [x, y, z] = std::array::from_fn(|axis| (point[axis] - lower[axis]) / size);
-            [(3.0 * y).sin(), 0.4 * (5.0 * x).cos(), x * z].map(|value| 0.1 * size * value)
-        })
-        .collect()
 }
 
 /// The equations in PETSc's binary format: big-endian, numbered from 0.
@@ -482,7 +403,7 @@ fn write_system(file: &Path, ours: &Elasticity) -> std::io::Result<()> {
     out.flush()
 }
 
-/// What PETSc took.
+/// The seconds that PETSc took, and its solution.
 struct Peer {
     set_up: f64,
     solve: f64,
@@ -491,21 +412,16 @@ struct Peer {
 }
 
 fn petsc(system: &Path, solver: &str) -> Result<Peer, Box<dyn Error>> {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("peers/petsc.py");
-    let output = Command::new("mpirun")
-        .args(["--allow-run-as-root", "--oversubscribe", "-n", "2", "/usr/bin/python3"])
-        .args([&script, &PathBuf::from(system), &PathBuf::from(solver)])
-        .env("OMP_NUM_THREADS", "1")
-        .output()
-        .map_err(|error| format!("mpirun: {error}; `scripts/setup --benchmarks` installs it"))?;
-    let text = String::from_utf8_lossy(&output.stdout);
-    let line = text.lines().find_map(|line| line.strip_prefix("tombolo ")).unwrap_or_default();
-    let [set_up, solve, iterations] = line.split(' ').collect::<Vec<_>>()[..] else {
-        let message = String::from_utf8_lossy(&output.stderr);
-        return Err(format!(
-            "PETSc failed; `scripts/setup --benchmarks` installs it: {text}{message}"
-        )
-        .into());
+    let mut command = peer::on_ranks(2);
+    command
+        .arg("/usr/bin/python3")
+        .arg(project().join("benchmarks/peers/petsc.py"))
+        .arg(system)
+        .arg(solver);
+    let printed = peer::run(command.env("OMP_NUM_THREADS", "1"))?;
+    let [set_up, solve, iterations] = peer::answer(&printed)?.split(' ').collect::<Vec<_>>()[..]
+    else {
+        return Err(format!("PETSc gave no three figures: {printed}").into());
     };
     let bytes = std::fs::read(system.with_extension(solver))?;
     let values = bytes.get(8..).ok_or("PETSc wrote no solution")?.as_chunks::<8>().0;
@@ -516,14 +432,4 @@ fn petsc(system: &Path, solver: &str) -> Result<Peer, Box<dyn Error>> {
         iterations: iterations.parse()?,
         solution,
     })
-}
-
-/// The largest difference of any component, by the largest component.
-fn difference(ours: &[Vector], theirs: &[f64]) -> f64 {
-    let ours = ours.as_flattened();
-    if ours.len() != theirs.len() {
-        return f64::INFINITY;
-    }
-    let largest = theirs.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-    ours.iter().zip(theirs).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / largest
 }

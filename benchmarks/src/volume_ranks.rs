@@ -1,31 +1,32 @@
-//! Volume motion on the ranks of MPI: by PETSc with each of its preconditioners, and by the kernel's own solver on as many ranks.
+//! Volume motion on the ranks of MPI: by PETSc with each of its preconditioners, and by the
+//! kernel's own solver on as many ranks.
 //!
-//! The benchmark starts itself again under `mpirun` for each number of ranks; every rank reads or makes the mesh and keeps its part.
+//! The benchmark starts itself again under `mpirun` for each number of ranks; every rank reads or
+//! makes the mesh and keeps its part.
 
-use std::{error::Error, path::Path, process::Command, sync::Arc, time::Instant};
+use std::{error::Error, path::Path, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 use tombolo::{
-    Solvers,
-    comm::{
-        Communicator, Reduction, agree_on,
-        mpi::{Mpi, rsmpi},
-    },
+    communicator::{Communicator, Reduction, agree},
     deform::{
-        mesh::{FeatureSource, Mesh, Vector},
-        partition::Partition as _,
-        surface::FeatureSettings,
+        distributed::{Part, domain},
+        features::FeatureSettings,
+        linear::{BuiltIn, Solvers},
+        mesh::Vector,
         volume::{Deform, VolumeOperator},
     },
-    distributed::{Petsc, Preconditioning},
-    pipelines::distributed::{Part, PartBoundary, Ranks},
+    mpi::{Mpi, rsmpi},
+    petsc::{Petsc, Preconditioning},
 };
 
-use crate::volume::{THREADS, TOLERANCE, mesh, motion};
+use crate::measure::Times;
+use crate::peer;
+use crate::volume_case::{THREADS, TOLERANCE, mesh, motion};
 
 const RUNS: usize = 3;
 
-/// What one solver took on a number of ranks.
+/// The seconds that one solver took on a number of ranks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OnRanks {
     pub solver: String,
@@ -35,8 +36,8 @@ pub struct OnRanks {
     pub first: f64,
     pub later: f64,
     pub iterations: usize,
-    /// The largest difference from the displacement on one process by the largest displacement, both solved to the kernel's default
-    /// tolerance.
+    /// The largest difference from the displacement on one process by the largest displacement,
+    /// both solved to the kernel's default tolerance.
     pub difference: f64,
 }
 
@@ -57,22 +58,18 @@ pub fn started(
     ranks: usize,
     displacement: &Path,
 ) -> Result<Vec<OnRanks>, Box<dyn Error>> {
-    let output = Command::new("mpirun")
-        .args(["--allow-run-as-root", "--oversubscribe", "-n", &ranks.to_string()])
-        .arg(std::env::current_exe()?)
-        .args(["volume", "--part-of", &number.to_string(), "--displacement"])
-        .arg(displacement)
-        .output()
-        .map_err(|error| format!("mpirun: {error}; `scripts/setup --distributed` installs it"))?;
-    let text = String::from_utf8_lossy(&output.stdout);
-    let line = text.lines().find_map(|line| line.strip_prefix("tombolo ")).ok_or_else(|| {
-        let message = String::from_utf8_lossy(&output.stderr);
-        format!("the ranks failed: {text}{message}")
-    })?;
-    Ok(serde_json::from_str(line)?)
+    let mut command = peer::on_ranks(ranks);
+    command.arg(std::env::current_exe()?).args([
+        "volume",
+        "--part-of",
+        &number.to_string(),
+        "--displacement",
+    ]);
+    let printed = peer::run(command.arg(displacement))?;
+    Ok(serde_json::from_str(peer::answer(&printed)?)?)
 }
 
-/// What each rank does.
+/// The part of each rank.
 pub fn run(number: usize, displacement: &Path) -> Result<(), Box<dyn Error>> {
     let universe = rsmpi::initialize().ok_or("MPI was initialized before")?;
     let world = universe.world();
@@ -80,11 +77,8 @@ pub fn run(number: usize, displacement: &Path) -> Result<(), Box<dyn Error>> {
     let (rank, ranks) = (communicator.rank(), communicator.size());
     let threads = rayon::ThreadPoolBuilder::new().num_threads((THREADS / ranks).max(1)).build()?;
     let read = prepared(number, rank, ranks, displacement).map_err(|error| error.to_string());
-    let (part, motion, expected) = agree_on(&*communicator, read)?;
-    let (shared, boundary) =
-        PartBoundary::find(&*communicator, &part, &FeatureSettings::default())?;
-    let shared = Arc::new(shared);
-    let own = Mesh::new(part.points.clone(), part.cells.clone(), FeatureSource::SharpEdges)?;
+    let (part, motion, expected) = agree(&*communicator, read)?;
+    let (domain, boundary) = domain(&communicator, &part, &FeatureSettings::default())?;
     let motion: Vec<Vector> =
         boundary.vertices().iter().map(|&vertex| motion[vertex as usize]).collect();
     // Those whose displacement is not prescribed.
@@ -99,44 +93,43 @@ pub fn run(number: usize, displacement: &Path) -> Result<(), Box<dyn Error>> {
     ];
     let mut found = Vec::new();
     for (solver, preconditioning) in solvers {
-        let petsc: Option<Solvers> = preconditioning
-            .map(|preconditioning| Petsc::solvers(&world, Some(preconditioning)))
-            .transpose()?;
-        let ranks =
-            Ranks::new(Arc::clone(&communicator), Arc::clone(&shared), &boundary, Vec::new());
-        let mut unknown = [(0..)
-            .zip(&prescribed)
-            .filter(|&(vertex, &known)| !known && ranks.owns(vertex))
-            .count() as f64];
-        communicator.reduce(Reduction::Sum, &mut unknown);
-        let default = Preconditioning::quickest(unknown[0] as usize, communicator.size());
-        let partition = match &petsc {
-            Some(petsc) => petsc(ranks, &part.points),
-            None => Arc::new(ranks),
+        let solvers: Arc<dyn Solvers> = match preconditioning {
+            Some(preconditioning) => Petsc::solvers(&world, Some(preconditioning))?,
+            None => Arc::new(BuiltIn),
         };
+        let unknown = (0..)
+            .zip(&prescribed)
+            .filter(|&(vertex, &known)| !known && domain.owns(vertex))
+            .count();
+        let default = Preconditioning::quickest(communicator.total(unknown), communicator.size());
         let measure = || -> Result<OnRanks, Box<dyn Error + Send + Sync>> {
-            let (mut set_up, mut first, mut later, mut iterations) = (vec![], vec![], vec![], 0);
+            let (mut set_up, mut first, mut later, mut iterations) =
+                (Times::new(), Times::new(), Times::new(), 0);
             let settings = Deform { tolerance: TOLERANCE, ..Deform::default() };
             for _ in 0..RUNS {
                 communicator.barrier();
-                let start = Instant::now();
-                let operator =
-                    VolumeOperator::of_part(&own, boundary.vertices(), &[], &settings, &partition)?;
-                communicator.barrier();
-                set_up.push(start.elapsed().as_secs_f64());
-                for times in [&mut first, &mut later] {
-                    let start = Instant::now();
-                    iterations = operator.solve(&motion)?.iterations;
+                let boundary = boundary.vertices();
+                let operator = set_up.of(|| {
+                    let operator =
+                        VolumeOperator::with_sliding(&domain, boundary, &[], &settings, &*solvers);
                     communicator.barrier();
-                    times.push(start.elapsed().as_secs_f64());
+                    operator
+                })?;
+                for times in [&mut first, &mut later] {
+                    let solution = times.of(|| {
+                        let solution = operator.solve(&motion);
+                        communicator.barrier();
+                        solution
+                    });
+                    iterations = solution?.iterations;
                 }
             }
-            let operator = VolumeOperator::of_part(
-                &own,
+            let operator = VolumeOperator::with_sliding(
+                &domain,
                 boundary.vertices(),
                 &[],
                 &Deform::default(),
-                &partition,
+                &*solvers,
             )?;
             let solution = operator.solve(&motion)?.displacement;
             let largest = |values: &mut dyn Iterator<Item = f64>| {
@@ -153,13 +146,12 @@ pub fn run(number: usize, displacement: &Path) -> Result<(), Box<dyn Error>> {
                 largest(&mut expected.as_flattened().iter().copied()),
             ];
             communicator.reduce(Reduction::Maximum, &mut sizes);
-            let middle = |times: &mut Vec<f64>| crate::measure::middle(times);
             Ok(OnRanks {
                 solver: solver.into(),
                 is_default: preconditioning == Some(default),
-                set_up: middle(&mut set_up),
-                first: middle(&mut first),
-                later: middle(&mut later),
+                set_up: set_up.median(),
+                first: first.median(),
+                later: later.median(),
                 iterations,
                 difference: sizes[0] / sizes[1],
             })
@@ -172,8 +164,8 @@ pub fn run(number: usize, displacement: &Path) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// This rank's part of a mesh, and for each of its vertices the motion that is prescribed on the boundary and the displacement on one
-/// process.
+/// This rank's part of a mesh, and for each of its vertices the motion that is prescribed on the
+/// boundary and the displacement on one process.
 type Prepared = (Part, Vec<Vector>, Vec<Vector>);
 
 fn prepared(
@@ -202,8 +194,7 @@ fn prepared(
     }
     let part = Part::cut(&mesh, &of_cells, rank, false)?;
     let bytes = std::fs::read(displacement)?;
-    let values: Vec<f64> =
-        bytes.as_chunks().0.iter().map(|value| f64::from_le_bytes(*value)).collect();
+    let values = peer::numbers(&bytes);
     let values = values.as_chunks::<3>().0;
     if values.len() != mesh.points().len() {
         return Err("the displacement is not that of this mesh".into());

@@ -4,10 +4,9 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use tombolo::Parameter;
+use tombolo::foreign::RunError;
 use tombolo::pipelines::language::{self, Config, Pipeline, Steering, StreamServer, TimedCommand};
-use tombolo::pipelines::limits::{DOCUMENT, Limit, WAITING_BYTES};
 
-use crate::error::CatalystError;
 use crate::node::{Kind, Node};
 use crate::results::RESERVED;
 
@@ -21,28 +20,29 @@ const OUTPUT: &str = "TOMBOLO_OUTPUT";
 /// The variable that names the file of the report at the end.
 const REPORT: &str = "TOMBOLO_REPORT";
 
-/// What a run is set up with.
+/// The set-up of a run.
 #[derive(Debug)]
 pub(crate) struct Configuration {
-    /// What to watch.
+    /// The pipelines, and how they are served.
     pub(crate) config: Config,
-    /// Whether no file says so: then the surface of every channel is watched besides.
+    /// Whether no file names a pipeline: then the surface of every channel is watched besides.
     pub(crate) is_default: bool,
-    /// The pipelines of each script and pipeline of the node, by its name there; none where the node names no pipelines.
+    /// The pipelines of each script and pipeline of the node, by its name there; none where the
+    /// node names no pipelines.
     pub(crate) groups: Groups,
     pub(crate) parameters: Vec<Parameter>,
     pub(crate) orders: Vec<TimedCommand>,
     pub(crate) output: PathBuf,
     /// The Fortran handle of the communicator.
     pub(crate) communicator: Option<i32>,
-    /// What is not done, for the log.
+    /// Requests that are not carried out, for the log.
     pub(crate) notes: Vec<String>,
 }
 
 /// Names, each with those of the pipelines that it stands for.
 pub(crate) type Groups = Vec<(String, Vec<String>)>;
 
-/// What is found on the way through the node.
+/// The pipelines and files found on the way through the node.
 #[derive(Default)]
 struct Found {
     /// The names that the node gives them, and the files.
@@ -54,8 +54,9 @@ struct Found {
 }
 
 impl Configuration {
-    /// Reads `catalyst` of the node of `catalyst_initialize`; without one everything is the default.
-    pub(crate) fn read(root: &Node<'_, '_>) -> Result<Self, CatalystError> {
+    /// Reads `catalyst` of the node of `catalyst_initialize`; without one everything is the
+    /// default.
+    pub(crate) fn read(root: &Node<'_, '_>) -> Result<Self, RunError> {
         let mut found = Found::default();
         let (mut parameters, mut communicator, mut orders) = (Vec::new(), None, Vec::new());
         if let Some(catalyst) = root.child(c"catalyst") {
@@ -69,16 +70,9 @@ impl Configuration {
                 each(&node, |child| parameter(child, &mut parameters))?;
             }
             if let Some(handle) = catalyst.child(c"mpi_comm") {
-                let value = handle
-                    .array()
-                    .ok()
-                    .filter(|array| array.len() == 1)
-                    .and_then(|array| array.integer(0));
-                let value = value.and_then(|value| i32::try_from(value).ok());
-                communicator =
-                    Some(value.ok_or_else(|| {
-                        handle.wrong("the Fortran handle of a communicator".into())
-                    })?);
+                let expected = "the Fortran handle of a communicator";
+                let value = i32::try_from(handle.integer(expected)?);
+                communicator = Some(value.map_err(|_| handle.wrong(expected))?);
             }
         }
         let mut of_user = None;
@@ -92,8 +86,7 @@ impl Configuration {
             }
         }
         if let Some(file) = variable(ORDERS) {
-            orders =
-                language::parse_orders(&text(&file, WAITING_BYTES)?, &file).map_err(unreadable)?;
+            orders = tombolo::Settings::default().orders_from_file(&file)?.orders;
         }
         let is_default = found.files.is_empty() && of_user.is_none();
         let (config, groups) = merged(&mut found, of_user.as_deref())?;
@@ -119,19 +112,9 @@ pub(crate) fn report_file() -> Option<String> {
     variable(REPORT)
 }
 
-fn text(file: &str, limit: Limit) -> Result<String, CatalystError> {
-    language::read_text(file.as_ref(), limit).map_err(unreadable)
-}
-
-fn unreadable(error: impl ToString) -> CatalystError {
-    CatalystError::Configuration(error.to_string())
-}
-
-/// The surface of each channel, for whoever opens the link, beside the pipelines of a configuration.
-pub(crate) fn with_default_views(
-    config: &Config,
-    channels: &[String],
-) -> Result<Config, CatalystError> {
+/// The surface of each channel, for whoever opens the link, beside the pipelines of a
+/// configuration.
+pub(crate) fn with_default_views(config: &Config, channels: &[String]) -> Result<Config, RunError> {
     let mut views = default_config(channels)?;
     for view in &mut views.pipelines {
         while config.pipelines.iter().any(|pipeline| pipeline.name == view.name) {
@@ -143,7 +126,7 @@ pub(crate) fn with_default_views(
 }
 
 /// The surface of each channel.
-fn default_config(channels: &[String]) -> Result<Config, CatalystError> {
+fn default_config(channels: &[String]) -> Result<Config, RunError> {
     let stages = json!([{"surface": {}}, {"stream": {}}]);
     let view = |channel: &String| match channels {
         // One channel needs no name beside what is seen of it.
@@ -152,14 +135,15 @@ fn default_config(channels: &[String]) -> Result<Config, CatalystError> {
     };
     let pipelines: Vec<_> = channels.iter().map(view).collect();
     let config = json!({"version": 1, "stream": {}, "pipelines": pipelines});
-    language::parse(&config.to_string(), "the default configuration").map_err(unreadable)
+    Ok(language::parse(&config.to_string(), "the default configuration")?)
 }
 
-/// The configurations of all files as one, and what the node itself asks for; and which pipelines each name in the node stands for.
-/// The user's file has no such name: no solver chooses what it says.
-fn merged(found: &mut Found, of_user: Option<&str>) -> Result<(Config, Groups), CatalystError> {
+/// The configurations of all files as one, and what the node itself asks for; and which pipelines
+/// each name in the node stands for. The user's file has no such name: no solver chooses what it
+/// says.
+fn merged(found: &mut Found, of_user: Option<&str>) -> Result<(Config, Groups), RunError> {
     let own = json!({"version": 1, "pipelines": found.pipelines});
-    let mut config = language::parse(&own.to_string(), "catalyst/pipelines").map_err(unreadable)?;
+    let mut config = language::parse(&own.to_string(), "catalyst/pipelines")?;
     let mut groups: Groups = found.others.iter().map(|name| (name.clone(), Vec::new())).collect();
     let mut of_solver: Vec<String> =
         config.pipelines.iter().map(|pipeline| pipeline.name.clone()).collect();
@@ -180,7 +164,8 @@ fn merged(found: &mut Found, of_user: Option<&str>) -> Result<(Config, Groups), 
     config.stream = settings.stream.map(|(stream, _)| stream);
     config.journal = settings.journal.map(|(journal, _)| journal);
     config.steering = settings.steering.map(|(steering, _)| steering).unwrap_or_default();
-    // Where there is nothing to choose from, the names are those of another implementation's scripts.
+    // Where there is nothing to choose from, the names are those of another implementation's
+    // scripts.
     if of_solver.is_empty() {
         groups.clear();
     }
@@ -193,7 +178,7 @@ fn merged(found: &mut Found, of_user: Option<&str>) -> Result<(Config, Groups), 
     Ok((config, groups))
 }
 
-/// What is said once for a run, with the file that says it: the first that does.
+/// Settings that a run has once, each with the file that says it: the first that does.
 #[derive(Default)]
 struct Settings {
     stream: Option<(StreamServer, String)>,
@@ -202,12 +187,9 @@ struct Settings {
 }
 
 impl Settings {
-    /// Takes in what a file says that none has said before, and gives its pipelines. What it says otherwise is told.
-    fn take(
-        &mut self,
-        file: &str,
-        notes: &mut Vec<String>,
-    ) -> Result<Vec<Pipeline>, CatalystError> {
+    /// Takes in what a file says that none has said before, and gives its pipelines. What it says
+    /// otherwise is told.
+    fn take(&mut self, file: &str, notes: &mut Vec<String>) -> Result<Vec<Pipeline>, RunError> {
         fn first<T: PartialEq>(
             known: &mut Option<(T, String)>,
             said: Option<T>,
@@ -224,7 +206,7 @@ impl Settings {
                 _ => {}
             }
         }
-        let config = language::parse(&text(file, DOCUMENT)?, file).map_err(unreadable)?;
+        let config = tombolo::Settings::from_file(file)?.config;
         // What a file does not say is what it would be by itself.
         let steering = Some(config.steering).filter(|steering| *steering != Steering::default());
         first(&mut self.stream, config.stream, "stream", file, notes);
@@ -236,17 +218,12 @@ impl Settings {
 
 fn each(
     node: &Node<'_, '_>,
-    mut visit: impl FnMut(&Node<'_, '_>) -> Result<(), CatalystError>,
-) -> Result<(), CatalystError> {
+    visit: impl FnMut(&Node<'_, '_>) -> Result<(), RunError>,
+) -> Result<(), RunError> {
     if !matches!(node.kind(), Kind::Object | Kind::List | Kind::Empty) {
-        return Err(node.wrong("an object or a list".into()));
+        return Err(node.wrong("an object or a list"));
     }
-    for (index, name) in node.names().iter().enumerate() {
-        if let Some(child) = node.at(index, name) {
-            visit(&child)?;
-        }
-    }
-    Ok(())
+    node.each(visit)
 }
 
 fn is_json(file: &str) -> bool {
@@ -254,7 +231,7 @@ fn is_json(file: &str) -> bool {
 }
 
 /// A script is a file, or an object with `filename`; ours are JSON.
-fn script(node: &Node<'_, '_>, found: &mut Found) -> Result<(), CatalystError> {
+fn script(node: &Node<'_, '_>, found: &mut Found) -> Result<(), RunError> {
     let file = match node.kind() {
         Kind::Text => node.text()?.into_owned(),
         _ => node.need(c"filename", "the script's file")?.text()?.into_owned(),
@@ -271,8 +248,9 @@ fn script(node: &Node<'_, '_>, found: &mut Found) -> Result<(), CatalystError> {
     Ok(())
 }
 
-/// A pipeline of Catalyst: `io` writes files; a text, or an object with `filename` and no other type, names a configuration.
-fn pipeline(node: &Node<'_, '_>, found: &mut Found) -> Result<(), CatalystError> {
+/// A pipeline of Catalyst: `io` writes files; a text, or an object with `filename` and no other
+/// type, names a configuration.
+fn pipeline(node: &Node<'_, '_>, found: &mut Found) -> Result<(), RunError> {
     if node.kind() == Kind::Text {
         return script(node, found);
     }
@@ -294,18 +272,17 @@ fn pipeline(node: &Node<'_, '_>, found: &mut Found) -> Result<(), CatalystError>
         _ if is_json(&file) => script(node, found),
         "" => Err(file_node.wrong_found(
             format!("'{file}'"),
-            "a file that ends in .json, or the type 'io' beside it".into(),
+            "a file that ends in .json, or the type 'io' beside it",
         )),
         other => {
             let kind = node.need(c"type", "'io'")?;
-            Err(kind
-                .wrong_found(format!("'{other}'"), "'io', or a filename that ends in .json".into()))
+            Err(kind.wrong_found(format!("'{other}'"), "'io', or a filename that ends in .json"))
         }
     }
 }
 
-/// ParaView's pattern as ours: `{timestep:04d}` of today and `%04ts` of before, `{time:.3f}` and `%.3t`. Files of VTK's other kinds
-/// are written as .vtpd, which holds any mesh.
+/// ParaView's pattern as ours: `{timestep:04d}` of today and `%04ts` of before, `{time:.3f}` and
+/// `%.3t`. Files of VTK's other kinds are written as .vtpd, which holds any mesh.
 fn written_file(file: &str) -> (String, Option<String>) {
     let mut pattern = String::new();
     let mut rest = file;
@@ -363,8 +340,9 @@ fn digits(format: &str) -> usize {
     format[..end].parse().map_or(0, |digits: usize| digits.min(20))
 }
 
-/// A number that can be steered: `{value, minimum, maximum}`, or a number without bounds. Texts are those of others.
-fn parameter(node: &Node<'_, '_>, parameters: &mut Vec<Parameter>) -> Result<(), CatalystError> {
+/// A number that can be steered: `{value, minimum, maximum}`, or a number without bounds. Texts are
+/// those of others.
+fn parameter(node: &Node<'_, '_>, parameters: &mut Vec<Parameter>) -> Result<(), RunError> {
     let name = node.name().into_owned();
     if RESERVED.contains(&name.as_str()) {
         return Err(node.wrong_found(

@@ -1,9 +1,9 @@
-//! What can be wrong with a call, and the status that says so.
+//! What can be wrong with a call of Catalyst's, and the status that says so.
 
-use tombolo::pipelines::extract::ChannelError;
-use tombolo::{ExecuteError, FinalizeError, InitializeError};
+use tombolo::foreign::RunError;
 
-/// What a call answers: Catalyst's own statuses, and above 99 those of this implementation (100 to 102 as ParaView uses them).
+/// The answer of a call: Catalyst's own statuses, and above 99 those of this implementation (100 to
+/// 102 as ParaView uses them).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(i32)]
 #[non_exhaustive]
@@ -18,8 +18,8 @@ pub enum Status {
     InvalidNode = 100,
     /// The results could not be filled in.
     Results = 101,
-    /// The adaptor could not be set up, a file could not be written, or the call met a defect of this library; the solver may
-    /// go on.
+    /// The adaptor could not be set up, a file could not be written, or the call met a defect of
+    /// this library; the solver may go on.
     Failed = 102,
 }
 
@@ -41,64 +41,9 @@ pub enum CatalystError {
         /// The first function that was not found.
         symbol: &'static str,
     },
-    /// A path that is needed is not there.
-    #[error("'{path}' is missing; expected {expected}")]
-    Missing {
-        /// The path.
-        path: String,
-        /// What should stand there.
-        expected: &'static str,
-    },
-    /// A path holds something else than is needed.
-    #[error("'{path}': found {found}; expected {expected}")]
-    Wrong {
-        /// The path.
-        path: String,
-        /// What stands there.
-        found: String,
-        /// What should.
-        expected: String,
-    },
-    /// An argument, or an array that was named, makes no sense.
-    #[error("{what}: found {found}; expected {expected}")]
-    Argument {
-        /// What is wrong.
-        what: String,
-        /// What it is.
-        found: String,
-        /// What it should be.
-        expected: String,
-    },
-    /// The configuration cannot be read.
-    #[error("{0}")]
-    Configuration(String),
-    /// Another rank cannot go on.
-    #[error("rank {rank}: {message}")]
-    Rank {
-        /// The lowest rank with an error.
-        rank: usize,
-        /// Its error.
-        message: String,
-        /// Its status.
-        status: Status,
-    },
-    /// Ranks let different pipelines run.
-    #[error(
-        "'catalyst/state/pipelines': found other names on other ranks; expected the same on all"
-    )]
-    Choices,
-    /// The adaptor could not be set up.
+    /// A node that makes no sense, or asks for what cannot be done.
     #[error(transparent)]
-    Initialize(#[from] InitializeError),
-    /// A channel's arrays do not fit together.
-    #[error(transparent)]
-    Channel(#[from] ChannelError),
-    /// The adaptor refused a step.
-    #[error(transparent)]
-    Execute(#[from] ExecuteError),
-    /// Something was not written.
-    #[error(transparent)]
-    Finalize(#[from] FinalizeError),
+    Run(#[from] RunError),
 }
 
 impl CatalystError {
@@ -108,9 +53,8 @@ impl CatalystError {
         match self {
             CatalystError::NotInitialized => Status::NoImplementation,
             CatalystError::MissingSymbol { .. } => Status::ConduitMismatch,
-            CatalystError::Rank { status, .. } => *status,
-            CatalystError::Initialize(_) | CatalystError::Finalize(_) => Status::Failed,
-            _ => Status::InvalidNode,
+            CatalystError::Run(error) if error.is_failure() => Status::Failed,
+            CatalystError::NullNode | CatalystError::Run(_) => Status::InvalidNode,
         }
     }
 }

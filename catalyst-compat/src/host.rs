@@ -1,8 +1,9 @@
 //! The host's Conduit: the C functions of the process that called, found at run time.
 //!
-//! A node's layout belongs to the Conduit that made it. `libcatalyst` exports that Conduit's C functions under the prefix
-//! `catalyst_conduit_`; they are looked up in the process, first in the global scope, then in a loaded `libcatalyst.so.3`
-//! (which a Python host loads without making its symbols global).
+//! A node's layout belongs to the Conduit that made it. `libcatalyst` exports that Conduit's C
+//! functions under the prefix `catalyst_conduit_`; they are looked up in the process, first in the
+//! global scope, then in a loaded `libcatalyst.so.3` (which a Python host loads without making its
+//! symbols global).
 
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::sync::OnceLock;
@@ -23,7 +24,8 @@ pub struct RawDatatype {
 
 macro_rules! host_functions {
     ($($field:ident: $symbol:literal => $signature:ty,)*) => {
-        /// The functions of the host's Conduit that are called. Signatures are those of Conduit's C interface.
+        /// The functions of the host's Conduit that are called. Signatures are those of Conduit's C
+        /// interface.
         pub(crate) struct Host {
             $(pub(crate) $field: $signature,)*
         }
@@ -34,9 +36,10 @@ macro_rules! host_functions {
                     $($field: {
                         let address = symbol(concat!("catalyst_conduit_", $symbol, "\0"))
                             .ok_or(concat!("catalyst_conduit_", $symbol))?;
-                        // SAFETY: a function of this name in a process that speaks Catalyst 2 is Conduit's, whose C interface
-                        // gives it this signature; the address is not null (`symbol`), and function and data pointers have
-                        // one size on every platform that has `dlsym`.
+                        // SAFETY: a function of this name in a process that speaks Catalyst 2 is
+                        // Conduit's, whose C interface gives it this signature; the address is not
+                        // null (`symbol`), and function and data pointers have one size on every
+                        // platform that has `dlsym`.
                         unsafe { std::mem::transmute::<*mut c_void, $signature>(address) }
                     },)*
                 })
@@ -85,18 +88,21 @@ impl Host {
 /// The address of a function that the process has loaded; `name` ends in a nul.
 fn symbol(name: &'static str) -> Option<*mut c_void> {
     let name = CStr::from_bytes_with_nul(name.as_bytes()).ok()?;
-    // SAFETY: `name` is a C string; `RTLD_DEFAULT` asks for the global scope and needs no handle to be open.
+    // SAFETY: `name` is a C string; `RTLD_DEFAULT` asks for the global scope and needs no handle to
+    // be open.
     let found = unsafe { libc::dlsym(libc::RTLD_DEFAULT, name.as_ptr()) };
     if !found.is_null() {
         return Some(found);
     }
-    // SAFETY: the file name is a C string; with `RTLD_NOLOAD` nothing is loaded and no foreign code runs.
+    // SAFETY: the file name is a C string; with `RTLD_NOLOAD` nothing is loaded and no foreign code
+    // runs.
     let library =
         unsafe { libc::dlopen(c"libcatalyst.so.3".as_ptr(), libc::RTLD_LAZY | libc::RTLD_NOLOAD) };
     if library.is_null() {
         return None;
     }
-    // SAFETY: `library` is an open handle (not null) and `name` a C string. The handle stays open, so the address stays valid.
+    // SAFETY: `library` is an open handle (not null) and `name` a C string. The handle stays open,
+    // so the address stays valid.
     let found = unsafe { libc::dlsym(library, name.as_ptr()) };
     (!found.is_null()).then_some(found)
 }

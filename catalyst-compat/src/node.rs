@@ -1,12 +1,13 @@
-//! Safe access to the host's nodes: every read asks first what is there, because Conduit answers a wrong guess with a C++
-//! exception, which must not run through Rust frames.
+//! Safe access to the host's nodes: every read asks first what is there, because Conduit answers a
+//! wrong guess with a C++ exception, which must not run through Rust frames.
 
 use std::borrow::Cow;
 use std::ffi::{CStr, CString, c_char};
 use std::marker::PhantomData;
 use std::ptr;
 
-use crate::array::{Array, NumberType};
+use tombolo::foreign::{Array, RunError, conduit_type};
+
 use crate::error::CatalystError;
 use crate::host::{Host, RawNode};
 
@@ -20,7 +21,7 @@ mod type_number {
 
 const BIG_ENDIAN: i64 = 1;
 
-/// What a node is.
+/// The kind of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Empty,
@@ -31,8 +32,8 @@ pub(crate) enum Kind {
     Unknown(i64),
 }
 
-/// A node that can be read for the length of one call (`'call`). It knows the way to itself, so that an error can name it; the
-/// way is written out only then.
+/// A node that can be read for the length of one call (`'call`). It knows the way to itself, so
+/// that an error can name it; the way is written out only then.
 #[derive(Clone, Copy)]
 pub(crate) struct Node<'up, 'call> {
     host: &'static Host,
@@ -45,8 +46,8 @@ pub(crate) struct Node<'up, 'call> {
 
 impl<'call> Node<'_, 'call> {
     /// # Safety
-    /// `pointer` is null or a node of the host's Conduit that lives, with all that it borrows, unchanged by others until the call
-    /// returns.
+    /// `pointer` is null or a node of the host's Conduit that lives, with all that it borrows,
+    /// unchanged by others until the call returns.
     pub(crate) unsafe fn root(
         host: &'static Host,
         pointer: *const RawNode,
@@ -87,6 +88,11 @@ impl<'call> Node<'_, 'call> {
         path.push_str(&self.name());
     }
 
+    /// The name under which it was reached, as Conduit has it.
+    pub(crate) fn key(&self) -> &CStr {
+        self.name
+    }
+
     /// The name under which it was reached.
     pub(crate) fn name(&self) -> Cow<'_, str> {
         self.name.to_string_lossy()
@@ -98,7 +104,7 @@ impl<'call> Node<'_, 'call> {
             type_number::OBJECT => Kind::Object,
             type_number::LIST => Kind::List,
             type_number::TEXT => Kind::Text,
-            3..=12 => Kind::Numbers,
+            other if conduit_type(other).is_some() => Kind::Numbers,
             other => Kind::Unknown(other),
         }
     }
@@ -108,7 +114,8 @@ impl<'call> Node<'_, 'call> {
         if self.kind() != Kind::Object {
             return None;
         }
-        // SAFETY: the node is a live object and the name a C string; the child is asked for only where it is there.
+        // SAFETY: the node is a live object and the name a C string; the child is asked for only
+        // where it is there.
         let pointer = unsafe {
             if (self.host.has_child)(self.pointer, name.as_ptr()) == 0 {
                 return None;
@@ -124,9 +131,9 @@ impl<'call> Node<'_, 'call> {
         &'next self,
         name: &'next CStr,
         expected: &'static str,
-    ) -> Result<Node<'next, 'call>, CatalystError> {
+    ) -> Result<Node<'next, 'call>, RunError> {
         self.child(name).ok_or_else(|| match self.kind() {
-            Kind::Object | Kind::Empty => CatalystError::Missing {
+            Kind::Object | Kind::Empty => RunError::Missing {
                 path: Node { name, parent: Some(self), ..*self }.path(),
                 expected,
             },
@@ -143,7 +150,8 @@ impl<'call> Node<'_, 'call> {
         usize::try_from(unsafe { (self.host.number_of_children)(self.pointer) }).unwrap_or(0)
     }
 
-    /// The names of the children, by which [`Node::at`] reaches them; in a list their numbers in brackets.
+    /// The names of the children, by which [`Node::at`] reaches them; in a list their numbers in
+    /// brackets.
     pub(crate) fn names(&self) -> Vec<CString> {
         let is_list = self.kind() == Kind::List;
         (0..self.len())
@@ -151,8 +159,8 @@ impl<'call> Node<'_, 'call> {
                 if is_list {
                     return CString::new(format!("[{index}]")).unwrap_or_default();
                 }
-                // SAFETY: the index is below the number of children; Conduit hands out a copy of the name, made by malloc, which
-                // is freed here once it has been copied.
+                // SAFETY: the index is below the number of children; Conduit hands out a copy of
+                // the name, made by malloc, which is freed here once it has been copied.
                 unsafe {
                     let child = (self.host.child)(self.pointer, index as i64);
                     let name: *mut c_char =
@@ -183,15 +191,28 @@ impl<'call> Node<'_, 'call> {
         (!pointer.is_null()).then(|| unsafe { Self::reached(self.host, pointer, name, Some(self)) })
     }
 
-    /// The text that it holds, up to its first nul; borrowed for the length of the call wherever its letters lie side by side.
-    pub(crate) fn text(&self) -> Result<Cow<'call, str>, CatalystError> {
+    /// Calls `visit` with each child of an object or a list.
+    pub(crate) fn each(
+        &self,
+        mut visit: impl FnMut(&Node<'_, 'call>) -> Result<(), RunError>,
+    ) -> Result<(), RunError> {
+        let names = self.names();
+        let mut children =
+            names.iter().enumerate().filter_map(|(index, name)| self.at(index, name));
+        children.try_for_each(|child| visit(&child))
+    }
+
+    /// The text that it holds, up to its first nul; borrowed for the length of the call wherever
+    /// its letters lie side by side.
+    pub(crate) fn text(&self) -> Result<Cow<'call, str>, RunError> {
         if self.kind() != Kind::Text {
-            return Err(self.wrong("a text".into()));
+            return Err(self.wrong("a text"));
         }
         let (first, count, stride) = self.layout()?;
-        let no_text = || self.wrong_found("bytes that are none".into(), "a text in UTF-8".into());
+        let no_text = || self.wrong_found("bytes that are none", "a text in UTF-8");
         if stride == 1 || count == 1 {
-            // SAFETY: Conduit says that the node holds `count` bytes, which live until the call returns (`root`).
+            // SAFETY: Conduit says that the node holds `count` bytes, which live until the call
+            // returns (`root`).
             let bytes: &'call [u8] = unsafe { std::slice::from_raw_parts(first, count as usize) };
             let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
             return std::str::from_utf8(&bytes[..end]).map(Cow::Borrowed).map_err(|_| no_text());
@@ -205,7 +226,7 @@ impl<'call> Node<'_, 'call> {
     }
 
     /// Address of the first element, number of elements, and bytes from one to the next.
-    fn layout(&self) -> Result<(*const u8, i64, i64), CatalystError> {
+    fn layout(&self) -> Result<(*const u8, i64, i64), RunError> {
         // SAFETY: the node is live; its data type is part of it.
         let (count, stride) = unsafe {
             let dtype = (self.host.dtype)(self.pointer);
@@ -218,7 +239,7 @@ impl<'call> Node<'_, 'call> {
         let first: *const u8 = unsafe { (self.host.element)(self.pointer, 0) }.cast::<u8>();
         if first.is_null() {
             return Err(
-                self.wrong_found("a null pointer".into(), format!("the address of {count} values"))
+                self.wrong_found("a null pointer", format!("the address of {count} values"))
             );
         }
         if stride < 0
@@ -226,54 +247,49 @@ impl<'call> Node<'_, 'call> {
         {
             return Err(self.wrong_found(
                 format!("{count} values {stride} bytes apart"),
-                "a length that memory can have".into(),
+                "a length that memory can have",
             ));
         }
         Ok((first, count, stride))
     }
 
     /// The numbers that it holds, borrowed for the length of the call.
-    pub(crate) fn array(&self) -> Result<Array<'call>, CatalystError> {
-        let number = match self.type_number {
-            3 => NumberType::I8,
-            4 => NumberType::I16,
-            5 => NumberType::I32,
-            6 => NumberType::I64,
-            7 => NumberType::U8,
-            8 => NumberType::U16,
-            9 => NumberType::U32,
-            10 => NumberType::U64,
-            11 => NumberType::F32,
-            12 => NumberType::F64,
-            _ => return Err(self.wrong("an array of numbers".into())),
-        };
+    pub(crate) fn array(&self) -> Result<Array<'call>, RunError> {
+        let number =
+            conduit_type(self.type_number).ok_or_else(|| self.wrong("an array of numbers"))?;
         let (first, count, stride) = self.layout()?;
         // SAFETY: the node is live; its data type is part of it.
         let endianness = unsafe { (self.host.endianness)((self.host.dtype)(self.pointer)) };
-        // SAFETY: Conduit says that the node holds `count` numbers of this type, `stride` bytes apart, and by the contract of
-        // `root` they live until the call returns.
+        // SAFETY: Conduit says that the node holds `count` numbers of this type, `stride` bytes
+        // apart, and by the contract of `root` they live until the call returns.
         Ok(unsafe {
             Array::new(first, count as usize, stride as usize, number, endianness == BIG_ENDIAN)
         })
     }
 
     /// The one number that it holds.
-    pub(crate) fn number(&self) -> Result<f64, CatalystError> {
-        let array = self.array().map_err(|_| self.wrong("a number".into()))?;
-        if array.len() == 1 { Ok(array.get(0)) } else { Err(self.wrong("one number".into())) }
+    pub(crate) fn number(&self) -> Result<f64, RunError> {
+        let array = self.array().map_err(|_| self.wrong("a number"))?;
+        if array.len() == 1 { Ok(array.get(0)) } else { Err(self.wrong("one number")) }
+    }
+
+    /// The one whole number that it holds, which errors expect as `expected`.
+    pub(crate) fn integer(&self, expected: &str) -> Result<i64, RunError> {
+        let array = self.array().ok().filter(|array| array.len() == 1);
+        array.and_then(|array| array.integer(0)).ok_or_else(|| self.wrong(expected))
     }
 
     /// The one whole number that it holds, from 0 on.
-    pub(crate) fn count(&self) -> Result<u64, CatalystError> {
-        let array = self.array().map_err(|_| self.wrong("a whole number from 0 on".into()))?;
+    pub(crate) fn count(&self) -> Result<u64, RunError> {
+        let array = self.array().map_err(|_| self.wrong("a whole number from 0 on"))?;
         let value = (array.len() == 1).then(|| array.whole(0)).flatten();
         value.ok_or_else(|| {
             let found = if array.len() == 1 { format!("{}", array.get(0)) } else { self.found() };
-            self.wrong_found(found, "a whole number from 0 on".into())
+            self.wrong_found(found, "a whole number from 0 on")
         })
     }
 
-    /// What it holds, in words.
+    /// The node's content, in words.
     pub(crate) fn found(&self) -> String {
         match self.kind() {
             Kind::Empty => "nothing".into(),
@@ -304,12 +320,16 @@ impl<'call> Node<'_, 'call> {
     }
 
     /// The error that this holds something else.
-    pub(crate) fn wrong(&self, expected: String) -> CatalystError {
+    pub(crate) fn wrong(&self, expected: impl Into<String>) -> RunError {
         self.wrong_found(self.found(), expected)
     }
 
-    pub(crate) fn wrong_found(&self, found: String, expected: String) -> CatalystError {
-        CatalystError::Wrong { path: self.path(), found, expected }
+    pub(crate) fn wrong_found(
+        &self,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> RunError {
+        RunError::Wrong { path: self.path(), found: found.into(), expected: expected.into() }
     }
 }
 
@@ -322,7 +342,8 @@ pub(crate) struct NodeMut<'call> {
 
 impl NodeMut<'_> {
     /// # Safety
-    /// `pointer` is null or a node of the host's Conduit that lives, and is used by nobody else, until the call returns.
+    /// `pointer` is null or a node of the host's Conduit that lives, and is used by nobody else,
+    /// until the call returns.
     pub(crate) unsafe fn new(
         host: &'static Host,
         pointer: *mut RawNode,
@@ -336,7 +357,8 @@ impl NodeMut<'_> {
 
     pub(crate) fn set_text(&mut self, path: &str, value: &str) {
         let (path, value) = (c_string(path), c_string(value));
-        // SAFETY: the node is live and ours alone (`new`), path and value are C strings, which Conduit copies.
+        // SAFETY: the node is live and ours alone (`new`), path and value are C strings, which
+        // Conduit copies.
         unsafe { (self.host.set_text)(self.pointer, path.as_ptr(), value.as_ptr()) }
     }
 
@@ -365,7 +387,8 @@ impl NodeMut<'_> {
 
     /// Copies one axis of vectors.
     pub(crate) fn set_axis(&mut self, path: &str, vectors: &[[f64; 3]], axis: usize) {
-        // SAFETY: as in `set_text`; of the values, from the `axis`-th on, every third is copied, none is written to.
+        // SAFETY: as in `set_text`; of the values, from the `axis`-th on, every third is copied,
+        // none is written to.
         unsafe {
             let data = vectors.as_ptr().cast::<f64>().cast_mut();
             let (count, offset) = (vectors.len() as i64, 8 * axis.min(2) as i64);
@@ -384,7 +407,8 @@ impl NodeMut<'_> {
 
     /// Shows at `path` what stands at `from`, without a copy.
     pub(crate) fn set_same(&mut self, path: &str, from: &str) {
-        // SAFETY: as in `set_text`; both places are in one tree, so that what is borrowed lives as long as what borrows it.
+        // SAFETY: as in `set_text`; both places are in one tree, so that what is borrowed lives as
+        // long as what borrows it.
         unsafe {
             let shown = (self.host.fetch)(self.pointer, c_string(from).as_ptr());
             if !shown.is_null() {

@@ -1,11 +1,15 @@
-//! What `catalyst_results` hands back, as meshes of the Blueprint in the two layouts that solvers read.
+//! What `catalyst_results` hands back, as meshes of the Blueprint in the two layouts that solvers
+//! read.
 //!
-//! `catalyst/<channel>` is there in the calls after which the mesh moves, and only then: points at the new `coordinates`, with the
-//! fields `displacement` and `velocity`; the boundary's vertices once more as a topology `surface`, with their numbers, for solvers that
-//! move their volume by themselves. `catalyst/steering` is always there: one point with a field for each parameter, and `stop`,
-//! `moving`, `shape`, `shapes`.
+//! `catalyst/<channel>` is there in the calls after which the mesh moves, and only then: points at
+//! the new `coordinates`, with the fields `displacement` and `velocity`; the boundary's vertices
+//! once more as a topology `surface`, with their numbers, for solvers that move their volume by
+//! themselves. `catalyst/steering` is always there: one point with a field for each parameter, and
+//! `stop`, `moving`, `shape`, `shapes`.
 
-use crate::motion::{Asked, Motion};
+use tombolo::MeshMotion;
+use tombolo::foreign::Asked;
+
 use crate::node::NodeMut;
 
 /// The name of the mesh of parameters; no channel may bear it.
@@ -15,12 +19,13 @@ pub(crate) const RESERVED: [&str; 4] = ["stop", "moving", "shape", "shapes"];
 
 /// A topology and its coordset.
 type Names = (&'static str, &'static str);
-/// All vertices.
+/// The names of the topology and the coordset of all vertices.
 const MESH: Names = ("mesh", "coords");
-/// Those of the boundary.
+/// The names of the boundary's topology and coordset.
 const SURFACE: Names = ("surface", "surface");
 
-/// Fills in what was asked. `blocks` are the names of the steered channel's meshes and how many vertices each has.
+/// Fills in what was asked. `blocks` are the names of the steered channel's meshes and how many
+/// vertices each has.
 pub(crate) fn fill(
     node: &mut NodeMut<'_>,
     asked: &Asked,
@@ -78,7 +83,7 @@ fn settings(node: &mut NodeMut<'_>, asked: &Asked) {
     second_layout(node, &root);
 }
 
-fn points(node: &mut NodeMut<'_>, root: &str, motion: &Motion, range: std::ops::Range<usize>) {
+fn points(node: &mut NodeMut<'_>, root: &str, motion: &MeshMotion, range: std::ops::Range<usize>) {
     let part = |vectors: &'_ [[f64; 3]]| vectors.get(range.clone()).unwrap_or_default().to_vec();
     coordinates(node, root, MESH, &part(&motion.coordinates));
     for (name, vectors) in [("displacement", &motion.displacement), ("velocity", &motion.velocity)]
@@ -90,7 +95,12 @@ fn points(node: &mut NodeMut<'_>, root: &str, motion: &Motion, range: std::ops::
 }
 
 /// The boundary's vertices among those of `range`, by their numbers in it.
-fn surface(node: &mut NodeMut<'_>, root: &str, motion: &Motion, range: &std::ops::Range<usize>) {
+fn surface(
+    node: &mut NodeMut<'_>,
+    root: &str,
+    motion: &MeshMotion,
+    range: &std::ops::Range<usize>,
+) {
     let surface = &motion.surface;
     let places: Vec<usize> = (0..surface.vertices.len())
         .filter(|&place| range.contains(&(surface.vertices[place] as usize)))

@@ -2,18 +2,17 @@
 
 use std::sync::Arc;
 
-use tombolo::comm::{Alarm, Communicator};
+use tombolo::communicator::{Alarm, Communicator};
+use tombolo::deform::linear::BuiltIn;
+use tombolo::foreign::mesh::Channel;
+use tombolo::foreign::{Asked, Run, RunError, ranks};
 use tombolo::pipelines::language::nearest;
 use tombolo::{InitializeError, Settings, Step};
 
 use crate::configuration::{self, Configuration, Groups, with_default_views};
-use crate::error::CatalystError;
-use crate::mesh::Channel;
-use crate::motion::Asked;
+use crate::mesh;
 use crate::node::{Kind, Node, NodeMut};
-use crate::ranks;
 use crate::results::{self, STEERING};
-use crate::run::Run;
 
 /// A run that is described by nodes.
 pub(crate) struct Session {
@@ -33,17 +32,19 @@ enum Stage {
 
 impl Session {
     /// Sets a run up. Collective.
-    pub(crate) fn new(node: &Node<'_, '_>) -> Result<Self, CatalystError> {
+    pub(crate) fn new(node: &Node<'_, '_>) -> Result<Self, RunError> {
         let configuration = Configuration::read(node);
         let handle =
             configuration.as_ref().ok().and_then(|configuration| configuration.communicator);
-        let communicator = ranks::communicator(handle)?;
+        // SAFETY: Catalyst's blueprint says that `catalyst/mpi_comm` is the handle of a live
+        // communicator.
+        let communicator = unsafe { ranks::communicator(handle) }?;
         let Configuration { config, is_default, groups, parameters, orders, output, notes, .. } =
             ranks::agree(&*communicator, configuration)?;
         let settings = Settings {
             config,
             communicator: Arc::clone(&communicator),
-            solvers: None,
+            solvers: Arc::new(BuiltIn),
             parameters,
             orders,
             output,
@@ -71,7 +72,7 @@ impl Session {
     }
 
     /// Shows a step to the adaptor. Collective.
-    pub(crate) fn execute(&mut self, node: &Node<'_, '_>) -> Result<(), CatalystError> {
+    pub(crate) fn execute(&mut self, node: &Node<'_, '_>) -> Result<(), RunError> {
         let _alarm = Alarm::among(&self.communicator);
         let mut given = self.read(node);
         if let Stage::Waiting { settings, .. } = &mut self.stage {
@@ -84,8 +85,9 @@ impl Session {
             }
             settings.config = with_default_views(&settings.config, &names)?;
             let run = match Run::new((**settings).clone()) {
-                // Nobody asked for that very port. On several ranks all have the error of the one that could not have it.
-                Err(CatalystError::Initialize(
+                // Nobody asked for that very port. On several ranks all have the error of the one
+                // that could not have it.
+                Err(RunError::Initialize(
                     InitializeError::Stream(_) | InitializeError::Rank(_),
                 )) => {
                     if let Some(stream) = &mut settings.config.stream {
@@ -101,7 +103,7 @@ impl Session {
             given = self.read(node).map(|(_, channels)| (step, channels));
         }
         match &mut self.stage {
-            Stage::UnderWay(run) => run.execute(given).map(|_| ()),
+            Stage::UnderWay(run) => run.execute(given).map(|_| ()).map_err(at_path),
             Stage::Waiting { .. } => Ok(()),
         }
     }
@@ -109,7 +111,7 @@ impl Session {
     fn read<'call>(
         &mut self,
         node: &Node<'_, 'call>,
-    ) -> Result<(Step, Vec<Channel<'call>>), CatalystError> {
+    ) -> Result<(Step, Vec<Channel<'call>>), RunError> {
         let catalyst = node.need(c"catalyst", "an object with 'state' and 'channels'")?;
         let state = catalyst.need(c"state", "an object with 'timestep' (or 'cycle') and 'time'")?;
         let cycle = match state.child(c"timestep") {
@@ -118,15 +120,13 @@ impl Session {
         };
         let finite = |node: &Node<'_, '_>| match node.number()? {
             value if value.is_finite() => Ok(value),
-            value => Err(node.wrong_found(format!("{value}"), "a finite number".into())),
+            value => Err(node.wrong_found(format!("{value}"), "a finite number")),
         };
         let time = finite(&state.need(c"time", "the simulated time")?)?;
         let time_step = match state.child(c"time_step") {
             Some(length) => match finite(&length)? {
                 value if value >= 0.0 => value,
-                value => {
-                    return Err(length.wrong_found(format!("{value}"), "a number from 0 on".into()));
-                }
+                value => return Err(length.wrong_found(format!("{value}"), "a number from 0 on")),
             },
             None => self.under_way().map_or(0.0, |run| run.likely_time_step(time)),
         };
@@ -136,10 +136,9 @@ impl Session {
         let mut channels = Vec::new();
         if let Some(all) = catalyst.child(c"channels") {
             if !matches!(all.kind(), Kind::Object | Kind::Empty) {
-                return Err(all.wrong("an object of channels by their names".into()));
+                return Err(all.wrong("an object of channels by their names"));
             }
-            for (index, name) in all.names().iter().enumerate() {
-                let Some(channel) = all.at(index, name) else { continue };
+            all.each(|channel| {
                 if channel.name() == STEERING {
                     let expected =
                         format!("another name: the results bring a mesh called '{STEERING}'");
@@ -147,8 +146,9 @@ impl Session {
                         channel.wrong_found(format!("a channel called '{STEERING}'"), expected)
                     );
                 }
-                channels.push(Channel::read(&channel, looked_at)?);
-            }
+                channels.push(mesh::read(channel, looked_at)?);
+                Ok(())
+            })?;
         }
         Ok((step, channels))
     }
@@ -160,10 +160,12 @@ impl Session {
         }
     }
 
-    /// Lets the pipelines run that a list of names chooses; all where there is none, and none where it is anything else.
-    fn choose(&mut self, node: Option<&Node<'_, '_>>) -> Result<(), CatalystError> {
+    /// Lets the pipelines run that a list of names chooses; all where there is none, and none where
+    /// it is anything else.
+    fn choose(&mut self, node: Option<&Node<'_, '_>>) -> Result<(), RunError> {
         let Stage::UnderWay(run) = &mut self.stage else { return Ok(()) };
-        // The names are those of another implementation's scripts where the configuration does not come from the solver.
+        // The names are those of another implementation's scripts where the configuration does not
+        // come from the solver.
         let of_solver = |name: &str| {
             self.groups.iter().any(|(_, pipelines)| pipelines.iter().any(|known| known == name))
         };
@@ -173,8 +175,7 @@ impl Session {
         };
         let mut chosen: Vec<&str> = Vec::new();
         if matches!(node.kind(), Kind::Object | Kind::List) {
-            for (index, name) in node.names().iter().enumerate() {
-                let Some(child) = node.at(index, name) else { continue };
+            node.each(|child| {
                 let wanted = child.text()?;
                 let Some((_, pipelines)) = self.groups.iter().find(|(name, _)| *name == *wanted)
                 else {
@@ -186,7 +187,8 @@ impl Session {
                     return Err(child.wrong_found(format!("'{wanted}'"), expected));
                 };
                 chosen.extend(pipelines.iter().map(String::as_str));
-            }
+                Ok(())
+            })?;
         }
         run.choose(Some(&chosen), &of_solver);
         Ok(())
@@ -204,17 +206,30 @@ impl Session {
     }
 
     /// Ends the run. Collective.
-    pub(crate) fn finalize(self) -> Result<(), CatalystError> {
+    pub(crate) fn finalize(self) -> Result<(), RunError> {
         let Stage::UnderWay(run) = self.stage else { return Ok(()) };
         let (report, ended) = run.finalize();
-        let report = report.filter(|_| self.communicator.rank() == 0);
         let mut told = Ok(());
-        if let (Some(report), Some(file)) = (report, configuration::report_file()) {
+        if self.communicator.rank() == 0
+            && let Some(file) = configuration::report_file()
+        {
             let text = serde_json::to_string_pretty(&report).unwrap_or_default();
             told = std::fs::write(&file, text)
-                .map_err(|error| CatalystError::Configuration(format!("{file}: {error}")));
+                .map_err(|error| RunError::Configuration(format!("{file}: {error}")));
         }
         // No rank goes on before the files are there.
         ranks::agree(&*self.communicator, ended.and(told))
+    }
+}
+
+/// Names the path of what chooses the pipelines.
+fn at_path(error: RunError) -> RunError {
+    match error {
+        RunError::Choices => RunError::wrong(
+            "catalyst/state/pipelines",
+            "other names on other ranks",
+            "the same on all",
+        ),
+        error => error,
     }
 }

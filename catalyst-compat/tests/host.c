@@ -154,6 +154,13 @@ int main(int argc, char** argv)
   mesh = step(&node);
   array(mesh, "topologies/mesh/elements/connectivity", INT32, below, 4, 0, 0);
   expect("a vertex below 0", impl->execute(&node), 100);
+  const int16_t short_beyond[4] = { 0, 1, 2, 4 }, short_below[4] = { 0, 1, 2, -3 };
+  mesh = step(&node);
+  array(mesh, "topologies/mesh/elements/connectivity", INT16, short_beyond, 4, 0, 0);
+  expect("a vertex that does not exist, in cells that are copied", impl->execute(&node), 100);
+  mesh = step(&node);
+  array(mesh, "topologies/mesh/elements/connectivity", INT16, short_below, 4, 0, 0);
+  expect("a vertex below 0, in cells that are copied", impl->execute(&node), 100);
   mesh = step(&node);
   array(mesh, "fields/temperature/values", FLOAT64, temperature, 3, 0, 0);
   expect("a field that is too short", impl->execute(&node), 100);

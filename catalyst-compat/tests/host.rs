@@ -5,15 +5,12 @@ use std::process::{Command, Output};
 
 use tombolo::deform::mesh::CellType;
 use tombolo::pipelines::files::{MeshFile, read_mesh};
+use tombolo_tests::{library, output, succeed};
 
-/// The shared library that cargo built beside this test.
-fn library() -> PathBuf {
-    let mut path = std::env::current_exe().expect("a running test has a path");
-    path.set_file_name("libtombolo_catalyst.so");
-    path
-}
+const LIBRARY: &str = "libtombolo_catalyst.so";
 
-/// Compiles a program of this directory; with `exporting`, its Conduit functions can be found by the library.
+/// Compiles a program of this directory; with `exporting`, its Conduit functions can be found by
+/// the library.
 fn compile(directory: &Path, name: &str, exporting: bool) -> PathBuf {
     let program = directory.join(name);
     let source = format!("{}/tests/{name}.c", env!("CARGO_MANIFEST_DIR"));
@@ -24,8 +21,7 @@ fn compile(directory: &Path, name: &str, exporting: bool) -> PathBuf {
     if exporting {
         compiler.arg("-rdynamic");
     }
-    let output = compiler.args(["-ldl", "-lm"]).output().expect("cc is installed (scripts/setup)");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    succeed(compiler.args(["-ldl", "-lm"]));
     program
 }
 
@@ -34,12 +30,8 @@ fn run(program: &Path, script: Option<&Path>, environment: &[(&str, &str)]) -> (
     for name in ["PIPELINES", "ORDERS", "OUTPUT", "REPORT"] {
         command.env_remove(format!("TOMBOLO_{name}"));
     }
-    let output = command
-        .arg(library())
-        .args(script)
-        .envs(environment.iter().copied())
-        .output()
-        .expect("the host was just compiled");
+    let output =
+        output(command.arg(library(LIBRARY)).args(script).envs(environment.iter().copied()));
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     (output, errors)
 }
@@ -80,8 +72,10 @@ fn whatever_is_wrong_is_told_with_its_path() {
         "'catalyst/channels/grid/data/topologies/mesh/coordset': found the text 'points'; expected one of the coordsets coords",
         "'catalyst/channels/grid/data/topologies/mesh/elements/shape': found 'tetrahedron'",
         "/elements/connectivity': found 3 value(s) of type int32; expected a multiple of 4 values",
-        "/elements/connectivity': found 4 at entry 3; expected whole numbers from 0 to 3",
-        "/elements/connectivity': found -3 at entry 3; expected whole numbers from 0 to 3",
+        "channel 'grid': cell 0: vertex 4 does not exist; the mesh has 4 vertices, numbered from 0",
+        "channel 'grid': cell 0: vertex -3 does not exist; the mesh has 4 vertices, numbered from 0",
+        "/elements/connectivity': cell 0: vertex 4 does not exist; the mesh has 4 vertices, numbered from 0",
+        "/elements/connectivity': cell 0: vertex -3 does not exist; the mesh has 4 vertices, numbered from 0",
         "'catalyst/channels/grid/data/fields/temperature/values': found 3 values; expected 4, one for each vertex",
         "'catalyst/channels/grid/data/fields/temperature/association': found 'point'; expected 'vertex' or 'element'",
         "'catalyst/channels/grid/data/fields/temperature/values' is missing",
@@ -165,7 +159,7 @@ fn every_mesh_of_the_blueprint_arrives() {
     let program = compile(directory.path(), "meshes", true);
     let written = directory.path().join("out");
     let output = Command::new(&program)
-        .arg(library())
+        .arg(library(LIBRARY))
         .arg(&pipelines)
         .env("TOMBOLO_OUTPUT", &written)
         .env_remove("TOMBOLO_PIPELINES")
@@ -437,7 +431,11 @@ fn valgrind_finds_nothing() {
             "--leak-check=full",
             "--errors-for-leak-kinds=definite",
         ]);
-        command.arg(&program).arg(library()).arg(&pipelines).env("TOMBOLO_PIPELINES", &pipelines);
+        command
+            .arg(&program)
+            .arg(library(LIBRARY))
+            .arg(&pipelines)
+            .env("TOMBOLO_PIPELINES", &pipelines);
         let output = command
             .env("TOMBOLO_OUTPUT", directory.path())
             .output()

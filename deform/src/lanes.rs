@@ -1,6 +1,7 @@
 //! Four numbers side by side, which processors with wide registers compute at once.
 //!
-//! Every operation is that of its numbers one by one, so that the bits do not depend on the processor.
+//! Every operation is that of its numbers one by one, so that the bits do not depend on the
+//! processor.
 #![expect(
     clippy::needless_range_loop,
     reason = "loops over lanes and axes read like the formulas, and vectorise"
@@ -19,7 +20,7 @@ pub(crate) struct Lanes(pub(crate) [f64; LANES]);
 impl Lanes {
     pub(crate) const ZERO: Self = Self::all(0.0);
 
-    /// The same number four times.
+    /// One number four times.
     #[inline(always)]
     pub(crate) const fn all(value: f64) -> Self {
         Self([value; LANES])
@@ -56,10 +57,35 @@ impl Lanes {
         self.zip(other, |a, b| if b < a { b } else { a })
     }
 
+    /// The larger ones; that of `self` where one is no number.
+    #[inline(always)]
+    pub(crate) fn greatest(self, other: Self) -> Self {
+        self.zip(other, |a, b| if b > a { b } else { a })
+    }
+
+    /// Without their signs.
+    #[inline(always)]
+    pub(crate) fn magnitude(self) -> Self {
+        self.zip(self, |value, _| value.abs())
+    }
+
+    /// Its numbers where those of `test` are not below `bound`, 0 elsewhere.
+    #[inline(always)]
+    pub(crate) fn unless_below(self, test: Self, bound: f64) -> Self {
+        self.zip(test, |value, test| if test < bound { 0.0 } else { value })
+    }
+
     #[inline(always)]
     pub(crate) fn sum(self) -> f64 {
         let [a, b, c, d] = self.0;
         (a + b) + (c + d)
+    }
+
+    /// The smallest.
+    #[inline(always)]
+    pub(crate) fn min(self) -> f64 {
+        let [a, b, c, d] = self.0;
+        a.min(b).min(c.min(d))
     }
 
     #[inline(always)]
@@ -107,7 +133,8 @@ operator!(Sub sub SubAssign sub_assign -);
 operator!(Mul mul MulAssign mul_assign *);
 operator!(Div div /);
 
-/// Calls `work`, compiled for the widest registers that this processor has. What is to use them must be inlined into it.
+/// Calls `work`, compiled for the widest registers that this processor has. What is to use them
+/// must be inlined into it.
 #[inline(always)]
 pub(crate) fn with_wide_registers<R>(work: impl FnOnce() -> R) -> R {
     #[cfg(target_arch = "x86_64")]

@@ -1,7 +1,7 @@
 //! Limits on what comes from outside: the same for files, programs and the network.
 //!
-//! They lie far beyond what is meant and below what a machine can hold. Whatever is beyond one is refused with an [`Exceeded`],
-//! which says what was found and what the limit is.
+//! They lie far beyond what is meant and below what a machine can hold. Whatever is beyond one is
+//! refused with an [`Exceeded`], which says what was found and what the limit is.
 //!
 //! ```
 //! use tombolo_deform::limits;
@@ -13,7 +13,7 @@
 /// How much there may be of something.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limit {
-    /// What is counted, in the plural.
+    /// The things counted, in the plural.
     pub what: &'static str,
     /// The most that is allowed.
     pub most: usize,
@@ -90,8 +90,13 @@ pub const WAITING_BYTES: Limit = limit(
     "a file of orders; the commands of viewers that the solver has not come to",
 );
 
+/// Surfaces that cut a mesh at once.
+pub const CUTS: Limit = limit("surfaces", 256, "the planes of a slice, or the values of a contour");
+/// Points of a probe.
+pub const PROBES: Limit = limit("points", 1 << 20, "a probe");
+
 /// All of them.
-pub const ALL: [Limit; 13] = [
+pub const ALL: [Limit; 15] = [
     DOCUMENT,
     VALUES,
     DEPTH,
@@ -105,4 +110,6 @@ pub const ALL: [Limit; 13] = [
     ORDERS,
     WAITING,
     WAITING_BYTES,
+    CUTS,
+    PROBES,
 ];

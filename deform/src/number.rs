@@ -1,11 +1,10 @@
-//! Numbers in messages.
+//! Numbers in messages, and counts as numbers of other types.
 
+use std::cmp::Ordering;
 use std::fmt;
 
-use crate::mesh::Vector;
-
-/// A number as a message shows it: the shortest that reads back as the same, with an exponent where it is far from 1. A precision
-/// is the most digits that it is given.
+/// A number as a message shows it: the shortest that reads back as the same, with an exponent where
+/// it is far from 1. A precision is the most digits that it is given.
 ///
 /// ```
 /// use tombolo_deform::number::Number;
@@ -33,21 +32,43 @@ impl fmt::Display for Number {
     }
 }
 
-/// A position as a message shows it, to seven digits.
-///
-/// ```
-/// use tombolo_deform::number::Position;
-///
-/// assert_eq!(Position([0.1, -1.0 / 3.0, 1e-9]).to_string(), "(0.1, -0.3333333, 1e-9)");
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Position(pub Vector);
+/// A number in the total order of `f64`: what heaps and sorts need.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ordered(pub f64);
 
-impl fmt::Display for Position {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [x, y, z] = self.0.map(Number);
-        write!(formatter, "({x:.7}, {y:.7}, {z:.7})")
+impl Ord for Ordered {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.0.total_cmp(&other.0)
     }
+}
+
+impl PartialOrd for Ordered {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Ordered {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Ordered {}
+
+/// A count as a real number: exact below 2^53, which is more than memory holds of anything.
+#[inline]
+#[must_use]
+pub fn real(count: usize) -> f64 {
+    count as f64
+}
+
+/// A number of a vertex, row or cell in 32 bits: meshes with more of them are refused before.
+#[inline]
+#[must_use]
+pub(crate) fn index(number: usize) -> u32 {
+    debug_assert!(u32::try_from(number).is_ok(), "{number} is beyond 32 bits");
+    number as u32
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
-//! Loops that use threads where the feature `parallel` is on, and give the same bits where it is off.
+//! Loops that use threads where the feature `parallel` is on, and give the same bits where it is
+//! off.
 //!
-//! Work is cut into chunks whose size depends on the problem alone, and partial results are combined in the order of the
-//! chunks. So no result depends on how many threads there are.
+//! Work is cut into chunks whose size depends on the problem alone, and partial results are
+//! combined in the order of the chunks. So no result depends on how many threads there are.
 
 #[cfg(feature = "parallel")]
 use rayon::prelude::*;

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use crate::limits::{Exceeded, SHAPES};
 use crate::number::Number;
 
-/// How a change of shape is spread over the run: in `steps` shapes, one `every` so many cycles or so much simulated time, at equal
-/// distances or eased.
+/// How a change of shape is spread over the run: in `steps` shapes, one `every` so many cycles or
+/// so much simulated time, at equal distances or eased.
 ///
 /// # Example
 /// ```
@@ -23,7 +23,8 @@ use crate::number::Number;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Schedule {
-    /// How many shapes lie between the present one (not counted) and the new one (counted). At least 1.
+    /// How many shapes lie between the present one (not counted) and the new one (counted). At
+    /// least 1.
     #[schemars(range(max = SHAPES.most))]
     pub steps: NonZeroU32,
     /// The distance between one shape and the next: solver steps, or simulated time.
@@ -39,8 +40,8 @@ pub enum Ease {
     /// At equal distances: the mesh sets off and stops at full speed.
     #[default]
     Linear,
-    /// Closer together at both ends (the smooth step `3 s² - 2 s³`): the mesh sets off and stops gently, and is 1.5 times as
-    /// fast in the middle.
+    /// Closer together at both ends (the smooth step `3 s² - 2 s³`): the mesh sets off and stops
+    /// gently, and is 1.5 times as fast in the middle.
     Smooth,
 }
 
@@ -103,8 +104,8 @@ impl Default for Schedule {
 }
 
 impl Schedule {
-    /// How far along the way from the present shape to the new one each shape lies: `k / steps` for `k` in `1..=steps`, eased,
-    /// the last exactly 1.
+    /// How far along the way from the present shape to the new one each shape lies: `k / steps` for
+    /// `k` in `1..=steps`, eased, the last exactly 1.
     #[must_use]
     pub fn fractions(&self) -> Vec<f64> {
         (1..=self.steps.get()).map(|step| self.fraction(step)).collect()
@@ -118,7 +119,8 @@ impl Schedule {
         SHAPES.check(usize::try_from(self.steps.get()).unwrap_or(usize::MAX))
     }
 
-    /// How far along the way shape `step` lies (from 1; 0 is the present shape, and beyond the last is the last).
+    /// How far along the way shape `step` lies (from 1; 0 is the present shape, and beyond the last
+    /// is the last).
     #[must_use]
     pub fn fraction(&self, step: u32) -> f64 {
         let even = f64::from(step.min(self.steps.get())) / f64::from(self.steps.get());
@@ -128,9 +130,10 @@ impl Schedule {
         }
     }
 
-    /// Whether the next shape is due when `shapes_taken` have been taken, and `cycles` and `time` have gone by since the first
-    /// could be taken. The first is due at once; nothing is due after the last. Time is compared with a slack of one part in
-    /// 10⁹ of the interval, so that adding up time steps does not make a shape a step late.
+    /// Whether the next shape is due when `shapes_taken` have been taken, and `cycles` and `time`
+    /// have gone by since the first could be taken. The first is due at once; nothing is due after
+    /// the last. Time is compared with a slack of one part in 10⁹ of the interval, so that adding
+    /// up time steps does not make a shape a step late.
     #[must_use]
     pub fn is_due(&self, shapes_taken: u32, cycles: u64, time: f64) -> bool {
         if shapes_taken >= self.steps.get() {

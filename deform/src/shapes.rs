@@ -1,7 +1,7 @@
 //! Small meshes with known geometry, for tests, examples and benchmarks.
 //!
-//! Every mesh here is structured, so that its counts, volumes and normals have closed forms, and its vertices are numbered in
-//! a stated order.
+//! Every mesh here is structured, so that its counts, volumes and normals have closed forms, and
+//! its vertices are numbered in a stated order.
 //!
 //! ```
 //! use tombolo_deform::shapes;
@@ -11,8 +11,8 @@
 //! ```
 //!
 //! # Panics
-//! The functions of this module panic for coordinates that are not finite and for more than `u32::MAX` vertices: their
-//! arguments are written by a programmer, never read from a user.
+//! The functions of this module panic for coordinates that are not finite and for more than
+//! `u32::MAX` vertices: their arguments are written by a programmer, never read from a user.
 
 use crate::mesh::{CellType, Cells, FeatureSource, Mesh, MeshError, TaggedFaces, Vector};
 use crate::vector::{add, cross, dot, scale, subtract};
@@ -20,10 +20,12 @@ use crate::vector::{add, cross, dot, scale, subtract};
 /// The features of a box, in the order of their tags 1 to 6.
 pub const BOX_FEATURES: [&str; 6] = ["x-min", "x-max", "y-min", "y-max", "z-min", "z-max"];
 
-/// A box of `counts` cubes in x, y and z, each split into six tetrahedra (Kuhn 1960) along its main diagonal.
+/// A box of `counts` cubes in x, y and z, each split into six tetrahedra (Kuhn 1960) along its main
+/// diagonal.
 ///
-/// Vertex `i + (counts[0] + 1) * (j + (counts[1] + 1) * k)` lies at `lower + (upper - lower) * [i, j, k] / counts`. The
-/// boundary triangles carry the features [`BOX_FEATURES`]. A count of 0 is taken as 1.
+/// Vertex `i + (counts[0] + 1) * (j + (counts[1] + 1) * k)` lies at `lower + (upper - lower) * [i,
+/// j, k] / counts`. The boundary triangles carry the features [`BOX_FEATURES`]. A count of 0 is
+/// taken as 1.
 #[must_use]
 pub fn box_of_tets(counts: [usize; 3], lower: Vector, upper: Vector) -> Mesh {
     let grid = Grid::new(counts);
@@ -48,7 +50,8 @@ pub fn box_of_tets(counts: [usize; 3], lower: Vector, upper: Vector) -> Mesh {
     let mut faces = Cells::new();
     let mut tags = Vec::new();
     grid.for_each_boundary_quad(|tag, [a, b, c, d]| {
-        // Corner a is the lowest and c the highest of the square, so that a-c is the diagonal the tetrahedra have.
+        // Corner a is the lowest and c the highest of the square, so that a-c is the diagonal the
+        // tetrahedra have.
         for triangle in [[a, b, c], [a, c, d]] {
             valid(faces.push(CellType::Triangle, &triangle));
             tags.push(tag);
@@ -58,7 +61,8 @@ pub fn box_of_tets(counts: [usize; 3], lower: Vector, upper: Vector) -> Mesh {
     valid(Mesh::new(grid.points(lower, upper), cells, box_features(faces, tags)))
 }
 
-/// A box of hexahedra, its vertices and features as those of [`box_of_tets`]; its boundary faces are quadrilaterals.
+/// A box of hexahedra, its vertices and features as those of [`box_of_tets`]; its boundary faces
+/// are quadrilaterals.
 #[must_use]
 pub fn box_of_hexahedra(counts: [usize; 3], lower: Vector, upper: Vector) -> Mesh {
     let grid = Grid::new(counts);
@@ -74,11 +78,13 @@ pub fn box_of_hexahedra(counts: [usize; 3], lower: Vector, upper: Vector) -> Mes
     valid(Mesh::new(grid.points(lower, upper), cells, box_features(faces, tags)))
 }
 
-/// A box of hexahedra, wedges, pyramids and tetrahedra, its first vertices and its features as those of [`box_of_tets`].
+/// A box of hexahedra, wedges, pyramids and tetrahedra, its first vertices and its features as
+/// those of [`box_of_tets`].
 ///
-/// The kind of a column of cubes along z repeats every three steps, by `(i + 2 j) mod 3`: hexahedra; six pyramids in each cube;
-/// two wedges in each cube of an even layer, four pyramids and four tetrahedra in each of an odd one. The cubes cut to pyramids
-/// have a vertex of their own in the middle; these are the last vertices. So there is every kind from 3 by 1 by 2 cubes on.
+/// The kind of a column of cubes along z repeats every three steps, by `(i + 2 j) mod 3`:
+/// hexahedra; six pyramids in each cube; two wedges in each cube of an even layer, four pyramids
+/// and four tetrahedra in each of an odd one. The cubes cut to pyramids have a vertex of their own
+/// in the middle; these are the last vertices. So there is every kind from 3 by 1 by 2 cubes on.
 #[must_use]
 pub fn box_of_mixed_cells(counts: [usize; 3], lower: Vector, upper: Vector) -> Mesh {
     // The squares of a cube, their normals inward: at z-min, z-max, and around.
@@ -136,12 +142,14 @@ pub fn box_of_mixed_cells(counts: [usize; 3], lower: Vector, upper: Vector) -> M
     valid(Mesh::new(points, cells, box_features(faces, tags)))
 }
 
-/// A closed torus of triangles about the z axis: a mesh of dimension 2, its triangles counter-clockwise seen from outside.
+/// A closed torus of triangles about the z axis: a mesh of dimension 2, its triangles
+/// counter-clockwise seen from outside.
 ///
-/// `counts` vertices lie around the axis and around the tube (at least 3 of each). Vertex `j + counts[1] * i` lies at the angle
-/// `u = 2 pi i / counts[0]` about the axis and `v = 2 pi j / counts[1]` about the tube:
-/// `((major + minor cos v) cos u, (major + minor cos v) sin u, minor sin v)`. Features are given by vertices, as in a VTK array:
-/// the torus is cut into four quarters `feature-0` to `feature-3` by `u`.
+/// `counts` vertices lie around the axis and around the tube (at least 3 of each). Vertex `j +
+/// counts[1] * i` lies at the angle `u = 2 pi i / counts[0]` about the axis and `v = 2 pi j /
+/// counts[1]` about the tube: `((major + minor cos v) cos u, (major + minor cos v) sin u, minor sin
+/// v)`. Features are given by vertices, as in a VTK array: the torus is cut into four quarters
+/// `feature-0` to `feature-3` by `u`.
 #[must_use]
 pub fn torus(major: f64, minor: f64, counts: [usize; 2]) -> Mesh {
     let [around, about] = counts.map(|count| count.max(3));
@@ -169,12 +177,12 @@ pub fn torus(major: f64, minor: f64, counts: [usize; 2]) -> Mesh {
     valid(Mesh::new(points, cells, FeatureSource::Vertices(tags)))
 }
 
-/// An open tube of triangles around a polyline of at least 2 points: a mesh of dimension 2, its triangles counter-clockwise seen
-/// from outside.
+/// An open tube of triangles around a polyline of at least 2 points: a mesh of dimension 2, its
+/// triangles counter-clockwise seen from outside.
 ///
-/// `around` vertices (at least 3) lie on a circle of the radius about each point, in the plane normal to the polyline there; vertex
-/// `j + around * i` is the `j`-th about point `i`. The circles are not turned against each other along the way. Its features are
-/// to be found at sharp edges.
+/// `around` vertices (at least 3) lie on a circle of the radius about each point, in the plane
+/// normal to the polyline there; vertex `j + around * i` is the `j`-th about point `i`. The circles
+/// are not turned against each other along the way. Its features are to be found at sharp edges.
 #[must_use]
 pub fn tube(axis: &[Vector], radius: f64, around: usize) -> Mesh {
     let around = around.max(3);
@@ -211,8 +219,9 @@ pub fn tube(axis: &[Vector], radius: f64, around: usize) -> Mesh {
 
 /// A flat plate of triangles in the plane z = 0, normal along +z: an open mesh of dimension 2.
 ///
-/// Vertex `i + (counts[0] + 1) * j` lies at `lower + (upper - lower) * [i, j] / counts`; every square is split along its rising
-/// diagonal. A count of 0 is taken as 1. Its features are to be found at sharp edges, of which it has none.
+/// Vertex `i + (counts[0] + 1) * j` lies at `lower + (upper - lower) * [i, j] / counts`; every
+/// square is split along its rising diagonal. A count of 0 is taken as 1. Its features are to be
+/// found at sharp edges, of which it has none.
 #[must_use]
 pub fn plate(counts: [usize; 2], lower: [f64; 2], upper: [f64; 2]) -> Mesh {
     let [columns, rows] = counts.map(|count| count.max(1));
@@ -239,8 +248,9 @@ pub fn plate(counts: [usize; 2], lower: [f64; 2], upper: [f64; 2]) -> Mesh {
     valid(Mesh::new(points, cells, FeatureSource::SharpEdges))
 }
 
-/// One cell of a type, right-handed and of unit size: each kind of cell spans a unit square or cube (prisms of more sides: a
-/// unit circle by a unit height), and a polyhedron is a cube given by its faces.
+/// One cell of a type, right-handed and of unit size: each kind of cell spans a unit square or cube
+/// (prisms of more sides: a unit circle by a unit height), and a polyhedron is a cube given by its
+/// faces.
 #[must_use]
 pub fn single_cell(cell_type: CellType) -> Mesh {
     let mut cells = Cells::new();
@@ -335,7 +345,8 @@ impl Grid {
         points
     }
 
-    /// Calls `visit` with each cell's corners: bit 0 of a corner's number stands for x, bit 1 for y, bit 2 for z.
+    /// Calls `visit` with each cell's corners: bit 0 of a corner's number stands for x, bit 1 for
+    /// y, bit 2 for z.
     fn for_each_cell(&self, mut visit: impl FnMut(&dyn Fn(usize) -> u32)) {
         for k in 0..self.counts[2] {
             for j in 0..self.counts[1] {
@@ -352,8 +363,8 @@ impl Grid {
         }
     }
 
-    /// Calls `visit` with the tag and the vertices of each boundary square, counter-clockwise seen from outside, from its
-    /// lowest corner.
+    /// Calls `visit` with the tag and the vertices of each boundary square, counter-clockwise seen
+    /// from outside, from its lowest corner.
     fn for_each_boundary_quad(&self, mut visit: impl FnMut(i64, [u32; 4])) {
         for axis in 0..3 {
             let [first, second] = [(axis + 1) % 3, (axis + 2) % 3];
@@ -361,11 +372,11 @@ impl Grid {
                 for q in 0..self.counts[second] {
                     for p in 0..self.counts[first] {
                         let at = |dp: usize, dq: usize| {
-                            let mut place = [0; 3];
-                            place[axis] = side;
-                            place[first] = p + dp;
-                            place[second] = q + dq;
-                            self.vertex(place)
+                            let mut corner = [0; 3];
+                            corner[axis] = side;
+                            corner[first] = p + dp;
+                            corner[second] = q + dq;
+                            self.vertex(corner)
                         };
                         let quad = if side == 0 {
                             [at(0, 0), at(0, 1), at(1, 1), at(1, 0)]
@@ -396,7 +407,8 @@ fn valid<T>(built: Result<T, MeshError>) -> T {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::{FeatureSettings, Surface};
+    use crate::features::FeatureSettings;
+    use crate::surface::Surface;
 
     /// Six times the volume enclosed by the faces of a cell, by the divergence theorem.
     fn six_volumes(mesh: &Mesh, cell: usize) -> f64 {

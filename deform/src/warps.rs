@@ -1,8 +1,10 @@
-//! Motions of a mesh's boundary that no straight way of the inside can follow, for tests and benchmarks.
+//! Motions of a mesh's boundary that no straight way of the inside can follow, for tests and
+//! benchmarks.
 //!
-//! Each takes a mesh about the box from `[0, 0, 0]` to `[1, 1, height]`, such as those of [`shapes`](crate::shapes), and says where
-//! its boundary vertices lie at a fraction of the way. A valid mesh at the end is known for all but [`Warp::Shake`] and [`Warp::Wobble`]: the
-//! map is one of space, which is one-to-one on the box.
+//! Each takes a mesh about the box from `[0, 0, 0]` to `[1, 1, height]`, such as those of
+//! [`shapes`](crate::shapes), and says where its boundary vertices lie at a fraction of the way. A
+//! valid mesh at the end is known for all but [`Warp::Shake`] and [`Warp::Wobble`]: the map is one
+//! of space, which is one-to-one on the box.
 
 use crate::mesh::Vector;
 use crate::vector::{add, cross, dot, scale, subtract};
@@ -15,7 +17,8 @@ pub enum Warp {
         /// The turn of the top.
         degrees: f64,
     },
-    /// The box bent about an axis along y, so that its top has turned by this many degrees: 300 make of a column an open ring.
+    /// The box bent about an axis along y, so that its top has turned by this many degrees: 300
+    /// make of a column an open ring.
     Bend {
         /// The turn of the top.
         degrees: f64,
@@ -25,8 +28,8 @@ pub enum Warp {
         /// The factor; below 1 a waist.
         factor: f64,
     },
-    /// The box laid along an open trefoil knot, as thick as it is: a column of a height of 24 or more. Its boundary goes there in a
-    /// straight line, on which it cannot be followed.
+    /// The box laid along an open trefoil knot, as thick as it is: a column of a height of 24 or
+    /// more. Its boundary goes there in a straight line, on which it cannot be followed.
     Knot,
     /// Each boundary vertex displaced at random, by at most this much in each direction.
     Shake {
@@ -45,9 +48,10 @@ pub enum Warp {
 }
 
 impl Warp {
-    /// Where a point of the reference lies at a `fraction` of the way; `height` is that of the box, `number` tells points apart.
+    /// Where a point of the reference lies at a `fraction` of the way; `height` is that of the box,
+    /// `number` tells points apart.
     #[must_use]
-    pub fn place(self, point: Vector, number: u32, height: f64, fraction: f64) -> Vector {
+    pub fn position(self, point: Vector, number: u32, height: f64, fraction: f64) -> Vector {
         let [x, y, z] = [point[0] - 0.5, point[1] - 0.5, point[2]];
         match self {
             Self::Twist { degrees } => {
@@ -78,26 +82,26 @@ impl Warp {
                 [point[0] + axis(0), point[1] + axis(1), point[2] + axis(2)]
             }
             Self::Wobble { amount, seed } => {
-                let mut place = point;
+                let mut moved = point;
                 for wave in 0..4 {
                     let number = |which: u64| random(seed, 16 * wave + which);
                     let direction = [4.0 * number(0), 4.0 * number(1), 4.0 * number(2)];
                     let phase = dot(direction, point) + 3.0 * number(3);
                     let high = [amount * number(4), amount * number(5), amount * number(6)];
-                    place = add(place, scale(high, fraction * phase.sin()));
+                    moved = add(moved, scale(high, fraction * phase.sin()));
                 }
-                place
+                moved
             }
         }
     }
 
     /// Where the vertices `boundary` of a mesh with these points lie at a `fraction` of the way.
     #[must_use]
-    pub fn places(self, points: &[Vector], boundary: &[u32], fraction: f64) -> Vec<Vector> {
+    pub fn positions(self, points: &[Vector], boundary: &[u32], fraction: f64) -> Vec<Vector> {
         let height = points.iter().map(|point| point[2]).fold(0.0, f64::max);
         boundary
             .iter()
-            .map(|&vertex| self.place(points[vertex as usize], vertex, height, fraction))
+            .map(|&vertex| self.position(points[vertex as usize], vertex, height, fraction))
             .collect()
     }
 }
@@ -110,7 +114,6 @@ fn random(seed: u64, number: u64) -> f64 {
         .wrapping_add(number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     value = (value ^ (value >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     value = (value ^ (value >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    #[expect(clippy::cast_precision_loss, reason = "53 bits")]
     let unit = ((value ^ (value >> 31)) >> 11) as f64 / (1u64 << 53) as f64;
     2.0 * unit - 1.0
 }

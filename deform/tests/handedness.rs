@@ -2,10 +2,11 @@
 
 use proptest::prelude::*;
 use tombolo_deform::{
+    features::FeatureSettings,
     mesh::{CellType, Cells, FeatureSource, Mesh, MeshError, Vector},
     quality::{Guard, judge, quality, volumes},
     shapes,
-    surface::{FeatureSettings, Surface},
+    surface::Surface,
     volume::{Deform, VolumeError, VolumeOperator},
 };
 
@@ -187,11 +188,88 @@ fn orders_of_other_programs_are_recognised() {
     assert!(error.contains("hexahedron: give the cells that type"), "{error}");
 }
 
+/// Quadrilaterals on a paraboloid, or in the plane.
+fn quadrilaterals(bend: f64, cell_type: CellType) -> Mesh {
+    let number = |i: u32, j: u32| 5 * j + i;
+    let point = |vertex: u32| {
+        let (x, y) = (f64::from(vertex % 5), f64::from(vertex / 5));
+        [x + 0.2 * y, y, bend * (x * x - y * y)]
+    };
+    let quad = |cell: u32| {
+        let (i, j) = (cell % 4, cell / 4);
+        [number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)]
+    };
+    let cells = Cells::uniform(CellType::Quad, (0..12).flat_map(quad).collect()).unwrap();
+    let mesh = Mesh::new((0..20).map(point).collect(), cells, FeatureSource::SharpEdges).unwrap();
+    if cell_type == CellType::Quad {
+        return mesh;
+    }
+    let cells = reordered(&mesh, CellType::Quad, &[0, 1, 3, 2]);
+    let cells = Cells::uniform(cell_type, cells.connectivity().to_vec()).unwrap();
+    Mesh::new(mesh.points().to_vec(), cells, FeatureSource::SharpEdges).unwrap()
+}
+
+#[test]
+fn quadrilaterals_in_other_orders_are_recognised() {
+    for bend in [0.0, 0.3] {
+        for cell_type in [CellType::Quad, CellType::Pixel] {
+            let mesh = quadrilaterals(bend, cell_type);
+            let told = |order: &[usize]| {
+                let cells = reordered(&mesh, cell_type, order);
+                Mesh::new(mesh.points().to_vec(), cells, FeatureSource::SharpEdges).map(drop)
+            };
+            // The same quadrilateral from another corner, and the other way round, which surfaces
+            // may be.
+            let as_quad: [usize; 4] =
+                if cell_type == CellType::Quad { [0, 1, 2, 3] } else { [0, 1, 3, 2] };
+            for local in [[1, 2, 3, 0], [3, 2, 1, 0], [0, 3, 2, 1]] {
+                let around = local.map(|corner| as_quad[corner]);
+                let order = if cell_type == CellType::Quad {
+                    around
+                } else {
+                    [0, 1, 3, 2].map(|corner| around[corner])
+                };
+                assert_eq!(told(&order), Ok(()), "{cell_type} {order:?}");
+            }
+            for crossed in [[0, 1, 3, 2], [0, 2, 1, 3], [2, 0, 3, 1]] {
+                let around = crossed.map(|corner| as_quad[corner]);
+                let order = if cell_type == CellType::Quad {
+                    around
+                } else {
+                    [0, 1, 3, 2].map(|corner| around[corner])
+                };
+                let Err(MeshError::OtherOrder(other)) = told(&order) else {
+                    panic!("{cell_type} {order:?}")
+                };
+                let right: Vec<usize> = other.order.iter().map(|&local| order[local]).collect();
+                assert_eq!(told(&right), Ok(()), "{cell_type} {order:?}: {other}");
+            }
+            let Err(error) = told(&[0, 1, 3, 2]) else {
+                panic!("{cell_type} with its last vertices swapped")
+            };
+            let (who, text) =
+                (if cell_type == CellType::Quad { "deal.II" } else { "quad" }, error.to_string());
+            assert!(text.contains("VTK's order is") && text.contains(who), "{text}");
+        }
+    }
+}
+
+/// The corners of such cells are sound, and they have no middle.
+#[test]
+fn cells_whose_top_is_turned_by_half_a_turn_are_recognised() {
+    let mesh = shapes::box_of_hexahedra([3, 2, 2], [0.0; 3], [1.0; 3]);
+    for order in [[0, 1, 2, 3, 6, 7, 4, 5], [3, 2, 1, 0, 5, 4, 7, 6]] {
+        let cells = reordered(&mesh, CellType::Hexahedron, &order);
+        let error = Mesh::new(mesh.points().to_vec(), cells, FeatureSource::SharpEdges);
+        assert!(matches!(error, Err(MeshError::OtherOrder(_))), "{error:?}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Whatever order all cells of a type are in: the mesh is sound, as it is or turned, or the error names an order that makes it
-    /// so.
+    /// Whatever order all cells of a type are in: the mesh is sound, as it is or turned, or the
+    /// error names an order that makes it so.
     #[test]
     fn what_is_said_of_an_order_is_true(
         order in Just((0..8).collect::<Vec<usize>>()).prop_shuffle(),

@@ -2,10 +2,11 @@
 
 use proptest::prelude::*;
 
+use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, Vector};
 use tombolo_deform::shapes;
 use tombolo_deform::skeleton::{Skeleton, SkeletonError, SkeletonSettings};
-use tombolo_deform::surface::{FeatureSettings, Surface};
+use tombolo_deform::surface::Surface;
 
 fn surface_of(points: Vec<Vector>, triangles: &[[u32; 3]]) -> Surface {
     let cells = Cells::uniform(CellType::Triangle, triangles.concat()).unwrap();
@@ -32,7 +33,8 @@ fn counts(skeleton: &Skeleton) -> [usize; 4] {
     ]
 }
 
-/// A tube about the z axis without its ends: `rings` rings of `about` vertices from z = 0 to `height`.
+/// A tube about the z axis without its ends: `rings` rings of `about` vertices from z = 0 to
+/// `height`.
 fn open_tube(radius: f64, height: f64, [rings, about]: [u32; 2]) -> (Vec<Vector>, Vec<[u32; 3]>) {
     let mut points = Vec::new();
     let mut triangles = Vec::new();

@@ -19,10 +19,10 @@ mod random;
 
 use std::sync::Arc;
 
+use tombolo_deform::edit::{Edit, Editor, HarmonicOrder, ScaleDirection, ScaleNormals, Translate};
+use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::mesh::{FeatureSource, Mesh, Vector};
-use tombolo_deform::surface::{
-    Edit, Editor, FeatureSettings, HarmonicOrder, ScaleDirection, ScaleNormals, Surface, Translate,
-};
+use tombolo_deform::surface::Surface;
 
 const ORDERS: [HarmonicOrder; 3] =
     [HarmonicOrder::Harmonic, HarmonicOrder::Biharmonic, HarmonicOrder::Triharmonic];

@@ -1,15 +1,19 @@
-//! What a drag of the skeleton does, as JSON for `scripts/pictures`: the surface and its skeleton before and after.
+//! What a drag of the skeleton does, as JSON for `scripts/pictures`: the surface and its skeleton
+//! before and after.
 //!
-//! cargo run -p tombolo-pipelines --example skeleton_picture -- meshes/bypass-0.msh examples/flow/orders/bypass-angle.json
+//! cargo run -p tombolo-pipelines --example skeleton_picture -- meshes/bypass-0.msh
+//! examples/flow/orders/bypass-angle.json
 
 use std::error::Error;
 use std::path::Path;
 use std::sync::Arc;
 
 use serde_json::json;
+use tombolo_deform::edit::{Edit, Editor};
+use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::mesh::Vector;
 use tombolo_deform::skeleton::SkeletonDrag;
-use tombolo_deform::surface::{Edit, Editor, FeatureSettings, Surface};
+use tombolo_deform::surface::Surface;
 use tombolo_pipelines::files::read_mesh;
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 use tombolo_pipelines::language::{
-    At, Change, Command, Config, Due, Order, Stage, config_schema, order_schema, parse, parse_json,
-    parse_orders, parse_valid, text,
+    At, Change, Command, Config, Due, Order, Slice, Stage, config_schema, order_schema, parse,
+    parse_json, parse_orders, parse_valid, text,
 };
 
 const DESIGN: &str = include_str!("design.json");
@@ -15,7 +15,7 @@ fn the_example_of_the_design_is_read_and_written_back() {
     assert_eq!(config.pipelines[2].due, Due::OnOrder);
     assert_eq!(config.pipelines[3].due, Due::At(At::Time(0.1)));
     assert!(
-        matches!(config.pipelines[0].stages[0], Stage::Slice(slice) if slice.normal == [1.0, 0.0, 0.0])
+        matches!(&config.pipelines[0].stages[0], Stage::Slice(Slice::Plane(plane)) if plane.normal == [1.0, 0.0, 0.0])
     );
     let again = parse(&serde_json::to_string_pretty(&config).unwrap(), "again.json").unwrap();
     assert_eq!(config, again);
@@ -27,7 +27,7 @@ type Case = (&'static str, usize, usize, &'static str, &'static str, Option<&'st
 #[test]
 fn errors_point_at_the_token() {
     #[rustfmt::skip]
-    let cases: [Case; 42] = [
+    let cases: [Case; 45] = [
         ("", 1, 1, "", "found the end of the text, expected a value", None),
         ("{\"version\": 1,\n}", 2, 1, "", "expected a key in double quotes", None),
         (r#"{"version": 1} x"#, 1, 16, "", "after the end of the value", None),
@@ -36,6 +36,9 @@ fn errors_point_at_the_token() {
         (r#"{"version": NaN}"#, 1, 13, "version", "expected a finite number", None),
         (r#"{'version': 1}"#, 1, 2, "", "double quotes", None),
         (r#"{"version": 01}"#, 1, 13, "version", "starts with 0", None),
+        (r#"{"version": 1.}"#, 1, 15, "version", "found '}', expected a digit", None),
+        (r#"{"version": -.5}"#, 1, 14, "version", "found '.', expected a digit", None),
+        (r#"{"version": -Infinity}"#, 1, 14, "version", "an infinity, expected a finite number", None),
         (r#"{"version": "x}"#, 1, 13, "version", "does not end", None),
         (r#"{"version": 2}"#, 1, 13, "version", "found version 2, expected 1", None),
         (r#"{"version": "1"}"#, 1, 13, "version", "found \"1\", expected a whole number from 0 to 4294967295", None),
@@ -84,6 +87,72 @@ fn errors_point_at_the_token() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn extracts_are_checked_at_the_token() {
+    #[rustfmt::skip]
+    let cases = [
+        (r#"{"slice": {"normal": [1,0,0]}}"#, "", "the key `origin` is missing", None),
+        (r#"{"slice": {}}"#, "", "found nothing that cuts, expected `origin` with `normal`, `planes`", None),
+        (r#"{"slice": {"plains": []}}"#, ".plains", "unknown key `plains`", Some("planes")),
+        (r#"{"slice": {"planes": []}}"#, ".planes", "at least one plane", None),
+        (r#"{"slice": {"planes": [{"origin": [0,0,0], "normal": [0,0,0]}]}}"#, ".planes[0].normal", "length is not 0", None),
+        (r#"{"slice": {"sphere": {"center": [0,0,0], "radius": -1}}}"#, ".sphere.radius", "found -1, expected a number above 0", None),
+        (r#"{"slice": {"sphere": {"centre": [0,0,0], "radius": 1}}}"#, ".sphere.centre", "unknown key", Some("center")),
+        (r#"{"slice": {"origin": [0,0,0], "normal": [0,0,1], "sphere": {"center": [0,0,0], "radius": 1}}}"#, "", "found more than one of `origin`", None),
+        (r#"{"slice": {"cylinder": {"origin": [0,0,0], "axis": [0,0,0], "radius": 1}}}"#, ".cylinder.axis", "length is not 0", None),
+        (r#"{"contour": {"field": "p", "values": []}}"#, ".values", "at least one value", None),
+        (r#"{"contour": {"field": "p", "values": [1, 2, 1]}}"#, ".values[2]", "the same value twice", None),
+        (r#"{"contour": {"feild": "p", "values": [1]}}"#, ".feild", "unknown key `feild`", Some("field")),
+        (r#"{"threshold": {"field": "p"}}"#, "", "expected `min` or `max`", None),
+        (r#"{"threshold": {"field": "p", "min": 2, "max": 1}}"#, ".min", "found 2, which is above `max`: 1", None),
+        (r#"{"threshold": {"field": "p", "min": 2, "vertices": "some"}}"#, ".vertices", "unknown name `some`", None),
+        (r#"{"clip": {}}"#, "", "found nothing to clip by", None),
+        (r#"{"clip": {"box": {"lower": [0,0,0], "upper": [1,0,1]}}}"#, ".box.lower[1]", "found 0, expected less than `upper[1]`: 0", None),
+        (r#"{"clip": {"field": {"nam": "p", "value": 1}}}"#, ".field.nam", "unknown key", Some("name")),
+        (r#"{"probe": {"points": []}}"#, ".points", "at least one point", None),
+        (r#"{"probe": {"line": {"from": [0,0,0], "to": [1,0,0], "count": 1}}}"#, ".line.count", "found 1, expected at least 2", None),
+        (r#"{"probe": {"grid": {"lower": [0,0,0], "upper": [1,1,1], "counts": [1000,1000,1000]}}}"#, ".grid.counts", "found 1000000000 points, expected at most 1048576", None),
+        (r#"{"probe": {"grid": {"lower": [0,0,0], "upper": [1,1,1], "counts": [1,0,1]}}}"#, ".grid.counts[1]", "found 0, expected at least 1 point", None),
+        (r#"{"probe": {"points": [[0,0,0]], "method": "linear"}}"#, ".method", "unknown name `linear`", None),
+        (r#"{"gradient": {"field": "p", "name": "x"}}"#, ".name", "has a meaning of its own", None),
+        (r#"{"gradient": {"feld": "p"}}"#, ".feld", "unknown key", Some("field")),
+        (r#"{"expression": {"name": "a", "formula": "p +"}}"#, ".formula", "column 4 of the formula: found the end", None),
+        (r#"{"expression": {"name": "a", "components": ["p", "sqr(p)"]}}"#, ".components[1]", "unknown function", Some("sqrt")),
+        (r#"{"expression": {"name": "a"}}"#, "", "expected `formula` or `components`", None),
+    ];
+    for (stage, path, message, suggestion) in cases {
+        let text =
+            format!(r#"{{"version": 1, "pipelines": [{{"name": "a", "stages": [{stage}]}}]}}"#);
+        let error = parse(&text, "views.json").expect_err(stage);
+        let name = stage.split('"').nth(1).unwrap();
+        assert_eq!(error.path, format!("pipelines[0].stages[0].{name}{path}"), "{error}");
+        assert!(error.message.contains(message), "{error}");
+        assert_eq!(error.suggestion.as_deref(), suggestion, "{error}");
+    }
+    let of_stages = |stages: &str| {
+        let text =
+            format!(r#"{{"version": 1, "pipelines": [{{"name": "a", "stages": [{stages}]}}]}}"#);
+        parse(&text, "views.json")
+    };
+    let gradient = r#"{"gradient": {"field": "p"}}"#;
+    let error = of_stages(&format!("{gradient}, {gradient}")).unwrap_err();
+    assert_eq!(error.path, "pipelines[0].stages[1].gradient.name");
+    assert!(error.message.contains("two stages derive a field `gradient`"), "{error}");
+    let error = of_stages(&format!(r#"{{"surface": {{}}}}, {gradient}"#)).unwrap_err();
+    assert!(error.message.contains("must come before all others"), "{error}");
+    assert!(of_stages(&format!(r#"{gradient}, {{"surface": {{}}}}"#)).is_ok());
+    for stages in [
+        r#"{"slice": {"planes": [{"origin": [0,0,0], "normal": [0,0,1]}]}}"#,
+        r#"{"slice": {"cylinder": {"origin": [0,0,0], "axis": [0,0,1], "radius": 2}}}"#,
+        r#"{"expression": {"name": "a", "components": ["p", "q"]}}, {"clip": {"box": {"lower": [0,0,0], "upper": [1,1,1]}, "invert": true}}"#,
+        r#"{"expression": {"name": "a", "formula": "p"}}, {"probe": {"grid": {"lower": [0,0,0], "upper": [1,1,1], "counts": [2,3,4]}, "method": "nearest"}}"#,
+    ] {
+        let config = of_stages(stages).unwrap_or_else(|error| panic!("{error}"));
+        let again = parse(&serde_json::to_string(&config).unwrap(), "again.json").unwrap();
+        assert_eq!(config, again, "{stages}");
+    }
 }
 
 #[test]
@@ -226,7 +295,8 @@ proptest! {
         }
     }
 
-    /// A valid text with some bytes overwritten, removed or doubled is read or refused at a place that it has.
+    /// A valid text with some bytes overwritten, removed or doubled is read or refused at a place
+    /// that it has.
     #[test]
     fn no_mutation_makes_the_parser_panic(
         changes in proptest::collection::vec((any::<prop::sample::Index>(), 0..3u8, r#"[\[\]{}:,"0-9a-e\\. é-]"#), 1..6)
@@ -262,7 +332,8 @@ proptest! {
     }
 }
 
-/// Numbers that no list of faces, vertices or steps can hold are told their range; numbers far from 1 are told in a few characters.
+/// Numbers that no list of faces, vertices or steps can hold are told their range; numbers far from
+/// 1 are told in a few characters.
 #[test]
 fn bounds_are_the_true_ones_and_numbers_are_short() {
     let order = |faces: &str| {

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use serde_json::{Value, json};
-use tombolo_deform::surface::Edit;
+use tombolo_deform::edit::Edit;
 use tombolo_pipelines::language::{
     Change, Config, LanguageError, Message, Order, parse, parse_json, parse_message, parse_orders,
     parse_valid,
@@ -28,7 +28,8 @@ fn list(item: &str, count: usize) -> String {
     text + "]"
 }
 
-/// What each reader says of an order: a file of one order, of several, of a journal, and a viewer's message.
+/// What each reader says of an order: a file of one order, of several, of a journal, and a viewer's
+/// message.
 fn read_everywhere(order: &str) -> Vec<Result<Order, LanguageError>> {
     let of_file = |text: String| {
         parse_orders(&text, "orders.json").map(|mut commands| match commands.remove(0).command {

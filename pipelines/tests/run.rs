@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
+use tombolo_deform::communicator::Solo;
 use tombolo_deform::mesh::{
     ArrayView, CellType, Cells, CellsView, FeatureSource, Indices, Mesh, MeshView, Values, Vector,
 };
 use tombolo_deform::shapes;
-use tombolo_pipelines::extract::{Association, Channel, Extract, FieldView, Snapshot, Source};
-use tombolo_pipelines::language::{Slice, parse};
+use tombolo_pipelines::extract::{Channel, Extract, FieldView, Input, Kept, Snapshot, Source};
+use tombolo_pipelines::language::{Command, Plane, Slice, parse};
 use tombolo_pipelines::run::{Output, Runner, ViewKind};
 
 fn runner(pipelines: &str) -> Runner {
@@ -35,11 +36,10 @@ fn area(extract: &Extract, normal: Vector) -> f64 {
 
 fn cut(mesh: &Mesh, fields: &[FieldView], origin: Vector, normal: Vector) -> Arc<Extract> {
     let channel = Channel { name: "fluid", mesh: MeshView::from(mesh), fields };
-    let source = Source::new(&channel).unwrap();
-    source
-        .slice(&channel, &Slice { origin, normal }, 0, &|_| true, &|furthest| furthest)
-        .unwrap()
-        .extract
+    let mut source = Source::new(&channel).unwrap();
+    let input = Input { channel: &channel, cycle: 0, wanted: &|_| true, communicator: &Solo };
+    let slice = Slice::Plane(Plane { origin, normal });
+    source.slice(&input, &slice, &mut Kept::default()).unwrap().extract
 }
 
 #[test]
@@ -58,18 +58,8 @@ fn a_slice_of_a_box_is_exact() {
             let values: Vec<f64> =
                 mesh.points().iter().map(|p| 1.0 + 2.0 * p[0] - 3.0 * p[1] + 0.5 * p[2]).collect();
             let numbers: Vec<f64> = (0..mesh.cells().len()).map(|cell| cell as f64).collect();
-            let fields = [
-                FieldView {
-                    name: "linear",
-                    association: Association::Vertex,
-                    values: ArrayView::scalars(&values),
-                },
-                FieldView {
-                    name: "cell",
-                    association: Association::Element,
-                    values: ArrayView::scalars(&numbers),
-                },
-            ];
+            let fields =
+                [FieldView::vertex("linear", &values), FieldView::element("cell", &numbers)];
             let slice = cut(&mesh, &fields, [0.5; 3], normal);
             assert!(
                 (area(&slice, normal) - expected).abs() < 1e-12,
@@ -153,7 +143,8 @@ fn a_slice_beside_the_mesh_is_empty() {
     assert!(cut(&mesh, &[], [5.0, 0.0, 0.0], [1.0, 0.0, 0.0]).cells.is_empty());
 }
 
-/// Arrays as a C solver has them: single precision, 64-bit connectivity, coordinates of two components.
+/// Arrays as a C solver has them: single precision, 64-bit connectivity, coordinates of two
+/// components.
 #[test]
 fn a_surface_follows_borrowed_arrays() {
     let mesh = shapes::box_of_tets([3, 3, 3], [0.0; 3], [1.0; 3]);
@@ -161,11 +152,8 @@ fn a_surface_follows_borrowed_arrays() {
     let connectivity: Vec<i64> =
         mesh.cells().connectivity().iter().map(|&vertex| i64::from(vertex)).collect();
     let velocity: Vec<f32> = (0..3 * mesh.points().len()).map(|i| i as f32).collect();
-    let fields = [FieldView {
-        name: "velocity",
-        association: Association::Vertex,
-        values: ArrayView::interleaved(Values::F32(&velocity), 3).unwrap(),
-    }];
+    let fields =
+        [FieldView::vertex("velocity", ArrayView::interleaved(Values::F32(&velocity), 3).unwrap())];
     let points = ArrayView::interleaved(Values::F32(&coordinates), 3).unwrap();
     let cells = CellsView::Uniform {
         cell_type: CellType::Tetra,
@@ -233,11 +221,7 @@ fn monitors_conditions_and_orders() {
     let mut seen = Vec::new();
     for cycle in 0..7u64 {
         let speed: Vec<f64> = (0..27).map(|vertex| f64::from(vertex % 2) * cycle as f64).collect();
-        let fields = [FieldView {
-            name: "speed",
-            association: Association::Vertex,
-            values: ArrayView::scalars(&speed),
-        }];
+        let fields = [FieldView::vertex("speed", &speed)];
         let channels = [Channel { name: "fluid", mesh: MeshView::from(&mesh), fields: &fields }];
         let time = cycle as f64 * 0.1;
         assert_eq!(runner.is_due(cycle, time), cycle % 2 == 0 || cycle == 3);
@@ -259,15 +243,15 @@ fn monitors_conditions_and_orders() {
                     );
                     format!("{cycle} monitor")
                 }
-                Output::Pause { reason, .. } => {
-                    assert!(reason.contains("speed.max > 3"), "{reason}");
+                Output::Command { pipeline, command: Command::Pause {} } => {
+                    assert_eq!(&*pipeline, "health");
                     format!("{cycle} pause")
                 }
                 Output::Write { path, extract, .. } => {
                     assert_eq!(extract.cells.len(), mesh.cells().len(), "the whole mesh");
                     format!("{cycle} {path}")
                 }
-                Output::Order { order, .. } => {
+                Output::Command { command: Command::Order(order), .. } => {
                     format!("{cycle} order {}", serde_json::to_string(&order).unwrap())
                 }
                 other => panic!("{other:?}"),
@@ -302,18 +286,8 @@ fn trouble_is_told_once_by_name_and_stops_nothing() {
     let mut pressure = vec![1.0; 27];
     let velocity = vec![[1.0; 3]; 27];
     let run = |pressure: &[f64], pipelines: &mut Runner, cycle| {
-        let fields = [
-            FieldView {
-                name: "pressure",
-                association: Association::Vertex,
-                values: ArrayView::scalars(pressure),
-            },
-            FieldView {
-                name: "velocity",
-                association: Association::Vertex,
-                values: ArrayView::vectors(&velocity),
-            },
-        ];
+        let fields =
+            [FieldView::vertex("pressure", pressure), FieldView::vertex("velocity", &velocity)];
         let channels = [Channel { name: "fluid", mesh: MeshView::from(&mesh), fields: &fields }];
         pipelines.run(&Snapshot { cycle, time: 0.0, channels: &channels })
     };
@@ -425,18 +399,7 @@ fn slices_are_those_of_vtk() {
     let numbers: Vec<f64> = (0..cells.len()).map(|cell| (cell % 17) as f64).collect();
     let mesh = Mesh::new(table.mesh.points, cells, FeatureSource::SharpEdges).unwrap();
     let values: Vec<f64> = mesh.points().iter().map(|[x, y, z]| x * y + z * z - 0.5 * x).collect();
-    let fields = [
-        FieldView {
-            name: "vertex",
-            association: Association::Vertex,
-            values: ArrayView::scalars(&values),
-        },
-        FieldView {
-            name: "element",
-            association: Association::Element,
-            values: ArrayView::scalars(&numbers),
-        },
-    ];
+    let fields = [FieldView::vertex("vertex", &values), FieldView::element("element", &numbers)];
     for theirs in table.slices {
         let ours = cut(&mesh, &fields, theirs.origin, theirs.normal);
         let length = theirs.normal.iter().map(|x| x * x).sum::<f64>().sqrt();

@@ -3,17 +3,16 @@
 use std::sync::Arc;
 
 use serde_json::{Value, json};
+use tombolo_deform::shape::{Plan, Refused, Request, Shaper};
 use tombolo_deform::{
+    edit::Edit,
+    features::FeatureSettings,
     mesh::{FeatureSource, Mesh},
     quality::{Guard, Otherwise, quality},
-    schedule::Schedule,
     shapes::{box_of_hexahedra, box_of_tets},
-    surface::{Edit, FeatureSettings, Surface},
+    surface::Surface,
 };
-use tombolo_pipelines::{
-    language::{DeformStage, Order, parse_valid},
-    shape::{Plan, Refused, Shaper},
-};
+use tombolo_pipelines::language::{Deformation, Order, parse_valid};
 
 const SIDES: [&str; 4] = ["x-min", "x-max", "y-min", "y-max"];
 
@@ -36,13 +35,13 @@ fn plan(
     deform: Value,
     guard: &Guard,
 ) -> Result<Plan, Refused> {
-    let deform: DeformStage = serde_json::from_value(deform).unwrap();
+    let deform: Deformation = serde_json::from_value(deform).unwrap();
     let here = Arc::clone(shaper.reference());
-    shaper.plan(edits, here, &deform, &Schedule::default(), guard)
+    shaper.plan(&Request { deformation: deform, guard: *guard, ..Request::new(edits, here) })
 }
 
-/// Between sides that let it slide, a block is compressed evenly, however the edit would bend the sides; so it can be pressed
-/// further than where the surface of the edit itself folds.
+/// Between sides that let it slide, a block is compressed evenly, however the edit would bend the
+/// sides; so it can be pressed further than where the surface of the edit itself folds.
 #[test]
 fn a_block_between_sliding_sides_is_pressed_evenly() {
     for mesh in [
@@ -92,7 +91,8 @@ fn free_features_follow_and_are_judged_as_any_other() {
     assert!((0..told.len() as u32).any(|vertex| off(vertex) > 0.01));
 }
 
-/// A body of its own whose whole surface slides: the list and its features are named, not those of the body that is held.
+/// A body of its own whose whole surface slides: the list and its features are named, not those of
+/// the body that is held.
 #[test]
 fn a_closed_body_that_slides_is_told_by_name() {
     let held = box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);

@@ -1,7 +1,8 @@
 //! Files of vtkio, a reader and writer of VTK's formats that we did not write, are read rightly.
 //!
-//! vtkio is not the reader itself, because a damaged file makes it panic or ask for memory by a count that it has not checked,
-//! and because it does not read arrays appended raw, as VTK writes them by default.
+//! vtkio is not the reader itself, because a damaged file makes it panic or ask for memory by a
+//! count that it has not checked, and because it does not read arrays appended raw, as VTK writes
+//! them by default.
 #![cfg(feature = "files")]
 
 use tombolo_deform::mesh::{CellType, Mesh};

@@ -1,4 +1,5 @@
-//! Programs over CGAL, for cross-checks: the C++ files of `tests/cgal`, compiled once and kept in the target directory.
+//! Programs over CGAL, for cross-checks: the C++ files of `tests/cgal`, compiled once and kept in
+//! the target directory.
 
 use std::fmt::Write as _;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
@@ -14,8 +15,9 @@ use crate::{project, target};
 const FLAGS: [&str; 5] = ["-std=c++17", "-O2", "-w", "-DNDEBUG", "-I/usr/include/eigen3"];
 const LIBRARIES: [&str; 2] = ["-lgmp", "-lmpfr"];
 
-/// The program made from `tests/cgal/<name>.cpp`. It is compiled with g++ where the target directory has no program yet for this
-/// text and these flags; CGAL and Eigen (Debian's libcgal-dev and libeigen3-dev) must be there, as `scripts/setup` has them.
+/// The program made from `tests/cgal/<name>.cpp`. It is compiled with g++ where the target
+/// directory has no program yet for this text and these flags; CGAL and Eigen (Debian's libcgal-dev
+/// and libeigen3-dev) must be there, as `scripts/setup` has them.
 ///
 /// # Panics
 /// Where there is no such file, or it does not compile.
@@ -33,7 +35,8 @@ pub fn cgal_program(name: &str) -> PathBuf {
     std::fs::create_dir_all(&directory).expect("the target directory can be written to");
     let program = directory.join(format!("{name}-{:016x}", hasher.finish()));
     if !program.exists() {
-        // Another test may compile it at the same time: each writes a file of its own, and the last one stays.
+        // Another test may compile it at the same time: each writes a file of its own, and the last
+        // one stays.
         let own = program.with_extension(std::process::id().to_string());
         let output = Command::new("g++")
             .args(FLAGS)

@@ -4,9 +4,11 @@ use std::io::Write as _;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use tombolo_deform::bounds::Bounds;
 use tombolo_deform::mesh::Vector;
 use tombolo_deform::skeleton::Skeleton;
 use tombolo_deform::surface::Surface;
+use tombolo_deform::vector::distance;
 
 use crate::{cgal_program, off};
 
@@ -18,7 +20,7 @@ pub struct CurveGraph {
 }
 
 impl CurveGraph {
-    /// Those of a skeleton of ours.
+    /// The curves of a skeleton of ours.
     #[must_use]
     pub fn of(skeleton: &Skeleton) -> Self {
         let segments = skeleton.curves().iter().flat_map(|curve| curve.nodes().windows(2));
@@ -26,8 +28,8 @@ impl CurveGraph {
         Self { points: skeleton.nodes().to_vec(), edges }
     }
 
-    /// What CGAL finds and the seconds that its extraction takes, without reading; none where it takes longer than the limit,
-    /// and is ended: it loops for ever on some surfaces.
+    /// The curves that CGAL finds and the seconds that its extraction takes, without reading; none
+    /// where it takes longer than the limit, and is ended: it loops for ever on some surfaces.
     ///
     /// # Panics
     /// Where the program cannot be made or run.
@@ -69,7 +71,8 @@ impl CurveGraph {
         ))
     }
 
-    /// The graph without the branches with a free end that are shorter than a part of the surface's diagonal, shortest first.
+    /// The graph without the branches with a free end that are shorter than a part of the surface's
+    /// diagonal, shortest first.
     #[must_use]
     pub fn without_spurs(&self, part: f64, surface: &Surface) -> Self {
         let bound = part * diagonal(surface);
@@ -97,7 +100,8 @@ impl CurveGraph {
             let Some((_, path)) = shortest else { break };
             edges.retain(|&[a, b]| !path.windows(2).any(|pair| pair == [a, b] || pair == [b, a]));
         }
-        // What is left, numbered from 0 on; points without an edge were points before or the cut ends.
+        // What is left, numbered from 0 on; points without an edge were points before or the cut
+        // ends.
         let kept: Vec<usize> = (0..self.points.len())
             .filter(|&point| {
                 edges.iter().any(|edge| edge.contains(&point))
@@ -131,8 +135,9 @@ impl CurveGraph {
         [piece.len(), loops, of_degree(|degree| degree > 2), of_degree(|degree| degree == 1)]
     }
 
-    /// The Hausdorff distance's two sides, as parts of the diagonal of the surface's bounding box: how far the points of this
-    /// graph are from the other at most, and the other's from this. The curves are sampled at a thousandth of the diagonal.
+    /// The Hausdorff distance's two sides, as parts of the diagonal of the surface's bounding box:
+    /// how far the points of this graph are from the other at most, and the other's from this. The
+    /// curves are sampled at a thousandth of the diagonal.
     #[must_use]
     pub fn apart(&self, other: &Self, surface: &Surface) -> [f64; 2] {
         let diagonal = diagonal(surface);
@@ -157,20 +162,8 @@ impl CurveGraph {
 
 /// The diagonal of a surface's bounding box.
 fn diagonal(surface: &Surface) -> f64 {
-    let [lower, upper] = surface.points().iter().fold(
-        [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
-        |[lower, upper], point| {
-            [
-                std::array::from_fn(|axis| lower[axis].min(point[axis])),
-                std::array::from_fn(|axis| upper[axis].max(point[axis])),
-            ]
-        },
-    );
+    let Bounds { lower, upper } = Bounds::around(surface.points().iter().copied());
     distance(lower, upper)
-}
-
-fn distance(a: Vector, b: Vector) -> f64 {
-    (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt()
 }
 
 /// The largest distance from one of the first to the nearest of the others.

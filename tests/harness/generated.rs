@@ -6,8 +6,8 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::{project, target};
 
-/// The files of `scripts/meshes --surface` of these names: made once, kept in the target directory, and made again after the
-/// script has changed.
+/// The files of `scripts/meshes --surface` of these names: made once, kept in the target directory,
+/// and made again after the script has changed.
 ///
 /// # Panics
 /// Where the script fails: it needs what `scripts/setup` installs.
@@ -38,7 +38,8 @@ pub fn generated_surfaces(names: &[&str]) -> Vec<PathBuf> {
     names.iter().map(|name| path(name)).collect()
 }
 
-/// A mesh of `scripts/meshes`, in `meshes/`, where the cases of the examples look for it; made where it is not there yet.
+/// A mesh of `scripts/meshes`, in `meshes/`, where the cases of the examples look for it; made
+/// where it is not there yet.
 ///
 /// # Panics
 /// Where the script fails: it needs what `scripts/setup` installs.

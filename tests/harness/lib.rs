@@ -1,7 +1,8 @@
-//! Harness of the whole-system tests: the programs, built once, run as a user runs them; a small nozzle; a viewer in a few
-//! lines; programs over CGAL.
+//! Harness of the whole-system tests: the programs, built once, run as a user runs them; a small
+//! nozzle; a viewer in a few lines; programs over CGAL.
 
 mod cgal;
+mod command;
 mod curves;
 mod generated;
 mod mesh;
@@ -10,6 +11,7 @@ mod small;
 mod viewer;
 
 pub use cgal::{cgal, cgal_program, off};
+pub use command::{install, library, output, succeed};
 pub use curves::CurveGraph;
 pub use generated::{generated_mesh, generated_surfaces};
 pub use mesh::{NOZZLE_FEATURES, write_nozzle};
@@ -20,7 +22,8 @@ pub use viewer::{Link, Message, Viewer};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// How long a test waits for what should come: so long that only what never comes is missed, on however busy a machine.
+/// How long a test waits for what should come: so long that only what never comes is missed, on
+/// however busy a machine.
 pub const PATIENCE: Duration = Duration::from_secs(900);
 
 /// The root of the project.

@@ -13,7 +13,8 @@ const LOWER: Vector = [-0.025, -0.525, -0.05];
 const UPPER: Vector = [0.025, 0.525, 0.05];
 const COUNTS: [usize; 3] = [2, 42, 4];
 
-/// Writes a channel along y of about 2 000 tetrahedra as Gmsh 2.2, its throat between y = -0.1 and 0.1.
+/// Writes a channel along y of about 2 000 tetrahedra as Gmsh 2.2, its throat between y = -0.1 and
+/// 0.1.
 ///
 /// # Panics
 /// Where the file cannot be written.

@@ -17,12 +17,22 @@ use crate::{Link, PATIENCE, project};
 #[must_use]
 pub fn programs() -> &'static Path {
     static PROGRAMS: OnceLock<PathBuf> = OnceLock::new();
-    // With a test among the targets, the dependencies have the features that `cargo test` gave them: nothing is built twice.
+    // With a test among the targets, the dependencies have the features that `cargo test` gave
+    // them: nothing is built twice.
     PROGRAMS.get_or_init(|| {
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let output = Command::new(cargo)
             .current_dir(project())
-            .args(["build", "--quiet", "--workspace", "--bins", "--test", "browser"])
+            .args([
+                "build",
+                "--quiet",
+                "--workspace",
+                "--bins",
+                "--example",
+                "heat",
+                "--test",
+                "browser",
+            ])
             .args(cfg!(feature = "distributed").then_some("--features=tombolo-tests/distributed"))
             .output()
             .expect("cargo runs");

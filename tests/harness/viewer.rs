@@ -37,7 +37,7 @@ impl Link {
         format!("http://{}/?token={}", self.address, self.token)
     }
 
-    /// The same run, another token.
+    /// A link to this run with another token.
     #[must_use]
     pub fn with_token(&self, token: &str) -> Link {
         Link { address: self.address.clone(), token: token.to_owned() }
@@ -55,7 +55,7 @@ impl Link {
     }
 }
 
-/// What the server sent.
+/// A message of the server.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Message {
     /// A JSON message.
@@ -74,7 +74,7 @@ impl Viewer {
     /// Connects.
     ///
     /// # Errors
-    /// What the server answered instead, as text.
+    /// The server's answer instead, as text.
     ///
     /// # Panics
     /// Where no runtime can be made.
@@ -123,7 +123,8 @@ impl Viewer {
         }
     }
 
-    /// Waits for the first JSON message of this name for which `wanted` holds, and returns its content.
+    /// Waits for the first JSON message of this name for which `wanted` holds, and returns its
+    /// content.
     ///
     /// # Panics
     /// Where none comes in a long time.
@@ -142,7 +143,8 @@ impl Viewer {
         panic!("no such '{name}' came; the last was {last}");
     }
 
-    /// Waits until the run is paused, and lets it go on: a resume that comes before the pause would do nothing.
+    /// Waits until the run is paused, and lets it go on: a resume that comes before the pause would
+    /// do nothing.
     ///
     /// # Panics
     /// Where it is not paused in a long time.

@@ -3,6 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use serde_json::{Value, json};
+use tombolo_deform::communicator::Reduction;
 use tombolo_pipelines::{
     extract::Channel,
     files::{UnreadFile, read_displacements},
@@ -11,14 +12,15 @@ use tombolo_pipelines::{
 
 use super::{Adaptor, SteeredMesh};
 use crate::{
-    comm,
-    steering::{Asked, Forecaster, Log, Moment, Queue, Received, Source},
+    meeting,
+    steering::{Asked, Forecaster, Log, Queue, Received, Source},
+    step::Moment,
     stream::{CommandSink, Hub},
 };
 
 impl Adaptor {
-    /// Takes in a command that no viewer sent. All ranks come here with the same one; rank 0 reads its files, names it and writes it
-    /// to the journal, and what it takes, all obey.
+    /// Takes in a command that no viewer sent. All ranks come here with the same one; rank 0 reads
+    /// its files, names it and writes it to the journal, and what it takes, all obey.
     pub(super) fn accept(
         &mut self,
         id: Option<String>,
@@ -43,7 +45,8 @@ impl Adaptor {
         mut command: Command,
         moment: Moment,
     ) -> Option<(String, Command)> {
-        // The journal gets what a file holds and not its name, so that it replays whatever becomes of the file.
+        // The journal gets what a file holds and not its name, so that it replays whatever becomes
+        // of the file.
         let read = self.read_files(&mut command);
         match self.log.accept(id, source, &command, moment) {
             Ok(id) => match read {
@@ -55,9 +58,10 @@ impl Adaptor {
         None
     }
 
-    /// The commands of rank 0 on all ranks, so that they take effect at the same cycle everywhere. Collective; free on one process.
+    /// The commands of rank 0 on all ranks, so that they take effect at the same cycle everywhere.
+    /// Collective; free on one process.
     fn told_to_all(&self, commands: Vec<(String, Command)>) -> Vec<(String, Command)> {
-        comm::share(&*self.communicator, commands).unwrap_or_else(|reason| {
+        meeting::share(&*self.communicator, commands).unwrap_or_else(|reason| {
             self.complain(&reason);
             Vec::new()
         })
@@ -89,11 +93,12 @@ impl Adaptor {
         let received: Vec<Received> = self.queue.take().into();
         let clients: Vec<u64> = received.iter().map(|received| received.client).collect();
         let own = received.into_iter().map(|received| (received.id, received.command)).collect();
-        for (place, (id, command)) in self.told_to_all(own).into_iter().enumerate() {
+        for (index, (id, command)) in self.told_to_all(own).into_iter().enumerate() {
             // Only rank 0 has viewers to answer.
-            let client = clients.get(place).copied().unwrap_or_default();
+            let client = clients.get(index).copied().unwrap_or_default();
             self.obey(id, &Source::Viewer(client), command, moment);
         }
+        self.make_ready();
         let named = self.steered_channel().map(str::to_owned);
         if let (SteeredMesh::Steered(steerer, _), Ok(channel)) =
             (&mut self.mesh, Channel::find(channels, named.as_deref()))
@@ -101,7 +106,7 @@ impl Adaptor {
         {
             steerer.observe(&channel.mesh.points);
         }
-        self.foretell();
+        self.forecast();
         let step_seconds = self.timing.steps.median();
         if let SteeredMesh::Steered(steerer, _) = &mut self.mesh
             && steerer.advance(moment, step_seconds)
@@ -111,8 +116,23 @@ impl Adaptor {
         }
     }
 
-    /// Answers what viewers want to know of a mesh in parts: only the ranks together can, here. On one process another thread does.
-    fn foretell(&self) {
+    /// Has the steered mesh made ready for orders once somebody may give one. Collective.
+    fn make_ready(&mut self) {
+        if let SteeredMesh::Steered(steerer, _) = &mut self.mesh
+            && !steerer.is_ready()
+        {
+            // Only rank 0 has viewers.
+            let mut driven = [u64::from(self.queue.is_driven())];
+            self.communicator.reduce_integers(Reduction::Maximum, &mut driven);
+            if driven == [1] {
+                steerer.make_ready();
+            }
+        }
+    }
+
+    /// Answers what viewers want to know of a mesh in parts: only the ranks together can, here. On
+    /// one process another thread does.
+    fn forecast(&self) {
         if self.communicator.size() == 1 {
             return;
         }
@@ -121,13 +141,13 @@ impl Adaptor {
             .iter()
             .map(|asked| (String::new(), Command::Order((*asked.order).clone())))
             .collect();
-        for (place, (_, command)) in self.told_to_all(asked).into_iter().enumerate() {
+        for (index, (_, command)) in self.told_to_all(asked).into_iter().enumerate() {
             let (Command::Order(order), SteeredMesh::Steered(steerer, _)) = (command, &self.mesh)
             else {
                 continue;
             };
             let forecast = steerer.forecast(&order);
-            if let (Some(Asked { client, id, .. }), Some(hub)) = (questions.get(place), &self.hub) {
+            if let (Some(Asked { client, id, .. }), Some(hub)) = (questions.get(index), &self.hub) {
                 hub.tell_client(*client, &json!({"forecast": {"id": id, "order": forecast}}));
             }
         }
@@ -247,6 +267,10 @@ impl CommandSink for Intake {
         let id = self.log.accept(id, &Source::Viewer(client), &command, Moment { cycle, time })?;
         self.queue.push(Received { client, id, command, bytes });
         Ok(())
+    }
+
+    fn driven(&self) {
+        self.queue.drive();
     }
 
     fn orders(&self) -> Value {

@@ -1,18 +1,18 @@
-//! What is checked of what a solver lends, and when.
+//! The checks of the arrays that a solver lends, and when they are made.
 //!
-//! Lengths are compared in every call. What takes a pass over the mesh is looked at when a mesh is lent first or replaced, and
-//! the coordinates once more whenever they are used.
+//! Lengths are compared in every call. What takes a pass over the mesh is looked at when a mesh is
+//! lent first or replaced, and the coordinates once more whenever they are used.
 
+use tombolo_deform::communicator::agree;
 use tombolo_pipelines::extract::{Channel, MeshKey, check_names};
 
 use super::{Adaptor, SteeredMesh};
 use crate::{
-    comm,
-    settings::{ExecuteError, Step},
-    steering::Moment,
+    error::ExecuteError,
+    step::{Moment, Step},
 };
 
-/// What was looked at already.
+/// The arrays that were looked at already.
 #[derive(Debug, Default)]
 pub(super) struct Lent {
     /// By the channel's name, the mesh that passed.
@@ -42,7 +42,8 @@ impl Lent {
 }
 
 impl Adaptor {
-    /// Refuses what the solver got wrong, as far as this rank can tell before it has spoken with the others.
+    /// Refuses what the solver got wrong, as far as this rank can tell before it has spoken with
+    /// the others.
     pub(super) fn check(
         &mut self,
         step: &Step,
@@ -63,11 +64,19 @@ impl Adaptor {
         check_names(channels).map_err(of_channel)?;
         channels.iter().try_for_each(Channel::check_lengths).map_err(of_channel)?;
         let steered = self.steered_among(step, channels)?;
-        for channel in channels.iter().filter(|channel| !self.lent.is_known(channel)) {
+        for (index, channel) in channels.iter().enumerate() {
+            let is_steered = steered == Some(channel.name);
+            if self.lent.is_known(channel) {
+                let is_used = is_steered && self.uses_steered(moment)
+                    || self.pipelines.is_due(moment)
+                        && self.pipelines.reads(moment, channel.name, index == 0);
+                if is_used {
+                    channel.check_points().map_err(of_channel)?;
+                }
+                continue;
+            }
             channel.check_mesh().map_err(of_channel)?;
-            if let (Some((fingerprint, expected)), true) =
-                (self.lent.reference, steered == Some(channel.name))
-            {
+            if let (Some((fingerprint, expected)), true) = (self.lent.reference, is_steered) {
                 let found = channel.mesh.cells.len();
                 if (channel.mesh.cells.fingerprint(), found) != (fingerprint, expected) {
                     return Err(ExecuteError::OtherCells {
@@ -78,22 +87,13 @@ impl Adaptor {
                     });
                 }
             }
-        }
-        for (index, channel) in channels.iter().enumerate() {
-            let is_used = steered == Some(channel.name) && self.uses_steered(moment)
-                || self.pipelines.is_due(moment)
-                    && self.pipelines.reads(moment, channel.name, index == 0);
-            if is_used && self.lent.is_known(channel) {
-                channel.check_points().map_err(of_channel)?;
-            }
-            if !self.lent.is_known(channel) {
-                self.lent.keep(channel);
-            }
+            self.lent.keep(channel);
         }
         Ok(())
     }
 
-    /// The name of the channel whose shape can be changed, where one was taken over: with as many vertices as it had.
+    /// The name of the channel whose shape can be changed, where one was taken over: with as many
+    /// vertices as it had.
     fn steered_among<'c>(
         &self,
         step: &Step,
@@ -122,8 +122,8 @@ impl Adaptor {
         is_busy || self.timed.is_due(moment)
     }
 
-    /// Refuses coordinates of the steered mesh that are not finite, where rank 0 was called to look at something: only it knew of
-    /// that before. Collective.
+    /// Refuses coordinates of the steered mesh that are not finite, where rank 0 was called to look
+    /// at something: only it knew of that before. Collective.
     pub(super) fn check_called(
         &self,
         step: &Step,
@@ -135,10 +135,6 @@ impl Adaptor {
             Ok(Err(source)) => Err(ExecuteError::Channel { cycle: step.cycle, source }),
             _ => Ok(()),
         };
-        if self.communicator.size() == 1 {
-            mine
-        } else {
-            Ok(comm::agree_on(&*self.communicator, mine)?)
-        }
+        if self.communicator.size() == 1 { mine } else { Ok(agree(&*self.communicator, mine)?) }
     }
 }

@@ -1,7 +1,7 @@
 //! What viewers are told of a run besides its frames.
 
 use serde_json::{Value, json};
-use tombolo_deform::{mesh::Vector, surface::Surface};
+use tombolo_deform::{features::FeatureSize, surface::Surface};
 
 use super::{Adaptor, SteeredMesh};
 use crate::steering::Defaults;
@@ -52,24 +52,6 @@ impl Adaptor {
 
 /// The features of a surface: names, sizes and bounds.
 pub(super) fn features(surface: &Surface) -> Value {
-    let features = surface.features();
-    let mut faces = vec![0_usize; features.names().len()];
-    for &feature in features.face_features() {
-        if let Some(count) = faces.get_mut(feature as usize) {
-            *count += 1;
-        }
-    }
-    let described = features.names().iter().zip(faces).zip(0..).map(|((name, faces), feature)| {
-        let vertices = features.vertices(feature);
-        let points = vertices.iter().map(|&vertex| surface.points()[vertex as usize]);
-        let empty = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-        let bounds = points.fold(empty, |[lower, upper]: [Vector; 2], point| {
-            [
-                std::array::from_fn(|axis| lower[axis].min(point[axis])),
-                std::array::from_fn(|axis| upper[axis].max(point[axis])),
-            ]
-        });
-        json!({"name": name, "faces": faces, "vertices": vertices.len(), "bounds": bounds})
-    });
-    described.collect()
+    let described = |FeatureSize { name, faces, vertices, bounds, .. }: FeatureSize| json!({"name": name, "faces": faces, "vertices": vertices, "bounds": bounds});
+    surface.feature_sizes().into_iter().map(described).collect()
 }

@@ -2,19 +2,21 @@
 
 use std::{borrow::Cow, collections::HashSet};
 
+use tombolo_deform::communicator::Reduction;
 use tombolo_deform::{
+    features::{MisplacedFaces, check_feature_names, misplaced_faces},
     mesh::{CellsView, FeatureSource, MeshError, TaggedFaces, Vector},
-    surface::{MisplacedFaces, check_feature_names, misplaced_faces},
 };
-use tombolo_pipelines::{communicator::Reduction, extract::Channel};
+use tombolo_pipelines::extract::Channel;
 
 use super::Adaptor;
 
 impl Adaptor {
-    /// Refuses faces with features that are none of the mesh, and names of features that no face of any rank has. Faces that lie
-    /// inside the mesh make no feature of its surface; that is told. Collective.
+    /// Refuses faces with features that are none of the mesh, and names of features that no face of
+    /// any rank has. Faces that lie inside the mesh make no feature of its surface; that is told.
+    /// Collective.
     pub(super) fn check_features(&self, channel: &Channel<'_>) -> Result<(), MeshError> {
-        let mut counts = [0.0; 2];
+        let mut counts = [0; 2];
         let mut numbers: Vec<i64> = Vec::new();
         let mut own = Ok(());
         let (mut found, none) = (MisplacedFaces::default(), TaggedFaces::default());
@@ -30,12 +32,10 @@ impl Adaptor {
                 Ok(cells) => found = misplaced_faces(tagged, &cells),
                 Err(error) => own = Err(error),
             }
-            #[expect(clippy::cast_precision_loss, reason = "counts below 2^53")]
-            let counted = [found.inside as f64, tagged.faces.len() as f64];
-            counts = counted;
+            counts = [found.inside as u64, tagged.faces.len() as u64];
         }
         self.unite(&mut numbers);
-        self.communicator.reduce(Reduction::Sum, &mut counts);
+        self.communicator.reduce_integers(Reduction::Sum, &mut counts);
         self.forgive(&mut found, tagged, channel);
         own?;
         found.check(tagged)?;
@@ -43,7 +43,7 @@ impl Adaptor {
             check_feature_names(&tagged.names, &numbers)?;
         }
         let [inside, faces] = counts;
-        if inside > 0.0 {
+        if inside > 0 {
             self.complain(&format!(
                 "channel '{}': {inside} of {faces} faces with features lie inside the mesh, and make no feature of its surface",
                 channel.name
@@ -52,17 +52,16 @@ impl Adaptor {
         Ok(())
     }
 
-    /// Takes the loose faces away that are faces of cells of another rank, which tags them too: a rank may name every face whose vertices
-    /// it has. Faces are matched by their centres, to a millionth of the size of the whole mesh. Collective.
+    /// Takes the loose faces away that are faces of cells of another rank, which tags them too: a
+    /// rank may name every face whose vertices it has. Faces are matched by their centres, to a
+    /// millionth of the size of the whole mesh. Collective.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_precision_loss,
         reason = "counts, and millionths of the size"
     )]
     fn forgive(&self, misplaced: &mut MisplacedFaces, tagged: &TaggedFaces, channel: &Channel<'_>) {
-        let mut loose = [misplaced.loose.len() as f64];
-        self.communicator.reduce(Reduction::Sum, &mut loose);
-        if self.communicator.size() == 1 || loose[0] == 0.0 {
+        if self.communicator.size() == 1 || self.communicator.total(misplaced.loose.len()) == 0 {
             return;
         }
         let points = channel.mesh.points;
@@ -93,12 +92,10 @@ impl Adaptor {
             .flat_map(|&face| centre(face))
             .flat_map(f64::to_le_bytes)
             .collect();
-        let gathered = self.communicator.gather(0, &mine);
-        let mut all = gathered.map(|parts| parts.concat()).unwrap_or_default();
-        self.communicator.broadcast(0, &mut all);
+        let all = self.communicator.gather_all(&mine).concat();
         let all: Vec<f64> =
             all.as_chunks::<8>().0.iter().map(|value| f64::from_le_bytes(*value)).collect();
-        let mut known: Vec<f64> = all
+        let mut known: Vec<u64> = all
             .as_chunks::<3>()
             .0
             .iter()
@@ -107,16 +104,16 @@ impl Adaptor {
                 let mut around = (0..27).map(|neighbour: i64| {
                     [x + neighbour % 3 - 1, y + neighbour / 3 % 3 - 1, z + neighbour / 9 - 1]
                 });
-                f64::from(u8::from(around.any(|square| own.contains(&square))))
+                u64::from(around.any(|square| own.contains(&square)))
             })
             .collect();
-        self.communicator.reduce(Reduction::Maximum, &mut known);
+        self.communicator.reduce_integers(Reduction::Maximum, &mut known);
         let known: HashSet<[u64; 3]> = all
             .as_chunks::<3>()
             .0
             .iter()
             .zip(known)
-            .filter(|(_, known)| *known > 0.0)
+            .filter(|(_, known)| *known > 0)
             .map(|(centre, _)| centre.map(f64::to_bits))
             .collect();
         misplaced.loose.retain(|&face| !known.contains(&centre(face).map(f64::to_bits)));

@@ -1,29 +1,29 @@
-//! What an order would give, for a viewer that asks while the solver keeps stepping.
+//! Forecasts for viewers that ask while the solver keeps stepping.
 
 use std::sync::{Arc, Mutex};
 
 use tombolo_deform::mesh::Vector;
-use tombolo_pipelines::{
-    language::Order,
-    shape::{Forecast, Place},
-};
+use tombolo_deform::shape::{CurrentShape, Forecast};
+use tombolo_pipelines::language::Order;
 
 use super::{
     Defaults, EditStack,
-    planner::{Rejection, Wish},
-    worker::{Jobs, lock},
+    planner::{PlanRequest, Rejection},
+    worker::Jobs,
 };
+use crate::lock::lock;
 
 /// The shape that the mesh has now, as those see it who are not the solver's thread.
 #[derive(Debug, Clone)]
 pub(super) struct Present {
     pub(super) stack: EditStack,
-    pub(super) place: Place,
-    /// What the solver's own motion has added to it, as far as it was looked at.
+    pub(super) here: CurrentShape,
+    /// The motion that the solver itself has added to it, as far as it was looked at.
     pub(super) own: Option<Arc<[Vector]>>,
 }
 
-/// Asks the worker without going through the solver's thread, so that an answer does not wait for the end of a step.
+/// Asks the worker without going through the solver's thread, so that an answer does not wait for
+/// the end of a step.
 pub(crate) struct Forecaster {
     pub(super) defaults: Defaults,
     pub(super) present: Arc<Mutex<Present>>,
@@ -31,17 +31,19 @@ pub(crate) struct Forecaster {
 }
 
 impl Forecaster {
-    /// Has `answer` called with what `order` would come to, were it given now. What the same `asker` asked for before and was
-    /// not told yet is forgotten: its answer never comes.
+    /// Has `answer` called with what `order` would come to, were it given now. What the same
+    /// `asker` asked for before and was not told yet is forgotten: its answer never comes.
     pub(crate) fn ask(
         &self,
         asker: u64,
         order: &Order,
         answer: impl FnOnce(Forecast) + Send + 'static,
     ) {
-        let Present { stack, place, own } = lock(&self.present).clone();
-        match self.defaults.wish(&stack, place, order) {
-            Ok((_, wish)) => self.jobs.forecast(asker, Wish { own, ..wish }, Box::new(answer)),
+        let Present { stack, here, own } = lock(&self.present).clone();
+        match self.defaults.request(&stack, here, order) {
+            Ok((_, request)) => {
+                self.jobs.forecast(asker, PlanRequest { request, own }, Box::new(answer))
+            }
             Err(error) => {
                 let Rejection { reason, seconds, .. } = Rejection::from(error);
                 answer(Forecast::rejected(reason, None, None, seconds));

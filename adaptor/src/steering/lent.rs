@@ -1,29 +1,32 @@
 //! The mesh as the solver lends it, against the shape that it was asked to have.
 //!
-//! A shape is handed out as coordinates; whether the solver went there is seen at the next call alone. What it lends is the shape, a
-//! motion of its own added to it, or the shape before, where it did not follow.
+//! A shape is handed out as coordinates; whether the solver went there is seen at the next call
+//! alone. What it lends is the shape, a motion of its own added to it, or the shape before, where
+//! it did not follow.
 
 use std::sync::Arc;
 
 use serde::Serialize;
 use tombolo_deform::{
-    mesh::{ArrayView, Vector},
-    partition::{Partition, Reduction},
+    communicator::{Communicator, Reduction},
+    mesh::{ArrayView, Domain, Vector},
+    vector::{dot, subtract},
 };
 
 /// Rounding in single precision, as a fraction of the largest coordinate.
 const SINGLE: f64 = 1.0 / (1 << 22) as f64;
-/// The same in double precision.
+/// The rounding of coordinates kept in double precision, as a fraction of their size.
 const DOUBLE: f64 = 1.0 / (1_u64 << 48) as f64;
 
-/// That a solver did not take a motion.
+/// A shape that the solver did not follow.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct NotFollowed {
     /// The cycle of the call that handed the shape out.
     pub cycle: u64,
     /// The shape of the schedule, counted from 1.
     pub shape: u32,
-    /// The largest distance between a vertex as it was lent at the next call and where it was asked to be, in units of the mesh.
+    /// The largest distance between a vertex as it was lent at the next call and where it was asked
+    /// to be, in units of the mesh.
     pub distance: f64,
 }
 
@@ -40,11 +43,12 @@ pub(super) struct HandedOut {
 pub(super) struct Own {
     /// The mesh as lent; `None` where it is the shape, bit for bit.
     pub(super) lent: Option<Arc<[Vector]>>,
-    /// What the solver's own motion has added to the shape; `None` where that is rounding on all ranks.
+    /// The motion that the solver itself has added to the shape; `None` where that is rounding on
+    /// all ranks.
     pub(super) offsets: Option<Arc<[Vector]>>,
 }
 
-/// What became of a shape that was handed out.
+/// Whether a shape that was handed out was followed.
 pub(super) struct Outcome {
     pub(super) is_followed: bool,
     /// The largest distance from where it was asked to be; 0 where that is rounding.
@@ -59,16 +63,16 @@ pub(super) struct Rounding {
 }
 
 impl Rounding {
-    /// That of a mesh. Collective.
-    pub(super) fn of(reference: &[Vector], partition: &dyn Partition) -> Self {
+    /// The rounding of a mesh's coordinates. Collective.
+    pub(super) fn of(reference: &[Vector], communicator: &dyn Communicator) -> Self {
         let mut extent =
             [reference.as_flattened().iter().fold(0.0_f64, |largest, x| largest.max(x.abs()))];
-        partition.reduce(Reduction::Maximum, &mut extent);
+        communicator.reduce(Reduction::Maximum, &mut extent);
         Self { extent: extent[0] }
     }
 
-    /// Whether a coordinate is the one that was asked for, as far as the precision goes in which the solver seems to keep it: single
-    /// where the value fits into that.
+    /// Whether a coordinate is the one that was asked for, as far as the precision goes in which
+    /// the solver seems to keep it: single where the value fits into that.
     #[inline]
     fn holds(self, lent: f64, asked: f64) -> bool {
         if lent == asked {
@@ -84,8 +88,8 @@ impl Rounding {
         (0..3).all(|axis| self.holds(lent[axis], asked[axis]))
     }
 
-    /// Where a vertex lent at `lent` comes to when the shape goes from `now` to `next`: there, if it is in the shape now; else as
-    /// far on.
+    /// Where a vertex lent at `lent` comes to when the shape goes from `now` to `next`: there, if
+    /// it is in the shape now; else as far on.
     #[inline]
     pub(super) fn carried(self, lent: Vector, now: Vector, next: Vector) -> Vector {
         std::array::from_fn(|axis| {
@@ -99,24 +103,24 @@ impl Rounding {
 
     /// Whether the mesh as it is lent is where it was asked to be.
     ///
-    /// A vertex has stayed where it went less than half as far along as it was asked to; a shape was not followed where those that
-    /// stayed make up more than half of the motion, as its sum of squares. A vertex that the solver moves by itself does not stay.
-    /// Collective.
+    /// A vertex has stayed where it went less than half as far along as it was asked to; a shape
+    /// was not followed where those that stayed make up more than half of the motion, as its sum of
+    /// squares. A vertex that the solver moves by itself does not stay. Collective.
     pub(super) fn compare(
         self,
         handed: &HandedOut,
         lent: &ArrayView<'_>,
-        partition: &dyn Partition,
+        domain: &Domain,
     ) -> Outcome {
         let (mut all, mut stayed, mut distance) = (0.0, 0.0, 0.0_f64);
         for (vertex, (&from, &to)) in handed.from.iter().zip(&*handed.to).enumerate() {
             let now = lent.vector(vertex);
             let is_there = now == to || self.holds_at(now, to);
             if !is_there {
-                distance = distance.max(norm(minus(now, to)));
+                distance = distance.max(norm(subtract(now, to)));
             }
-            if u32::try_from(vertex).is_ok_and(|vertex| partition.owns(vertex)) {
-                let (asked, went) = (minus(to, from), minus(now, from));
+            if u32::try_from(vertex).is_ok_and(|vertex| domain.owns(vertex)) {
+                let (asked, went) = (subtract(to, from), subtract(now, from));
                 let square = dot(asked, asked);
                 all += square;
                 if !is_there && dot(went, went) < 0.25 * square {
@@ -125,20 +129,13 @@ impl Rounding {
             }
         }
         let (mut sums, mut largest) = ([all, stayed], [distance]);
-        if partition.ranks() > 1 {
-            partition.reduce(Reduction::Sum, &mut sums);
-            partition.reduce(Reduction::Maximum, &mut largest);
-        }
+        domain.communicator().reduce(Reduction::Sum, &mut sums);
+        domain.communicator().reduce(Reduction::Maximum, &mut largest);
         Outcome { is_followed: sums[1] <= 0.5 * sums[0], distance: largest[0] }
     }
 
-    /// What the solver's own motion has added to `shape`. Collective.
-    pub(super) fn own(
-        self,
-        shape: &[Vector],
-        lent: &ArrayView<'_>,
-        partition: &dyn Partition,
-    ) -> Own {
+    /// The motion that the solver itself has added to `shape`. Collective.
+    pub(super) fn own(self, shape: &[Vector], lent: &ArrayView<'_>, domain: &Domain) -> Own {
         let (mut is_same, mut is_rounding) = (true, true);
         for (vertex, &asked) in shape.iter().enumerate() {
             let now = lent.vector(vertex);
@@ -148,10 +145,7 @@ impl Rounding {
                 is_rounding = is_rounding && self.holds_at(now, asked);
             }
         }
-        let mut differs = [f64::from(u8::from(!is_rounding))];
-        if partition.ranks() > 1 {
-            partition.reduce(Reduction::Maximum, &mut differs);
-        }
+        let differs = domain.communicator().any(!is_rounding);
         let offset = |(vertex, &asked): (usize, &Vector)| -> Vector {
             let now = lent.vector(vertex);
             std::array::from_fn(|axis| {
@@ -160,17 +154,9 @@ impl Rounding {
         };
         Own {
             lent: (!is_same).then(|| lent.to_vectors().into()),
-            offsets: (differs[0] > 0.0).then(|| shape.iter().enumerate().map(offset).collect()),
+            offsets: differs.then(|| shape.iter().enumerate().map(offset).collect()),
         }
     }
-}
-
-fn minus(a: Vector, b: Vector) -> Vector {
-    std::array::from_fn(|axis| a[axis] - b[axis])
-}
-
-fn dot(a: Vector, b: Vector) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 fn norm(a: Vector) -> f64 {

@@ -2,25 +2,23 @@
 
 use std::{
     collections::VecDeque,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex},
 };
 
 use serde_json::{Value, json};
-use tombolo_pipelines::{
-    language::{Command, JournalEntry, Order, OrderStatus as JournalStatus},
-    shape::ShapeSeconds,
-};
+use tombolo_pipelines::language::{Command, JournalEntry, Order, OrderStatus as JournalStatus};
 
-use super::{NotFollowed, planner::Rejection};
-use crate::{
-    journal::Journal,
-    report::{ORDERS_KEPT, OrderReport, OrderStatus},
-    stream::Hub,
+use super::{
+    NotFollowed,
+    order_report::{ORDERS_KEPT, OrderReport, OrderStatus},
+    planner::Rejection,
 };
+use crate::{journal::Journal, lock::lock, step::Moment, stream::Hub};
 
 /// Orders that a viewer is told of when it connects.
 const ORDERS_TOLD: usize = 100;
-/// Bytes of JSON up to which an order itself is told too; a longer one holds the numbers of a displacement.
+/// Bytes of JSON up to which an order itself is told too; a longer one holds the numbers of a
+/// displacement.
 const TOLD_WHOLE: usize = 16 << 10;
 
 /// Who gave a command.
@@ -34,15 +32,9 @@ pub(crate) enum Source {
     Pipeline(String),
 }
 
-/// Where and when something happens.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Moment {
-    pub(crate) cycle: u64,
-    pub(crate) time: f64,
-}
-
+/// The commands that were given, as far as they are kept.
 #[derive(Default)]
-struct State {
+struct KnownCommands {
     orders: VecDeque<OrderReport>,
     /// The newest orders as they were given, by their names.
     given: VecDeque<(String, Value)>,
@@ -53,7 +45,7 @@ struct State {
 
 /// Shared by the thread that reads from viewers and the solver's.
 pub(crate) struct Log {
-    state: Mutex<State>,
+    state: Mutex<KnownCommands>,
     journal: Journal,
     hub: Option<Arc<Hub>>,
 }
@@ -63,11 +55,8 @@ impl Log {
         Self { state: Mutex::default(), journal, hub }
     }
 
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Takes a command in: gives it a name unless it has one, writes it to the journal, tells the viewers of an order.
+    /// Takes a command in: gives it a name unless it has one, writes it to the journal, tells the
+    /// viewers of an order.
     ///
     /// # Errors
     /// Where another command has that name already.
@@ -83,7 +72,7 @@ impl Log {
             _ => None,
         };
         let id = {
-            let mut state = self.lock();
+            let mut state = lock(&self.state);
             let id = match wanted {
                 Some(id) if state.has(&id) => {
                     return Err(format!("the id '{id}' was given to another command"));
@@ -99,22 +88,7 @@ impl Log {
                 if state.orders.len() >= ORDERS_KEPT {
                     state.orders.pop_front();
                 }
-                state.orders.push_back(OrderReport {
-                    id: id.clone(),
-                    status: OrderStatus::Accepted,
-                    reason: None,
-                    cycle_applied: None,
-                    shape: 0,
-                    shapes: 0,
-                    min_scaled_jacobian: None,
-                    judged: None,
-                    not_followed: None,
-                    deviation: None,
-                    largest_displacement: None,
-                    fraction: None,
-                    seconds: ShapeSeconds::default(),
-                    added_steps: None,
-                });
+                state.orders.push_back(OrderReport { id: id.clone(), ..OrderReport::default() });
             } else {
                 if state.others.len() >= ORDERS_KEPT {
                     state.others.pop_front();
@@ -123,7 +97,8 @@ impl Log {
             }
             id
         };
-        // A replay's own pipelines give their commands again; those of the journal would double them.
+        // A replay's own pipelines give their commands again; those of the journal would double
+        // them.
         let command = (!matches!(source, Source::Pipeline(_))).then(|| command.clone());
         let reason = match source {
             Source::Pipeline(name) => Some(format!("from pipeline '{name}'")),
@@ -149,7 +124,7 @@ impl Log {
     /// Changes what is known of an order and tells the viewers.
     pub(crate) fn update(&self, id: &str, change: impl FnOnce(&mut OrderReport)) {
         {
-            let mut state = self.lock();
+            let mut state = lock(&self.state);
             let Some(order) = state.orders.iter_mut().rev().find(|order| order.id == id) else {
                 return;
             };
@@ -172,7 +147,8 @@ impl Log {
         });
     }
 
-    /// Notes that the motion of an order begins; `clamped` is the fraction that is done, where that is not all of it.
+    /// Notes that the motion of an order begins; `clamped` is the fraction that is done, where that
+    /// is not all of it.
     pub(crate) fn begin(
         &self,
         id: &str,
@@ -201,7 +177,7 @@ impl Log {
     }
 
     /// Notes that the solver did not take a motion; it is said once for each order.
-    pub(crate) fn not_followed(&self, id: &str, not: NotFollowed) {
+    pub(crate) fn not_followed(&self, id: &str, handed_out: Moment, not: NotFollowed) {
         let NotFollowed { cycle, shape, distance } = not;
         let mut first = None;
         self.update(id, |order| {
@@ -212,14 +188,31 @@ impl Log {
             }
         });
         let Some(shapes) = first else { return };
-        let message = format!(
-            "order '{id}': applied, not followed: shape {shape} of {shapes}, handed out at cycle {cycle}, is not where the \
-             solver's mesh is at the next call; its vertices are up to {distance:.3e} from there"
+        let reason = format!(
+            "shape {shape} of {shapes}, handed out at cycle {cycle}, is not where the solver's mesh is at the next call; its \
+             vertices are up to {distance:.3e} from there"
         );
+        let message = format!("order '{id}': applied, not followed: {reason}");
+        self.journal(id, JournalStatus::NotFollowed, handed_out, None, Some(reason), [None; 2]);
         log::warn!("{message}");
         if let Some(hub) = &self.hub {
             hub.tell(&json!({"error": {"message": message, "id": id}}));
         }
+    }
+
+    /// Notes that no call came after the one that handed a shape out.
+    pub(crate) fn not_confirmed(&self, id: &str, handed_out: Moment, shape: u32) {
+        let mut shapes = shape;
+        self.update(id, |order| {
+            order.not_confirmed = Some(shape);
+            shapes = order.shapes;
+        });
+        let reason = format!(
+            "shape {shape} of {shapes}, handed out at cycle {}, was the last: no call after it shows whether the solver's mesh is there",
+            handed_out.cycle
+        );
+        log::info!("order '{id}': applied, not confirmed: {reason}");
+        self.journal(id, JournalStatus::NotConfirmed, handed_out, None, Some(reason), [None; 2]);
     }
 
     fn journal(
@@ -253,9 +246,10 @@ impl Log {
 
     fn tell(&self, id: &str) {
         let Some(hub) = &self.hub else { return };
-        let state = self.lock();
+        let state = lock(&self.state);
         if let Some(order) = state.orders.iter().rev().find(|order| order.id == id) {
-            // What it asks for is told once: to those who are there when it comes in, and to others when they come.
+            // The edits of an order are sent once, when it is accepted; a viewer that connects later
+            // gets them in its `hello`.
             let told = if order.status == OrderStatus::Accepted {
                 state.told(order)
             } else {
@@ -267,17 +261,18 @@ impl Log {
 
     /// The newest orders, for a viewer that connects.
     pub(crate) fn told(&self) -> Value {
-        let state = self.lock();
+        let state = lock(&self.state);
         let skipped = state.orders.len().saturating_sub(ORDERS_TOLD);
         state.orders.iter().skip(skipped).map(|order| state.told(order)).collect()
     }
 
     pub(crate) fn reports(&self) -> Vec<OrderReport> {
-        self.lock().orders.iter().cloned().collect()
+        lock(&self.state).orders.iter().cloned().collect()
     }
 }
 
-/// An order as JSON, unless it is long; of a long one no more is written than it takes to find that out.
+/// An order as JSON, unless it is long; of a long one no more is written than it takes to find that
+/// out.
 fn told_whole(order: &Order) -> Option<Value> {
     let mut bytes = [0; TOLD_WHOLE];
     let mut rest = &mut bytes[..];
@@ -286,7 +281,7 @@ fn told_whole(order: &Order) -> Option<Value> {
     serde_json::from_slice(&bytes[..written]).ok()
 }
 
-impl State {
+impl KnownCommands {
     /// An order's report, with what was asked for.
     fn told(&self, order: &OrderReport) -> Value {
         let mut told = json!(order);

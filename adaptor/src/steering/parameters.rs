@@ -84,22 +84,16 @@ impl Parameters {
         &self.all
     }
 
-    pub(crate) fn check(&self, name: &str, value: f64) -> Result<usize, ParameterError> {
-        let known = || self.all.iter().map(|parameter| parameter.name.clone()).collect::<Vec<_>>();
-        let index =
-            self.all.iter().position(|parameter| parameter.name == name).ok_or_else(|| {
-                let near = nearest(name, self.all.iter().map(|parameter| parameter.name.as_str()))
-                    .map(str::to_owned);
-                ParameterError::Unknown { name: name.into(), near, known: known() }
-            })?;
-        check(&self.all[index], value)?;
-        Ok(index)
-    }
-
     pub(crate) fn set(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
-        let index = self.check(name, value)?;
+        let Some(parameter) = self.all.iter_mut().find(|parameter| parameter.name == name) else {
+            let known: Vec<String> =
+                self.all.iter().map(|parameter| parameter.name.clone()).collect();
+            let near = nearest(name, known.iter().map(String::as_str)).map(str::to_owned);
+            return Err(ParameterError::Unknown { name: name.into(), near, known });
+        };
+        check(parameter, value)?;
+        parameter.value = value;
         self.forget_read();
-        self.all[index].value = value;
         self.changed.retain(|(other, _)| other != name);
         self.changed.push((name.into(), value));
         Ok(())

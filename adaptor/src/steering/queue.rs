@@ -3,7 +3,7 @@
 use std::{
     collections::VecDeque,
     sync::{
-        Condvar, Mutex, MutexGuard, PoisonError,
+        Condvar, Mutex,
         atomic::{AtomicBool, Ordering},
     },
 };
@@ -12,6 +12,8 @@ use tombolo_pipelines::{
     language::{Command, Order},
     limits::{Exceeded, WAITING, WAITING_BYTES},
 };
+
+use crate::lock::{lock, wait};
 
 /// A command that was read, found valid and written to the journal.
 #[derive(Debug)]
@@ -35,19 +37,17 @@ pub(crate) struct Asked {
 #[derive(Debug, Default)]
 pub(crate) struct Queue {
     attention: AtomicBool,
+    /// Whether there has been a viewer that may steer.
+    driven: AtomicBool,
     waiting: Mutex<VecDeque<Received>>,
     questions: Mutex<Vec<Asked>>,
     arrived: Condvar,
 }
 
 impl Queue {
-    fn lock(&self) -> MutexGuard<'_, VecDeque<Received>> {
-        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Refuses one more of so many bytes where there is no room for it.
     pub(crate) fn check_room(&self, bytes: usize) -> Result<(), Exceeded> {
-        let waiting = self.lock();
+        let waiting = lock(&self.waiting);
         WAITING.check(waiting.len() + 1)?;
         WAITING_BYTES.check(
             waiting.iter().map(|received| received.bytes).sum::<usize>().saturating_add(bytes),
@@ -55,13 +55,13 @@ impl Queue {
     }
 
     pub(crate) fn push(&self, received: Received) {
-        self.lock().push_back(received);
+        lock(&self.waiting).push_back(received);
         self.call();
     }
 
     /// Asks in place of what the same client asked before and was not told yet.
     pub(crate) fn ask(&self, asked: Asked) {
-        let mut questions = self.questions.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut questions = lock(&self.questions);
         questions.retain(|waiting| waiting.client != asked.client);
         questions.push(asked);
         drop(questions);
@@ -70,15 +70,26 @@ impl Queue {
 
     /// All that is asked.
     pub(crate) fn take_questions(&self) -> Vec<Asked> {
-        std::mem::take(&mut *self.questions.lock().unwrap_or_else(PoisonError::into_inner))
+        std::mem::take(&mut *lock(&self.questions))
     }
 
     /// Tells the solver's thread that there is something to look at.
     pub(crate) fn call(&self) {
         // Under the lock, so that a thread about to wait cannot miss it.
-        let _held = self.lock();
+        let _held = lock(&self.waiting);
         self.attention.store(true, Ordering::Release);
         self.arrived.notify_all();
+    }
+
+    /// Tells the solver's thread that a viewer may steer from now on.
+    pub(crate) fn drive(&self) {
+        self.driven.store(true, Ordering::Release);
+        self.call();
+    }
+
+    /// Whether there has been a viewer that may steer.
+    pub(crate) fn is_driven(&self) -> bool {
+        self.driven.load(Ordering::Acquire)
     }
 
     /// Whether there was a call since [`Queue::take`].
@@ -89,16 +100,16 @@ impl Queue {
 
     /// All that waits.
     pub(crate) fn take(&self) -> VecDeque<Received> {
-        let mut waiting = self.lock();
+        let mut waiting = lock(&self.waiting);
         self.attention.store(false, Ordering::Release);
         std::mem::take(&mut *waiting)
     }
 
     /// Returns once there was a call.
     pub(crate) fn wait(&self) {
-        let mut waiting = self.lock();
+        let mut waiting = lock(&self.waiting);
         while !self.has_called() {
-            waiting = self.arrived.wait(waiting).unwrap_or_else(PoisonError::into_inner);
+            waiting = wait(&self.arrived, waiting);
         }
     }
 }

@@ -2,13 +2,13 @@
 
 use std::{num::NonZeroU32, sync::Arc};
 
-use tombolo_deform::{quality::Guard, surface::Edit};
+use tombolo_deform::{edit::Edit, quality::Guard, shape::check_stack};
 use tombolo_pipelines::{
-    language::{Change, DeformStage, check_stack},
+    language::{Change, Deformation},
     limits::{Exceeded, ORDERS},
 };
 
-/// What one order did to the stack.
+/// The change that one order made to the stack.
 #[derive(Debug, Clone, PartialEq)]
 struct Entry {
     replaces: bool,
@@ -16,10 +16,10 @@ struct Entry {
     settings: ShapeSettings,
 }
 
-/// What the shape of a stack depends on besides its edits.
+/// The settings that the shape of a stack depends on besides its edits.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct ShapeSettings {
-    pub(crate) deform: DeformStage,
+    pub(crate) deform: Deformation,
     pub(crate) guard: Guard,
 }
 
@@ -39,12 +39,13 @@ pub(crate) enum StackError {
 }
 
 impl EditStack {
-    /// The stack after an order, and the settings that its shape is made with: the order's own, else for an undo those that the
-    /// shape it goes back to was made with (so that the same bits come back), else `default`.
+    /// The stack after an order, and the settings that its shape is made with: the order's own,
+    /// else for an undo those that the shape it goes back to was made with (so that the same bits
+    /// come back), else `default`.
     pub(crate) fn after(
         &self,
         change: &Change,
-        deform: Option<&DeformStage>,
+        deform: Option<&Deformation>,
         guard: Option<Guard>,
         default: &ShapeSettings,
     ) -> Result<(Self, ShapeSettings), StackError> {
@@ -79,13 +80,14 @@ impl EditStack {
             .count()
     }
 
-    /// The stack with a fraction of the last order's edits, those after the first `kept` edits of the stack.
+    /// The stack with a fraction of the last order's edits, those after the first `kept` edits of
+    /// the stack.
     pub(crate) fn clamped(mut self, kept: usize, fraction: f64) -> Self {
         let count = self.present().count();
         if let Some(last) = self.entries.last_mut().map(Arc::make_mut) {
             let before = count - last.edits.len();
-            for (place, edit) in last.edits.iter_mut().enumerate() {
-                if before + place >= kept {
+            for (index, edit) in last.edits.iter_mut().enumerate() {
+                if before + index >= kept {
                     *edit = edit.scaled(fraction);
                 }
             }
@@ -148,7 +150,7 @@ mod tests {
 
     #[test]
     fn an_undo_deforms_as_the_shape_it_goes_back_to() {
-        let stiff = DeformStage { sliding: vec!["a".into()], ..DeformStage::default() };
+        let stiff = Deformation { sliding: vec!["a".into()], ..Deformation::default() };
         let mending = Guard { otherwise: Otherwise::Untangle, ..Guard::default() };
         let none = EditStack::default();
         let default = ShapeSettings::default();

@@ -2,7 +2,7 @@
 
 use tombolo_pipelines::language::{At, Command, Order, TimedCommand};
 
-use super::Moment;
+use crate::step::Moment;
 
 /// Commands that are not due yet, in the order in which they were given.
 #[derive(Debug)]

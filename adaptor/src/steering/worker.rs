@@ -1,13 +1,13 @@
 //! The thread on which shapes are planned while the solver keeps stepping.
 //!
-//! It computes on threads of its own: were they the solver's, a solver would wait for the plan in its own loops. Orders come
-//! first, then forecasts, then what is only made ready.
+//! It computes on threads of its own: were they the solver's, a solver would wait for the plan in
+//! its own loops. Orders come first, then forecasts, then what is only made ready.
 
 use std::{
     collections::VecDeque,
     num::NonZeroUsize,
     sync::{
-        Arc, Condvar, Mutex, MutexGuard, PoisonError,
+        Arc, Condvar, Mutex,
         mpsc::{Receiver, RecvError, Sender, TryRecvError, channel},
     },
     thread::JoinHandle,
@@ -15,17 +15,17 @@ use std::{
 
 use rayon::ThreadPool;
 use tombolo_deform::quality::{Quality, quality};
-use tombolo_pipelines::{
-    language::DeformStage,
-    shape::{Forecast, Plan},
-};
+use tombolo_deform::shape::{Forecast, Plan};
+use tombolo_pipelines::language::Deformation;
 
 use super::{
-    planner::{Planner, Rejection, Wish},
+    planner::{PlanRequest, Planner, Rejection},
     queue::Queue,
 };
 
-/// What the worker has to say.
+use crate::lock::{lock, wait};
+
+/// A message of the worker.
 pub(crate) enum Done {
     /// The quality of the reference mesh.
     Prepared(Box<Quality>),
@@ -36,38 +36,39 @@ pub(crate) enum Done {
 pub(crate) type Answer = Box<dyn FnOnce(Forecast) + Send>;
 
 /// A forecast that waits, and who asked for it.
-struct Asked {
+struct Question {
     asker: u64,
-    wish: Wish,
+    asked: PlanRequest,
     answer: Answer,
 }
 
+/// The jobs that wait, by how urgent they are.
 #[derive(Default)]
-struct State {
-    plans: VecDeque<Wish>,
+struct WaitingJobs {
+    plans: VecDeque<PlanRequest>,
     /// The newest of each asker.
-    forecasts: VecDeque<Asked>,
-    prepare: Option<DeformStage>,
-    ahead: Option<Wish>,
+    forecasts: VecDeque<Question>,
+    prepare: Option<Deformation>,
+    ahead: Option<PlanRequest>,
     closed: bool,
 }
 
 enum Job {
-    Plan(Wish),
-    Forecast(Asked),
-    Prepare(DeformStage),
-    Ahead(Wish),
+    Plan(PlanRequest),
+    Forecast(Question),
+    Prepare(Deformation),
+    Ahead(PlanRequest),
 }
 
-/// What there is to do.
+/// A job of the worker.
 #[derive(Default)]
 pub(crate) struct Jobs {
-    state: Mutex<State>,
+    state: Mutex<WaitingJobs>,
     changed: Condvar,
 }
 
 impl Jobs {
-    fn change(&self, change: impl FnOnce(&mut State)) {
+    fn change(&self, change: impl FnOnce(&mut WaitingJobs)) {
         change(&mut lock(&self.state));
         self.changed.notify_one();
     }
@@ -86,15 +87,16 @@ impl Jobs {
             if job.is_some() {
                 return job;
             }
-            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+            state = wait(&self.changed, state);
         }
     }
 
-    /// Asks what a wish would come to, in place of what the same asker wanted to know before and was not told yet.
-    pub(crate) fn forecast(&self, asker: u64, wish: Wish, answer: Answer) {
+    /// Asks for a forecast, in place of what the same asker wanted to know before and was not told
+    /// yet.
+    pub(crate) fn forecast(&self, asker: u64, asked: PlanRequest, answer: Answer) {
         self.change(|state| {
             state.forecasts.retain(|waiting| waiting.asker != asker);
-            state.forecasts.push_back(Asked { asker, wish, answer });
+            state.forecasts.push_back(Question { asker, asked, answer });
         });
     }
 }
@@ -130,26 +132,26 @@ impl Worker {
         Ok(())
     }
 
-    /// What can be asked of it from other threads.
+    /// The jobs of the worker, which other threads may add to.
     pub(crate) fn jobs(&self) -> &Arc<Jobs> {
         &self.jobs
     }
 
     /// Sets up the operator of the volume.
-    pub(crate) fn prepare(&self, deform: DeformStage) {
+    pub(crate) fn prepare(&self, deform: Deformation) {
         self.jobs.change(|state| state.prepare = Some(deform));
     }
 
     /// Makes a plan that will be asked for.
-    pub(crate) fn look_ahead(&self, wish: Wish) {
-        self.jobs.change(|state| state.ahead = Some(wish));
+    pub(crate) fn look_ahead(&self, asked: PlanRequest) {
+        self.jobs.change(|state| state.ahead = Some(asked));
     }
 
-    pub(crate) fn plan(&self, wish: Wish) {
-        self.jobs.change(|state| state.plans.push_back(wish));
+    pub(crate) fn plan(&self, asked: PlanRequest) {
+        self.jobs.change(|state| state.plans.push_back(asked));
     }
 
-    /// What is done, if anything is.
+    /// The next finished job, if there is one.
     pub(crate) fn try_take(&self) -> Option<Done> {
         match self.done.try_recv() {
             Ok(done) => Some(done),
@@ -158,7 +160,7 @@ impl Worker {
         }
     }
 
-    /// What is done next; waits for it.
+    /// Waits for the next finished job.
     pub(crate) fn take(&self) -> Done {
         self.done.recv().unwrap_or_else(|RecvError| gone())
     }
@@ -176,16 +178,16 @@ impl Drop for Worker {
 fn work(jobs: &Jobs, planner: &Mutex<Planner>, tell: &Sender<Done>, queue: &Queue) {
     while let Some(job) = jobs.next() {
         let done = match job {
-            Job::Plan(wish) => Done::Planned(Box::new(lock(planner).plan(&wish))),
+            Job::Plan(asked) => Done::Planned(Box::new(lock(planner).plan(&asked))),
             Job::Prepare(deform) => Done::Prepared(Box::new(prepare(planner, &deform))),
-            Job::Forecast(Asked { wish, answer, .. }) => {
-                let forecast = lock(planner).forecast(&wish);
+            Job::Forecast(Question { asked, answer, .. }) => {
+                let forecast = lock(planner).forecast(&asked);
                 answer(forecast);
                 continue;
             }
-            Job::Ahead(wish) => {
+            Job::Ahead(asked) => {
                 // Whoever asks for it is told what is wrong with it.
-                let _ = lock(planner).plan(&wish);
+                let _ = lock(planner).plan(&asked);
                 continue;
             }
         };
@@ -196,11 +198,11 @@ fn work(jobs: &Jobs, planner: &Mutex<Planner>, tell: &Sender<Done>, queue: &Queu
     }
 }
 
-fn prepare(planner: &Mutex<Planner>, deform: &DeformStage) -> Quality {
+fn prepare(planner: &Mutex<Planner>, deform: &Deformation) -> Quality {
     let mesh = {
         let mut planner = lock(planner);
         planner.prepare(deform);
-        Arc::clone(planner.shaper().mesh())
+        planner.shaper().mesh().clone()
     };
     quality(mesh.cells(), mesh.points())
 }
@@ -215,9 +217,4 @@ fn pool(name: &'static str, threads: usize) -> std::io::Result<ThreadPool> {
 
 fn gone() -> Done {
     Done::Planned(Box::new(Err(Rejection::from("the thread that plans shapes has ended"))))
-}
-
-/// A panic in the kernel leaves at worst a cache without its entry.
-pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,4 +1,5 @@
-//! Connections that cannot be held open by a client that says nothing, reads nothing, or never finishes its request.
+//! Connections that cannot be held open by a client that says nothing, reads nothing, or never
+//! finishes its request.
 
 use std::{
     future::Future,
@@ -23,14 +24,16 @@ use tokio::{
 
 /// How long a connection may go without a request answered before it has become a WebSocket.
 const REQUEST_TIME: Duration = Duration::from_secs(15);
-/// How long a WebSocket may go without a byte from the viewer, who answers a ping every [`super::PING_PERIOD`].
+/// How long a WebSocket may go without a byte from the viewer, who answers a ping every
+/// [`super::PING_PERIOD`].
 const SILENT_TIME: Duration = Duration::from_secs(30);
 /// How long a write may wait for a client that does not read.
 pub(super) const WRITE_TIME: Duration = Duration::from_secs(10);
-/// Connections open at once, viewers and others together. Beyond it the newest is closed unanswered.
+/// Connections open at once, viewers and others together. Beyond it the newest is closed
+/// unanswered.
 const CONNECTIONS: usize = 128;
 
-/// What a handler knows about the connection that a request came by.
+/// The connection that a request came by, as a handler knows it.
 #[derive(Debug, Clone)]
 pub(super) struct Connection {
     upgraded: Arc<AtomicBool>,
@@ -64,11 +67,13 @@ impl axum::serve::Listener for Listener {
             match self.socket.accept().await {
                 Ok((stream, address)) => {
                     let Ok(slot) = Arc::clone(&self.slots).try_acquire_owned() else { continue };
-                    // Small messages (an order's outcome) should not wait for more bytes; a socket that cannot be told so works too.
+                    // Small messages (an order's outcome) should not wait for more bytes; a socket
+                    // that cannot be told so works too.
                     let _ = stream.set_nodelay(true);
                     return (TimedStream::new(stream, slot), address);
                 }
-                // Out of file descriptors, or a connection that was gone before it was taken: try again a little later.
+                // Out of file descriptors, or a connection that was gone before it was taken: try
+                // again a little later.
                 Err(_) => tokio::time::sleep(Duration::from_millis(100)).await,
             }
         }

@@ -1,12 +1,14 @@
-//! What the solver's side has to say to the viewers, the newest of each kind, and who the viewers are.
+//! What the solver's side has to say to the viewers, the newest of each kind, and who the viewers
+//! are.
 //!
-//! Every call returns at once. What is kept is bounded: one newest frame of each view (as an extract until somebody looks), the
-//! same again for each viewer that has not read it yet, and short queues of texts.
+//! Every call returns at once. What is kept is bounded: one newest frame of each view (as an
+//! extract until somebody looks), the same again for each viewer that has not read it yet, and
+//! short queues of texts.
 
 use std::{
     collections::{BTreeMap, VecDeque},
     sync::{
-        Arc, Condvar, Mutex, MutexGuard, PoisonError,
+        Arc, Condvar, Mutex,
         atomic::{AtomicU64, Ordering},
     },
     time::{Duration, Instant},
@@ -17,6 +19,7 @@ use serde_json::{Map, Value, json};
 use tokio::sync::Notify;
 
 use super::{ReferenceSurface, StreamCounts};
+use crate::lock::{lock, wait};
 
 /// How long the wheel is kept for a driver whose connection was lost.
 pub(super) const WHEEL_KEPT: Duration = Duration::from_secs(3);
@@ -40,7 +43,7 @@ pub(crate) struct Frame {
 /// Encodes a frame on the encoder's thread; the message says why it could not be done.
 pub(crate) type Encode = Box<dyn FnOnce() -> Result<Frame, String> + Send>;
 
-/// What one viewer has yet to read.
+/// The messages that a viewer has yet to read.
 #[derive(Default)]
 struct Outbox {
     texts: VecDeque<Arc<str>>,
@@ -58,7 +61,7 @@ pub(super) struct Client {
     outbox: Mutex<Outbox>,
 }
 
-/// What to send to a viewer next.
+/// A message for a viewer.
 pub(super) enum Message {
     Text(Arc<str>),
     Hello,
@@ -66,7 +69,8 @@ pub(super) enum Message {
 }
 
 impl Client {
-    /// The next thing to send, the most urgent first; `Err` once the viewer has left too much unread.
+    /// The next thing to send, the most urgent first; `Err` once the viewer has left too much
+    /// unread.
     pub(super) fn next(&self) -> Result<Option<Message>, ()> {
         let mut outbox = lock(&self.outbox);
         if outbox.overflowed {
@@ -102,7 +106,8 @@ impl Client {
     }
 }
 
-/// The part of the status that changes with every step: written by the solver's thread with plain stores.
+/// The part of the status that changes with every step: written by the solver's thread with plain
+/// stores.
 #[derive(Debug, Default)]
 pub(crate) struct Clock {
     cycle: AtomicU64,
@@ -135,8 +140,9 @@ struct View {
     frame: Option<Arc<Frame>>,
 }
 
+/// The viewers, and the newest message of each kind for them.
 #[derive(Default)]
-struct State {
+struct HubState {
     description: Map<String, Value>,
     conditions: Map<String, Value>,
     views: Vec<View>,
@@ -151,23 +157,18 @@ struct State {
     closed: bool,
 }
 
-/// See the module.
+/// The newest messages of the solver, for all viewers.
 #[derive(Default)]
 pub(crate) struct Hub {
-    state: Mutex<State>,
+    state: Mutex<HubState>,
     work: Condvar,
     pub(crate) clock: Clock,
     counters: Counters,
 }
 
-/// What a viewer is called in messages.
+/// The name of a viewer in messages.
 fn name(client: u64) -> String {
     format!("c{client}")
-}
-
-/// A panic while one of these was held leaves nothing half-done in it: every change is one assignment or one push.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Said by the solver's side.
@@ -230,7 +231,8 @@ impl Hub {
         }
     }
 
-    /// Hands over the newest extract of a view. The one before it, if nobody came to encode it, is dropped.
+    /// Hands over the newest extract of a view. The one before it, if nobody came to encode it, is
+    /// dropped.
     pub(crate) fn frame(&self, view: usize, encode: Encode) {
         let mut state = lock(&self.state);
         if state.views.len() <= view {
@@ -278,7 +280,7 @@ impl Hub {
                 });
                 match waiting {
                     Some(found) => break found,
-                    None => state = self.work.wait(state).unwrap_or_else(PoisonError::into_inner),
+                    None => state = wait(&self.work, state),
                 }
             };
             drop(state);
@@ -311,7 +313,8 @@ impl Hub {
 
 /// Done on the stream's thread.
 impl Hub {
-    /// Lets a viewer in, unless there are `limit` already. `returning` is what it was called before its connection was lost.
+    /// Lets a viewer in, unless there are `limit` already. `returning` is what it was called before
+    /// its connection was lost.
     pub(super) fn join(&self, limit: usize, returning: Option<&str>) -> Option<Arc<Client>> {
         let mut state = lock(&self.state);
         if state.clients.len() >= limit {
@@ -408,7 +411,8 @@ impl Hub {
             return;
         }
         state.status_dirty = false;
-        // Measured over the steps since the last status, so that the solver need not look at a clock for it.
+        // Measured over the steps since the last status, so that the solver need not look at a
+        // clock for it.
         let step_seconds = before.and_then(|(last, at)| {
             let steps = cycle.checked_sub(last).filter(|&steps| steps > 0)?;
             #[expect(clippy::cast_precision_loss, reason = "steps of a fraction of a second")]
@@ -440,7 +444,7 @@ impl Hub {
     }
 }
 
-impl State {
+impl HubState {
     fn wheel_is_free(&self) -> bool {
         self.driver.is_none() && self.wheel_lost.is_none_or(|(at, _)| at.elapsed() >= WHEEL_KEPT)
     }

@@ -1,14 +1,17 @@
 //! The server that viewers connect to, on a thread of its own.
 //!
-//! It serves the viewer's files at `/`, one WebSocket at `/ws?token=...` and the reference surface at `/surface?token=...` (the
-//! protocol is in `docs/protocol.md`). Nothing that a client does reaches the solver but commands that were read and found valid.
+//! It serves the viewer's files at `/`, one WebSocket at `/ws?token=...` and the reference surface
+//! at `/surface?token=...` (the protocol is in `docs/protocol.md`). Nothing that a client does
+//! reaches the solver but commands that were read and found valid.
 //!
-//! What it guarantees: it listens on the loopback address unless told otherwise; nothing of the run without the token; no page of
-//! another site can use a browser's connection (the `Origin` must be the server's own), nor reach it under another name (on
-//! loopback the `Host` must be loopback too); messages over [`DOCUMENT`], more than [`VIEWERS`] viewers, and floods of messages
-//! are refused; a client that does not read for 10 seconds, or says nothing for 30, is let go.
+//! What it guarantees: it listens on the loopback address unless told otherwise; nothing of the run
+//! without the token; no page of another site can use a browser's connection (the `Origin` must be
+//! the server's own), nor reach it under another name (on loopback the `Host` must be loopback
+//! too); messages over [`DOCUMENT`], more than [`VIEWERS`] viewers, and floods of messages are
+//! refused; a client that does not read for 10 seconds, or says nothing for 30, is let go.
 //!
-//! What it does not: it does not encrypt. Over an open network use an SSH tunnel to the loopback address.
+//! What it does not: it does not encrypt. Over an open network use an SSH tunnel to the loopback
+//! address.
 
 mod connection;
 mod hub;
@@ -49,9 +52,10 @@ pub use token::Token;
 use connection::{Connection, Listener};
 use viewer_files::ViewerFiles;
 
-/// Viewers at once; one more is told so.
+/// The most viewers that may watch at once.
 pub const VIEWERS: usize = 16;
-/// The largest message that is read at all, in bytes: so much more than a document may have that one too long is told so.
+/// The largest message that is read at all, in bytes: so much more than a document may have that
+/// one too long is told so.
 const MESSAGE_SIZE: usize = DOCUMENT.most + (1 << 16);
 /// How often a viewer is asked whether it is still there.
 const PING_PERIOD: Duration = Duration::from_secs(10);
@@ -63,7 +67,7 @@ pub(crate) trait CommandSink: Send + Sync {
     /// Takes one message, which had so many bytes.
     ///
     /// # Errors
-    /// What is wrong with it, for the viewer to read; then nothing was taken.
+    /// A text for the viewer that says what is wrong; then nothing was taken.
     fn receive(
         &self,
         client: u64,
@@ -71,6 +75,9 @@ pub(crate) trait CommandSink: Send + Sync {
         message: Message,
         bytes: usize,
     ) -> Result<(), String>;
+
+    /// Hears that a viewer has connected which may steer.
+    fn driven(&self);
 
     /// The orders so far, for a viewer that connects.
     fn orders(&self) -> serde_json::Value;
@@ -81,7 +88,8 @@ pub(crate) trait CommandSink: Send + Sync {
 pub struct StreamCounts {
     /// Frames that viewers were sent, each viewer counted.
     pub frames: u64,
-    /// Frames that made way for newer ones before a viewer had read them or the encoder had come to them.
+    /// Frames that made way for newer ones before a viewer had read them or the encoder had come to
+    /// them.
     pub dropped: u64,
     /// Bytes of all frames sent.
     pub bytes: u64,
@@ -237,7 +245,8 @@ const HEADERS: [(HeaderName, &str); 6] = [
     (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
 ];
 
-/// Refuses requests under a foreign name or from a foreign page, and puts the headers on every answer.
+/// Refuses requests under a foreign name or from a foreign page, and puts the headers on every
+/// answer.
 async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Response {
     let mut response = match refuse(request.headers(), shared.loopback) {
         Some(reason) => (StatusCode::FORBIDDEN, reason).into_response(),
@@ -271,7 +280,7 @@ fn refuse(headers: &HeaderMap, loopback: bool) -> Option<&'static str> {
 #[derive(Deserialize)]
 struct Credentials {
     token: Option<String>,
-    /// What the viewer was called before it lost its connection.
+    /// The name of the viewer before it lost its connection.
     client: Option<String>,
 }
 
@@ -333,7 +342,8 @@ async fn file(State(shared): State<Shared>, uri: Uri, request: Request) -> Respo
     if request.method() != axum::http::Method::GET {
         return StatusCode::METHOD_NOT_ALLOWED.into_response();
     }
-    // A link with a wrong token is answered here, where a person can read it, rather than by a page that cannot connect.
+    // A link with a wrong token is answered here, where a person can read it, rather than by a page
+    // that cannot connect.
     let shown = Query::<Credentials>::try_from_uri(&uri).ok().and_then(|query| query.0.token);
     if shown.is_some_and(|token| !shared.token.matches(&token)) {
         return (StatusCode::UNAUTHORIZED, UNAUTHORIZED).into_response();

@@ -37,6 +37,9 @@ pub(super) async fn serve(
     hub: Arc<Hub>,
     commands: Arc<dyn CommandSink>,
 ) {
+    if hub.is_driver(client.id) {
+        commands.driven();
+    }
     let (sink, stream) = socket.split();
     // Reading goes on while a write waits, so that a command is never stuck behind a frame.
     tokio::select! {
@@ -125,7 +128,8 @@ async fn read(
     }
 }
 
-/// Takes one message: `{"id"?, "order" | "pause" | "resume" | "stop" | "parameter" | "forecast" | "drive": ...}`.
+/// Takes one message: `{"id"?, "order" | "pause" | "resume" | "stop" | "parameter" | "forecast" |
+/// "drive": ...}`.
 fn receive(
     text: &str,
     client: &Client,
@@ -157,7 +161,8 @@ fn bytes(message: &Wire) -> usize {
     }
 }
 
-/// A bucket that fills at [`RATE`] up to [`BURST`], and that each message takes one from, and one more for each [`WEIGHT`] of it.
+/// A bucket that fills at [`RATE`] up to [`BURST`], and that each message takes one from, and one
+/// more for each [`WEIGHT`] of it.
 struct Allowance {
     left: f64,
     since: Instant,

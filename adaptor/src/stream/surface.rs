@@ -1,4 +1,5 @@
-//! The reference surface, for viewers that preview edits: every bit of it, encoded when the first of them asks.
+//! The reference surface, for viewers that preview edits: every bit of it, encoded when the first
+//! of them asks.
 
 use std::{
     collections::hash_map::DefaultHasher,
@@ -32,7 +33,7 @@ impl ReferenceSurface {
         Self { id: hasher.finish(), surface, frame: OnceLock::new() }
     }
 
-    /// What `hello` tells of it.
+    /// The description of the surface in `hello`.
     pub(crate) fn described(&self) -> Value {
         let (vertices, faces) = (self.surface.points().len(), self.surface.faces().len());
         json!({"id": format!("{:016x}", self.id), "vertices": vertices, "faces": faces})

@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-/// 128 random bits as 32 hexadecimal digits, or what the configuration says.
+/// The secret that viewers must show: 128 random bits as 32 hexadecimal digits, or the
+/// configuration's own.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Token(String);
 
@@ -17,13 +18,13 @@ impl Token {
         Ok(Self(bytes.iter().map(|byte| format!("{byte:02x}")).collect()))
     }
 
-    /// A token that somebody else has chosen.
+    /// The token that the configuration gives.
     #[must_use]
     pub fn given(text: &str) -> Self {
         Self(text.to_owned())
     }
 
-    /// The text of it.
+    /// The token as text.
     #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0

@@ -1,4 +1,5 @@
-//! The files of the viewer: built into the library, in a directory, or a page that says that there are none.
+//! The files of the viewer: built into the library, in a directory, or a page that says that there
+//! are none.
 
 use std::{
     borrow::Cow,

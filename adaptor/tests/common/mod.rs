@@ -9,11 +9,11 @@ use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, tungstenite::Message};
 use tombolo::{
     Adaptor, Report, Settings, Step,
     deform::{
-        mesh::{ArrayView, Mesh, MeshView, Vector},
+        mesh::{Mesh, MeshView, Vector},
         shapes::box_of_tets,
     },
     pipelines::{
-        extract::{Association, Channel, FieldView},
+        extract::{Channel, FieldView},
         language::{self, Config},
     },
 };
@@ -68,11 +68,7 @@ impl Solver {
         let step = Step { cycle: self.cycle, time: self.cycle as f64 * 0.01, time_step: 0.01 };
         let speed: Vec<f64> =
             self.mesh.points().iter().map(|[x, y, z]| x + y * z + step.time).collect();
-        let fields = [FieldView {
-            name: "speed",
-            association: Association::Vertex,
-            values: ArrayView::scalars(&speed),
-        }];
+        let fields = [FieldView::vertex("speed", &speed)];
         let channels =
             [Channel { name: "fluid", mesh: MeshView::from(&self.mesh), fields: &fields }];
         let begun = Instant::now();
@@ -90,7 +86,7 @@ impl Solver {
             self.motions.push((self.cycle, motion.shape, motion.order.to_owned()));
             moved = Some(motion.coordinates.to_vec());
         }
-        self.parameters.extend_from_slice(steering.parameters);
+        self.parameters.extend(steering.parameters);
         self.stopped |= steering.stop;
         if let Some(points) = moved {
             self.mesh = self.mesh.with_points(points).expect("finite");

@@ -62,7 +62,8 @@ public:
   {
     other.Handle = nullptr;
   }
-  ~Node() { this->release(); }
+  // Nothing is written to memory that is given back: VTK 9.2 reads the handle of nodes that are gone out of scope.
+  ~Node() { this->destroy(); }
 
   Node& operator=(const Node& other)
   {
@@ -386,12 +387,17 @@ private:
   {
   }
 
-  void release()
+  void destroy()
   {
     if (this->Handle && this->Owns)
     {
       conduit_node_destroy(this->Handle);
     }
+  }
+
+  void release()
+  {
+    this->destroy();
     this->Handle = nullptr;
   }
 

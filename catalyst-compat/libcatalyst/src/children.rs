@@ -3,37 +3,35 @@
 use std::collections::HashMap;
 use std::ptr::NonNull;
 
-use crate::node::Node;
-
 /// Of so many children each is looked at.
 const FEW: usize = 16;
 
 /// A child: its name, which is empty in a list, and the node.
-pub struct Child {
+pub struct Child<N> {
     /// The name.
     pub name: String,
     /// The node, which whoever has the child owns.
-    pub node: NonNull<Node>,
+    pub node: NonNull<N>,
 }
 
 /// Children in order.
 #[derive(Default)]
-pub struct Children {
-    list: Vec<Child>,
+pub struct Children<N> {
+    list: Vec<Child<N>>,
     /// The number of each name, as soon as there are many.
     numbers: Option<HashMap<String, usize>>,
 }
 
-impl Children {
+impl<N> Children<N> {
     /// The children in order.
     #[must_use]
-    pub fn list(&self) -> &[Child] {
+    pub fn list(&self) -> &[Child<N>] {
         &self.list
     }
 
     /// The children alone.
     #[must_use]
-    pub fn into_list(self) -> Vec<Child> {
+    pub fn into_list(self) -> Vec<Child<N>> {
         self.list
     }
 
@@ -47,7 +45,7 @@ impl Children {
     }
 
     /// Appends a child.
-    pub fn push(&mut self, child: Child) {
+    pub fn push(&mut self, child: Child<N>) {
         let number = self.list.len();
         if let Some(numbers) = &mut self.numbers {
             numbers.entry(child.name.clone()).or_insert(number);
@@ -59,7 +57,7 @@ impl Children {
     }
 
     /// Takes out a child; those behind it move up.
-    pub fn remove(&mut self, index: usize) -> Option<Child> {
+    pub fn remove(&mut self, index: usize) -> Option<Child<N>> {
         if index >= self.list.len() {
             return None;
         }

@@ -8,7 +8,7 @@ use crate::node::Node;
 use crate::print::{Detail, Style};
 use crate::schema::{self, Protocol};
 
-/// What is in a file.
+/// The content of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
     /// Compact data, and beside them in `FILE_json` their schema.

@@ -233,7 +233,7 @@ impl Node {
                 layout.elements
             )));
         }
-        // What is copied may lie in the memory that this node is about to let go.
+        // The source may lie in the memory that this node is about to free.
         let kept = self.memory.clone();
         self.make_room(Datatype::compact(kind, layout.elements))?;
         let source = Node::over(data.cast_mut(), layout);

@@ -32,6 +32,7 @@ pub mod datatype;
 pub mod dump;
 pub mod error;
 pub mod files;
+pub mod implementation;
 pub mod information;
 pub mod json;
 pub mod leaf;

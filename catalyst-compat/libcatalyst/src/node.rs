@@ -20,7 +20,7 @@ pub struct Node {
     parent: Cell<*const Node>,
     pub(crate) datatype: Datatype,
     pub(crate) memory: Memory,
-    children: Children,
+    children: Children<Node>,
 }
 
 impl Default for Node {
@@ -112,7 +112,7 @@ impl Node {
         self.child(self.position(name)?)
     }
 
-    /// The child of a name, made if it is not there. What is not an object becomes an empty one first.
+    /// The child of a name, made if it is not there. A node that is no object becomes an empty one first.
     ///
     /// # Errors
     /// The tree would be deeper than [`DEEPEST`].
@@ -125,7 +125,7 @@ impl Node {
         self.child_mut(index).ok_or_else(|| Error::new("a child that was just made is not there"))
     }
 
-    /// A new child at the end of the list. What is not a list becomes an empty one first.
+    /// A new child at the end of the list. A node that is no list becomes an empty one first.
     ///
     /// # Errors
     /// The tree would be deeper than [`DEEPEST`].
@@ -415,7 +415,7 @@ impl Node {
     fn settle(&self) {
         let here = ptr::from_ref(self);
         // SAFETY: children are owned by this node and live; only their cells are written.
-        let told = |child: &Child| unsafe { child.node.as_ref() }.parent.get();
+        let told = |child: &Child<Node>| unsafe { child.node.as_ref() }.parent.get();
         if self.children.list().first().is_some_and(|first| !ptr::eq(told(first), here)) {
             for child in self.children.list() {
                 // SAFETY: as above.

@@ -49,7 +49,7 @@ impl Style {
     }
 }
 
-/// What is written of a leaf.
+/// The text of a leaf.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Detail {
     /// Its values.

@@ -8,7 +8,7 @@ use std::{env, fs};
 
 use crate::dump::{self, Stage};
 use crate::error::{Error, Result};
-use crate::loader::{Implementation, Status};
+use crate::implementation::{Implementation, Status};
 use crate::node::Node;
 use crate::{files, ranks};
 
@@ -104,7 +104,7 @@ fn describe(node: &mut Node) -> Result<()> {
     about_conduit(node.at("catalyst/tpl/conduit")?)
 }
 
-/// What is said of the Conduit whose interface this is.
+/// The description of the Conduit whose interface this is.
 ///
 /// # Errors
 /// There is no memory.

@@ -50,6 +50,8 @@ impl Built {
                     .args(["--library".as_ref(), library().as_os_str()])
                     .args(["--replay", env!("CARGO_BIN_EXE_catalyst_replay")]),
             );
+            // CMake refuses what another clone left.
+            drop(std::fs::remove_dir_all(&build));
             let mut configure = Command::new("cmake");
             configure.arg("-S").arg(package().join("tests/programs")).arg("-B").arg(&build);
             succeed(configure.arg(format!("-DCMAKE_PREFIX_PATH={}", prefix.display())));

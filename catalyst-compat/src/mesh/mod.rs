@@ -1,20 +1,11 @@
-//! Meshes of the Blueprint as nodes describe them, and what the adaptor is lent of them.
-//!
-//! [`Channel::read`] takes a channel's node apart without looking at an array's values; [`Kept`] holds over the steps what cannot
-//! be lent as it lies in the solver's memory.
+//! Meshes of the Blueprint, read from nodes: no value of an array is looked at.
 
 mod amr;
 mod channel;
 mod coordset;
-mod described;
 mod domain;
 mod field;
-mod kept;
-mod polyhedron;
 mod rows;
 mod topology;
 
-pub(crate) use amr::Grid;
-pub(crate) use channel::{Block, Channel};
-pub(crate) use described::{DescribedCells, Description};
-pub(crate) use kept::Kept;
+pub(crate) use channel::read;

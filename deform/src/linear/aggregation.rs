@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use super::transfer::Interpolation;
 use super::{ROW_CHUNK, SparseMatrix};
-use crate::mesh::Vector;
+use crate::number::{index, real};
 use crate::parallel;
-use crate::vector::{add, dot, scale, subtract};
+use crate::vector::{Vector, add, dot, scale, subtract};
 
 /// A row that belongs to no aggregate.
 const NONE: u32 = u32::MAX;
@@ -14,8 +14,9 @@ const NONE: u32 = u32::MAX;
 /// An aggregate is taken to be at least this part as large as those of its level are on average.
 const LEAST_SIZE: f64 = 1e-2;
 
-/// For each block of a matrix one number, the trace of its first three rows and columns: for elasticity that is the Laplacian of
-/// the same material, which tells how strongly two vertices are coupled whatever the direction.
+/// For each block of a matrix one number, the trace of its first three rows and columns: for
+/// elasticity that is the Laplacian of the same material, which tells how strongly two vertices are
+/// coupled whatever the direction.
 pub(super) fn couplings<const B: usize>(matrix: &SparseMatrix<B>) -> Vec<f64> {
     let mut couplings = vec![0.0; matrix.values().len()];
     parallel::for_each_chunk(&mut couplings, 16 * ROW_CHUNK, |chunk, part| {
@@ -29,7 +30,8 @@ pub(super) fn couplings<const B: usize>(matrix: &SparseMatrix<B>) -> Vec<f64> {
 /// For rows how strongly they are coupled to aggregates by what is not in their own columns.
 pub(super) type Across = BTreeMap<u32, Vec<(u32, f64)>>;
 
-/// Rows put together into coarser ones: all rows of a matrix, or the first ones, which make aggregates by themselves.
+/// Rows put together into coarser ones: all rows of a matrix, or the first ones, which make
+/// aggregates by themselves.
 #[derive(Debug)]
 pub(super) struct Aggregates {
     /// For each block of these rows, whether it counts in smoothing.
@@ -40,9 +42,10 @@ pub(super) struct Aggregates {
 }
 
 impl Aggregates {
-    /// The first `rows` rows with those of them that they are strongly coupled to: `a_ij² > threshold² a_ii a_jj`. A row that is so
-    /// coupled to none is in no aggregate, smoothing alone solves for it; or in one of its own, where `reaches` says that it is
-    /// coupled to other rows than these.
+    /// The first `rows` rows with those of them that they are strongly coupled to: `a_ij² >
+    /// threshold² a_ii a_jj`. A row that is so coupled to none is in no aggregate, smoothing alone
+    /// solves for it; or in one of its own, where `reaches` says that it is coupled to other rows
+    /// than these.
     pub(super) fn new<const B: usize>(
         matrix: &SparseMatrix<B>,
         couplings: &[f64],
@@ -52,8 +55,8 @@ impl Aggregates {
     ) -> Self {
         let diagonal: Vec<f64> = parallel::map_chunks(rows, ROW_CHUNK, |range| {
             let own = |row: usize| {
-                let place = matrix.row(row).0.binary_search_by_key(&row, |&column| column as usize);
-                place.map_or(0.0, |place| couplings[matrix.offsets()[row] + place])
+                let entry = matrix.row(row).0.binary_search_by_key(&row, |&column| column as usize);
+                entry.map_or(0.0, |entry| couplings[matrix.offsets()[row] + entry])
             };
             range.map(own).collect::<Vec<_>>()
         })
@@ -80,10 +83,12 @@ impl Aggregates {
         Self { strong, of_row, count }
     }
 
-    /// The interpolation from the aggregates to the rows: constant on each, smoothed by one step of damped Jacobi with the
-    /// matrix of couplings, the weak ones lumped into its diagonal (P. Vaněk, J. Mandel, M. Brezina 1996).
+    /// The interpolation from the aggregates to the rows: constant on each, smoothed by one step of
+    /// damped Jacobi with the matrix of couplings, the weak ones lumped into its diagonal (P.
+    /// Vaněk, J. Mandel, M. Brezina 1996).
     ///
-    /// With `bodies` each aggregate turns as well. `across` are couplings beside those of the rows with each other, all of them strong.
+    /// With `bodies` each aggregate turns as well. `across` are couplings beside those of the rows
+    /// with each other, all of them strong.
     pub(super) fn interpolation<const B: usize>(
         &self,
         matrix: &SparseMatrix<B>,
@@ -105,12 +110,12 @@ impl Aggregates {
                     continue;
                 }
                 let among = matrix.row(row).0.partition_point(|&column| (column as usize) < rows);
-                let places = offsets[row]..offsets[row] + among;
+                let entries = offsets[row]..offsets[row] + among;
                 let (mut lumped, mut whole) = (0.0, 0.0);
-                for place in places.clone().filter(|&place| !self.strong[place]) {
-                    lumped += couplings[place];
-                    if matrix.columns()[place] as usize == row {
-                        whole = couplings[place];
+                for entry in entries.clone().filter(|&entry| !self.strong[entry]) {
+                    lumped += couplings[entry];
+                    if matrix.columns()[entry] as usize == row {
+                        whole = couplings[entry];
                     }
                 }
                 let diagonal = if lumped > 0.1 * whole { lumped } else { whole };
@@ -126,15 +131,14 @@ impl Aggregates {
                     }
                 };
                 gather(row, own, 1.0 - damping);
-                for place in places.filter(|&place| self.strong[place]) {
-                    let other = matrix.columns()[place] as usize;
+                for entry in entries.filter(|&entry| self.strong[entry]) {
+                    let other = matrix.columns()[entry] as usize;
                     let aggregate = self.of_row[other];
                     if aggregate != NONE {
-                        gather(other, aggregate, -damping * couplings[place] / diagonal);
+                        gather(other, aggregate, -damping * couplings[entry] / diagonal);
                     }
                 }
-                #[expect(clippy::cast_possible_truncation, reason = "rows are 32-bit")]
-                for &(aggregate, coupling) in across.get(&(row as u32)).into_iter().flatten() {
+                for &(aggregate, coupling) in across.get(&index(row)).into_iter().flatten() {
                     gather(row, aggregate, -damping * coupling / diagonal);
                 }
                 found.sort_unstable_by_key(|(aggregate, ..)| *aggregate);
@@ -178,13 +182,15 @@ impl Aggregates {
     }
 }
 
-/// Where the rows of a matrix and their aggregates lie, so that aggregates can turn as rigid bodies.
+/// Where the rows of a matrix and their aggregates lie, so that aggregates can turn as rigid
+/// bodies.
 #[derive(Debug)]
 pub(super) struct Bodies {
-    /// The place of each row, and the centre of each aggregate.
-    places: Vec<Vector>,
+    /// The position of each row, and the centre of each aggregate.
+    positions: Vec<Vector>,
     centres: Vec<Vector>,
-    /// The mean size of an aggregate: a turn is told by how far it moves what is as far from the centre as this.
+    /// The mean size of an aggregate: a turn is told by how far it moves what is as far from the
+    /// centre as this.
     size: f64,
     /// A turn of a row, as this level tells it, for one of its aggregate.
     turn: f64,
@@ -194,33 +200,33 @@ pub(super) struct Bodies {
 
 impl Bodies {
     /// `turn_size` is the size that tells a turn of the rows themselves; 0 where these do not turn.
-    pub(super) fn new(aggregates: &Aggregates, places: Vec<Vector>, turn_size: f64) -> Self {
+    pub(super) fn new(aggregates: &Aggregates, positions: Vec<Vector>, turn_size: f64) -> Self {
         let mut centres = vec![[0.0; 3]; aggregates.count];
         let mut members = vec![0.0f64; aggregates.count];
-        let pairs =
-            || aggregates.of_row.iter().zip(&places).filter(|(aggregate, _)| **aggregate != NONE);
-        for (&aggregate, &place) in pairs() {
-            centres[aggregate as usize] = add(centres[aggregate as usize], place);
+        let pairs = || {
+            aggregates.of_row.iter().zip(&positions).filter(|(aggregate, _)| **aggregate != NONE)
+        };
+        for (&aggregate, &position) in pairs() {
+            centres[aggregate as usize] = add(centres[aggregate as usize], position);
             members[aggregate as usize] += 1.0;
         }
         for (centre, members) in centres.iter_mut().zip(&members) {
             *centre = scale(*centre, 1.0 / members);
         }
         let mut sizes = vec![0.0; aggregates.count];
-        for (&aggregate, &place) in pairs() {
-            let arm = subtract(place, centres[aggregate as usize]);
+        for (&aggregate, &position) in pairs() {
+            let arm = subtract(position, centres[aggregate as usize]);
             sizes[aggregate as usize] += dot(arm, arm) / members[aggregate as usize];
         }
-        #[expect(clippy::cast_precision_loss, reason = "fewer aggregates than 2^53")]
-        let size = (sizes.iter().sum::<f64>() / sizes.len().max(1) as f64).sqrt();
+        let size = (sizes.iter().sum::<f64>() / real(sizes.len().max(1))).sqrt();
         let size = if size.is_normal() { size } else { 1.0 };
         let sizes =
             sizes.into_iter().map(|square| (square.sqrt() / size).max(LEAST_SIZE)).collect();
-        Self { places, centres, size, turn: turn_size / size, sizes }
+        Self { positions, centres, size, turn: turn_size / size, sizes }
     }
 
     fn arm(&self, row: usize, aggregate: u32) -> Vector {
-        scale(subtract(self.places[row], self.centres[aggregate as usize]), 1.0 / self.size)
+        scale(subtract(self.positions[row], self.centres[aggregate as usize]), 1.0 / self.size)
     }
 
     /// The size of each aggregate, in parts of the mean one.
@@ -228,13 +234,14 @@ impl Bodies {
         &self.sizes
     }
 
-    /// The mean size of an aggregate, and the centres, which are the places of the coarser rows.
+    /// The mean size of an aggregate, and the centres, which are the positions of the coarser rows.
     pub(super) fn into_coarse(self) -> (Vec<Vector>, f64) {
         (self.centres, self.size)
     }
 }
 
-/// Each row that is free, with all that it is coupled to, makes an aggregate; then what is left joins its neighbours.
+/// Each row that is free, with all that it is coupled to, makes an aggregate; then what is left
+/// joins its neighbours.
 fn group<const B: usize>(
     matrix: &SparseMatrix<B>,
     strong: &[bool],

@@ -1,25 +1,23 @@
-//! What a level of multigrid does about rows that other ranks speak for.
-
-use std::sync::Arc;
+//! The couplings of a level of multigrid between rows of different ranks.
 
 use super::SparseMatrix;
+use super::distribution::Distribution;
 use super::gauss_seidel::Pieces;
-use super::parts::Parts;
 use super::real::Real;
-use crate::partition::{Partition, Shares};
+use crate::communicator::Halo;
 
-/// What is added to the diagonal of a row, in parts of the sum of its couplings with rows of other ranks. With half of it sweeps that
-/// each rank makes on its own rows cannot overshoot (A. Baker, R. Falgout, T. Kolev, U. Yang, Multigrid smoothers for ultraparallel
-/// computing, 2011).
+/// The damping added to the diagonal of a row, in parts of the sum of its couplings with rows of
+/// other ranks. With half of it sweeps that each rank makes on its own rows cannot overshoot (A.
+/// Baker, R. Falgout, T. Kolev, U. Yang, Multigrid smoothers for ultraparallel computing, 2011).
 const DAMPING: f64 = 0.5;
 
-/// The couplings of a level between rows of different ranks; vectors are as [`Pieces`] has this rank's own rows, and then the others.
+/// The couplings of a level between rows of different ranks; vectors are as [`Pieces`] has this
+/// rank's own rows, and then the others.
 #[derive(Debug)]
 pub(super) struct Border<T, const B: usize> {
-    partition: Arc<dyn Partition>,
-    shares: Shares,
+    halo: Halo,
     own: usize,
-    /// Those that this rank has, by the slots of their rows.
+    /// The rows of these couplings that this rank has, by their slots.
     rows: Vec<u32>,
     offsets: Vec<usize>,
     columns: Vec<u32>,
@@ -29,18 +27,17 @@ pub(super) struct Border<T, const B: usize> {
 }
 
 impl<T: Real, const B: usize> Border<T, B> {
-    /// That of an assembled part, and what is added to the diagonal of each of its own rows. Collective.
+    /// The border of an assembled part, and what is added to the diagonal of each of its own rows.
+    /// Collective.
     pub(super) fn new(
-        parts: &Parts,
+        rows: &Distribution,
         matrix: &SparseMatrix<B>,
         pieces: Pieces,
     ) -> (Self, Vec<[f64; B]>) {
-        let own = parts.own();
-        #[expect(clippy::cast_possible_truncation, reason = "rows are 32-bit")]
-        let slot = |row: u32| pieces.slot(row as usize) as u32;
+        let own = rows.own();
+        let slot = |row: u32| crate::number::index(pieces.slot(row as usize));
         let mut border = Self {
-            partition: Arc::clone(parts.partition()),
-            shares: parts.shares().moved(slot),
+            halo: rows.halo().moved(slot),
             own,
             rows: Vec::new(),
             offsets: vec![0],
@@ -48,8 +45,8 @@ impl<T: Real, const B: usize> Border<T, B> {
             blocks: Vec::new(),
             touched: Vec::new(),
         };
-        let mut added = vec![[0.0; B]; parts.rows()];
-        for row in (0..).take(parts.rows()) {
+        let mut added = vec![[0.0; B]; rows.rows()];
+        for row in (0..).take(rows.rows()) {
             let (columns, blocks) = matrix.row(row as usize);
             let from = if (row as usize) < own {
                 columns.partition_point(|&column| (column as usize) < own)
@@ -69,7 +66,7 @@ impl<T: Real, const B: usize> Border<T, B> {
             border.rows.push(slot(row));
             border.offsets.push(border.columns.len());
         }
-        parts.shares().sum(&*border.partition, B, added.as_flattened_mut());
+        rows.halo().sum(B, added.as_flattened_mut());
         added.truncate(own);
         let touched =
             (0..).zip(&added).filter(|(_, added)| added.iter().any(|&value| value != 0.0));
@@ -77,17 +74,18 @@ impl<T: Real, const B: usize> Border<T, B> {
         (border, added)
     }
 
-    /// Gives all ranks what those have found that speak for the rows.
-    pub(super) fn spread<const K: usize>(&self, values: &mut [[[T; B]; K]]) {
-        self.shares.spread(&*self.partition, B * K, values.as_flattened_mut().as_flattened_mut());
+    /// Gives all ranks what the owners of the rows have found.
+    pub(super) fn update<const K: usize>(&self, values: &mut [[[T; B]; K]]) {
+        self.halo.update(B * K, values.as_flattened_mut().as_flattened_mut());
     }
 
     /// Adds up what the ranks have of each row.
     pub(super) fn sum<const K: usize>(&self, values: &mut [[[T; B]; K]]) {
-        self.shares.sum_real(&*self.partition, B * K, values.as_flattened_mut().as_flattened_mut());
+        self.halo.sum(B * K, values.as_flattened_mut().as_flattened_mut());
     }
 
-    /// Makes of the residual of each rank's own rows by themselves this rank's part of that of the system.
+    /// Makes of the residual of each rank's own rows by themselves this rank's part of that of the
+    /// system.
     pub(super) fn complete<const K: usize>(
         &self,
         solution: &[[[T; B]; K]],

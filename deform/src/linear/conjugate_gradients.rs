@@ -1,24 +1,30 @@
 //! Preconditioned conjugate gradients.
 
+use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
-use super::iteration::{Columns, conjugate_gradients, single_column, single_column_mut};
+use super::iteration::{Columns, Sum, conjugate_gradients, single_column, single_column_mut};
 use super::{
     BlockPreconditioner, Convergence, Factorization, LinearError, LinearSolver, SparseMatrix,
     Tolerance,
 };
+use crate::communicator::{Communicator, Halo};
 
 /// Conjugate gradients (Hestenes, Stiefel 1952) preconditioned by a [`BlockPreconditioner`].
 ///
-/// It starts with incomplete Cholesky. Should that not converge, as can happen on a nearly degenerate mesh, the solve is made
-/// again with symmetric Gauss–Seidel before it is given up.
+/// It starts with incomplete Cholesky. Should that not converge, as can happen on a nearly
+/// degenerate mesh, the solve is made again with symmetric Gauss–Seidel before it is given up.
 #[derive(Debug)]
 pub struct ConjugateGradients<const B: usize> {
+    halo: Halo,
     matrix: Arc<SparseMatrix<B>>,
-    preconditioner: BlockPreconditioner<B>,
-    fallback: OnceLock<Result<BlockPreconditioner<B>, LinearError>>,
+    first: OnceLock<Prepared<B>>,
+    fallback: OnceLock<Prepared<B>>,
     max_iterations: usize,
 }
+
+/// A preconditioner, on a rank that has rows; or why there is none on any.
+type Prepared<const B: usize> = Result<Option<BlockPreconditioner<B>>, LinearError>;
 
 impl<const B: usize> ConjugateGradients<B> {
     /// A solver for a symmetric positive definite matrix.
@@ -26,43 +32,131 @@ impl<const B: usize> ConjugateGradients<B> {
     /// # Errors
     /// [`LinearError::Diagonal`].
     pub fn new(matrix: impl Into<Arc<SparseMatrix<B>>>) -> Result<Self, LinearError> {
-        let matrix = matrix.into();
-        let preconditioner = BlockPreconditioner::new(&matrix, Factorization::IncompleteCholesky)?;
-        Ok(Self { matrix, preconditioner, fallback: OnceLock::new(), max_iterations: 2000 })
+        Self::distributed(Halo::none(), matrix)
     }
 
-    /// The same with another limit of iterations for each preconditioner; 2000 otherwise.
+    /// A solver for the sum of the ranks' matrices, whose rows are the entries of `halo`. Each rank
+    /// preconditions with its own part. Collective.
+    ///
+    /// # Errors
+    /// [`LinearError::Diagonal`]; [`LinearError::OtherRank`].
+    pub fn distributed(
+        halo: Halo,
+        matrix: impl Into<Arc<SparseMatrix<B>>>,
+    ) -> Result<Self, LinearError> {
+        let matrix = matrix.into();
+        let [first, fallback] = [const { OnceLock::new() }; 2];
+        let solver = Self { halo, matrix, first, fallback, max_iterations: 2000 };
+        solver.preconditioner(Factorization::IncompleteCholesky)?;
+        Ok(solver)
+    }
+
+    /// The solver with another limit of iterations for each preconditioner; 2000 otherwise.
     #[must_use]
     pub fn with_max_iterations(self, max_iterations: usize) -> Self {
         Self { max_iterations, ..self }
     }
 
-    /// The matrix.
+    /// The matrix of this rank.
     #[must_use]
     pub fn matrix(&self) -> &SparseMatrix<B> {
         &self.matrix
     }
 
-    fn iterate(
+    fn sum(&self) -> Sum<'_, B> {
+        Sum { matrix: &self.matrix, halo: &self.halo }
+    }
+
+    /// A preconditioner of each rank's own matrix, whose diagonal at shared rows is that of the
+    /// sum. Collective.
+    fn preconditioner(
         &self,
-        preconditioner: &BlockPreconditioner<B>,
+        kind: Factorization,
+    ) -> Result<Option<&BlockPreconditioner<B>>, LinearError> {
+        let kept = if kind == Factorization::GaussSeidel { &self.fallback } else { &self.first };
+        let found = kept.get_or_init(|| {
+            let matrix = self.with_whole_diagonal();
+            let found =
+                (matrix.rows() > 0).then(|| BlockPreconditioner::new(&matrix, kind)).transpose();
+            match (self.halo.communicator().all(found.is_ok()), found) {
+                (false, Ok(_)) => Err(LinearError::OtherRank),
+                (_, found) => found,
+            }
+        });
+        found.as_ref().map(Option::as_ref).map_err(|error| *error)
+    }
+
+    fn with_whole_diagonal(&self) -> Cow<'_, SparseMatrix<B>> {
+        let (matrix, shared) = (&*self.matrix, self.halo.shared());
+        if self.halo.communicator().size() == 1 {
+            return Cow::Borrowed(matrix);
+        }
+        let position = |row: u32| {
+            let (columns, _) = matrix.row(row as usize);
+            columns.binary_search(&row).ok().map(|found| matrix.offsets()[row as usize] + found)
+        };
+        let mut diagonal = vec![[[0.0; B]; B]; matrix.rows()];
+        for &row in shared {
+            diagonal[row as usize] =
+                position(row).map_or([[0.0; B]; B], |found| matrix.values()[found]);
+        }
+        self.halo.sum(B * B, diagonal.as_flattened_mut().as_flattened_mut());
+        let mut whole = matrix.clone();
+        let (_, _, values) = whole.offsets_and_values_mut();
+        for &row in shared {
+            if let Some(found) = position(row) {
+                values[found] = diagonal[row as usize];
+            }
+        }
+        Cow::Owned(whole)
+    }
+
+    /// `result` becomes what the ranks' preconditioners make of a vector, added up. Collective.
+    pub(super) fn apply(
+        &self,
+        kind: Factorization,
+        vector: &[[f64; B]],
+        result: &mut [[f64; B]],
+    ) -> Result<(), LinearError> {
+        match self.preconditioner(kind)? {
+            Some(preconditioner) => preconditioner.apply(vector, result),
+            None => result.fill([0.0; B]),
+        }
+        self.sum().add_up(single_column_mut(result));
+        Ok(())
+    }
+
+    /// Solves from what `solution` holds. The right side is the same on all ranks where these share
+    /// rows.
+    pub(super) fn iterate(
+        &self,
         right_side: &[[f64; B]],
         solution: &mut [[f64; B]],
         tolerance: Tolerance,
     ) -> Result<Convergence, LinearError> {
-        let apply = |vector: &[Columns<B, 1>], result: &mut [Columns<B, 1>]| {
-            preconditioner.apply(vector.as_flattened(), result.as_flattened_mut());
+        let mut iterate = |kind| {
+            self.preconditioner(kind)?;
+            let apply = |vector: &[Columns<B, 1>], result: &mut [Columns<B, 1>]| {
+                // That it can be made was seen above.
+                let _ = self.apply(kind, vector.as_flattened(), result.as_flattened_mut());
+            };
+            let (right_side, solution) = (single_column(right_side), single_column_mut(solution));
+            let [convergence] = conjugate_gradients(
+                self.sum(),
+                apply,
+                right_side,
+                solution,
+                [tolerance],
+                self.max_iterations,
+            )?;
+            Ok(convergence)
         };
-        let (right_side, solution) = (single_column(right_side), single_column_mut(solution));
-        let [convergence] = conjugate_gradients(
-            &*self.matrix,
-            apply,
-            right_side,
-            solution,
-            [tolerance],
-            self.max_iterations,
-        )?;
-        Ok(convergence)
+        match iterate(Factorization::IncompleteCholesky) {
+            Err(LinearError::NotConverged { .. } | LinearError::Indefinite { .. }) => {
+                iterate(Factorization::GaussSeidel)
+            }
+            other => other,
+        }
     }
 }
 
@@ -77,26 +171,21 @@ impl<const B: usize> LinearSolver<B> for ConjugateGradients<B> {
         solution: &mut [[f64; B]],
         tolerance: Tolerance,
     ) -> Result<Convergence, LinearError> {
-        match self.iterate(&self.preconditioner, right_side, solution, tolerance) {
-            Err(LinearError::NotConverged { .. } | LinearError::Indefinite { .. }) => {
-                let fallback = self
-                    .fallback
-                    .get_or_init(|| {
-                        BlockPreconditioner::new(&self.matrix, Factorization::GaussSeidel)
-                    })
-                    .as_ref()
-                    .map_err(|error| *error)?;
-                self.iterate(fallback, right_side, solution, tolerance)
-            }
-            other => other,
+        if self.halo.communicator().size() == 1 {
+            return self.iterate(right_side, solution, tolerance);
         }
+        let mut whole = right_side.to_vec();
+        self.sum().add_up(single_column_mut(&mut whole));
+        self.iterate(&whole, solution, tolerance)
     }
 
     fn renewed(
         &self,
         matrix: Arc<SparseMatrix<B>>,
     ) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
-        Ok(Box::new(Self::new(matrix)?.with_max_iterations(self.max_iterations)))
+        Ok(Box::new(
+            Self::distributed(self.halo.clone(), matrix)?.with_max_iterations(self.max_iterations),
+        ))
     }
 }
 

@@ -8,14 +8,16 @@ use super::rows::{Rows, Run};
 use super::{ROW_CHUNK, SparseMatrix};
 use crate::parallel;
 
-/// Rows are cut into at most this many pieces. Half of it bounds the threads that one sweep can use.
+/// Rows are cut into at most this many pieces. Half of it bounds the threads that one sweep can
+/// use.
 const PIECES: usize = 32;
 
 /// A piece has at least this many rows.
 const PIECE_ROWS: usize = 256;
 
-/// Rows cut into pieces at least as long as the matrix is wide about its diagonal, so that no piece couples with any but the
-/// ones beside it. Those with even numbers are placed before those with odd numbers.
+/// Rows cut into pieces at least as long as the matrix is wide about its diagonal, so that no piece
+/// couples with any but the ones beside it. Those with even numbers are placed before those with
+/// odd numbers.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pieces {
     rows: usize,
@@ -24,7 +26,7 @@ pub(super) struct Pieces {
 }
 
 impl Pieces {
-    /// Those of the first `rows` rows and columns of a matrix.
+    /// The pieces of the first `rows` rows and columns of a matrix.
     pub(super) fn new<const B: usize>(matrix: &SparseMatrix<B>, rows: usize) -> Self {
         let width = |row: usize| {
             let columns = among(matrix, row, rows);
@@ -46,7 +48,7 @@ impl Pieces {
     }
 
     /// Whether a row is in an odd piece, and which of those rows it is.
-    fn place(&self, row: usize) -> (bool, usize) {
+    fn half_and_index(&self, row: usize) -> (bool, usize) {
         let piece = row / self.piece_rows;
         (piece % 2 == 1, piece / 2 * self.piece_rows + row % self.piece_rows)
     }
@@ -56,7 +58,7 @@ impl Pieces {
         if row >= self.rows {
             return row;
         }
-        let (odd, index) = self.place(row);
+        let (odd, index) = self.half_and_index(row);
         if odd { self.even_rows + index } else { index }
     }
 
@@ -87,7 +89,7 @@ impl Pieces {
     }
 }
 
-/// Those of a row's columns that are below `count`.
+/// The columns of a row that are below `count`.
 fn among<const B: usize>(matrix: &SparseMatrix<B>, row: usize, count: usize) -> &[u32] {
     let columns = matrix.row(row).0;
     // Most rows have no others.
@@ -99,8 +101,8 @@ fn among<const B: usize>(matrix: &SparseMatrix<B>, row: usize, count: usize) -> 
     }
 }
 
-/// The sweeps of Gauss–Seidel through the first rows and columns of one matrix, in the order of [`Pieces`]: first through all even
-/// pieces, then through all odd ones, or back.
+/// The sweeps of Gauss–Seidel through the first rows and columns of one matrix, in the order of
+/// [`Pieces`]: first through all even pieces, then through all odd ones, or back.
 #[derive(Debug)]
 pub(super) struct GaussSeidel<T, const B: usize> {
     pieces: Pieces,
@@ -120,7 +122,7 @@ struct Half<T, const B: usize> {
 }
 
 /// The blocks of one row.
-struct Parts {
+struct RowRuns {
     /// Of its own piece, before and after the diagonal.
     lower: Run,
     upper: Run,
@@ -128,8 +130,8 @@ struct Parts {
     cross: [Run; 2],
 }
 
-impl Parts {
-    /// Those of the row in a slot, which is the one of number `index` in its half.
+impl RowRuns {
+    /// The blocks of the row in a slot, which is the one of number `index` in its half.
     fn new<const B: usize>(
         matrix: &SparseMatrix<B>,
         pieces: Pieces,
@@ -147,29 +149,30 @@ impl Parts {
             + usize::from(
                 columns.get(middle - first).is_some_and(|&column| column as usize == row),
             );
-        #[expect(clippy::cast_possible_truncation, reason = "columns are 32-bit")]
-        let run = |places: Range<usize>, from: usize, to: usize| Run {
-            places,
+        // Wrapping, as the shift is where it is added.
+        let run = |indices: Range<usize>, from: usize, to: usize| Run {
+            indices,
             shift: to.wrapping_sub(from) as u32,
         };
         // No piece couples with any but the ones beside it.
         let beside = |piece: usize| (piece * pieces.piece_rows, piece / 2 * pieces.piece_rows);
-        let ((before, before_place), (next, next_place)) =
+        let ((before, before_index), (next, next_index)) =
             (beside(piece.saturating_sub(1)), beside(piece + 1));
         Self {
             lower: run(begin..middle, row, index),
             upper: run(after..end, row, index),
             cross: [
-                run(first..begin, before, before_place),
-                run(end..first + columns.len(), next, next_place),
+                run(first..begin, before, before_index),
+                run(end..first + columns.len(), next, next_index),
             ],
         }
     }
 }
 
 impl<T: Real, const B: usize> GaussSeidel<T, B> {
-    /// The rows and columns of `pieces`, with what is `added` to the diagonal of each, if anything is. `None` where a diagonal block is
-    /// missing, or not positive definite, or has no inverse in this precision.
+    /// The rows and columns of `pieces`, with what is `added` to the diagonal of each, if anything
+    /// is. `None` where a diagonal block is missing, or not positive definite, or has no inverse in
+    /// this precision.
     pub(super) fn new(
         matrix: &SparseMatrix<B>,
         pieces: Pieces,
@@ -178,14 +181,14 @@ impl<T: Real, const B: usize> GaussSeidel<T, B> {
         let half = |odd: bool| {
             let slots = if odd { pieces.even_rows..pieces.rows } else { 0..pieces.even_rows };
             let (start, count) = (slots.start, slots.len());
-            let parts = |index: usize| Parts::new(matrix, pieces, start + index, index);
+            let runs = |index: usize| RowRuns::new(matrix, pieces, start + index, index);
             let inverse_diagonal = parallel::map_chunks(count, ROW_CHUNK, |range| {
                 let invert = |index: usize| {
                     let row = pieces.row(start + index);
                     let (columns, blocks) = matrix.row(row);
-                    let place =
+                    let diagonal =
                         columns.binary_search_by_key(&row, |&column| column as usize).ok()?;
-                    let mut block = blocks[place];
+                    let mut block = blocks[diagonal];
                     for (axis, more) in added.get(row).into_iter().flatten().enumerate() {
                         block[axis][axis] += more;
                     }
@@ -199,9 +202,9 @@ impl<T: Real, const B: usize> GaussSeidel<T, B> {
                 range.map(invert).collect::<Option<Vec<_>>>()
             });
             Some(Half {
-                lower: Rows::new(matrix, count, |index| [parts(index).lower, Run::default()]),
-                upper: Rows::new(matrix, count, |index| [parts(index).upper, Run::default()]),
-                cross: Rows::new(matrix, count, |index| parts(index).cross),
+                lower: Rows::new(matrix, count, |index| [runs(index).lower, Run::default()]),
+                upper: Rows::new(matrix, count, |index| [runs(index).upper, Run::default()]),
+                cross: Rows::new(matrix, count, |index| runs(index).cross),
                 inverse_diagonal: inverse_diagonal
                     .into_iter()
                     .collect::<Option<Vec<_>>>()?

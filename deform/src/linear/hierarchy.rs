@@ -7,36 +7,45 @@ use super::ROW_CHUNK;
 use super::SparseMatrix;
 use super::aggregation::{Across, Aggregates, Bodies, couplings};
 use super::border::Border;
-use super::direct::Direct;
+use super::cholesky::Factor;
+use super::distribution::{Distribution, Order};
+use super::gathered::Gathered;
 use super::gauss_seidel::{GaussSeidel, Pieces};
-use super::parts::{Order, Parts};
+use super::null_space::NullSpace;
 use super::real::Real;
 use super::transfer::{Transfer, galerkin};
-use crate::mesh::Vector;
+use crate::communicator::{Communicator, Halo};
+use crate::number::real;
 use crate::parallel;
-use crate::partition::{Partition, Shares};
+use crate::vector::Vector;
 
 /// Systems of at most this many equations are solved directly.
-pub(super) const COARSEST: usize = 1000;
+const COARSEST: usize = 1000;
 
-/// Where the ranks' own aggregates would not make a system smaller, because they have few rows each, one of at most this many
-/// equations is gathered on all of them.
+/// Where the ranks' own aggregates would not make a system smaller, because they have few rows
+/// each, one of at most this many equations is gathered on all of them.
 const LARGEST: usize = 100_000;
 
 /// A coarser system of ranks is to have at most this part of the rows.
 const COARSER: f64 = 0.5;
 
-/// Couplings weaker than this are left out where aggregates are formed; half of it on each coarser level.
+/// Couplings weaker than this are left out where aggregates are formed; half of it on each coarser
+/// level.
 const THRESHOLD: f64 = 0.08;
+
+/// The shift of the diagonal of a semi-definite matrix, relative to it, that makes the matrix
+/// positive definite.
+const LIFT: f64 = 1e-8;
 
 /// How far interpolation is smoothed.
 const DAMPING: f64 = 2.0 / 3.0;
 
-/// A system of `B` by `B` blocks and ever coarser ones of `C` by `C`, by smoothed aggregation. `C` is `B`, or 6 where aggregates
-/// turn as rigid bodies.
+/// A system of `B` by `B` blocks and ever coarser ones of `C` by `C`, by smoothed aggregation. `C`
+/// is `B`, or 6 where aggregates turn as rigid bodies.
 ///
-/// The system may be a sum of ranks' parts ([`Parts`]): each rank then makes aggregates of the rows that it speaks for, and sweeps
-/// through these; couplings between ranks count in the interpolation, in residuals and in coarser matrices as all others do.
+/// The system may be distributed over ranks ([`Distribution`]): each rank then makes aggregates of
+/// its own rows, and sweeps through these; couplings between ranks count in the interpolation, in
+/// residuals and in coarser matrices as all others do.
 #[derive(Debug)]
 pub(super) struct Hierarchy<T, const B: usize, const C: usize> {
     /// The order of the rows, where they are parts of a sum.
@@ -54,6 +63,56 @@ enum Coarsest<T, const B: usize, const C: usize> {
     Coarse(Direct<T, C>),
 }
 
+/// A small system that is solved as a whole.
+#[derive(Debug)]
+struct Direct<T, const B: usize> {
+    rows: Gathered,
+    inverse: Inverse<T, B>,
+}
+
+/// The inverse of a matrix, or a cycle in its place.
+#[derive(Debug)]
+enum Inverse<T, const B: usize> {
+    Factor(Box<Factor>),
+    /// A cycle: many ranks have many rows between them, however few each of them has.
+    Cycle(Box<Hierarchy<T, B, B>>),
+}
+
+impl<T: Real, const B: usize> Direct<T, B> {
+    /// `None` where there is no inverse. Collective over the ranks of a distribution.
+    fn new(system: &System<'_, B>) -> Option<Self> {
+        let System { matrix, distribution, null_space, pieces } = system;
+        let (rows, whole) = Gathered::new(matrix, *pieces, distribution.as_ref(), *null_space);
+        Some(Self { rows, inverse: Inverse::new(&whole, *null_space)? })
+    }
+
+    fn solve<const K: usize>(&self, vectors: &mut Vectors<T, B, K>) {
+        let Vectors { right_side, solution, .. } = vectors;
+        self.rows.solve(right_side, solution, |vector, result| self.inverse.apply(vector, result));
+    }
+}
+
+impl<T: Real, const B: usize> Inverse<T, B> {
+    fn new(matrix: &SparseMatrix<B>, null_space: NullSpace) -> Option<Self> {
+        if B * matrix.rows() <= COARSEST {
+            let matrix = match null_space {
+                NullSpace::Zero => Cow::Borrowed(matrix),
+                NullSpace::Constants => Cow::Owned(lifted(matrix)),
+            };
+            return Factor::of(&matrix).map(|factor| Self::Factor(Box::new(factor)));
+        }
+        Hierarchy::new(matrix, &Halo::none(), null_space, None, None)
+            .map(|levels| Self::Cycle(Box::new(levels)))
+    }
+
+    fn apply<const K: usize>(&self, vector: &[[[f64; B]; K]], result: &mut [[[f64; B]; K]]) {
+        match self {
+            Self::Factor(factor) => factor.solve(vector, result),
+            Self::Cycle(levels) => levels.apply(&mut levels.workspace(), [1.0; K], vector, result),
+        }
+    }
+}
+
 #[derive(Debug)]
 struct Level<T, const B: usize> {
     aggregates: Arc<Aggregates>,
@@ -68,9 +127,9 @@ struct Level<T, const B: usize> {
 
 /// The vectors of one level.
 #[derive(Debug)]
-pub(super) struct Vectors<T, const B: usize, const K: usize> {
-    pub(super) right_side: Vec<[[T; B]; K]>,
-    pub(super) solution: Vec<[[T; B]; K]>,
+struct Vectors<T, const B: usize, const K: usize> {
+    right_side: Vec<[[T; B]; K]>,
+    solution: Vec<[[T; B]; K]>,
     residual: Vec<[[T; B]; K]>,
 }
 
@@ -89,67 +148,77 @@ pub(super) struct Workspace<T, const B: usize, const C: usize, const K: usize> {
 }
 
 /// Where rows lie, and the size that a turn of theirs is told by (0 where they do not turn).
-type Places = (Vec<Vector>, f64);
+type Positions = (Vec<Vector>, f64);
 
-/// A system while its levels are made: the matrix, the pieces of its own rows, and whose its rows are.
+/// A system while its levels are made: the matrix, the pieces of its own rows, and who owns its
+/// rows.
 struct System<'a, const B: usize> {
     matrix: Cow<'a, SparseMatrix<B>>,
-    parts: Option<Parts>,
+    distribution: Option<Distribution>,
+    null_space: NullSpace,
     pieces: Pieces,
 }
 
 impl<'a, const B: usize> System<'a, B> {
-    /// Collective over the ranks of `parts`, as all that is done with it.
-    fn new(matrix: Cow<'a, SparseMatrix<B>>, parts: Option<Parts>, order: Option<&Order>) -> Self {
-        let matrix = match &parts {
-            Some(parts) => Cow::Owned(parts.assembled(&matrix, order)),
+    /// Collective over the ranks of a distribution, as all that is done with it.
+    fn new(
+        matrix: Cow<'a, SparseMatrix<B>>,
+        distribution: Option<Distribution>,
+        null_space: NullSpace,
+        order: Option<&Order>,
+    ) -> Self {
+        let matrix = match &distribution {
+            Some(distribution) => Cow::Owned(distribution.assembled(&matrix, order)),
             None => matrix,
         };
-        let own = parts.as_ref().map_or(matrix.rows(), Parts::own);
+        let own = distribution.as_ref().map_or(matrix.rows(), Distribution::own);
         let pieces =
             if B * own <= COARSEST { Pieces::whole(own) } else { Pieces::new(&matrix, own) };
-        Self { matrix, parts, pieces }
+        Self { matrix, distribution, null_space, pieces }
     }
 
     /// The number of rows of all ranks.
     fn total(&self) -> usize {
-        self.parts.as_ref().map_or(self.matrix.rows(), |parts| parts.sum(parts.own()))
+        self.distribution
+            .as_ref()
+            .map_or(self.matrix.rows(), |rows| rows.communicator().total(rows.own()))
     }
 
     fn agreed<R>(&self, found: Option<R>) -> Option<R> {
-        match &self.parts {
-            Some(parts) => parts.agreed(found),
+        match &self.distribution {
+            Some(distribution) => distribution.agreed(found),
             None => found,
         }
     }
 }
 
 impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
-    /// `None` where a diagonal block of any level is not positive definite, or the ranks' rows cannot be aggregated. `parts` says where
-    /// the matrix is one of those that ranks have of a sum. `like` is a hierarchy of a matrix with the same pattern, whose aggregates
-    /// are used again. `places` are those of the rows where aggregates are to turn, which those of parts cannot.
+    /// `None` where a diagonal block of any level is not positive definite, or the ranks' rows
+    /// cannot be aggregated. On several ranks the matrix is one of those that they have of a sum.
+    /// `like` is a hierarchy of a matrix with the same pattern, whose aggregates are used again.
+    /// `positions` are those of the rows where aggregates are to turn, which those of parts cannot.
     pub(super) fn new(
         matrix: &SparseMatrix<B>,
-        parts: Option<(&Arc<dyn Partition>, &Shares)>,
+        halo: &Halo,
+        null_space: NullSpace,
         like: Option<&Self>,
-        places: Option<&[Vector]>,
+        positions: Option<&[Vector]>,
     ) -> Option<Self> {
-        let parts = parts
-            .map(|(partition, shares)| Parts::new(Arc::clone(partition), shares, matrix.rows()));
-        let (parts, order) =
-            parts.map_or((None, None), |(parts, order)| (Some(parts), Some(order)));
-        let mut places = places.map(|places| (places.to_vec(), 0.0));
-        let system = System::new(Cow::Borrowed(matrix), parts, order.as_ref());
+        let several = (halo.communicator().size() > 1).then_some(halo);
+        let (distribution, order) =
+            several.map(|halo| Distribution::new(halo, matrix.rows())).unzip();
+        let mut positions = positions.map(|positions| (positions.to_vec(), 0.0));
+        let system = System::new(Cow::Borrowed(matrix), distribution, null_space, order.as_ref());
         let known =
             like.and_then(|like| like.finest.as_ref()).map(|level| Arc::clone(&level.aggregates));
         let (finest, mut current) =
-            match coarsened::<T, B, C>(system, known, THRESHOLD, &mut places)? {
+            match coarsened::<T, B, C>(system, known, THRESHOLD, &mut positions)? {
                 Step::Last(direct) => {
                     return Some(Self {
                         order,
                         finest: None,
                         coarser: Vec::new(),
-                        coarsest: Coarsest::Finest(direct),
+                        coarsest: Coarsest::Finest(*direct),
                     });
                 }
                 Step::Level(found) => *found,
@@ -160,13 +229,13 @@ impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
             threshold *= 0.5;
             let known = like.and_then(|like| like.coarser.get(coarser.len()));
             let known = known.map(|level| Arc::clone(&level.aggregates));
-            match coarsened::<T, C, C>(current, known, threshold, &mut places)? {
+            match coarsened::<T, C, C>(current, known, threshold, &mut positions)? {
                 Step::Last(direct) => {
                     return Some(Self {
                         order,
                         finest: Some(finest),
                         coarser,
-                        coarsest: Coarsest::Coarse(direct),
+                        coarsest: Coarsest::Coarse(*direct),
                     });
                 }
                 Step::Level(found) => {
@@ -181,18 +250,22 @@ impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
     pub(super) fn workspace<const K: usize>(&self) -> Workspace<T, B, C, K> {
         let coarsest = match &self.coarsest {
             Coarsest::Finest(direct) => {
-                return Workspace { finest: Vectors::new(direct.rows()), coarser: Vec::new() };
+                return Workspace {
+                    finest: Vectors::new(direct.rows.count()),
+                    coarser: Vec::new(),
+                };
             }
-            Coarsest::Coarse(direct) => direct.rows(),
+            Coarsest::Coarse(direct) => direct.rows.count(),
         };
         let rows = self.coarser.iter().map(|level| level.rows).chain([coarsest]);
         let finest = self.finest.as_ref().map_or(0, |level| level.rows);
         Workspace { finest: Vectors::new(finest), coarser: rows.map(Vectors::new).collect() }
     }
 
-    /// One V-cycle: `result` becomes an approximate inverse of the matrix times `vector`, a symmetric positive definite one.
-    /// `scale` brings each column of the vector to the order of 1. Of parts of a sum, all ranks have the same `vector` where they
-    /// share rows, and get the same `result`; collective.
+    /// One V-cycle: `result` becomes an approximate inverse of the matrix times `vector`, a
+    /// symmetric positive definite one. `scale` brings each column of the vector to the order of 1.
+    /// Of parts of a sum, all ranks have the same `vector` where they share rows, and get the same
+    /// `result`; collective.
     pub(super) fn apply<const K: usize>(
         &self,
         workspace: &mut Workspace<T, B, C, K>,
@@ -260,7 +333,7 @@ impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
         let Some((own, coarser)) = vectors.split_first_mut() else { return };
         let Some((level, coarser_levels)) = levels.split_first() else {
             if let Coarsest::Coarse(direct) = &self.coarsest {
-                direct.sum(&mut own.right_side);
+                direct.rows.sum(&mut own.right_side);
                 direct.solve(own);
             }
             return;
@@ -277,46 +350,64 @@ impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
     }
 }
 
-/// What becomes of a system.
+/// A semi-definite matrix made definite.
+fn lifted<const B: usize>(matrix: &SparseMatrix<B>) -> SparseMatrix<B> {
+    let mut lifted = matrix.clone();
+    let (offsets, columns, blocks) = lifted.offsets_and_values_mut();
+    for row in 0..offsets.len() - 1 {
+        let range = offsets[row]..offsets[row + 1];
+        for (_, block) in columns[range.clone()]
+            .iter()
+            .zip(&mut blocks[range])
+            .filter(|(c, _)| **c as usize == row)
+        {
+            (0..B).for_each(|axis| block[axis][axis] *= 1.0 + LIFT);
+        }
+    }
+    lifted
+}
+
+/// The next step for a system.
 enum Step<T, const B: usize, const C: usize> {
     /// It is small: the last one.
-    Last(Direct<T, B>),
+    Last(Box<Direct<T, B>>),
     /// A level, and the next coarser system.
     Level(Box<(Level<T, B>, System<'static, C>)>),
 }
 
-/// `places` becomes that of the coarser rows. `None` where there is no inverse on the way.
+/// `positions` becomes that of the coarser rows. `None` where there is no inverse on the way.
 fn coarsened<T: Real, const B: usize, const C: usize>(
     system: System<'_, B>,
     known: Option<Arc<Aggregates>>,
     threshold: f64,
-    places: &mut Option<Places>,
+    positions: &mut Option<Positions>,
 ) -> Option<Step<T, B, C>> {
-    let System { matrix, parts, pieces } = &system;
+    let System { matrix, distribution, null_space, pieces } = &system;
     let total = system.total();
-    let last = || system.agreed(Direct::new(matrix, *pieces, parts.as_ref())).map(Step::Last);
+    let last = || system.agreed(Direct::new(&system)).map(|direct| Step::Last(Box::new(direct)));
     if B * total <= COARSEST {
         return last();
     }
     let couplings = couplings(matrix);
-    let (border, added) = parts.as_ref().map(|parts| Border::new(parts, matrix, *pieces)).unzip();
+    let (border, added) =
+        distribution.as_ref().map(|rows| Border::new(rows, matrix, *pieces)).unzip();
     let added = added.unwrap_or_default();
     let reaches =
         |row: usize| added.get(row).is_some_and(|added| added.iter().any(|&value| value != 0.0));
     let aggregates = known.unwrap_or_else(|| {
         Arc::new(Aggregates::new(matrix, &couplings, threshold, pieces.rows(), reaches))
     });
-    #[expect(clippy::cast_precision_loss, reason = "counts below 2^53")]
-    if let Some(parts) = parts
-        && parts.sum(aggregates.count()) as f64 > COARSER * total as f64
+    if let Some(rows) = distribution
+        && real(rows.communicator().total(aggregates.count())) > COARSER * real(total)
     {
         return if B * total <= LARGEST { last() } else { None };
     }
-    let bodies = places.take().map(|(places, size)| Bodies::new(&aggregates, places, size));
-    let (interpolation, coarse) = match parts {
-        Some(parts) => {
+    let bodies =
+        positions.take().map(|(positions, size)| Bodies::new(&aggregates, positions, size));
+    let (interpolation, coarse) = match distribution {
+        Some(rows) => {
             let (interpolation, coarse) =
-                parts.interpolation(matrix, &couplings, &aggregates, DAMPING);
+                rows.interpolation(matrix, &couplings, &aggregates, DAMPING);
             (interpolation, Some(coarse))
         }
         None => {
@@ -324,12 +415,12 @@ fn coarsened<T: Real, const B: usize, const C: usize>(
             (aggregates.interpolation(matrix, &couplings, DAMPING, bodies.as_ref(), &none), None)
         }
     };
-    let (starts, entries) =
-        interpolation.transposed(coarse.as_ref().map_or(aggregates.count(), Parts::rows));
+    let transposed =
+        interpolation.transposed(coarse.as_ref().map_or(aggregates.count(), Distribution::rows));
     let sizes = bodies.as_ref().map_or(&[][..], Bodies::sizes);
-    let next = galerkin::<B, C>(matrix, &interpolation, (&starts, &entries), sizes);
-    *places = bodies.map(Bodies::into_coarse);
-    let next = System::new(Cow::Owned(next), coarse, None);
+    let next = galerkin::<B, C>(matrix, &interpolation, &transposed, sizes);
+    *positions = bodies.map(Bodies::into_coarse);
+    let next = System::new(Cow::Owned(next), coarse, *null_space, None);
     let smoother = system.agreed(GaussSeidel::new(matrix, *pieces, &added))?;
     let (own, coarse) = (*pieces, next.pieces);
     let level = Level {
@@ -345,7 +436,7 @@ fn coarsened<T: Real, const B: usize, const C: usize>(
         ),
         restriction: Transfer::restriction(
             &interpolation,
-            (&starts, &entries),
+            &transposed,
             |slot| coarse.row(slot),
             |row| own.slot(row),
         ),
@@ -364,7 +455,7 @@ impl<T: Real, const B: usize> Level<T, B> {
         self.smoother.forward(&own.right_side[..count], &mut own.solution[..count]);
         self.smoother.residual(&own.solution[..count], &mut own.residual[..count]);
         if let Some(border) = &self.border {
-            border.spread(&mut own.solution);
+            border.update(&mut own.solution);
             border.complete(&own.solution, &mut own.residual);
         }
         parallel::for_each_chunk(&mut next.right_side, ROW_CHUNK / 8, |chunk, part| {
@@ -375,7 +466,7 @@ impl<T: Real, const B: usize> Level<T, B> {
         });
     }
 
-    /// What the coarser level has found, and a sweep back.
+    /// Adds the correction of the coarser level, and sweeps back.
     fn up<const C: usize, const K: usize>(
         &self,
         own: &mut Vectors<T, B, K>,
@@ -392,7 +483,7 @@ impl<T: Real, const B: usize> Level<T, B> {
         let count = self.pieces.rows();
         self.smoother.backward(&own.right_side[..count], &mut own.solution[..count]);
         if let Some(border) = &self.border {
-            border.spread(&mut own.solution);
+            border.update(&mut own.solution);
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The iteration of conjugate gradients, for any preconditioner and several right sides at once.
 
 use super::{Convergence, LinearError, ROW_CHUNK, SparseMatrix, Tolerance};
+use crate::communicator::{Communicator, Halo, Reduction};
 use crate::parallel;
 
 /// The vectors at one unknown: `K` right sides of `B` values each.
@@ -16,51 +17,100 @@ pub(super) fn single_column_mut<const B: usize>(vector: &mut [[f64; B]]) -> &mut
     vector.as_chunks_mut().0
 }
 
-/// What the iteration asks of a matrix and of the vectors that it acts on.
-pub(super) trait Operator<const B: usize> {
-    /// How many values a vector has here.
-    fn rows(&self) -> usize;
+/// Solves for each column by itself: `solve` has its index, its right side and what its solution
+/// starts from.
+pub(super) fn each_column<const B: usize, const K: usize>(
+    right_sides: &[Columns<B, K>],
+    solutions: &mut [Columns<B, K>],
+    mut solve: impl FnMut(usize, &[[f64; B]], &mut [[f64; B]]) -> Result<Convergence, LinearError>,
+) -> Result<[Convergence; K], LinearError> {
+    let mut result = [Convergence::default(); K];
+    for (column, result) in result.iter_mut().enumerate() {
+        let right_side: Vec<[f64; B]> = right_sides.iter().map(|value| value[column]).collect();
+        let mut solution: Vec<[f64; B]> = solutions.iter().map(|value| value[column]).collect();
+        *result = solve(column, &right_side, &mut solution)?;
+        solutions.iter_mut().zip(solution).for_each(|(value, found)| value[column] = found);
+    }
+    Ok(result)
+}
+
+/// A matrix that is the sum of the ranks'. Vectors are the same on all ranks where these share
+/// entries.
+#[derive(Clone, Copy)]
+pub(super) struct Sum<'a, const B: usize> {
+    pub(super) matrix: &'a SparseMatrix<B>,
+    pub(super) halo: &'a Halo,
+}
+
+impl<const B: usize> Sum<'_, B> {
+    /// Adds up what the ranks have of a vector.
+    pub(super) fn add_up<const K: usize>(&self, vector: &mut [Columns<B, K>]) {
+        self.halo.sum(B * K, vector.as_flattened_mut().as_flattened_mut());
+    }
+
     /// `result = self * vector`.
-    fn multiply<const K: usize>(&self, vector: &[Columns<B, K>], result: &mut [Columns<B, K>]);
+    pub(super) fn multiply<const K: usize>(
+        &self,
+        vector: &[Columns<B, K>],
+        result: &mut [Columns<B, K>],
+    ) {
+        self.matrix.multiply_columns(vector, result);
+        self.add_up(result);
+    }
+
     /// The inner product of each column.
-    fn dot<const K: usize>(&self, a: &[Columns<B, K>], b: &[Columns<B, K>]) -> [f64; K];
+    pub(super) fn dot<const K: usize>(&self, a: &[Columns<B, K>], b: &[Columns<B, K>]) -> [f64; K] {
+        // Everything, less the entries of other ranks.
+        let mut sum = dot(a, b);
+        for entry in self
+            .halo
+            .shared()
+            .iter()
+            .map(|&entry| entry as usize)
+            .filter(|&entry| !self.halo.owns(entry))
+        {
+            for (column, sum) in sum.iter_mut().enumerate() {
+                *sum -=
+                    (0..B).map(|axis| a[entry][column][axis] * b[entry][column][axis]).sum::<f64>();
+            }
+        }
+        self.halo.communicator().reduce(Reduction::Sum, &mut sum);
+        sum
+    }
+
     /// The largest value of each column.
-    fn largest<const K: usize>(&self, vector: &[Columns<B, K>]) -> [f64; K];
-}
-
-impl<const B: usize> Operator<B> for SparseMatrix<B> {
-    fn rows(&self) -> usize {
-        SparseMatrix::rows(self)
-    }
-
-    fn multiply<const K: usize>(&self, vector: &[Columns<B, K>], result: &mut [Columns<B, K>]) {
-        self.multiply_columns(vector, result);
-    }
-
-    fn dot<const K: usize>(&self, a: &[Columns<B, K>], b: &[Columns<B, K>]) -> [f64; K] {
-        dot(a, b)
-    }
-
     fn largest<const K: usize>(&self, vector: &[Columns<B, K>]) -> [f64; K] {
-        largest(vector)
+        let mut most = largest(vector);
+        self.halo.communicator().reduce(Reduction::Maximum, &mut most);
+        most
+    }
+
+    /// Brings each column to the order of 1, by its norm.
+    pub(super) fn scale<const K: usize>(&self, vector: &[Columns<B, K>]) -> [f64; K] {
+        self.dot(vector, vector).map(|square| {
+            let scale = 1.0 / square.sqrt();
+            if scale.is_normal() { scale } else { 1.0 }
+        })
     }
 }
 
-/// How much larger than the tolerance the last correction may be, each by the largest value of its vector.
+/// How much larger than the tolerance the last correction may be, each by the largest value of its
+/// vector.
 const CORRECTION: f64 = 10.0;
 
-/// Conjugate gradients (Hestenes, Stiefel 1952) from what `solution` holds, for each column by itself. `precondition` sets its
-/// second argument to an approximate inverse times its first.
+/// Conjugate gradients (Hestenes, Stiefel 1952) from what `solution` holds, for each column by
+/// itself. `precondition` sets its second argument to an approximate inverse times its first.
 ///
-/// A column is done once its residual is small enough, and the preconditioner says the same of the error: it must not want to
-/// change any value by more than [`CORRECTION`] times the relative tolerance. On a mesh whose cells differ much in stiffness the
-/// residual is that of the stiff ones, and tells next to nothing of the error in the soft ones.
+/// A column is done once its residual is small enough, and the preconditioner says the same of the
+/// error: it must not want to change any value by more than [`CORRECTION`] times the relative
+/// tolerance. On a mesh whose cells differ much in stiffness the residual is that of the stiff
+/// ones, and tells next to nothing of the error in the soft ones.
 ///
 /// # Errors
-/// The first failure of any column. `solution` then holds the last iterate, which is finite unless the error is
-/// [`LinearError::NotFinite`].
+/// The first failure of any column. `solution` then holds the last iterate, which is finite unless
+/// the error is [`LinearError::NotFinite`].
 pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
-    matrix: &impl Operator<B>,
+    matrix: Sum<'_, B>,
     mut precondition: impl FnMut(&[Columns<B, K>], &mut [Columns<B, K>]),
     right_side: &[Columns<B, K>],
     solution: &mut [Columns<B, K>],
@@ -68,7 +118,7 @@ pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
     max_iterations: usize,
 ) -> Result<[Convergence; K], LinearError> {
     assert!(
-        right_side.len() == matrix.rows() && solution.len() == matrix.rows(),
+        right_side.len() == matrix.matrix.rows() && solution.len() == matrix.matrix.rows(),
         "one value for each row of the matrix"
     );
     let whole = matrix.dot(right_side, right_side).map(f64::sqrt);
@@ -181,9 +231,10 @@ pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
     })
 }
 
-/// Which columns are not solved yet; `correction` is what the preconditioner makes of their residuals.
+/// Which columns are not solved yet; `correction` is what the preconditioner makes of their
+/// residuals.
 fn unfinished<const B: usize, const K: usize>(
-    matrix: &impl Operator<B>,
+    matrix: Sum<'_, B>,
     tolerances: [Tolerance; K],
     target: [f64; K],
     reached: [f64; K],
@@ -202,7 +253,7 @@ fn unfinished<const B: usize, const K: usize>(
 }
 
 /// The largest value of each column.
-pub(super) fn largest<const B: usize, const K: usize>(vector: &[Columns<B, K>]) -> [f64; K] {
+fn largest<const B: usize, const K: usize>(vector: &[Columns<B, K>]) -> [f64; K] {
     let parts = parallel::map_chunks(vector.len(), ROW_CHUNK, |range| {
         vector[range].iter().fold([0.0; K], |most: [f64; K], value| {
             std::array::from_fn(|column| {
@@ -216,10 +267,7 @@ pub(super) fn largest<const B: usize, const K: usize>(vector: &[Columns<B, K>]) 
 }
 
 /// The inner product of each column, summed chunk by chunk.
-pub(super) fn dot<const B: usize, const K: usize>(
-    a: &[Columns<B, K>],
-    b: &[Columns<B, K>],
-) -> [f64; K] {
+fn dot<const B: usize, const K: usize>(a: &[Columns<B, K>], b: &[Columns<B, K>]) -> [f64; K] {
     let parts = parallel::map_chunks(a.len(), ROW_CHUNK, |range| {
         // Four sums side by side, so that one need not wait for another.
         let mut sums = [[0.0; K]; 4];

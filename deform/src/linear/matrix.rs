@@ -8,8 +8,8 @@ pub(crate) const ROW_CHUNK: usize = 1024;
 /// A small dense block, row after row.
 pub type Block<const B: usize> = [[f64; B]; B];
 
-/// A sparse matrix of dense `B` by `B` blocks in compressed rows; with `B` 1 an ordinary sparse matrix, with 3 one that acts on
-/// vectors in space.
+/// A sparse matrix of dense `B` by `B` blocks in compressed rows; with `B` 1 an ordinary sparse
+/// matrix, with 3 one that acts on vectors in space.
 ///
 /// Within a row the columns rise. The matrix need not be square.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,7 +23,8 @@ impl<const B: usize> SparseMatrix<B> {
     /// A matrix of zeros: row `i` has blocks at `columns[offsets[i]..offsets[i + 1]]`.
     ///
     /// # Panics
-    /// Where `offsets` does not rise from 0 to the number of columns, or the columns of a row do not rise.
+    /// Where `offsets` does not rise from 0 to the number of columns, or the columns of a row do
+    /// not rise.
     #[must_use]
     pub fn zeros(offsets: Vec<usize>, columns: Vec<u32>) -> Self {
         assert!(
@@ -77,6 +78,11 @@ impl<const B: usize> SparseMatrix<B> {
         &self.values
     }
 
+    /// The blocks, row after row, to be changed.
+    pub fn values_mut(&mut self) -> &mut [Block<B>] {
+        &mut self.values
+    }
+
     pub(crate) fn offsets_and_values_mut(&mut self) -> (&[usize], &[u32], &mut [Block<B>]) {
         (&self.offsets, &self.columns, &mut self.values)
     }
@@ -99,7 +105,7 @@ impl<const B: usize> SparseMatrix<B> {
         self.multiply_columns::<1>(vector.as_chunks().0, result.as_chunks_mut().0);
     }
 
-    /// The same for `K` vectors side by side.
+    /// The product with `K` vectors side by side.
     pub(crate) fn multiply_columns<const K: usize>(
         &self,
         vector: &[[[f64; B]; K]],
@@ -142,7 +148,8 @@ pub(super) fn add<const B: usize>(sum: &mut Block<B>, block: &Block<B>) {
     }
 }
 
-/// The inverse of a symmetric positive definite block; `None` where a pivot falls below `1e-10` of its diagonal entry.
+/// The inverse of a symmetric positive definite block; `None` where a pivot falls below `1e-10` of
+/// its diagonal entry.
 #[expect(clippy::needless_range_loop, reason = "the indices are those of the formulas")]
 pub(crate) fn invert_positive<const B: usize>(block: &Block<B>) -> Option<Block<B>> {
     // Cholesky, then the inverse of the factor, then inverse = factor⁻ᵀ factor⁻¹.

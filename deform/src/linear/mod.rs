@@ -1,25 +1,26 @@
 //! Sparse matrices and the solvers of linear systems.
 //!
-//! A [`LinearSolver`] is set up for one symmetric positive definite matrix and answers any number of right sides.
-//! [`solver`] chooses one: [`Cholesky`] for small systems, [`Multigrid`] for all others, which falls back on
-//! [`ConjugateGradients`] with a [`BlockPreconditioner`]. All of it is deterministic: sums are taken in chunks whose size does
-//! not depend on the number of threads.
+//! A [`LinearSolver`] is set up for one symmetric positive definite matrix and answers any number
+//! of right sides. A semi-definite one whose [`NullSpace`] is known is for [`Multigrid`].
+//! [`solver`] chooses one: [`Cholesky`] for small systems, [`Multigrid`] for all others, which
+//! falls back on [`ConjugateGradients`] with a [`BlockPreconditioner`]. All of it is deterministic:
+//! sums are taken in chunks whose size does not depend on the number of threads.
 
 use std::sync::Arc;
 
 mod aggregation;
 mod border;
-mod cholesky;
+pub(crate) mod cholesky;
 mod conjugate_gradients;
-mod direct;
-mod distributed;
+mod distribution;
+mod gathered;
 mod gauss_seidel;
 mod hierarchy;
 mod iteration;
 mod matrix;
 mod multigrid;
+mod null_space;
 mod ordering;
-mod parts;
 mod preconditioner;
 mod real;
 mod rows;
@@ -27,28 +28,38 @@ mod rows;
 mod tests;
 mod transfer;
 
+use crate::communicator::{Communicator, Halo};
+use crate::vector::Vector;
 pub use cholesky::Cholesky;
 pub use conjugate_gradients::ConjugateGradients;
-pub use distributed::DistributedMultigrid;
+use iteration::each_column;
 pub(crate) use iteration::norms;
 use matrix::add;
 pub use matrix::{Block, SparseMatrix};
 pub(crate) use matrix::{ROW_CHUNK, invert_positive};
 pub use multigrid::{Multigrid, MultigridSettings, Precision};
+pub use null_space::NullSpace;
 pub use ordering::reverse_cuthill_mckee;
 pub use preconditioner::{BlockPreconditioner, Factorization};
-pub(crate) use real::Real;
 
 /// Systems of at most this many equations are solved directly.
 const DIRECT: usize = 1500;
 
-/// The solver for a symmetric positive definite matrix that is quickest at its size.
+/// The solver for a symmetric positive definite matrix that is quickest at its size. On several
+/// ranks it is one for the sum of their matrices; the rows are the entries of `halo`. Collective.
 ///
 /// # Errors
-/// [`LinearError::Diagonal`].
+/// [`LinearError::Diagonal`]; [`LinearError::OtherRank`].
 pub fn solver<const B: usize>(
     matrix: Arc<SparseMatrix<B>>,
+    halo: &Halo,
 ) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
+    if halo.communicator().size() > 1 {
+        // Sweeps know less of the other ranks' rows, and more of them are needed before multigrid
+        // has stalled.
+        let settings = MultigridSettings { max_iterations: 300, ..MultigridSettings::default() };
+        return Ok(Box::new(Multigrid::distributed(halo.clone(), matrix, settings)?));
+    }
     if B * matrix.rows() <= DIRECT
         && let Ok(direct) = Cholesky::new(Arc::clone(&matrix))
     {
@@ -57,10 +68,47 @@ pub fn solver<const B: usize>(
     Ok(Box::new(Multigrid::new(matrix, MultigridSettings::default())?))
 }
 
-/// When an iterative solve may stop: once the residual's 2-norm is at most the larger of the two, and the error as the
-/// preconditioner estimates it (the largest change that it would make to any value, by the largest value) at most ten times the
-/// relative one. The second matters where stiffnesses differ by many orders of magnitude: the residual is then that of the
-/// stiff unknowns. What has come to the absolute one is rounding and needs no estimate.
+/// The choice of solvers for the systems of a volume.
+///
+/// On several ranks the matrix is the sum of the ranks' and a right side the sum of theirs; a
+/// solution is the same on all ranks that have an entry. The rows are the entries of `halo`, and
+/// `positions` are where their vertices lie. To make a solver, and to use it, is collective.
+pub trait Solvers: std::fmt::Debug + Send + Sync {
+    /// A solver for one value at each vertex.
+    ///
+    /// # Errors
+    /// [`LinearError`], on all ranks.
+    fn scalar(&self, matrix: Arc<SparseMatrix<1>>, halo: &Halo, positions: &[Vector]) -> Solver<1>;
+
+    /// A solver for three values at each vertex.
+    ///
+    /// # Errors
+    /// [`LinearError`], on all ranks.
+    fn vector(&self, matrix: Arc<SparseMatrix<3>>, halo: &Halo, positions: &[Vector]) -> Solver<3>;
+}
+
+/// A solver, or why there is none.
+pub type Solver<const B: usize> = Result<Box<dyn LinearSolver<B>>, LinearError>;
+
+/// The kernel's own solvers: those that [`solver`] chooses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct BuiltIn;
+
+impl Solvers for BuiltIn {
+    fn scalar(&self, matrix: Arc<SparseMatrix<1>>, halo: &Halo, _: &[Vector]) -> Solver<1> {
+        solver(matrix, halo)
+    }
+
+    fn vector(&self, matrix: Arc<SparseMatrix<3>>, halo: &Halo, _: &[Vector]) -> Solver<3> {
+        solver(matrix, halo)
+    }
+}
+
+/// When an iterative solve may stop: once the residual's 2-norm is at most the larger of the two,
+/// and the error as the preconditioner estimates it (the largest change that it would make to any
+/// value, by the largest value) at most ten times the relative one. The second matters where
+/// stiffnesses differ by many orders of magnitude: the residual is then that of the stiff unknowns.
+/// A residual below the absolute tolerance is rounding, and its error is not estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
     /// A multiple of the 2-norm of the right side.
@@ -83,7 +131,8 @@ pub trait LinearSolver<const B: usize>: std::fmt::Debug + Send + Sync {
     /// How many unknown vectors of `B` values the system has on this process.
     fn unknowns(&self) -> usize;
 
-    /// Solves for one right side, from zero. `right_side` and `solution` have [`LinearSolver::unknowns`] entries each.
+    /// Solves for one right side, from zero. `right_side` and `solution` have
+    /// [`LinearSolver::unknowns`] entries each.
     ///
     /// A right side of zeros gives exact zeros.
     ///
@@ -102,7 +151,8 @@ pub trait LinearSolver<const B: usize>: std::fmt::Debug + Send + Sync {
         self.solve_from(right_side, solution, tolerance)
     }
 
-    /// The same from what `solution` holds, which the iteration leaves as it is where it is good enough already.
+    /// Solves for one right side from what `solution` holds, which the iteration leaves as it is
+    /// where it is good enough already.
     ///
     /// # Errors
     /// As [`LinearSolver::solve`].
@@ -113,8 +163,8 @@ pub trait LinearSolver<const B: usize>: std::fmt::Debug + Send + Sync {
         tolerance: Tolerance,
     ) -> Result<Convergence, LinearError>;
 
-    /// Solves for three right sides side by side, from what `solutions` holds: quicker than one after the other, where the
-    /// solver reads its matrix once for all three.
+    /// Solves for three right sides side by side, from what `solutions` holds: quicker than one
+    /// after the other, where the solver reads its matrix once for all three.
     ///
     /// # Errors
     /// As [`LinearSolver::solve`].
@@ -124,20 +174,13 @@ pub trait LinearSolver<const B: usize>: std::fmt::Debug + Send + Sync {
         solutions: &mut [[[f64; B]; 3]],
         tolerances: [Tolerance; 3],
     ) -> Result<[Convergence; 3], LinearError> {
-        let mut result = [Convergence::default(); 3];
-        for (column, result) in result.iter_mut().enumerate() {
-            let right_side: Vec<[f64; B]> = right_sides.iter().map(|value| value[column]).collect();
-            let mut solution: Vec<[f64; B]> = solutions.iter().map(|value| value[column]).collect();
-            *result = self.solve_from(&right_side, &mut solution, tolerances[column])?;
-            for (value, found) in solutions.iter_mut().zip(solution) {
-                value[column] = found;
-            }
-        }
-        Ok(result)
+        each_column(right_sides, solutions, |column, right_side, solution| {
+            self.solve_from(right_side, solution, tolerances[column])
+        })
     }
 
-    /// The same kind of solver for another matrix. Where that has its blocks at the same places, what depends on these alone is
-    /// used again.
+    /// A solver of this kind for another matrix. Where that has its blocks at the same positions,
+    /// what depends on these alone is used again.
     ///
     /// # Errors
     /// [`LinearError::Diagonal`], [`LinearError::Factor`].
@@ -180,12 +223,12 @@ pub enum LinearError {
         /// The row of the block.
         row: usize,
     },
-    /// Rigid bodies need a place for each row of 3 by 3 blocks.
+    /// Rigid bodies need a position for each row of 3 by 3 blocks.
     #[error(
-        "{found} places given for {expected} rows of {block} by {block} blocks; rigid bodies need one for each row of 3 by 3 blocks"
+        "{found} positions given for {expected} rows of {block} by {block} blocks; rigid bodies need one for each row of 3 by 3 blocks"
     )]
-    Places {
-        /// How many places were given.
+    Positions {
+        /// How many positions were given.
         found: usize,
         /// How many rows there are.
         expected: usize,

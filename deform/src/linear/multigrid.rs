@@ -1,12 +1,20 @@
 //! Conjugate gradients with a multigrid preconditioner.
 
+use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
 use super::hierarchy::Hierarchy;
-use super::iteration::{Columns, conjugate_gradients, dot, single_column, single_column_mut};
+use super::iteration::{
+    Columns, Sum, conjugate_gradients, each_column, single_column, single_column_mut,
+};
+use super::null_space::{Constants, NullSpace};
 use super::real::Real;
-use super::{ConjugateGradients, Convergence, LinearError, LinearSolver, SparseMatrix, Tolerance};
-use crate::mesh::Vector;
+use super::{
+    ConjugateGradients, Convergence, Factorization, LinearError, LinearSolver, SparseMatrix,
+    Tolerance,
+};
+use crate::communicator::{Communicator, Halo};
+use crate::vector::Vector;
 
 /// The precision that a preconditioner is kept and applied in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -18,36 +26,58 @@ pub enum Precision {
     Double,
 }
 
-/// What may be chosen about [`Multigrid`].
+/// The settings of [`Multigrid`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MultigridSettings {
     /// The precision of the preconditioner.
     pub precision: Precision,
-    /// The iterations after which multigrid is taken to have stalled, and the fallback goes on from there.
+    /// The iterations after which multigrid is taken to have stalled, and the fallback goes on from
+    /// there.
     pub max_iterations: usize,
+    /// The vectors that the matrix takes to zero.
+    pub null_space: NullSpace,
 }
 
 impl Default for MultigridSettings {
-    /// Single precision, 100 iterations.
+    /// Single precision, 100 iterations, a positive definite matrix.
     fn default() -> Self {
-        Self { precision: Precision::Single, max_iterations: 100 }
+        Self { precision: Precision::Single, max_iterations: 100, null_space: NullSpace::Zero }
     }
 }
 
-/// Conjugate gradients preconditioned by one V-cycle of algebraic multigrid: smoothed aggregation of whole blocks (P. Vaněk, J.
-/// Mandel, M. Brezina 1996), one sweep of block Gauss–Seidel forwards before and backwards after each coarser level, Cholesky
-/// on the coarsest.
+/// Conjugate gradients preconditioned by one V-cycle of algebraic multigrid: smoothed aggregation
+/// of whole blocks (P. Vaněk, J. Mandel, M. Brezina 1996), one sweep of block Gauss–Seidel forwards
+/// before and backwards after each coarser level, Cholesky on the coarsest.
 ///
-/// The number of iterations hardly grows with the system. Where multigrid cannot be set up, or stalls, or breaks down, the solve
-/// goes on with [`ConjugateGradients`], set up at that moment.
+/// The number of iterations hardly grows with the system. Where multigrid cannot be set up, or
+/// stalls, or breaks down, the solve goes on with [`ConjugateGradients`], set up at that moment.
 ///
-/// Number the unknowns well ([`reverse_cuthill_mckee`](super::reverse_cuthill_mckee)): the narrower the matrix is about its
-/// diagonal, the more threads can be used.
+/// A semi-definite matrix is solved where its [`NullSpace`] is told
+/// ([`MultigridSettings::null_space`]): the coarsest system, which has the same one, is made
+/// definite by a little on its diagonal, and solved for what is orthogonal to it.
+///
+/// Number the unknowns well ([`reverse_cuthill_mckee`](super::reverse_cuthill_mckee)): the narrower
+/// the matrix is about its diagonal, the more threads can be used.
+///
+/// # On several ranks
+/// The matrix is the sum of the ranks', a right side too; a solution is the same, bit for bit, on
+/// all ranks that have an entry. Each rank forms aggregates of its own rows. Couplings between
+/// ranks count in the interpolation, in residuals and in all coarser matrices, which stay sums of
+/// parts; a sweep of Gauss–Seidel goes through each rank's own rows with what the others had before
+/// it (A. Baker, R. Falgout, T. Kolev, U. Yang 2011). The coarsest system is gathered, and solved
+/// on every rank.
+///
+/// An aggregate lies on one rank; where ranks have few rows left, the system is gathered on all of
+/// them and made coarser there, which is what bounds the number of ranks: to a few ten thousands.
+/// Where there are more, or the parts are not connected in themselves, the solve is made with
+/// [`ConjugateGradients`].
 #[derive(Debug)]
 pub struct Multigrid<const B: usize> {
+    halo: Halo,
     matrix: Arc<SparseMatrix<B>>,
     settings: MultigridSettings,
-    levels: Levels<B>,
+    levels: Arc<Levels<B>>,
+    constants: Option<Arc<Constants>>,
     fallback: OnceLock<Result<ConjugateGradients<B>, LinearError>>,
 }
 
@@ -70,88 +100,169 @@ impl<const B: usize> Multigrid<B> {
         matrix: impl Into<Arc<SparseMatrix<B>>>,
         settings: MultigridSettings,
     ) -> Result<Self, LinearError> {
-        let matrix = matrix.into();
-        let levels = match settings.precision {
-            Precision::Single => Hierarchy::new(&matrix, None, None, None).map(Levels::Single),
-            Precision::Double => Hierarchy::new(&matrix, None, None, None).map(Levels::Double),
-        };
-        Self::with_levels(matrix, settings, levels)
+        Self::distributed(Halo::none(), matrix, settings)
     }
 
-    /// The same where each aggregate of unknowns may turn about its centre as well as shift: `places` are where the vertices of
-    /// the unknowns lie. An iteration costs up to twice as much; elastic bodies that are held at few places, or slide, need
-    /// fewer of them.
+    /// A solver for the sum of the ranks' matrices, which is symmetric and positive definite; the
+    /// rows are the entries of `halo`. Collective, as is its use.
     ///
     /// # Errors
-    /// [`LinearError::Places`], [`LinearError::Diagonal`].
-    pub fn with_rigid_bodies(
+    /// [`LinearError::Diagonal`]; [`LinearError::OtherRank`].
+    pub fn distributed(
+        halo: Halo,
         matrix: impl Into<Arc<SparseMatrix<B>>>,
-        places: impl Into<Arc<[Vector]>>,
         settings: MultigridSettings,
     ) -> Result<Self, LinearError> {
-        let (matrix, places) = (matrix.into(), places.into());
-        if B != 3 || places.len() != matrix.rows() {
-            return Err(LinearError::Places {
-                found: places.len(),
+        let matrix = matrix.into();
+        let null_space = settings.null_space;
+        let levels = match settings.precision {
+            Precision::Single => {
+                Hierarchy::new(&matrix, &halo, null_space, None, None).map(Levels::Single)
+            }
+            Precision::Double => {
+                Hierarchy::new(&matrix, &halo, null_space, None, None).map(Levels::Double)
+            }
+        };
+        Self::with_levels(halo, matrix, settings, levels)
+    }
+
+    /// A solver for a symmetric positive definite matrix where each aggregate of unknowns may turn
+    /// about its centre as well as shift: `positions` are where the vertices of the unknowns lie.
+    /// An iteration costs up to twice as much; elastic bodies that are held at few places, or
+    /// slide, need fewer of them.
+    ///
+    /// # Errors
+    /// [`LinearError::Positions`], [`LinearError::Diagonal`].
+    pub fn with_rigid_bodies(
+        matrix: impl Into<Arc<SparseMatrix<B>>>,
+        positions: impl Into<Arc<[Vector]>>,
+        settings: MultigridSettings,
+    ) -> Result<Self, LinearError> {
+        let (matrix, positions, halo) = (matrix.into(), positions.into(), Halo::none());
+        if B != 3 || positions.len() != matrix.rows() {
+            return Err(LinearError::Positions {
+                found: positions.len(),
                 expected: matrix.rows(),
                 block: B,
             });
         }
-        let levels = Hierarchy::new(&matrix, None, None, Some(&places));
-        Self::with_levels(
-            matrix,
-            settings,
-            levels.map(|levels| Levels::Bodies(Box::new(levels), places)),
-        )
+        let levels = Hierarchy::new(&matrix, &halo, settings.null_space, None, Some(&positions));
+        let levels = levels.map(|levels| Levels::Bodies(Box::new(levels), positions));
+        Self::with_levels(halo, matrix, settings, levels)
     }
 
-    /// The same for another matrix; the aggregates are used again where that has its blocks at the same places.
-    pub(super) fn of_like_matrix(&self, matrix: Arc<SparseMatrix<B>>) -> Result<Self, LinearError> {
-        let same = self.matrix.has_pattern_of(&matrix);
-        let levels = match &self.levels {
+    /// A solver for another matrix of the same rows; the aggregates are used again where that has
+    /// its blocks at the same positions. Collective.
+    ///
+    /// # Errors
+    /// As [`Multigrid::distributed`].
+    pub fn of_like_matrix(&self, matrix: Arc<SparseMatrix<B>>) -> Result<Self, LinearError> {
+        let same = self.halo.communicator().all(self.matrix.has_pattern_of(&matrix));
+        let (halo, null_space) = (&self.halo, self.settings.null_space);
+        let levels = match &*self.levels {
             Levels::Single(like) => {
-                Hierarchy::new(&matrix, None, same.then_some(like), None).map(Levels::Single)
+                Hierarchy::new(&matrix, halo, null_space, same.then_some(like), None)
+                    .map(Levels::Single)
             }
             Levels::Double(like) => {
-                Hierarchy::new(&matrix, None, same.then_some(like), None).map(Levels::Double)
+                Hierarchy::new(&matrix, halo, null_space, same.then_some(like), None)
+                    .map(Levels::Double)
             }
-            Levels::Bodies(like, places) => (places.len() == matrix.rows())
-                .then(|| Hierarchy::new(&matrix, None, same.then_some(&**like), Some(places)))
+            Levels::Bodies(like, positions) => (positions.len() == matrix.rows())
+                .then(|| {
+                    Hierarchy::new(
+                        &matrix,
+                        halo,
+                        null_space,
+                        same.then_some(&**like),
+                        Some(positions),
+                    )
+                })
                 .flatten()
-                .map(|levels| Levels::Bodies(Box::new(levels), Arc::clone(places))),
-            Levels::None => return Self::new(matrix, self.settings),
+                .map(|levels| Levels::Bodies(Box::new(levels), Arc::clone(positions))),
+            Levels::None => return Self::distributed(halo.clone(), matrix, self.settings),
         };
-        Self::with_levels(matrix, self.settings, levels)
+        Self::with_levels(halo.clone(), matrix, self.settings, levels)
     }
 
-    /// The matrix.
+    /// A solver for a matrix that differs little from this one's, with the preconditioner of this
+    /// one's: nothing is set up. The more they differ, the more iterations it takes.
+    ///
+    /// # Panics
+    /// Where the matrix has another number of rows.
+    #[must_use]
+    pub fn of_similar_matrix(&self, matrix: Arc<SparseMatrix<B>>) -> Self {
+        assert_eq!(matrix.rows(), self.matrix.rows(), "as many rows");
+        Self {
+            halo: self.halo.clone(),
+            matrix,
+            settings: self.settings,
+            levels: Arc::clone(&self.levels),
+            constants: self.constants.clone(),
+            fallback: OnceLock::new(),
+        }
+    }
+
+    /// The matrix of this rank.
     #[must_use]
     pub fn matrix(&self) -> &SparseMatrix<B> {
         &self.matrix
     }
 
+    /// `result` becomes the product of the sum with a vector that all ranks have the same of.
+    /// Collective.
+    pub fn multiply(&self, vector: &[[f64; B]], result: &mut [[f64; B]]) {
+        self.sum().multiply(single_column(vector), single_column_mut(result));
+    }
+
+    /// Calls `work` with the preconditioner, an approximate inverse of the sum: from a vector that
+    /// all ranks have the same of, to one that they do. `scale`, the same on all ranks, brings
+    /// vectors to the order of 1. Collective, as the preconditioner is.
+    pub fn with_cycle<R>(
+        &self,
+        scale: f64,
+        work: impl FnOnce(&mut dyn FnMut(&[[f64; B]], &mut [[f64; B]])) -> R,
+    ) -> R {
+        match &*self.levels {
+            Levels::Single(hierarchy) => cycle_of(hierarchy, scale, work),
+            Levels::Double(hierarchy) => cycle_of(hierarchy, scale, work),
+            Levels::Bodies(hierarchy, _) => cycle_of(hierarchy, scale, work),
+            Levels::None => work(&mut |vector, result| {
+                let applied = self
+                    .fallback()
+                    .and_then(|own| own.apply(Factorization::GaussSeidel, vector, result));
+                if applied.is_err() {
+                    result.fill([0.0; B]);
+                }
+            }),
+        }
+    }
+
+    fn sum(&self) -> Sum<'_, B> {
+        Sum { matrix: &self.matrix, halo: &self.halo }
+    }
+
     fn with_levels(
+        halo: Halo,
         matrix: Arc<SparseMatrix<B>>,
         settings: MultigridSettings,
         levels: Option<Levels<B>>,
     ) -> Result<Self, LinearError> {
-        let solver = Self {
-            matrix,
-            settings,
-            levels: levels.unwrap_or(Levels::None),
-            fallback: OnceLock::new(),
+        let levels = Arc::new(levels.unwrap_or(Levels::None));
+        let constants = match settings.null_space {
+            NullSpace::Zero => None,
+            NullSpace::Constants => Some(Arc::new(Constants::new(&matrix, &halo))),
         };
-        if matches!(solver.levels, Levels::None) {
+        let solver = Self { halo, matrix, settings, levels, constants, fallback: OnceLock::new() };
+        if matches!(*solver.levels, Levels::None) {
             solver.fallback()?;
         }
         Ok(solver)
     }
 
     fn fallback(&self) -> Result<&ConjugateGradients<B>, LinearError> {
-        self.fallback
-            .get_or_init(|| ConjugateGradients::new(Arc::clone(&self.matrix)))
-            .as_ref()
-            .map_err(|error| *error)
+        let made = || ConjugateGradients::distributed(self.halo.clone(), Arc::clone(&self.matrix));
+        self.fallback.get_or_init(made).as_ref().map_err(|error| *error)
     }
 
     fn iterate<T: Real, const C: usize, const K: usize>(
@@ -162,15 +273,12 @@ impl<const B: usize> Multigrid<B> {
         tolerances: [Tolerance; K],
     ) -> Result<[Convergence; K], LinearError> {
         let mut workspace = hierarchy.workspace();
-        let scale = dot(right_side, right_side).map(|square| {
-            let scale = 1.0 / square.sqrt();
-            if scale.is_normal() { scale } else { 1.0 }
-        });
+        let scale = self.sum().scale(right_side);
         let precondition = |vector: &[Columns<B, K>], result: &mut [Columns<B, K>]| {
             hierarchy.apply(&mut workspace, scale, vector, result);
         };
         let limit = self.settings.max_iterations;
-        conjugate_gradients(&*self.matrix, precondition, right_side, solution, tolerances, limit)
+        conjugate_gradients(self.sum(), precondition, right_side, solution, tolerances, limit)
     }
 
     fn solve_columns<const K: usize>(
@@ -179,7 +287,29 @@ impl<const B: usize> Multigrid<B> {
         solution: &mut [Columns<B, K>],
         tolerances: [Tolerance; K],
     ) -> Result<[Convergence; K], LinearError> {
-        let result = match &self.levels {
+        let mut right_side = Cow::Borrowed(right_side);
+        if self.halo.communicator().size() > 1 {
+            self.sum().add_up(right_side.to_mut());
+        }
+        if let Some(constants) = &self.constants {
+            constants.remove(&self.halo, right_side.to_mut());
+        }
+        let result = self.solve_consistent(&right_side, solution, tolerances)?;
+        if let Some(constants) = &self.constants {
+            constants.remove(&self.halo, solution);
+        }
+        Ok(result)
+    }
+
+    /// Solves for right sides that have a solution, and are the same on all ranks where these share
+    /// rows.
+    fn solve_consistent<const K: usize>(
+        &self,
+        right_side: &[Columns<B, K>],
+        solution: &mut [Columns<B, K>],
+        tolerances: [Tolerance; K],
+    ) -> Result<[Convergence; K], LinearError> {
+        let result = match &*self.levels {
             Levels::Single(hierarchy) => self.iterate(hierarchy, right_side, solution, tolerances),
             Levels::Double(hierarchy) => self.iterate(hierarchy, right_side, solution, tolerances),
             Levels::Bodies(hierarchy, _) => {
@@ -199,21 +329,29 @@ impl<const B: usize> Multigrid<B> {
             other => return other,
         };
         let fallback = self.fallback()?;
-        let mut result = [Convergence::default(); K];
-        for (column, result) in result.iter_mut().enumerate() {
-            let right: Vec<[f64; B]> = right_side.iter().map(|value| value[column]).collect();
-            let mut start: Vec<[f64; B]> = solution.iter().map(|value| value[column]).collect();
-            if !start.as_flattened().iter().all(|value| value.is_finite()) {
+        each_column(right_side, solution, |column, right_side, start| {
+            if !self
+                .halo
+                .communicator()
+                .all(start.as_flattened().iter().all(|value| value.is_finite()))
+            {
                 start.fill([0.0; B]);
             }
-            *result = fallback.solve_from(&right, &mut start, tolerances[column])?;
-            result.iterations += before;
-            for (value, found) in solution.iter_mut().zip(start) {
-                value[column] = found;
-            }
-        }
-        Ok(result)
+            let converged = fallback.iterate(right_side, start, tolerances[column])?;
+            Ok(Convergence { iterations: converged.iterations + before, ..converged })
+        })
     }
+}
+
+fn cycle_of<T: Real, const B: usize, const C: usize, R>(
+    hierarchy: &Hierarchy<T, B, C>,
+    scale: f64,
+    work: impl FnOnce(&mut dyn FnMut(&[[f64; B]], &mut [[f64; B]])) -> R,
+) -> R {
+    let mut workspace = hierarchy.workspace();
+    work(&mut |vector, result| {
+        hierarchy.apply(&mut workspace, [scale], single_column(vector), single_column_mut(result));
+    })
 }
 
 impl<const B: usize> LinearSolver<B> for Multigrid<B> {

@@ -1,16 +1,19 @@
 //! Numbering unknowns so that neighbours lie close together in memory.
 
-/// The reverse Cuthill–McKee order of a symmetric graph (E. Cuthill, J. McKee 1969; A. George 1971): `result[new] = old`.
+use crate::number::index;
+
+/// The reverse Cuthill–McKee order of a symmetric graph (E. Cuthill, J. McKee 1969; A. George
+/// 1971): `result[new] = old`.
 ///
-/// `neighbours(i)` are the vertices that share an edge with vertex `i` of `0..count`. Each component starts from a vertex far
-/// from its others. The order depends on the graph and its numbering alone. Cost: two visits of each edge.
+/// `neighbours(i)` are the vertices that share an edge with vertex `i` of `0..count`. Each
+/// component starts from a vertex far from its others. The order depends on the graph and its
+/// numbering alone. Cost: two visits of each edge.
 pub fn reverse_cuthill_mckee<'a>(count: usize, neighbours: impl Fn(u32) -> &'a [u32]) -> Vec<u32> {
     let mut order: Vec<u32> = Vec::with_capacity(count);
     // The number of the walk that saw a vertex last.
     let mut seen = vec![0u32; count];
     let mut walk = 0;
-    #[expect(clippy::cast_possible_truncation, reason = "columns are 32-bit")]
-    for first in 0..count as u32 {
+    for first in 0..index(count) {
         if seen[first as usize] != 0 {
             continue;
         }
@@ -70,12 +73,12 @@ mod tests {
         lists[6].push(7);
         lists[7].push(6);
         let order = reverse_cuthill_mckee(8, |vertex| &lists[vertex as usize]);
-        let mut place = [0i64; 8];
+        let mut index = [0i64; 8];
         for (new, &old) in order.iter().enumerate() {
-            place[old as usize] = new as i64;
+            index[old as usize] = new as i64;
         }
         for (vertex, list) in lists.iter().enumerate() {
-            assert!(list.iter().all(|&other| (place[vertex] - place[other as usize]).abs() == 1));
+            assert!(list.iter().all(|&other| (index[vertex] - index[other as usize]).abs() == 1));
         }
     }
 }

@@ -2,9 +2,12 @@
 
 use super::matrix::{Block, invert_positive};
 use super::{LinearError, SparseMatrix};
+use crate::number::index;
 use crate::parallel;
+use crate::topology::Groups;
 
-/// Rows are cut into at most this many pieces. Half of it bounds the threads that one application can use.
+/// Rows are cut into at most this many pieces. Half of it bounds the threads that one application
+/// can use.
 const PIECES: usize = 8;
 
 /// A piece has at least this many rows.
@@ -13,25 +16,30 @@ const PIECE_ROWS: usize = 512;
 /// Which factorisation a [`BlockPreconditioner`] is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Factorization {
-    /// Incomplete Cholesky without fill-in. Where it breaks down, the diagonal is raised (Manteuffel 1980) until it does not.
+    /// Incomplete Cholesky without fill-in. Where it breaks down, the diagonal is raised
+    /// (Manteuffel 1980) until it does not.
     IncompleteCholesky,
-    /// Symmetric Gauss–Seidel: it never breaks down, and converges on some nearly degenerate meshes on which the other stalls.
+    /// Symmetric Gauss–Seidel: it never breaks down, and converges on some nearly degenerate meshes
+    /// on which the other stalls.
     GaussSeidel,
 }
 
 /// `(D + L) D⁻¹ (D + L)ᵀ`, with `L` in the pattern of the matrix's lower triangle.
 ///
-/// Rows are cut into pieces of consecutive rows. Those with even numbers come first in the order of elimination and do not
-/// couple with each other, nor do the odd ones, so that either half is worked on in parallel. Nothing is left out where a piece
-/// is at least as long as the matrix is wide about its diagonal, which decides how many pieces there are; so number the
-/// unknowns well ([`reverse_cuthill_mckee`](super::reverse_cuthill_mckee)).
+/// Rows are cut into pieces of consecutive rows. Those with even numbers come first in the order of
+/// elimination and do not couple with each other, nor do the odd ones, so that either half is
+/// worked on in parallel. Nothing is left out where a piece is at least as long as the matrix is
+/// wide about its diagonal, which decides how many pieces there are; so number the unknowns well
+/// ([`reverse_cuthill_mckee`](super::reverse_cuthill_mckee)).
 ///
-/// The blocks are stored in single precision, half the memory to be read in each iteration; vectors stay in double precision.
+/// The blocks are stored in single precision, half the memory to be read in each iteration; vectors
+/// stay in double precision.
 #[derive(Debug, Clone)]
 pub struct BlockPreconditioner<const B: usize> {
     piece_rows: usize,
     lower: Rows<B>,
-    /// For the rows of even pieces, the blocks of `lower` in their column that lie in odd pieces, not transposed.
+    /// For the rows of even pieces, the blocks of `lower` in their column that lie in odd pieces,
+    /// not transposed.
     below: Rows<B>,
     inverse_diagonal: Vec<SingleBlock<B>>,
 }
@@ -55,7 +63,7 @@ impl<const B: usize> Rows<B> {
 }
 
 /// One piece while it is factorised.
-struct Piece<const B: usize> {
+struct PieceFactor<const B: usize> {
     first: usize,
     offsets: Vec<usize>,
     columns: Vec<u32>,
@@ -80,12 +88,12 @@ impl<const B: usize> BlockPreconditioner<B> {
         let pieces = rows.div_ceil(piece_rows);
         let range = |piece: usize| piece * piece_rows..((piece + 1) * piece_rows).min(rows);
         let even = parallel::map_chunks(pieces.div_ceil(2), 1, |index| {
-            Piece::new(matrix, range(2 * index.start), [None, None], factorization)
+            PieceFactor::new(matrix, range(2 * index.start), [None, None], factorization)
         });
         let even = even.into_iter().collect::<Result<Vec<_>, _>>()?;
         let odd = parallel::map_chunks(pieces / 2, 1, |index| {
             let neighbours = [even.get(index.start), even.get(index.start + 1)];
-            Piece::new(matrix, range(2 * index.start + 1), neighbours, factorization)
+            PieceFactor::new(matrix, range(2 * index.start + 1), neighbours, factorization)
         });
         let odd = odd.into_iter().collect::<Result<Vec<_>, _>>()?;
 
@@ -147,8 +155,8 @@ impl<const B: usize> BlockPreconditioner<B> {
         });
     }
 
-    /// Solves `(D + L) w = vector` for the rows of a piece that starts at row `first`; `before` and `after` hold `w` for the
-    /// pieces on either side.
+    /// Solves `(D + L) w = vector` for the rows of a piece that starts at row `first`; `before` and
+    /// `after` hold `w` for the pieces on either side.
     fn forward(
         &self,
         first: usize,
@@ -177,8 +185,8 @@ impl<const B: usize> BlockPreconditioner<B> {
         }
     }
 
-    /// Solves `(I + D⁻¹ Lᵀ) z = w` for the rows of a piece that starts at row `first`, `w` and then `z` being `result`. `above`
-    /// holds what the rows of other pieces add to `Lᵀ z`.
+    /// Solves `(I + D⁻¹ Lᵀ) z = w` for the rows of a piece that starts at row `first`, `w` and then
+    /// `z` being `result`. `above` holds what the rows of other pieces add to `Lᵀ z`.
     fn backward(&self, first: usize, result: &mut [[f64; B]], mut above: Vec<[f64; B]>) {
         let end = first + result.len();
         for row in (first..end).rev() {
@@ -198,37 +206,23 @@ impl<const B: usize> BlockPreconditioner<B> {
 /// The blocks of rows in odd pieces and columns in even ones, in the order of their columns.
 fn below<const B: usize>(lower: &Rows<B>, piece_rows: usize) -> Rows<B> {
     let rows = lower.offsets.len() - 1;
-    let blocks = || {
-        (0..rows).filter(|row| row / piece_rows % 2 == 1).flat_map(|row| {
-            let across = move |&(column, _): &(usize, _)| column / piece_rows != row / piece_rows;
-            lower.row(row).filter(across).map(move |(column, block)| (row, column, block))
-        })
-    };
-    let mut offsets = vec![0; rows + 1];
-    for (_, column, _) in blocks() {
-        offsets[column + 1] += 1;
-    }
-    for row in 0..rows {
-        offsets[row + 1] += offsets[row];
-    }
-    let mut next = offsets.clone();
-    let mut result = Rows {
-        columns: vec![0; offsets[rows]],
-        blocks: vec![[[0.0; B]; B]; offsets[rows]],
+    let across = (0..rows).filter(|row| row / piece_rows % 2 == 1).flat_map(|row| {
+        let columns =
+            (lower.offsets[row]..lower.offsets[row + 1]).map(|entry| (lower.columns[entry], entry));
+        let across =
+            columns.filter(move |(column, _)| *column as usize / piece_rows != row / piece_rows);
+        across.map(move |(column, entry)| (column, (index(row), entry)))
+    });
+    let Groups { offsets, items } = Groups::new(rows, across);
+    let (columns, entries): (Vec<u32>, Vec<usize>) = items.into_iter().unzip();
+    Rows {
         offsets,
-    };
-    for (row, column, block) in blocks() {
-        let place = next[column];
-        next[column] += 1;
-        #[expect(clippy::cast_possible_truncation, reason = "columns are 32-bit")]
-        (result.columns[place] = row as u32);
-        result.blocks[place] = *block;
+        columns,
+        blocks: entries.into_iter().map(|entry| lower.blocks[entry]).collect(),
     }
-    result
 }
 
 fn single<const B: usize>(block: &Block<B>) -> SingleBlock<B> {
-    #[expect(clippy::cast_possible_truncation, reason = "single precision is what is wanted")]
     block.map(|row| row.map(|entry| entry as f32))
 }
 
@@ -257,7 +251,7 @@ fn subtract_product<const B: usize>(a: &mut Block<B>, b: &Block<B>, c: &Block<B>
     }
 }
 
-impl<const B: usize> Piece<B> {
+impl<const B: usize> PieceFactor<B> {
     /// `neighbours` are the pieces before and after, where those are eliminated before this one.
     fn new(
         matrix: &SparseMatrix<B>,
@@ -275,8 +269,8 @@ impl<const B: usize> Piece<B> {
         let mut diagonal = Vec::with_capacity(rows.len());
         for row in rows.clone() {
             let (columns, blocks) = matrix.row(row);
-            let place = columns.binary_search_by_key(&row, |&column| column as usize);
-            let place = place.map_err(|_| LinearError::Diagonal { row })?;
+            let on_diagonal = columns.binary_search_by_key(&row, |&column| column as usize);
+            let on_diagonal = on_diagonal.map_err(|_| LinearError::Diagonal { row })?;
             // In the order of elimination: the pieces beside this one, then this one.
             let own = columns.partition_point(|&column| (column as usize) < rows.start);
             let after = columns.partition_point(|&column| (column as usize) < rows.end);
@@ -286,15 +280,15 @@ impl<const B: usize> Piece<B> {
             let last = neighbours[1].map_or(after, |other| {
                 columns.partition_point(|&column| (column as usize) < other.first + other.rows())
             });
-            for range in [before..own, after..last, own..place] {
+            for range in [before..own, after..last, own..on_diagonal] {
                 piece.columns.extend_from_slice(&columns[range.clone()]);
                 piece.lower.extend_from_slice(&blocks[range]);
             }
             piece.offsets.push(piece.columns.len());
             piece
                 .inverse_diagonal
-                .push(invert_positive(&blocks[place]).ok_or(LinearError::Diagonal { row })?);
-            diagonal.push(blocks[place]);
+                .push(invert_positive(&blocks[on_diagonal]).ok_or(LinearError::Diagonal { row })?);
+            diagonal.push(blocks[on_diagonal]);
         }
         if factorization == Factorization::IncompleteCholesky {
             for shift in [0.0, 1e-3, 1e-2, 1e-1] {
@@ -325,8 +319,9 @@ impl<const B: usize> Piece<B> {
         let base = before.map_or(self.first, |other| other.first);
         let mut lower = self.lower.clone();
         let mut inverse_diagonal: Vec<Block<B>> = Vec::with_capacity(diagonal.len());
-        // Where in the present row a column's block lies, and that block times the inverse of the column's diagonal.
-        let mut place = vec![u32::MAX; end - base + after.map_or(0, Self::rows)];
+        // Where in the present row a column's block lies, and that block times the inverse of the
+        // column's diagonal.
+        let mut entry_of = vec![u32::MAX; end - base + after.map_or(0, Self::rows)];
         let mut scaled: Vec<Block<B>> = Vec::new();
         for (row, &block) in diagonal.iter().enumerate() {
             let start = self.offsets[row];
@@ -336,7 +331,7 @@ impl<const B: usize> Piece<B> {
                 entries[axis] *= 1.0 + shift;
             }
             scaled.clear();
-            for (index, &column) in columns.iter().enumerate() {
+            for (entry, &column) in columns.iter().enumerate() {
                 let global = column as usize;
                 let owner = if global < self.first {
                     before
@@ -354,10 +349,10 @@ impl<const B: usize> Piece<B> {
                 } else {
                     (&owner.lower[range.clone()], &owner.inverse_diagonal[local])
                 };
-                let mut value = lower[start + index];
+                let mut value = lower[start + entry];
                 for (&shared, block) in owner.columns[range].iter().zip(blocks) {
                     if let Some(found) =
-                        place.get(shared as usize - base).and_then(|&at| scaled.get(at as usize))
+                        entry_of.get(shared as usize - base).and_then(|&at| scaled.get(at as usize))
                     {
                         subtract_product(&mut value, found, block);
                     }
@@ -365,13 +360,12 @@ impl<const B: usize> Piece<B> {
                 scaled.push(std::array::from_fn(|i| {
                     std::array::from_fn(|j| (0..B).map(|k| value[i][k] * inverse[k][j]).sum())
                 }));
-                lower[start + index] = value;
-                #[expect(clippy::cast_possible_truncation, reason = "a row has few blocks")]
-                (place[global - base] = index as u32);
-                subtract_product(&mut pivot, &scaled[index], &value);
+                lower[start + entry] = value;
+                entry_of[global - base] = index(entry);
+                subtract_product(&mut pivot, &scaled[entry], &value);
             }
             for &column in columns {
-                place[column as usize - base] = u32::MAX;
+                entry_of[column as usize - base] = u32::MAX;
             }
             inverse_diagonal.push(invert_positive(&pivot)?);
         }

@@ -1,6 +1,8 @@
 //! The precisions that a preconditioner can be kept in.
 
-use std::ops::{AddAssign, Mul, Neg, Sub};
+use std::ops::{Mul, Neg, Sub};
+
+use crate::communicator::Value;
 
 /// `f32` or `f64`.
 pub(crate) trait Real:
@@ -9,7 +11,7 @@ pub(crate) trait Real:
     + Send
     + Sync
     + std::fmt::Debug
-    + AddAssign
+    + Value
     + Mul<Output = Self>
     + Sub<Output = Self>
     + Neg<Output = Self>
@@ -22,8 +24,7 @@ pub(crate) trait Real:
 impl Real for f32 {
     #[inline(always)]
     fn of(value: f64) -> Self {
-        #[expect(clippy::cast_possible_truncation, reason = "single precision is what is wanted")]
-        (value as Self)
+        value as Self
     }
 
     #[inline(always)]

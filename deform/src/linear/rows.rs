@@ -11,16 +11,17 @@ use crate::parallel;
 pub(super) struct Rows<T, const B: usize> {
     offsets: Vec<usize>,
     columns: Vec<u32>,
-    /// The entries of all blocks, and one more, so that four entries can be read from where the last column begins.
+    /// The entries of all blocks, and one more, so that four entries can be read from where the
+    /// last column begins.
     entries: Vec<T>,
 }
 
 /// Blocks of a matrix that lie side by side.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Run {
-    /// Their places among its blocks.
-    pub(super) places: Range<usize>,
-    /// What is added to their columns, wrapping around.
+    /// Their indices among its blocks.
+    pub(super) indices: Range<usize>,
+    /// The shift added to their columns, wrapping around.
     pub(super) shift: u32,
 }
 
@@ -33,7 +34,7 @@ impl<T: Real, const B: usize> Rows<T, B> {
     ) -> Self {
         let lengths = parallel::map_chunks(count, ROW_CHUNK, |range| {
             range
-                .map(|row| runs(row).iter().map(|run| run.places.len()).sum())
+                .map(|row| runs(row).iter().map(|run| run.indices.len()).sum())
                 .collect::<Vec<usize>>()
         });
         let mut offsets = Vec::with_capacity(count + 1);
@@ -54,12 +55,13 @@ impl<T: Real, const B: usize> Rows<T, B> {
             |rows, columns, found| {
                 let mut kept = columns.iter_mut().zip(found);
                 for row in rows {
-                    for Run { places, shift } in runs(row) {
+                    for Run { indices, shift } in runs(row) {
                         let blocks =
-                            matrix.columns()[places.clone()].iter().zip(&matrix.values()[places]);
-                        // The blocks come first, so that none of those to be kept is passed over where they end.
-                        for ((&column, block), (place, found)) in blocks.zip(kept.by_ref()) {
-                            *place = column.wrapping_add(shift);
+                            matrix.columns()[indices.clone()].iter().zip(&matrix.values()[indices]);
+                        // The blocks come first, so that none of those to be kept is passed over
+                        // where they end.
+                        for ((&column, block), (kept_column, found)) in blocks.zip(kept.by_ref()) {
+                            *kept_column = column.wrapping_add(shift);
                             *found = std::array::from_fn(|j| {
                                 std::array::from_fn(|i| T::of(block[i][j]))
                             });
@@ -83,8 +85,8 @@ impl<T: Real, const B: usize> Rows<T, B> {
         self.add_product_either_way::<K, false>(row, vector, first, sum);
     }
 
-    /// The same from the last block to the first: where rows are gone through backwards, memory is then read in one direction
-    /// throughout, which processors see coming.
+    /// Adds the product from the last block to the first: where rows are gone through backwards,
+    /// memory is then read in one direction throughout, which processors see coming.
     #[inline(always)]
     pub(super) fn add_product_backwards<const K: usize>(
         &self,
@@ -107,15 +109,16 @@ impl<T: Real, const B: usize> Rows<T, B> {
         let range = self.offsets[row]..self.offsets[row + 1];
         let entries = &self.entries[B * B * range.start..=B * B * range.end];
         let columns = &self.columns[range];
-        let places = (0..columns.len())
-            .map(|place| if BACKWARDS { columns.len() - 1 - place } else { place });
+        let indices = (0..columns.len())
+            .map(|index| if BACKWARDS { columns.len() - 1 - index } else { index });
         if B == 3 {
-            // Four entries at a time, as processors have it; the fourth is the next column's and comes to nothing. Each column of
-            // a block has its own sum, so that none need wait for another.
+            // Four entries at a time, as processors have it; the fourth is the next column's and
+            // comes to nothing. Each column of a block has its own sum, so that none need wait for
+            // another.
             let mut wide = [[[T::default(); 4]; 3]; K];
-            for place in places {
-                let Some(block) = entries[9 * place..].first_chunk::<10>() else { break };
-                for (sums, vector) in wide.iter_mut().zip(&vector[columns[place] as usize - first])
+            for index in indices {
+                let Some(block) = entries[9 * index..].first_chunk::<10>() else { break };
+                for (sums, vector) in wide.iter_mut().zip(&vector[columns[index] as usize - first])
                 {
                     for (j, sum) in sums.iter_mut().enumerate() {
                         for lane in 0..4 {
@@ -133,9 +136,9 @@ impl<T: Real, const B: usize> Rows<T, B> {
             }
             return;
         }
-        for place in places {
-            let block = &entries[B * B * place..B * B * (place + 1)];
-            for (sum, vector) in sum.iter_mut().zip(&vector[columns[place] as usize - first]) {
+        for index in indices {
+            let block = &entries[B * B * index..B * B * (index + 1)];
+            for (sum, vector) in sum.iter_mut().zip(&vector[columns[index] as usize - first]) {
                 for (column, &value) in block.chunks_exact(B).zip(vector) {
                     for (total, &entry) in sum.iter_mut().zip(column) {
                         *total += entry * value;

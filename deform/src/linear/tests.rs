@@ -15,7 +15,8 @@ fn noise(seed: u64) -> f64 {
     (mixed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
-/// A symmetric positive definite block that looks random: the identity plus a product of a block with itself.
+/// A symmetric positive definite block that looks random: the identity plus a product of a block
+/// with itself.
 fn positive<const B: usize>(seed: u64) -> Block<B> {
     let part: Block<B> =
         std::array::from_fn(|i| std::array::from_fn(|j| noise(seed * 31 + (B * i + j) as u64)));
@@ -27,8 +28,8 @@ fn positive<const B: usize>(seed: u64) -> Block<B> {
     })
 }
 
-/// Springs along the edges of a grid of `count` cubed vertices, those of the outermost ones to a wall: `spring(edge)` is the
-/// block of each.
+/// Springs along the edges of a grid of `count` cubed vertices, those of the outermost ones to a
+/// wall: `spring(edge)` is the block of each.
 fn grid<const B: usize>(count: usize, spring: impl Fn(u64) -> Block<B>) -> SparseMatrix<B> {
     let vertices = count.pow(3);
     let mut rows: Vec<std::collections::BTreeMap<u32, Block<B>>> =
@@ -42,17 +43,17 @@ fn grid<const B: usize>(count: usize, spring: impl Fn(u64) -> Block<B>) -> Spars
     let mut edge = 0;
     for vertex in 0..vertices {
         for stride in [1, count, count * count] {
-            let place = vertex / stride % count;
+            let step = vertex / stride % count;
             edge += 1;
             let block = spring(edge);
             add(vertex, vertex, &block, 1.0);
-            if place + 1 < count {
+            if step + 1 < count {
                 let other = vertex + stride;
                 add(other, other, &block, 1.0);
                 add(vertex, other, &block, -1.0);
                 add(other, vertex, &block, -1.0);
             }
-            if place == 0 {
+            if step == 0 {
                 add(vertex, vertex, &block, 1.0);
             }
         }
@@ -178,9 +179,10 @@ fn what_stalls_is_finished_by_the_fallback() {
 fn a_solve_goes_on_from_where_it_is_told_to() {
     let matrix = laplace(14);
     let right_side = right_side(matrix.rows());
-    for solver in
-        [solver(Arc::new(matrix.clone())).unwrap(), Box::new(Cholesky::new(matrix).unwrap())]
-    {
+    for solver in [
+        solver(Arc::new(matrix.clone()), &Halo::none()).unwrap(),
+        Box::new(Cholesky::new(matrix).unwrap()),
+    ] {
         let (mut solution, iterations) = solved(solver.as_ref(), &right_side);
         let kept = solution.clone();
         let loose = Tolerance { relative: 1e-10, absolute: 0.0 };
@@ -234,6 +236,18 @@ fn a_renewed_solver_is_the_one_of_the_new_matrix() {
     // Another pattern: nothing is used again.
     let small = first.renewed(Arc::new(grid(8, positive::<3>))).unwrap();
     assert_eq!(small.unknowns(), 512);
+}
+
+#[test]
+fn a_similar_matrix_is_solved_with_the_preconditioner_there_is() {
+    let springs = |change: f64| Arc::new(grid(12, |edge| [[1.0 + change * noise(edge)]]));
+    let right_side = right_side(springs(0.0).rows());
+    let first = Multigrid::new(springs(0.0), MultigridSettings::default()).unwrap();
+    let (_, fresh) =
+        solved(&Multigrid::new(springs(0.3), MultigridSettings::default()).unwrap(), &right_side);
+    let (solution, iterations) = solved(&first.of_similar_matrix(springs(0.3)), &right_side);
+    assert!(residual(&springs(0.3), &right_side, &solution) < 1e-10);
+    assert!(iterations <= 2 * fresh, "{iterations} {fresh}");
 }
 
 #[test]

@@ -2,9 +2,10 @@
 
 use super::real::Real;
 use super::{Block, ROW_CHUNK, SparseMatrix};
-use crate::mesh::Vector;
+use crate::number::index;
 use crate::parallel;
-use crate::vector::cross;
+use crate::topology::Groups;
+use crate::vector::{Vector, cross};
 
 /// How many coarse rows are worked on at a time.
 const COARSE_CHUNK: usize = 64;
@@ -12,14 +13,15 @@ const COARSE_CHUNK: usize = 64;
 /// A column that the present row has no block in.
 const NONE: u32 = u32::MAX;
 
-/// How much stiffer against turning an aggregate is made than it is, in parts of its stiffness against shifts: what lies on one
-/// line, or is one vertex, does not resist all turns.
+/// How much stiffer against turning an aggregate is made than it is, in parts of its stiffness
+/// against shifts: what lies on one line, or is one vertex, does not resist all turns.
 const TURNING: f64 = 1e-4;
 
 /// How coarse values make fine ones, in compressed rows: each by a weight.
 ///
-/// Coarse values of 6 entries are a shift and a turn; there is an arm for each weight then, and a fine shift is the sum of
-/// `weight shift + turn × arm`, a fine turn that of `turn_factor weight turn`.
+/// Coarse values of 6 entries are a shift and a turn; there is an arm for each weight then, and a
+/// fine shift is the sum of `weight shift + turn × arm`, a fine turn that of `turn_factor weight
+/// turn`.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Interpolation {
     pub(super) offsets: Vec<usize>,
@@ -34,48 +36,35 @@ impl Interpolation {
         self.offsets.len() - 1
     }
 
-    fn arm(&self, place: usize) -> Vector {
-        self.arms.get(place).copied().unwrap_or_default()
+    fn arm(&self, entry: usize) -> Vector {
+        self.arms.get(entry).copied().unwrap_or_default()
     }
 
-    /// For each column the rows that have a weight there, and the places of these.
-    pub(super) fn transposed(&self, columns: usize) -> (Vec<usize>, Vec<(u32, u32)>) {
-        let mut starts = vec![0usize; columns + 2];
-        for &column in &self.columns {
-            starts[column as usize + 2] += 1;
-        }
-        for column in 2..starts.len() {
-            starts[column] += starts[column - 1];
-        }
-        let mut entries = vec![(0, 0); self.columns.len()];
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "rows are 32-bit, and they have few weights"
-        )]
-        for row in 0..self.rows() {
-            for place in self.offsets[row]..self.offsets[row + 1] {
-                let next = &mut starts[self.columns[place] as usize + 1];
-                entries[*next] = (row as u32, place as u32);
-                *next += 1;
-            }
-        }
-        starts.pop();
-        (starts, entries)
+    /// The rows that have a weight in each column, and the indices of these weights.
+    pub(super) fn transposed(&self, columns: usize) -> Transposed {
+        let weights = self.offsets.windows(2).zip(0..).flat_map(|(range, row)| {
+            let weights = self.columns[range[0]..range[1]].iter().zip(index(range[0])..);
+            weights.map(move |(&column, weight)| (column, (row, weight)))
+        });
+        Groups::new(columns, weights)
     }
 }
+
+/// An interpolation by its columns: rows, and the indices of their weights.
+pub(super) type Transposed = Groups<(u32, u32)>;
 
 /// A block of a coarse column in a fine row.
 type Image<const F: usize, const C: usize> = [[f64; C]; F];
 
-/// `Pᵀ A P` for the matrix `A` and interpolation `P`, with as many rows as `P` has columns; `transposed` is that of `P`. `sizes`
-/// are those of the aggregates, where they turn.
+/// `Pᵀ A P` for the matrix `A` and interpolation `P`, with as many rows as `P` has columns;
+/// `transposed` is that of `P`. `sizes` are those of the aggregates, where they turn.
 pub(super) fn galerkin<const F: usize, const C: usize>(
     matrix: &SparseMatrix<F>,
     interpolation: &Interpolation,
-    (starts, entries): (&[usize], &[(u32, u32)]),
+    transposed: &Transposed,
     sizes: &[f64],
 ) -> SparseMatrix<C> {
-    let count = starts.len() - 1;
+    let count = transposed.offsets.len() - 1;
     let image: Vec<RowsFound<Image<F, C>>> =
         parallel::map_chunks(matrix.rows(), ROW_CHUNK, |range| {
             let mut row = Accumulator::new(count, [[0.0; C]; F]);
@@ -84,10 +73,10 @@ pub(super) fn galerkin<const F: usize, const C: usize>(
                 let (columns, blocks) = matrix.row(index);
                 for (&column, block) in columns.iter().zip(blocks) {
                     let column = column as usize;
-                    for place in interpolation.offsets[column]..interpolation.offsets[column + 1] {
-                        let sum = row.at(interpolation.columns[place]);
+                    for entry in interpolation.offsets[column]..interpolation.offsets[column + 1] {
+                        let sum = row.at(interpolation.columns[entry]);
                         let (weight, arm) =
-                            (interpolation.weights[place], interpolation.arm(place));
+                            (interpolation.weights[entry], interpolation.arm(entry));
                         for (sum, entries) in sum.iter_mut().zip(block) {
                             add_row(sum, entries, weight, arm, interpolation.turn);
                         }
@@ -102,17 +91,16 @@ pub(super) fn galerkin<const F: usize, const C: usize>(
         let mut row = Accumulator::new(count, [[0.0; C]; C]);
         let mut found = RowsFound::default();
         for coarse in range {
-            for &(fine, place) in &entries[starts[coarse]..starts[coarse + 1]] {
-                let (fine, place) = (fine as usize, place as usize);
-                let (weight, arm) = (interpolation.weights[place], interpolation.arm(place));
+            for &(fine, entry) in transposed.of(index(coarse)) {
+                let (fine, entry) = (fine as usize, entry as usize);
+                let (weight, arm) = (interpolation.weights[entry], interpolation.arm(entry));
                 let (columns, blocks) = image[fine / ROW_CHUNK].row(fine % ROW_CHUNK);
                 for (&column, block) in columns.iter().zip(blocks) {
                     add_rows(row.at(column), block, weight, arm, interpolation.turn);
                 }
             }
             if C == 6 {
-                #[expect(clippy::cast_possible_truncation, reason = "rows are 32-bit")]
-                let own = row.at(coarse as u32);
+                let own = row.at(index(coarse));
                 let stiffness =
                     TURNING * sizes[coarse] * sizes[coarse] * (own[0][0] + own[1][1] + own[2][2])
                         / 3.0;
@@ -242,28 +230,24 @@ pub(super) fn collected<const B: usize>(
 
 /// A row that is dense to look up and sparse to walk.
 struct Accumulator<T> {
-    places: Vec<u32>,
+    indices: Vec<u32>,
     entries: Vec<(u32, T)>,
     zero: T,
 }
 
 impl<T: Copy> Accumulator<T> {
     fn new(columns: usize, zero: T) -> Self {
-        Self { places: vec![NONE; columns], entries: Vec::new(), zero }
+        Self { indices: vec![NONE; columns], entries: Vec::new(), zero }
     }
 
     #[inline]
     fn at(&mut self, column: u32) -> &mut T {
-        let place = &mut self.places[column as usize];
-        if *place == NONE {
-            #[expect(
-                clippy::cast_possible_truncation,
-                reason = "a row has fewer blocks than there are columns"
-            )]
-            (*place = self.entries.len() as u32);
+        let entry = &mut self.indices[column as usize];
+        if *entry == NONE {
+            *entry = index(self.entries.len());
             self.entries.push((column, self.zero));
         }
-        &mut self.entries[*place as usize].1
+        &mut self.entries[*entry as usize].1
     }
 
     /// Puts the entries in the order of their columns; nothing may be looked up any more.
@@ -273,7 +257,7 @@ impl<T: Copy> Accumulator<T> {
 
     fn finish(&mut self, found: &mut RowsFound<T>) {
         for (column, _) in &self.entries {
-            self.places[*column as usize] = NONE;
+            self.indices[*column as usize] = NONE;
         }
         for (column, block) in self.entries.drain(..) {
             found.push(column, block);
@@ -293,7 +277,8 @@ pub(super) struct Transfer<T> {
 }
 
 impl<T: Real> Transfer<T> {
-    /// The interpolation with row `rows(slot)` in place of `slot` and `columns(column)` in place of a column.
+    /// The interpolation with row `rows(slot)` in place of `slot` and `columns(column)` in place of
+    /// a column.
     pub(super) fn interpolation(
         from: &Interpolation,
         rows: impl Fn(usize) -> usize + Sync,
@@ -301,23 +286,22 @@ impl<T: Real> Transfer<T> {
     ) -> Self {
         Self::new(from.rows(), from, |slot, push| {
             let row = rows(slot);
-            for place in from.offsets[row]..from.offsets[row + 1] {
-                push(columns(from.columns[place] as usize), place);
+            for entry in from.offsets[row]..from.offsets[row + 1] {
+                push(columns(from.columns[entry] as usize), entry);
             }
         })
     }
 
-    /// The same for its transpose.
+    /// The restriction: the transpose of an interpolation.
     pub(super) fn restriction(
         from: &Interpolation,
-        (starts, entries): (&[usize], &[(u32, u32)]),
+        transposed: &Transposed,
         rows: impl Fn(usize) -> usize + Sync,
         columns: impl Fn(usize) -> usize + Sync,
     ) -> Self {
-        Self::new(starts.len() - 1, from, |slot, push| {
-            let row = rows(slot);
-            for &(fine, place) in &entries[starts[row]..starts[row + 1]] {
-                push(columns(fine as usize), place as usize);
+        Self::new(transposed.offsets.len() - 1, from, |slot, push| {
+            for &(fine, entry) in transposed.of(index(rows(slot))) {
+                push(columns(fine as usize), entry as usize);
             }
         })
     }
@@ -330,7 +314,7 @@ impl<T: Real> Transfer<T> {
         let parts = parallel::map_chunks(count, ROW_CHUNK, |range| {
             let (mut ends, mut found) = (Vec::with_capacity(range.len()), Vec::new());
             for slot in range {
-                row(slot, &mut |column, place| found.push((column, place)));
+                row(slot, &mut |column, entry| found.push((column, entry)));
                 ends.push(found.len());
             }
             (ends, found)
@@ -345,11 +329,10 @@ impl<T: Real> Transfer<T> {
         for (ends, found) in parts {
             let base = result.columns.len();
             result.offsets.extend(ends.into_iter().map(|end| base + end));
-            #[expect(clippy::cast_possible_truncation, reason = "rows are 32-bit")]
-            result.columns.extend(found.iter().map(|&(column, _)| column as u32));
-            result.weights.extend(found.iter().map(|&(_, place)| T::of(from.weights[place])));
+            result.columns.extend(found.iter().map(|&(column, _)| index(column)));
+            result.weights.extend(found.iter().map(|&(_, entry)| T::of(from.weights[entry])));
             if !from.arms.is_empty() {
-                result.arms.extend(found.iter().map(|&(_, place)| from.arms[place].map(T::of)));
+                result.arms.extend(found.iter().map(|&(_, entry)| from.arms[entry].map(T::of)));
             }
         }
         result
@@ -363,9 +346,9 @@ impl<T: Real> Transfer<T> {
         coarse: &[[[T; C]; K]],
         value: &mut [[T; F]; K],
     ) {
-        for place in self.offsets[row]..self.offsets[row + 1] {
-            let weight = self.weights[place];
-            for (value, coarse) in value.iter_mut().zip(&coarse[self.columns[place] as usize]) {
+        for entry in self.offsets[row]..self.offsets[row + 1] {
+            let weight = self.weights[entry];
+            for (value, coarse) in value.iter_mut().zip(&coarse[self.columns[entry] as usize]) {
                 for (value, &coarse) in
                     value.iter_mut().zip(coarse).take(if C == 6 { 3 } else { C })
                 {
@@ -373,7 +356,7 @@ impl<T: Real> Transfer<T> {
                 }
                 if C == 6 && F >= 3 {
                     let turn = [coarse[3], coarse[4], coarse[5]];
-                    for (value, moved) in value.iter_mut().zip(product(turn, self.arms[place])) {
+                    for (value, moved) in value.iter_mut().zip(product(turn, self.arms[entry])) {
                         *value += moved;
                     }
                     if F == 6 {
@@ -394,14 +377,14 @@ impl<T: Real> Transfer<T> {
         fine: &[[[T; F]; K]],
         value: &mut [[T; C]; K],
     ) {
-        for place in self.offsets[row]..self.offsets[row + 1] {
-            let weight = self.weights[place];
-            for (value, fine) in value.iter_mut().zip(&fine[self.columns[place] as usize]) {
+        for entry in self.offsets[row]..self.offsets[row + 1] {
+            let weight = self.weights[entry];
+            for (value, fine) in value.iter_mut().zip(&fine[self.columns[entry] as usize]) {
                 for (value, &fine) in value.iter_mut().zip(fine).take(if C == 6 { 3 } else { C }) {
                     *value += weight * fine;
                 }
                 if C == 6 && F >= 3 {
-                    let turned = product(self.arms[place], [fine[0], fine[1], fine[2]]);
+                    let turned = product(self.arms[entry], [fine[0], fine[1], fine[2]]);
                     for (axis, turned) in turned.into_iter().enumerate() {
                         value[3 + axis] += turned;
                         if F == 6 {

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A linear VTK cell type. The discriminant is VTK's own number, and vertices are numbered as VTK numbers them.
+/// A linear VTK cell type. The discriminant is VTK's own number, and vertices are numbered as VTK
+/// numbers them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[repr(u8)]
@@ -115,7 +116,8 @@ impl CellType {
 
     /// The faces of a volume cell as local vertex numbers, counter-clockwise seen from outside.
     ///
-    /// Empty for cells of lower dimension and for [`CellType::Polyhedron`], whose faces are stored with the cell.
+    /// Empty for cells of lower dimension and for [`CellType::Polyhedron`], whose faces are stored
+    /// with the cell.
     #[must_use]
     pub const fn faces(self) -> &'static [&'static [usize]] {
         match self {
@@ -136,8 +138,9 @@ impl CellType {
                 &[0, 3, 2, 1],
                 &[4, 5, 6, 7],
             ],
-            // VTK's manual has wedges whose first triangle's normal points out of the cell, its measures and most mesh generators
-            // those whose first triangle's normal points in: a mesh turns the ones to be the others.
+            // VTK's manual has wedges whose first triangle's normal points out of the cell, its
+            // measures and most mesh generators those whose first triangle's normal points in: a
+            // mesh turns the ones to be the others.
             CellType::Wedge => {
                 &[&[0, 2, 1], &[3, 4, 5], &[0, 1, 4, 3], &[1, 2, 5, 4], &[2, 0, 3, 5]]
             }
@@ -193,6 +196,24 @@ impl CellType {
 impl std::fmt::Display for CellType {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(self.name())
+    }
+}
+
+/// Some of the types of cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Types(u64);
+
+impl Types {
+    pub(super) fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    pub(super) fn contains(self, cell_type: CellType) -> bool {
+        self.0 & 1 << cell_type.vtk() != 0
+    }
+
+    pub(super) fn insert(&mut self, cell_type: CellType) {
+        self.0 |= 1 << cell_type.vtk();
     }
 }
 

@@ -1,17 +1,14 @@
 //! Cells of any linear type, owned.
 
-use std::borrow::Cow;
-
-use super::handedness::{Types, hands, mirror};
-use super::other_order::other_order;
-use super::{CellType, MeshError, Vector};
+use super::cell_type::Types;
+use super::{CellType, MeshError};
 
 /// Cells of any mix of linear types, as compressed rows of vertex numbers.
 ///
 /// A polyhedron's row lists its distinct vertices; its faces are kept beside it.
 ///
-/// The cells of a [`Mesh`](super::Mesh) are right-handed: types that were given left-handed, as in a mirrored mesh, are turned
-/// where the mesh is made. [`Cells::as_given`] has them as they came.
+/// The cells of a [`Mesh`](super::Mesh) are right-handed: types that were given left-handed, as in
+/// a mirrored mesh, are turned where the mesh is made. [`Cells::as_given`] has them as they came.
 #[derive(Debug, Clone)]
 pub struct Cells {
     types: Vec<CellType>,
@@ -65,8 +62,8 @@ impl Cells {
     /// Cells that are all of one type with a fixed number of vertices.
     ///
     /// # Errors
-    /// [`MeshError::CellType`] for a type whose vertex count varies; [`MeshError::VertexCount`] where `connectivity` is
-    /// not a whole number of cells.
+    /// [`MeshError::CellType`] for a type whose vertex count varies; [`MeshError::VertexCount`]
+    /// where `connectivity` is not a whole number of cells.
     pub fn uniform(cell_type: CellType, connectivity: Vec<u32>) -> Result<Self, MeshError> {
         let size = cell_type.vertex_count().ok_or(MeshError::CellType {
             cell: 0,
@@ -93,8 +90,8 @@ impl Cells {
     /// Appends one cell.
     ///
     /// # Errors
-    /// [`MeshError::VertexCount`] where the type asks for another number of vertices; [`MeshError::CellType`] for a
-    /// polyhedron (use [`Cells::push_polyhedron`]).
+    /// [`MeshError::VertexCount`] where the type asks for another number of vertices;
+    /// [`MeshError::CellType`] for a polyhedron (use [`Cells::push_polyhedron`]).
     pub fn push(&mut self, cell_type: CellType, vertices: &[u32]) -> Result<(), MeshError> {
         let fits = match cell_type {
             CellType::Polyhedron => {
@@ -125,7 +122,8 @@ impl Cells {
     /// Appends a polyhedron given by its faces, each counter-clockwise seen from outside.
     ///
     /// # Errors
-    /// [`MeshError::VertexCount`] where there are fewer than four faces or a face has fewer than three vertices.
+    /// [`MeshError::VertexCount`] where there are fewer than four faces or a face has fewer than
+    /// three vertices.
     pub fn push_polyhedron(&mut self, faces: &[Vec<u32>]) -> Result<(), MeshError> {
         let smallest = faces.iter().map(Vec::len).min().unwrap_or(0);
         if faces.len() < 4 || smallest < 3 {
@@ -172,8 +170,8 @@ impl Cells {
         &self.types
     }
 
-    /// The vertices of a cell, in VTK's order. The normal of a wedge's first triangle points at the second in a mesh, which is
-    /// one of the two orders that VTK's programs and pages have.
+    /// The vertices of a cell, in VTK's order. The normal of a wedge's first triangle points at the
+    /// second in a mesh, which is one of the two orders that VTK's programs and pages have.
     ///
     /// # Panics
     /// Where `cell` is not below [`Cells::len`].
@@ -195,7 +193,7 @@ impl Cells {
     }
 
     /// Each cell's type and vertices, in order.
-    pub fn iter(&self) -> impl ExactSizeIterator<Item = (CellType, &[u32])> {
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = (CellType, &[u32])> + Clone {
         (0..self.len()).map(|cell| (self.types[cell], self.vertices(cell)))
     }
 
@@ -212,7 +210,8 @@ impl Cells {
         self.types.iter().map(|cell| cell.dimension()).max().unwrap_or(0)
     }
 
-    /// Calls `visit` with each face of a volume cell: global vertex numbers, counter-clockwise seen from outside.
+    /// Calls `visit` with each face of a volume cell: global vertex numbers, counter-clockwise seen
+    /// from outside.
     pub fn for_each_face(&self, cell: usize, mut visit: impl FnMut(&[u32])) {
         if self.types[cell] == CellType::Polyhedron {
             for face in self.polyhedron_faces(cell) {
@@ -251,7 +250,7 @@ impl Cells {
         cells.offsets.push(0);
         let renumbered =
             |vertices: &[u32]| vertices.iter().map(|&vertex| number[vertex as usize]).collect();
-        for (place, &cell) in order.iter().enumerate() {
+        for (index, &cell) in order.iter().enumerate() {
             let cell = cell as usize;
             cells.types.push(self.types[cell]);
             cells
@@ -261,7 +260,7 @@ impl Cells {
             if self.types[cell] == CellType::Polyhedron {
                 let faces =
                     self.polyhedron_faces(cell).iter().map(|face| renumbered(face)).collect();
-                cells.polyhedra.push(PolyhedronFaces { cell: place, faces });
+                cells.polyhedra.push(PolyhedronFaces { cell: index, faces });
             }
         }
         cells
@@ -286,7 +285,7 @@ impl Cells {
         subset
     }
 
-    /// The same cells with the number `numbers[vertex]` for each vertex.
+    /// The cells with the number `numbers[vertex]` for each vertex.
     ///
     /// # Panics
     /// Where a cell names a vertex beyond `numbers`.
@@ -300,98 +299,24 @@ impl Cells {
         cells
     }
 
-    /// The cells right-handed, as a mesh with these points has them: each type most of whose cells are left-handed is turned.
-    /// Cells that are a mesh's, or were taken from one, stay as they are whatever the points.
-    ///
-    /// # Panics
-    /// Where a cell names a vertex beyond `points`.
-    #[must_use]
-    pub fn right_handed(&self, points: &[Vector]) -> Cow<'_, Self> {
-        if self.turned.is_some() {
-            return Cow::Borrowed(self);
-        }
-        let (turned, _) = hands(self, points);
-        if turned.is_empty() {
-            return Cow::Borrowed(self);
-        }
-        let mut cells = self.clone();
-        cells.turn(turned);
-        cells.turned = Some(turned);
-        Cow::Owned(cells)
+    /// The types whose cells were turned; `None` before any points have told.
+    pub(super) fn turned_types(&self) -> Option<Types> {
+        self.turned
     }
 
-    /// The cells of a mesh, right-handed.
-    ///
-    /// # Errors
-    /// [`MeshError::OtherOrder`].
-    pub(super) fn of_mesh(mut self, points: &[Vector]) -> Result<Self, MeshError> {
-        // Another mesh may have had them elsewhere.
-        self.turn(self.turned.unwrap_or_default());
-        let (turned, neither) = hands(&self, points);
-        if let Some(other) = other_order(&self, points, neither) {
-            return Err(other);
-        }
-        self.turn(turned);
-        self.turned = Some(turned);
-        Ok(self)
+    /// The cells, those of the types `turned` taken as turned.
+    pub(super) fn with_turned_types(self, turned: Option<Types>) -> Self {
+        Self { turned, ..self }
     }
 
-    /// The cells with their vertices in the order in which they were given, before a mesh turned those that were left-handed.
-    #[must_use]
-    pub fn as_given(&self) -> Cow<'_, Self> {
-        match self.turned {
-            Some(turned) if !turned.is_empty() => {
-                let mut cells = self.clone();
-                cells.turn(turned);
-                cells.turned = None;
-                Cow::Owned(cells)
-            }
-            _ => Cow::Borrowed(self),
-        }
+    /// The vertices of a cell, to be put in another order.
+    pub(super) fn vertices_mut(&mut self, cell: usize) -> &mut [u32] {
+        &mut self.connectivity[self.offsets[cell]..self.offsets[cell + 1]]
     }
 
-    /// What a person should know of the order in which the vertices were given: which types of cells were left-handed. Wedges are
-    /// not told of, which have no agreed order.
-    #[must_use]
-    pub fn handedness_note(&self) -> Option<String> {
-        let turned = self.turned.unwrap_or_default();
-        let types: Vec<&str> = CellType::ALL
-            .into_iter()
-            .filter(|&cell_type| cell_type != CellType::Wedge && turned.contains(cell_type))
-            .map(CellType::name)
-            .collect();
-        let types = match &types[..] {
-            [] => return None,
-            [one] => (*one).to_owned(),
-            [first @ .., last] => format!("{} and {last}", first.join(", ")),
-        };
-        Some(format!(
-            "left-handed cells: those of type {types} run the other way round than VTK's; they are read as mirrored, and keep \
-             their own order of vertices wherever they are written"
-        ))
-    }
-
-    /// Mirrors the order of vertices of the cells of some types; twice is not at all.
-    fn turn(&mut self, types: Types) {
-        if types.is_empty() {
-            return;
-        }
-        let mut row = Vec::new();
-        for (cell, &cell_type) in self.types.iter().enumerate() {
-            if types.contains(cell_type) && cell_type != CellType::Polyhedron {
-                let vertices = &mut self.connectivity[self.offsets[cell]..self.offsets[cell + 1]];
-                row.clear();
-                row.extend_from_slice(vertices);
-                for (vertex, &from) in vertices.iter_mut().zip(mirror(cell_type)) {
-                    *vertex = row[from];
-                }
-            }
-        }
-        if types.contains(CellType::Polyhedron) {
-            for face in self.polyhedra.iter_mut().flat_map(|polyhedron| &mut polyhedron.faces) {
-                face[1..].reverse();
-            }
-        }
+    /// The faces of all polyhedra, whose vertices are to be put in another order.
+    pub(super) fn polyhedron_faces_mut(&mut self) -> impl Iterator<Item = &mut Vec<u32>> {
+        self.polyhedra.iter_mut().flat_map(|polyhedron| &mut polyhedron.faces)
     }
 
     /// Refuses a vertex number at or above `vertex_count`.

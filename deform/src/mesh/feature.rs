@@ -10,21 +10,23 @@ pub enum FeatureSource {
     SharpEdges,
     /// Faces that carry a feature, as physical surfaces in Gmsh do.
     Faces(TaggedFaces),
-    /// One feature number for each vertex, as a VTK point array named `features` gives them. A boundary face belongs to the
-    /// feature that most of its vertices carry, the lowest number on a tie.
+    /// One feature number for each vertex, as a VTK point array named `features` gives them. A
+    /// boundary face belongs to the feature that most of its vertices carry, the lowest number on a
+    /// tie.
     Vertices(Vec<i64>),
 }
 
-/// Faces that carry a feature each. They need not be all of the boundary, and need not lie on it; boundary faces that are not
-/// among them make a feature of their own, named `untagged`.
+/// Faces that carry a feature each. They need not be all of the boundary, and need not lie on it;
+/// boundary faces that are not among them make a feature of their own, named `untagged`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TaggedFaces {
-    /// The faces: cells of dimension 2 by the vertex numbers of the mesh. A boundary face of four vertices or more may also be
-    /// tagged by the triangles that make it up.
+    /// The faces: cells of dimension 2 by the vertex numbers of the mesh. A boundary face of four
+    /// vertices or more may also be tagged by the triangles that make it up.
     pub faces: Cells,
     /// The number of each face's feature, one for each of `faces`.
     pub tags: Vec<i64>,
-    /// The names of features, by their number. A feature without a name is called `feature-<number>`.
+    /// The names of features, by their number. A feature without a name is called
+    /// `feature-<number>`.
     pub names: Vec<(i64, String)>,
 }
 

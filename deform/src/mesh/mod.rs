@@ -1,52 +1,65 @@
-//! Meshes: owned ([`Mesh`]) and borrowed from a solver ([`MeshView`]), of any mix of linear VTK cells.
+//! Meshes: owned ([`Mesh`]) and borrowed from a solver ([`MeshView`]), of any mix of linear VTK
+//! cells.
 //!
-//! The kernel works on owned meshes in double precision. A solver's arrays are borrowed as they lie in its memory, strided,
-//! separate or interleaved, of any common number type ([`ArrayView`], [`CellsView`]); nothing is copied until something needs it.
+//! The kernel works on owned meshes in double precision. A solver's arrays are borrowed as they lie
+//! in its memory, strided, separate or interleaved, of any common number type ([`ArrayView`],
+//! [`CellsView`]); nothing is copied until something needs it.
 
 use std::sync::Arc;
 
+mod array;
+mod cell_faces;
+pub(crate) mod cell_geometry;
 mod cell_type;
 mod cells;
+mod domain;
 mod feature;
+pub mod ghosts;
 mod handedness;
 mod ordered;
 mod other_order;
+mod shared;
 mod view;
 mod view_check;
 
+pub use crate::vector::Vector;
+pub use array::{ArrayView, NumberType, Values};
+pub(crate) use cell_faces::{CellFace, FaceBuffer, face_vertices, lowest_four, sorted};
 pub use cell_type::CellType;
 pub use cells::Cells;
+pub use domain::Domain;
 pub use feature::{FeatureSource, TaggedFaces};
 pub(crate) use handedness::is_left_handed;
 #[cfg(test)]
 pub(crate) use ordered::shuffled;
 pub(crate) use ordered::{Numbering, Ordered};
 pub use other_order::OtherOrder;
-pub use view::{ArrayView, CellsView, Indices, MeshView, NumberType, Values};
+pub use shared::SharedVertices;
+pub use view::{CellsView, Indices, MeshView};
 
-/// A point or vector in space.
-pub type Vector = [f64; 3];
-
-/// An unstructured mesh that owns its arrays.
+/// An unstructured mesh that owns its arrays. To clone a mesh copies none of them.
 ///
-/// Invariants, kept by [`Mesh::new`]: every coordinate is finite, every vertex number is in range, and of each type of volume cell
-/// no more are left-handed than right-handed. A mesh whose cells are left-handed throughout, because it was mirrored or its
-/// vertices stand in another order, is read as well: its cells are turned here, once, and [`Cells::as_given`] has them as they came.
+/// Invariants, kept by [`Mesh::new`]: every coordinate is finite, every vertex number is in range,
+/// and of each type of volume cell no more are left-handed than right-handed. A mesh whose cells
+/// are left-handed throughout, because it was mirrored or its vertices stand in another order, is
+/// read as well: its cells are turned here, once, and [`Cells::as_given`] has them as they came.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
-    points: Vec<Vector>,
-    // Shared with the same cells at other coordinates.
+    // Shared with clones, and the cells with meshes of other coordinates.
+    points: Arc<Vec<Vector>>,
     cells: Arc<Cells>,
     features: Arc<FeatureSource>,
 }
 
 impl Mesh {
-    /// A mesh from its points (length units of the caller), its cells and where its features come from.
+    /// A mesh from its points (length units of the caller), its cells and where its features come
+    /// from.
     ///
     /// # Errors
-    /// [`MeshError::NotFinite`] for a NaN or infinite coordinate, [`MeshError::VertexNumber`] for a vertex that does not exist,
-    /// [`MeshError::FeatureCount`] where the feature tags do not match the mesh, [`MeshError::OtherOrder`] where most cells of a type
-    /// have their vertices in an order that is not VTK's and can be told.
+    /// [`MeshError::NotFinite`] for a NaN or infinite coordinate, [`MeshError::VertexNumber`] for a
+    /// vertex that does not exist, [`MeshError::FeatureCount`] where the feature tags do not match
+    /// the mesh, [`MeshError::OtherOrder`] where most cells of a type have their vertices in an
+    /// order that is not VTK's and can be told.
     pub fn new(
         points: Vec<Vector>,
         cells: Cells,
@@ -56,7 +69,7 @@ impl Mesh {
         cells.validate(points.len())?;
         features.validate(points.len())?;
         let cells = cells.of_mesh(&points)?;
-        Ok(Self { points, cells: Arc::new(cells), features: Arc::new(features) })
+        Ok(Self { points: Arc::new(points), cells: Arc::new(cells), features: Arc::new(features) })
     }
 
     /// The coordinates of each vertex.
@@ -82,16 +95,21 @@ impl Mesh {
         &self.cells
     }
 
-    /// The same cells at other coordinates, without a copy of them.
+    /// The mesh with its vertices at other coordinates, without a copy of its cells.
     ///
     /// # Errors
-    /// [`MeshError::PointCount`] where there are more or fewer points than before; [`MeshError::NotFinite`].
+    /// [`MeshError::PointCount`] where there are more or fewer points than before;
+    /// [`MeshError::NotFinite`].
     pub fn with_points(&self, points: Vec<Vector>) -> Result<Self, MeshError> {
         if points.len() != self.points.len() {
             return Err(MeshError::PointCount { found: points.len(), expected: self.points.len() });
         }
         check_finite(&points)?;
-        Ok(Self { points, cells: Arc::clone(&self.cells), features: Arc::clone(&self.features) })
+        Ok(Self {
+            points: Arc::new(points),
+            cells: Arc::clone(&self.cells),
+            features: Arc::clone(&self.features),
+        })
     }
 }
 
@@ -132,17 +150,18 @@ pub enum MeshError {
         vertex: usize,
         /// The axis: x, y or z.
         axis: &'static str,
-        /// What was found.
+        /// The value of the coordinate.
         value: f64,
     },
     /// A cell names a vertex that does not exist.
     #[error(
-        "cell {cell}: vertex {vertex} does not exist; the mesh has {vertex_count} vertices, numbered from 0"
+        "cell {cell}: vertex {} does not exist; the mesh has {vertex_count} vertices, numbered from 0",
+        vertex.cast_signed()
     )]
     VertexNumber {
         /// The cell.
         cell: usize,
-        /// The vertex it names.
+        /// The vertex it names; negative numbers are told as such.
         vertex: u64,
         /// How many there are.
         vertex_count: usize,
@@ -164,7 +183,7 @@ pub enum MeshError {
         cell: usize,
         /// Its type.
         found: CellType,
-        /// What is needed.
+        /// The types that can be used.
         expected: &'static str,
     },
     /// The vertices of cells stand in another order than VTK's.
@@ -248,7 +267,8 @@ pub enum MeshError {
         /// The numbers that faces have.
         numbers: Vec<i64>,
     },
-    /// An array is too short for the values that its stride asks for, or has another number of values than is needed.
+    /// An array is too short for the values that its stride asks for, or has another number of
+    /// values than is needed.
     #[error("array '{name}': {found} values where {expected} are needed")]
     ArrayLength {
         /// The array.

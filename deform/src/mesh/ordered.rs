@@ -4,32 +4,35 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::{FeatureSource, Mesh, Vector};
+use crate::bounds::{self, BITS, Bounds};
+use crate::number::real;
 use crate::parallel;
+use crate::topology::{Groups, indices};
 
-/// Bits of each coordinate in a vertex's place on the curve.
-const BITS: u32 = 21;
-
-/// Vertices of a cell whose numbers lie this far apart in the mean, in units of the vertices in a section through a cube of as
-/// many, are near enough.
+/// Vertices of a cell whose numbers lie this far apart in the mean, in units of the vertices in a
+/// section through a cube of as many, are near enough.
 const NEAR: f64 = 2.0;
 
-/// A mesh whose vertices and cells are numbered along a curve that fills space (G. M. Morton 1966), so that what is near in space
-/// is near in memory: mesh generators number at random, and work on such a mesh waits for memory most of the time.
+/// A mesh whose vertices and cells are numbered along a curve that fills space (G. M. Morton 1966),
+/// so that what is near in space is near in memory: mesh generators number at random, and work on
+/// such a mesh waits for memory most of the time.
 ///
-/// A mesh that is numbered well stays as it is. The order depends on the coordinates; vertices in one place keep theirs.
+/// A mesh that is numbered well stays as it is. The order depends on the coordinates; vertices in
+/// one place keep theirs.
 #[derive(Debug)]
 pub(crate) struct Ordered {
     mesh: Mesh,
     numbering: Numbering,
-    /// What each cell of the ordered mesh is in the other, where they are not the same.
+    /// The number in the other mesh of each cell of the ordered one, where they differ.
     cells: Option<Vec<u32>>,
 }
 
-/// What the vertices of an ordered mesh are in the other one, and the other way round.
+/// The numbers of the vertices of an ordered mesh in the other one, and the other way round.
 #[derive(Debug)]
 pub(crate) struct Numbering {
     count: usize,
-    /// The vertices in their order, and the place of each; `None` where they are numbered as they were.
+    /// The vertices in their order, and the index of each; `None` where they are numbered as they
+    /// were.
     numbers: Option<(Vec<u32>, Vec<u32>)>,
 }
 
@@ -45,17 +48,14 @@ impl Ordered {
             };
         }
         let vertices = along_curve(&mesh.points);
-        let mut places = vec![0u32; count];
-        for (place, &vertex) in (0..).zip(&vertices) {
-            places[vertex as usize] = place;
-        }
-        let cells = by_first_vertex(mesh, &places);
+        let indices = indices(count, &vertices);
+        let cells = by_first_vertex(mesh, &indices);
         let ordered = Mesh {
-            points: vertices.iter().map(|&vertex| mesh.points[vertex as usize]).collect(),
-            cells: Arc::new(mesh.cells.renumbered(&cells, &places)),
+            points: Arc::new(vertices.iter().map(|&vertex| mesh.points[vertex as usize]).collect()),
+            cells: Arc::new(mesh.cells.renumbered(&cells, &indices)),
             features: Arc::new(FeatureSource::default()),
         };
-        let numbering = Numbering { count, numbers: Some((vertices, places)) };
+        let numbering = Numbering { count, numbers: Some((vertices, indices)) };
         Self { mesh: ordered, numbering, cells: Some(cells) }
     }
 
@@ -67,7 +67,7 @@ impl Ordered {
     /// Another mesh with the same cells, which has finite coordinates, in this order.
     pub(crate) fn like(&self, mesh: &Mesh) -> Mesh {
         Mesh {
-            points: self.numbering.gather(&mesh.points).into_owned(),
+            points: Arc::new(self.numbering.gather(&mesh.points).into_owned()),
             cells: Arc::clone(&self.mesh.cells),
             features: Arc::clone(&self.mesh.features),
         }
@@ -82,23 +82,23 @@ impl Ordered {
     }
 
     /// The number in the other mesh of a cell of the ordered one.
-    pub(crate) fn cell(&self, place: usize) -> usize {
-        self.cells.as_ref().map_or(place, |cells| cells[place] as usize)
+    pub(crate) fn cell(&self, index: usize) -> usize {
+        self.cells.as_ref().map_or(index, |cells| cells[index] as usize)
     }
 }
 
 impl Numbering {
     /// The number in the ordered mesh of a vertex of the other, if it has that.
-    pub(crate) fn place(&self, vertex: u32) -> Option<u32> {
+    pub(crate) fn index(&self, vertex: u32) -> Option<u32> {
         match &self.numbers {
-            Some((_, places)) => places.get(vertex as usize).copied(),
+            Some((_, indices)) => indices.get(vertex as usize).copied(),
             None => Some(vertex).filter(|&vertex| (vertex as usize) < self.count),
         }
     }
 
     /// The number in the other mesh of a vertex of the ordered one.
-    pub(crate) fn vertex(&self, place: u32) -> u32 {
-        self.numbers.as_ref().map_or(place, |(vertices, _)| vertices[place as usize])
+    pub(crate) fn vertex(&self, index: u32) -> u32 {
+        self.numbers.as_ref().map_or(index, |(vertices, _)| vertices[index as usize])
     }
 
     /// A value for each vertex of the other mesh, in this order.
@@ -130,76 +130,38 @@ fn is_near(mesh: &Mesh) -> bool {
         u64::from(most.saturating_sub(least))
     };
     let sum: u64 = mesh.cells.iter().map(|(_, vertices)| spread(vertices)).sum();
-    #[expect(clippy::cast_precision_loss, reason = "an estimate")]
-    let (sum, cells, vertices) = (sum as f64, mesh.cells.len() as f64, mesh.points.len() as f64);
-    sum <= NEAR * vertices.powf(2.0 / 3.0) * cells
+    sum as f64 <= NEAR * real(mesh.points.len()).powf(2.0 / 3.0) * real(mesh.cells.len())
 }
 
 /// The vertices in the order of Morton's curve through their bounding cube.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "saturating; vertex numbers are 32-bit"
-)]
 fn along_curve(points: &[Vector]) -> Vec<u32> {
     const CHUNK: usize = 16384;
-    let bound = |start: f64, pick: fn(f64, f64) -> f64| {
-        points.iter().fold([start; 3], |a, b| std::array::from_fn(|axis| pick(a[axis], b[axis])))
-    };
-    let (lower, upper) = (bound(f64::INFINITY, f64::min), bound(f64::NEG_INFINITY, f64::max));
-    let size = (0..3).map(|axis| upper[axis] - lower[axis]).fold(0.0, f64::max);
+    let bounds = Bounds::around(points.iter().copied());
+    let (lower, size) = (bounds.lower, bounds.extent().into_iter().fold(0.0, f64::max));
     let steps = f64::from((1u32 << BITS) - 1);
     let mut order = vec![(0u64, 0u32); points.len()];
     parallel::for_each_chunk(&mut order, CHUNK, |chunk, part| {
         for (index, entry) in part.iter_mut().enumerate() {
             let vertex = chunk * CHUNK + index;
-            let along = |axis: usize| {
-                spread(((points[vertex][axis] - lower[axis]) / size * steps) as u64) << axis
-            };
-            *entry = (along(0) | along(1) | along(2), vertex as u32);
+            let steps =
+                [0, 1, 2].map(|axis| ((points[vertex][axis] - lower[axis]) / size * steps) as u64);
+            *entry = (bounds::along_curve(steps), vertex as u32);
         }
     });
     parallel::sort(&mut order);
     order.into_iter().map(|(_, vertex)| vertex).collect()
 }
 
-/// The lowest bits of a number, two zeros after each.
-fn spread(value: u64) -> u64 {
-    let mut value = value & ((1 << BITS) - 1);
-    for (shift, mask) in [
-        (32, 0x001f_0000_0000_ffff),
-        (16, 0x001f_0000_ff00_00ff),
-        (8, 0x100f_00f0_0f00_f00f),
-        (4, 0x10c3_0c30_c30c_30c3),
-        (2, 0x1249_2492_4924_9249),
-    ] {
-        value = (value | value << shift) & mask;
-    }
-    value
-}
-
 /// The cells in the order of the first of their vertices.
-fn by_first_vertex(mesh: &Mesh, places: &[u32]) -> Vec<u32> {
+fn by_first_vertex(mesh: &Mesh, indices: &[u32]) -> Vec<u32> {
     const CHUNK: usize = 16384;
     let first = |cell: usize| {
-        let vertices = mesh.cells.vertices(cell).iter();
-        vertices.map(|&vertex| places[vertex as usize]).min().map_or(0, |first| first as usize)
+        mesh.cells.vertices(cell).iter().map(|&vertex| indices[vertex as usize]).min().unwrap_or(0)
     };
-    let firsts =
-        parallel::map_chunks(mesh.cells.len(), CHUNK, |range| range.map(first).collect::<Vec<_>>());
-    let mut next = vec![0u32; places.len() + 1];
-    for &first in firsts.iter().flatten() {
-        next[first + 1] += 1;
-    }
-    for vertex in 0..places.len() {
-        next[vertex + 1] += next[vertex];
-    }
-    let mut order = vec![0u32; mesh.cells.len()];
-    for (cell, &first) in (0..).zip(firsts.iter().flatten()) {
-        order[next[first] as usize] = cell;
-        next[first] += 1;
-    }
-    order
+    let firsts = parallel::map_chunks(mesh.cells.len(), CHUNK, |range| {
+        range.map(first).collect::<Vec<u32>>()
+    });
+    Groups::new(indices.len(), firsts.iter().flatten().copied().zip(0..)).items
 }
 
 /// A mesh whose vertices and cells have other numbers, and those of the vertices.
@@ -211,7 +173,7 @@ pub(crate) fn shuffled(mesh: &Mesh) -> (Mesh, Vec<u32>) {
     // Steps without a factor in common with the counts visit all of them.
     let number = turned(mesh.points.len(), 619);
     let mut points = vec![[0.0; 3]; number.len()];
-    for (&number, &point) in number.iter().zip(&mesh.points) {
+    for (&number, &point) in number.iter().zip(mesh.points()) {
         points[number as usize] = point;
     }
     let order = turned(mesh.cells.len(), 1009);
@@ -235,27 +197,27 @@ mod tests {
         let numbering = ordered.numbering();
         assert!(!is_near(&mesh) && is_near(ordered.mesh()));
         let mut seen = vec![false; mesh.points().len()];
-        for place in 0..mesh.points().len() {
-            let vertex = numbering.vertex(place as u32);
+        for index in 0..mesh.points().len() {
+            let vertex = numbering.vertex(index as u32);
             assert!(!std::mem::replace(&mut seen[vertex as usize], true));
-            assert_eq!(numbering.place(vertex), Some(place as u32));
-            assert_eq!(ordered.mesh().points()[place], mesh.points()[vertex as usize]);
+            assert_eq!(numbering.index(vertex), Some(index as u32));
+            assert_eq!(ordered.mesh().points()[index], mesh.points()[vertex as usize]);
         }
         let mut seen = vec![false; mesh.cells().len()];
-        for place in 0..mesh.cells().len() {
-            let cell = ordered.cell(place);
+        for index in 0..mesh.cells().len() {
+            let cell = ordered.cell(index);
             assert!(!std::mem::replace(&mut seen[cell], true));
             let (new, old) = (ordered.mesh().cells(), mesh.cells());
-            assert_eq!(new.cell_type(place), old.cell_type(cell));
+            assert_eq!(new.cell_type(index), old.cell_type(cell));
             let back: Vec<u32> =
-                new.vertices(place).iter().map(|&vertex| numbering.vertex(vertex)).collect();
+                new.vertices(index).iter().map(|&vertex| numbering.vertex(vertex)).collect();
             assert_eq!(back, old.vertices(cell));
         }
         let mut values = vec![[0.0; 3]; mesh.points().len()];
         numbering.scatter(&numbering.gather(mesh.points()), &mut values);
         assert_eq!(values, mesh.points());
         assert_eq!(ordered.like(&mesh), *ordered.mesh());
-        assert_eq!(numbering.place(mesh.points().len() as u32), None);
+        assert_eq!(numbering.index(mesh.points().len() as u32), None);
     }
 
     #[test]
@@ -279,7 +241,7 @@ mod tests {
         assert!(numbering.numbers.is_none());
         assert_eq!(*ordered.mesh(), mesh);
         assert_eq!(
-            (numbering.place(5), numbering.vertex(5), ordered.cell(7), numbering.place(1000)),
+            (numbering.index(5), numbering.vertex(5), ordered.cell(7), numbering.index(1000)),
             (Some(5), 5, 7, None)
         );
     }

@@ -1,24 +1,39 @@
 //! Cells whose vertices stand in the order of another program.
 
-use super::handedness::{Hand, Types, hand};
+use super::cell_type::Types;
+use super::handedness::{Hand, hand, hands};
 use super::{CellType, Cells, MeshError, Vector};
-use crate::number::Position;
-use crate::quality::{centroid, scaled_jacobian};
+use crate::mesh::cell_geometry::{centroid, scaled_jacobian};
+use crate::number::real;
+use crate::vector::Position;
 
 /// How many cells of a type are looked at.
 const SAMPLE: usize = 32;
 
-/// An order that no program is known for is only named where it makes as many cells valid: few could be so by chance.
+/// An order that no program is known for is only named where it makes as many cells valid: few
+/// could be so by chance.
 const FEW: usize = 8;
 
-/// The least mean of scaled Jacobians by which an order is told: rounding makes flat cells valid in some order.
+/// The least mean of scaled Jacobians by which an order is told: rounding makes flat cells valid in
+/// some order.
 const SOUND: f64 = 0.05;
 
 /// Scaled Jacobians that differ by less are of the same cell, read from another corner.
 const SAME: f64 = 1e-9;
 
-/// The orders of other programs that are known by name: their type, which vertices VTK's order takes first, and who has them.
-const KNOWN: [(CellType, &[usize], &str); 6] = [
+/// The orders of other programs that are known by name: their type, which vertices VTK's order
+/// takes first, and who has them.
+const KNOWN: [(CellType, &[usize], &str); 8] = [
+    (
+        CellType::Quad,
+        &[0, 1, 3, 2],
+        "lexicographic (tensor-product) order, as in deal.II, p4est and VTK's pixel",
+    ),
+    (
+        CellType::Pixel,
+        &[0, 1, 3, 2],
+        "the order of VTK's quadrilateral (quad): give the cells that type",
+    ),
     (
         CellType::Hexahedron,
         &[0, 1, 3, 2, 4, 5, 7, 6],
@@ -75,9 +90,27 @@ impl std::fmt::Display for OtherOrder {
     }
 }
 
-/// What to say of cells of the types `neither`, most of which are neither right- nor left-handed: the order in which all that are
-/// looked at would be valid, where there is one.
-pub(super) fn other_order(cells: &Cells, points: &[Vector], neither: Types) -> Option<MeshError> {
+impl Cells {
+    /// The cells of a mesh, right-handed.
+    ///
+    /// # Errors
+    /// [`MeshError::OtherOrder`].
+    pub(super) fn of_mesh(mut self, points: &[Vector]) -> Result<Self, MeshError> {
+        // Another mesh may have had them elsewhere.
+        self.turn(self.turned_types().unwrap_or_default());
+        let (turned, neither) = hands(&self, points);
+        if let Some(other) = other_order(&self, points, neither) {
+            return Err(other);
+        }
+        self.turn(turned);
+        Ok(self.with_turned_types(Some(turned)))
+    }
+}
+
+/// The error for cells of the types `neither`, most of which are neither right- nor left-handed. It
+/// names the order in which all cells of the sample would be valid; there is no error where no
+/// order does that.
+fn other_order(cells: &Cells, points: &[Vector], neither: Types) -> Option<MeshError> {
     CellType::ALL.into_iter().filter(|&cell_type| neither.contains(cell_type)).find_map(
         |cell_type| {
             let size = cell_type.vertex_count().filter(|&size| size <= 8)?;
@@ -125,22 +158,21 @@ pub(super) fn other_order(cells: &Cells, points: &[Vector], neither: Types) -> O
     )
 }
 
-/// The sum of the scaled Jacobians of cells whose vertices are read in another order; `None` where one of them is not valid then.
+/// The sum of the scaled Jacobians of cells whose vertices are read in another order; `None` where
+/// one of them is not valid then.
 fn worth(cell_type: CellType, samples: &[Vec<Vector>], order: &[usize]) -> Option<f64> {
     let mut sum = 0.0;
     let (mut cells, mut tets) = (Cells::new(), Vec::new());
     let local: Vec<u32> = (0..).take(order.len()).collect();
     cells.push(cell_type, &local).ok()?;
     for sample in samples {
-        let points: Vec<Vector> = order.iter().map(|&place| sample[place]).collect();
+        let points: Vec<Vector> = order.iter().map(|&index| sample[index]).collect();
         if hand(&cells, 0, &points, &mut tets) != Hand::Right {
             return None;
         }
         sum += scaled_jacobian(cell_type, &points)?;
     }
-    #[expect(clippy::cast_precision_loss, reason = "a few cells")]
-    let least = SOUND * samples.len() as f64;
-    (sum >= least).then_some(sum)
+    (sum >= SOUND * real(samples.len())).then_some(sum)
 }
 
 /// Calls `visit` with every order of `0..size`, the lexicographically first one first.
@@ -148,14 +180,14 @@ fn for_each_order(size: usize, visit: &mut impl FnMut(&[usize])) {
     let mut order: Vec<usize> = (0..size).collect();
     loop {
         visit(&order);
-        let Some(place) = (1..size).rev().find(|&place| order[place - 1] < order[place]) else {
+        let Some(index) = (1..size).rev().find(|&index| order[index - 1] < order[index]) else {
             return;
         };
-        let Some(next) = (place..size).rev().find(|&next| order[next] > order[place - 1]) else {
+        let Some(next) = (index..size).rev().find(|&next| order[next] > order[index - 1]) else {
             return;
         };
-        order.swap(place - 1, next);
-        order[place..].reverse();
+        order.swap(index - 1, next);
+        order[index..].reverse();
     }
 }
 
@@ -163,6 +195,8 @@ fn for_each_order(size: usize, visit: &mut impl FnMut(&[usize])) {
 fn of_vtk(cell_type: CellType) -> &'static str {
     match cell_type {
         CellType::Hexahedron => "the bottom quadrilateral around, then the top one above it",
+        CellType::Quad => "around the quadrilateral",
+        CellType::Pixel => "x fastest, then y",
         CellType::Voxel => "x fastest, then y, then z",
         CellType::Wedge => "one triangle around, then the other, vertex over vertex",
         CellType::Pyramid => "the base around, then the apex",

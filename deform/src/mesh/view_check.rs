@@ -1,12 +1,17 @@
-//! What can be wrong with a borrowed mesh: found without a copy, and without a look at the values where lengths tell it.
+//! What can be wrong with a borrowed mesh: found without a copy, and without a look at the values
+//! where lengths tell it.
 
-use super::{ArrayView, CellType, Cells, CellsView, FeatureSource, Indices, MeshError, MeshView};
+use std::ops::Range;
+
+use super::view::{check_length, mixed_cell};
+use super::{ArrayView, Cells, CellsView, FeatureSource, Indices, MeshError, MeshView};
 
 /// Values looked at together.
 const CHUNK: usize = 1024;
 
 impl ArrayView<'_> {
-    /// The first value that is NaN or infinite: its tuple, its component and what it is. One pass over the values.
+    /// The first value that is NaN or infinite: its tuple, its component and what it is. One pass
+    /// over the values.
     #[must_use]
     pub fn first_not_finite(&self) -> Option<(usize, usize, f64)> {
         let suspicious = |from: usize, to: usize| -> bool {
@@ -54,7 +59,8 @@ impl CellsView<'_> {
     /// Compares the lengths of the arrays. Looks at two offsets and at nothing else.
     ///
     /// # Errors
-    /// [`MeshError::CellType`], [`MeshError::VertexCount`], [`MeshError::ArrayLength`] or [`MeshError::Offsets`].
+    /// [`MeshError::CellType`], [`MeshError::VertexCount`], [`MeshError::ArrayLength`] or
+    /// [`MeshError::Offsets`].
     pub fn check_lengths(&self) -> Result<(), MeshError> {
         match *self {
             CellsView::Owned(_) => Ok(()),
@@ -73,7 +79,7 @@ impl CellsView<'_> {
                 }
             }
             CellsView::Mixed { types, offsets, connectivity } => {
-                length("offsets", offsets.len(), types.len() + 1)?;
+                check_length("offsets", offsets.len(), types.len() + 1)?;
                 let (start, end, length) =
                     (offsets.get(0), offsets.get(types.len()), connectivity.len());
                 if start > end || end > length as u64 {
@@ -89,11 +95,13 @@ impl CellsView<'_> {
         }
     }
 
-    /// Refuses cells that name vertices at or above `vertex_count`, or are none. One pass over the connectivity, without a copy.
+    /// Refuses cells that name vertices at or above `vertex_count`, or are none. One pass over the
+    /// connectivity, without a copy.
     ///
     /// # Errors
-    /// As [`check_lengths`](Self::check_lengths); [`MeshError::UnknownCellType`], [`MeshError::Offsets`],
-    /// [`MeshError::VertexCount`] or [`MeshError::VertexNumber`] with the first cell that is wrong.
+    /// As [`check_lengths`](Self::check_lengths); [`MeshError::UnknownCellType`],
+    /// [`MeshError::Offsets`], [`MeshError::VertexCount`] or [`MeshError::VertexNumber`] with the
+    /// first cell that is wrong.
     pub fn validate(&self, vertex_count: usize) -> Result<(), MeshError> {
         self.check_lengths()?;
         match *self {
@@ -109,20 +117,8 @@ impl CellsView<'_> {
                 )
             }
             CellsView::Mixed { types, offsets, connectivity } => {
-                for (cell, &number) in types.iter().enumerate() {
-                    let cell_type = CellType::from_vtk(number)
-                        .ok_or(MeshError::UnknownCellType { cell, number: u64::from(number) })?;
-                    let (start, end) = (offsets.get(cell), offsets.get(cell + 1));
-                    if start > end || end > connectivity.len() as u64 {
-                        return Err(MeshError::Offsets {
-                            cell,
-                            start,
-                            end,
-                            length: connectivity.len(),
-                        });
-                    }
-                    #[expect(clippy::cast_possible_truncation, reason = "below a slice's length")]
-                    let range = start as usize..end as usize;
+                for cell in 0..types.len() {
+                    let (cell_type, range) = mixed_cell(cell, types, offsets, connectivity.len())?;
                     let found = range.len();
                     if cell_type.vertex_count() != Some(found) {
                         // What the types with any number of vertices allow is known there.
@@ -139,7 +135,8 @@ impl CellsView<'_> {
         }
     }
 
-    /// A number that other cells almost certainly do not have: of their types and vertices, in their order. One pass.
+    /// A number that other cells almost certainly do not have: of their types and vertices, in
+    /// their order. One pass.
     #[must_use]
     pub fn fingerprint(&self) -> u64 {
         let mut hash = Hash::default();
@@ -163,7 +160,6 @@ impl CellsView<'_> {
             CellsView::Mixed { types, offsets, connectivity } => {
                 for (cell, &cell_type) in types.iter().enumerate() {
                     hash.add(u64::from(cell_type));
-                    #[expect(clippy::cast_possible_truncation, reason = "validated")]
                     (offsets.get(cell) as usize..offsets.get(cell + 1) as usize)
                         .for_each(|index| hash.add(connectivity.get(index)));
                 }
@@ -177,7 +173,8 @@ impl MeshView<'_> {
     /// Compares the lengths of all arrays. Looks at no value.
     ///
     /// # Errors
-    /// [`MeshError::Components`], [`MeshError::ArrayLength`], [`MeshError::FeatureCount`]; as [`CellsView::check_lengths`].
+    /// [`MeshError::Components`], [`MeshError::ArrayLength`], [`MeshError::FeatureCount`]; as
+    /// [`CellsView::check_lengths`].
     pub fn check_lengths(&self) -> Result<(), MeshError> {
         let (vertices, components) = (self.points.len(), self.points.components());
         if components > 3 {
@@ -186,13 +183,13 @@ impl MeshView<'_> {
         self.cells.check_lengths()?;
         let cells = self.cells.len();
         if let Some(ghosts) = self.ghost_cells {
-            length("ghost_cells", ghosts.len(), cells)?;
+            check_length("ghost_cells", ghosts.len(), cells)?;
         }
         if let Some(numbers) = self.global_cells {
-            length("global_cells", numbers.len(), cells)?;
+            check_length("global_cells", numbers.len(), cells)?;
         }
         if let Some(numbers) = self.global_vertices {
-            length("global_vertices", numbers.len(), vertices)?;
+            check_length("global_vertices", numbers.len(), vertices)?;
         }
         let count = |found, expected, what| {
             if found == expected {
@@ -208,24 +205,17 @@ impl MeshView<'_> {
         }
     }
 
-    /// Refuses cells and tagged faces that name vertices beyond the last, and coordinates that are not finite. One pass over
-    /// the mesh, without a copy.
+    /// Refuses cells and tagged faces that name vertices beyond the last, and coordinates that are
+    /// not finite. One pass over the mesh, without a copy.
     ///
     /// # Errors
-    /// As [`check_lengths`](Self::check_lengths), [`CellsView::validate`] and [`ArrayView::check_finite`].
+    /// As [`check_lengths`](Self::check_lengths), [`CellsView::validate`] and
+    /// [`ArrayView::check_finite`].
     pub fn validate(&self) -> Result<(), MeshError> {
         self.check_lengths()?;
         self.points.check_finite()?;
         self.cells.validate(self.points.len())?;
         self.features.validate(self.points.len())
-    }
-}
-
-fn length(name: &str, found: usize, expected: usize) -> Result<(), MeshError> {
-    if found == expected {
-        Ok(())
-    } else {
-        Err(MeshError::ArrayLength { name: name.into(), found, expected })
     }
 }
 
@@ -243,14 +233,10 @@ fn at(cell: usize, error: MeshError) -> MeshError {
 }
 
 /// The first of these numbers that is out of range, and where it stands.
-fn in_range(
-    numbers: Indices<'_>,
-    range: std::ops::Range<usize>,
-    count: usize,
-) -> Result<(), (usize, u64)> {
+fn in_range(numbers: Indices<'_>, range: Range<usize>, count: usize) -> Result<(), (usize, u64)> {
     let beyond =
         range.map(|index| (index, numbers.get(index))).find(|(_, number)| *number >= count as u64);
-    beyond.map_or(Ok(()), Err)
+    beyond.map_or(Ok(()), |(index, _)| Err((index, numbers.signed(index))))
 }
 
 /// FNV-1a of whole numbers.

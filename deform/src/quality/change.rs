@@ -3,19 +3,21 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::cell::Scratch;
-use super::{CHUNK, Measure, normalized_scaled_jacobians, tet_determinant};
-use crate::mesh::{CellType, Cells, Vector};
+use super::{CHUNK, Measure, normalized_scaled_jacobians};
+use crate::communicator::{Communicator, Reduction};
+use crate::mesh::cell_geometry::Scratch;
+use crate::mesh::cell_geometry::tet_determinant;
+use crate::mesh::{CellType, Cells, Domain, Vector};
 use crate::parallel;
-use crate::partition::{Partition, Reduction, Whole};
-use crate::vector::{add, cross, dot, mean, scale, subtract};
+use crate::vector::{cross, dot, mean, subtract};
 
 /// How the cells of a mesh have changed since its reference.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Change {
     /// The scaled Jacobian of each cell by that of the same cell in the reference.
     pub normalized_scaled_jacobian: Spread,
-    /// The volume of each cell (the area, in a mesh of polygons) by that of the same cell in the reference.
+    /// The volume of each cell (the area, in a mesh of polygons) by that of the same cell in the
+    /// reference.
     pub volume_ratio: Spread,
 }
 
@@ -31,15 +33,10 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// The spread of values; those that are NaN are passed over.
+    /// The spread of what the ranks have between them; values that are NaN are passed over.
+    /// Collective.
     #[must_use]
-    pub fn of(values: &[f64]) -> Self {
-        Self::in_parts(values, &Whole)
-    }
-
-    /// The same of what the ranks have between them. Collective.
-    #[must_use]
-    pub fn in_parts(values: &[f64], partition: &dyn Partition) -> Self {
+    pub fn of(values: &[f64], communicator: &dyn Communicator) -> Self {
         let (mut min, mut max, mut sum, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0u32);
         for &value in values.iter().filter(|value| !value.is_nan()) {
             min = min.min(value);
@@ -48,8 +45,8 @@ impl Spread {
             count += 1;
         }
         let (mut ends, mut sums) = ([min, -max], [sum, f64::from(count)]);
-        partition.reduce(Reduction::Minimum, &mut ends);
-        partition.reduce(Reduction::Sum, &mut sums);
+        communicator.reduce(Reduction::Minimum, &mut ends);
+        communicator.reduce(Reduction::Sum, &mut sums);
         if sums[1] == 0.0 {
             Self { min: 1.0, mean: 1.0, max: 1.0 }
         } else {
@@ -58,45 +55,33 @@ impl Spread {
     }
 }
 
-/// How the cells have changed between `reference` and `points`.
+/// How the cells of a domain have changed where its vertices have moved to `points`. Collective.
 ///
 /// # Panics
-/// Where a cell names a vertex beyond `reference` or `points`.
+/// Where a cell names a vertex beyond `points`.
 #[must_use]
-pub fn change(cells: &Cells, reference: &[Vector], points: &[Vector]) -> Change {
-    change_in_parts(cells, reference, points, &Whole)
-}
-
-/// The same of a mesh that is in parts: `cells` are those of this rank alone. Collective; all ranks get the whole mesh's.
-///
-/// # Panics
-/// As [`change`].
-#[must_use]
-pub fn change_in_parts(
-    cells: &Cells,
-    reference: &[Vector],
-    points: &[Vector],
-    partition: &dyn Partition,
-) -> Change {
-    let cells = &*cells.right_handed(reference);
+pub fn change(domain: impl Into<Domain>, points: &[Vector]) -> Change {
+    let domain = domain.into();
+    let (cells, reference) = (domain.mesh().cells(), domain.mesh().points());
     let (before, after) = (volumes(cells, reference), volumes(cells, points));
     let ratios: Vec<f64> =
         before.iter().zip(after).map(|(&a, b)| if a == 0.0 { f64::NAN } else { b / a }).collect();
+    let normalized = normalized_scaled_jacobians(cells, reference, points);
+    let communicator = domain.communicator();
     Change {
-        normalized_scaled_jacobian: Spread::in_parts(
-            &normalized_scaled_jacobians(cells, reference, points),
-            partition,
-        ),
-        volume_ratio: Spread::in_parts(&ratios, partition),
+        normalized_scaled_jacobian: Spread::of(&normalized, communicator),
+        volume_ratio: Spread::of(&ratios, communicator),
     }
 }
 
-/// The volume of each volume cell; in a mesh of polygons, their areas. NaN for cells of lower dimension.
+/// The volume of each volume cell; in a mesh of polygons, their areas. NaN for cells of lower
+/// dimension.
 ///
-/// A face of more than three vertices is taken as the triangles that its edges make with the mean of its vertices: exact where it
-/// is flat, and for hexahedra the volume of the trilinear cell. So cells that share a face agree on it, and the volumes of
-/// neighbours add up. Cells turned inside out have a negative volume; cells that are no mesh's yet are taken as
-/// [`Cells::right_handed`] has them.
+/// A face of more than three vertices is taken as the triangles that its edges make with the mean
+/// of its vertices: exact where it is flat, and for hexahedra the volume of the trilinear cell. So
+/// cells that share a face agree on it, and the volumes of neighbours add up. Cells turned inside
+/// out have a negative volume; cells that are no mesh's yet are taken as [`Cells::right_handed`]
+/// has them.
 ///
 /// # Panics
 /// Where a cell names a vertex beyond `points`.
@@ -126,7 +111,7 @@ fn volume(measure: &Measure<'_>, cell: usize, points: &[Vector], scratch: &mut S
     scratch.points.clear();
     if cells.cell_type(cell).dimension() == 2 {
         scratch.points.extend(vertices.iter().map(|&vertex| points[vertex as usize]));
-        let area = super::cell::vector_area(&scratch.points);
+        let area = crate::mesh::cell_geometry::vector_area(&scratch.points);
         return 0.5 * dot(area, area).sqrt();
     }
     let centre = mean(vertices.iter().map(|&vertex| points[vertex as usize]));
@@ -142,52 +127,43 @@ fn volume(measure: &Measure<'_>, cell: usize, points: &[Vector], scratch: &mut S
     sum / 6.0
 }
 
-/// The volume that a face sweeps while its vertices go straight from `start` to `end`, positive where it moves along its normal
-/// (that of a counter-clockwise face): the integral over time of velocity times area, by Gauss's rule of two points, which is
-/// exact. Faces of more than three vertices are taken as in [`volumes`], so that the swept volumes of a cell's faces sum up to
-/// its change of volume (the geometric conservation law of M. Lesoinne and C. Farhat 1996) to rounding.
-///
-/// `start` and `end` are the corners of the face in order.
-///
-/// # Example
-/// ```
-/// use tombolo_deform::quality::swept_volume;
-///
-/// let floor = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
-/// let lifted = floor.map(|[x, y, _]| [2.0 * x, y, 0.5]);
-/// // A frustum of height 0.5 between rectangles of area 1 and 2.
-/// assert!((swept_volume(&floor, &lifted) - 0.5 * 1.5).abs() < 1e-15);
-/// ```
-#[must_use]
-pub fn swept_volume(start: &[Vector], end: &[Vector]) -> f64 {
-    let offset = 0.5 / 3.0f64.sqrt();
-    let (middle, middle_end) = (mean(start.iter().copied()), mean(end.iter().copied()));
-    let velocity = |index: usize| subtract(end[index], start[index]);
-    let drift = subtract(middle_end, middle);
-    [0.5 - offset, 0.5 + offset]
-        .into_iter()
-        .map(|time| {
-            let at = |from: Vector, to: Vector| add(from, scale(subtract(to, from), time));
-            let centre = at(middle, middle_end);
-            let mut sum = 0.0;
-            for index in 0..start.len().min(end.len()) {
-                let next = (index + 1) % start.len();
-                let a = subtract(at(start[index], end[index]), centre);
-                let b = subtract(at(start[next], end[next]), centre);
-                sum += dot(add(drift, add(velocity(index), velocity(next))), cross(a, b));
-            }
-            // Half for the two points of time, a sixth for the mean velocity of a triangle times twice its area.
-            sum / 12.0
-        })
-        .sum()
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
     use super::*;
     use crate::shapes;
+    use crate::vector::{add, scale, subtract};
+
+    /// The volume that a face sweeps while its vertices go straight from `start` to `end`, positive
+    /// where it moves along its normal (that of a counter-clockwise face): the integral over time
+    /// of velocity times area, by Gauss's rule of two points, which is exact. Faces of more than
+    /// three vertices are taken as in [`volumes`], so that the swept volumes of a cell's faces sum
+    /// up to its change of volume (the geometric conservation law of M. Lesoinne and C. Farhat
+    /// 1996) to rounding.
+    fn swept_volume(start: &[Vector], end: &[Vector]) -> f64 {
+        let offset = 0.5 / 3.0f64.sqrt();
+        let (middle, middle_end) = (mean(start.iter().copied()), mean(end.iter().copied()));
+        let velocity = |index: usize| subtract(end[index], start[index]);
+        let drift = subtract(middle_end, middle);
+        [0.5 - offset, 0.5 + offset]
+            .into_iter()
+            .map(|time| {
+                let at = |from: Vector, to: Vector| add(from, scale(subtract(to, from), time));
+                let centre = at(middle, middle_end);
+                let mut sum = 0.0;
+                for index in 0..start.len().min(end.len()) {
+                    let next = (index + 1) % start.len();
+                    let a = subtract(at(start[index], end[index]), centre);
+                    let b = subtract(at(start[next], end[next]), centre);
+                    sum += dot(add(drift, add(velocity(index), velocity(next))), cross(a, b));
+                }
+                // Half for the two points of time, a sixth for the mean velocity of a triangle
+                // times twice its area.
+                sum / 12.0
+            })
+            .sum()
+    }
 
     #[test]
     fn unit_cells_have_their_volumes() {
@@ -211,7 +187,7 @@ mod tests {
         let mesh = shapes::box_of_hexahedra([3, 2, 2], [0.0; 3], [1.0; 3]);
         let end: Vec<Vector> =
             mesh.points().iter().map(|&[x, y, z]| [3.0 * x, 0.5 * y, z]).collect();
-        let change = change(mesh.cells(), mesh.points(), &end);
+        let change = change(&mesh, &end);
         for value in [change.volume_ratio.min, change.volume_ratio.mean, change.volume_ratio.max] {
             assert!((value - 1.5).abs() < 1e-13);
         }
@@ -219,7 +195,10 @@ mod tests {
             (change.normalized_scaled_jacobian.min - 1.0).abs() < 1e-12,
             "right angles stay right"
         );
-        assert_eq!(Spread::of(&[]), Spread { min: 1.0, mean: 1.0, max: 1.0 });
+        assert_eq!(
+            Spread::of(&[], &crate::communicator::Solo),
+            Spread { min: 1.0, mean: 1.0, max: 1.0 }
+        );
     }
 
     proptest! {

@@ -1,29 +1,29 @@
 //! Whether a prescribed surface folds.
 
-use crate::mesh::{Cells, Vector};
-use crate::partition::Partition;
+use crate::communicator::{Communicator, Reader, Writer};
+use crate::mesh::{Cells, Domain, Vector};
 use crate::vector::{dot, mean};
 
-use super::cell::vector_area;
+use crate::mesh::cell_geometry::vector_area;
 
-/// Whether a face (its corners in order) that lay at `before` has no area at `after`, or has turned by a right angle or more. A
-/// face without area to begin with has no side to turn to.
+/// Whether a face (its corners in order) that lay at `before` has no area at `after`, or has turned
+/// by a right angle or more. A face without area to begin with has no side to turn to.
 #[must_use]
 pub fn turns_over(before: &[Vector], after: &[Vector]) -> bool {
     let normal = vector_area(before);
     normal != [0.0; 3] && dot(normal, vector_area(after)) <= 0.0
 }
 
-/// The boundary faces whose normal at `end` points against that at `start`: how many, and the place (at `start`) of the first.
-/// For a mesh of polygons, the polygons themselves. Of a mesh in parts, all ranks' together.
+/// The boundary faces whose normal at `end` points against that at `start`: how many, and where the
+/// first lies at `start`. For a mesh of polygons, the polygons themselves. Collective.
 pub(super) fn folded_faces(
-    cells: &Cells,
+    domain: &Domain,
     start: &[Vector],
     end: &[Vector],
-    partition: &dyn Partition,
 ) -> (usize, Option<Vector>) {
+    let (cells, communicator) = (domain.mesh().cells(), domain.communicator());
     let mut count = 0;
-    let mut place = None;
+    let mut first = None;
     let (mut before, mut after) = (Vec::new(), Vec::new());
     let mut look = |face: &[u32]| {
         before.clear();
@@ -32,10 +32,10 @@ pub(super) fn folded_faces(
         after.extend(face.iter().map(|&vertex| end[vertex as usize]));
         if turns_over(&before, &after) {
             count += 1;
-            place.get_or_insert_with(|| mean(before.iter().copied()));
+            first.get_or_insert_with(|| mean(before.iter().copied()));
         }
     };
-    if let Some(faces) = partition.boundary_faces() {
+    if let Some(faces) = domain.boundary_faces() {
         faces.iter().for_each(|(_, face)| look(face));
     } else if cells.dimension() == 2 {
         (0..cells.len())
@@ -44,12 +44,12 @@ pub(super) fn folded_faces(
     } else {
         for_each_boundary_face(cells, look);
     }
-    if partition.ranks() == 1 {
-        return (count, place);
-    }
-    let total = crate::partition::count(partition, count);
-    let found = partition.gather(&place.map_or([f64::NAN; 3], |place| place));
-    (total, found.as_chunks().0.iter().copied().find(|place| !place[0].is_nan()))
+    let mut message = Writer::default();
+    first.iter().for_each(|position| message.f64s(position));
+    let all = communicator.gather_all(&message.into_bytes());
+    let found =
+        all.iter().enumerate().find_map(|(rank, bytes)| Reader::new(rank, bytes).vector().ok());
+    (communicator.total(count), found)
 }
 
 /// Calls `visit` with each face that only one volume cell has, in the order of the cells.

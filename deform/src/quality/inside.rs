@@ -1,12 +1,14 @@
-//! Whether a cell with curved faces is valid at every place inside it, and not at its corners alone.
+//! Whether a cell with curved faces is valid at every place inside it, and not at its corners
+//! alone.
 //!
-//! The determinant of the map of a hexahedron, wedge or pyramid is a polynomial of degree 2 along each of its axes. Its Bernstein
-//! coefficients bound it from below (A. Johnen, J.-C. Weill, J.-F. Remacle, *Robust and efficient validation of the linear
-//! hexahedral element*, 2017); where they are not all positive the cell is cut in halves, whose coefficients lie closer. Along a
-//! straight path each coefficient is a cubic in the path parameter.
+//! The determinant of the map of a hexahedron, wedge or pyramid is a polynomial of degree 2 along
+//! each of its axes. Its Bernstein coefficients bound it from below (A. Johnen, J.-C. Weill, J.-F.
+//! Remacle, *Robust and efficient validation of the linear hexahedral element*, 2017); where they
+//! are not all positive the cell is cut in halves, whose coefficients lie closer. Along a straight
+//! path each coefficient is a cubic in the path parameter.
 
-use super::cell::VOXEL_AS_HEXAHEDRON;
-use super::path::{Cubic, Least, least_of_cubic, triple};
+use super::cubic::{Cubic, Least, least_of_cubic, triple};
+use crate::mesh::cell_geometry::VOXEL_AS_HEXAHEDRON;
 use crate::mesh::{CellType, Vector};
 use crate::vector::subtract;
 
@@ -16,8 +18,8 @@ const CUTS: usize = 3;
 /// The ends of an edge of the map, at the start and at the end of the path.
 type Edge = [Vector; 2];
 
-/// The least Bernstein coefficient that is not positive on the way of a cell from `start` to `start + until (end - start)`,
-/// after the cuts; [`Least::NONE`] where there is none.
+/// The least Bernstein coefficient that is not positive on the way of a cell from `start` to `start
+/// + until (end - start)`, after the cuts; [`Least::NONE`] where there is none.
 pub(super) fn least_inside(
     cell_type: CellType,
     start: &[Vector],
@@ -166,7 +168,8 @@ mod tests {
 
     use super::*;
     use crate::mesh::Cells;
-    use crate::quality::{corner_tets, quality, tet_determinant};
+    use crate::mesh::cell_geometry::{corner_tets, tet_determinant};
+    use crate::quality::quality;
     use crate::vector::{add, determinant, scale};
 
     const CUBE: [Vector; 8] = [
@@ -203,7 +206,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(300))]
 
-        /// What is said to be valid is valid wherever one looks, and what is far from broken is not refused.
+        /// A cell that is called valid is valid at every sampled point, and a cell far from broken is not
+        /// refused.
         #[test]
         fn hexahedra_are_judged_inside(moves in prop::collection::vec(prop::array::uniform3(-0.45..0.45f64), 8)) {
             let points: Vec<Vector> = CUBE.iter().zip(&moves).map(|(&a, &b)| add(a, b)).collect();
@@ -213,7 +217,8 @@ mod tests {
             prop_assert!(found.positive || least < 0.05, "{least} {found:?}");
         }
 
-        /// On the way from the cube too, for the cube split in wedges and drawn together to a pyramid as well.
+        /// On the way from the cube too, for the cube split in wedges and drawn together to a
+        /// pyramid as well.
         #[test]
         fn ways_are_judged_inside(moves in prop::collection::vec(prop::array::uniform3(-0.9..0.9f64), 8)) {
             let points: Vec<Vector> = CUBE.iter().zip(&moves).map(|(&a, &b)| add(a, b)).collect();
@@ -243,7 +248,8 @@ mod tests {
         }
     }
 
-    /// The top of a box turned by 150 degrees in its plane and stretched: every corner is valid, the middle is turned over.
+    /// The top of a box turned by 150 degrees in its plane and stretched: every corner is valid,
+    /// the middle is turned over.
     #[test]
     fn a_cell_broken_between_its_corners_is_found() {
         let (sine, cosine) = 150f64.to_radians().sin_cos();

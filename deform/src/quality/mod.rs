@@ -1,37 +1,39 @@
 //! The quality of cells, and the guard that lets no broken mesh through.
 //!
 //! - [`scaled_jacobian`] and [`scaled_jacobians`] measure cells, [`quality`] sums up a mesh.
-//! - [`judge`] checks a whole path from one shape to another before the first step of it is handed out.
+//! - [`judge`] checks a whole path from one shape to another before the first step of it is handed
+//!   out.
 
-mod cell;
 mod change;
+mod cubic;
 mod fold;
+mod fours;
+mod guard;
 mod inside;
 mod judge;
 mod path;
+mod refusal;
 #[cfg(test)]
 mod tests;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
-pub use cell::scaled_jacobian;
-pub(crate) use cell::{
-    HEXAHEDRON_CORNERS, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, corner_tets,
+pub use crate::mesh::cell_geometry::scaled_jacobian;
+use crate::mesh::cell_geometry::{
+    Scratch, centroid, corner_tets, scaled_jacobian_of, tet_determinant,
 };
-pub use change::{Change, Spread, change, change_in_parts, swept_volume, volumes};
+use crate::number::real;
+pub use change::{Change, Spread, change, volumes};
 pub use fold::turns_over;
-pub use judge::{
-    BrokenPath, FailingCell, Guard, Otherwise, PathQuality, Refusal, ShapeQuality, SurfaceRule,
-    judge, judge_in_parts, keeps, keeps_in_parts, shape_at,
-};
+pub use guard::{Guard, Otherwise, SurfaceRule};
+pub use judge::{PathQuality, ShapeQuality, judge, keeps, shape_at};
+pub use refusal::{BrokenPath, FailingCell, Refusal};
 
-use crate::mesh::{CellType, Cells, Vector};
+use crate::communicator::{Garbled, Reader, Writer};
+use crate::lanes::LANES;
+use crate::mesh::{CellType, Cells, Domain, Vector};
 use crate::parallel;
-use crate::partition::{Partition, Whole};
-use crate::vector::{determinant, mean, subtract};
-pub(crate) use cell::Scratch;
-use cell::scaled_jacobian_of;
 use inside::least_inside;
 
 /// How many cells are measured at a time.
@@ -46,7 +48,8 @@ pub const CLASSES: usize = 20;
 /// The quality of a mesh: of its cells of the highest dimension, where that is 2 or 3.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Quality {
-    /// How many cells were measured. Where there is none, nothing is broken: the values below are 1.
+    /// How many cells were measured. Where there is none, nothing is broken: the values below are
+    /// 1.
     pub cells: usize,
     /// The least scaled Jacobian.
     pub min: f64,
@@ -54,8 +57,10 @@ pub struct Quality {
     pub mean: f64,
     /// The largest scaled Jacobian.
     pub max: f64,
-    /// How many cells are turned inside out or flat: a volume cell with a corner whose determinant is not positive
-    /// (hexahedra, wedges and pyramids: any place inside whose determinant may not be), a polygon with a corner turned against its normal, any cell with a coordinate that is not finite.
+    /// How many cells are turned inside out or flat: a volume cell with a corner whose determinant
+    /// is not positive (hexahedra, wedges and pyramids: any place inside whose determinant may not
+    /// be), a polygon with a corner turned against its normal, any cell with a coordinate that is
+    /// not finite.
     pub inverted: usize,
     /// How many cells have a scaled Jacobian in each of 20 equal classes from -1 to 1.
     pub histogram: [u64; CLASSES],
@@ -74,10 +79,11 @@ pub struct WorstCell {
     pub centroid: Vector,
 }
 
-/// The quality of `cells` at `points` (one for each vertex).
+/// The quality of `cells` at `points` (one for each vertex). That of a domain of several ranks is
+/// the [gathered](Quality::gathered) one of their cells.
 ///
-/// A cell whose measure is NaN counts as inverted with the value -1. Cells that are no mesh's yet are taken as
-/// [`Cells::right_handed`] has them at these points.
+/// A cell whose measure is NaN counts as inverted with the value -1. Cells that are no mesh's yet
+/// are taken as [`Cells::right_handed`] has them at these points.
 ///
 /// Cost: one pass over the cells, on all threads; the same bits for any number of them.
 ///
@@ -85,15 +91,6 @@ pub struct WorstCell {
 /// Where a cell names a vertex beyond `points`; a [`Mesh`](crate::mesh::Mesh) never does.
 #[must_use]
 pub fn quality(cells: &Cells, points: &[Vector]) -> Quality {
-    quality_in_parts(cells, points, &Whole)
-}
-
-/// The same of a mesh that is in parts: `cells` are those of this rank alone. Collective; all ranks get the whole mesh's.
-///
-/// # Panics
-/// As [`quality`].
-#[must_use]
-pub fn quality_in_parts(cells: &Cells, points: &[Vector], partition: &dyn Partition) -> Quality {
     let cells = &*cells.right_handed(points);
     let measure = Measure::new(cells);
     let mut parts = parallel::map_chunks(cells.len(), CHUNK, |range| {
@@ -113,22 +110,12 @@ pub fn quality_in_parts(cells: &Cells, points: &[Vector], partition: &dyn Partit
     parts.for_each(|part| total.merge(part));
     for worst in &mut total.worst {
         worst.centroid = centroid(cells, worst.cell, points);
-        worst.cell = partition.cell_number(worst.cell);
     }
-    if partition.ranks() > 1 {
-        total = total.added_up(partition);
-    }
-    #[expect(clippy::cast_precision_loss, reason = "fewer cells than 2^53")]
-    if total.cells == 0 {
-        (total.min, total.mean, total.max) = (1.0, 1.0, 1.0);
-    } else {
-        total.mean /= total.cells as f64;
-    }
-    total
+    total.with_mean()
 }
 
-/// The scaled Jacobian of each cell, NaN for those that have none: vertices, lines, cells with a coordinate that is NaN.
-/// Cells that are no mesh's yet are taken as in [`quality`].
+/// The scaled Jacobian of each cell, NaN for those that have none: vertices, lines, cells with a
+/// coordinate that is NaN. Cells that are no mesh's yet are taken as in [`quality`].
 ///
 /// # Panics
 /// Where a cell names a vertex beyond `points`.
@@ -150,8 +137,8 @@ pub fn scaled_jacobians(cells: &Cells, points: &[Vector]) -> Vec<f64> {
     values
 }
 
-/// The scaled Jacobian of each cell at `points` by that of the same cell at `reference`: below 1 where motion made the cell
-/// worse. NaN where there is no measure or the reference is flat.
+/// The scaled Jacobian of each cell at `points` by that of the same cell at `reference`: below 1
+/// where motion made the cell worse. NaN where there is no measure or the reference is flat.
 ///
 /// # Panics
 /// Where a cell names a vertex beyond `reference` or `points`.
@@ -188,65 +175,84 @@ impl Quality {
         self.max = self.max.max(value);
         self.mean += value;
         self.inverted += usize::from(inverted);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "clamped to the classes"
-        )]
         let class =
             ((value + 1.0) * 0.5 * CLASSES as f64).clamp(0.0, CLASSES as f64 - 1.0) as usize;
         self.histogram[class] += 1;
         if self.worst.len() < WORST
             || self.worst.last().is_some_and(|last| value < last.scaled_jacobian)
         {
-            let place = self.worst.partition_point(|other| other.scaled_jacobian <= value);
+            let index = self.worst.partition_point(|other| other.scaled_jacobian <= value);
             self.worst
-                .insert(place, WorstCell { cell, scaled_jacobian: value, centroid: [0.0; 3] });
+                .insert(index, WorstCell { cell, scaled_jacobian: value, centroid: [0.0; 3] });
             self.worst.truncate(WORST);
         }
     }
 
-    /// What the ranks have measured.
-    #[expect(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "counts below 2^53"
-    )]
-    fn added_up(&self, partition: &dyn Partition) -> Self {
-        let worst = self.worst.iter().flat_map(|worst| {
-            let [x, y, z] = worst.centroid;
-            [worst.cell as f64, worst.scaled_jacobian, x, y, z]
-        });
-        let mut mine = vec![self.cells as f64, self.min, self.mean, self.max, self.inverted as f64];
-        mine.extend(self.histogram.iter().map(|&count| count as f64));
-        mine.push(self.worst.len() as f64);
-        mine.extend(worst);
-        let all = partition.gather(&mine);
-        let mut values = all.into_iter();
+    /// The quality of the whole domain, of which this is that of one rank's cells: cells are then
+    /// named by their numbers in the whole mesh. Collective.
+    #[must_use]
+    pub fn gathered(mut self, domain: &Domain) -> Self {
+        self.worst.iter_mut().for_each(|worst| worst.cell = domain.cell_number(worst.cell));
+        if domain.communicator().size() == 1 {
+            return self;
+        }
+        let mut message = Writer::default();
+        [self.cells, self.inverted].iter().for_each(|&count| message.u64(count as u64));
+        message.f64s(&[self.min, self.mean, self.max]);
+        self.histogram.iter().for_each(|&count| message.u64(count));
+        for worst in &self.worst {
+            message.u64(worst.cell as u64);
+            message.f64s(&[worst.scaled_jacobian]);
+            message.f64s(&worst.centroid);
+        }
+        let all = domain.communicator().gather_all(&message.into_bytes());
+        let parts = all
+            .iter()
+            .enumerate()
+            .filter_map(|(rank, bytes)| Self::read(Reader::new(rank, bytes)).ok());
         let mut total = Self::empty();
-        let mut next = || values.next().unwrap_or(f64::NAN);
-        for _ in 0..partition.ranks() {
-            let mut part = Self {
-                cells: next() as usize,
-                min: next(),
-                mean: next(),
-                max: next(),
-                ..Self::empty()
-            };
-            part.inverted = next() as usize;
-            part.histogram = std::array::from_fn(|_| next() as u64);
-            let count = next() as usize;
-            part.worst = (0..count.min(WORST))
-                .map(|_| WorstCell {
-                    cell: next() as usize,
-                    scaled_jacobian: next(),
-                    centroid: [next(), next(), next()],
-                })
-                .collect();
+        for mut part in parts.filter(|part| part.cells > 0) {
+            part.mean *= real(part.cells);
             total.merge(part);
         }
-        total
+        total.with_mean()
+    }
+
+    fn read(mut reader: Reader<'_>) -> Result<Self, Garbled> {
+        let count =
+            |reader: &mut Reader<'_>| Ok(usize::try_from(reader.u64()?).unwrap_or(usize::MAX));
+        let (cells, inverted) = (count(&mut reader)?, count(&mut reader)?);
+        let values = reader.f64s(3)?;
+        let mut part = Self {
+            cells,
+            inverted,
+            min: values[0],
+            mean: values[1],
+            max: values[2],
+            ..Self::empty()
+        };
+        for class in &mut part.histogram {
+            *class = reader.u64()?;
+        }
+        while !reader.is_empty() {
+            let (cell, values) = (count(&mut reader)?, reader.f64s(1)?);
+            part.worst.push(WorstCell {
+                cell,
+                scaled_jacobian: values[0],
+                centroid: reader.vector()?,
+            });
+        }
+        Ok(part)
+    }
+
+    /// Makes the mean of the sum.
+    fn with_mean(mut self) -> Self {
+        if self.cells == 0 {
+            (self.min, self.mean, self.max) = (1.0, 1.0, 1.0);
+        } else {
+            self.mean /= real(self.cells);
+        }
+        self
     }
 
     fn merge(&mut self, other: Self) {
@@ -282,7 +288,34 @@ impl<'a> Measure<'a> {
         self.cells.cell_type(cell).dimension() == self.dimension
     }
 
-    /// The scaled Jacobian (-1 for NaN) of a cell whose vertices lie `at`, and whether the cell is inverted.
+    /// Calls `fours` with each four tetrahedra of a range that are measured, in order, and `each`
+    /// with every other cell that is.
+    #[inline(always)]
+    pub(crate) fn in_fours(
+        &self,
+        range: std::ops::Range<usize>,
+        mut fours: impl FnMut([usize; LANES]),
+        mut each: impl FnMut(usize),
+    ) {
+        let mut pending = [0; LANES];
+        let mut count = 0;
+        for cell in range {
+            if self.cells.cell_type(cell) == CellType::Tetra {
+                pending[count] = cell;
+                count += 1;
+                if count == LANES {
+                    fours(pending);
+                    count = 0;
+                }
+            } else if self.is_measured(cell) {
+                each(cell);
+            }
+        }
+        pending[..count].iter().for_each(|&cell| each(cell));
+    }
+
+    /// The scaled Jacobian (-1 for NaN) of a cell whose vertices lie `at`, and whether the cell is
+    /// inverted.
     pub(crate) fn cell(
         &self,
         cell: usize,
@@ -314,14 +347,4 @@ impl<'a> Measure<'a> {
         };
         Some((value, !valid))
     }
-}
-
-#[inline]
-pub(crate) fn tet_determinant([p, a, b, c]: [Vector; 4]) -> f64 {
-    determinant(subtract(a, p), subtract(b, p), subtract(c, p))
-}
-
-/// The mean of a cell's vertices.
-pub(crate) fn centroid(cells: &Cells, cell: usize, points: &[Vector]) -> Vector {
-    mean(cells.vertices(cell).iter().map(|&vertex| points[vertex as usize]))
 }

@@ -85,8 +85,9 @@ fn every_mirrored_volume_cell_is_inverted() {
     }
 }
 
-/// The least over the corners of a wedge of the determinant of its three edges by their lengths, 1 where the triangles are
-/// equilateral: a corner's neighbours are the other two of its triangle and the one across.
+/// The least over the corners of a wedge of the determinant of its three edges by their lengths, 1
+/// where the triangles are equilateral: a corner's neighbours are the other two of its triangle and
+/// the one across.
 fn worst_corner_of_wedge(points: &[Vector], sign: f64) -> f64 {
     let corner = |at: usize| {
         let top = at / 3 * 3;
@@ -100,7 +101,8 @@ fn worst_corner_of_wedge(points: &[Vector], sign: f64) -> f64 {
 }
 
 proptest! {
-    /// A wedge has the quality of its worst corner in whichever of the two orders it is written, and no cell is better than ideal.
+    /// A wedge has the quality of its worst corner in whichever of the two orders it is written,
+    /// and no cell is better than ideal.
     #[test]
     fn wedges_of_either_order_have_their_worst_corner(moves in prop::collection::vec(prop::array::uniform3(-0.4..0.4f64), 6)) {
         let unit = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 0.866, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.5, 0.866, 1.0]];
@@ -206,8 +208,9 @@ fn broken(result: Result<PathQuality, Refusal>) -> BrokenPath {
     }
 }
 
-/// Turning the base of a tetrahedron by half a turn about its axis: both ends are the same good cell, but on straight paths
-/// every base vertex passes through the axis, where the cell has no volume.
+/// Turning the base of a tetrahedron by half a turn about its axis: both ends are the same good
+/// cell, but on straight paths every base vertex passes through the axis, where the cell has no
+/// volume.
 #[test]
 fn an_inversion_between_valid_shapes_is_caught() {
     let turn = |angle: f64| -> Vec<Vector> {
@@ -229,7 +232,8 @@ fn an_inversion_between_valid_shapes_is_caught() {
     assert!(judge(&mesh, mesh.points(), &turn(1.5), &[1.0], &Guard::default()).is_ok());
 }
 
-/// A vertex pressed towards the opposite face: the height falls as `1 - 2 t`, and so does the determinant.
+/// A vertex pressed towards the opposite face: the height falls as `1 - 2 t`, and so does the
+/// determinant.
 #[test]
 fn the_feasible_fraction_is_that_of_the_closed_form() {
     let mesh = one_tet();
@@ -315,7 +319,8 @@ fn senseless_arguments_are_named() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(256))]
 
-    /// Whatever the guard lets through has no inverted cell in any of very many shapes along the way.
+    /// Whatever the guard lets through has no inverted cell in any of very many shapes along the
+    /// way.
     #[test]
     fn what_is_let_through_is_valid_all_along(
         motion in prop::collection::vec(-0.6..0.6f64, 12),

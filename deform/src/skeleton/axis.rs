@@ -1,13 +1,15 @@
-//! A curve of a skeleton as the axis of a tube: where along it a point lies, and how its frames turn when it bends.
+//! A curve of a skeleton as the axis of a tube: where along it a point lies, and how its frames
+//! turn when it bends.
 
 use super::Skeleton;
-use super::curve::is_free_loop;
-use super::rotation::{Rotation, direction, distance, smooth_step, transported};
+use super::drag::is_free_loop;
+use super::rotation::{Rotation, direction, smooth_step, transported};
 use crate::mesh::Vector;
-use crate::vector::{add, dot, scale, subtract};
+use crate::vector::{add, distance, dot, scale, subtract};
 
-/// The axis of a curve. Skeletons are rough, so positions and tangents are those of parabolas fitted to the nodes within one local
-/// radius, each weighted by the length it stands for: the axis does not depend on how densely nodes lie.
+/// The axis of a curve. Skeletons are rough, so positions and tangents are those of parabolas
+/// fitted to the nodes within one local radius, each weighted by the length it stands for: the axis
+/// does not depend on how densely nodes lie.
 #[derive(Debug, Clone)]
 pub(super) struct Axis {
     /// The nodes of the skeleton; those of a closed axis without the first one again.
@@ -16,8 +18,10 @@ pub(super) struct Axis {
     lengths: Vec<f64>,
     /// The whole length of a closed axis.
     period: Option<f64>,
+    /// The parabolas fitted to the nodes.
     fits: Vec<Fit>,
-    /// The same for the means of what the nodes carry, where these lie along the axis.
+    /// The parabolas fitted to the means of the vertices that nodes carry, where these lie along
+    /// the axis.
     carried_fits: Vec<Fit>,
     radii: Vec<f64>,
     /// How much of its turn each node makes: none at a branch node, all of it one radius away.
@@ -27,15 +31,15 @@ pub(super) struct Axis {
     tangents: Vec<Vector>,
 }
 
-/// A parabola fitted around a node, as weights of the nodes from `first` on (counted around a closed axis): of its value and of its
-/// slope at the node.
+/// A parabola fitted around a node, as weights of the nodes from `first` on (counted around a
+/// closed axis): of its value and of its slope at the node.
 #[derive(Debug, Clone)]
 struct Fit {
     first: usize,
     weights: Vec<[f64; 2]>,
 }
 
-/// A place on an axis: a part of the way from a node to the next.
+/// A position on an axis: a part of the way from a node to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Station {
     node: u32,
@@ -45,7 +49,8 @@ pub(super) struct Station {
 }
 
 impl Axis {
-    /// The axis of a curve, where `radii` are those of the nodes of the skeleton and `surface` are the points of its surface.
+    /// The axis of a curve, where `radii` are those of the nodes of the skeleton and `surface` are
+    /// the points of its surface.
     pub fn new(skeleton: &Skeleton, curve: usize, radii: &[f64], surface: &[Vector]) -> Self {
         let closed = is_free_loop(skeleton, curve);
         let mut nodes = skeleton.curves()[curve].nodes().to_vec();
@@ -119,7 +124,8 @@ impl Axis {
         &self.nodes
     }
 
-    /// How far a node lies ahead of another in terms of arc length, across the start of a closed axis where that is shorter.
+    /// How far a node lies ahead of another in terms of arc length, across the start of a closed
+    /// axis where that is shorter.
     fn ahead(&self, from: usize, to: usize) -> f64 {
         let ahead = self.lengths[to] - self.lengths[from];
         self.period.map_or(ahead, |period| ahead - (ahead / period).round() * period)
@@ -150,20 +156,21 @@ impl Axis {
         }
     }
 
-    /// Fits a parabola around a node to samples within a distance, that lie ahead of their nodes by `leads` (`None`: none).
+    /// Fits a parabola around a node to samples within a distance, that lie ahead of their nodes by
+    /// `leads` (`None`: none).
     fn fit(&self, node: usize, within: f64, leads: &[Option<f64>]) -> Fit {
         let count = self.nodes.len();
         let wanted = leads.iter().flatten().count().min(if self.period.is_some() { 3 } else { 4 });
         let most = if self.period.is_some() { (count - 1) / 2 } else { count };
-        let offset = |place: usize| leads[place].map(|lead| self.ahead(node, place) + lead);
+        let offset = |index: usize| leads[index].map(|lead| self.ahead(node, index) + lead);
         // The samples within the distance, and so many more that a parabola has enough of them.
         let mut reach = within;
         let mut found = usize::from(leads[node].is_some());
         let [mut low, mut high] = [(0, node), (0, node)];
         loop {
-            let next = |(steps, place): (usize, usize), next: Option<usize>| match next {
+            let next = |(steps, index): (usize, usize), next: Option<usize>| match next {
                 Some(next) if steps < most => (self.ahead(node, next).abs(), (steps + 1, next)),
-                _ => (f64::INFINITY, (steps, place)),
+                _ => (f64::INFINITY, (steps, index)),
             };
             let below = next(low, self.before(low.1));
             let above = next(high, self.next(high.1));
@@ -173,8 +180,8 @@ impl Axis {
             }
             let side = if below.0 <= above.0 { &mut low } else { &mut high };
             *side = if below.0 <= above.0 { below.1 } else { above.1 };
-            let place = side.1;
-            if let Some(offset) = offset(place) {
+            let index = side.1;
+            if let Some(offset) = offset(index) {
                 found += 1;
                 if nearest >= within {
                     reach = reach.max(1.25 * offset.abs());
@@ -182,15 +189,15 @@ impl Axis {
             }
         }
         let (first, steps) = (low.1, low.0 + high.0);
-        let share = |place: usize| {
-            let before = self.before(place).map_or(0.0, |before| self.segment(before, place));
-            0.5 * (before + self.next(place).map_or(0.0, |next| self.segment(place, next)))
+        let share = |index: usize| {
+            let before = self.before(index).map_or(0.0, |before| self.segment(before, index));
+            0.5 * (before + self.next(index).map_or(0.0, |next| self.segment(index, next)))
         };
         let terms: Vec<(f64, f64)> = (0..=steps)
             .map(|step| (first + step) % count)
-            .map(|place| match offset(place).map(|offset| offset / reach) {
+            .map(|index| match offset(index).map(|offset| offset / reach) {
                 Some(offset) => {
-                    ((1.0 - offset.abs().powi(3)).max(0.0).powi(3) * share(place), offset)
+                    ((1.0 - offset.abs().powi(3)).max(0.0).powi(3) * share(index), offset)
                 }
                 None => (0.0, 0.0),
             })
@@ -233,17 +240,18 @@ impl Axis {
         Fit { first, weights }
     }
 
-    /// How far the vertices that each node carries lie ahead of it on the mean; `None` where it carries none.
+    /// How far the vertices that each node carries lie ahead of it on the mean; `None` where it
+    /// carries none.
     fn mean_leads(&self, skeleton: &Skeleton, surface: &[Vector]) -> Vec<Option<f64>> {
-        let mut places = vec![None; skeleton.nodes().len()];
-        for (place, &node) in self.nodes.iter().enumerate() {
-            places[node as usize] = Some(place);
+        let mut indices = vec![None; skeleton.nodes().len()];
+        for (index, &node) in self.nodes.iter().enumerate() {
+            indices[node as usize] = Some(index);
         }
         let mut sums = vec![(0.0, 0u32); self.nodes.len()];
         for (&point, &node) in surface.iter().zip(skeleton.node_of_vertex()) {
-            if let Some(place) = places[node as usize] {
-                let (sum, count) = &mut sums[place];
-                *sum += self.lead(point, place);
+            if let Some(index) = indices[node as usize] {
+                let (sum, count) = &mut sums[index];
+                *sum += self.lead(point, index);
                 *count += 1;
             }
         }
@@ -255,8 +263,9 @@ impl Axis {
         dot(subtract(point, self.points[node]), self.tangents[node])
     }
 
-    /// The station whose normal plane a point lies in: the first one met from `start` on (a place along the axis). Points before
-    /// the start of an open axis or beyond its end belong to the end; those whose plane is not found nearby to `start` itself.
+    /// The station whose normal plane a point lies in: the first one met from `start` on (an index
+    /// along the axis). Points before the start of an open axis or beyond its end belong to the
+    /// end; those whose plane is not found nearby to `start` itself.
     pub fn station(&self, point: Vector, start: usize) -> Station {
         let spacing = self.next(start).map_or(0.0, |next| self.segment(start, next));
         let limit = 2.0 * distance(point, self.points[start]) + spacing;
@@ -322,8 +331,8 @@ impl Axis {
         station
     }
 
-    /// The place along the axis nearest to a station.
-    pub fn place(&self, station: Station) -> usize {
+    /// The index of the node nearest to a station.
+    pub fn nearest(&self, station: Station) -> usize {
         if station.fraction < 0.5 { station.node as usize } else { station.next as usize }
     }
 
@@ -338,7 +347,8 @@ impl Axis {
         self.radii.iter().copied().fold(0.0, f64::max)
     }
 
-    /// The axis where edits below have moved what its nodes carry by `below` on the mean, and where it now bends by `moved`.
+    /// The axis where edits below have moved what its nodes carry by `below` on the mean, and where
+    /// it now bends by `moved`.
     pub fn bend(&self, below: &[Vector], moved: &[Vector]) -> Bent {
         let (mut points, mut slopes, mut tangents) =
             (self.points.clone(), self.slopes.clone(), self.tangents.clone());

@@ -1,24 +1,27 @@
-//! From a surface to closed pieces: open edges that lie on each other are joined, vertices where sheets touch are parted,
-//! triangles are turned alike, holes are closed.
+//! From a surface to closed pieces: open edges that lie on each other are joined, vertices where
+//! sheets touch are parted, triangles are turned alike, holes are closed.
 
 use std::collections::HashMap;
 
 use super::SkeletonError;
 use super::triangulation::Triangulation;
+use crate::bounds::Bounds;
 use crate::mesh::Vector;
 use crate::surface::Surface;
-use crate::vector::{add, dot, scale, subtract};
+use crate::topology::{CrowdedEdge, DisjointSets, OPEN, SidesOfEdges, ends_of_sides, indices};
+use crate::vector::{add, length, scale};
 
 /// A connected piece of the surface, closed, about the origin and of diagonal 1.
-pub(super) struct Piece {
+pub(super) struct ClosedPiece {
     pub mesh: Triangulation,
-    /// Where it lies: the centre, in units of the largest coordinate, the diagonal in these units, and the unit.
+    /// Where it lies in the surface.
     pub frame: Frame,
     /// The surface vertices of the piece, each with the vertex of the mesh that stands for it.
     pub vertices: Vec<(u32, u32)>,
 }
 
-/// What brings a piece back to its place.
+/// The frame of a piece: its points are taken about `centre` in units of `diagonal`, all of it in
+/// units of `unit`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Frame {
     centre: Vector,
@@ -27,40 +30,46 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// The frame of some points, none of which has a larger coordinate than `unit`; `None` where they are one point.
+    /// The frame of some points, none of which has a larger coordinate than `unit`; `None` where
+    /// they are one point.
     fn new(points: &[Vector], unit: f64) -> Option<Self> {
-        let mut lower = [f64::INFINITY; 3];
-        let mut upper = [f64::NEG_INFINITY; 3];
-        for axis in 0..3 {
-            for point in points {
-                lower[axis] = lower[axis].min(point[axis] / unit);
-                upper[axis] = upper[axis].max(point[axis] / unit);
-            }
-        }
-        let extent = subtract(upper, lower);
-        let diagonal = dot(extent, extent).sqrt();
-        (diagonal > 0.0).then(|| Self { centre: scale(add(lower, upper), 0.5), diagonal, unit })
+        let bounds = Bounds::around(points.iter().map(|point| point.map(|value| value / unit)));
+        let diagonal = length(bounds.extent());
+        (diagonal > 0.0).then(|| Self {
+            centre: scale(add(bounds.lower, bounds.upper), 0.5),
+            diagonal,
+            unit,
+        })
     }
 
+    /// A point of the surface in the coordinates of the piece.
     pub fn enter(&self, point: Vector) -> Vector {
         [0, 1, 2].map(|axis| (point[axis] / self.unit - self.centre[axis]) / self.diagonal)
     }
 
-    /// Where a point of the piece lies in the surface's own coordinates.
+    /// A point of the piece in the coordinates of the surface.
     pub fn leave(&self, point: Vector) -> Vector {
         [0, 1, 2].map(|axis| (point[axis] * self.diagonal + self.centre[axis]) * self.unit)
     }
 }
 
-/// The enclosed volume of a piece, in units of its area to the power 1.5, under which it is flat. A ball has 0.094.
+/// The enclosed volume of a piece, in units of its area to the power 1.5, under which it is flat. A
+/// ball has 0.094.
 const FLAT: f64 = 1e-7;
 
-pub(super) fn closed_pieces(surface: &Surface) -> Result<Vec<Piece>, SkeletonError> {
+/// The closed pieces of a surface.
+///
+/// # Errors
+/// [`SkeletonError`] for a surface that cannot be closed, or that encloses nothing.
+pub(super) fn closed_pieces(surface: &Surface) -> Result<Vec<ClosedPiece>, SkeletonError> {
+    // 1. Order: vertices by coordinates, triangles by vertices, so that no numbering changes a bit
+    //    of what follows.
     let Ordered { points, vertices, mut triangles } = Ordered::new(surface);
     if triangles.is_empty() {
         return Err(SkeletonError::NoTriangles);
     }
     let mesh_vertex = |vertex: u32| surface.vertices()[vertices[vertex as usize] as usize];
+    // 2. Join: vertices of open edges that have the same coordinates become the lowest of them.
     let joined = join_open_edges(&points, &triangles);
     if joined.iter().zip(0u32..).any(|(&into, vertex)| into != vertex) {
         triangles
@@ -68,10 +77,21 @@ pub(super) fn closed_pieces(surface: &Surface) -> Result<Vec<Piece>, SkeletonErr
             .for_each(|triangle| *triangle = triangle.map(|vertex| joined[vertex as usize]));
         triangles.retain(|[a, b, c]| a != b && b != c && c != a);
     }
-    let mut twins = twins(&triangles, points.len(), mesh_vertex)?;
+    // 3. Twins: each side of a triangle gets the side of the other triangle at its edge.
+    let mut twins = SidesOfEdges::new(&triangles, points.len()).twins().map_err(
+        |CrowdedEdge { ends, triangles }| {
+            let [a, b] = ends.map(mesh_vertex);
+            SkeletonError::NonManifoldEdge { edge: [a.min(b), a.max(b)], faces: triangles }
+        },
+    )?;
+    // 4. Orient: neighbours run the same way round. What edges hold together is a piece.
     let piece_of = orient(&mut triangles, &mut twins, mesh_vertex)?;
+    // 5. Part: sheets that touch in a vertex alone get a vertex each.
     let corners = part_sheets(&triangles, &twins);
+    // 6. Close: each piece is taken out, its holes are filled, it is brought about the origin and
+    //    turned outward.
     let mut pieces = pieces(&points, &triangles, &twins, &piece_of, &corners, mesh_vertex)?;
+    // 7. Account for every vertex of the surface: those that were joined go with the lowest.
     for (vertex, &representative) in joined.iter().enumerate() {
         let (piece, number) = pieces.stands_for[representative as usize];
         if let Some(piece) = pieces.closed.get_mut(piece as usize) {
@@ -81,12 +101,13 @@ pub(super) fn closed_pieces(surface: &Surface) -> Result<Vec<Piece>, SkeletonErr
     Ok(pieces.closed)
 }
 
-/// A surface in an order that does not depend on how it is numbered: vertices by their coordinates, triangles by their vertices.
+/// A surface in an order that does not depend on how it is numbered: vertices by their coordinates,
+/// triangles by their vertices.
 struct Ordered {
     points: Vec<Vector>,
     /// The surface's own number of each vertex.
     vertices: Vec<u32>,
-    /// Those with three different vertices, from the lowest on.
+    /// The triangles with three different vertices, each from its lowest on.
     triangles: Vec<[u32; 3]>,
 }
 
@@ -99,10 +120,8 @@ impl Ordered {
             let [x, y, z] = [0, 1, 2].map(|axis| a[axis].total_cmp(&b[axis]));
             x.then(y).then(z).then(own.cmp(other))
         });
-        let mut ranks = vec![0u32; ordered.len()];
-        for (&(_, vertex), rank) in ordered.iter().zip(0..) {
-            ranks[vertex as usize] = rank;
-        }
+        let (points, vertices): (Vec<Vector>, Vec<u32>) = ordered.into_iter().unzip();
+        let ranks = indices(vertices.len(), &vertices);
         let mut triangles: Vec<[u32; 3]> = surface
             .triangles()
             .iter()
@@ -110,7 +129,6 @@ impl Ordered {
             .filter(|[a, b, c]| a != b && b != c && c != a)
             .collect();
         triangles.sort_unstable();
-        let (points, vertices) = ordered.into_iter().unzip();
         Self { points, vertices, triangles }
     }
 }
@@ -126,16 +144,17 @@ fn lowest_first([a, b, c]: [u32; 3]) -> [u32; 3] {
     }
 }
 
-/// For each vertex the lowest one it is joined with: those on open edges that have the same place to the last bit.
+/// For each vertex the lowest one it is joined with: those on open edges with the same coordinates
+/// to the last bit.
 fn join_open_edges(points: &[Vector], triangles: &[[u32; 3]]) -> Vec<u32> {
     let mut joined: Vec<u32> = (0..points.len() as u32).collect();
     let mut is_open = vec![false; points.len()];
-    Sides::new(triangles, points.len()).for_each_edge(|ends, sides| {
+    for (ends, sides) in SidesOfEdges::new(triangles, points.len()).edges() {
         if sides.len() == 1 {
             ends.into_iter().for_each(|end| is_open[end as usize] = true);
         }
-    });
-    // Vertices that lie in the same place follow each other.
+    }
+    // Vertices with the same coordinates follow each other.
     let mut first: Option<u32> = None;
     for vertex in (0..points.len() as u32).filter(|&vertex| is_open[vertex as usize]) {
         match first {
@@ -148,88 +167,15 @@ fn join_open_edges(points: &[Vector], triangles: &[[u32; 3]]) -> Vec<u32> {
     joined
 }
 
-/// The sides of triangles (three each) by the lower of their ends.
-struct Sides {
-    starts: Vec<u32>,
-    /// The higher end, and the number of the side.
-    sides: Vec<(u32, u32)>,
-}
-
-impl Sides {
-    fn new(triangles: &[[u32; 3]], vertices: usize) -> Self {
-        let mut starts = vec![0u32; vertices + 1];
-        for [lower, _] in triangles.iter().flat_map(sides_of).map(sorted) {
-            starts[lower as usize + 1] += 1;
-        }
-        for vertex in 0..vertices {
-            starts[vertex + 1] += starts[vertex];
-        }
-        let mut next = starts.clone();
-        let mut sides = vec![(0, 0); 3 * triangles.len()];
-        for ([lower, higher], side) in triangles.iter().flat_map(sides_of).map(sorted).zip(0u32..) {
-            let place = &mut next[lower as usize];
-            sides[*place as usize] = (higher, side);
-            *place += 1;
-        }
-        for pair in starts.windows(2) {
-            sides[pair[0] as usize..pair[1] as usize].sort_unstable();
-        }
-        Self { starts, sides }
-    }
-
-    /// Calls `work` with the ends of each edge, the lower first, and its sides.
-    fn for_each_edge(&self, mut work: impl FnMut([u32; 2], &[(u32, u32)])) {
-        for (pair, lower) in self.starts.windows(2).zip(0u32..) {
-            for same in self.sides[pair[0] as usize..pair[1] as usize].chunk_by(|a, b| a.0 == b.0) {
-                work([lower, same[0].0], same);
-            }
-        }
-    }
-}
-
-fn sides_of(triangle: &[u32; 3]) -> [[u32; 2]; 3] {
-    let [a, b, c] = *triangle;
-    [[a, b], [b, c], [c, a]]
-}
-
-fn sorted([a, b]: [u32; 2]) -> [u32; 2] {
-    [a.min(b), a.max(b)]
-}
-
-const OPEN: u32 = u32::MAX;
-
-/// For each side (three a triangle) the side of the other triangle at its edge. `mesh_vertex` names vertices in errors.
-fn twins(
-    triangles: &[[u32; 3]],
-    vertices: usize,
-    mesh_vertex: impl Fn(u32) -> u32,
-) -> Result<Vec<u32>, SkeletonError> {
-    let mut twins = vec![OPEN; 3 * triangles.len()];
-    let mut fault = None;
-    Sides::new(triangles, vertices).for_each_edge(|ends, sides| match sides {
-        [(_, a), (_, b)] => {
-            twins[*a as usize] = *b;
-            twins[*b as usize] = *a;
-        }
-        [_] | [] => {}
-        more => fault = fault.or(Some((ends, more.len()))),
-    });
-    match fault {
-        Some((edge, faces)) => {
-            Err(SkeletonError::NonManifoldEdge { edge: sorted(edge.map(mesh_vertex)), faces })
-        }
-        None => Ok(twins),
-    }
-}
-
-/// Turns triangles, and their sides with them, so that neighbours run alike, and gives each the number of its connected piece.
+/// Turns triangles, and their sides with them, so that neighbours run alike, and gives each the
+/// number of its connected piece.
 fn orient(
     triangles: &mut [[u32; 3]],
     twins: &mut [u32],
     mesh_vertex: impl Fn(u32) -> u32,
 ) -> Result<Vec<u32>, SkeletonError> {
     let original = triangles.to_vec();
-    let side = |side: u32| sides_of(&original[side as usize / 3])[side as usize % 3];
+    let side = |side: u32| ends_of_sides(&original[side as usize / 3])[side as usize % 3];
     let mut piece_of = vec![OPEN; triangles.len()];
     let mut turned = vec![false; triangles.len()];
     let mut pieces = 0;
@@ -260,7 +206,7 @@ fn orient(
         pieces += 1;
     }
     if turned.contains(&true) {
-        // A triangle [a, b, c] becomes [a, c, b]: its first side and its last change places.
+        // A triangle [a, b, c] becomes [a, c, b]: its first side and its last are exchanged.
         let now =
             |side: u32| if turned[side as usize / 3] { side + 2 - 2 * (side % 3) } else { side };
         let old = twins.to_vec();
@@ -274,42 +220,29 @@ fn orient(
     Ok(piece_of)
 }
 
-/// A number for each corner (three a triangle) that is the same for corners at a vertex joined by edges, so that sheets which
-/// touch in a vertex alone have one each.
+/// The sheet of each corner (three a triangle): corners at one vertex that edges join are in one
+/// sheet, so that sheets which touch in a vertex alone are parted.
 fn part_sheets(triangles: &[[u32; 3]], twins: &[u32]) -> Vec<u32> {
-    let mut sheets: Vec<u32> = (0..twins.len() as u32).collect();
-    fn root(sheets: &mut [u32], mut corner: u32) -> u32 {
-        while sheets[corner as usize] != corner {
-            let above = sheets[sheets[corner as usize] as usize];
-            sheets[corner as usize] = above;
-            corner = above;
-        }
-        corner
-    }
+    let mut sheets = DisjointSets::new(twins.len());
     for (side, &twin) in twins.iter().enumerate() {
         if twin == OPEN {
             continue;
         }
-        for place in [side % 3, (side + 1) % 3] {
-            let vertex = triangles[side / 3][place];
-            let own = (side - side % 3 + place) as u32;
+        for corner in [side % 3, (side + 1) % 3] {
+            let vertex = triangles[side / 3][corner];
+            let own = (side - side % 3 + corner) as u32;
             if let Some(there) =
                 triangles[twin as usize / 3].iter().position(|&other| other == vertex)
             {
-                let [a, b] =
-                    [root(&mut sheets, own), root(&mut sheets, twin - twin % 3 + there as u32)];
-                sheets[a.max(b) as usize] = a.min(b);
+                sheets.join(own, twin - twin % 3 + there as u32);
             }
         }
     }
-    for corner in 0..sheets.len() as u32 {
-        sheets[corner as usize] = root(&mut sheets, corner);
-    }
-    sheets
+    (0..twins.len() as u32).map(|corner| sheets.root(corner)).collect()
 }
 
 struct Pieces {
-    closed: Vec<Piece>,
+    closed: Vec<ClosedPiece>,
     /// The piece of each vertex and its number there, by the first sheet met.
     stands_for: Vec<(u32, u32)>,
 }
@@ -338,9 +271,9 @@ fn pieces(
         let mut points = Vec::new();
         let mut own = Vec::with_capacity(members.len());
         for &triangle in members {
-            let renumbered = [0, 1, 2].map(|place| {
-                let sheet = corners[3 * triangle + place] as usize;
-                let vertex = triangles[triangle][place] as usize;
+            let renumbered = [0, 1, 2].map(|corner| {
+                let sheet = corners[3 * triangle + corner] as usize;
+                let vertex = triangles[triangle][corner] as usize;
                 if numbers[sheet] == OPEN {
                     numbers[sheet] = points.len() as u32;
                     points.push(all_points[vertex]);
@@ -354,8 +287,8 @@ fn pieces(
         }
         let mut next: HashMap<u32, u32> = HashMap::new();
         let mut starts = Vec::new();
-        for (place, &triangle) in members.iter().enumerate() {
-            for (side, [from, to]) in sides_of(&own[place]).into_iter().enumerate() {
+        for (index, &triangle) in members.iter().enumerate() {
+            for (side, [from, to]) in ends_of_sides(&own[index]).into_iter().enumerate() {
                 if twins[3 * triangle + side] == OPEN {
                     next.insert(from, to);
                     starts.push(from);
@@ -378,12 +311,13 @@ fn pieces(
         if !encloses {
             return Err(flat);
         }
-        closed.push(Piece { mesh, frame, vertices: Vec::new() });
+        closed.push(ClosedPiece { mesh, frame, vertices: Vec::new() });
     }
     Ok(Pieces { closed, stands_for })
 }
 
-/// Closes every loop of open edges by triangles about its centre. At most one open edge leaves each vertex.
+/// Closes every loop of open edges by triangles about its centre. At most one open edge leaves each
+/// vertex.
 fn close_holes(
     points: &mut Vec<Vector>,
     triangles: &mut Vec<[u32; 3]>,
@@ -403,8 +337,8 @@ fn close_holes(
         let centre = points.len() as u32;
         let sum = rim.iter().fold([0.0; 3], |sum, &vertex| add(sum, points[vertex as usize]));
         points.push(scale(sum, 1.0 / rim.len() as f64));
-        for (place, &from) in rim.iter().enumerate() {
-            triangles.push([rim[(place + 1) % rim.len()], from, centre]);
+        for (index, &from) in rim.iter().enumerate() {
+            triangles.push([rim[(index + 1) % rim.len()], from, centre]);
         }
     }
 }

@@ -1,52 +1,39 @@
 //! Distances along a surface.
 
-use std::cmp::{Ordering, Reverse};
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::rotation::distance;
 use crate::mesh::Vector;
-use crate::vector::{dot, subtract};
+use crate::number::Ordered;
+use crate::topology::triangles_at;
+use crate::vector::{distance, dot, subtract};
 
-/// For each vertex its distance along the surface from the nearest of some vertices, and which of them that is: the fast marching
-/// method (Kimmel and Sethian 1998), which takes the front within a triangle as straight. At obtuse corners it may go along the
-/// edges instead, which is up to some percent longer. Vertices farther than `farthest`, or not connected, have none.
+/// For each vertex its distance along the surface from the nearest of some vertices, and which of
+/// them that is: the fast marching method (Kimmel and Sethian 1998), which takes the front within a
+/// triangle as straight. At obtuse corners it may go along the edges instead, which is up to some
+/// percent longer. Vertices farther than `farthest`, or not connected, have none.
 pub(super) fn from_vertices(
     points: &[Vector],
     triangles: &[[u32; 3]],
     sources: impl Iterator<Item = u32>,
     farthest: f64,
 ) -> Vec<Option<(f64, u32)>> {
-    let mut offsets = vec![0usize; points.len() + 1];
-    for triangle in triangles {
-        for &corner in triangle {
-            offsets[corner as usize + 1] += 1;
-        }
-    }
-    for vertex in 0..points.len() {
-        offsets[vertex + 1] += offsets[vertex];
-    }
-    let mut around = vec![0u32; 3 * triangles.len()];
-    let mut next = offsets.clone();
-    for (number, triangle) in triangles.iter().enumerate() {
-        for &corner in triangle {
-            around[next[corner as usize]] = number as u32;
-            next[corner as usize] += 1;
-        }
-    }
+    let around = triangles_at(triangles, points.len());
 
     let mut best: Vec<Option<(f64, u32)>> = vec![None; points.len()];
     let mut is_final = vec![false; points.len()];
+    // By distance, and then by number.
     let mut front = BinaryHeap::new();
     for source in sources {
         best[source as usize] = Some((0.0, source));
-        front.push(Reverse(Front { distance: 0.0, vertex: source }));
+        front.push(Reverse((Ordered(0.0), source)));
     }
-    while let Some(Reverse(Front { distance: reached, vertex })) = front.pop() {
+    while let Some(Reverse((Ordered(reached), vertex))) = front.pop() {
         if std::mem::replace(&mut is_final[vertex as usize], true) {
             continue;
         }
         let source = best[vertex as usize].map_or(vertex, |(_, source)| source);
-        for &triangle in &around[offsets[vertex as usize]..offsets[vertex as usize + 1]] {
+        for &triangle in around.of(vertex) {
             let corners = triangles[triangle as usize];
             for [target, other] in others(corners, vertex) {
                 if is_final[target as usize] {
@@ -65,7 +52,7 @@ pub(super) fn from_vertices(
                     && best[target as usize].is_none_or(|(known, _)| length < known)
                 {
                     best[target as usize] = Some((length, source));
-                    front.push(Reverse(Front { distance: length, vertex: target }));
+                    front.push(Reverse((Ordered(length), target)));
                 }
             }
         }
@@ -82,8 +69,8 @@ fn others([a, b, c]: [u32; 3], vertex: u32) -> [[u32; 2]; 2] {
     }
 }
 
-/// The distance at the corner from which `to_a` and `to_b` lead to corners of known distance, for a straight front that reaches
-/// it through their side.
+/// The distance at the corner from which `to_a` and `to_b` lead to corners of known distance, for a
+/// straight front that reaches it through their side.
 fn straight_front(to_a: Vector, to_b: Vector, at_a: f64, at_b: f64) -> Option<f64> {
     let [aa, ab, bb] = [dot(to_a, to_a), dot(to_a, to_b), dot(to_b, to_b)];
     let determinant = aa * bb - ab * ab;
@@ -109,37 +96,12 @@ fn straight_front(to_a: Vector, to_b: Vector, at_a: f64, at_b: f64) -> Option<f6
     (from_a <= 0.0 && from_b <= 0.0 && reached >= at_a.max(at_b)).then_some(reached)
 }
 
-/// A vertex of the front, ordered by distance and then by number.
-struct Front {
-    distance: f64,
-    vertex: u32,
-}
-
-impl Ord for Front {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.distance.total_cmp(&other.distance).then(self.vertex.cmp(&other.vertex))
-    }
-}
-
-impl PartialOrd for Front {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Front {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Front {}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::features::FeatureSettings;
     use crate::shapes;
-    use crate::surface::{FeatureSettings, Surface};
+    use crate::surface::Surface;
 
     #[test]
     fn distances_on_a_plate_converge_to_straight_lines() {

@@ -5,24 +5,27 @@ use faer::Mat;
 use super::SkeletonSettings;
 use super::medial::{self, NearestPoints};
 use super::system::{Row, least_squares};
-use super::triangulation::{Triangulation, length};
+use super::triangulation::Triangulation;
 use crate::mesh::Vector;
-use crate::vector::{add, dot, scale, subtract};
+use crate::vector::{add, distance, dot, length, scale, subtract};
 
 /// Edges whose opposite angles have both no larger cosine than this are split (110 degrees).
 const SPLIT_COSINE: f64 = -0.342_020_143_325_668_7;
 
-/// The largest cotangent a weight is made of: what is lost of a needle's stiffness is nothing to see, and the least squares
-/// system keeps its digits.
+/// The largest cotangent a weight is made of: what is lost of a needle's stiffness is nothing to
+/// see, and the least squares system keeps its digits.
 const LARGEST_COTANGENT: f64 = 1e3;
 
-/// A pole counts as inside while it lies deeper than this below its vertex, in units of the shortest edge kept.
+/// A pole counts as inside while it lies deeper than this below its vertex, in units of the
+/// shortest edge kept.
 const DEPTH: f64 = 0.5;
 
-/// How far about a vertex the surface is looked at to see whether it has closed to a curve, in units of the shortest edge kept.
+/// How far about a vertex the surface is looked at to see whether it has closed to a curve, in
+/// units of the shortest edge kept.
 const REACH: f64 = 2.0;
 
-/// Contracts a surface of diagonal 1 until it hardly has an area (Tagliasacchi, Alhashim, Olson and Zhang 2012).
+/// Contracts a surface of diagonal 1 until it hardly has an area (Tagliasacchi, Alhashim, Olson and
+/// Zhang 2012).
 pub(super) fn contract(
     mesh: &mut Triangulation,
     tree: &NearestPoints,
@@ -65,7 +68,8 @@ struct Flow<'a> {
 }
 
 impl Flow<'_> {
-    /// One implicit step: the free vertices minimise `|L x|^2 + keep^2 |x - x_0|^2 + centre^2 |x - pole|^2`.
+    /// One implicit step: the free vertices minimise
+    /// `|L x|^2 + keep^2 |x - x_0|^2 + centre^2 |x - pole|^2`.
     fn step(&mut self, settings: &SkeletonSettings) {
         const NONE: u32 = u32::MAX;
         let mesh = &*self.mesh;
@@ -128,9 +132,9 @@ impl Flow<'_> {
         }
         let Some(solution) = least_squares(&rows, &diagonal, right_side) else { return };
         for (slot, &vertex) in free.iter().enumerate() {
-            let place = [0, 1, 2].map(|axis| solution[(slot, axis)]);
-            if place.iter().all(|value| value.is_finite()) {
-                self.mesh.points[vertex as usize] = place;
+            let point = [0, 1, 2].map(|axis| solution[(slot, axis)]);
+            if point.iter().all(|value| value.is_finite()) {
+                self.mesh.points[vertex as usize] = point;
             }
         }
     }
@@ -167,15 +171,15 @@ impl Flow<'_> {
 
     fn collapse(&mut self, kept: u32, gone: u32) {
         let [kept_fixed, gone_fixed] = [kept, gone].map(|vertex| self.fixed[vertex as usize]);
-        let place = match (kept_fixed, gone_fixed) {
+        let merged = match (kept_fixed, gone_fixed) {
             (true, _) => self.mesh.points[kept as usize],
             (_, true) => self.mesh.points[gone as usize],
             _ => self.mesh.middle(kept, gone),
         };
         self.fixed[kept as usize] |= gone_fixed;
-        self.mesh.collapse(kept, gone, place);
+        self.mesh.collapse(kept, gone, merged);
         // Of two poles the nearer is the more likely to be still inside.
-        let distance = |pole: Vector| length(subtract(pole, place));
+        let distance = |pole: Vector| distance(pole, merged);
         let nearer = match (self.poles[kept as usize], self.poles[gone as usize]) {
             (Some(own), Some(other)) => {
                 Some(if distance(other) < distance(own) { other } else { own })
@@ -188,8 +192,8 @@ impl Flow<'_> {
     fn split_flat_triangles(&mut self, largest: usize) {
         let mut wide: Vec<(u32, u32, u32)> = Vec::new();
         for triangle in self.mesh.live_triangles() {
-            for place in 0..3 {
-                let [a, b, c] = [0, 1, 2].map(|step| triangle[(place + step) % 3]);
+            for corner in 0..3 {
+                let [a, b, c] = [0, 1, 2].map(|step| triangle[(corner + step) % 3]);
                 if a < b
                     && self.mesh.cosine(c, a, b) <= SPLIT_COSINE
                     && let Some([(_, first), (_, second)]) = self.mesh.sides(a, b)
@@ -216,7 +220,8 @@ impl Flow<'_> {
         }
     }
 
-    /// Fixes the vertices about which the surface within [`REACH`] is no disc: it has closed to a curve there.
+    /// Fixes the vertices about which the surface within [`REACH`] is no disc: it has closed to a
+    /// curve there.
     fn fix_degenerate(&mut self) {
         let reach = REACH * self.shortest;
         let mut disc: Vec<u32> = Vec::new();
@@ -279,11 +284,12 @@ impl Triangulation {
         if cosine.is_finite() { cosine } else { 1.0 }
     }
 
-    /// The cotangent of the angle at `corner` between two other vertices, not negative and not too large.
+    /// The cotangent of the angle at `corner` between two other vertices, not negative and not too
+    /// large.
     fn cotangent(&self, corner: u32, a: u32, b: u32) -> f64 {
-        let [place, to_a, to_b] = [corner, a, b].map(|vertex| self.points[vertex as usize]);
+        let [apex, to_a, to_b] = [corner, a, b].map(|vertex| self.points[vertex as usize]);
         let area = length(self.normal([corner, a, b]));
-        let cosine = dot(subtract(to_a, place), subtract(to_b, place));
+        let cosine = dot(subtract(to_a, apex), subtract(to_b, apex));
         if cosine <= 0.0 {
             0.0
         } else if cosine >= LARGEST_COTANGENT * area {

@@ -1,12 +1,15 @@
 //! The skeleton as a graph of polylines.
 
 use crate::mesh::Vector;
+use crate::topology::{DisjointSets, indices};
 use crate::vector::{dot, subtract};
 
-/// A curve skeleton: nodes joined into polylines, and the node that carries each vertex of a surface.
+/// A curve skeleton: nodes joined into polylines, and the node that carries each vertex of a
+/// surface.
 ///
-/// Polylines ([`Curve`]) run between nodes that are no inner node of a curve: ends (degree 1) and branch nodes (degree 3 and
-/// more). A loop without a branch node starts and ends in the same node. What shrinks to a point is a node of degree 0.
+/// Polylines ([`Curve`]) run between nodes that are no inner node of a curve: ends (degree 1) and
+/// branch nodes (degree 3 and more). A loop without a branch node starts and ends in the same node.
+/// What shrinks to a point is a node of degree 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Skeleton {
     nodes: Vec<Vector>,
@@ -24,7 +27,8 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// The numbers of its nodes from one end to the other: at least 2, at least 4 where it is closed.
+    /// The numbers of its nodes from one end to the other: at least 2, at least 4 where it is
+    /// closed.
     #[must_use]
     pub fn nodes(&self) -> &[u32] {
         &self.nodes
@@ -50,8 +54,9 @@ impl Curve {
 }
 
 impl Skeleton {
-    /// A skeleton from its parts: `[n]` nodes, polylines of their numbers, and for each of `[v]` surface vertices the number of
-    /// the node that carries it. Time and memory are linear in all three.
+    /// A skeleton from its parts: `[n]` nodes, polylines of their numbers, and for each of `[v]`
+    /// surface vertices the number of the node that carries it. Time and memory are linear in all
+    /// three.
     ///
     /// # Errors
     /// [`InvalidSkeleton`], which names the first node, curve or vertex at fault.
@@ -143,13 +148,15 @@ impl Skeleton {
         &self.node_of_vertex
     }
 
-    /// How many segments meet in a node: 1 at an end, 2 along a curve, more at a branch node; 0 for a number that is no node's.
+    /// How many segments meet in a node: 1 at an end, 2 along a curve, more at a branch node; 0 for
+    /// a number that is no node's.
     #[must_use]
     pub fn degree(&self, node: usize) -> usize {
         self.degrees.get(node).map_or(0, |&degree| degree as usize)
     }
 
-    /// For each node the number of the connected piece it belongs to, counted from 0 in the order of their lowest nodes.
+    /// For each node the number of the connected piece it belongs to, counted from 0 in the order
+    /// of their lowest nodes.
     #[must_use]
     pub fn components(&self) -> &[u32] {
         &self.components
@@ -173,7 +180,8 @@ impl Skeleton {
         self.degrees.iter().filter(|&&degree| degree == 1).count()
     }
 
-    /// How many independent loops the graph has; that of a closed surface of one piece has as many as the surface has handles.
+    /// How many independent loops the graph has; that of a closed surface of one piece has as many
+    /// as the surface has handles.
     #[must_use]
     pub fn loop_count(&self) -> usize {
         let segments: usize = self.curves.iter().map(|curve| curve.nodes.len() - 1).sum();
@@ -194,9 +202,10 @@ impl Skeleton {
         nearest.1
     }
 
-    /// The radius of the surface about each node: the mean distance to it of the vertices it carries, where `points` are those
-    /// of the surface (`[v]`, as many as [`Skeleton::node_of_vertex`] has). A node that carries none has that of the nearest
-    /// node along the graph that carries some, and 0 where there is none.
+    /// The radius of the surface about each node: the mean distance to it of the vertices it
+    /// carries, where `points` are those of the surface (`[v]`, as many as
+    /// [`Skeleton::node_of_vertex`] has). A node that carries none has that of the nearest node
+    /// along the graph that carries some, and 0 where there is none.
     #[must_use]
     pub fn radii(&self, points: &[Vector]) -> Vec<f64> {
         let mut sums = vec![(0.0f64, 0u32); self.nodes.len()];
@@ -231,32 +240,11 @@ impl Skeleton {
 
 /// The connected piece of each node, and how many there are.
 fn components(nodes: usize, curves: &[Vec<u32>]) -> (Vec<u32>, usize) {
-    let mut parents: Vec<u32> = (0..nodes as u32).collect();
-    let root = |parents: &mut Vec<u32>, mut node: u32| {
-        while parents[node as usize] != node {
-            let above = parents[parents[node as usize] as usize];
-            parents[node as usize] = above;
-            node = above;
-        }
-        node
-    };
-    for pair in curves.iter().flat_map(|curve| curve.windows(2)) {
-        let [a, b] = [root(&mut parents, pair[0]), root(&mut parents, pair[1])];
-        parents[a.max(b) as usize] = a.min(b);
-    }
-    let mut numbers = vec![0; nodes];
-    let mut count = 0;
-    for node in 0..nodes as u32 {
-        let above = root(&mut parents, node);
-        if above == node {
-            numbers[node as usize] = count as u32;
-            count += 1;
-        } else {
-            // The root has the lowest number of its piece, so that it has been met.
-            numbers[node as usize] = numbers[above as usize];
-        }
-    }
-    (numbers, count)
+    let roots = DisjointSets::components(nodes, curves.iter().map(Vec::as_slice));
+    let is_root = |node: &u32| roots[*node as usize] == *node;
+    let lowest: Vec<u32> = (0..nodes as u32).filter(is_root).collect();
+    let numbers = indices(nodes, &lowest);
+    (roots.iter().map(|&root| numbers[root as usize]).collect(), lowest.len())
 }
 
 /// Why nodes and polylines are not a skeleton.

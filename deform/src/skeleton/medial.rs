@@ -1,10 +1,13 @@
-//! Points of the medial axis: the centres of the largest balls inside a surface that touch it in its vertices.
+//! Points of the medial axis: the centres of the largest balls inside a surface that touch it in
+//! its vertices.
 
-use super::triangulation::{Triangulation, length};
+use super::triangulation::Triangulation;
+use crate::bounds::Bounds;
 use crate::mesh::Vector;
-use crate::vector::{dot, scale, subtract};
+use crate::vector::{distance, dot, length, scale, subtract};
 
-/// Two touching points seen from the centre under less than this angle are taken for noise (its cosine: 25 degrees).
+/// Two touching points seen from the centre under less than this angle are taken for noise (its
+/// cosine: 25 degrees).
 const LEAST_SEPARATION: f64 = 0.906;
 
 /// A ball counts from this many times the mean distance to the neighbours on.
@@ -13,11 +16,13 @@ const LEAST_RADIUS: f64 = 1.2;
 /// Shrinking stops after this many balls, each smaller than the one before.
 const MOST_BALLS: usize = 40;
 
-/// The pole of each vertex that is there: the centre of the ball that touches the surface there from inside and holds no other
-/// vertex (Ma, Bae and Choi 2012: a ball is shrunk to the vertex nearest to its centre until there is none inside).
+/// The pole of each vertex that is there: the centre of the ball that touches the surface there
+/// from inside and holds no other vertex (Ma, Bae and Choi 2012: a ball is shrunk to the vertex
+/// nearest to its centre until there is none inside).
 ///
-/// There is none where the vertex has no normal, nor where the ball is not much larger than the space between vertices: at
-/// sharp edges it says nothing of the middle. Of noisy vertices the last ball is taken whose touching points are well apart.
+/// There is none where the vertex has no normal, nor where the ball is not much larger than the
+/// space between vertices: at sharp edges it says nothing of the middle. Of noisy vertices the last
+/// ball is taken whose touching points are well apart.
 pub(super) fn poles(mesh: &Triangulation, tree: &NearestPoints) -> Vec<Option<Vector>> {
     let normals = mesh.vertex_normals();
     let largest = 0.5 * mesh.diagonal();
@@ -71,7 +76,8 @@ fn shrink(
     center(radius)
 }
 
-/// A k-d tree (Bentley 1975): the middle of each range parts it along the axis of its largest extent.
+/// A k-d tree (Bentley 1975): the middle of each range parts it along the axis of its largest
+/// extent.
 pub(super) struct NearestPoints {
     points: Vec<(Vector, u32)>,
     axes: Vec<u8>,
@@ -87,13 +93,13 @@ impl NearestPoints {
         Self::new(alive.map(|vertex| (mesh.points[vertex as usize], vertex)).collect())
     }
 
-    /// The distance from a place to the nearest point; infinite where there is none.
-    pub fn distance(&self, place: Vector) -> f64 {
-        self.nearest(place, u32::MAX)
-            .map_or(f64::INFINITY, |(point, _)| length(subtract(point, place)))
+    /// The distance from a point to the nearest point; infinite where there is none.
+    pub fn distance(&self, target: Vector) -> f64 {
+        self.nearest(target, u32::MAX).map_or(f64::INFINITY, |(point, _)| distance(point, target))
     }
 
-    /// The mean distance from an axis of the points beside it that are not farther than a bound; `None` where there is none.
+    /// The mean distance from an axis of the points beside it that are not farther than a bound;
+    /// `None` where there is none.
     pub fn mean_across(&self, [from, to]: [Vector; 2], farthest: f64) -> Option<f64> {
         let along = subtract(to, from);
         let squared = dot(along, along);
@@ -119,17 +125,8 @@ impl NearestPoints {
             if end - start <= LEAF {
                 continue;
             }
-            let mut lower = [f64::INFINITY; 3];
-            let mut upper = [f64::NEG_INFINITY; 3];
-            for (point, _) in &points[start..end] {
-                for axis in 0..3 {
-                    lower[axis] = lower[axis].min(point[axis]);
-                    upper[axis] = upper[axis].max(point[axis]);
-                }
-            }
-            let extent = subtract(upper, lower);
             let axis =
-                (0..3).fold(0, |best, axis| if extent[axis] > extent[best] { axis } else { best });
+                Bounds::around(points[start..end].iter().map(|(point, _)| *point)).longest_axis();
             let middle = usize::midpoint(start, end);
             points[start..end].select_nth_unstable_by(middle - start, |a, b| {
                 a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1))
@@ -140,15 +137,15 @@ impl NearestPoints {
         Self { points, axes }
     }
 
-    /// The point nearest to a place, other than that of number `except`.
-    fn nearest(&self, place: Vector, except: u32) -> Option<(Vector, u32)> {
+    /// The point nearest to another, not counting than that of number `except`.
+    fn nearest(&self, target: Vector, except: u32) -> Option<(Vector, u32)> {
         let mut best = (f64::INFINITY, None);
         // Ranges with the squared distance to the plane that parts them off.
         let mut ranges = [(0usize, 0usize, 0.0f64); 64];
         ranges[0] = (0, self.points.len(), 0.0);
         let mut waiting = 1;
         let look = |candidate: &(Vector, u32), best: &mut (f64, Option<(Vector, u32)>)| {
-            let away = subtract(candidate.0, place);
+            let away = subtract(candidate.0, target);
             let distance = dot(away, away);
             if distance < best.0 && candidate.1 != except {
                 *best = (distance, Some(*candidate));
@@ -167,12 +164,13 @@ impl NearestPoints {
             let middle = usize::midpoint(start, end);
             let axis = usize::from(self.axes[middle]);
             look(&self.points[middle], &mut best);
-            let offset = place[axis] - self.points[middle].0[axis];
+            let offset = target[axis] - self.points[middle].0[axis];
             let (near, far) = match offset < 0.0 {
                 true => ((start, middle), (middle + 1, end)),
                 false => ((middle + 1, end), (start, middle)),
             };
-            // The nearer range is searched first: it is put on last. Halving 2^32 points takes fewer places than there are.
+            // The nearer range is searched first: it is put on last. Halving 2^32 points takes
+            // fewer slots than there are.
             ranges[waiting] = (far.0, far.1, offset * offset);
             ranges[waiting + 1] = (near.0, near.1, least);
             waiting += 2;
@@ -200,11 +198,11 @@ mod tests {
             .collect();
         let tree = NearestPoints::new(points.clone());
         for except in 0..300 {
-            let place = [random(), random(), 3.0 * random()];
-            let distance = |point: Vector| length(subtract(point, place));
+            let target = [random(), random(), 3.0 * random()];
+            let distance = |point: Vector| distance(point, target);
             let others = points.iter().filter(|point| point.1 != except);
             let least = others.map(|point| distance(point.0)).fold(f64::INFINITY, f64::min);
-            assert_eq!(distance(tree.nearest(place, except).unwrap().0), least);
+            assert_eq!(distance(tree.nearest(target, except).unwrap().0), least);
         }
         assert!(NearestPoints::new(vec![([0.0; 3], 7)]).nearest([1.0; 3], 7).is_none());
     }

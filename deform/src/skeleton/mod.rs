@@ -1,32 +1,34 @@
 //! Curve skeletons of surfaces.
 //!
-//! A [`Skeleton`] is a graph of polylines along the middle of a surface, with the surface vertices that each of its nodes
-//! carries.
+//! A [`Skeleton`] is a graph of polylines along the middle of a surface, with the surface vertices
+//! that each of its nodes carries.
 //!
 //! # Dragging
-//! A [`SkeletonDrag`] bends the curves of a skeleton on which nodes are dragged, and a [`Skin`] says how the surface follows. The
-//! `skeleton` edit ([`surface::Skeleton`](crate::surface::Skeleton)) does both.
+//! A [`SkeletonDrag`] bends the curves of a skeleton on which nodes are dragged, and a [`Skin`]
+//! says how the surface follows. The [`SkeletonEdit`](crate::edit::SkeletonEdit) does both.
 
 mod axis;
 mod closing;
-mod curve;
-mod curves;
+mod curve_deformation;
 mod distance;
-mod editing;
+mod drag;
+mod error;
 mod extraction;
 mod flow;
 mod graph;
 mod medial;
+mod pruning;
 mod resolution;
 mod rotation;
+mod settings;
 mod skinning;
 mod system;
 mod thinning;
 mod triangulation;
 
-pub use curve::{CurveDeformation, CurveError, DragError, SkeletonDrag};
-pub use editing::SkeletonEditError;
-pub(crate) use editing::SkeletonEditor;
-pub use extraction::{SkeletonError, SkeletonSettings};
+pub use curve_deformation::{CurveDeformation, CurveError};
+pub use drag::{DragError, SkeletonDrag};
+pub use error::SkeletonError;
 pub use graph::{Curve, InvalidSkeleton, Skeleton};
-pub use skinning::{Skin, SkinError};
+pub use settings::SkeletonSettings;
+pub use skinning::{Skin, SkinError, Skinning};

@@ -2,13 +2,14 @@
 
 use super::triangulation::Triangulation;
 use crate::mesh::Vector;
-use crate::vector::dot;
+use crate::vector::{dot, triangle_normal};
 
 /// A bound on passes that end by themselves but for surfaces made to resist.
 const MOST_PASSES: usize = 60;
 
-/// Collapses short edges until at most about `most` vertices are left, and splits edges that are long for a surface of `least`
-/// vertices. The topology stays as it is; the vertices that resist stay too.
+/// Collapses short edges until at most about `most` vertices are left, and splits edges that are
+/// long for a surface of `least` vertices. The topology stays as it is; the vertices that resist
+/// stay too.
 pub(super) fn resample(mesh: &mut Triangulation, least: usize, most: usize) {
     coarsen(mesh, most);
     refine(mesh, least, most);
@@ -42,10 +43,11 @@ fn coarsen(mesh: &mut Triangulation, most: usize) {
             edges.retain(|edge| edge.0 < threshold);
             edges.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             for (_, other) in edges {
-                let place = mesh.middle(vertex, other);
-                if mesh.can_collapse(vertex, other, &mut work) && !folds(mesh, vertex, other, place)
+                let merged = mesh.middle(vertex, other);
+                if mesh.can_collapse(vertex, other, &mut work)
+                    && !folds(mesh, vertex, other, merged)
                 {
-                    mesh.collapse(vertex, other, place);
+                    mesh.collapse(vertex, other, merged);
                     break;
                 }
             }
@@ -60,7 +62,7 @@ fn coarsen(mesh: &mut Triangulation, most: usize) {
 }
 
 /// Whether merging the ends of an edge would turn a triangle by more than 75 degrees.
-fn folds(mesh: &Triangulation, a: u32, b: u32, place: Vector) -> bool {
+fn folds(mesh: &Triangulation, a: u32, b: u32, merged: Vector) -> bool {
     let turns = |vertex: u32, other: u32| {
         mesh.triangles_at[vertex as usize].iter().any(|&number| {
             let triangle = mesh.triangles[number as usize];
@@ -69,10 +71,8 @@ fn folds(mesh: &Triangulation, a: u32, b: u32, place: Vector) -> bool {
             }
             let old = mesh.normal(triangle);
             let moved = triangle
-                .map(|corner| if corner == vertex { place } else { mesh.points[corner as usize] });
-            let [p, q, r] = moved;
-            let new =
-                crate::vector::cross(crate::vector::subtract(q, p), crate::vector::subtract(r, p));
+                .map(|corner| if corner == vertex { merged } else { mesh.points[corner as usize] });
+            let new = triangle_normal(moved);
             let size = (dot(old, old) * dot(new, new)).sqrt();
             dot(old, new) < 0.25 * size
         })
@@ -100,8 +100,8 @@ fn refine(mesh: &mut Triangulation, least: usize, most: usize) {
             if mesh.vertex_count() >= 2 * most {
                 return;
             }
-            let place = mesh.middle(a, b);
-            mesh.split(a, b, place);
+            let middle = mesh.middle(a, b);
+            mesh.split(a, b, middle);
         }
     }
 }
@@ -110,6 +110,7 @@ fn refine(mesh: &mut Triangulation, least: usize, most: usize) {
 mod tests {
     use super::*;
     use crate::shapes;
+    use crate::vector::subtract;
 
     fn torus(counts: [usize; 2]) -> Triangulation {
         let mesh = shapes::torus(1.0, 0.3, counts);
@@ -140,8 +141,8 @@ mod tests {
             let [i, j] = [vertex / 60, vertex % 60].map(|number| number as f64);
             let [u, v] = [i / 200.0, j / 60.0].map(|turn| std::f64::consts::TAU * turn);
             let radius = 1.0 + 0.3 * v.cos();
-            let place = [radius * u.cos(), radius * u.sin(), 0.3 * v.sin()];
-            let away = crate::vector::subtract(mesh.points[into as usize], place);
+            let center = [radius * u.cos(), radius * u.sin(), 0.3 * v.sin()];
+            let away = subtract(mesh.points[into as usize], center);
             assert!(dot(away, away).sqrt() < 0.2);
         }
     }

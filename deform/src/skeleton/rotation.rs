@@ -1,7 +1,7 @@
 //! Rotations as unit quaternions.
 
 use crate::mesh::Vector;
-use crate::vector::{add, cross, dot, scale, subtract};
+use crate::vector::{add, cross, dot, scale};
 
 /// A rotation by the angle `2 atan2(|vector|, scalar)` about `vector`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,7 +19,8 @@ impl Rotation {
         Self { scalar: cosine, vector: scale(axis, sine) }
     }
 
-    /// The least rotation that takes one unit vector to another; for opposite ones, one of the half turns that do.
+    /// The least rotation that takes one unit vector to another; for opposite ones, one of the half
+    /// turns that do.
     pub fn between(from: Vector, to: Vector) -> Self {
         if from == to {
             return Self::IDENTITY;
@@ -51,7 +52,8 @@ impl Rotation {
         Self { scalar: self.scalar, vector: scale(self.vector, -1.0) }
     }
 
-    /// What the rotation adds to a vector: exact zeros for no rotation, and accurate for small ones.
+    /// The change of a vector by the rotation: exact zeros for no rotation, and accurate for small
+    /// ones.
     pub fn change(self, vector: Vector) -> Vector {
         let twice = scale(cross(self.vector, vector), 2.0);
         add(scale(twice, self.scalar), cross(self.vector, twice))
@@ -99,9 +101,10 @@ impl Rotation {
     }
 }
 
-/// Carries rotations along two curves: from unit tangents `reference` and `deformed` to the rotation that takes each of the one to
-/// its partner, without twist between neighbours but for what brings the least rotation to both ends, spread evenly over `lengths`
-/// (arc length from the first node, rising). On closed curves the twist is 0 on the mean.
+/// Carries rotations along two curves: from unit tangents `reference` and `deformed` to the
+/// rotation that takes each of the one to its partner, without twist between neighbours but for
+/// what brings the least rotation to both ends, spread evenly over `lengths` (arc length from the
+/// first node, rising). On closed curves the twist is 0 on the mean.
 pub(super) fn transported(
     reference: &[Vector],
     deformed: &[Vector],
@@ -173,15 +176,10 @@ pub(super) fn smooth_step(x: f64) -> f64 {
     x * x * (3.0 - 2.0 * x)
 }
 
-/// The distance of two points.
-pub(super) fn distance(a: Vector, b: Vector) -> f64 {
-    let away = subtract(a, b);
-    dot(away, away).sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::vector::distance;
 
     fn near(a: Vector, b: Vector) {
         assert!(distance(a, b) < 1e-14, "{a:?} {b:?}");

@@ -2,50 +2,72 @@
 
 use std::sync::Arc;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::axis::{Axis, Station};
 use super::rotation::smooth_step;
 use super::{Skeleton, SkeletonDrag, distance};
 use crate::mesh::Vector;
-use crate::surface::{Skinning, Surface};
+use crate::surface::Surface;
 use crate::vector::{add, scale};
+
+/// How the surface follows its skeleton.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Skinning {
+    /// With the rotation of the skeleton too, blended along its arc length: cross-sections keep
+    /// their shape.
+    #[default]
+    Smooth,
+    /// With the translation of the nearest node alone.
+    Nearest,
+}
 
 /// A surface bound to the skeleton whose nodes are dragged.
 ///
 /// # How the surface follows
-/// With [`Skinning::Nearest`] a vertex moves as the node that carries it does (Wetterer-Nelson, Jansen and Evans). Cross-sections
-/// then stay parallel to what they were, and a tube bent by an angle `a` is narrower by the factor `cos a`.
+/// With [`Skinning::Nearest`] a vertex moves as the node that carries it does (Wetterer-Nelson,
+/// Jansen and Evans). Cross-sections then stay parallel to what they were, and a tube bent by an
+/// angle `a` is narrower by the factor `cos a`.
 ///
-/// With [`Skinning::Smooth`] a vertex `x` belongs to the place `s` along the curve whose normal plane it lies in, and moves by
+/// With [`Skinning::Smooth`] a vertex `x` belongs to the arc length `s` of the curve whose normal
+/// plane it lies in, and moves by
 ///
 /// ```text
 /// d(s) + (R(s) - 1) (x - c(s)),
 /// ```
 ///
-/// `c` the axis, `d` its displacement and `R` the rotation from its tangent to the deformed one. Rotations are carried along both
-/// curves in parallel, without twist (Bishop 1975); what twist would be left at the far end is spread evenly. So a cross-section
-/// keeps its shape as long as the curve does not bend within its radius. Tangents and `c` are those of parabolas fitted over one
+/// `c` the axis, `d` its displacement and `R` the rotation from its tangent to the deformed one.
+/// Rotations are carried along both curves in parallel, without twist (Bishop 1975); what twist
+/// would be left at the far end is spread evenly. So a cross-section keeps its shape as long as the
+/// curve does not bend within its radius. Tangents and `c` are those of parabolas fitted over one
 /// local radius, since skeletons are rough.
 ///
 /// # Where the motion ends
-/// - Ends and branch nodes are pinned and do not move. At an end the surface turns with the curve, as on a hinge. Within one local
-///   radius of a branch node the rotation fades out, so that the surface follows there without a jump; what is carried by other
-///   curves follows up to one local radius away from what the moved curve carries.
-/// - Held vertices do not move at all, and the motion fades out towards them within one local radius, measured along the surface.
+/// - Ends and branch nodes are pinned and do not move. At an end the surface turns with the curve,
+///   as on a hinge. Within one local radius of a branch node the rotation fades out, so that the
+///   surface follows there without a jump; what is carried by other curves follows up to one local
+///   radius away from what the moved curve carries.
+/// - Held vertices do not move at all, and the motion fades out towards them within one local
+///   radius, measured along the surface.
 ///
 /// # What it guarantees
-/// Vertices farther away move by exact zeros, and all do where nothing is dragged. Same input, same bits.
+/// Vertices farther away move by exact zeros, and all do where nothing is dragged. Same input, same
+/// bits.
 ///
 /// # What it does not
-/// Where the curve bends more sharply than the tube is wide, the surface folds on the inner side; surface checks find that.
+/// Where the curve bends more sharply than the tube is wide, the surface folds on the inner side;
+/// surface checks find that.
 ///
 /// # Performance
-/// Binding is linear in the surface, but for distances along it, which take as long as sorting those within one radius. A drag is
-/// linear in the vertices that move.
+/// Binding is linear in the surface, but for distances along it, which take as long as sorting
+/// those within one radius. A drag is linear in the vertices that move.
 ///
 /// ```
 /// use std::sync::Arc;
 /// use tombolo_deform::skeleton::{Skeleton, SkeletonDrag, Skin};
-/// use tombolo_deform::{shapes, surface::{FeatureSettings, Skinning, Surface}};
+/// use tombolo_deform::{shapes, features::FeatureSettings, skeleton::Skinning, surface::Surface};
 ///
 /// // A tube along z with its axis, each ring of vertices carried by the node in its middle.
 /// let nodes: Vec<_> = (0..=20).map(|i| [0.0, 0.0, 0.5 * f64::from(i)]).collect();
@@ -92,7 +114,8 @@ struct BoundVertex {
 }
 
 impl Skin {
-    /// Binds a surface to its skeleton. `held` says of each surface vertex (`[v]`) whether it stays where it is.
+    /// Binds a surface to its skeleton. `held` says of each surface vertex (`[v]`) whether it stays
+    /// where it is.
     ///
     /// # Errors
     /// [`SkinError`], where the skeleton or `held` is not one of this surface.
@@ -123,12 +146,13 @@ impl Skin {
         Ok(Self { surface, skeleton, drag, binding })
     }
 
-    /// The displacement that dragging the nodes of the [`SkeletonDrag`] by `by` adds at each surface vertex to `below` (`[v]`), the
-    /// displacement from the reference that has been reached before.
+    /// The displacement that dragging the nodes of the [`SkeletonDrag`] by `by` adds at each
+    /// surface vertex to `below` (`[v]`), the displacement from the reference that has been reached
+    /// before.
     ///
-    /// The curve bends as it does on the reference. What turns is the shape that has been reached, about the axis that has been
-    /// reached: each node of it is taken to have moved by the mean of the vertices that it carries. `below` of another length is taken
-    /// as far as it goes.
+    /// The curve bends as it does on the reference. What turns is the shape that has been reached,
+    /// about the axis that has been reached: each node of it is taken to have moved by the mean of
+    /// the vertices that it carries. `below` of another length is taken as far as it goes.
     #[must_use]
     pub fn displacement(&self, by: &[Vector], below: &[Vector]) -> Vec<Vector> {
         let moved = self.drag.displacement(by);
@@ -197,13 +221,13 @@ impl BoundCurve {
     ) -> Self {
         let axis = Axis::new(skeleton, curve, radii, surface.points());
         // Branch nodes carry what several curves share.
-        let mut places = vec![None; skeleton.nodes().len()];
-        for (place, &node) in axis.nodes().iter().enumerate() {
+        let mut indices = vec![None; skeleton.nodes().len()];
+        for (index, &node) in axis.nodes().iter().enumerate() {
             if skeleton.degree(node as usize) <= 2 {
-                places[node as usize] = Some(place);
+                indices[node as usize] = Some(index);
             }
         }
-        let own = |vertex: u32| places[skeleton.node_of_vertex()[vertex as usize] as usize];
+        let own = |vertex: u32| indices[skeleton.node_of_vertex()[vertex as usize] as usize];
         let all = 0..surface.points().len() as u32;
         let reach = axis.largest_radius();
         let from_own = distance::from_vertices(
@@ -217,7 +241,7 @@ impl BoundCurve {
         let mut stations: Vec<Option<Station>> = vec![None; surface.points().len()];
         for vertex in all.clone() {
             stations[vertex as usize] =
-                own(vertex).map(|place| axis.station(surface.points()[vertex as usize], place));
+                own(vertex).map(|index| axis.station(surface.points()[vertex as usize], index));
         }
         for vertex in all {
             let Some((away, source)) = from_own[vertex as usize] else { continue };
@@ -226,7 +250,7 @@ impl BoundCurve {
                 Some(station) => (station, 1.0),
                 None => {
                     let station =
-                        axis.station(surface.points()[vertex as usize], axis.place(at_source));
+                        axis.station(surface.points()[vertex as usize], axis.nearest(at_source));
                     (station, 1.0 - share(away, axis.radius(at_source)))
                 }
             };

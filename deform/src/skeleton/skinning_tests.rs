@@ -2,9 +2,9 @@ use std::sync::Arc;
 
 use super::super::rotation::{Rotation, direction};
 use super::*;
+use crate::features::FeatureSettings;
 use crate::mesh::{CellType, Cells, FeatureSource, Mesh};
 use crate::shapes;
-use crate::surface::FeatureSettings;
 use crate::vector::{cross, dot, subtract};
 
 fn line(from: Vector, to: Vector, steps: usize) -> Vec<Vector> {
@@ -24,7 +24,8 @@ fn nearest(nodes: &[Vector], point: Vector) -> u32 {
     nearest.unwrap() as u32
 }
 
-/// A tube around an axis and its skeleton: one curve through `nodes`, which may be others than those of the axis.
+/// A tube around an axis and its skeleton: one curve through `nodes`, which may be others than
+/// those of the axis.
 fn tube(axis: &[Vector], nodes: Vec<Vector>) -> (Arc<Surface>, Arc<Skeleton>) {
     let surface = surface_of(&shapes::tube(axis, 1.0, 48));
     let carriers = surface.points().iter().map(|&point| nearest(&nodes, point)).collect();
@@ -75,7 +76,8 @@ impl Case {
         self.skeleton.nodes().iter().zip(moved).map(|(&node, moved)| add(node, moved)).collect()
     }
 
-    /// The area of the cross-section at each inner node of the bent curve, in the plane normal to it, by that of the tube.
+    /// The area of the cross-section at each inner node of the bent curve, in the plane normal to
+    /// it, by that of the tube.
     fn areas(&self, skinning: Skinning) -> Vec<f64> {
         let (shape, nodes) = (self.shape(skinning), self.bent_nodes());
         let area = |node: usize| {
@@ -87,8 +89,9 @@ impl Case {
     }
 }
 
-/// The area that a plane cuts out of a closed surface within some distance of a point: the sum of the signed triangles between
-/// the point and each cut, which follow the boundary counter-clockwise about the normal.
+/// The area that a plane cuts out of a closed surface within some distance of a point: the sum of
+/// the signed triangles between the point and each cut, which follow the boundary counter-clockwise
+/// about the normal.
 fn section(
     triangles: &[[u32; 3]],
     points: &[Vector],

@@ -1,11 +1,13 @@
 //! From a contracted surface to a graph of curves.
 
-use std::cmp::{Ordering, Reverse};
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::triangulation::{GONE, Triangulation, length};
+use super::triangulation::{GONE, Triangulation};
 use crate::mesh::Vector;
-use crate::vector::{add, scale, subtract};
+use crate::number::Ordered;
+use crate::topology::lead_to_roots;
+use crate::vector::{add, distance, scale};
 
 /// A graph whose vertices were merged from those of a surface.
 pub(super) struct Graph {
@@ -17,9 +19,9 @@ pub(super) struct Graph {
     pub neighbours: Vec<Vec<u32>>,
 }
 
-/// Merges the ends of edges that bound a triangle, shortest first, until no triangle is left (Au, Tai, Chu, Cohen-Or and Lee
-/// 2008). Edges without triangles stay, so that what has become a curve keeps its loops. A merged vertex lies at the mean of
-/// what it was merged from.
+/// Merges the ends of edges that bound a triangle, shortest first, until no triangle is left (Au,
+/// Tai, Chu, Cohen-Or and Lee 2008). Edges without triangles stay, so that what has become a curve
+/// keeps its loops. A merged vertex lies at the mean of what it was merged from.
 pub(super) fn thin(mesh: &Triangulation) -> Graph {
     let count = mesh.points.len();
     let mut thinning = Thinning {
@@ -41,19 +43,13 @@ pub(super) fn thin(mesh: &Triangulation) -> Graph {
             }
         }
     }
-    while let Some(Reverse(edge)) = thinning.waiting.pop() {
-        if thinning.is_current(&edge) && thinning.bounds_triangle(edge.ends) {
-            thinning.collapse(edge.ends);
+    while let Some(Reverse((Ordered(length), ends))) = thinning.waiting.pop() {
+        if thinning.is_current(length, ends) && thinning.bounds_triangle(ends) {
+            thinning.collapse(ends);
         }
     }
     let Thinning { points, mut merged, neighbours, .. } = thinning;
-    for vertex in 0..count {
-        let mut root = vertex as u32;
-        while merged[root as usize] != root {
-            root = merged[root as usize];
-        }
-        merged[vertex] = root;
-    }
+    lead_to_roots(&mut merged);
     Graph { points, merged, neighbours }
 }
 
@@ -64,52 +60,26 @@ struct Thinning {
     triangles: Vec<[u32; 3]>,
     triangles_at: Vec<Vec<u32>>,
     neighbours: Vec<Vec<u32>>,
-    waiting: BinaryHeap<Reverse<Waiting>>,
+    /// Edges by their lengths, the shortest first.
+    waiting: BinaryHeap<Reverse<(Ordered, [u32; 2])>>,
 }
-
-#[derive(Debug, Clone, Copy)]
-struct Waiting {
-    length: f64,
-    ends: [u32; 2],
-}
-
-impl Ord for Waiting {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.length.total_cmp(&other.length).then(self.ends.cmp(&other.ends))
-    }
-}
-
-impl PartialOrd for Waiting {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Waiting {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Waiting {}
 
 impl Thinning {
     fn length(&self, [a, b]: [u32; 2]) -> f64 {
-        length(subtract(self.points[a as usize], self.points[b as usize]))
+        distance(self.points[a as usize], self.points[b as usize])
     }
 
     fn push(&mut self, a: u32, b: u32) {
         let ends = [a.min(b), a.max(b)];
-        self.waiting.push(Reverse(Waiting { length: self.length(ends), ends }));
+        self.waiting.push(Reverse((Ordered(self.length(ends)), ends)));
     }
 
     /// Whether an edge is still there and as long as it was.
-    fn is_current(&self, edge: &Waiting) -> bool {
-        let [a, b] = edge.ends;
+    fn is_current(&self, length: f64, [a, b]: [u32; 2]) -> bool {
         self.merged[a as usize] == a
             && self.merged[b as usize] == b
             && self.neighbours[a as usize].binary_search(&b).is_ok()
-            && self.length(edge.ends) == edge.length
+            && self.length([a, b]) == length
     }
 
     fn bounds_triangle(&self, [a, b]: [u32; 2]) -> bool {
@@ -148,13 +118,13 @@ impl Thinning {
 
         for neighbour in std::mem::take(&mut self.neighbours[gone as usize]) {
             let list = &mut self.neighbours[neighbour as usize];
-            if let Ok(place) = list.binary_search(&gone) {
-                list.remove(place);
+            if let Ok(index) = list.binary_search(&gone) {
+                list.remove(index);
             }
             if neighbour != kept {
                 for (from, to) in [(neighbour, kept), (kept, neighbour)] {
-                    if let Err(place) = self.neighbours[from as usize].binary_search(&to) {
-                        self.neighbours[from as usize].insert(place, to);
+                    if let Err(index) = self.neighbours[from as usize].binary_search(&to) {
+                        self.neighbours[from as usize].insert(index, to);
                     }
                 }
             }

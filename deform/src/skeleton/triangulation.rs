@@ -1,9 +1,12 @@
 //! A closed triangulated surface whose edges can be collapsed and split.
 
+use crate::bounds::Bounds;
 use crate::mesh::Vector;
-use crate::vector::{add, cross, dot, scale, subtract};
+use crate::topology::{indices, lead_to_roots};
+use crate::vector::{add, cross, distance, dot, length, scale, subtract, triangle_normal};
 
-/// A closed, oriented, manifold triangulation that changes, and keeps account of which vertex was merged into which.
+/// A closed, oriented, manifold triangulation that changes, and keeps account of which vertex was
+/// merged into which.
 #[derive(Debug, Clone)]
 pub(super) struct Triangulation {
     pub points: Vec<Vector>,
@@ -31,18 +34,16 @@ impl Triangulation {
         Self { alive: points.len(), points, triangles, triangles_at, merged_into }
     }
 
-    /// What is left of it, numbered from 0 on, and for each vertex there ever was the one it has become there. The numbers are
-    /// scattered: neighbours have no close ones, so that passes over all vertices lean towards no side.
+    /// The rest of it, numbered from 0 on, and for each vertex there ever was the one it has become
+    /// there. The numbers are scattered: neighbours have no close ones, so that passes over all
+    /// vertices lean towards no side.
     pub fn scattered(self) -> (Self, Vec<u32>) {
         let merged = self.merged();
         let mut alive: Vec<u32> =
             (0..self.points.len() as u32).filter(|&vertex| self.is_alive(vertex)).collect();
         // The golden ratio of the range spreads them evenly.
         alive.sort_unstable_by_key(|vertex| vertex.wrapping_mul(0x9E37_79B1));
-        let mut numbers = vec![0; self.points.len()];
-        for (&vertex, number) in alive.iter().zip(0..) {
-            numbers[vertex as usize] = number;
-        }
+        let numbers = indices(self.points.len(), &alive);
         let points = alive.iter().map(|&vertex| self.points[vertex as usize]).collect();
         let triangles = self
             .live_triangles()
@@ -64,22 +65,12 @@ impl Triangulation {
     /// For each vertex there ever was the one it has become.
     pub fn merged(&self) -> Vec<u32> {
         let mut found = self.merged_into.clone();
-        for vertex in 0..found.len() {
-            let mut root = vertex as u32;
-            while found[root as usize] != root {
-                root = found[root as usize];
-            }
-            let mut walk = vertex as u32;
-            while found[walk as usize] != root {
-                walk = std::mem::replace(&mut found[walk as usize], root);
-            }
-        }
+        lead_to_roots(&mut found);
         found
     }
 
     pub fn length(&self, a: u32, b: u32) -> f64 {
-        let along = subtract(self.points[a as usize], self.points[b as usize]);
-        dot(along, along).sqrt()
+        distance(self.points[a as usize], self.points[b as usize])
     }
 
     pub fn middle(&self, a: u32, b: u32) -> Vector {
@@ -92,9 +83,8 @@ impl Triangulation {
     }
 
     /// Twice the area of a triangle along its normal.
-    pub fn normal(&self, [a, b, c]: [u32; 3]) -> Vector {
-        let [a, b, c] = [a, b, c].map(|vertex| self.points[vertex as usize]);
-        cross(subtract(b, a), subtract(c, a))
+    pub fn normal(&self, triangle: [u32; 3]) -> Vector {
+        triangle_normal(triangle.map(|vertex| self.points[vertex as usize]))
     }
 
     pub fn area(&self) -> f64 {
@@ -129,15 +119,7 @@ impl Triangulation {
 
     /// The length of the diagonal of the bounding box.
     pub fn diagonal(&self) -> f64 {
-        let mut lower = [f64::INFINITY; 3];
-        let mut upper = [f64::NEG_INFINITY; 3];
-        for point in &self.points {
-            for axis in 0..3 {
-                lower[axis] = lower[axis].min(point[axis]);
-                upper[axis] = upper[axis].max(point[axis]);
-            }
-        }
-        length(subtract(upper, lower))
+        length(Bounds::around(self.points.iter().copied()).extent())
     }
 
     /// Writes the neighbours of a vertex, rising.
@@ -150,8 +132,9 @@ impl Triangulation {
         out.dedup();
     }
 
-    /// Whether merging the ends of an edge leaves the surface a manifold of the same topology: their common neighbours are the
-    /// two opposite corners, and the surface is more than a tetrahedron (Dey, Edelsbrunner, Guha and Nekhayev 1999).
+    /// Whether merging the ends of an edge leaves the surface a manifold of the same topology:
+    /// their common neighbours are the two opposite corners, and the surface is more than a
+    /// tetrahedron (Dey, Edelsbrunner, Guha and Nekhayev 1999).
     pub fn can_collapse(&self, a: u32, b: u32, work: &mut [Vec<u32>; 2]) -> bool {
         let [around_a, around_b] = work;
         self.neighbours(a, around_a);
@@ -168,9 +151,9 @@ impl Triangulation {
         common == 2
     }
 
-    /// Merges `gone` into `kept`, which comes to lie at `place`.
-    pub fn collapse(&mut self, kept: u32, gone: u32, place: Vector) {
-        self.points[kept as usize] = place;
+    /// Merges `gone` into `kept`, which comes to lie at `point`.
+    pub fn collapse(&mut self, kept: u32, gone: u32, point: Vector) {
+        self.points[kept as usize] = point;
         for number in std::mem::take(&mut self.triangles_at[gone as usize]) {
             let triangle = self.triangles[number as usize];
             if triangle.contains(&kept) {
@@ -201,10 +184,10 @@ impl Triangulation {
     }
 
     /// Puts a new vertex on an edge; `None` where there is no such edge.
-    pub fn split(&mut self, a: u32, b: u32, place: Vector) -> Option<u32> {
+    pub fn split(&mut self, a: u32, b: u32, point: Vector) -> Option<u32> {
         let sides = self.sides(a, b)?;
         let new = u32::try_from(self.points.len()).ok()?;
-        self.points.push(place);
+        self.points.push(point);
         self.merged_into.push(new);
         self.triangles_at.push(Vec::with_capacity(4));
         self.alive += 1;
@@ -238,8 +221,4 @@ impl Triangulation {
         }
         normals
     }
-}
-
-pub(super) fn length(vector: Vector) -> f64 {
-    dot(vector, vector).sqrt()
 }

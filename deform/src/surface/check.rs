@@ -1,16 +1,17 @@
-//! What is wrong with a deformed surface: faces without area, faces folded over, and self-intersections.
-
-use schemars::JsonSchema;
-use serde::Serialize;
+//! The flaws of a deformed surface: faces without area, faces folded over, and self-intersections.
 
 use super::Surface;
-use super::bounds::{Bounds, Hierarchy};
+use super::hierarchy::Hierarchy;
 use super::inside_out::turned_inside_out;
-use super::triangle_pair::{Shared, place};
+use super::report::{
+    BrokenSurface, FlawedFace, FlawedFaces, Intersection, Intersections, SurfaceReport,
+};
+use super::triangle_pair::{Shared, common_point};
+use crate::bounds::Bounds;
 use crate::mesh::Vector;
-use crate::number::Position;
 use crate::parallel;
-use crate::vector::{cross, dot, subtract};
+use crate::topology::{Groups, triangles_at};
+use crate::vector::{cross, dot, subtract, triangle_normal};
 
 /// How many flaws of each kind are named.
 const NAMED: usize = 16;
@@ -21,131 +22,39 @@ const CHUNK: usize = 256;
 /// After how many intersections such a part is left.
 const ENOUGH: usize = 10_000;
 
-/// A triangle is degenerate where its height is this part of its longest side or less, or its longest side this part of what it
-/// was: beyond that the direction of its normal is rounding.
+/// A triangle is degenerate where its height is this part of its longest side or less, or its
+/// longest side this part of what it was: beyond that the direction of its normal is rounding.
 const FLAT: f64 = 1e-8;
 
-/// Two triangles that open less than this many degrees at their edge, and much less than they did, may be folded.
+/// Two triangles that open less than this many degrees at their edge, and much less than they did,
+/// may be folded.
 const FOLDED: f64 = 60.0;
 
 /// Below so many degrees they lie on each other.
 const CLOSED: f64 = 1.0;
 
-/// What a shape of a surface has that its reference did not have.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
-pub struct SurfaceReport {
-    /// Faces without area, or with a coordinate that is not finite.
-    pub degenerate: FlawedFaces,
-    /// Faces folded over: turned by more than 120° against most of what was smoothly connected to them around, or lying on a
-    /// neighbour with less than 1° between.
-    pub flipped: FlawedFaces,
-    /// Faces of closed pieces that are turned inside out as a whole: what was inside them is outside.
-    pub inside_out: FlawedFaces,
-    /// Faces that pass through each other or touch, but for the vertices and edges they share.
-    pub intersections: Intersections,
-}
-
-/// Faces with a flaw.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
-pub struct FlawedFaces {
-    /// How many there are.
-    pub count: usize,
-    /// Those with the lowest numbers, at most 16.
-    pub first: Vec<FlawedFace>,
-}
-
-/// A face with a flaw.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-pub struct FlawedFace {
-    /// The number of the face, as in [`Surface::faces`].
-    pub face: u32,
-    /// The mean of its vertices in the shape.
-    pub place: Vector,
-}
-
-/// Pairs of faces that intersect.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
-pub struct Intersections {
-    /// How many pairs of triangles intersect (faces with more than three vertices are split into triangles).
-    pub count: usize,
-    /// Whether there are more: the count ends early where a small part of the surface has ten thousand.
-    pub more: bool,
-    /// Those with the lowest numbers among those counted, at most 16.
-    pub first: Vec<Intersection>,
-}
-
-/// Two faces that intersect.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-pub struct Intersection {
-    /// The numbers of the faces, as in [`Surface::faces`], the lower first; twice the same where the triangles of one face
-    /// meet.
-    pub faces: [u32; 2],
-    /// A point of both; for faces in one plane, a point near both.
-    pub place: Vector,
-}
-
-impl SurfaceReport {
-    /// Whether nothing is wrong.
-    #[must_use]
-    pub fn is_sound(&self) -> bool {
-        [&self.degenerate, &self.flipped, &self.inside_out].iter().all(|flawed| flawed.count == 0)
-            && self.intersections.count == 0
-    }
-}
-
-impl std::fmt::Display for SurfaceReport {
-    /// One line for people: what is wrong, how often, and where first.
-    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let at = Position;
-        let mut parts = Vec::new();
-        for (flawed, what) in [
-            (&self.degenerate, "lose their area"),
-            (&self.flipped, "fold over"),
-            (&self.inside_out, "of closed pieces are turned inside out"),
-        ] {
-            if let Some(first) = flawed.first.first() {
-                parts.push(format!(
-                    "{} face(s) {what}, the first is face {} at {}",
-                    flawed.count,
-                    first.face,
-                    at(first.place)
-                ));
-            }
-        }
-        if let Some(first) = self.intersections.first.first() {
-            let more = if self.intersections.more { "more than " } else { "" };
-            let [a, b] = first.faces;
-            parts.push(format!(
-                "{more}{} pair(s) of faces intersect, the first are faces {a} and {b} at {}",
-                self.intersections.count,
-                at(first.place)
-            ));
-        }
-        if parts.is_empty() {
-            return formatter.write_str("the surface is sound");
-        }
-        formatter.write_str(&parts.join("; "))
-    }
-}
-
-/// Looks for what is wrong with a surface at `shape` and was not already wrong at `reference` (coordinates of each surface
-/// vertex).
+/// Finds the flaws that a surface has at `shape` and had not at `reference` (coordinates of each
+/// surface vertex).
 ///
-/// - **Degenerate**: a triangle whose height is under 10⁻⁸ of its longest side, or whose sides are under 10⁻⁸ of what they were.
-/// - **Flipped**: judged by the angles between normals only, before and after, so that a part that is turned as a whole, by
-///   180° too, is never flipped. Sharp edges that the reference has, however sharp, do not count.
+/// - **Degenerate**: a triangle whose height is under 10⁻⁸ of its longest side, or whose sides are
+///   under 10⁻⁸ of what they were.
+/// - **Flipped**: judged by the angles between normals only, before and after, so that a part that
+///   is turned as a whole, by 180° too, is never flipped. Sharp edges that the reference has,
+///   however sharp, do not count.
 /// - **Inside out**: the volume that a closed piece encloses has another sign than before.
-/// - **Intersections**: by exact predicates, so that no rounding hides or makes one; touching counts. Triangles without area are
-///   left out, and so are pairs that met or touched in the reference (to 10⁻⁹ of their size): parts in contact may move together.
+/// - **Intersections**: by exact predicates, so that no rounding hides or makes one; touching
+///   counts. Triangles without area are left out, and so are pairs that met or touched in the
+///   reference (to 10⁻⁹ of their size): parts in contact may move together.
 ///
-/// Pairs of triangles none of which moves are not looked at. Cost: a sort of the triangles and, for each, its neighbours in a
-/// hierarchy of boxes; on all threads. The same input gives the same report whatever their number.
+/// Pairs of triangles none of which moves are not looked at. Cost: a sort of the triangles and, for
+/// each, its neighbours in a hierarchy of boxes; on all threads. The same input gives the same
+/// report whatever their number.
 ///
-/// What it does not say: whether the volume can follow, nor whether the surface passes through itself on the way to the shape and
-/// out again.
+/// It does not say whether the volume can follow, nor whether the surface passes through itself on
+/// the way to the shape and out again.
 ///
 /// ```
-/// use tombolo_deform::{shapes, surface::{FeatureSettings, Surface, check}};
+/// use tombolo_deform::{shapes, features::FeatureSettings, surface::{Surface, check}};
 ///
 /// let mesh = shapes::box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
 /// let surface = Surface::extract(&mesh, &FeatureSettings::default())?;
@@ -155,7 +64,7 @@ impl std::fmt::Display for SurfaceReport {
 /// shape[middle][2] = 1.5;
 /// let report = check(&surface, surface.points(), &shape);
 /// assert!(report.intersections.count > 0);
-/// assert_eq!(report.intersections.first[0].place[2], 1.0);
+/// assert_eq!(report.intersections.first[0].position[2], 1.0);
 /// // Turning everything by half a turn breaks nothing.
 /// let turned: Vec<_> = surface.points().iter().map(|[x, y, z]| [-x, -y, *z]).collect();
 /// assert!(check(&surface, surface.points(), &turned).is_sound());
@@ -181,20 +90,21 @@ pub fn check(surface: &Surface, reference: &[Vector], shape: &[Vector]) -> Surfa
         faces.dedup();
         let named = faces.iter().take(NAMED).map(|&face| {
             let vertices = surface.faces().vertices(face as usize);
-            let place = crate::vector::mean(vertices.iter().map(|&vertex| shape[vertex as usize]));
-            FlawedFace { face, place }
+            let position =
+                crate::vector::mean(vertices.iter().map(|&vertex| shape[vertex as usize]));
+            FlawedFace { face, position }
         });
         FlawedFaces { count: faces.len(), first: named.collect() }
     };
     let first = found.intersecting.iter().map(|&[a, b]| {
         let corners = [a, b].map(|triangle| surface.triangles()[triangle as usize]);
-        let place = place(shape, corners[0], corners[1]).unwrap_or_else(|| {
+        let position = common_point(shape, corners[0], corners[1]).unwrap_or_else(|| {
             let [a, b] =
                 corners.map(|corners| Bounds::around(corners.map(|vertex| shape[vertex as usize])));
-            a.middle_with(&b)
+            a.center_with(&b)
         });
         let (a, b) = (face(a), face(b));
-        Intersection { faces: [a.min(b), a.max(b)], place }
+        Intersection { faces: [a.min(b), a.max(b)], position }
     });
     SurfaceReport {
         degenerate: faces(found.degenerate),
@@ -206,20 +116,6 @@ pub fn check(surface: &Surface, reference: &[Vector], shape: &[Vector]) -> Surfa
         flipped: faces(found.flipped),
         inside_out: faces(turned_inside_out(surface.triangles(), reference, shape)),
     }
-}
-
-/// A surface that is broken before any volume comes into it.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema, thiserror::Error)]
-#[error(
-    "the surface itself would be broken: {report}; the largest feasible fraction is at most {:.4}",
-    // Rounded down, so that what is shown is feasible.
-    (sound_fraction * 1e4).floor() / 1e4
-)]
-pub struct BrokenSurface {
-    /// What is wrong with it.
-    pub report: SurfaceReport,
-    /// How far it can go and still be sound there: see [`sound_fraction`].
-    pub sound_fraction: f64,
 }
 
 /// [`check`], for those who take a sound surface or none.
@@ -242,10 +138,11 @@ pub fn require_sound(
     Err(Box::new(BrokenSurface { report, sound_fraction }))
 }
 
-/// How far a surface can go from `reference` straight to `shape` and still be sound there, by bisection of [`check`] to one part
-/// in 1024: 0 where not at all, 1 where all the way.
+/// How far a surface can go from `reference` straight to `shape` and still be sound there, by
+/// bisection of [`check`] to one part in 1024: 0 where not at all, 1 where all the way.
 ///
-/// The surface is sound at that place; that it is sound at every place before is likely, and not looked at.
+/// The surface is sound at that fraction; that it is sound at every smaller one is likely, and not
+/// looked at.
 ///
 /// # Panics
 /// As [`check`].
@@ -292,7 +189,7 @@ struct Shapes<'a> {
     shape: &'a [Vector],
 }
 
-/// What was found, by numbers of triangles.
+/// The flaws found, by numbers of triangles.
 #[derive(Default)]
 struct Found {
     degenerate: Vec<u32>,
@@ -402,10 +299,10 @@ impl Shapes<'_> {
         }
     }
 
-    /// Of the triangles at folds, those that are turned against most of the area smoothly connected to them around; where a fold
-    /// is closed and neither side is in the minority, both.
+    /// Of the triangles at folds, those that are turned against most of the area smoothly connected
+    /// to them around; where a fold is closed and neither side is in the minority, both.
     fn flipped(&self, folds: &[Fold]) -> Vec<u32> {
-        let around = TrianglesAround::new(self.triangles, self.shape.len());
+        let around = triangles_at(self.triangles, self.shape.len());
         let mut flipped = Vec::new();
         for fold in folds {
             let turned = fold.triangles.map(|triangle| self.is_turned(triangle, &around));
@@ -418,7 +315,7 @@ impl Shapes<'_> {
         flipped
     }
 
-    fn is_turned(&self, triangle: u32, around: &TrianglesAround) -> bool {
+    fn is_turned(&self, triangle: u32, around: &Groups<u32>) -> bool {
         let corners = self.triangles[triangle as usize];
         let [was, is] = [self.reference, self.shape].map(|points| normal(points, corners));
         let mut neighbours: Vec<u32> = corners
@@ -448,9 +345,8 @@ impl Shapes<'_> {
     }
 }
 
-fn normal(points: &[Vector], [a, b, c]: [u32; 3]) -> Vector {
-    let [a, b, c] = [a, b, c].map(|vertex| points[vertex as usize]);
-    cross(subtract(b, a), subtract(c, a))
+fn normal(points: &[Vector], triangle: [u32; 3]) -> Vector {
+    triangle_normal(triangle.map(|vertex| points[vertex as usize]))
 }
 
 /// The cosine of the angle between two vectors, NaN where one has no length.
@@ -458,7 +354,8 @@ fn cosine(a: Vector, b: Vector) -> f64 {
     dot(a, b) / (dot(a, a).sqrt() * dot(b, b).sqrt())
 }
 
-/// The angle in degrees between two triangles on an edge: 180 where they continue each other, 0 where one lies on the other.
+/// The angle in degrees between two triangles on an edge: 180 where they continue each other, 0
+/// where one lies on the other.
 fn opening([start, end]: [Vector; 2], [a, b]: [Vector; 2]) -> f64 {
     let along = subtract(end, start);
     let [a, b] = [a, b].map(|third| cross(along, subtract(third, start)));
@@ -466,7 +363,7 @@ fn opening([start, end]: [Vector; 2], [a, b]: [Vector; 2]) -> f64 {
     dot(turn, turn).sqrt().atan2(dot(a, b)).to_degrees()
 }
 
-/// The same as `opening(..) < 90.0`, in a few operations.
+/// Whether `opening(..) < 90.0`, in a few operations.
 fn opens_less_than_right([start, end]: [Vector; 2], [a, b]: [Vector; 2]) -> bool {
     let along = subtract(end, start);
     let [a, b] = [a, b].map(|third| cross(along, subtract(third, start)));
@@ -482,7 +379,8 @@ fn longest_side(points: &[Vector], [a, b, c]: [u32; 3]) -> f64 {
     square(a, b).max(square(b, c)).max(square(c, a)).sqrt()
 }
 
-/// Whether a triangle has no area to speak of, or no side longer than `least`, or a coordinate that is not finite.
+/// Whether a triangle has no area to speak of, or no side longer than `least`, or a coordinate that
+/// is not finite.
 fn is_flat(points: &[Vector], triangle: [u32; 3], least: f64) -> bool {
     let longest = longest_side(points, triangle);
     let normal = normal(points, triangle);
@@ -490,36 +388,4 @@ fn is_flat(points: &[Vector], triangle: [u32; 3], least: f64) -> bool {
         && dot(normal, normal).sqrt() > FLAT * longest * longest
         && longest.is_finite();
     !has_area
-}
-
-/// The triangles at each vertex.
-struct TrianglesAround {
-    offsets: Vec<u32>,
-    triangles: Vec<u32>,
-}
-
-impl TrianglesAround {
-    fn new(triangles: &[[u32; 3]], vertices: usize) -> Self {
-        let mut offsets = vec![0u32; vertices + 1];
-        for vertex in triangles.iter().flatten() {
-            offsets[*vertex as usize + 1] += 1;
-        }
-        for vertex in 0..vertices {
-            offsets[vertex + 1] += offsets[vertex];
-        }
-        let mut next = offsets.clone();
-        let mut around = vec![0; 3 * triangles.len()];
-        for (number, triangle) in triangles.iter().enumerate() {
-            for &vertex in triangle {
-                around[next[vertex as usize] as usize] = number as u32;
-                next[vertex as usize] += 1;
-            }
-        }
-        Self { offsets, triangles: around }
-    }
-
-    fn of(&self, vertex: u32) -> &[u32] {
-        &self.triangles
-            [self.offsets[vertex as usize] as usize..self.offsets[vertex as usize + 1] as usize]
-    }
 }

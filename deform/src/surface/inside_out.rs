@@ -1,19 +1,21 @@
 //! Closed pieces of a surface that are turned inside out.
 
-use super::sharp_edges::{Parts, edges};
 use crate::mesh::Vector;
+use crate::topology::{DisjointSets, edges};
 use crate::vector::{determinant, subtract};
 
 /// A volume under this part of what its piece would hold as a ball is rounding.
 const EMPTY: f64 = 1e-12;
 
-/// The triangles of closed pieces that enclose a volume of another sign at `shape` than at `reference`.
+/// The triangles of closed pieces that enclose a volume of another sign at `shape` than at
+/// `reference`.
 pub(super) fn turned_inside_out(
     triangles: &[[u32; 3]],
     reference: &[Vector],
     shape: &[Vector],
 ) -> Vec<u32> {
-    let parts = Parts::components(reference.len(), triangles);
+    let parts =
+        DisjointSets::components(reference.len(), triangles.iter().map(<[u32; 3]>::as_slice));
     let [before, after] = [reference, shape].map(|points| volumes(triangles, points, &parts));
     let mut suspect: Vec<bool> =
         before.iter().zip(&after).map(|(before, after)| before * after < 0.0).collect();
@@ -37,7 +39,8 @@ pub(super) fn turned_inside_out(
     chosen.into_iter().filter(|&number| suspect[part(&triangles[number as usize])]).collect()
 }
 
-/// Six times the volume of each piece, in units of the cube of its extent; 0 where that is rounding.
+/// Six times the volume of each piece, in units of the cube of its extent; 0 where that is
+/// rounding.
 fn volumes(triangles: &[[u32; 3]], points: &[Vector], parts: &[u32]) -> Vec<f64> {
     // Counted from a vertex of the piece, which costs no digits where it lies far from the origin.
     let from = |vertex: u32| {

@@ -1,14 +1,15 @@
 //! Which way round the faces of a surface run.
 
-use super::sharp_edges::edges;
 use crate::mesh::{Cells, Vector};
-use crate::vector::{cross, dot, subtract};
+use crate::topology::edges;
+use crate::vector::{cross, dot, polygon_normal, subtract};
 
 /// Which faces have to be turned for all to run the same way round.
 ///
-/// Faces that meet at an edge of two should walk it opposite ways. In each piece that hangs together by such edges, what has the
-/// smaller area is turned. Closed pieces are then turned together where they enclose a negative volume in all, so that normals
-/// point outward. Pieces with one side only, as a Moebius strip, stay as they are.
+/// Faces that meet at an edge of two should walk it opposite ways. In each piece that hangs
+/// together by such edges, what has the smaller area is turned. Closed pieces are then turned
+/// together where they enclose a negative volume in all, so that normals point outward. Pieces with
+/// one side only, as a Moebius strip, stay as they are.
 pub(super) fn faces_to_turn(points: &[Vector], faces: &Cells) -> Vec<bool> {
     let sides = edges((0..faces.len()).map(|face| faces.vertices(face)));
     let mut open = vec![false; faces.len()];
@@ -33,9 +34,9 @@ pub(super) fn faces_to_turn(points: &[Vector], faces: &Cells) -> Vec<bool> {
         turned[first] = Some(false);
         let mut piece = vec![first];
         let mut has_two_sides = true;
-        let mut place = 0;
-        while let Some(&face) = piece.get(place) {
-            place += 1;
+        let mut next = 0;
+        while let Some(&face) = piece.get(next) {
+            next += 1;
             for &(other, against) in &neighbours[face] {
                 let expected = turned[face].map(|turned| turned != against);
                 match &mut turned[other as usize] {
@@ -49,7 +50,7 @@ pub(super) fn faces_to_turn(points: &[Vector], faces: &Cells) -> Vec<bool> {
         }
         let [mut kept, mut changed] = [0.0, 0.0];
         for &face in &piece {
-            let normal = super::extraction::polygon_normal(points, faces.vertices(face));
+            let normal = polygon_normal(points, faces.vertices(face));
             *if turned[face] == Some(true) { &mut changed } else { &mut kept } +=
                 dot(normal, normal).sqrt();
         }
@@ -75,6 +76,6 @@ pub(super) fn faces_to_turn(points: &[Vector], faces: &Cells) -> Vec<bool> {
 
 /// Six times the volume between a face and a point.
 fn cone(points: &[Vector], vertices: &[u32], origin: Vector) -> f64 {
-    let corner = |place: usize| subtract(points[vertices[place] as usize], origin);
-    (2..vertices.len()).map(|place| dot(corner(0), cross(corner(place - 1), corner(place)))).sum()
+    let corner = |index: usize| subtract(points[vertices[index] as usize], origin);
+    (2..vertices.len()).map(|index| dot(corner(0), cross(corner(index - 1), corner(index)))).sum()
 }

@@ -1,8 +1,9 @@
-//! Whether two triangles intersect: exactly, by the signs of determinants that are never wrong (Shewchuk 1997, crate `robust`).
+//! Whether two triangles intersect: exactly, by the signs of determinants that are never wrong
+//! (Shewchuk 1997, crate `robust`).
 //!
-//! Triangles are closed: to touch is to intersect. What two triangles share by the numbers of their vertices does not count: a
-//! common vertex, a common edge. Most pairs are told apart before by a separating plane found in floating point, with a margin
-//! far above its rounding.
+//! Triangles are closed: to touch is to intersect. What two triangles share by the numbers of their
+//! vertices does not count: a common vertex, a common edge. Most pairs are told apart before by a
+//! separating plane found in floating point, with a margin far above its rounding.
 
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
@@ -11,7 +12,8 @@ use crate::vector::{cross, dot, subtract};
 
 type Triangle = [Vector; 3];
 
-/// What rounding can add to a distance, as a part of the size of both triangles together; well above what it does.
+/// The most that rounding can add to a distance, as a part of the size of both triangles together;
+/// well above what it does.
 const ROUNDING: f64 = 1e-14;
 
 /// The least distance of triangles that are clear of each other, as a part of their size.
@@ -40,13 +42,13 @@ impl Shared {
             [false, false, false] => Self::Nothing([a, b].map(|triangle| triangle.map(point))),
             [true, true, true] => Self::All,
             [true, false, false] | [false, true, false] | [false, false, true] => {
-                let place = usize::from(in_b[1]) + 2 * usize::from(in_b[2]);
-                let other = usize::from(b[1] == a[place]) + 2 * usize::from(b[2] == a[place]);
+                let own = usize::from(in_b[1]) + 2 * usize::from(in_b[2]);
+                let other = usize::from(b[1] == a[own]) + 2 * usize::from(b[2] == a[own]);
                 let turned = |triangle: [u32; 3], first: usize| {
                     [triangle[first], triangle[(first + 1) % 3], triangle[(first + 2) % 3]]
                         .map(point)
                 };
-                Self::Vertex([turned(a, place), turned(b, other)])
+                Self::Vertex([turned(a, own), turned(b, other)])
             }
             _ => {
                 let lone = usize::from(!in_b[1]) + 2 * usize::from(!in_b[2]);
@@ -57,7 +59,8 @@ impl Shared {
         }
     }
 
-    /// Whether the triangles meet anywhere but in what they share. For triangles without area the answer may be either.
+    /// Whether the triangles meet anywhere but in what they share. For triangles without area the
+    /// answer may be either.
     #[inline]
     pub fn intersect(&self) -> bool {
         match self {
@@ -71,7 +74,8 @@ impl Shared {
         }
     }
 
-    /// Whether the triangles neither meet nor, where they share nothing, lie so close that rounding could make them.
+    /// Whether the triangles neither meet nor, where they share nothing, lie so close that rounding
+    /// could make them.
     pub fn is_clear(&self) -> bool {
         match self {
             Self::Nothing([a, b]) => are_apart(a, b, CLEARANCE),
@@ -80,9 +84,9 @@ impl Shared {
     }
 }
 
-/// A place where two triangles that intersect do so: where an edge of one passes through the other; for triangles in one plane a
-/// place near both.
-pub(super) fn place(points: &[Vector], a: [u32; 3], b: [u32; 3]) -> Option<Vector> {
+/// A point of both of two triangles that intersect, where an edge of one passes through the other;
+/// `None` for triangles in one plane.
+pub(super) fn common_point(points: &[Vector], a: [u32; 3], b: [u32; 3]) -> Option<Vector> {
     let corners = [a, b].map(|triangle| triangle.map(|vertex| points[vertex as usize]));
     for (triangle, numbers, other) in [(&corners[0], a, 1), (&corners[1], b, 0)] {
         let other_numbers = if other == 0 { a } else { b };
@@ -148,7 +152,8 @@ fn segment_meets(triangle: &Triangle, [start, end]: [Vector; 2]) -> bool {
         return Plane::of(triangle)
             .is_some_and(|plane| plane.segment_meets(triangle, [start, end]));
     }
-    // The line through the segment passes all sides of the triangle the same way round, or touches them.
+    // The line through the segment passes all sides of the triangle the same way round, or touches
+    // them.
     let turns =
         [0, 1, 2].map(|side| orientation(&[start, end, triangle[side]], triangle[(side + 1) % 3]));
     turns.iter().all(|&turn| turn >= 0.0) || turns.iter().all(|&turn| turn <= 0.0)
@@ -190,7 +195,8 @@ impl Plane {
             || (0..3).any(|number| self.segments_cross([start, end], side(number)))
     }
 
-    /// Whether segments cross in a point inside at least one of them; of segments along one line the ends decide, elsewhere.
+    /// Whether segments cross in a point inside at least one of them; of segments along one line
+    /// the ends decide, elsewhere.
     fn segments_cross(self, [a, b]: [Vector; 2], [c, d]: [Vector; 2]) -> bool {
         let [first, second] = [self.turn(&[a, b, c]), self.turn(&[a, b, d])];
         let [third, fourth] = [self.turn(&[c, d, a]), self.turn(&[c, d, b])];
@@ -201,7 +207,8 @@ impl Plane {
     }
 }
 
-/// Whether a plane is found that parts the triangles and leaves a gap of `margin` of their size; it is wherever there is one.
+/// Whether a plane is found that parts the triangles and leaves a gap of `margin` of their size; it
+/// is wherever there is one.
 fn are_apart(a: &Triangle, b: &Triangle, margin: f64) -> bool {
     let origin = a[0];
     let [a, b] = [a, b].map(|triangle| triangle.map(|point| subtract(point, origin)));
@@ -233,7 +240,8 @@ fn are_apart(a: &Triangle, b: &Triangle, margin: f64) -> bool {
             .any(|side| sides_b.into_iter().any(|other| parts(cross(side, other))))
 }
 
-/// Whether a plane through the first vertex, which is both triangles', is found that parts the cones they span there.
+/// Whether a plane through the first vertex, which is both triangles', is found that parts the
+/// cones they span there.
 fn cones_are_apart(a: &Triangle, b: &Triangle) -> bool {
     let apex = a[0];
     let unit = |vector: Vector| {

@@ -1,16 +1,22 @@
-//! Carrying a motion of the boundary that one linear solve cannot follow into the volume in sub-steps.
+//! Carrying a motion of the boundary that one linear solve cannot follow into the volume in
+//! sub-steps.
 
 use std::sync::Arc;
 
+use super::impossible::Prescribed;
+use super::route::{BoundaryMotion, FollowError, Route, Stalled, Volume, Waypoint};
 use super::spring::sprung;
+use super::untangle::Regularisation;
 use super::{Deform, Impossible, Untangler, VolumeError, VolumeOperator, agreed};
+use crate::communicator::Communicator;
 use crate::linear::LinearError;
 use crate::mesh::{Mesh, Vector};
-use crate::partition::{Partition, any};
-use crate::quality::{Guard, Refusal, judge_in_parts, keeps_in_parts, quality_in_parts};
+use crate::number::real;
+use crate::quality::{Guard, judge, keeps, quality};
 use crate::vector::{add, scale, subtract};
 
-/// The first sub-step, what a sub-step that holds lets the next one grow by, and the least one tried.
+/// The first sub-step, what a sub-step that holds lets the next one grow by, and the least one
+/// tried.
 const FIRST: f64 = 0.2;
 const GROWTH: f64 = 1.5;
 const LEAST: f64 = 1.0 / 512.0;
@@ -26,7 +32,11 @@ const STIFFER: f64 = 1.0;
 
 /// Sub-steps tried before it is given up, and those of them that were untangled in vain.
 const TRIES: usize = 200;
-const UNTANGLED_IN_VAIN: usize = 4;
+const UNTANGLED_IN_VAIN: usize = 2;
+
+/// The least one tried where the whole way is proved to be impossible: the fraction is advice then,
+/// and no shape is handed out.
+const LEAST_IMPOSSIBLE: f64 = 1.0 / 128.0;
 
 /// Shapes tried in between on the way from one valid shape to another.
 const BETWEEN: usize = 200;
@@ -34,127 +44,39 @@ const BETWEEN: usize = 200;
 /// How often the part of the way is halved within which the boundary becomes impossible.
 const HALVINGS: usize = 12;
 
-/// Sub-steps are solved no finer than this: what a solve leaves out is small against a sub-step, and the boundary is set exactly.
+/// Sub-steps are solved no finer than this: what a solve leaves out is small against a sub-step,
+/// and the boundary is set exactly.
 const TOLERANCE: f64 = 1e-5;
-
-/// A shape on the way of [`follow`].
-#[derive(Debug, Clone, PartialEq)]
-pub struct Waypoint {
-    /// How far along the motion of the boundary it lies, from 0 to 1. Where that motion could not be followed, but a way to its end was
-    /// found on which the boundary goes elsewhere, how far along that.
-    pub fraction: f64,
-    /// The coordinates of every vertex of the mesh.
-    pub points: Arc<[Vector]>,
-}
-
-/// A way along which the volume followed its boundary: every straight piece of it was judged.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Route {
-    /// The shapes after the first one; the last has the fraction 1.
-    pub waypoints: Vec<Waypoint>,
-    /// Sub-steps that were tried and did not hold.
-    pub rejected: usize,
-    /// Sub-steps that held only after they were untangled.
-    pub untangled: usize,
-    /// Iterations of the linear solver in all.
-    pub iterations: usize,
-}
-
-/// A way that ended before the boundary had come to its place.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Stalled {
-    /// As far as it came; its last fraction is the largest that was reached.
-    pub route: Route,
-    /// What is wrong with the smallest sub-step from there.
-    pub refusal: Refusal,
-    /// Whether it is the boundary itself that folds in that sub-step.
-    pub folds: bool,
-    /// Why there is no valid mesh at the end of the way, where that is proved.
-    pub impossible: Option<Impossible>,
-    /// Whether a valid mesh was found at the end of the way: then it is the way to it that was not.
-    pub end_is_valid: bool,
-}
-
-impl Stalled {
-    /// How far along the motion of the boundary the volume could follow.
-    #[must_use]
-    pub fn fraction(&self) -> f64 {
-        self.route.waypoints.last().map_or(0.0, |last| last.fraction)
-    }
-}
-
-/// Why the volume did not follow.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum FollowError<E> {
-    /// The boundary has no place at some fraction.
-    #[error(transparent)]
-    Boundary(E),
-    /// An equation could not be set up or solved.
-    #[error(transparent)]
-    Volume(VolumeError),
-    /// No further sub-step keeps to the guard.
-    #[error("the volume can follow {:.1} % of the way: {}", 100.0 * .0.fraction(), .0.refusal.flaw())]
-    Stalled(Box<Stalled>),
-}
-
-/// A motion of the boundary: where its vertices lie at the fraction `to`, going on from the shape of the whole mesh that was
-/// reached at the fraction `from`.
-pub trait BoundaryMotion {
-    /// Why there is no such place.
-    type Error;
-
-    /// The coordinates of each boundary vertex at the fraction `to`.
-    ///
-    /// # Errors
-    /// Where there are none.
-    fn at(&mut self, from: f64, to: f64, shape: &[Vector]) -> Result<Vec<Vector>, Self::Error>;
-
-    /// Whether its places at a fraction do not depend on the shape that was reached before it: then they are asked for in any order.
-    fn is_stated(&self) -> bool {
-        true
-    }
-
-    /// Whether the boundary folds over itself on its way to `places`, so that no motion of the inside can help.
-    fn folds(&self, shape: &[Vector], places: &[Vector]) -> bool {
-        let _ = (shape, places);
-        false
-    }
-}
-
-/// What is taken along with its boundary.
-#[derive(Debug, Clone, Copy)]
-pub struct Domain<'a> {
-    /// The reference mesh, or this rank's part of it, whose cells no other rank has.
-    pub mesh: &'a Mesh,
-    /// Its vertices on the boundary of the whole mesh.
-    pub boundary: &'a [u32],
-    /// The parts that the mesh is in.
-    pub partition: &'a Arc<dyn Partition>,
-    /// An operator of this boundary, set up on the mesh where it starts, if there is one already.
-    pub operator: Option<&'a Arc<VolumeOperator>>,
-}
 
 /// Takes the volume along with a motion of its boundary from the shape `start` on.
 ///
-/// One linear solve on the shape reached, with a material stiffened anew, makes a sub-step: a fifth of the way at first. The
-/// first that the guard does not let through is tried again with a stiffening of 1, which the rest of the way keeps, unless it
-/// was that or more; others are halved, and a small one is untangled (see [`Untangler`]). After one that holds, the next may be
-/// half as long again. Each solve starts from what the last one found, made as long as the sub-step.
+/// One linear solve on the shape reached, with a material stiffened anew, makes a sub-step: a fifth
+/// of the way at first. The first that the guard does not let through is tried again with a
+/// stiffening of 1, which the rest of the way keeps, unless it was that or more; others are halved,
+/// and a small one is untangled (see [`Untangler`]). After one that holds, the next may be half as
+/// long again. Each solve starts from what the last one found, made as long as the sub-step.
 ///
-/// Where untangling a small sub-step does not help either, the end of the way is gone for at once: the whole mesh is untangled with its
-/// boundary there. From the shape reached to the one found the way goes straight where it can, else over a shape half way between, which
-/// is untangled where need be, and so on. Where the boundary's own way is broken, the shape found is let go and springs back, and the way
-/// is that of its springing back, the other way round: vertices of the boundary that lie at the end where they do at the start stay there all
-/// the way, others are not where the motion has them until the end. A boundary for which [`Impossible`] has a proof is told before anything is solved, and
-/// followed as far as there is none. So what is found is a function of the arguments alone.
+/// Where untangling a small sub-step does not help either, the end of the way is gone for at once:
+/// the whole mesh is untangled with its boundary there, from up to three starts. From the shape
+/// reached to the one found the way goes straight where it can, else over a shape half way between,
+/// which is untangled where need be, and so on. Where the boundary's own way is broken, the shape
+/// found is let go and springs back, and the way is that of its springing back, the other way
+/// round: vertices of the boundary that lie at the end where they do at the start stay there all
+/// the way, others are not where the motion has them until the end.
 ///
-/// `untangler`, called where it is needed, is of the reference mesh, which is what cells are drawn back to. Collective, where the
-/// mesh is in parts: the motion then must fail on all ranks or on none.
+/// A boundary for which [`Impossible`] has a proof is told before anything is solved, and followed
+/// nearly as far as there is none. Where there is no proof, two sub-steps untangled in vain end the
+/// search. All limits are counts, so that what is found is a function of the arguments alone.
+///
+/// `untangler`, called where it is needed, is of the reference mesh, which is what cells are drawn
+/// back to. Collective, where the mesh is in parts: the motion then must fail on all ranks or on
+/// none.
 ///
 /// # Errors
-/// [`FollowError`]; [`FollowError::Stalled`] with how far it came. A linear system that cannot be solved is a sub-step that does not hold.
+/// [`FollowError`]; [`FollowError::Stalled`] with how far it came. A linear system that cannot be
+/// solved is a sub-step that does not hold.
 pub fn follow<M: BoundaryMotion>(
-    domain: Domain<'_>,
+    volume: Volume<'_>,
     start: &Arc<[Vector]>,
     motion: &mut M,
     settings: &Deform,
@@ -164,11 +86,13 @@ pub fn follow<M: BoundaryMotion>(
     let settings = Deform { tolerance: settings.tolerance.max(TOLERANCE), ..*settings };
     let route = Route { waypoints: Vec::new(), rejected: 0, untangled: 0, iterations: 0 };
     let here = Waypoint { fraction: 0.0, points: Arc::clone(start) };
-    let mut follower = Follower { domain, motion, guard, untangler, here, route };
+    let prescribed = Prescribed::new(volume.domain, volume.boundary);
+    let mut follower = Follower { volume, prescribed, motion, guard, untangler, here, route };
+    // 1. What no motion of the inside can do.
     let (goal, impossible) = follower.goal().map_err(FollowError::Boundary)?;
     let mut step = FIRST;
     let mut stiffening = settings.stiffening;
-    let mut operator = domain.operator.map(Arc::clone);
+    let mut operator = volume.operator.map(Arc::clone);
     // What the last sub-step was solved to, and how long it was.
     let mut latest: Option<(Vec<Vector>, f64)> = None;
     let (mut in_vain, mut end_is_valid) = (0, None);
@@ -176,52 +100,56 @@ pub fn follow<M: BoundaryMotion>(
         let shape = Arc::clone(&follower.here.points);
         let reached = follower.here.fraction;
         // Both that it started from and what was solved for are finite.
-        let stiffened = domain.mesh.with_points(shape.to_vec()).map_err(|_| overflow());
-        let stiffened = agreed(&**domain.partition, stiffened).map_err(FollowError::Volume)?;
+        let stiffened = volume.domain.mesh().with_points(shape.to_vec()).map_err(|_| overflow());
+        let stiffened =
+            agreed(volume.domain.communicator(), stiffened).map_err(FollowError::Volume)?;
         let mut current = match operator.take() {
             Some(first) if follower.route.waypoints.is_empty() => Some(first),
             before => follower.operator(before.as_deref(), &stiffened, stiffening, &settings)?,
         };
         loop {
-            // A last sub-step that would leave next to nothing takes it along.
+            // 2. A sub-step by one linear solve. A last one that would leave next to nothing takes
+            //    it along.
             let next = if reached + 1.25 * step >= goal { goal } else { reached + step };
-            let places =
+            let positions =
                 follower.motion.at(reached, next, &shape).map_err(FollowError::Boundary)?;
             let guess = latest
                 .as_ref()
                 .map(|(displacement, length)| scaled(displacement, (next - reached) / length));
-            let mut candidate = match follower.moved(current.as_deref(), &shape, &places, guess)? {
-                Some((displacement, candidate)) => {
-                    latest = Some((displacement, next - reached));
-                    candidate
-                }
-                None => follower.placed(&shape, &places),
-            };
+            let mut candidate =
+                match follower.moved(current.as_deref(), &shape, &positions, guess)? {
+                    Some((displacement, candidate)) => {
+                        latest = Some((displacement, next - reached));
+                        candidate
+                    }
+                    None => follower.placed(&shape, &positions),
+                };
+            // 3. Where that does not hold and is small, the same sub-step untangled; then the end
+            //    of the way.
             let mut holds = follower.keeps(&shape, &candidate);
-            let folds = !holds && any(&**domain.partition, follower.motion.folds(&shape, &places));
+            let folds = !holds
+                && volume.domain.communicator().any(follower.motion.folds(&shape, &positions));
             if holds {
                 follower.go(next, candidate.as_slice().into());
             } else if next - reached <= UNTANGLED_BELOW && untangler.is_some() {
-                if !folds && follower.untangle(&mut candidate) {
+                if !folds && follower.untangle(&mut candidate, Regularisation::Fitting) {
                     let there = Waypoint { fraction: next, points: candidate.as_slice().into() };
                     holds = follower.bridge(there).map_err(FollowError::Boundary)?;
                 }
                 in_vain += usize::from(!holds && !folds);
-                if !holds && end_is_valid.is_none() && follower.motion.is_stated() {
-                    let found = follower.end(goal, current.as_deref())?;
-                    end_is_valid = Some(found.is_some());
-                    if let Some(end) = found
-                        && !follower.bridge(end.clone()).map_err(FollowError::Boundary)?
-                        && goal == 1.0
-                    {
-                        follower.spring(start, &end);
-                    }
+                if !holds
+                    && end_is_valid.is_none()
+                    && impossible.is_none()
+                    && follower.motion.is_stated()
+                {
+                    end_is_valid = Some(follower.go_for_end(start, current.as_deref())?);
                 }
             }
             if follower.here.fraction > reached {
                 step = if holds { GROWTH * (next - reached) } else { FIRST * UNTANGLED_BELOW };
                 break;
             }
+            // 4. The same with more stiffening, else a shorter one, as long as there is hope.
             follower.route.rejected += 1;
             if stiffening < STIFFER && !folds {
                 stiffening = STIFFER;
@@ -230,18 +158,27 @@ pub fn follow<M: BoundaryMotion>(
                 continue;
             }
             step = 0.5 * (next - reached);
-            let given_up = follower.route.rejected >= TRIES || in_vain >= UNTANGLED_IN_VAIN;
-            if step < (if folds { LEAST_FOLDING } else { LEAST }) || given_up {
-                let end_is_valid = goal == 1.0 && end_is_valid == Some(true);
-                return Err(follower.stalled(&candidate, folds, impossible, end_is_valid));
+            let (least, most) = match (folds, impossible) {
+                (true, _) => (LEAST_FOLDING, UNTANGLED_IN_VAIN),
+                (false, Some(_)) => (LEAST_IMPOSSIBLE, 1),
+                (false, None) => (LEAST, UNTANGLED_IN_VAIN),
+            };
+            if step < least || in_vain >= most || follower.route.rejected >= TRIES {
+                return Err(follower.stalled(
+                    &candidate,
+                    folds,
+                    impossible,
+                    end_is_valid == Some(true),
+                ));
             }
         }
         operator = current;
     }
     if goal < 1.0 {
         let Waypoint { fraction, points } = follower.here.clone();
-        let places = follower.motion.at(fraction, 1.0, &points).map_err(FollowError::Boundary)?;
-        let candidate = follower.placed(&points, &places);
+        let positions =
+            follower.motion.at(fraction, 1.0, &points).map_err(FollowError::Boundary)?;
+        let candidate = follower.placed(&points, &positions);
         return Err(follower.stalled(&candidate, false, impossible, false));
     }
     Ok(follower.route)
@@ -250,9 +187,10 @@ pub fn follow<M: BoundaryMotion>(
 /// A displacement of every vertex, and the shape after it.
 type Moved = (Vec<Vector>, Vec<Vector>);
 
-/// What goes along a way.
+/// A volume on its way.
 struct Follower<'a, M> {
-    domain: Domain<'a>,
+    volume: Volume<'a>,
+    prescribed: Prescribed<'a>,
     motion: &'a mut M,
     guard: &'a Guard,
     untangler: Option<&'a dyn Fn() -> Arc<Untangler>>,
@@ -266,15 +204,15 @@ impl<M: BoundaryMotion> Follower<'_, M> {
         if !self.motion.is_stated() {
             return Ok((1.0, None));
         }
-        let Domain { mesh, boundary, partition, .. } = self.domain;
-        let floor = quality_in_parts(mesh.cells(), mesh.points(), &**partition)
-            .min
-            .min(self.guard.min_scaled_jacobian);
+        let Volume { domain, boundary, .. } = self.volume;
+        let mesh = domain.mesh();
+        let least = quality(mesh.cells(), mesh.points()).gathered(domain).min;
+        let floor = least.min(self.guard.min_scaled_jacobian);
         let floor = floor - 1e-6 * floor.abs();
         let mut proof = |fraction: f64| {
-            let places = self.motion.at(0.0, fraction, &self.here.points)?;
-            let points = with_boundary(boundary, &self.here.points, &places);
-            Ok(Impossible::find(mesh, boundary, &points, floor, &**partition))
+            let positions = self.motion.at(0.0, fraction, &self.here.points)?;
+            let points = with_boundary(boundary, &self.here.points, &positions);
+            Ok(self.prescribed.proof(&points, floor))
         };
         let impossible = proof(1.0)?;
         if impossible.is_none() {
@@ -289,15 +227,16 @@ impl<M: BoundaryMotion> Follower<'_, M> {
     }
 
     fn keeps(&self, from: &[Vector], to: &[Vector]) -> bool {
-        keeps_in_parts(self.domain.mesh, from, to, self.guard, &**self.domain.partition)
+        keeps(self.volume.domain, from, to, self.guard)
     }
 
-    fn untangle(&self, points: &mut [Vector]) -> bool {
-        let Domain { mesh, boundary, partition, .. } = self.domain;
+    fn untangle(&self, points: &mut [Vector], from: Regularisation) -> bool {
         let floor = self.guard.min_scaled_jacobian;
-        let possible = Impossible::find(mesh, boundary, points, 0.0, &**partition).is_none();
+        let possible = self.prescribed.proof(points, 0.0).is_none();
         possible
-            && self.untangler.is_some_and(|untangler| untangler().untangle(mesh, points, floor))
+            && self
+                .untangler
+                .is_some_and(|untangler| untangler().untangle_from(points, floor, from))
     }
 
     fn go(&mut self, fraction: f64, points: Arc<[Vector]>) {
@@ -305,31 +244,49 @@ impl<M: BoundaryMotion> Follower<'_, M> {
         self.route.waypoints.push(self.here.clone());
     }
 
-    fn placed(&self, shape: &[Vector], places: &[Vector]) -> Vec<Vector> {
-        with_boundary(self.domain.boundary, shape, places)
+    fn placed(&self, shape: &[Vector], positions: &[Vector]) -> Vec<Vector> {
+        with_boundary(self.volume.boundary, shape, positions)
     }
 
-    /// The valid mesh with its boundary where it is at `fraction`, if it is found.
-    fn end(
+    /// Goes for a valid mesh at the end of the way; says whether one was found, from which `here`
+    /// may still be far.
+    fn go_for_end(
         &mut self,
-        fraction: f64,
+        start: &Arc<[Vector]>,
         operator: Option<&VolumeOperator>,
-    ) -> Result<Option<Waypoint>, FollowError<M::Error>> {
-        let shape = Arc::clone(&self.here.points);
-        let places =
-            self.motion.at(self.here.fraction, fraction, &shape).map_err(FollowError::Boundary)?;
-        let solved = self.moved(operator, &shape, &places, None)?.map(|(_, candidate)| candidate);
-        // From where the solve leaves the inside, and from where it is.
-        for start in solved.into_iter().chain([self.placed(&shape, &places)]) {
-            let mut points = start;
-            if self.untangle(&mut points) {
-                return Ok(Some(Waypoint { fraction, points: points.into() }));
+    ) -> Result<bool, FollowError<M::Error>> {
+        let mut found = false;
+        // From where a solve leaves the inside, and from where it is.
+        let attempts = [
+            (true, Regularisation::Fitting),
+            (false, Regularisation::Fitting),
+            (true, Regularisation::Large),
+        ];
+        for (solved, regularisation) in attempts {
+            let shape = Arc::clone(&self.here.points);
+            let positions =
+                self.motion.at(self.here.fraction, 1.0, &shape).map_err(FollowError::Boundary)?;
+            let mut points =
+                match self.moved(operator.filter(|_| solved), &shape, &positions, None)? {
+                    Some((_, candidate)) => candidate,
+                    None if solved => continue,
+                    None => self.placed(&shape, &positions),
+                };
+            if !self.untangle(&mut points, regularisation) {
+                continue;
+            }
+            found = true;
+            let end = Waypoint { fraction: 1.0, points: points.into() };
+            if self.bridge(end.clone()).map_err(FollowError::Boundary)? || self.spring(start, &end)
+            {
+                break;
             }
         }
-        Ok(None)
+        Ok(found)
     }
 
-    /// Goes to another valid shape over straight pieces, as far as these can be found; says whether it came there.
+    /// Goes to another valid shape over straight pieces, as far as these can be found; says whether
+    /// it came there.
     fn bridge(&mut self, end: Waypoint) -> Result<bool, M::Error> {
         let mut ahead = vec![end];
         let mut between = 0;
@@ -344,7 +301,7 @@ impl<M: BoundaryMotion> Follower<'_, M> {
                 return Ok(false);
             }
             let fraction = 0.5 * (self.here.fraction + next.fraction);
-            let places = self.motion.at(self.here.fraction, fraction, &self.here.points)?;
+            let positions = self.motion.at(self.here.fraction, fraction, &self.here.points)?;
             let middle: Vec<Vector> = self
                 .here
                 .points
@@ -352,8 +309,9 @@ impl<M: BoundaryMotion> Follower<'_, M> {
                 .zip(&*next.points)
                 .map(|(&a, &b)| scale(add(a, b), 0.5))
                 .collect();
-            let mut middle = self.placed(&middle, &places);
-            if !self.keeps(&middle, &middle) && !self.untangle(&mut middle) {
+            let mut middle = self.placed(&middle, &positions);
+            if !self.keeps(&middle, &middle) && !self.untangle(&mut middle, Regularisation::Fitting)
+            {
                 return Ok(false);
             }
             ahead.push(next);
@@ -362,25 +320,28 @@ impl<M: BoundaryMotion> Follower<'_, M> {
         Ok(true)
     }
 
-    /// Goes from `start` to a valid shape over shapes whose boundary is not where the motion has it, if there is such a way.
-    fn spring(&mut self, start: &Arc<[Vector]>, end: &Waypoint) {
-        let keeps = |from: &[Vector], to: &[Vector]| self.keeps(from, to);
-        let Some(way) = sprung(self.domain, start, &end.points, &keeps) else { return };
+    /// Goes from `start` to a valid shape over shapes whose boundary is not where the motion has
+    /// it, if there is such a way.
+    fn spring(&mut self, start: &Arc<[Vector]>, end: &Waypoint) -> bool {
+        let keeps =
+            |from: &[Vector], to: &[Vector]| self.keeps(from, to) && self.motion.is_sound(to);
+        let Some(way) = sprung(self.volume, start, &end.points, &keeps) else { return false };
         self.route.waypoints.clear();
         let count = way.len();
         for (index, points) in way.into_iter().enumerate() {
-            #[expect(clippy::cast_precision_loss, reason = "a few hundred shapes")]
             let fraction = if index + 1 == count {
                 end.fraction
             } else {
-                end.fraction * (index + 1) as f64 / count as f64
+                end.fraction * real(index + 1) / real(count)
             };
             self.route.untangled += 1;
             self.go(fraction, points);
         }
+        true
     }
 
-    /// The operator on another shape; `None` where its equations cannot be set up with any stiffening.
+    /// The operator on another shape; `None` where its equations cannot be set up with any
+    /// stiffening.
     fn operator(
         &self,
         before: Option<&VolumeOperator>,
@@ -388,19 +349,26 @@ impl<M: BoundaryMotion> Follower<'_, M> {
         stiffening: f64,
         settings: &Deform,
     ) -> Result<Option<Arc<VolumeOperator>>, FollowError<M::Error>> {
-        let Domain { boundary, partition, .. } = self.domain;
+        let Volume { domain, boundary, solvers, .. } = self.volume;
         for stiffening in [stiffening, 0.0] {
             let made = match before {
                 Some(before) => before.restiffened(stiffened, stiffening),
                 None => {
                     let settings = Deform { stiffening, ..*settings };
-                    VolumeOperator::of_part(stiffened, boundary, &[], &settings, partition)
+                    VolumeOperator::with_sliding(
+                        domain.with_mesh(stiffened.clone()),
+                        boundary,
+                        &[],
+                        &settings,
+                        solvers,
+                    )
                 }
             };
             match made {
                 Ok(made) => return Ok(Some(Arc::new(made.with_tolerance(settings.tolerance)))),
                 Err(VolumeError::Linear(_)) => {}
-                // A mesh that the guard lets through and the material does not is one that no solve can follow.
+                // A mesh that the guard lets through and the material does not is one that no solve
+                // can follow.
                 Err(VolumeError::InvertedCell { .. } | VolumeError::OtherRank)
                     if self.here.fraction > 0.0 => {}
                 Err(error) => return Err(FollowError::Volume(error)),
@@ -409,17 +377,17 @@ impl<M: BoundaryMotion> Follower<'_, M> {
         Ok(None)
     }
 
-    /// The displacement that takes the boundary to `places`, solved for from a guess, and the shape after it; `None` where it cannot be
-    /// solved for.
+    /// The displacement that takes the boundary to `positions`, solved for from a guess, and the
+    /// shape after it; `None` where it cannot be solved for.
     fn moved(
         &mut self,
         operator: Option<&VolumeOperator>,
         shape: &[Vector],
-        places: &[Vector],
+        positions: &[Vector],
         guess: Option<Vec<Vector>>,
     ) -> Result<Option<Moved>, FollowError<M::Error>> {
         let Some(operator) = operator else { return Ok(None) };
-        match moved(operator, shape, places, guess, &mut self.route.iterations) {
+        match moved(operator, shape, positions, guess, &mut self.route.iterations) {
             Ok(found) => Ok(Some(found)),
             Err(VolumeError::Linear(_)) => Ok(None),
             Err(error) => Err(FollowError::Volume(error)),
@@ -433,8 +401,7 @@ impl<M: BoundaryMotion> Follower<'_, M> {
         impossible: Option<Impossible>,
         end_is_valid: bool,
     ) -> FollowError<M::Error> {
-        let Domain { mesh, partition, .. } = self.domain;
-        match judge_in_parts(mesh, &self.here.points, candidate, &[1.0], self.guard, &**partition) {
+        match judge(self.volume.domain, &self.here.points, candidate, &[1.0], self.guard) {
             Err(refusal) => FollowError::Stalled(Box::new(Stalled {
                 route: self.route,
                 refusal,
@@ -452,27 +419,33 @@ fn scaled(displacement: &[Vector], factor: f64) -> Vec<Vector> {
     displacement.iter().map(|&by| scale(by, factor)).collect()
 }
 
-fn with_boundary(boundary: &[u32], shape: &[Vector], places: &[Vector]) -> Vec<Vector> {
+/// A shape with the vertices `boundary` at other positions.
+pub(crate) fn with_boundary(
+    boundary: &[u32],
+    shape: &[Vector],
+    positions: &[Vector],
+) -> Vec<Vector> {
     let mut shape = shape.to_vec();
-    for (&vertex, &place) in boundary.iter().zip(places) {
-        shape[vertex as usize] = place;
+    for (&vertex, &position) in boundary.iter().zip(positions) {
+        shape[vertex as usize] = position;
     }
     shape
 }
 
-/// The displacement that takes the boundary to `places`, solved for from a guess, and the shape after it.
+/// The displacement that takes the boundary to `positions`, solved for from a guess, and the shape
+/// after it.
 fn moved(
     operator: &VolumeOperator,
     shape: &[Vector],
-    places: &[Vector],
+    positions: &[Vector],
     guess: Option<Vec<Vector>>,
     iterations: &mut usize,
 ) -> Result<Moved, VolumeError> {
     let displacement: Vec<Vector> = operator
         .boundary()
         .iter()
-        .zip(places)
-        .map(|(&vertex, place)| subtract(*place, shape[vertex as usize]))
+        .zip(positions)
+        .map(|(&vertex, position)| subtract(*position, shape[vertex as usize]))
         .collect();
     let solution = match guess {
         Some(guess) => operator.solve_from(&displacement, &guess)?,
@@ -481,7 +454,7 @@ fn moved(
     *iterations += solution.iterations;
     let candidate: Vec<Vector> =
         shape.iter().zip(&solution.displacement).map(|(&a, &b)| add(a, b)).collect();
-    Ok((solution.displacement, with_boundary(operator.boundary(), &candidate, places)))
+    Ok((solution.displacement, with_boundary(operator.boundary(), &candidate, positions)))
 }
 
 fn overflow() -> VolumeError {
@@ -493,8 +466,10 @@ mod tests {
     use std::convert::Infallible;
 
     use super::*;
-    use crate::partition::whole;
-    use crate::quality::{keeps, quality};
+    use crate::linear::BuiltIn;
+    use crate::mesh::Domain;
+    use crate::mesh::Mesh;
+    use crate::quality::{Refusal, keeps, quality};
     use crate::shapes;
 
     struct Places<F>(F);
@@ -527,7 +502,8 @@ mod tests {
         moved(&operator, mesh.points(), places, None, &mut 0).unwrap().1
     }
 
-    /// A turn that a single solve cannot follow, on tetrahedra and on hexahedra; every piece of the way holds.
+    /// A turn that a single solve cannot follow, on tetrahedra and on hexahedra; every piece of the
+    /// way holds.
     #[test]
     fn a_half_twist_is_followed() {
         let guard = Guard { min_scaled_jacobian: 0.01, ..Guard::default() };
@@ -541,12 +517,12 @@ mod tests {
             let start: Arc<[Vector]> = mesh.points().into();
             let untangler = Arc::new(Untangler::new(&mesh, &boundary));
             let untangler = || Arc::clone(&untangler);
-            let partition = whole();
-            let domain =
-                Domain { mesh: &mesh, boundary: &boundary, partition: &partition, operator: None };
+            let domain = Domain::from(&mesh);
+            let volume =
+                Volume { domain: &domain, boundary: &boundary, solvers: &BuiltIn, operator: None };
             let mut motion = Places(|to| twisted(&mesh, &boundary, 180.0 * to));
             let route =
-                follow(domain, &start, &mut motion, &Deform::default(), &guard, Some(&untangler))
+                follow(volume, &start, &mut motion, &Deform::default(), &guard, Some(&untangler))
                     .unwrap();
             let mut before = &start;
             for point in &route.waypoints {
@@ -559,7 +535,7 @@ mod tests {
                 assert_eq!(before[vertex as usize], *place);
             }
             let again =
-                follow(domain, &start, &mut motion, &Deform::default(), &guard, Some(&untangler))
+                follow(volume, &start, &mut motion, &Deform::default(), &guard, Some(&untangler))
                     .unwrap();
             assert_eq!(route, again);
         }
@@ -581,11 +557,11 @@ mod tests {
         let untangler = Arc::new(Untangler::new(&mesh, &boundary));
         let untangler = || Arc::clone(&untangler);
         let guard = Guard { min_scaled_jacobian: 0.05, ..Guard::default() };
-        let partition = whole();
-        let domain =
-            Domain { mesh: &mesh, boundary: &boundary, partition: &partition, operator: None };
+        let domain = Domain::from(&mesh);
+        let volume =
+            Volume { domain: &domain, boundary: &boundary, solvers: &BuiltIn, operator: None };
         let result = follow(
-            domain,
+            volume,
             &start,
             &mut Places(pressed),
             &Deform::default(),

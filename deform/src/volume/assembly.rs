@@ -4,11 +4,13 @@ use std::sync::Arc;
 
 use super::element::{Elements, Scratch};
 use super::{VolumeError, agreed};
+use crate::communicator::{Communicator, Reduction};
 use crate::linear::{Block, SparseMatrix, reverse_cuthill_mckee};
-use crate::mesh::{Mesh, Ordered, Vector, is_left_handed};
+use crate::mesh::cell_geometry::centroid;
+use crate::mesh::{Domain, Mesh, Ordered, Vector, is_left_handed};
+use crate::number::{index, real};
 use crate::parallel;
-use crate::partition::{Partition, Reduction, Shares, all, any};
-use crate::quality::centroid;
+use crate::topology::{Groups, indices, marks};
 use crate::vector::dot;
 
 /// How many cells are worked on at a time.
@@ -20,8 +22,8 @@ const ASSEMBLY_CHUNK: usize = 8192;
 /// Which vertex is what: free ones are numbered first, then those of the boundary.
 const NONE: u32 = u32::MAX;
 
-/// A bilinear form: what it couples two shape functions with, by their gradients. It is linear in the product of these, so
-/// that products are summed over the cells first.
+/// A bilinear form: what it couples two shape functions with, by their gradients. It is linear in
+/// the product of these, so that products are summed over the cells first.
 pub(super) trait Form<const B: usize>: Sync {
     /// A sum of products of gradients.
     type Sum: Copy + Default;
@@ -113,84 +115,48 @@ pub(super) struct Graph {
     pub(super) ordered: Arc<Ordered>,
     /// The vertex of each unknown.
     pub(super) vertices: Vec<u32>,
-    /// For each vertex of the ordered mesh the number of its unknown; for boundary vertices the number of unknowns and their
-    /// number on the boundary.
+    /// For each vertex of the ordered mesh the number of its unknown; for boundary vertices the
+    /// number of unknowns and their number on the boundary.
     slots: Vec<u32>,
-    /// The other way round: the vertices of the ordered mesh that are solved for, and those of the boundary.
+    /// The other way round: the vertices of the ordered mesh that are solved for, and those of the
+    /// boundary.
     slot_vertices: Vec<u32>,
-    incidence: Incidence,
+    /// The volume cells at each vertex of the ordered mesh.
+    cells_at: Groups<u32>,
     matrix: (Vec<usize>, Vec<u32>),
     coupling: (Vec<usize>, Vec<u32>),
 }
 
-/// The volume cells at each vertex of the ordered mesh.
-#[derive(Debug)]
-struct Incidence {
-    offsets: Vec<usize>,
-    cells: Vec<u32>,
-}
-
-impl Incidence {
-    fn new(mesh: &Mesh) -> Self {
-        let cells = mesh.cells();
-        let volume_cells =
-            || (0..cells.len()).filter(|&cell| cells.cell_type(cell).dimension() == 3);
-        let mut offsets = vec![0usize; mesh.points().len() + 2];
-        for cell in volume_cells() {
-            for &vertex in cells.vertices(cell) {
-                offsets[vertex as usize + 2] += 1;
-            }
-        }
-        for index in 2..offsets.len() {
-            offsets[index] += offsets[index - 1];
-        }
-        let mut found = vec![0u32; offsets[offsets.len() - 1]];
-        for cell in volume_cells() {
-            for &vertex in cells.vertices(cell) {
-                let place = &mut offsets[vertex as usize + 1];
-                #[expect(
-                    clippy::cast_possible_truncation,
-                    reason = "checked where the operator is set up"
-                )]
-                (found[*place] = cell as u32);
-                *place += 1;
-            }
-        }
-        offsets.pop();
-        Self { offsets, cells: found }
-    }
-
-    fn cells(&self, vertex: u32) -> &[u32] {
-        &self.cells[self.offsets[vertex as usize]..self.offsets[vertex as usize + 1]]
-    }
+/// The volume cells at each vertex of a mesh.
+fn volume_cells_at(mesh: &Mesh) -> Groups<u32> {
+    let cells =
+        mesh.cells().iter().zip(0u32..).filter(|((cell_type, _), _)| cell_type.dimension() == 3);
+    let corners =
+        cells.flat_map(|((_, vertices), cell)| vertices.iter().map(move |&vertex| (vertex, cell)));
+    Groups::new(mesh.points().len(), corners)
 }
 
 impl Graph {
     /// # Errors
-    /// [`VolumeError::BoundaryVertex`], [`VolumeError::BoundaryTwice`], [`VolumeError::Unattached`].
+    /// [`VolumeError::BoundaryVertex`], [`VolumeError::BoundaryTwice`],
+    /// [`VolumeError::Unattached`].
     pub(super) fn new(
         ordered: Arc<Ordered>,
         boundary: &[u32],
-        partition: &dyn Partition,
+        domain: &Domain,
     ) -> Result<Self, VolumeError> {
-        let boundary: Vec<u32> = agreed(partition, boundary_places(&ordered, boundary))?;
+        let boundary: Vec<u32> =
+            agreed(domain.communicator(), boundary_indices(&ordered, boundary))?;
         let mesh = ordered.mesh();
         let vertex_count = mesh.points().len();
-        let mut on_boundary = vec![false; vertex_count];
-        boundary.iter().for_each(|&vertex| on_boundary[vertex as usize] = true);
-        let incidence = Incidence::new(mesh);
-        #[expect(clippy::cast_possible_truncation, reason = "vertex numbers are 32-bit")]
-        let free: Vec<u32> = (0..vertex_count as u32)
-            .filter(|&vertex| !on_boundary[vertex as usize] && !incidence.cells(vertex).is_empty())
-            .collect();
-        #[expect(clippy::cast_possible_truncation, reason = "no more than there are vertices")]
-        let free_count = free.len() as u32;
-        let mut slots = vec![NONE; vertex_count];
-        for (slot, &vertex) in (0..).zip(free.iter().chain(&boundary)) {
-            slots[vertex as usize] = slot;
-        }
-
-        let (offsets, neighbours) = neighbours(mesh, &incidence, &free, &slots);
+        let on_boundary = marks(vertex_count, &boundary);
+        let cells_at = volume_cells_at(mesh);
+        let is_free =
+            |&vertex: &u32| !on_boundary[vertex as usize] && !cells_at.of(vertex).is_empty();
+        let free: Vec<u32> = (0..index(vertex_count)).filter(is_free).collect();
+        let free_count = index(free.len());
+        let slots = indices(vertex_count, &[&free[..], &boundary].concat());
+        let (offsets, neighbours) = neighbours(mesh, &cells_at, &free, &slots);
         let row = |index: u32| &neighbours[offsets[index as usize]..offsets[index as usize + 1]];
         let split = |index: u32| {
             let row = row(index);
@@ -198,17 +164,14 @@ impl Graph {
         };
         let order = reverse_cuthill_mckee(free.len(), |index| split(index).0);
 
-        let mut place = vec![0u32; free.len()];
-        for (new, &old) in (0..).zip(&order) {
-            place[old as usize] = new;
-        }
+        let new_index = indices(free.len(), &order);
         let parts = parallel::map_chunks(order.len(), ASSEMBLY_CHUNK, |range| {
             let mut inner_rows = (Vec::with_capacity(range.len()), Vec::new());
             let mut outer_rows = (Vec::with_capacity(range.len()), Vec::new());
             for &old in &order[range] {
                 let (inner, outer) = split(old);
                 let start = inner_rows.1.len();
-                inner_rows.1.extend(inner.iter().map(|&slot| place[slot as usize]));
+                inner_rows.1.extend(inner.iter().map(|&slot| new_index[slot as usize]));
                 inner_rows.1[start..].sort_unstable();
                 inner_rows.0.push(inner.len());
                 outer_rows.1.extend(outer.iter().map(|&slot| slot - free_count));
@@ -220,18 +183,16 @@ impl Graph {
         let (matrix, coupling) = (compressed(inner), compressed(outer));
         let slot_vertices: Vec<u32> =
             order.iter().map(|&old| free[old as usize]).chain(boundary).collect();
-        for (slot, &vertex) in (0..).zip(&slot_vertices) {
-            slots[vertex as usize] = slot;
-        }
+        let slots = indices(vertex_count, &slot_vertices);
         let vertices: Vec<u32> = slot_vertices[..free.len()]
             .iter()
             .map(|&vertex| ordered.numbering().vertex(vertex))
             .collect();
         agreed(
-            partition,
-            check_attached(&vertices, (&matrix.0, &matrix.1), &coupling.0, partition),
+            domain.communicator(),
+            check_attached(&vertices, (&matrix.0, &matrix.1), &coupling.0, domain),
         )?;
-        Ok(Self { ordered, vertices, slots, slot_vertices, incidence, matrix, coupling })
+        Ok(Self { ordered, vertices, slots, slot_vertices, cells_at, matrix, coupling })
     }
 
     /// The unknown of a vertex that is solved for.
@@ -246,7 +207,7 @@ impl Graph {
     }
 
     fn slot(&self, vertex: u32) -> u32 {
-        self.ordered.numbering().place(vertex).map_or(NONE, |place| self.slots[place as usize])
+        self.ordered.numbering().index(vertex).map_or(NONE, |index| self.slots[index as usize])
     }
 
     /// How many vertices the mesh has.
@@ -254,8 +215,8 @@ impl Graph {
         self.slots.len()
     }
 
-    /// The matrix of the free vertices, and that which couples them to the boundary. `mesh` is in the order of the graph, and
-    /// `stiffness` has a factor for each of its cells.
+    /// The matrix of the free vertices, and that which couples them to the boundary. `mesh` is in
+    /// the order of the graph, and `stiffness` has a factor for each of its cells.
     pub(super) fn assemble<const B: usize, F: Form<B>>(
         &self,
         mesh: &Mesh,
@@ -276,7 +237,7 @@ impl Graph {
             |rows, inner, outer| {
                 let mut scratch = Scratch::default();
                 // Where in the present row the block of each vertex of the ordered mesh lies.
-                let mut places = vec![0u32; self.slots.len()];
+                let mut column_of = vec![0u32; self.slots.len()];
                 let mut sums: Vec<F::Sum> = Vec::new();
                 let (first, outer_first) = (offsets[rows.start], outer_offsets[rows.start]);
                 for row in rows {
@@ -287,13 +248,13 @@ impl Graph {
                     let outer_columns = outer_columns[outer_range.clone()]
                         .iter()
                         .map(|&column| free_count + column as usize);
-                    for (place, slot) in (0..).zip(inner_columns.chain(outer_columns)) {
-                        places[self.slot_vertices[slot] as usize] = place;
+                    for (column, slot) in (0..).zip(inner_columns.chain(outer_columns)) {
+                        column_of[self.slot_vertices[slot] as usize] = column;
                     }
                     sums.clear();
                     sums.resize(inner_range.len() + outer_range.len(), F::Sum::default());
                     let vertex = self.slot_vertices[row];
-                    for &cell in self.incidence.cells(vertex) {
+                    for &cell in self.cells_at.of(vertex) {
                         let cell = cell as usize;
                         let vertices = mesh.cells().vertices(cell);
                         let Some(own) = vertices.iter().position(|&other| other == vertex) else {
@@ -303,7 +264,11 @@ impl Graph {
                             let weight = weight * stiffness[cell];
                             let own: Vector = gradients[own].map(|value| value * weight);
                             for (&other, &gradient) in vertices.iter().zip(gradients) {
-                                F::add(&mut sums[places[other as usize] as usize], own, gradient);
+                                F::add(
+                                    &mut sums[column_of[other as usize] as usize],
+                                    own,
+                                    gradient,
+                                );
                             }
                         });
                     }
@@ -322,10 +287,11 @@ impl Graph {
     }
 }
 
-/// The slots of the vertices that share a cell with each free vertex (itself among them), rising, in compressed rows.
+/// The slots of the vertices that share a cell with each free vertex (itself among them), rising,
+/// in compressed rows.
 fn neighbours(
     mesh: &Mesh,
-    incidence: &Incidence,
+    cells_at: &Groups<u32>,
     free: &[u32],
     slots: &[u32],
 ) -> (Vec<usize>, Vec<u32>) {
@@ -336,9 +302,10 @@ fn neighbours(
         let mut met = vec![0u32; slots.len()];
         for (row, &vertex) in (1..).zip(&free[range]) {
             let start = found.len();
-            for &cell in incidence.cells(vertex) {
+            for &cell in cells_at.of(vertex) {
                 for &other in mesh.cells().vertices(cell as usize) {
-                    // A vertex that is neither free nor on the boundary is in no volume cell, so every slot is one.
+                    // A vertex that is neither free nor on the boundary is in no volume cell, so
+                    // every slot is one.
                     let slot = slots[other as usize];
                     if std::mem::replace(&mut met[slot as usize], row) != row {
                         found.push(slot);
@@ -370,30 +337,31 @@ fn compressed(parts: Vec<(Vec<usize>, Vec<u32>)>) -> (Vec<usize>, Vec<u32>) {
     (offsets, all)
 }
 
-/// The places of the boundary vertices, each of which must exist and be named once.
-fn boundary_places(ordered: &Ordered, boundary: &[u32]) -> Result<Vec<u32>, VolumeError> {
+/// The indices of the boundary vertices, each of which must exist and be named once.
+fn boundary_indices(ordered: &Ordered, boundary: &[u32]) -> Result<Vec<u32>, VolumeError> {
     let vertex_count = ordered.mesh().points().len();
     let mut named = vec![false; vertex_count];
-    let mut place = |&vertex: &u32| {
-        let place = ordered
+    let mut index = |&vertex: &u32| {
+        let index = ordered
             .numbering()
-            .place(vertex)
+            .index(vertex)
             .ok_or(VolumeError::BoundaryVertex { vertex, vertex_count })?;
-        if std::mem::replace(&mut named[place as usize], true) {
+        if std::mem::replace(&mut named[index as usize], true) {
             return Err(VolumeError::BoundaryTwice { vertex });
         }
-        Ok(place)
+        Ok(index)
     };
-    boundary.iter().map(&mut place).collect()
+    boundary.iter().map(&mut index).collect()
 }
 
-/// Every free vertex must be connected to the boundary, be it on other ranks. `vertices` are in the order of Cuthill and McKee,
-/// reversed: every vertex but the last of its component has a neighbour after it.
+/// Every free vertex must be connected to the boundary, be it on other ranks. `vertices` are in the
+/// order of Cuthill and McKee, reversed: every vertex but the last of its component has a neighbour
+/// after it.
 fn check_attached(
     vertices: &[u32],
     (offsets, columns): (&[usize], &[u32]),
     outer_offsets: &[usize],
-    partition: &dyn Partition,
+    domain: &Domain,
 ) -> Result<(), VolumeError> {
     let mut component = vec![0usize; vertices.len()];
     let mut attached: Vec<bool> = Vec::new();
@@ -407,22 +375,22 @@ fn check_attached(
         };
         attached[component[row]] |= outer_offsets[row] < outer_offsets[row + 1];
     }
-    if partition.ranks() > 1 {
-        // What is held on one rank holds what other ranks have of it.
-        let shares = Shares::new(partition, vertices);
+    if domain.communicator().size() > 1 {
+        // A component that is attached on one rank is attached on every rank that shares it.
+        let halo = domain.halo().of(vertices);
         loop {
             let mut held: Vec<f64> = component
                 .iter()
                 .map(|&component| f64::from(u8::from(attached[component])))
                 .collect();
-            shares.sum(partition, 1, &mut held);
+            halo.sum(1, &mut held);
             let mut news = false;
-            for &place in shares.places() {
-                let attached = &mut attached[component[place as usize]];
-                news |= !*attached && held[place as usize] > 0.0;
-                *attached |= held[place as usize] > 0.0;
+            for &entry in halo.shared() {
+                let attached = &mut attached[component[entry as usize]];
+                news |= !*attached && held[entry as usize] > 0.0;
+                *attached |= held[entry as usize] > 0.0;
             }
-            if !any(partition, news) {
+            if !domain.communicator().any(news) {
                 break;
             }
         }
@@ -437,8 +405,9 @@ fn check_attached(
     }
 }
 
-/// The stiffness of each cell, `(mean volume / volume)^stiffening`; 0 for cells that are not of volume. Divided by the size of
-/// a mean cell, so that the equations are of order 1 whatever the unit of length. `mesh` has the order of `ordered`.
+/// The stiffness of each cell, `(mean volume / volume)^stiffening`; 0 for cells that are not of
+/// volume. Divided by the size of a mean cell, so that the equations are of order 1 whatever the
+/// unit of length. `mesh` has the order of `ordered`.
 ///
 /// # Errors
 /// [`VolumeError::InvertedCell`].
@@ -447,7 +416,7 @@ pub(super) fn stiffness(
     mesh: &Mesh,
     elements: &Elements<'_>,
     stiffening: f64,
-    partition: &dyn Partition,
+    domain: &Domain,
 ) -> Result<Vec<f64>, VolumeError> {
     let cells = mesh.cells();
     let mut volumes = vec![0.0; cells.len()];
@@ -466,9 +435,8 @@ pub(super) fn stiffness(
         })
     });
     let (sum, count) = sums.into_iter().fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
-    #[expect(clippy::cast_precision_loss, reason = "fewer cells than 2^53")]
-    let mut sums = [sum, count as f64];
-    partition.reduce(Reduction::Sum, &mut sums);
+    let mut sums = [sum, real(count)];
+    domain.communicator().reduce(Reduction::Sum, &mut sums);
     let [sum, count] = sums;
     let mean = sum / count.max(1.0);
     let size = mean.cbrt();
@@ -479,7 +447,7 @@ pub(super) fn stiffness(
         }
     });
     let inverted = |&cell: &usize| !volumes[cell].is_finite() || volumes[cell] < 0.0;
-    if all(partition, sum.is_finite() && (0..cells.len()).all(|cell| !inverted(&cell))) {
+    if domain.communicator().all(sum.is_finite() && (0..cells.len()).all(|cell| !inverted(&cell))) {
         return Ok(volumes);
     }
     // A NaN sum makes all of them NaN: the cells are looked at again to tell which are to blame.
@@ -492,7 +460,7 @@ pub(super) fn stiffness(
     let first = broken.iter().copied().min_by_key(|&cell| ordered.cell(cell));
     let Some(cell) = first else { return Err(VolumeError::OtherRank) };
     Err(VolumeError::InvertedCell {
-        cell: partition.cell_number(ordered.cell(cell)),
+        cell: domain.cell_number(ordered.cell(cell)),
         cell_type: cells.cell_type(cell),
         centroid: centroid(cells, cell, mesh.points()),
         count: broken.len(),

@@ -20,7 +20,7 @@ const FIRST: [[usize; 4]; 4] = [[0, 1, 2, 3], [1, 0, 3, 2], [2, 0, 1, 3], [3, 0,
 
 /// A tetrahedron at a corner of a cell, or a cell that is one.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Piece {
+pub(super) struct Simplex {
     pub(super) vertices: [u32; 4],
     /// Makes a corner's determinant by the product of its edges the quality.
     pub(super) factor: f64,
@@ -28,7 +28,7 @@ pub(super) struct Piece {
     pub(super) whole: bool,
 }
 
-impl Piece {
+impl Simplex {
     /// The least quality at its corners.
     pub(super) fn least(&self, points: &[Vector]) -> f64 {
         let [a, b, c, d] = self.vertices.map(|vertex| points[vertex as usize]);
@@ -47,7 +47,7 @@ impl Piece {
     }
 }
 
-/// Four pieces as one of their vertices sees them.
+/// Four simplices as one of their vertices sees them.
 #[derive(Debug, Clone, Copy)]
 struct Four {
     /// The coordinates of each other vertex.
@@ -55,16 +55,16 @@ struct Four {
     /// The gradient of the determinant by the vertex.
     normal: [Lanes; 3],
     factor: Lanes,
-    /// What does not depend on the vertex of the product of the squared edges at each corner, the vertex's own first; infinite
-    /// for corners that do not count.
+    /// The factors of each corner's product of squared edges that do not depend on the vertex, the
+    /// vertex's own corner first; infinite for corners that do not count.
     products: [Lanes; 4],
 }
 
-/// The pieces around a vertex, as it sees them.
+/// The simplices around a vertex, as it sees them.
 #[derive(Debug, Default)]
 pub(super) struct Star {
     fours: Vec<Four>,
-    pieces: usize,
+    simplices: usize,
 }
 
 impl Four {
@@ -108,14 +108,14 @@ impl Four {
 impl Star {
     pub(super) fn clear(&mut self) {
         self.fours.clear();
-        self.pieces = 0;
+        self.simplices = 0;
     }
 
-    /// Adds a piece, of whose vertices `place` is the star's own.
-    pub(super) fn push(&mut self, piece: &Piece, place: usize, points: &[Vector]) {
-        let order = FIRST[place];
+    /// Adds a simplex, of whose vertices `index` is the star's own.
+    pub(super) fn push(&mut self, simplex: &Simplex, index: usize, points: &[Vector]) {
+        let order = FIRST[index];
         let others =
-            [order[1], order[2], order[3]].map(|local| points[piece.vertices[local] as usize]);
+            [order[1], order[2], order[3]].map(|local| points[simplex.vertices[local] as usize]);
         let [a, b, c] = others;
         let square = |p: Vector, q: Vector| {
             let edge = subtract(p, q);
@@ -124,11 +124,11 @@ impl Star {
         let (ab, ac, bc) = (square(a, b), square(a, c), square(b, c));
         let products = [1.0, ab * ac, ab * bc, ac * bc];
         let normal = cross(subtract(c, a), subtract(b, a));
-        let lane = self.pieces % LANES;
+        let lane = self.simplices % LANES;
         if lane == 0 {
             self.fours.push(Four::NONE);
         }
-        self.pieces += 1;
+        self.simplices += 1;
         let Some(four) = self.fours.last_mut() else { return };
         for axis in 0..3 {
             for (lanes, other) in four.others.iter_mut().zip(&others) {
@@ -136,9 +136,9 @@ impl Star {
             }
             four.normal[axis].0[lane] = normal[axis];
         }
-        four.factor.0[lane] = piece.factor;
+        four.factor.0[lane] = simplex.factor;
         for ((local, product), lanes) in order.into_iter().zip(products).zip(&mut four.products) {
-            if piece.whole || local == 0 {
+            if simplex.whole || local == 0 {
                 lanes.0[lane] = product;
             }
         }
@@ -166,7 +166,7 @@ impl Star {
     }
 }
 
-/// What one sweep brings down: `Σ (δ / (q - τ))² - 0.01 ln q` over the corners `q` of a star.
+/// The energy that one sweep lowers: `Σ (δ / (q - τ))² - 0.01 ln q` over the corners `q` of a star.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Barrier {
     /// `τ`.
@@ -305,8 +305,9 @@ pub(super) fn length(index: usize) -> f64 {
     if index == 0 { 0.0 } else { (power(index) - power(SHORTER)).exp2() }
 }
 
-/// The place along a direction where the energy, a function of the length, has fallen enough: where the direction itself is not too
-/// long but falls short, as it does near the barrier, it is doubled while that helps.
+/// The place along a direction where the energy, a function of the length, has fallen enough: where
+/// the direction itself is not too long but falls short, as it does near the barrier, it is doubled
+/// while that helps.
 pub(super) fn searched(
     point: Vector,
     direction: Vector,
@@ -340,7 +341,8 @@ pub(super) fn searched(
     point
 }
 
-/// The direction of Newton's method, with as much of the identity added to the Hessian as makes it positive definite.
+/// The direction of Newton's method, with as much of the identity added to the Hessian as makes it
+/// positive definite.
 pub(super) fn newton(gradient: &Vector, hessian: &[Vector; 3]) -> Option<Vector> {
     let size = (hessian[0][0] + hessian[1][1] + hessian[2][2]).abs();
     let least = 1e-9 * size;
@@ -390,9 +392,9 @@ mod tests {
             [0.1, 0.0, 1.2],
             [0.0, 0.0, -1.0],
         ];
-        let piece = |vertices, whole| Piece { vertices, factor: 1.2, whole };
+        let simplex = |vertices, whole| Simplex { vertices, factor: 1.2, whole };
         let mut star = Star::default();
-        for (vertices, place, whole) in [
+        for (vertices, index, whole) in [
             ([0, 1, 2, 5], 0, true),
             ([2, 3, 0, 5], 2, true),
             ([4, 3, 5, 0], 3, true),
@@ -400,7 +402,7 @@ mod tests {
             ([0, 2, 1, 6], 0, false),
             ([2, 3, 6, 0], 3, false),
         ] {
-            star.push(&piece(vertices, whole), place, &points);
+            star.push(&simplex(vertices, whole), index, &points);
         }
         (points[0], star)
     }
@@ -434,31 +436,32 @@ mod tests {
         }
     }
 
-    /// Three edges of length 1 at right angles: the quality at their corner is the factor, at the others the factor by the root of 4.
+    /// Three edges of length 1 at right angles: the quality at their corner is the factor, at the
+    /// others the factor by the root of 4.
     #[test]
-    fn corners_count_as_their_piece_says() {
+    fn corners_count_as_their_simplex_says() {
         let points = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let barrier = Barrier { floor: 0.1, gap: 0.3 };
         for (whole, least, corners) in
             [(true, 0.4, vec![0.8, 0.4, 0.4, 0.4]), (false, 0.8, vec![0.8])]
         {
-            let piece = Piece { vertices: [0, 1, 2, 3], factor: 0.8, whole };
-            assert!((piece.least(&points) - least).abs() < 1e-15);
+            let simplex = Simplex { vertices: [0, 1, 2, 3], factor: 0.8, whole };
+            assert!((simplex.least(&points) - least).abs() < 1e-15);
             let expected: f64 =
                 corners.iter().map(|q: &f64| (0.3 / (q - 0.1)).powi(2) - MEAN * q.ln()).sum();
-            for place in 0..4 {
+            for index in 0..4 {
                 let mut star = Star::default();
-                star.push(&piece, place, &points);
-                assert!((barrier.energy(points[place], &star) - expected).abs() < 1e-13, "{place}");
+                star.push(&simplex, index, &points);
+                assert!((barrier.energy(points[index], &star) - expected).abs() < 1e-13, "{index}");
                 assert!(
-                    star.is_above(points[place], 0.999 * least)
-                        && !star.is_above(points[place], 1.001 * least)
+                    star.is_above(points[index], 0.999 * least)
+                        && !star.is_above(points[index], 1.001 * least)
                 );
             }
             assert_eq!(
                 Barrier { floor: least, ..barrier }.energy(points[0], &{
                     let mut star = Star::default();
-                    star.push(&piece, 0, &points);
+                    star.push(&simplex, 0, &points);
                     star
                 }),
                 f64::INFINITY

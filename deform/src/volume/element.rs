@@ -1,20 +1,24 @@
 //! Gradients of the shape functions of volume cells at points of quadrature.
 
+use crate::mesh::cell_geometry::{corner_tets, tet_determinant};
 use crate::mesh::{CellType, Mesh, Vector};
-use crate::quality::{corner_tets, tet_determinant};
+use crate::number::real;
 use crate::vector::{add, cross, dot, mean, scale, subtract};
 
-/// Derivatives of the shape functions of one cell type, in its own coordinates, at the points of a quadrature rule.
+/// Derivatives of the shape functions of one cell type, in its own coordinates, at the points of a
+/// quadrature rule.
 type Rule = Vec<(f64, Vec<Vector>)>;
 
 /// The volume cells of a mesh as finite elements.
 ///
 /// - Tetrahedra: linear, exact.
 /// - Hexahedra and voxels: trilinear, 2×2×2 Gauss points.
-/// - Wedges: linear by linear, 3×2 points. Pyramids: the hexahedron whose upper face is drawn together, 2×2×2 points.
-/// - Prisms and polyhedra: split into the tetrahedra that each edge of each face makes with the mean of the face and the mean
-///   of the cell; the displacement of a mean is the mean of the vertices' (no unknowns are added, neighbours agree on
-///   shared faces, linear fields are represented exactly).
+/// - Wedges: linear by linear, 3×2 points. Pyramids: the hexahedron whose upper face is drawn
+///   together, 2×2×2 points.
+/// - Prisms and polyhedra: split into the tetrahedra that each edge of each face makes with the
+///   mean of the face and the mean of the cell; the displacement of a mean is the mean of the
+///   vertices' (no unknowns are added, neighbours agree on shared faces, linear fields are
+///   represented exactly).
 pub(super) struct Elements<'a> {
     mesh: &'a Mesh,
     hexahedron: Rule,
@@ -42,7 +46,8 @@ impl<'a> Elements<'a> {
         Self { mesh, hexahedron, voxel, wedge: wedge_rule(), pyramid: pyramid_rule() }
     }
 
-    /// The volume of a cell; `None` where it, or the determinant at a corner or point of quadrature, is not positive.
+    /// The volume of a cell; `None` where it, or the determinant at a corner or point of
+    /// quadrature, is not positive.
     pub(super) fn volume(&self, cell: usize, scratch: &mut Scratch) -> Option<f64> {
         let (mut volume, mut valid) = (0.0, true);
         self.for_each_point(cell, scratch, |weight, _| {
@@ -62,8 +67,8 @@ impl<'a> Elements<'a> {
         (valid && volume.is_finite()).then_some(volume)
     }
 
-    /// Calls `visit` with the weight (in units of volume) of each point of quadrature of a volume cell, and the gradients there
-    /// of the shape functions of the cell's vertices.
+    /// Calls `visit` with the weight (in units of volume) of each point of quadrature of a volume
+    /// cell, and the gradients there of the shape functions of the cell's vertices.
     #[inline]
     pub(super) fn for_each_point(
         &self,
@@ -124,7 +129,8 @@ impl<'a> Elements<'a> {
         let point = |vertex: u32| self.mesh.points()[vertex as usize];
         let local = |vertex: u32| vertices.iter().position(|&other| other == vertex);
         let centre = mean(vertices.iter().map(|&vertex| point(vertex)));
-        // Each tetrahedron has two or three vertices of the face, the mean of the cell and perhaps that of the face.
+        // Each tetrahedron has two or three vertices of the face, the mean of the cell and perhaps
+        // that of the face.
         let mut part = |corners: [Vector; 4], own: &[u32], face: &[u32]| {
             let (weight, [first, second, third, last]) = tetra(corners);
             gradients.clear();
@@ -157,8 +163,7 @@ impl<'a> Elements<'a> {
 
 /// The part of a mean's gradient that falls to one of `count` vertices.
 fn share(gradient: Vector, count: usize) -> Vector {
-    #[expect(clippy::cast_precision_loss, reason = "a cell's vertex count is small")]
-    scale(gradient, 1.0 / count as f64)
+    scale(gradient, 1.0 / real(count))
 }
 
 /// The volume of a tetrahedron and the gradients of its linear shape functions.
@@ -182,7 +187,8 @@ fn gauss() -> [f64; 2] {
 /// The corners of the unit square in order around.
 const SQUARE: [(f64, f64); 4] = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
 
-/// The linear function that is 1 at `end` (0 or 1) and 0 at the other end of `0..=1`: its value and slope.
+/// The linear function that is 1 at `end` (0 or 1) and 0 at the other end of `0..=1`: its value and
+/// slope.
 fn linear(end: f64, at: f64) -> (f64, f64) {
     if end > 0.5 { (at, 1.0) } else { (1.0 - at, -1.0) }
 }

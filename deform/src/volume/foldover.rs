@@ -4,7 +4,8 @@ use crate::linear::Block;
 use crate::mesh::Vector;
 use crate::vector::{add, cross, determinant, dot, scale, subtract};
 
-/// The weight of the term that resists a change of volume; the rest is that of the term that resists a change of shape.
+/// The weight of the term that resists a change of volume; the rest is that of the term that
+/// resists a change of shape.
 const VOLUME: f64 = 0.5;
 
 /// The energy of a corner that is as in the reference: the least there is.
@@ -29,7 +30,8 @@ pub(super) struct Local {
     pub(super) blocks: [Block<3>; 10],
 }
 
-/// The gradient of the map that takes the reference, where the shape functions have `gradients`, to `points`.
+/// The gradient of the map that takes the reference, where the shape functions have `gradients`, to
+/// `points`.
 #[inline]
 pub(super) fn jacobian(points: [Vector; 4], gradients: &[Vector; 4]) -> Matrix {
     let mut rows = [[0.0; 3]; 3];
@@ -60,6 +62,12 @@ fn regularised(determinant: f64, epsilon: f64) -> (f64, f64) {
     (chi, root)
 }
 
+/// `χ`.
+#[inline]
+pub(super) fn chi(determinant: f64, epsilon: f64) -> f64 {
+    regularised(determinant, epsilon).0
+}
+
 /// `(1 - t) tr(JᵀJ) / χ^⅔ + t (1 + det²J) / χ`: at least 2 for a rotation.
 #[inline]
 pub(super) fn energy(j: &Matrix, epsilon: f64) -> f64 {
@@ -72,8 +80,9 @@ pub(super) fn energy(j: &Matrix, epsilon: f64) -> f64 {
 
 /// The energy to second order at `j`.
 ///
-/// In the frame of the singular vectors the Hessian falls apart into 3×3 for the singular values and three pairs of a twist and
-/// a flip (B. Smith, F. de Goes, T. Kim, *Analytic eigensystems for isotropic distortion energies*, 2019).
+/// In the frame of the singular vectors the Hessian falls apart into 3×3 for the singular values
+/// and three pairs of a twist and a flip (B. Smith, F. de Goes, T. Kim, *Analytic eigensystems for
+/// isotropic distortion energies*, 2019).
 pub(super) fn local(j: &Matrix, epsilon: f64, gradients: &[Vector; 4]) -> Local {
     let determinant = determinant_of(j);
     let (chi, root) = regularised(determinant, epsilon);
@@ -149,7 +158,8 @@ fn rotated(left: &Matrix, block: &Block<3>) -> Block<3> {
     })
 }
 
-/// `J = Σ sigma[k] left[k] right[k]ᵀ` to rounding, with right-handed vectors and the sign of the determinant in the last value.
+/// `J = Σ sigma[k] left[k] right[k]ᵀ` to rounding, with right-handed vectors and the sign of the
+/// determinant in the last value.
 pub(super) fn singular(j: &Matrix) -> (Matrix, Vector, Matrix) {
     let mut square = [[0.0; 3]; 3];
     for (a, row) in square.iter_mut().enumerate() {

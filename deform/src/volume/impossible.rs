@@ -2,16 +2,21 @@
 
 use std::fmt;
 
-use super::untangle::{Corner, corners};
-use crate::mesh::{CellType, Mesh, Vector};
-use crate::partition::{Partition, all};
-use crate::quality::{Measure, Scratch, centroid};
-use crate::vector::{add, cross, dot, scale, subtract};
+use super::corners::{Corner, for_each_corner_of};
+use super::foldover::determinant_of;
+use crate::communicator::{Communicator, Garbled, Reader, Writer};
+use crate::mesh::cell_geometry::{Scratch, centroid};
+use crate::mesh::{CellType, Domain, Vector};
+use crate::quality::Measure;
+use crate::topology::marks;
+use crate::vector::{add, cross, dot, scale, triangle_normal};
 
-/// Half-spaces about one vertex that are looked at: more than any mesh has but about a vertex where thousands of cells meet.
+/// Half-spaces about one vertex that are looked at: more than any mesh has but about a vertex where
+/// thousands of cells meet.
 const HALF_SPACES: usize = 32;
 
-/// Half-spaces that miss each other by less than this part of the size of the cells may do so by rounding.
+/// Half-spaces that miss each other by less than this part of the size of the cells may do so by
+/// rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// Why the cells of a mesh cannot all be valid with their boundary where it is prescribed.
@@ -25,11 +30,21 @@ pub enum Impossible {
         cell_type: CellType,
         /// The mean of its vertices in the reference.
         centroid: Vector,
-        /// What its scaled Jacobian would be.
+        /// The scaled Jacobian that it would have.
         scaled_jacobian: f64,
     },
-    /// A vertex inside belongs to cells whose other vertices are on the boundary, and there is no place where all of these cells
-    /// are valid.
+    /// A corner of a cell and its three neighbours are on the boundary, so that nothing can mend
+    /// it.
+    Corner {
+        /// The cell's number in the mesh.
+        cell: usize,
+        /// Its type.
+        cell_type: CellType,
+        /// The mean of its vertices in the reference.
+        centroid: Vector,
+    },
+    /// A vertex inside belongs to cells whose other vertices are on the boundary, and there is no
+    /// place where all of these cells are valid.
     Vertex {
         /// Where the vertex lies in the reference.
         point: Vector,
@@ -46,6 +61,11 @@ impl fmt::Display for Impossible {
                 "cell {cell} ({cell_type}) at ({x:.6}, {y:.6}, {z:.6}) has all its vertices on the prescribed boundary, which gives \
                  it a scaled Jacobian of {scaled_jacobian:.4}"
             ),
+            Self::Corner { cell, cell_type, centroid: [x, y, z] } => write!(
+                formatter,
+                "cell {cell} ({cell_type}) at ({x:.6}, {y:.6}, {z:.6}) has a corner and its three neighbours on the prescribed \
+                 boundary, which turns it inside out there"
+            ),
             Self::Vertex { point: [x, y, z], cells } => {
                 let mut cells = cells.to_vec();
                 cells.sort_unstable();
@@ -61,93 +81,182 @@ impl fmt::Display for Impossible {
     }
 }
 
-impl Impossible {
-    /// A proof that no place of the free vertices gives every cell a scaled Jacobian of at least `floor`, with `boundary` as it
-    /// lies in `points`; `None` where none is found, which does not mean that there is a valid mesh. `mesh` is the reference mesh, or
-    /// this rank's part of it. Collective; the proof of the first rank that has one.
-    #[must_use]
-    pub fn find(
-        mesh: &Mesh,
-        boundary: &[u32],
-        points: &[Vector],
-        floor: f64,
-        partition: &dyn Partition,
-    ) -> Option<Self> {
-        let mut prescribed = vec![false; mesh.points().len()];
-        boundary.iter().for_each(|&vertex| prescribed[vertex as usize] = true);
-        let numbered = |proof: Self| match proof {
-            Self::Cell { cell, cell_type, centroid, scaled_jacobian } => Self::Cell {
-                cell: partition.cell_number(cell),
-                cell_type,
-                centroid,
-                scaled_jacobian,
-            },
-            Self::Vertex { point, cells } => {
-                Self::Vertex { point, cells: cells.map(|cell| partition.cell_number(cell)) }
-            }
+/// The cells and corners of a mesh that its boundary decides about: set up once, and looked at for
+/// any number of boundaries.
+#[derive(Debug)]
+pub(super) struct Prescribed<'a> {
+    domain: &'a Domain,
+    /// The cells all of whose vertices are on the boundary.
+    cells: Vec<usize>,
+    /// The corners of other cells that have all their four.
+    corners: Vec<Corner>,
+    /// The corners with one vertex inside, and which of the four that is; those of one vertex come
+    /// one after the other.
+    free: Vec<(Corner, usize)>,
+}
+
+impl<'a> Prescribed<'a> {
+    /// The cells that `boundary` decides about; `domain` is that of the reference mesh.
+    pub(super) fn new(domain: &'a Domain, boundary: &[u32]) -> Self {
+        let mesh = domain.mesh();
+        let prescribed = marks(mesh.points().len(), boundary);
+        let held = |cell: usize| {
+            mesh.cells().vertices(cell).iter().all(|&vertex| prescribed[vertex as usize])
         };
-        let mine = broken_cell(mesh, &prescribed, points, floor);
-        let mine = mine.or_else(|| torn_vertex(mesh, &prescribed, points)).map(numbered);
-        if all(partition, mine.is_none()) {
+        let cells: Vec<usize> = (0..mesh.cells().len()).filter(|&cell| held(cell)).collect();
+        let (mut corners, mut free) = (Vec::new(), Vec::new());
+        for_each_corner_of(mesh, |corner| {
+            let mut inside = (0..4).filter(|&local| !prescribed[corner.vertices[local] as usize]);
+            match (inside.next(), inside.next()) {
+                (None, _) if !held(corner.cell as usize) => corners.push(corner),
+                (Some(local), None) => free.push((corner, local)),
+                _ => {}
+            }
+        });
+        free.sort_by_key(|&(corner, local)| corner.vertices[local]);
+        Self { domain, cells, corners, free }
+    }
+
+    /// A proof that no place of the vertices inside gives every cell a scaled Jacobian of at least
+    /// `floor`, with the boundary as it lies in `points`; the proof of the first rank that has one.
+    /// Collective.
+    pub(super) fn proof(&self, points: &[Vector], floor: f64) -> Option<Impossible> {
+        let mine = self.broken_cell(points, floor).or_else(|| self.broken_corner(points));
+        let mine =
+            mine.or_else(|| self.torn_vertex(points)).map(|proof| proof.numbered(self.domain));
+        let communicator = self.domain.communicator();
+        if communicator.all(mine.is_none()) {
             return None;
         }
-        let mine = mine.map_or([f64::NAN; LENGTH], Self::packed);
-        partition.gather(&mine).as_chunks::<LENGTH>().0.iter().find_map(Self::unpacked)
+        let mut message = Writer::default();
+        mine.iter().for_each(|proof| proof.write(&mut message));
+        let all = communicator.gather_all(&message.into_bytes());
+        all.iter()
+            .enumerate()
+            .find_map(|(rank, bytes)| Impossible::read(Reader::new(rank, bytes)).ok())
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "fewer cells than 2^53")]
-    fn packed(self) -> [f64; LENGTH] {
-        match self {
-            Self::Cell { cell, cell_type, centroid: [x, y, z], scaled_jacobian } => {
-                [0.0, x, y, z, cell as f64, f64::from(cell_type.vtk()), scaled_jacobian, 0.0]
-            }
-            Self::Vertex { point: [x, y, z], cells: [a, b, c, d] } => {
-                [1.0, x, y, z, a as f64, b as f64, c as f64, d as f64]
-            }
-        }
+    /// The worst of the cells whose vertices are all prescribed, where it is inverted or below
+    /// `floor`.
+    fn broken_cell(&self, points: &[Vector], floor: f64) -> Option<Impossible> {
+        let cells = self.domain.mesh().cells();
+        let measure = Measure::new(cells);
+        let mut scratch = Scratch::default();
+        let measured = self.cells.iter().filter_map(|&cell| {
+            let (value, inverted) =
+                measure.cell(cell, |vertex| points[vertex as usize], &mut scratch)?;
+            (inverted || value < floor).then_some((cell, value))
+        });
+        let (cell, scaled_jacobian) = measured.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let (cell_type, centroid) =
+            (cells.cell_type(cell), centroid(cells, cell, self.domain.mesh().points()));
+        Some(Impossible::Cell { cell, cell_type, centroid, scaled_jacobian })
     }
 
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "what was packed")]
-    fn unpacked(&[kind, x, y, z, a, b, c, d]: &[f64; LENGTH]) -> Option<Self> {
-        if kind == 0.0 {
-            let cell_type = CellType::from_vtk(b as u8)?;
-            Some(Self::Cell {
-                cell: a as usize,
-                cell_type,
-                centroid: [x, y, z],
-                scaled_jacobian: c,
+    /// The corner of another cell that is inverted by most.
+    fn broken_corner(&self, points: &[Vector]) -> Option<Impossible> {
+        let cells = self.domain.mesh().cells();
+        let determinants =
+            self.corners.iter().map(|corner| (corner, determinant_of(&corner.jacobian(points))));
+        let (corner, _) =
+            determinants.filter(|(_, value)| *value <= 0.0).min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let cell = corner.cell as usize;
+        let (cell_type, centroid) =
+            (cells.cell_type(cell), centroid(cells, cell, self.domain.mesh().points()));
+        Some(Impossible::Corner { cell, cell_type, centroid })
+    }
+
+    /// A free vertex and four half-spaces that it must be in, which have no point in common.
+    ///
+    /// That half-spaces have none is shown by four of them (E. Helly 1923): normals that add up to
+    /// zero with factors that are not negative, while the offsets with these factors do not come
+    /// below zero (J. Farkas 1902).
+    fn torn_vertex(&self, points: &[Vector]) -> Option<Impossible> {
+        let vertex = |&(corner, local): &(Corner, usize)| corner.vertices[local] as usize;
+        self.free.chunk_by(|a, b| vertex(a) == vertex(b)).find_map(|about| {
+            let halves =
+                about.iter().filter_map(|(corner, local)| half_space(corner, *local, points));
+            let halves: Vec<HalfSpace> = halves.take(HALF_SPACES).collect();
+            let vertex = vertex(about.first()?);
+            if halves.iter().all(|half| dot(half.normal, points[vertex]) > half.offset) {
+                return None;
+            }
+            disjoint(&halves).map(|cells| Impossible::Vertex {
+                point: self.domain.mesh().points()[vertex],
+                cells,
             })
-        } else if kind == 1.0 {
-            Some(Self::Vertex { point: [x, y, z], cells: [a, b, c, d].map(|cell| cell as usize) })
-        } else {
-            None
-        }
+        })
     }
 }
 
-/// How many numbers a proof is sent as.
-const LENGTH: usize = 8;
+impl Impossible {
+    /// A proof that no place of the free vertices gives every cell a scaled Jacobian of at least
+    /// `floor`, with `boundary` as it lies in `points`; `None` where none is found, which does not
+    /// mean that there is a valid mesh. `domain` is that of the reference mesh. Collective; the
+    /// proof of the first rank that has one.
+    #[must_use]
+    pub fn find(
+        domain: impl Into<Domain>,
+        boundary: &[u32],
+        points: &[Vector],
+        floor: f64,
+    ) -> Option<Self> {
+        Prescribed::new(&domain.into(), boundary).proof(points, floor)
+    }
 
-/// The worst of the cells whose vertices are all prescribed, where it is inverted or below `floor`.
-fn broken_cell(
-    mesh: &Mesh,
-    prescribed: &[bool],
-    points: &[Vector],
-    floor: f64,
-) -> Option<Impossible> {
-    let cells = mesh.cells();
-    let measure = Measure::new(cells);
-    let mut scratch = Scratch::default();
-    let held =
-        |cell: &usize| cells.vertices(*cell).iter().all(|&vertex| prescribed[vertex as usize]);
-    let measured = (0..cells.len()).filter(held).filter_map(|cell| {
-        let (value, inverted) =
-            measure.cell(cell, |vertex| points[vertex as usize], &mut scratch)?;
-        (inverted || value < floor).then_some((cell, value))
-    });
-    let (cell, scaled_jacobian) = measured.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    let (cell_type, centroid) = (cells.cell_type(cell), centroid(cells, cell, mesh.points()));
-    Some(Impossible::Cell { cell, cell_type, centroid, scaled_jacobian })
+    /// The proof with the cells' numbers in the whole mesh.
+    fn numbered(self, domain: &Domain) -> Self {
+        let number = |cell| domain.cell_number(cell);
+        match self {
+            Self::Cell { cell, cell_type, centroid, scaled_jacobian } => {
+                Self::Cell { cell: number(cell), cell_type, centroid, scaled_jacobian }
+            }
+            Self::Corner { cell, cell_type, centroid } => {
+                Self::Corner { cell: number(cell), cell_type, centroid }
+            }
+            Self::Vertex { point, cells } => Self::Vertex { point, cells: cells.map(number) },
+        }
+    }
+
+    fn write(&self, message: &mut Writer) {
+        match self {
+            Self::Cell { cell, cell_type, centroid, scaled_jacobian } => {
+                message.u8(cell_type.vtk());
+                message.u64(*cell as u64);
+                message.f64s(centroid);
+                message.f64s(&[*scaled_jacobian]);
+            }
+            Self::Corner { cell, cell_type, centroid } => {
+                message.u8(cell_type.vtk());
+                message.u64(*cell as u64);
+                message.f64s(centroid);
+            }
+            Self::Vertex { point, cells } => {
+                message.u8(0);
+                cells.iter().for_each(|&cell| message.u64(cell as u64));
+                message.f64s(point);
+            }
+        }
+    }
+
+    fn read(mut reader: Reader<'_>) -> Result<Self, Garbled> {
+        let number =
+            |reader: &mut Reader<'_>| Ok(usize::try_from(reader.u64()?).unwrap_or(usize::MAX));
+        let cell_type = reader.u8()?;
+        if cell_type == 0 {
+            let mut cells = [0; 4];
+            for cell in &mut cells {
+                *cell = number(&mut reader)?;
+            }
+            return Ok(Self::Vertex { cells, point: reader.vector()? });
+        }
+        let cell_type = CellType::from_vtk(cell_type).ok_or(reader.garbled())?;
+        let (cell, centroid) = (number(&mut reader)?, reader.vector()?);
+        if reader.is_empty() {
+            return Ok(Self::Corner { cell, cell_type, centroid });
+        }
+        Ok(Self::Cell { cell, cell_type, centroid, scaled_jacobian: reader.f64s(1)?[0] })
+    }
 }
 
 /// Where a point must lie for a cell to be valid: `normal · x > offset`, the normal of length 1.
@@ -157,51 +266,25 @@ struct HalfSpace {
     cell: usize,
 }
 
-/// A free vertex and four half-spaces that it must be in, which have no point in common.
-///
-/// That half-spaces have none is shown by four of them (E. Helly 1923): normals that add up to zero with factors that are not
-/// negative, while the offsets with these factors do not come below zero (J. Farkas 1902).
-fn torn_vertex(mesh: &Mesh, prescribed: &[bool], points: &[Vector]) -> Option<Impossible> {
-    let mut about: Vec<(u32, HalfSpace)> = Vec::new();
-    for corner in corners(mesh) {
-        let mut free = (0..4).filter(|&local| !prescribed[corner.vertices[local] as usize]);
-        if let (Some(local), None) = (free.next(), free.next()) {
-            about.extend(
-                half_space(&corner, local, points).map(|half| (corner.vertices[local], half)),
-            );
-        }
-    }
-    about.sort_by_key(|(vertex, _)| *vertex);
-    about.chunk_by(|a, b| a.0 == b.0).find_map(|same| {
-        let point = mesh.points()[same[0].0 as usize];
-        let halves: Vec<&HalfSpace> = same.iter().take(HALF_SPACES).map(|(_, half)| half).collect();
-        let now = points[same[0].0 as usize];
-        if halves.iter().all(|half| dot(half.normal, now) > half.offset) {
-            return None;
-        }
-        disjoint(&halves).map(|cells| Impossible::Vertex { point, cells })
-    })
-}
-
 /// Where the free vertex `local` must lie for the corner's determinant to be positive.
 fn half_space(corner: &Corner, local: usize, points: &[Vector]) -> Option<HalfSpace> {
     const OTHERS: [[usize; 3]; 4] = [[1, 3, 2], [0, 2, 3], [0, 3, 1], [0, 1, 2]];
-    let [a, b, c] = OTHERS[local].map(|other| points[corner.vertices[other] as usize]);
-    let normal = cross(subtract(b, a), subtract(c, a));
+    let face = OTHERS[local].map(|other| points[corner.vertices[other] as usize]);
+    let normal = triangle_normal(face);
     let length = dot(normal, normal).sqrt();
     let normal = (length > 0.0 && length.is_finite()).then(|| scale(normal, 1.0 / length))?;
-    Some(HalfSpace { normal, offset: dot(normal, a), cell: corner.cell as usize })
+    Some(HalfSpace { normal, offset: dot(normal, face[0]), cell: corner.cell as usize })
 }
 
 /// The cells of four half-spaces without a point in common.
-fn disjoint(halves: &[&HalfSpace]) -> Option<[usize; 4]> {
+fn disjoint(halves: &[HalfSpace]) -> Option<[usize; 4]> {
     let count = halves.len();
     let size = halves.iter().fold(0.0_f64, |most, half| most.max(half.offset.abs()));
     for d in 3..count {
         for c in 2..d {
             for b in 1..c {
                 for a in 0..b {
-                    let four = [a, b, c, d].map(|index| halves[index]);
+                    let four = [a, b, c, d].map(|index| &halves[index]);
                     let [p, q, r, s] = four.map(|half| half.normal);
                     let triple = |u, v, w| dot(cross(u, v), w);
                     let mut factors =
@@ -215,7 +298,8 @@ fn disjoint(halves: &[&HalfSpace]) -> Option<[usize; 4]> {
                     }
                     let apart: f64 =
                         factors.iter().zip(four).map(|(factor, half)| factor * half.offset).sum();
-                    // What rounding leaves of the sum of the normals moves the sum of the offsets by as much.
+                    // What rounding leaves of the sum of the normals moves the sum of the offsets
+                    // by as much.
                     let rest = (0..4)
                         .fold([0.0; 3], |rest, k| add(rest, scale(four[k].normal, factors[k])));
                     let slack = ROUNDING * size * sum + size * dot(rest, rest).sqrt();
@@ -232,8 +316,9 @@ fn disjoint(halves: &[&HalfSpace]) -> Option<[usize; 4]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::partition::Whole;
+    use crate::mesh::Mesh;
     use crate::shapes;
+    use crate::vector::subtract;
 
     fn boundary(mesh: &Mesh) -> Vec<u32> {
         let on = |p: &Vector| p.iter().any(|&x| x == 0.0 || x == 1.0);
@@ -254,14 +339,14 @@ mod tests {
         for mesh in meshes() {
             let boundary = boundary(&mesh);
             let mut points = mesh.points().to_vec();
-            assert_eq!(Impossible::find(&mesh, &boundary, &points, 0.0, &Whole), None);
+            assert_eq!(Impossible::find(&mesh, &boundary, &points, 0.0), None);
             // Wherever the inside lies.
             for (vertex, point) in (0u32..).zip(&mut points) {
                 if !boundary.contains(&vertex) {
                     *point = [0.01, 0.99, 0.02];
                 }
             }
-            assert_eq!(Impossible::find(&mesh, &boundary, &points, 0.0, &Whole), None);
+            assert_eq!(Impossible::find(&mesh, &boundary, &points, 0.0), None);
         }
     }
 
@@ -277,17 +362,32 @@ mod tests {
         ] {
             let mesh = shapes::single_cell(cell_type);
             let boundary: Vec<u32> = (0..mesh.points().len() as u32).collect();
-            assert_eq!(Impossible::find(&mesh, &boundary, mesh.points(), 0.0, &Whole), None);
+            assert_eq!(Impossible::find(&mesh, &boundary, mesh.points(), 0.0), None);
             let mut pushed = mesh.points().to_vec();
             let [away, from] = [pushed[0], pushed[pushed.len() - 1]];
             pushed[0] = add(from, scale(subtract(from, away), 2.0));
-            let proof = Impossible::find(&mesh, &boundary, &pushed, 0.0, &Whole);
+            let proof = Impossible::find(&mesh, &boundary, &pushed, 0.0);
             assert!(
                 matches!(proof, Some(Impossible::Cell { cell: 0, .. })),
                 "{cell_type}: {proof:?}"
             );
             assert!(proof.unwrap().to_string().contains(&cell_type.to_string()));
         }
+    }
+
+    /// The corner of the box is pushed through the hexahedron there, which has a free vertex.
+    #[test]
+    fn a_corner_without_a_free_vertex_is_named() {
+        let mesh = shapes::box_of_hexahedra([2, 2, 2], [0.0; 3], [1.0; 3]);
+        let boundary = boundary(&mesh);
+        let mut points = mesh.points().to_vec();
+        let corner = points.iter().position(|point| *point == [0.0; 3]).unwrap();
+        points[corner] = [0.3, 0.3, 0.3];
+        let proof = Impossible::find(&mesh, &boundary, &points, 0.0);
+        assert!(matches!(proof, Some(Impossible::Corner { cell: 0, .. })), "{proof:?}");
+        assert!(proof.unwrap().to_string().contains("cell 0 (hexahedron) at (0.25"));
+        points[corner] = [0.1, 0.1, 0.1];
+        assert_eq!(Impossible::find(&mesh, &boundary, &points, 0.0), None);
     }
 
     /// Four cells about one free vertex, in a tetrahedron that is turned inside out.
@@ -298,7 +398,7 @@ mod tests {
         let cells = vec![0, 1, 2, 4, 0, 3, 1, 4, 0, 2, 3, 4, 1, 3, 2, 4];
         let cells = crate::mesh::Cells::uniform(CellType::Tetra, cells).unwrap();
         let mesh = Mesh::new(points, cells, crate::mesh::FeatureSource::SharpEdges).unwrap();
-        let find = |points: &[Vector]| Impossible::find(&mesh, &[0, 1, 2, 3], points, 0.0, &Whole);
+        let find = |points: &[Vector]| Impossible::find(&mesh, &[0, 1, 2, 3], points, 0.0);
         let mut outside = mesh.points().to_vec();
         outside[4] = [3.0, -2.0, 1.0];
         assert_eq!(find(&outside), None);

@@ -1,16 +1,15 @@
 //! Raising the quality of the cells of a valid mesh beyond the guard's floor.
 
-use std::sync::Arc;
-
-use super::barrier::{Barrier, LENGTHS, Piece, Star, length, newton, searched};
+use super::barrier::{Barrier, LENGTHS, Simplex, Star, length, newton, searched};
 use super::colours::{Held, colours};
-use crate::mesh::{CellType, Mesh, Numbering, Ordered, Vector};
-use crate::parallel;
-use crate::partition::{Partition, Reduction, Shares, all, most, whole};
-use crate::quality::{
-    HEXAHEDRON_CORNERS, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, scaled_jacobians,
-    tet_determinant,
+use crate::communicator::{Communicator, Halo, Reduction};
+use crate::mesh::cell_geometry::{
+    HEXAHEDRON_CORNERS, PYRAMID_CORNERS, VOXEL_AS_HEXAHEDRON, WEDGE_CORNERS, tet_determinant,
 };
+use crate::mesh::{CellType, Domain, Mesh, Numbering, Ordered, Vector};
+use crate::parallel;
+use crate::quality::scaled_jacobians;
+use crate::topology::{Groups, marked};
 use crate::vector::{add, dot, scale};
 
 /// How many vertices or corners are worked on at a time.
@@ -20,127 +19,104 @@ const CHUNK: usize = 4096;
 /// Vertices stay where none of their cells has lost more than this part of its quality.
 const GOOD: f64 = 0.95;
 
-/// How far below the least quality the barrier stands, as a part of what that has lost (of this much at least).
+/// How far below the least quality the barrier stands, as a part of what that has lost (of this
+/// much at least).
 const GAP: f64 = 0.05;
 const LOST: f64 = 0.05;
 
-/// Moves the free vertices of a mesh so that its worst cells get better, without making a new one as bad.
+/// Moves the free vertices of a mesh so that its worst cells get better, without making a new one
+/// as bad.
 ///
-/// The quality of a cell is its scaled Jacobian by that of the same cell in the reference. One sweep moves every free vertex
-/// that has a cell of less than 0.95, one after the other, down
+/// The quality of a cell is its scaled Jacobian by that of the same cell in the reference. One
+/// sweep moves every free vertex that has a cell of less than 0.95, one after the other, down
 ///
 /// `Σ (δ / (q - τ))² - 0.01 ln q`
 ///
-/// over the corners `q` of its cells (a corner's determinant by the product of its edges) by one step of Newton's method with a
-/// line search both ways. The barrier `τ` stands `δ` below the least `q` of the mesh and rises with it from sweep to sweep, so
-/// that the worst cells are lifted first and all others gain as far as these let them. L. Freitag, C. Ollivier-Gooch (*Tetrahedral
-/// mesh improvement using swapping and smoothing*, 1997) show why one vertex at a time is enough where a mesh is nearly good:
-/// what a linear solve leaves to be mended lies close by.
+/// over the corners `q` of its cells (a corner's determinant by the product of its edges) by one
+/// step of Newton's method with a line search both ways. The barrier `τ` stands `δ` below the least
+/// `q` of the mesh and rises with it from sweep to sweep, so that the worst cells are lifted first
+/// and all others gain as far as these let them. L. Freitag, C. Ollivier-Gooch (*Tetrahedral mesh
+/// improvement using swapping and smoothing*, 1997) show why one vertex at a time is enough where a
+/// mesh is nearly good: what a linear solve leaves to be mended lies close by.
 ///
 /// Vertices of one colour share no cell and move at the same time, on all threads.
 ///
 /// Vertices of pentagonal and hexagonal prisms and of polyhedra stay.
 ///
 /// # Guarantees
-/// - Vertices that are not free do not move, nor does any where no cell has lost a twentieth of its quality: rigid motions come
-///   back bit for bit.
+/// - Vertices that are not free do not move, nor does any where no cell has lost a twentieth of its
+///   quality: rigid motions come back bit for bit.
 /// - The least quality is not lower afterwards, and no cell that was valid is turned inside out.
-/// - The same bits whatever the number of threads; the same places, to rounding, however the vertices are numbered and whatever
-///   parts the mesh is in.
+/// - The same bits whatever the number of threads; the same places, to rounding, however the
+///   vertices are numbered and whatever parts the mesh is in.
 #[derive(Debug)]
 pub struct Improver {
-    /// That of the ordered mesh, whose numbers all vertices here have.
+    /// The numbering of the ordered mesh, whose numbers all vertices here have.
     numbering: Numbering,
-    pieces: Vec<Piece>,
+    simplices: Vec<Simplex>,
     /// Free vertices, none of a list with a cell in common.
     colours: Vec<Vec<u32>>,
-    /// The pieces of each vertex: four times the piece, plus the vertex's place in it.
-    incident: Vec<u32>,
-    offsets: Vec<usize>,
-    /// The pieces that have a free vertex.
+    /// The simplices of each vertex: four times the simplex, plus the vertex's index in it.
+    incident: Groups<u32>,
+    /// The simplices that have a free vertex.
     movable: Vec<u32>,
-    parts: Option<Parts>,
+    interface: Option<Interface>,
     /// Vertices none of whose cells is below this stay.
     good: f64,
 }
 
-/// What is known of the other ranks.
+/// The vertices that other ranks have too.
 #[derive(Debug)]
-struct Parts {
-    partition: Arc<dyn Partition>,
+struct Interface {
     held: Held,
-    /// For each colour which of its vertices are shared; these are in no list of `Improver::colours`.
-    colours: Vec<Shares>,
+    /// For each colour which of its vertices are shared; these are in no list of
+    /// `Improver::colours`.
+    colours: Vec<Halo>,
 }
 
 impl Improver {
-    /// An improver of the cells of the reference mesh `mesh`; the vertices of `boundary` are not free.
+    /// An improver of the cells of a reference mesh; the vertices of `boundary`, those on the
+    /// boundary of the whole mesh, are not free. Collective, as is its use.
     #[must_use]
-    pub fn new(mesh: &Mesh, boundary: &[u32]) -> Self {
-        Self::of_part(mesh, boundary, &whole())
-    }
-
-    /// The same where `mesh` is the part of this rank, whose cells no other rank has, and `boundary` its vertices on the boundary
-    /// of the whole mesh. Collective, as is its use.
-    #[must_use]
-    pub fn of_part(mesh: &Mesh, boundary: &[u32], partition: &Arc<dyn Partition>) -> Self {
-        let ordered = Ordered::new(mesh);
-        let held = (partition.ranks() > 1).then(|| Held::new(&ordered, &**partition));
+    pub fn new(domain: impl Into<Domain>, boundary: &[u32]) -> Self {
+        let domain = domain.into();
+        let ordered = Ordered::new(domain.mesh());
+        let held = (domain.communicator().size() > 1).then(|| Held::new(&ordered, domain.halo()));
         let (mesh, numbering) = ordered.into_parts();
         let mut free = vec![true; mesh.points().len()];
         boundary
             .iter()
-            .filter_map(|&vertex| numbering.place(vertex))
-            .for_each(|place| free[place as usize] = false);
-        let pieces = pieces(&mesh, &mut free);
+            .filter_map(|&vertex| numbering.index(vertex))
+            .for_each(|index| free[index as usize] = false);
+        let simplices = simplices(&mesh, &mut free);
         if let Some(held) = &held {
-            held.all(&**partition, &mut free);
+            held.all(&mut free);
         }
-        let mut offsets = vec![0usize; free.len() + 1];
-        for piece in &pieces {
-            for &vertex in &piece.vertices {
-                offsets[vertex as usize + 1] += usize::from(free[vertex as usize]);
-            }
-        }
-        for vertex in 0..free.len() {
-            offsets[vertex + 1] += offsets[vertex];
-        }
-        let mut next = offsets.clone();
-        let mut incident = vec![0u32; offsets[free.len()]];
-        let mut movable = Vec::new();
-        for (number, piece) in (0u32..).zip(&pieces) {
-            for (place, &vertex) in (0..).zip(&piece.vertices) {
-                if free[vertex as usize] {
-                    incident[next[vertex as usize]] = 4 * number + place;
-                    next[vertex as usize] += 1;
-                }
-            }
-            if piece.vertices.iter().any(|&vertex| free[vertex as usize]) {
-                movable.push(number);
-            }
-        }
+        let corners = simplices.iter().flat_map(|simplex| simplex.vertices).zip(0u32..);
+        let incident =
+            Groups::new(free.len(), corners.filter(|(vertex, _)| free[*vertex as usize]));
+        let is_movable =
+            |simplex: &Simplex| simplex.vertices.iter().any(|&vertex| free[vertex as usize]);
+        let movable = marked(&simplices.iter().map(is_movable).collect::<Vec<_>>());
         let mut improver = Self {
             numbering,
-            pieces,
+            simplices,
             colours: Vec::new(),
             incident,
-            offsets,
             movable,
-            parts: None,
+            interface: None,
             good: GOOD,
         };
         let around = |vertex: u32, visit: &mut dyn FnMut(u32)| {
-            for &code in improver.incident(vertex) {
-                improver.pieces[(code / 4) as usize]
+            for &code in improver.incident.of(vertex) {
+                improver.simplices[(code / 4) as usize]
                     .vertices
                     .iter()
                     .for_each(|&other| visit(other));
             }
         };
-        let free: Vec<u32> =
-            (0..).zip(&free).filter(|(_, free)| **free).map(|(vertex, _)| vertex).collect();
-        let colour_of =
-            colours(mesh.points(), &free, around, held.as_ref().map(|held| (&**partition, held)));
+        let free = marked(&free);
+        let colour_of = colours(mesh.points(), &free, around, held.as_ref());
         let mut colours: Vec<Vec<u32>> = Vec::new();
         for &vertex in &free {
             let shared = held.as_ref().is_some_and(|held| held.is_shared(vertex));
@@ -149,31 +125,36 @@ impl Improver {
                 colours[colour].push(vertex);
             }
         }
-        improver.parts = held.map(|held| {
-            let of_place = |place: u32| colour_of[held.vertex(place) as usize].map(usize::from);
-            let shared = held.shares().places().iter().filter_map(|&place| of_place(place));
+        improver.interface = held.map(|held| {
+            let of_index = |index: u32| colour_of[held.vertex(index) as usize].map(usize::from);
+            let shared = held.halo().shared().iter().filter_map(|&index| of_index(index));
             let own = shared.fold(colours.len(), |count, colour| count.max(colour + 1));
-            colours.resize_with(most(&**partition, own), Vec::new);
+            colours.resize_with(domain.communicator().most(own), Vec::new);
             let of_colour =
-                |colour: usize| held.shares().only(|place| of_place(place) == Some(colour));
-            let shares = (0..colours.len()).map(of_colour).collect();
-            Parts { partition: Arc::clone(partition), held, colours: shares }
+                |colour: usize| held.halo().only(|index| of_index(index) == Some(colour));
+            let colours = (0..colours.len()).map(of_colour).collect();
+            Interface { held, colours }
         });
         improver.colours = colours;
         improver
     }
 
-    /// The same where cells are lifted to `good` times the quality that they have in the reference, and above it.
+    /// The improver where cells are lifted to `good` times the quality that they have in the
+    /// reference, and above it.
     #[must_use]
     pub(super) fn lifting_to(self, good: f64) -> Self {
         Self { good, ..self }
     }
 
-    /// Improves `points` (coordinates of each vertex) in at most `sweeps` sweeps. Says whether anything has moved; nothing does
-    /// where a cell is turned inside out.
+    /// Improves `points` (coordinates of each vertex) in at most `sweeps` sweeps. Says whether
+    /// anything has moved; nothing does where a cell is turned inside out.
     pub fn improve(&self, points: &mut [Vector], sweeps: u32) -> bool {
-        let fits = points.len() + 1 == self.offsets.len();
-        if !self.parts.as_ref().map_or(fits, |parts| all(&*parts.partition, fits)) {
+        let fits = points.len() + 1 == self.incident.offsets.len();
+        if !self
+            .interface
+            .as_ref()
+            .map_or(fits, |interface| interface.held.halo().communicator().all(fits))
+        {
             return false;
         }
         let mut near = self.numbering.gather(points).into_owned();
@@ -195,23 +176,25 @@ impl Improver {
 
     /// The least quality of what can be moved.
     fn least(&self, points: &[Vector]) -> f64 {
-        let least = parallel::map_chunks(self.movable.len(), CHUNK, |range| {
-            self.movable[range].iter().map(|&piece| self.pieces[piece as usize].least(points)).fold(
-                f64::INFINITY,
-                |least, value| if value < least || value.is_nan() { value } else { least },
-            )
-        })
-        .into_iter()
-        .fold(
-            f64::INFINITY,
-            |least, value| if value < least || value.is_nan() { value } else { least },
-        );
-        match &self.parts {
+        let least =
+            parallel::map_chunks(self.movable.len(), CHUNK, |range| {
+                self.movable[range]
+                    .iter()
+                    .map(|&simplex| self.simplices[simplex as usize].least(points))
+                    .fold(f64::INFINITY, |least, value| {
+                        if value < least || value.is_nan() { value } else { least }
+                    })
+            })
+            .into_iter()
+            .fold(f64::INFINITY, |least, value| {
+                if value < least || value.is_nan() { value } else { least }
+            });
+        match &self.interface {
             None => least,
-            Some(Parts { partition, .. }) => {
+            Some(Interface { held, .. }) => {
                 // The reduction passes over NaN.
                 let mut least = [if least.is_nan() { f64::NEG_INFINITY } else { least }];
-                partition.reduce(Reduction::Minimum, &mut least);
+                held.halo().communicator().reduce(Reduction::Minimum, &mut least);
                 least[0]
             }
         }
@@ -231,42 +214,35 @@ impl Improver {
                     })
                     .collect::<Vec<Vector>>()
             });
-            for (&vertex, place) in colour.iter().zip(moved.into_iter().flatten()) {
-                points[vertex as usize] = place;
+            for (&vertex, position) in colour.iter().zip(moved.into_iter().flatten()) {
+                points[vertex as usize] = position;
             }
-            if let Some(parts) = &self.parts {
-                self.sweep_shared(points, &barrier, parts, &parts.colours[number]);
+            if let Some(interface) = &self.interface {
+                self.sweep_shared(points, &barrier, &interface.held, &interface.colours[number]);
             }
         }
     }
 
-    /// The same for the vertices of one colour that other ranks have too: what the cells of all of them say is added up, so that
-    /// all move them to the same place.
-    fn sweep_shared(
-        &self,
-        points: &mut [Vector],
-        barrier: &Barrier,
-        parts: &Parts,
-        shares: &Shares,
-    ) {
-        let Parts { partition, held, .. } = parts;
+    /// Sweeps through the vertices of one colour that other ranks have too: what the cells of all
+    /// of them say is added up, so that all move them to the same place.
+    fn sweep_shared(&self, points: &mut [Vector], barrier: &Barrier, held: &Held, halo: &Halo) {
         let vertices: Vec<(u32, u32)> =
-            shares.places().iter().map(|&place| (place, held.vertex(place))).collect();
+            halo.shared().iter().map(|&index| (index, held.vertex(index))).collect();
         let mut star = Star::default();
         // Whether any cell is not good, the gradient and the Hessian.
         let mut slopes = vec![[0.0; 13]; held.len()];
-        for &(place, vertex) in &vertices {
+        for &(entry, vertex) in &vertices {
             let point = points[vertex as usize];
             self.gather(vertex, points, &mut star);
             let (gradient, hessian) = barrier.derivatives(point, &star);
-            let slope = &mut slopes[place as usize];
+            let slope = &mut slopes[entry as usize];
             slope[0] = f64::from(u8::from(!star.is_above(point, self.good)));
             slope[1..4].copy_from_slice(&gradient);
             slope[4..].copy_from_slice(hessian.as_flattened());
         }
-        shares.sum(&**partition, 13, slopes.as_flattened_mut());
-        let direction = |place: u32| {
-            let [bad, a, b, c, hessian @ ..] = slopes[place as usize];
+        halo.sum(13, slopes.as_flattened_mut());
+        let direction = |entry: u32| {
+            let [bad, a, b, c, hessian @ ..] = slopes[entry as usize];
             let gradient = [a, b, c];
             let direction = newton(
                 &gradient,
@@ -275,18 +251,18 @@ impl Improver {
             (bad > 0.0).then(|| (direction, dot(direction, gradient)))
         };
         let mut energies = vec![[0.0; LENGTHS + 1]; held.len()];
-        for &(place, vertex) in &vertices {
-            let Some((direction, _)) = direction(place) else { continue };
+        for &(entry, vertex) in &vertices {
+            let Some((direction, _)) = direction(entry) else { continue };
             let point = points[vertex as usize];
             self.gather(vertex, points, &mut star);
-            for (index, energy) in energies[place as usize].iter_mut().enumerate() {
+            for (index, energy) in energies[entry as usize].iter_mut().enumerate() {
                 *energy = barrier.energy(add(point, scale(direction, length(index))), &star);
             }
         }
-        shares.sum(&**partition, LENGTHS + 1, energies.as_flattened_mut());
-        for &(place, vertex) in &vertices {
-            let Some((direction, slope)) = direction(place) else { continue };
-            let energies = &energies[place as usize];
+        halo.sum(LENGTHS + 1, energies.as_flattened_mut());
+        for &(entry, vertex) in &vertices {
+            let Some((direction, slope)) = direction(entry) else { continue };
+            let energies = &energies[entry as usize];
             let along = |wanted: f64| {
                 energies[(0..=LENGTHS).find(|&index| length(index) == wanted).unwrap_or(0)]
             };
@@ -294,24 +270,20 @@ impl Improver {
         }
     }
 
-    /// The pieces of a free vertex.
-    fn incident(&self, vertex: u32) -> &[u32] {
-        &self.incident[self.offsets[vertex as usize]..self.offsets[vertex as usize + 1]]
-    }
-
     fn gather(&self, vertex: u32, points: &[Vector], star: &mut Star) {
         star.clear();
-        for &code in self.incident(vertex) {
-            star.push(&self.pieces[(code / 4) as usize], (code % 4) as usize, points);
+        for &code in self.incident.of(vertex) {
+            star.push(&self.simplices[(code / 4) as usize], (code % 4) as usize, points);
         }
     }
 }
 
-/// The corners whose least is the quality of their cell. Vertices of cells that have none are taken out of `free`.
-fn pieces(mesh: &Mesh, free: &mut [bool]) -> Vec<Piece> {
+/// The corners whose least is the quality of their cell. Vertices of cells that have none are taken
+/// out of `free`.
+fn simplices(mesh: &Mesh, free: &mut [bool]) -> Vec<Simplex> {
     let (cells, points) = (mesh.cells(), mesh.points());
     let reference = scaled_jacobians(cells, points);
-    let mut pieces = Vec::with_capacity(cells.len());
+    let mut simplices = Vec::with_capacity(cells.len());
     for ((cell_type, vertices), &scaled) in cells.iter().zip(&reference) {
         let root = std::f64::consts::SQRT_2;
         let (corners, regular, whole): (&[[usize; 4]], f64, bool) = match cell_type {
@@ -321,7 +293,7 @@ fn pieces(mesh: &Mesh, free: &mut [bool]) -> Vec<Piece> {
             CellType::Pyramid => (&PYRAMID_CORNERS, 2.0, true),
             _ => (&[], 0.0, false),
         };
-        let from = pieces.len();
+        let from = simplices.len();
         for corner in corners {
             let local = if cell_type == CellType::Voxel {
                 corner.map(|local| VOXEL_AS_HEXAHEDRON[local])
@@ -330,16 +302,16 @@ fn pieces(mesh: &Mesh, free: &mut [bool]) -> Vec<Piece> {
             };
             let vertices = local.map(|index| vertices[index]);
             if tet_determinant(vertices.map(|vertex| points[vertex as usize])) > 0.0 {
-                pieces.push(Piece { vertices, factor: regular / scaled, whole });
+                simplices.push(Simplex { vertices, factor: regular / scaled, whole });
             }
         }
-        let known = pieces.len() - from == corners.len() && !corners.is_empty() && scaled > 0.0;
+        let known = simplices.len() - from == corners.len() && !corners.is_empty() && scaled > 0.0;
         if !known && cell_type.dimension() == 3 {
-            pieces.truncate(from);
+            simplices.truncate(from);
             vertices.iter().for_each(|&vertex| free[vertex as usize] = false);
         }
     }
-    pieces
+    simplices
 }
 
 #[cfg(test)]

@@ -1,37 +1,47 @@
 //! Carrying the motion of the boundary into the volume.
 //!
-//! A [`VolumeOperator`] is set up once from the reference mesh and then answers any number of boundary motions. It solves, on
-//! linear finite elements, either linear elasticity with a material that is stiffer where cells are small (T. Tezduyar et al.
-//! 1992; K. Stein, T. Tezduyar, R. Benney 2003) or Laplace's equation for each component of the displacement.
+//! A [`VolumeOperator`] is set up once from the reference mesh and then answers any number of
+//! boundary motions. It solves, on linear finite elements, either linear elasticity with a material
+//! that is stiffer where cells are small (T. Tezduyar et al. 1992; K. Stein, T. Tezduyar, R. Benney
+//! 2003) or Laplace's equation for each component of the displacement.
 
 mod adaptive;
 mod assembly;
 mod barrier;
 mod colours;
+mod corners;
 mod element;
+mod equations;
 mod foldover;
 mod impossible;
 mod improve;
+mod newton;
 mod operator;
 mod rigid;
+mod rotation;
+mod route;
 mod settings;
 mod sliding;
+mod solve;
 mod spring;
 #[cfg(test)]
 mod tests;
 mod untangle;
 
-pub use adaptive::{BoundaryMotion, Domain, FollowError, Route, Stalled, Waypoint, follow};
+pub use adaptive::follow;
+pub(crate) use adaptive::with_boundary;
 pub use impossible::Impossible;
 pub use improve::Improver;
 pub use operator::{VolumeOperator, VolumeSolution};
+pub use route::{BoundaryMotion, FollowError, Route, Stalled, Volume, Waypoint};
 pub use settings::{Deform, Method};
 pub use sliding::Sliding;
 pub use untangle::Untangler;
 
+use crate::communicator::Communicator;
 use crate::mesh::{CellType, Vector};
-use crate::number::{Number, Position};
-use crate::partition::{Partition, all};
+use crate::number::Number;
+use crate::vector::Position;
 
 impl VolumeError {
     /// Whether the reason lies with another rank, which has an error of its own.
@@ -41,9 +51,12 @@ impl VolumeError {
     }
 }
 
-/// What all ranks can go on with; an error on all of them where one cannot.
-fn agreed<T>(partition: &dyn Partition, mine: Result<T, VolumeError>) -> Result<T, VolumeError> {
-    match (all(partition, mine.is_ok()), mine) {
+/// The value of this rank, where all ranks have one; an error on all of them where one has none.
+fn agreed<T>(
+    communicator: &dyn Communicator,
+    mine: Result<T, VolumeError>,
+) -> Result<T, VolumeError> {
+    match (communicator.all(mine.is_ok()), mine) {
         (true, mine) => mine,
         (false, Err(error)) => Err(error),
         (false, Ok(_)) => Err(VolumeError::OtherRank),
@@ -68,9 +81,9 @@ pub enum VolumeError {
     Setting {
         /// The setting.
         name: &'static str,
-        /// What was found.
+        /// The value.
         value: f64,
-        /// What is allowed.
+        /// The range that is allowed.
         expected: &'static str,
     },
     /// A cell of the reference mesh is flat or turned inside out.

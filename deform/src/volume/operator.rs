@@ -2,32 +2,29 @@
 
 use std::sync::Arc;
 
-use super::assembly::{Elastic, Graph, Laplace, VectorLaplace, stiffness};
+use super::assembly::{Graph, stiffness};
 use super::element::Elements;
-use super::rigid::RigidMotion;
-use super::sliding::{Constraint, Sliding, constrain, constraints};
-use super::{Deform, Method, VolumeError, agreed};
-use crate::linear::{Convergence, LinearError, LinearSolver, SparseMatrix, Tolerance};
-use crate::mesh::{Cells, Mesh, Ordered, Vector};
-use crate::partition::{
-    Partition, Reduction, Shares, all, any, scalar_solver, vector_solver, whole,
-};
-use crate::vector::{add, subtract};
+use super::equations::{Equations, Start, equations};
+use super::sliding::{Constraint, Sliding, constraints};
+use super::{Deform, VolumeError, agreed};
+use crate::communicator::{Communicator, Halo};
+use crate::linear::{BuiltIn, LinearError, Solvers, SparseMatrix};
+use crate::mesh::{Cells, Domain, Mesh, Ordered, Vector};
 
-/// A residual this small against the right side is rounding.
-const ROUNDING: f64 = 1e-12;
-
-/// The operator that carries boundary motion into the volume of one reference mesh. Set up once (checked, assembled,
-/// preconditioned), immutable afterwards, and shared between threads as it is.
+/// The operator that carries boundary motion into the volume of one reference mesh. Set up once
+/// (checked, assembled, preconditioned), immutable afterwards, and shared between threads as it is.
 ///
 /// # Guarantees
-/// - Vertices of the boundary get exactly what is prescribed; vertices in no volume cell stay where they are.
-/// - No motion gives exact zeros; with [`Method::Harmonic`] so does every component that does not move.
-/// - A translation of the whole boundary, and a linearised rotation with elasticity, comes out to rounding whatever the
-///   tolerance.
+/// - Vertices of the boundary get exactly what is prescribed; vertices in no volume cell stay where
+///   they are.
+/// - No motion gives exact zeros; with [`Harmonic`](super::Method::Harmonic) so does every
+///   component that does not move.
+/// - A translation of the whole boundary, and a linearised rotation with elasticity, comes out to
+///   rounding whatever the tolerance.
 /// - The same bits whatever the number of threads.
 ///
-/// It does *not* guarantee that no cell is turned inside out: that is what [`judge`](crate::quality::judge) is for.
+/// It does *not* guarantee that no cell is turned inside out: that is what
+/// [`judge`](crate::quality::judge) is for.
 ///
 /// # Example
 /// ```
@@ -47,56 +44,22 @@ const ROUNDING: f64 = 1e-12;
 /// ```
 #[derive(Debug)]
 pub struct VolumeOperator {
-    /// What depends on the cells alone.
-    graph: Arc<Graph>,
-    cells: Arc<Cells>,
-    settings: Deform,
-    boundary: Vec<u32>,
-    boundary_points: Vec<Vector>,
-    sliding: Vec<Sliding>,
-    constraints: Vec<Constraint>,
+    /// The graph, which depends on the cells alone.
+    pub(super) graph: Arc<Graph>,
+    pub(super) cells: Arc<Cells>,
+    pub(super) settings: Deform,
+    pub(super) boundary: Vec<u32>,
+    pub(super) boundary_points: Vec<Vector>,
+    pub(super) sliding: Vec<Sliding>,
+    pub(super) constraints: Vec<Constraint>,
     /// Where the vertex of each unknown lies.
-    unknown_points: Vec<Vector>,
-    equations: Equations,
-    partition: Arc<dyn Partition>,
-    /// Which unknowns other ranks have too.
-    shares: Arc<Shares>,
-    /// The places in `boundary` of the vertices that this rank speaks for.
-    own_boundary: Arc<[u32]>,
-}
-
-#[derive(Debug)]
-enum Equations {
-    /// The three components together: elasticity, and whatever has sliding vertices.
-    Coupled(System<3>),
-    /// Each component by itself.
-    Separate(System<1>),
-}
-
-/// The equations of the free vertices.
-#[derive(Debug)]
-struct System<const B: usize> {
-    matrix: Arc<SparseMatrix<B>>,
-    /// What couples them to the boundary.
-    coupling: SparseMatrix<B>,
-    /// What couples them to the prescribed displacements of sliding vertices.
-    sliding: SparseMatrix<B>,
-    solver: Box<dyn LinearSolver<B>>,
-}
-
-impl<const B: usize> System<B> {
-    /// `slide` brings sliding vertices into the matrix, `set_up` makes its solver.
-    fn new(
-        (matrix, coupling): (SparseMatrix<B>, SparseMatrix<B>),
-        slide: impl FnOnce(&mut SparseMatrix<B>) -> SparseMatrix<B>,
-        set_up: impl FnOnce(Arc<SparseMatrix<B>>) -> Result<Box<dyn LinearSolver<B>>, LinearError>,
-    ) -> Result<Self, LinearError> {
-        let mut matrix = matrix;
-        let sliding = slide(&mut matrix);
-        let matrix = Arc::new(matrix);
-        let solver = set_up(Arc::clone(&matrix))?;
-        Ok(Self { matrix, coupling, sliding, solver })
-    }
+    pub(super) unknown_points: Vec<Vector>,
+    pub(super) equations: Equations,
+    pub(super) domain: Domain,
+    /// The halo of the unknowns.
+    pub(super) halo: Halo,
+    /// The positions in `boundary` of the vertices that this rank owns.
+    pub(super) own_boundary: Arc<[u32]>,
 }
 
 /// The displacement of every vertex of a mesh.
@@ -111,64 +74,72 @@ pub struct VolumeSolution {
 }
 
 impl VolumeOperator {
-    /// Sets up the operator of `mesh` as it lies, where the displacement of the vertices `boundary` will be prescribed: all
-    /// vertices of the mesh's boundary, each once, in any order. Cells of lower dimension are passed over; in a mesh that has
-    /// no others, there is nothing to solve for.
+    /// Sets up the operator of a domain as it lies, where the displacement of the vertices
+    /// `boundary` will be prescribed: all vertices on the mesh's boundary, each once, in any order.
+    /// Cells of lower dimension are passed over; in a mesh that has no others, there is nothing to
+    /// solve for.
     ///
-    /// Memory: about 150 bytes for each pair of neighbouring vertices (elasticity) or 30 (harmonic).
+    /// Of a domain of several ranks, `boundary` are those vertices of the part that are so in the
+    /// whole mesh, be it that no cell of this rank has a face on its boundary. Collective, as is
+    /// all that is done with the operator: every rank brings its part of the displacement of the
+    /// boundary.
     ///
-    /// # Errors
-    /// [`VolumeError::Setting`], [`VolumeError::BoundaryVertex`], [`VolumeError::BoundaryTwice`]; [`VolumeError::InvertedCell`]
-    /// for a flat or inverted reference cell; [`VolumeError::Unattached`] for cells that no boundary vertex holds.
-    pub fn new(mesh: &Mesh, boundary: &[u32], settings: &Deform) -> Result<Self, VolumeError> {
-        Self::with_sliding(mesh, boundary, &[], settings)
-    }
-
-    /// The same where other vertices of the mesh's boundary slide, and those in neither list are free of force. With any that
-    /// slide, all components of a harmonic displacement are solved for together.
-    ///
-    /// Each connected part of the mesh must still have a vertex in `boundary`; enough of them, or of sliding ones, that it cannot
-    /// turn.
+    /// Memory: about 150 bytes for each pair of neighbouring vertices (elasticity) or 30
+    /// (harmonic).
     ///
     /// # Errors
-    /// Also [`VolumeError::SlidingNormal`], and [`VolumeError::BoundaryTwice`] for a vertex of `boundary` that is said to slide.
-    pub fn with_sliding(
-        mesh: &Mesh,
+    /// [`VolumeError::Setting`], [`VolumeError::BoundaryVertex`], [`VolumeError::BoundaryTwice`];
+    /// [`VolumeError::InvertedCell`] for a flat or inverted reference cell;
+    /// [`VolumeError::Unattached`] for cells that no boundary vertex holds;
+    /// [`VolumeError::OtherRank`], where another rank has an error of its own.
+    pub fn new(
+        domain: impl Into<Domain>,
         boundary: &[u32],
-        sliding: &[Sliding],
         settings: &Deform,
     ) -> Result<Self, VolumeError> {
-        Self::of_part(mesh, boundary, sliding, settings, &whole())
+        Self::with_sliding(domain, boundary, &[], settings, &BuiltIn)
     }
 
-    /// The same where `mesh` is the part of this rank, whose cells no other rank has. `boundary` and `sliding` are those vertices
-    /// of the part that are so in the whole mesh, be it that no cell of this rank has a face on its boundary. Collective, as is all
-    /// that is done with the operator: every rank calls it with its own part, and its part of the displacement of the boundary.
+    /// Sets up the operator where other vertices on the mesh's boundary slide, and those in neither
+    /// list are free of force; its systems are solved by `solvers`. With any vertices that slide,
+    /// all components of a harmonic displacement are solved for together.
+    ///
+    /// Each connected part of the mesh must still have a vertex in `boundary`; enough of them, or
+    /// of sliding ones, that it cannot turn.
     ///
     /// # Errors
-    /// Also [`VolumeError::OtherRank`], where another rank has an error of its own.
-    pub fn of_part(
-        mesh: &Mesh,
+    /// Also [`VolumeError::SlidingNormal`], and [`VolumeError::BoundaryTwice`] for a vertex of
+    /// `boundary` that is said to slide.
+    pub fn with_sliding(
+        domain: impl Into<Domain>,
         boundary: &[u32],
         sliding: &[Sliding],
         settings: &Deform,
-        partition: &Arc<dyn Partition>,
+        solvers: &dyn Solvers,
     ) -> Result<Self, VolumeError> {
         settings.validate()?;
+        let domain = domain.into();
+        let mesh = domain.mesh();
         let cells = mesh.cells().len();
         let countable = if u32::try_from(cells).is_ok() {
             Ok(())
         } else {
             Err(VolumeError::TooLarge { cells })
         };
-        agreed(&**partition, countable)?;
+        agreed(domain.communicator(), countable)?;
         let ordered = Arc::new(Ordered::new(mesh));
         let elements = Elements::new(ordered.mesh());
         let stiffness =
-            stiffness(&ordered, ordered.mesh(), &elements, settings.stiffening, &**partition)?;
-        let graph = Arc::new(Graph::new(Arc::clone(&ordered), boundary, &**partition)?);
-        let constraints = agreed(&**partition, checked_constraints(mesh, &graph, sliding))?;
-        let start = Start::Fresh(partition);
+            stiffness(&ordered, ordered.mesh(), &elements, settings.stiffening, &domain)?;
+        let graph = Arc::new(Graph::new(Arc::clone(&ordered), boundary, &domain)?);
+        let constraints =
+            agreed(domain.communicator(), checked_constraints(mesh, &graph, sliding))?;
+        let halo = domain.halo().of(&graph.vertices);
+        let positions = |vertices: &[u32]| -> Vec<Vector> {
+            vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect()
+        };
+        let unknown_points = positions(&graph.vertices);
+        let start = Start::Fresh(solvers, &halo, &unknown_points);
         let equations = equations(
             &graph,
             ordered.mesh(),
@@ -178,37 +149,36 @@ impl VolumeOperator {
             settings,
             start,
         )?;
-        let places = |vertices: &[u32]| {
-            vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect()
-        };
-        let owned = (0..).zip(boundary).filter(|(_, vertex)| partition.owns(**vertex));
+        let owned = (0..).zip(boundary).filter(|(_, vertex)| domain.owns(**vertex));
         Ok(Self {
             cells: Arc::clone(mesh.shared_cells()),
             settings: *settings,
-            boundary_points: places(boundary),
+            boundary_points: positions(boundary),
             boundary: boundary.to_vec(),
             sliding: sliding.to_vec(),
             constraints,
-            unknown_points: places(&graph.vertices),
-            shares: Arc::new(Shares::new(&**partition, &graph.vertices)),
-            own_boundary: owned.map(|(place, _)| place).collect(),
-            partition: Arc::clone(partition),
+            unknown_points,
+            halo,
+            own_boundary: owned.map(|(position, _)| position).collect(),
+            domain,
             graph,
             equations,
         })
     }
 
-    /// The operator of the same cells with the vertices elsewhere: the stiffness is that of the cells as they lie now, and what
-    /// depends on the cells alone (the graph, its order, the aggregates of multigrid) is used again.
+    /// The operator of the same cells with the vertices elsewhere: the stiffness is that of the
+    /// cells as they lie now, and what depends on the cells alone (the graph, its order, the
+    /// aggregates of multigrid) is used again.
     ///
     /// # Errors
-    /// [`VolumeError::OtherCells`] where `mesh` does not have the cells that this operator was set up for;
-    /// [`VolumeError::InvertedCell`].
+    /// [`VolumeError::OtherCells`] where `mesh` does not have the cells that this operator was set
+    /// up for; [`VolumeError::InvertedCell`].
     pub fn updated(&self, mesh: &Mesh) -> Result<Self, VolumeError> {
         self.restiffened(mesh, self.settings.stiffening)
     }
 
-    /// The same with another exponent of the stiffening.
+    /// The operator of the same cells with the vertices elsewhere, and another exponent of the
+    /// stiffening.
     ///
     /// # Errors
     /// As [`VolumeOperator::updated`], and [`VolumeError::Setting`].
@@ -217,11 +187,14 @@ impl VolumeOperator {
         settings.validate()?;
         let same =
             *mesh.shared_cells() == self.cells && mesh.points().len() == self.graph.vertex_count();
-        agreed(&*self.partition, if same { Ok(()) } else { Err(VolumeError::OtherCells) })?;
+        agreed(
+            self.domain.communicator(),
+            if same { Ok(()) } else { Err(VolumeError::OtherCells) },
+        )?;
         let ordered = self.graph.ordered.like(mesh);
         let elements = Elements::new(&ordered);
         let stiffness =
-            stiffness(&self.graph.ordered, &ordered, &elements, stiffening, &*self.partition)?;
+            stiffness(&self.graph.ordered, &ordered, &elements, stiffening, &self.domain)?;
         let like = Start::Like(&self.equations);
         let equations = equations(
             &self.graph,
@@ -232,7 +205,7 @@ impl VolumeOperator {
             &settings,
             like,
         )?;
-        let places = |vertices: &[u32]| {
+        let positions = |vertices: &[u32]| {
             vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect()
         };
         Ok(Self {
@@ -240,25 +213,26 @@ impl VolumeOperator {
             cells: Arc::clone(&self.cells),
             settings,
             boundary: self.boundary.clone(),
-            boundary_points: places(&self.boundary),
+            boundary_points: positions(&self.boundary),
             sliding: self.sliding.clone(),
             constraints: self.constraints.clone(),
-            unknown_points: places(&self.graph.vertices),
-            shares: Arc::clone(&self.shares),
+            unknown_points: positions(&self.graph.vertices),
+            halo: self.halo.clone(),
             own_boundary: Arc::clone(&self.own_boundary),
-            partition: Arc::clone(&self.partition),
+            domain: self.domain.with_mesh(mesh.clone()),
             equations,
         })
     }
 
-    /// The same operator, whose solves are to leave another part of the right side.
+    /// The operator with another tolerance: the part of the right side that its solves may leave.
     #[must_use]
     pub fn with_tolerance(mut self, tolerance: f64) -> Self {
         self.settings.tolerance = tolerance;
         self
     }
 
-    /// The vertices whose displacement is prescribed, in the order in which [`VolumeOperator::solve`] takes them.
+    /// The vertices whose displacement is prescribed, in the order in which
+    /// [`VolumeOperator::solve`] takes them.
     #[must_use]
     pub fn boundary(&self) -> &[u32] {
         &self.boundary
@@ -270,14 +244,15 @@ impl VolumeOperator {
         self.graph.vertices.len()
     }
 
-    /// Where the vertices that are solved for lie in the mesh of this operator, in the order of the equations.
+    /// Where the vertices that are solved for lie in the mesh of this operator, in the order of the
+    /// equations.
     #[must_use]
     pub fn unknown_points(&self) -> &[Vector] {
         &self.unknown_points
     }
 
-    /// Where each component is solved for by itself, as with [`Method::Harmonic`] unless vertices slide, the matrix of its
-    /// equations: to try other solvers on.
+    /// Where each component is solved for by itself, as with [`Harmonic`](super::Method::Harmonic)
+    /// unless vertices slide, the matrix of its equations: to try other solvers on.
     #[must_use]
     pub fn separate_matrix(&self) -> Option<&SparseMatrix<1>> {
         match &self.equations {
@@ -286,9 +261,10 @@ impl VolumeOperator {
         }
     }
 
-    /// Where the three components are solved for together, as with [`Method::Elasticity`], the matrix and the right side of the
-    /// equations that [`VolumeOperator::solve`] solves for these displacements of the boundary, less the rigid motion nearest to
-    /// them: to try other solvers on.
+    /// Where the three components are solved for together, as with
+    /// [`Elasticity`](super::Method::Elasticity), the matrix and the right side of the equations
+    /// that [`VolumeOperator::solve`] solves for these displacements of the boundary, less the
+    /// rigid motion nearest to them: to try other solvers on.
     ///
     /// # Panics
     /// Where there is not one displacement for each of [`VolumeOperator::boundary`].
@@ -311,19 +287,21 @@ impl VolumeOperator {
         Some((&system.matrix, self.coupled_right_side(system, &rest, &rest_sliding)))
     }
 
-    /// The displacement of every vertex for these displacements of the boundary vertices, one for each of
-    /// [`VolumeOperator::boundary`].
+    /// The displacement of every vertex for these displacements of the boundary vertices, one for
+    /// each of [`VolumeOperator::boundary`].
     ///
     /// # Errors
-    /// [`VolumeError::BoundaryCount`]; [`VolumeError::NotFinite`] for a displacement that is NaN or infinite;
-    /// [`VolumeError::Linear`] where the iteration fails, or a displacement is so large that arithmetic overflows.
+    /// [`VolumeError::BoundaryCount`]; [`VolumeError::NotFinite`] for a displacement that is NaN or
+    /// infinite; [`VolumeError::Linear`] where the iteration fails, or a displacement is so large
+    /// that arithmetic overflows.
     pub fn solve(&self, boundary_displacement: &[Vector]) -> Result<VolumeSolution, VolumeError> {
         self.solve_sliding(boundary_displacement, &vec![[0.0; 3]; self.sliding.len()])
     }
 
-    /// The same from a displacement of every vertex that is near to it, such as that of a like motion: fewer iterations where it
-    /// is. Within the tolerance the result then depends on where it started from; where orders must come out to the same bits
-    /// whatever came before, start from zero.
+    /// The displacement of every vertex, solved for from one that is near to it, such as that of a
+    /// like motion: fewer iterations where it is. Within the tolerance the result then depends on
+    /// where it started from; where orders must come out to the same bits whatever came before,
+    /// start from zero.
     ///
     /// # Errors
     /// Also [`VolumeError::StartCount`], and [`VolumeError::NotFinite`] for a start that is not.
@@ -335,9 +313,10 @@ impl VolumeOperator {
         self.solve_all(boundary_displacement, &vec![[0.0; 3]; self.sliding.len()], Some(start))
     }
 
-    /// The same where sliding surfaces move: of each displacement in `sliding_displacement`, one for each of the sliding vertices
-    /// in the order in which they were given, the part across the surface is prescribed. A vertex that is listed several times
-    /// takes the displacement of its first place.
+    /// The displacement of every vertex where sliding surfaces move: of each displacement in
+    /// `sliding_displacement`, one for each of the sliding vertices in the order in which they were
+    /// given, the part across the surface is prescribed. A vertex that is listed several times
+    /// takes the displacement of its first entry.
     ///
     /// # Errors
     /// Also [`VolumeError::SlidingCount`].
@@ -356,7 +335,7 @@ impl VolumeOperator {
         start: Option<&[Vector]>,
     ) -> Result<VolumeSolution, VolumeError> {
         agreed(
-            &*self.partition,
+            self.domain.communicator(),
             self.check_displacements(boundary_displacement, sliding_displacement, start),
         )?;
         let mut displacement = vec![[0.0; 3]; self.graph.vertex_count()];
@@ -375,7 +354,10 @@ impl VolumeOperator {
                 self.solve_separate(system, boundary_displacement, start, &mut displacement)?
             }
         };
-        if !all(&*self.partition, displacement.as_flattened().iter().all(|value| value.is_finite()))
+        if !self
+            .domain
+            .communicator()
+            .all(displacement.as_flattened().iter().all(|value| value.is_finite()))
         {
             return Err(LinearError::NotFinite { iteration: convergence.iterations }.into());
         }
@@ -420,214 +402,6 @@ impl VolumeOperator {
         }
         Ok(())
     }
-
-    /// The 2-norm of what the ranks' values of the unknowns add up to.
-    fn norms<const B: usize, const K: usize>(&self, values: &[[[f64; B]; K]]) -> [f64; K] {
-        if self.partition.ranks() == 1 {
-            return crate::linear::norms(values);
-        }
-        let mut values = values.to_vec();
-        self.shares.sum(&*self.partition, B * K, values.as_flattened_mut().as_flattened_mut());
-        for &place in self.shares.places() {
-            if !self.shares.owns(place as usize) {
-                values[place as usize] = [[0.0; B]; K];
-            }
-        }
-        let mut squares = crate::linear::norms(&values).map(|norm| norm * norm);
-        self.partition.reduce(Reduction::Sum, &mut squares);
-        squares.map(f64::sqrt)
-    }
-
-    /// The values of the boundary vertices that this rank speaks for.
-    fn own<T: Copy>(&self, boundary: &[T]) -> Vec<T> {
-        self.own_boundary.iter().map(|&place| boundary[place as usize]).collect()
-    }
-
-    /// The rigid motion nearest to the boundary's, and that motion less the boundary's.
-    fn less_rigid(&self, boundary: &[Vector]) -> (RigidMotion, Vec<Vector>) {
-        let mut rigid = RigidMotion::nearest(
-            &self.own(&self.boundary_points),
-            &self.own(boundary),
-            &*self.partition,
-        );
-        if self.settings.method == Method::Harmonic {
-            // A rotation is no solution where the boundary is free.
-            rigid = rigid.translation();
-        }
-        let rest = self.boundary_points.iter().zip(boundary).map(|(&point, &value)| {
-            let motion = rigid.at(point);
-            std::array::from_fn(|axis| motion[axis] - value[axis])
-        });
-        (rigid, rest.collect())
-    }
-
-    /// A rigid motion strains nothing, so the one nearest to the boundary's motion is taken off, and added again at the end.
-    fn solve_coupled(
-        &self,
-        system: &System<3>,
-        boundary: &[Vector],
-        sliding: &[Vector],
-        start: Option<&[Vector]>,
-        displacement: &mut [Vector],
-    ) -> Result<Convergence, LinearError> {
-        if all(&*self.partition, boundary.iter().chain(sliding).all(|value| *value == [0.0; 3])) {
-            return Ok(Convergence::default());
-        }
-        let (rigid, rest) = self.less_rigid(boundary);
-        let across = |part: &dyn Fn(&Constraint) -> Vector| -> Vec<Vector> {
-            self.constraints.iter().map(|constraint| constraint.across(part(constraint))).collect()
-        };
-        let whole_sliding = across(&|constraint| sliding[constraint.first]);
-        let rest_sliding = across(&|constraint| {
-            subtract(rigid.at(self.unknown_points[constraint.row]), sliding[constraint.first])
-        });
-        let whole = self.coupled_right_side(system, boundary, &whole_sliding);
-        let [norm] = self.norms::<3, 1>(whole.as_chunks().0);
-        let absolute = ROUNDING * norm;
-        let right_side = self.coupled_right_side(system, &rest, &rest_sliding);
-        let tolerance = Tolerance { relative: self.settings.tolerance, absolute };
-        let mut solution = vec![[0.0; 3]; right_side.len()];
-        if let Some(start) = start {
-            for ((value, &vertex), &point) in
-                solution.iter_mut().zip(&self.graph.vertices).zip(&self.unknown_points)
-            {
-                *value = subtract(start[vertex as usize], rigid.at(point));
-            }
-            for constraint in &self.constraints {
-                solution[constraint.row] = constraint.along(solution[constraint.row]);
-            }
-        }
-        let convergence = system.solver.solve_from(&right_side, &mut solution, tolerance)?;
-        for (constraint, &rest) in self.constraints.iter().zip(&rest_sliding) {
-            solution[constraint.row] = subtract(constraint.along(solution[constraint.row]), rest);
-        }
-        for ((&vertex, &point), value) in
-            self.graph.vertices.iter().zip(&self.unknown_points).zip(solution)
-        {
-            let motion = rigid.at(point);
-            displacement[vertex as usize] = std::array::from_fn(|axis| motion[axis] + value[axis]);
-        }
-        Ok(convergence)
-    }
-
-    /// The right side for the boundary motion `-rest`, the prescribed motion of sliding vertices being `-rest_sliding`.
-    fn coupled_right_side(
-        &self,
-        system: &System<3>,
-        rest: &[Vector],
-        rest_sliding: &[Vector],
-    ) -> Vec<Vector> {
-        let mut right_side = vec![[0.0; 3]; self.graph.vertices.len()];
-        system.coupling.multiply(rest, &mut right_side);
-        if !self.constraints.is_empty() {
-            let mut other = vec![[0.0; 3]; right_side.len()];
-            system.sliding.multiply(rest_sliding, &mut other);
-            for (value, other) in right_side.iter_mut().zip(other) {
-                *value = add(*value, other);
-            }
-            for constraint in &self.constraints {
-                right_side[constraint.row] = constraint.along(right_side[constraint.row]);
-            }
-        }
-        right_side
-    }
-
-    /// A solve for each component that moves, its mean taken off first; all three at once where more than one does.
-    fn solve_separate(
-        &self,
-        system: &System<1>,
-        boundary: &[Vector],
-        start: Option<&[Vector]>,
-        displacement: &mut [Vector],
-    ) -> Result<Convergence, LinearError> {
-        let from = |vertex: u32, axis: usize, mean: f64| {
-            start.map_or(0.0, |start| start[vertex as usize][axis] - mean)
-        };
-        let mut moves: Vector = std::array::from_fn(|axis| {
-            f64::from(u8::from(boundary.iter().any(|value| value[axis] != 0.0)))
-        });
-        self.partition.reduce(Reduction::Maximum, &mut moves);
-        let moving = moves.map(|moves| moves > 0.0);
-        let own = self.own(boundary);
-        let sum = |axis: usize| own.iter().map(|value| value[axis]).sum::<f64>();
-        #[expect(clippy::cast_precision_loss, reason = "fewer vertices than 2^53")]
-        let mut sums = [sum(0), sum(1), sum(2), own.len() as f64];
-        self.partition.reduce(Reduction::Sum, &mut sums);
-        let mean: Vector = std::array::from_fn(|axis| sums[axis] / sums[3].max(1.0));
-        if let [axis] = (0..3).filter(|&axis| moving[axis]).collect::<Vec<_>>()[..] {
-            let values: Vec<[f64; 1]> = boundary.iter().map(|value| [value[axis]]).collect();
-            let rest: Vec<[f64; 1]> = values.iter().map(|[value]| [mean[axis] - value]).collect();
-            let mut right_side = vec![[0.0]; self.graph.vertices.len()];
-            system.coupling.multiply(&values, &mut right_side);
-            let [norm] = self.norms::<1, 1>(right_side.as_chunks().0);
-            let absolute = ROUNDING * norm;
-            system.coupling.multiply(&rest, &mut right_side);
-            let mut solution: Vec<[f64; 1]> = self
-                .graph
-                .vertices
-                .iter()
-                .map(|&vertex| [from(vertex, axis, mean[axis])])
-                .collect();
-            let tolerance = Tolerance { relative: self.settings.tolerance, absolute };
-            let convergence = system.solver.solve_from(&right_side, &mut solution, tolerance)?;
-            for (&vertex, [value]) in self.graph.vertices.iter().zip(solution) {
-                displacement[vertex as usize][axis] = mean[axis] + value;
-            }
-            return Ok(convergence);
-        }
-        if !moving.contains(&true) {
-            return Ok(Convergence::default());
-        }
-        let columns = |values: Vec<Vector>| {
-            values.into_iter().map(|value| value.map(|entry| [entry])).collect()
-        };
-        let values: Vec<[[f64; 1]; 3]> = columns(boundary.to_vec());
-        let rest = boundary
-            .iter()
-            .map(|value| std::array::from_fn(|axis| mean[axis] - value[axis]))
-            .collect();
-        let rest: Vec<[[f64; 1]; 3]> = columns(rest);
-        let mut right_side = vec![[[0.0]; 3]; self.graph.vertices.len()];
-        system.coupling.multiply_columns(&values, &mut right_side);
-        let absolute = self.norms(&right_side).map(|norm| ROUNDING * norm);
-        system.coupling.multiply_columns(&rest, &mut right_side);
-        let tolerances =
-            absolute.map(|absolute| Tolerance { relative: self.settings.tolerance, absolute });
-        let at = |&vertex: &u32| {
-            std::array::from_fn(|axis| {
-                [if moving[axis] { from(vertex, axis, mean[axis]) } else { 0.0 }]
-            })
-        };
-        let mut solution: Vec<[[f64; 1]; 3]> = self.graph.vertices.iter().map(at).collect();
-        let convergence = system.solver.solve_three_from(&right_side, &mut solution, tolerances)?;
-        for (&vertex, value) in self.graph.vertices.iter().zip(solution) {
-            for axis in (0..3).filter(|&axis| moving[axis]) {
-                displacement[vertex as usize][axis] = mean[axis] + value[axis][0];
-            }
-        }
-        Ok(convergence.into_iter().fold(Convergence::default(), |worst, column| Convergence {
-            iterations: worst.iterations.max(column.iterations),
-            residual: worst.residual.max(column.residual),
-        }))
-    }
-}
-
-/// What equations are set up from besides the mesh.
-#[derive(Clone, Copy)]
-enum Start<'a> {
-    Fresh(&'a Arc<dyn Partition>),
-    /// Equations of the same graph.
-    Like(&'a Equations),
-}
-
-impl Start<'_> {
-    /// Whether the components of a harmonic displacement are solved for together: where any rank has sliding vertices.
-    fn is_coupled(self, constraints: &[Constraint]) -> bool {
-        match self {
-            Start::Fresh(partition) => any(&**partition, !constraints.is_empty()),
-            Start::Like(equations) => matches!(equations, Equations::Coupled(_)),
-        }
-    }
 }
 
 fn checked_constraints(
@@ -645,47 +419,4 @@ fn checked_constraints(
         }
     }
     constraints(sliding, |vertex| graph.unknown(vertex))
-}
-
-/// Assembles the equations and sets up their solver.
-fn equations(
-    graph: &Graph,
-    mesh: &Mesh,
-    elements: &Elements<'_>,
-    stiffness: &[f64],
-    constraints: &[Constraint],
-    settings: &Deform,
-    start: Start<'_>,
-) -> Result<Equations, LinearError> {
-    let coupled = |system| {
-        let slide = |matrix: &mut SparseMatrix<3>| constrain(matrix, constraints);
-        let set_up = |matrix: Arc<SparseMatrix<3>>| match start {
-            Start::Like(Equations::Coupled(like)) => like.solver.renewed(matrix),
-            Start::Like(Equations::Separate(_)) => crate::linear::solver(matrix),
-            Start::Fresh(partition) => vector_solver(partition, matrix, &graph.vertices),
-        };
-        System::new(system, slide, set_up).map(Equations::Coupled)
-    };
-    match settings.method {
-        Method::Elasticity => {
-            let form = Elastic::new(settings.poisson_ratio);
-            coupled(graph.assemble(mesh, elements, &form, stiffness))
-        }
-        // On one rank that has sliding vertices all ranks must solve for the components together.
-        Method::Harmonic if start.is_coupled(constraints) => {
-            coupled(graph.assemble(mesh, elements, &VectorLaplace, stiffness))
-        }
-        Method::Harmonic => {
-            let system = graph.assemble(mesh, elements, &Laplace, stiffness);
-            let none = |matrix: &mut SparseMatrix<1>| {
-                SparseMatrix::zeros(vec![0; matrix.rows() + 1], Vec::new())
-            };
-            let set_up = |matrix: Arc<SparseMatrix<1>>| match start {
-                Start::Like(Equations::Separate(like)) => like.solver.renewed(matrix),
-                Start::Like(Equations::Coupled(_)) => crate::linear::solver(matrix),
-                Start::Fresh(partition) => scalar_solver(partition, matrix, &graph.vertices),
-            };
-            System::new(system, none, set_up).map(Equations::Separate)
-        }
-    }
 }

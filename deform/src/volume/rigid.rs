@@ -1,8 +1,9 @@
 //! Infinitesimal rigid motions.
 
+use crate::communicator::{Communicator, Reduction};
 use crate::linear::invert_positive;
 use crate::mesh::Vector;
-use crate::partition::{Partition, Reduction};
+use crate::number::real;
 use crate::vector::{add, cross, dot, scale, subtract};
 
 /// `translation + rotation × (point - centre)`.
@@ -14,19 +15,18 @@ pub(super) struct RigidMotion {
 }
 
 impl RigidMotion {
-    /// The motion nearest to `displacement` at `points` in the least squares; of those that the ranks have between them where
-    /// each rank brings the points that it speaks for. Where the points do not tell the rotation (all on one line), it is left
-    /// out.
+    /// The motion nearest to `displacement` at `points` in the least squares; of those that the
+    /// ranks have between them where each rank brings the points that it owns. Where the points do
+    /// not tell the rotation (all on one line), it is left out.
     pub(super) fn nearest(
         points: &[Vector],
         displacement: &[Vector],
-        partition: &dyn Partition,
+        communicator: &dyn Communicator,
     ) -> Self {
-        #[expect(clippy::cast_precision_loss, reason = "fewer vertices than 2^53")]
-        let mut sums = [points.len() as f64, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let mut sums = [real(points.len()), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
         sums[1..4].copy_from_slice(&points.iter().copied().fold([0.0; 3], add));
         sums[4..].copy_from_slice(&displacement.iter().copied().fold([0.0; 3], add));
-        partition.reduce(Reduction::Sum, &mut sums);
+        communicator.reduce(Reduction::Sum, &mut sums);
         let [count, sums @ ..] = sums;
         let [centre, translation] = [0, 3]
             .map(|from| scale([sums[from], sums[from + 1], sums[from + 2]], 1.0 / count.max(1.0)));
@@ -45,7 +45,7 @@ impl RigidMotion {
         let mut sums: [f64; 12] = [0.0; 12];
         sums[..9].copy_from_slice(inertia.as_flattened());
         sums[9..].copy_from_slice(&moment);
-        partition.reduce(Reduction::Sum, &mut sums);
+        communicator.reduce(Reduction::Sum, &mut sums);
         let row = |from: usize| [sums[from], sums[from + 1], sums[from + 2]];
         let (inertia, moment) = ([row(0), row(3), row(6)], row(9));
         let rotation = invert_positive(&inertia)
@@ -53,7 +53,7 @@ impl RigidMotion {
         Self { centre, translation, rotation }
     }
 
-    /// The same without its rotation.
+    /// The motion without its rotation.
     pub(super) fn translation(self) -> Self {
         Self { rotation: [0.0; 3], ..self }
     }
@@ -69,18 +69,18 @@ impl RigidMotion {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::partition::Whole;
+    use crate::communicator::Solo;
 
     #[test]
     fn finds_the_motion_it_was_given() {
         let points = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.5], [0.0, 1.0, 0.0], [0.3, 0.2, 3.0]];
         let (shift, turn) = ([1.0, -2.0, 0.5], [0.3, 0.1, -0.7]);
         let moved = points.map(|point| add(shift, cross(turn, point)));
-        let motion = RigidMotion::nearest(&points, &moved, &Whole);
+        let motion = RigidMotion::nearest(&points, &moved, &Solo);
         for (point, value) in points.into_iter().zip(moved) {
             assert!(subtract(motion.at(point), value).iter().all(|error| error.abs() < 1e-13));
         }
         let line = [[0.0; 3], [1.0, 0.0, 0.0]];
-        assert_eq!(RigidMotion::nearest(&line, &[[1.0; 3]; 2], &Whole).at([5.0; 3]), [1.0; 3]);
+        assert_eq!(RigidMotion::nearest(&line, &[[1.0; 3]; 2], &Solo).at([5.0; 3]), [1.0; 3]);
     }
 }

@@ -1,4 +1,4 @@
-//! What a user may choose about volume motion.
+//! The settings of volume motion.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -11,20 +11,21 @@ use super::VolumeError;
 pub struct Deform {
     /// The equation that is solved for the displacement.
     pub method: Method,
-    /// How much stiffer small cells are than large ones: the stiffness of a cell is (mean volume / volume) to this power.
-    /// 0 is a uniform material; 1 keeps thin boundary layers more nearly rigid and bends the cells about them the more. 0 to 4.
+    /// How much stiffer small cells are than large ones: the stiffness of a cell is (mean volume /
+    /// volume) to this power. 0 is a uniform material; 1 keeps thin boundary layers more nearly
+    /// rigid and bends the cells about them the more. 0 to 4.
     #[schemars(range(min = 0.0, max = 4.0))]
     pub stiffening: f64,
-    /// Poisson's ratio of the elastic material: how far it resists a change of volume. Above -1 and below 0.5; for
-    /// `elasticity` only.
+    /// Poisson's ratio of the elastic material: how far it resists a change of volume. Above -1 and
+    /// below 0.5; for `elasticity` only.
     #[schemars(extend("exclusiveMinimum" = -1.0, "exclusiveMaximum" = 0.5))]
     pub poisson_ratio: f64,
     /// The relative residual at which the iterative solve stops. Above 0, at most 0.1.
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 0.1))]
     pub tolerance: f64,
-    /// How often the vertices inside are gone through after the solve: each moves to where its worst cells are more like those
-    /// of the reference. Vertices whose cells have all kept 95 % of their scaled Jacobian stay. 0 leaves the shape as it was
-    /// solved for. 0 to 100.
+    /// How often the vertices inside are gone through after the solve: each moves to where its
+    /// worst cells are more like those of the reference. Vertices whose cells have all kept 95 % of
+    /// their scaled Jacobian stay. 0 leaves the shape as it was solved for. 0 to 100.
     #[schemars(range(min = 0, max = 100))]
     pub improve: u32,
 }
@@ -33,11 +34,11 @@ pub struct Deform {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Linear elasticity: the three components of the displacement are one coupled problem. The better choice for thin
-    /// cells at walls.
+    /// Linear elasticity: the three components of the displacement are one coupled problem. The
+    /// better choice for thin cells at walls.
     Elasticity,
-    /// Laplace's equation for each component by itself; a component that moves nowhere costs nothing. The cheaper choice
-    /// for motion along one axis.
+    /// Laplace's equation for each component by itself; a component that moves nowhere costs
+    /// nothing. The cheaper choice for motion along one axis.
     Harmonic,
 }
 

@@ -8,11 +8,12 @@ use crate::vector::{dot, scale, subtract};
 /// A direction that is new is at least this far out of the plane of those known, as a sine.
 const NEW_DIRECTION: f64 = 0.1;
 
-/// A vertex that may move along a surface but not across it: the displacement along `normal` is prescribed (none, unless told
-/// otherwise), the others are solved for without force.
+/// A vertex that may move along a surface but not across it: the displacement along `normal` is
+/// prescribed (none, unless told otherwise), the others are solved for without force.
 ///
-/// A vertex where two such surfaces meet is listed once for each, and slides along their edge; with three normals that span space
-/// all of its displacement is prescribed. Normals within about six degrees of the plane of those before them say nothing new.
+/// A vertex where two such surfaces meet is listed once for each, and slides along their edge; with
+/// three normals that span space all of its displacement is prescribed. Normals within about six
+/// degrees of the plane of those before them say nothing new.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sliding {
     /// The vertex of the mesh.
@@ -26,7 +27,7 @@ pub struct Sliding {
 pub(super) struct Constraint {
     /// Its unknown.
     pub(super) row: usize,
-    /// Its first place in what the user listed.
+    /// Its first index in what the user listed.
     pub(super) first: usize,
     /// The projection on the directions that are prescribed.
     pub(super) across: Block<3>,
@@ -44,7 +45,8 @@ impl Constraint {
     }
 }
 
-/// One constraint for each vertex that `sliding` lists and that has an unknown, in the order of the unknowns.
+/// One constraint for each vertex that `sliding` lists and that has an unknown, in the order of the
+/// unknowns.
 ///
 /// # Errors
 /// [`VolumeError::SlidingNormal`].
@@ -84,8 +86,9 @@ pub(super) fn constraints(
     Ok(constraints)
 }
 
-/// Takes the directions across out of the equations: `P A P + α (1 - P)`, which is positive definite where `A` is. What is
-/// returned couples the unknowns to the prescribed displacements, one column for each constraint.
+/// Takes the directions across out of the equations: `P A P + α (1 - P)`, which is positive
+/// definite where `A` is. What is returned couples the unknowns to the prescribed displacements,
+/// one column for each constraint.
 pub(super) fn constrain(
     matrix: &mut SparseMatrix<3>,
     constraints: &[Constraint],
@@ -98,9 +101,9 @@ pub(super) fn constrain(
     let (mut found_offsets, mut found_columns, mut found_values) =
         (vec![0], Vec::new(), Vec::new());
     for row in 0..of_row.len() {
-        for place in offsets[row]..offsets[row + 1] {
-            let column = columns[place] as usize;
-            let block = &mut values[place];
+        for entry in offsets[row]..offsets[row + 1] {
+            let column = columns[entry] as usize;
+            let block = &mut values[entry];
             let whole = *block;
             if let Some((index, constraint)) = of_row[column] {
                 found_columns.push(index);

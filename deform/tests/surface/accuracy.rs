@@ -1,9 +1,10 @@
 use std::sync::Arc;
 
 use super::*;
+use tombolo_deform::edit::EditError;
 use tombolo_deform::mesh::{CellType, Cells};
 use tombolo_deform::shapes;
-use tombolo_deform::surface::{EditError, SurfaceError};
+use tombolo_deform::surface::SurfaceError;
 
 fn torus(counts: [usize; 2]) -> Mesh {
     tagged(&shapes::torus(2.0, 0.7, counts), |[x, ..]| {
@@ -28,7 +29,8 @@ fn rounding_leaves_less_than_a_hundred_millionth_of_the_motion() {
     assert_eq!(editor.forward_error(&[]).unwrap(), 0.0);
 }
 
-/// Edits of every kind that has an amount, with amounts that need some, all and none of their bases.
+/// Edits of every kind that has an amount, with amounts that need some, all and none of their
+/// bases.
 fn amounts(kind: usize, amount: f64) -> Edit {
     let body = match kind {
         0 => format!(r#"{{"translate": {{"by": [{amount}, 0, 0.5]"#),
@@ -160,7 +162,8 @@ fn a_seam_that_an_edit_would_open_is_named() {
     assert!(editor.displacement(&[both]).is_ok());
 }
 
-/// What becomes of a strip one square high whose ends are `rings` squares wide, against the profile of the continuous problem.
+/// What becomes of a strip one square high whose ends are `rings` squares wide, against the profile
+/// of the continuous problem.
 fn profile_error(
     columns: usize,
     rings: usize,
@@ -190,14 +193,15 @@ fn profile_error(
         .fold(0.0, f64::max)
 }
 
-/// As many rings of prescribed vertices as the order clamp as many derivatives, and an open rim is a mirror: it doubles the rings
-/// that end there.
+/// As many rings of prescribed vertices as the order clamp as many derivatives, and an open rim is
+/// a mirror: it doubles the rings that end there.
 #[test]
 fn each_ring_of_prescribed_vertices_clamps_one_derivative_more() {
     let line = |x: f64| x;
     let cubic = |x: f64| x * x * (3.0 - 2.0 * x);
     let quintic = |x: f64| x * x * x * (10.0 - 15.0 * x + 6.0 * x * x);
-    // The polynomial of degree 5 whose first and third derivatives vanish at both ends: the curvature is free there.
+    // The polynomial of degree 5 whose first and third derivatives vanish at both ends: the
+    // curvature is free there.
     let mirrored = |x: f64| 2.5 * x * x - 2.5 * x.powi(4) + x.powi(5);
     for (rings, order, profile) in [
         (1, HarmonicOrder::Harmonic, &line as &dyn Fn(f64) -> f64),

@@ -1,14 +1,15 @@
 //! What each kind of edit does, against closed forms; regions, muting, and what is refused.
 
 use super::*;
+use tombolo_deform::edit::{EditError, InvalidEdit, Region};
 use tombolo_deform::shapes;
-use tombolo_deform::surface::{EditError, InvalidEdit, Region};
 
 fn edit(json: serde_json::Value) -> Edit {
     serde_json::from_value(json).expect("an edit")
 }
 
-/// The product of unit quaternions turns a vector; written without the formula that the kernel uses.
+/// The product of unit quaternions turns a vector; written without the formula that the kernel
+/// uses.
 fn turned(axis: Vector, degrees: f64, point: Vector) -> Vector {
     let length = axis.iter().map(|part| part * part).sum::<f64>().sqrt();
     let half = degrees.to_radians() / 2.0;
@@ -125,7 +126,8 @@ fn an_affine_map_is_made_as_it_is_written() {
         assert!(difference(shape[vertex as usize], expected) < 1e-14);
     }
 
-    // A diagonal matrix is a scaling, to the bit; a singular one flattens onto the centre of the handle's box.
+    // A diagonal matrix is a scaling, to the bit; a singular one flattens onto the centre of the
+    // handle's box.
     let diagonal = |matrix: serde_json::Value| {
         edit(
             serde_json::json!({"affine": {"features": ["x-max"], "fixed": ["x-min"], "matrix": matrix}}),
@@ -162,8 +164,8 @@ fn a_rigid_motion_of_the_whole_surface_keeps_its_shape() {
 
 #[test]
 fn a_closed_surface_grows_evenly_along_its_normals() {
-    // The vertices lie on the tube of radius 0.5; offset by 0.2 they lie on that of radius 0.7, up to how well the mean of
-    // flat faces gives the normal, which is of second order in their size.
+    // The vertices lie on the tube of radius 0.5; offset by 0.2 they lie on that of radius 0.7, up
+    // to how well the mean of flat faces gives the normal, which is of second order in their size.
     let errors: Vec<f64> = [1, 2]
         .map(|fine| {
             let mut editor = editor(&shapes::torus(2.0, 0.5, [32 * fine, 16 * fine]));
@@ -439,7 +441,7 @@ fn what_makes_no_sense_is_named_by_its_field() {
         assert!(source.to_string().starts_with(&source.field()), "{source}");
         assert!(error.to_string().starts_with(&format!("edit 0 ({}): ", edit.name())));
     }
-    let infinite = Edit::Affine(tombolo_deform::surface::Affine {
+    let infinite = Edit::Affine(tombolo_deform::edit::Affine {
         features: names(&["x-max"]),
         matrix: [[1.0; 3], [1.0, f64::NAN, 1.0], [1.0; 3]],
         ..Default::default()

@@ -53,7 +53,8 @@ fn rigid([a, b, c, d]: [f64; 4], shift: Vector) -> impl Fn(Vector) -> Vector {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
-    /// Of the whole: also where coordinates are far from the origin, and where flat sides are tilted.
+    /// Of the whole: also where coordinates are far from the origin, and where flat sides are
+    /// tilted.
     #[test]
     fn a_rigid_motion_breaks_nothing(turn in [-1.0..1.0f64, -1.0..1.0, -1.0..1.0, 0.1..1.0], far in 0.0..6.0f64, which in 0..3usize) {
         let surface = match which {
@@ -129,7 +130,8 @@ fn a_vertex_drawn_over_its_neighbours_folds_the_faces_behind_it() {
         moved[middle][0] += 0.2;
         let shape: Vec<Vector> = moved.into_iter().map(motion).collect();
         let report = check(&surface, surface.points(), &shape);
-        // Off the axes rounding lifts the faces out of their plane, some of them clear of each other.
+        // Off the axes rounding lifts the faces out of their plane, some of them clear of each
+        // other.
         assert!(
             report.flipped.count > 0 && (tilt != 0.0 || report.intersections.count > 0),
             "{report}"
@@ -144,7 +146,8 @@ fn a_vertex_drawn_over_its_neighbours_folds_the_faces_behind_it() {
             refused.to_string().contains("fold over") && refused.to_string().contains("feasible"),
             "{refused}"
         );
-        // The faces behind lose their area where the vertex meets the next one, after 0.125 of the 0.2.
+        // The faces behind lose their area where the vertex meets the next one, after 0.125 of the
+        // 0.2.
         if tilt == 0.0 {
             assert!((refused.sound_fraction - 0.625).abs() < 2e-3, "{}", refused.sound_fraction);
         }
@@ -168,9 +171,9 @@ fn plates_that_pass_each_other_meet_where_and_when_they_should() {
     assert_eq!(report.intersections.first.len(), report.intersections.count.min(16));
     for pair in &report.intersections.first {
         assert!(
-            pair.place[2].abs() < 1e-12 && (pair.place[0] - 0.5).abs() < 1e-9,
+            pair.position[2].abs() < 1e-12 && (pair.position[0] - 0.5).abs() < 1e-9,
             "{:?}",
-            pair.place
+            pair.position
         );
         let [a, b] =
             pair.faces.map(|face| surface.faces().vertices(face as usize)[0] as usize >= count);

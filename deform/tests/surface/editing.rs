@@ -1,12 +1,12 @@
 use std::sync::Arc;
 
 use super::*;
+use tombolo_deform::edit::{EditError, InvalidEdit};
 use tombolo_deform::mesh::{CellType, Cells};
 use tombolo_deform::shapes;
-use tombolo_deform::surface::{EditError, InvalidEdit};
 
-/// A flat strip of `columns` squares from x = 0 to 1, with three more on each side that are fixed (feature-0) and moved
-/// (feature-2).
+/// A flat strip of `columns` squares from x = 0 to 1, with three more on each side that are fixed
+/// (feature-0) and moved (feature-2).
 fn strip(columns: usize) -> Mesh {
     let width = 3.0 / columns as f64;
     let plate = shapes::plate([columns + 6, 4], [-width, 0.0], [1.0 + width, 4.0 / columns as f64]);
@@ -36,7 +36,8 @@ fn interpolate(nodes: &[(f64, f64)], at: f64) -> f64 {
     nodes.iter().enumerate().map(term).sum()
 }
 
-/// The largest difference to the polynomial that the scheme reproduces, and to the one of the continuous problem.
+/// The largest difference to the polynomial that the scheme reproduces, and to the one of the
+/// continuous problem.
 fn strip_errors(columns: usize, order: HarmonicOrder) -> (f64, f64) {
     let mesh = strip(columns);
     let mut editor = editor(&mesh);
@@ -73,7 +74,8 @@ fn a_strip_bends_as_the_closed_form_of_each_order() {
         if order == HarmonicOrder::Harmonic {
             assert!(errors[2].1 < 1e-13);
         } else {
-            // The slope is clamped between the two outermost rings, half a face outside: first order.
+            // The slope is clamped between the two outermost rings, half a face outside: first
+            // order.
             for pair in errors.windows(2) {
                 let ratio = pair[0].1 / pair[1].1;
                 assert!((1.7..2.3).contains(&ratio), "order {order}: {ratio} where 2 is expected");
@@ -129,7 +131,8 @@ fn rough_plate(count: usize) -> Mesh {
 
 #[test]
 fn affine_motion_is_reproduced_on_flat_pieces() {
-    // feature-0 is the outside, whose vertices make the handle; what is inside feature-1 only is free.
+    // feature-0 is the outside, whose vertices make the handle; what is inside feature-1 only is
+    // free.
     let mesh = rough_plate(20);
     let mut editor = editor(&mesh);
     let factors = [1.3, 0.6, 1.0];

@@ -1,9 +1,11 @@
 use std::collections::HashMap;
 
 use super::{editor, enclosed_volume, extract};
+use tombolo_deform::edit::Editor;
+use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, Vector};
 use tombolo_deform::shapes;
-use tombolo_deform::surface::{Editor, FeatureSettings, Surface, SurfaceError};
+use tombolo_deform::surface::{Surface, SurfaceError};
 
 fn mesh(points: Vec<Vector>, cells: Cells) -> Mesh {
     Mesh::new(points, cells, FeatureSource::SharpEdges).unwrap()
@@ -68,7 +70,8 @@ fn the_surface_of_one_cell_of_each_type_is_its_faces_outward() {
     }
 }
 
-/// Mesh generators and VTK's manual number a wedge the other way round; either way the faces look outward.
+/// Mesh generators and VTK's manual number a wedge the other way round; either way the faces look
+/// outward.
 #[test]
 fn wedges_of_either_hand_face_outward() {
     let left = shapes::single_cell(CellType::Wedge);
@@ -106,7 +109,8 @@ fn boxes_have_the_surface_of_the_box() {
     }
 }
 
-/// A cube with a pyramid on its top, a wedge at its side, a tetrahedron on a triangle of the wedge and a polyhedral cube below.
+/// A cube with a pyramid on its top, a wedge at its side, a tetrahedron on a triangle of the wedge
+/// and a polyhedral cube below.
 fn mixed_mesh() -> Mesh {
     let mut points = shapes::single_cell(CellType::Hexahedron).points().to_vec();
     points.extend([
@@ -152,7 +156,8 @@ fn cells_of_different_types_share_their_faces() {
 
 #[test]
 fn polygons_with_many_corners_match_by_all_of_them() {
-    // Two hexagonal prisms on each other share a hexagon, and no face of one is taken for another with the same lowest corners.
+    // Two hexagonal prisms on each other share a hexagon, and no face of one is taken for another
+    // with the same lowest corners.
     let prism = shapes::single_cell(CellType::HexagonalPrism);
     let mut points = prism.points().to_vec();
     points.extend(prism.points()[6..].iter().map(|point| [point[0], point[1], 2.0]));

@@ -1,7 +1,8 @@
 use super::{extract, tagged};
+use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, TaggedFaces};
 use tombolo_deform::shapes;
-use tombolo_deform::surface::{FeatureSettings, Surface};
+use tombolo_deform::surface::Surface;
 
 fn with_features(mesh: &Mesh, features: FeatureSource) -> Mesh {
     Mesh::new(mesh.points().to_vec(), mesh.cells().clone(), features).unwrap()

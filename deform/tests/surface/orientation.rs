@@ -1,7 +1,8 @@
 use super::*;
+use tombolo_deform::edit::EditError;
 use tombolo_deform::mesh::{CellType, Cells};
 use tombolo_deform::shapes;
-use tombolo_deform::surface::{EditError, check};
+use tombolo_deform::surface::check;
 
 /// The same mesh of triangles, those chosen turned round.
 fn with_turned(mesh: &Mesh, is_turned: impl Fn(usize) -> bool) -> Mesh {

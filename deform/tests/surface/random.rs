@@ -1,11 +1,12 @@
-//! Random meshes and edits with absurd values: an answer or an error, never a panic, and never a number that is not finite.
+//! Random meshes and edits with absurd values: an answer or an error, never a panic, and never a
+//! number that is not finite.
 
 use super::*;
 use proptest::prelude::*;
-use tombolo_deform::shapes;
-use tombolo_deform::surface::{
+use tombolo_deform::edit::{
     Affine, BoxRegion, Displacement, HalfSpaceRegion, Region, Rotate, SphereRegion,
 };
+use tombolo_deform::shapes;
 
 fn absurd() -> BoxedStrategy<f64> {
     prop_oneof![
@@ -282,7 +283,8 @@ proptest! {
         prop_assert!(editor.displacement(&[]).unwrap().iter().flatten().all(|value| value.to_bits() == 0));
     }
 
-    /// Layers are muted, reordered, removed and put back on one editor: what comes out is what a new editor makes of the stack.
+    /// Layers are muted, reordered, removed and put back on one editor: what comes out is what a
+    /// new editor makes of the stack.
     #[test]
     fn the_result_depends_on_the_stack_alone(
         layers in proptest::collection::vec(layer(), 1..5),

@@ -3,11 +3,12 @@
 use std::fmt;
 use std::sync::Arc;
 
+use tombolo_deform::communicator::{Communicator, Reduction};
 use tombolo_deform::mesh::Vector;
+use tombolo_deform::vector::{cross, dot, length, subtract};
 
 use crate::SolverError;
-use crate::geometry::{Geometry, cross, dot, minus};
-use crate::linear::Halo;
+use crate::geometry::Geometry;
 use crate::topology::Topology;
 
 /// Where and when a [`Value`] is asked for.
@@ -24,7 +25,7 @@ pub struct Place<'a> {
 /// A number that may depend on place, time and parameters.
 #[derive(Clone)]
 pub enum Value {
-    /// The same everywhere and always.
+    /// One value everywhere and always.
     Uniform(f64),
     /// A function of place, time and parameters.
     Function(Arc<dyn Fn(&Place) -> f64 + Send + Sync>),
@@ -55,7 +56,7 @@ impl fmt::Debug for Value {
     }
 }
 
-/// What holds on one part of the boundary.
+/// The boundary condition on one part of the boundary.
 #[derive(Debug, Clone)]
 pub enum Condition {
     /// The fluid moves with the wall.
@@ -64,21 +65,23 @@ pub enum Condition {
     Slip,
     /// The velocity is prescribed.
     Velocity([Value; 3]),
-    /// The pressure is prescribed, with zero viscous traction. It holds weakly: through the traction on the fluid.
+    /// The pressure is prescribed, with zero viscous traction. It holds weakly: through the
+    /// traction on the fluid.
     Pressure(Value),
 }
 
 /// A part of the boundary with its condition. The patches together must cover the whole boundary.
 ///
-/// Where patches meet, a prescribed velocity rules before a no-slip wall, so that what flows in is exactly what was prescribed,
-/// and both before slip and pressure; between two prescribed velocities the earlier patch rules.
+/// Where patches meet, a prescribed velocity rules before a no-slip wall, so that what flows in is
+/// exactly what was prescribed, and both before slip and pressure; between two prescribed
+/// velocities the earlier patch rules.
 #[derive(Debug, Clone)]
 pub struct Patch {
     /// Its name.
     pub name: String,
     /// Its faces by vertices of the mesh, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// What holds there.
+    /// The boundary condition there.
     pub condition: Condition,
 }
 
@@ -90,25 +93,28 @@ pub(crate) enum Rule {
     /// It is the mesh's velocity.
     Wall,
     /// A patch prescribes it.
-    Prescribed(u32),
+    Prescribed(usize),
 }
 
 /// A vertex on an outlet whose velocity is free.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct OutletVertex {
     pub vertex: u32,
-    pub patch: u32,
+    pub patch: usize,
     /// The integral of the vertex's shape function times the outward normal.
     pub area: Vector,
-    /// The velocity with which a potential of one drives fluid out (1/length); the same all over the patch.
+    /// The velocity with which a potential of one drives fluid out (1/length); the same all over
+    /// the patch.
     pub yield_rate: f64,
 }
 
-/// How much stiffer an outlet is than the lumped mass of its vertices says: no tetrahedron's mass matrix is less than a fifth of
-/// its lumped one (Wathen 1987), and the projection is stable only where the pressure equation is the stiffer one.
+/// How much stiffer an outlet is than the lumped mass of its vertices says: no tetrahedron's mass
+/// matrix is less than a fifth of its lumped one (Wathen 1987), and the projection is stable only
+/// where the pressure equation is the stiffer one.
 const OUTLET_STIFFNESS: f64 = 5.0;
 
-/// A vertex that no fluid passes through the wall at: one on a frictionless wall, or one where an inlet meets a no-slip wall.
+/// A vertex that no fluid passes through the wall at: one on a frictionless wall, or one where an
+/// inlet meets a no-slip wall.
 #[derive(Debug, Clone, Copy)]
 struct SlipVertex {
     vertex: u32,
@@ -132,13 +138,9 @@ pub(crate) struct Boundary {
 }
 
 impl Boundary {
-    /// The boundary of one rank's part. Its patches hold all triangles of the whole boundary that belong to a cell of the part.
-    /// Normals and areas are not known before [`Boundary::measure`].
-    pub fn new(
-        topology: &Topology,
-        mut patches: Vec<Patch>,
-        halo: &Halo,
-    ) -> Result<Self, SolverError> {
+    /// The boundary of one rank's part. Its patches hold all triangles of the whole boundary that
+    /// belong to a cell of the part. Normals and areas are not known before [`Boundary::measure`].
+    pub fn new(topology: &Topology, mut patches: Vec<Patch>) -> Result<Self, SolverError> {
         let vertex_count = topology.vertex_count();
         for patch in &mut patches {
             for vertex in patch.triangles.iter_mut().flatten() {
@@ -151,7 +153,7 @@ impl Boundary {
         for patch in &mut patches {
             let triangles = std::mem::take(&mut patch.triangles).into_iter();
             let (mut own, others): (Vec<_>, Vec<_>) =
-                triangles.partition(|triangle| halo.counts(triangle));
+                triangles.partition(|triangle| topology.counts(triangle));
             counted.push(own.len());
             own.extend(others);
             patch.triangles = own;
@@ -165,10 +167,7 @@ impl Boundary {
         for (index, patch) in patches.iter().enumerate().rev() {
             if let Condition::Velocity(_) = patch.condition {
                 for &vertex in patch.triangles.iter().flatten() {
-                    #[expect(clippy::cast_possible_truncation, reason = "a mesh has few features")]
-                    {
-                        rules[vertex as usize] = Rule::Prescribed(index as u32);
-                    }
+                    rules[vertex as usize] = Rule::Prescribed(index);
                 }
             }
         }
@@ -191,7 +190,12 @@ impl Boundary {
     }
 
     /// Brings normals and areas up to date with the coordinates. Collective.
-    pub fn measure(&mut self, geometry: &Geometry, halo: &Halo) {
+    pub fn measure(
+        &mut self,
+        topology: &Topology,
+        geometry: &Geometry,
+        communicator: &dyn Communicator,
+    ) {
         let points = geometry.points.as_slice();
         self.outlets.clear();
         self.slip.clear();
@@ -199,7 +203,7 @@ impl Boundary {
         let mut areas = vec![[0.0; 3]; points.len()];
         // Area and volume of each patch's outlet vertices.
         let mut sizes = vec![0.0; 2 * self.patches.len()];
-        self.measure_rims(points, &mut areas, halo);
+        self.measure_rims(points, &mut areas, topology.rows());
         for (index, patch) in self.patches.iter().enumerate() {
             if !matches!(patch.condition, Condition::Slip | Condition::Pressure(_)) {
                 continue;
@@ -220,22 +224,16 @@ impl Boundary {
             }
             let first_outlet = self.outlets.len();
             let is_free = |vertex: u32| {
-                (vertex as usize) < halo.rows() && self.rules[vertex as usize] == Rule::Free
+                (vertex as usize) < topology.rows() && self.rules[vertex as usize] == Rule::Free
             };
             for &vertex in vertices.iter().filter(|&&vertex| is_free(vertex)) {
                 let area = areas[vertex as usize];
-                let size = dot(area, area).sqrt();
+                let size = length(area);
                 if size == 0.0 {
                     continue;
                 }
                 if let Condition::Pressure(_) = patch.condition {
-                    #[expect(clippy::cast_possible_truncation, reason = "a mesh has few features")]
-                    self.outlets.push(OutletVertex {
-                        vertex,
-                        patch: index as u32,
-                        area,
-                        yield_rate: 0.0,
-                    });
+                    self.outlets.push(OutletVertex { vertex, patch: index, area, yield_rate: 0.0 });
                 } else {
                     let normal = area.map(|value| value / size);
                     if let Some(axis) = (0..3).find(|&axis| normal[axis].abs() > 1.0 - 1e-12) {
@@ -245,24 +243,24 @@ impl Boundary {
                 }
             }
             for outlet in &self.outlets[first_outlet..] {
-                sizes[2 * index] += dot(outlet.area, outlet.area).sqrt();
+                sizes[2 * index] += length(outlet.area);
                 sizes[2 * index + 1] += geometry.vertex_volumes[outlet.vertex as usize];
             }
         }
-        halo.add(&mut sizes);
+        communicator.reduce(Reduction::Sum, &mut sizes);
         self.open = sizes.iter().any(|&size| size > 0.0);
         for outlet in &mut self.outlets {
-            let patch = 2 * outlet.patch as usize;
+            let patch = 2 * outlet.patch;
             outlet.yield_rate = OUTLET_STIFFNESS * sizes[patch] / sizes[patch + 1];
         }
     }
 
-    /// Where a prescribed velocity meets no-slip walls, it rules, but not through the walls: what flows in then flows out,
-    /// also where a wall slopes away from the inlet. `areas` is memory, zero before and after.
-    fn measure_rims(&mut self, points: &[Vector], areas: &mut [Vector], halo: &Halo) {
+    /// Where a prescribed velocity meets no-slip walls, it rules, but not through the walls: what
+    /// flows in then flows out, also where a wall slopes away from the inlet. `areas` is memory,
+    /// zero before and after.
+    fn measure_rims(&mut self, points: &[Vector], areas: &mut [Vector], rows: usize) {
         let is_rim = |vertex: u32| {
-            (vertex as usize) < halo.rows()
-                && matches!(self.rules[vertex as usize], Rule::Prescribed(_))
+            (vertex as usize) < rows && matches!(self.rules[vertex as usize], Rule::Prescribed(_))
         };
         let mut rims = Vec::new();
         for patch in
@@ -286,7 +284,7 @@ impl Boundary {
         rims.dedup();
         for vertex in rims {
             let area = std::mem::take(&mut areas[vertex as usize]);
-            let size = dot(area, area).sqrt();
+            let size = length(area);
             if size > 0.0 {
                 self.slip.push(SlipVertex { vertex, normal: area.map(|value| value / size) });
             }
@@ -298,7 +296,8 @@ impl Boundary {
         self.open
     }
 
-    /// Writes the prescribed velocities into `velocity`, and takes the part through walls from the mesh.
+    /// Writes the prescribed velocities into `velocity`, and takes the part through walls from the
+    /// mesh.
     pub fn impose(
         &self,
         velocity: &mut [Vector],
@@ -312,7 +311,7 @@ impl Boundary {
                 Rule::Free => {}
                 Rule::Wall => velocity[vertex] = mesh_velocity[vertex],
                 Rule::Prescribed(patch) => {
-                    if let Condition::Velocity(values) = &self.patches[patch as usize].condition {
+                    if let Condition::Velocity(values) = &self.patches[patch].condition {
                         let place = Place { position: points[vertex], time, parameters };
                         velocity[vertex] = [0, 1, 2].map(|axis: usize| values[axis].at(&place));
                     }
@@ -322,12 +321,13 @@ impl Boundary {
         self.impose_slip(velocity, mesh_velocity);
     }
 
-    /// Takes the part of the velocity through walls, where it is not prescribed to be the wall's, from the mesh.
+    /// Takes the part of the velocity through walls, where it is not prescribed to be the wall's,
+    /// from the mesh.
     pub fn impose_slip(&self, velocity: &mut [Vector], mesh_velocity: &[Vector]) {
         for slip in &self.slip {
             let (own, wall) =
                 (&mut velocity[slip.vertex as usize], mesh_velocity[slip.vertex as usize]);
-            let through = dot(minus(*own, wall), slip.normal);
+            let through = dot(subtract(*own, wall), slip.normal);
             for axis in 0..3 {
                 own[axis] -= through * slip.normal[axis];
             }
@@ -342,7 +342,7 @@ impl Boundary {
         time: f64,
         parameters: &[f64],
     ) -> f64 {
-        match &self.patches[outlet.patch as usize].condition {
+        match &self.patches[outlet.patch].condition {
             Condition::Pressure(value) => {
                 value.at(&Place { position: points[outlet.vertex as usize], time, parameters })
             }
@@ -351,32 +351,42 @@ impl Boundary {
     }
 
     /// The flux of a vector field out through each patch. Collective.
-    pub fn fluxes(&self, field: &[Vector], points: &[Vector], halo: &Halo) -> Vec<f64> {
+    pub fn fluxes(
+        &self,
+        field: &[Vector],
+        points: &[Vector],
+        communicator: &dyn Communicator,
+    ) -> Vec<f64> {
         let outward = |triangle: &[u32; 3]| {
             let area = triangle_area(points, *triangle);
             triangle.iter().map(|&vertex| dot(field[vertex as usize], area)).sum::<f64>() / 3.0
         };
         let mut fluxes: Vec<f64> =
             self.counted_triangles().map(|patch| patch.iter().map(outward).sum()).collect();
-        halo.add(&mut fluxes);
+        communicator.reduce(Reduction::Sum, &mut fluxes);
         fluxes
     }
 
     /// The mean of a scalar field over each patch, and the patch's area. Collective.
-    pub fn means(&self, field: &[f64], points: &[Vector], halo: &Halo) -> Vec<(f64, f64)> {
+    pub fn means(
+        &self,
+        field: &[f64],
+        points: &[Vector],
+        communicator: &dyn Communicator,
+    ) -> Vec<(f64, f64)> {
         let mut sums = Vec::with_capacity(2 * self.patches.len());
         for triangles in self.counted_triangles() {
             let (mut total, mut whole) = (0.0, 0.0);
             for triangle in triangles {
                 let area = triangle_area(points, *triangle);
-                let size = dot(area, area).sqrt();
+                let size = length(area);
                 total +=
                     size * triangle.iter().map(|&vertex| field[vertex as usize]).sum::<f64>() / 3.0;
                 whole += size;
             }
             sums.extend([total, whole]);
         }
-        halo.add(&mut sums);
+        communicator.reduce(Reduction::Sum, &mut sums);
         let mean =
             |&[total, whole]: &[f64; 2]| (if whole > 0.0 { total / whole } else { 0.0 }, whole);
         sums.as_chunks().0.iter().map(mean).collect()
@@ -390,5 +400,5 @@ impl Boundary {
 /// The outward normal of a triangle, as long as its area.
 fn triangle_area(points: &[Vector], triangle: [u32; 3]) -> Vector {
     let [a, b, c] = triangle.map(|vertex| points[vertex as usize]);
-    cross(minus(b, a), minus(c, a)).map(|value| 0.5 * value)
+    cross(subtract(b, a), subtract(c, a)).map(|value| 0.5 * value)
 }

@@ -16,18 +16,19 @@ use tombolo_pipelines::language::{
 use tombolo_pipelines::limits::DOCUMENT;
 
 use crate::boundary::{Condition, Patch, Place, Value};
-use crate::solver::Fluid;
+use crate::fluid::Fluid;
 
 /// The names that every formula knows before the parameters.
 const PLACE_NAMES: [&str; 4] = ["x", "y", "z", "t"];
 
 /// A case file.
 ///
-/// A number may also be a formula, as a string, of `x`, `y`, `z`, `t` and the names of the parameters.
+/// A number may also be a formula, as a string, of `x`, `y`, `z`, `t` and the names of the
+/// parameters.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Case {
-    /// What the case shows, and what it takes from where.
+    /// A description of the case: the flow, and where its data are from.
     #[serde(default)]
     pub description: String,
     /// The mesh file, relative to the case file: `.msh`, `.vtu` or `.vtk`, of tetrahedra.
@@ -39,7 +40,7 @@ pub struct Case {
     /// The numbers that can be steered, by name.
     #[serde(default)]
     pub parameters: BTreeMap<String, ParameterRange>,
-    /// What holds on each feature of the mesh. Every feature must be named.
+    /// The boundary condition on each feature of the mesh. Every feature must be named.
     pub boundary: BTreeMap<String, BoundaryCondition>,
     /// The state at time 0; left out, the fluid is at rest.
     #[serde(default)]
@@ -47,7 +48,8 @@ pub struct Case {
     /// The length of a time step.
     #[schemars(range(min = 0.0))]
     pub time_step: f64,
-    /// How many steps a run takes that is not told otherwise. With viewers a run goes on until it is stopped.
+    /// How many steps a run takes that is not told otherwise. With viewers a run goes on until it
+    /// is stopped.
     pub steps: u64,
     /// The pipelines to use where none are given, relative to the case file.
     #[serde(default)]
@@ -61,7 +63,7 @@ pub struct Case {
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Number {
-    /// The same everywhere and always.
+    /// One value everywhere and always.
     Constant(f64),
     /// A formula.
     Formula(String),
@@ -85,7 +87,7 @@ pub struct ParameterRange {
     pub maximum: f64,
 }
 
-/// What holds on a feature.
+/// The boundary condition on a feature.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum BoundaryCondition {
@@ -191,7 +193,8 @@ impl Case {
         (self.vector(&self.initial.velocity), self.value(&self.initial.pressure))
     }
 
-    /// The conditions on the boundary of a mesh, one patch for each feature; `file` is the case's, for errors.
+    /// The conditions on the boundary of a mesh, one patch for each feature; `file` is the case's,
+    /// for errors.
     ///
     /// # Errors
     /// [`CaseError::UnknownFeature`] with the near name, and [`CaseError::NoCondition`].
@@ -240,7 +243,8 @@ impl Case {
             Number::Constant(value) => return Value::Uniform(*value),
             Number::Formula(formula) => formula,
         };
-        // Formulas were parsed once when the case was read; one that still fails is no number, which the solver tells.
+        // Formulas were parsed once when the case was read; one that still fails is no number,
+        // which the solver tells.
         let Ok(expression) = Expression::parse(formula, &self.names()) else {
             return Value::Uniform(f64::NAN);
         };

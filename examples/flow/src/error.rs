@@ -1,7 +1,8 @@
 //! Why the solver stopped.
 
+use tombolo_deform::communicator::RankError;
+use tombolo_deform::linear::LinearError;
 use tombolo_deform::mesh::{CellType, Vector};
-use tombolo_pipelines::communicator::RankError;
 
 /// Why the solver cannot start, or cannot go on.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -47,28 +48,31 @@ pub enum SolverError {
     /// A number that must be positive and finite is not.
     #[error("{what} is {value}; it must be positive and finite")]
     NotPositive {
-        /// What it is.
+        /// The name of the number.
         what: &'static str,
         /// Its value.
         value: f64,
     },
+    /// The pressure equation has no solver.
+    #[error("the pressure equation cannot be solved: {0}")]
+    Pressure(#[from] LinearError),
     /// Something is wrong on one rank. All ranks have this error.
     #[error(transparent)]
     Rank(#[from] RankError),
     /// An inverted or flat element.
-    #[error("cycle {cycle}: cell {cell} at ({:.6}, {:.6}, {:.6}) is inverted or flat (volume {volume:.3e})", place[0], place[1], place[2])]
+    #[error("cycle {cycle}: cell {cell} at ({:.6}, {:.6}, {:.6}) is inverted or flat (volume {volume:.3e})", position[0], position[1], position[2])]
     Inverted {
         /// The cycle.
         cycle: u64,
         /// The cell.
         cell: usize,
         /// Its centre.
-        place: Vector,
+        position: Vector,
         /// Its volume.
         volume: f64,
     },
     /// The solution is no longer finite.
-    #[error("cycle {cycle}, time {time:.6}: the {quantity} at vertex {vertex}, ({:.6}, {:.6}, {:.6}), is {value}: the solution has diverged; a smaller time step or a schedule of more steps may help", place[0], place[1], place[2])]
+    #[error("cycle {cycle}, time {time:.6}: the {quantity} at vertex {vertex}, ({:.6}, {:.6}, {:.6}), is {value}: the solution has diverged; a smaller time step or a schedule of more steps may help", position[0], position[1], position[2])]
     Diverged {
         /// The cycle.
         cycle: u64,
@@ -79,8 +83,8 @@ pub enum SolverError {
         /// The first vertex where it is not finite.
         vertex: usize,
         /// Where that is.
-        place: Vector,
-        /// What was found.
+        position: Vector,
+        /// The value that was found.
         value: f64,
     },
 }

@@ -1,9 +1,11 @@
 //! The parts of a tetrahedral mesh that change when it moves.
 
 use rayon::prelude::*;
+use tombolo_deform::linear::SparseMatrix;
 use tombolo_deform::mesh::Vector;
+use tombolo_deform::vector::{cross, dot, subtract};
 
-use crate::linear::{Matrix, for_each_chunk};
+use crate::linear::for_each;
 use crate::topology::Topology;
 
 /// A linear tetrahedron at its present place.
@@ -19,7 +21,7 @@ impl Element {
     /// The element with these corners.
     #[must_use]
     pub fn new(corners: [Vector; 4]) -> Self {
-        let [a, b, c] = [1, 2, 3].map(|corner| minus(corners[corner], corners[0]));
+        let [a, b, c] = [1, 2, 3].map(|corner| subtract(corners[corner], corners[0]));
         let (bc, ca, ab) = (cross(b, c), cross(c, a), cross(a, b));
         let determinant = dot(a, bc);
         let others = [bc, ca, ab].map(|area| area.map(|value| value / determinant));
@@ -63,14 +65,10 @@ impl Geometry {
             .map(|vertices| Element::new(vertices.map(|vertex| points[vertex as usize])))
             .collect();
         let mut vertex_volumes = vec![0.0; points.len()];
-        for_each_chunk(&mut vertex_volumes, |start, chunk| {
-            for (offset, volume) in chunk.iter_mut().enumerate() {
-                *volume = topology
-                    .around(start + offset)
-                    .iter()
-                    .map(|incidence| 0.25 * elements[incidence.element as usize].volume)
-                    .sum();
-            }
+        for_each(&mut vertex_volumes, |vertex, volume| {
+            let around = topology.around(vertex).iter();
+            *volume =
+                around.map(|incidence| 0.25 * elements[incidence.element as usize].volume).sum();
         });
         Self { points, elements, vertex_volumes }
     }
@@ -81,12 +79,12 @@ impl Geometry {
         self.elements.iter().position(|element| element.volume.is_nan() || element.volume <= 0.0)
     }
 
-    /// The stiffness matrix of the Laplacian: the integrals of products of the shape functions' gradients.
+    /// The stiffness matrix of the Laplacian: the integrals of products of the shape functions'
+    /// gradients.
     #[must_use]
-    pub fn laplacian(&self, topology: &Topology) -> Matrix {
-        let mut matrix = Matrix::zeros(std::sync::Arc::clone(&topology.pattern));
-        let pattern = &topology.pattern;
-        let rows = row_slices(pattern.starts.as_slice(), &mut matrix.values);
+    pub fn laplacian(&self, topology: &Topology) -> SparseMatrix<1> {
+        let mut matrix = topology.zeros.clone();
+        let rows = topology.own_rows(&mut matrix);
         rows.into_par_iter().enumerate().with_min_len(512).for_each(|(row, values)| {
             for incidence in topology.around(row) {
                 let element = &self.elements[incidence.element as usize];
@@ -98,37 +96,4 @@ impl Geometry {
         });
         matrix
     }
-}
-
-/// The values of a matrix, row by row.
-#[must_use]
-pub fn row_slices<'a>(starts: &[usize], mut values: &'a mut [f64]) -> Vec<&'a mut [f64]> {
-    let mut rows = Vec::with_capacity(starts.len().saturating_sub(1));
-    for window in starts.windows(2) {
-        let (row, rest) = values.split_at_mut(window[1] - window[0]);
-        rows.push(row);
-        values = rest;
-    }
-    rows
-}
-
-/// The scalar product.
-#[inline]
-#[must_use]
-pub fn dot(a: Vector, b: Vector) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// The vector product.
-#[inline]
-#[must_use]
-pub fn cross(a: Vector, b: Vector) -> Vector {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-/// The difference.
-#[inline]
-#[must_use]
-pub fn minus(a: Vector, b: Vector) -> Vector {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }

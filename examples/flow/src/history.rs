@@ -7,14 +7,15 @@ use std::path::{Path, PathBuf};
 use crate::Condition;
 use crate::solver::Solver;
 
-/// What flows through the domain, and the pressure that it takes.
+/// The flux through the domain, and the pressure that it takes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Through {
     /// Volume per time that flows in where the velocity is prescribed.
     pub mass_in: f64,
     /// Volume per time that flows out where the pressure is prescribed.
     pub mass_out: f64,
-    /// Mean pressure where the velocity is prescribed less that where the pressure is; 0 where one of them is nowhere.
+    /// Mean pressure where the velocity is prescribed less that where the pressure is; 0 where one
+    /// of them is nowhere.
     pub pressure_drop: f64,
 }
 
@@ -54,7 +55,8 @@ pub(crate) struct History {
 }
 
 impl History {
-    /// Creates the file, with the names of its columns: the state at the end of each step, and the seconds since the run began.
+    /// Creates the file, with the names of its columns: the state at the end of each step, and the
+    /// seconds since the run began.
     pub(crate) fn create(file: &Path) -> Result<Self, (PathBuf, std::io::Error)> {
         let failed = |error| (file.to_owned(), error);
         let mut lines = BufWriter::new(File::create(file).map_err(failed)?);

@@ -1,33 +1,43 @@
-//! Incompressible Navier-Stokes on moving tetrahedral meshes: the solver behind every demo of Tombolo.
+//! Incompressible Navier-Stokes on moving tetrahedral meshes: the solver behind every demo of
+//! Tombolo.
 //!
-//! [`Solver`] is the numerics, and knows nothing of steering. The program `flow` reads a case, calls Tombolo's adaptor
-//! before each step, and hands the mesh motion that comes back to the solver.
+//! [`Solver`] is the numerics, and knows nothing of steering. The program `flow` reads a case,
+//! calls Tombolo's adaptor before each step, and hands the mesh motion that comes back to the
+//! solver.
 //!
 //! # The scheme
 //!
-//! - Linear tetrahedra for velocity and pressure, in the arbitrary Lagrangian-Eulerian frame (Donea, Giuliani and Halleux 1982):
-//!   nodal values travel with the mesh, and the convecting velocity is `u - w` with the mesh velocity `w`.
-//! - Time: the second-order backward difference, convecting velocity extrapolated; the first-order one in the first step and
-//!   while the mesh moves.
-//! - Momentum: convection linearised and implicit, SUPG (Brooks and Hughes 1982). One matrix for the three components, solved
-//!   by BiCGStab with ILU(0).
-//! - Pressure: incremental projection (van Kan 1986; Guermond, Minev and Shen 2006), with orthogonal subscales for the
-//!   equal-order pair (Codina 2000, 2001). The matrix depends on the shape alone; conjugate gradients with multigrid.
-//! - Outlets: pressure through the traction, with zero viscous traction (in the Laplacian form, `mu du/dn = 0`); backflow is
-//!   damped (Bazilevs et al. 2009).
-//! - A wall that starts or stops within one step acts by an impulse: the velocity is projected onto the new boundary values
-//!   before the step (Gresho and Sani 1998, on impulsive starts). The impulse is no part of the reported pressure.
+//! - Linear tetrahedra for velocity and pressure, in the arbitrary Lagrangian-Eulerian frame
+//!   (Donea, Giuliani and Halleux 1982): nodal values travel with the mesh, and the convecting
+//!   velocity is `u - w` with the mesh velocity `w`.
+//! - Time: the second-order backward difference, convecting velocity extrapolated; the first-order
+//!   one in the first step and while the mesh moves.
+//! - Momentum: convection linearised and implicit, SUPG (Brooks and Hughes 1982). One matrix for
+//!   the three components, solved by BiCGStab with ILU(0).
+//! - Pressure: incremental projection (van Kan 1986; Guermond, Minev and Shen 2006), with
+//!   orthogonal subscales for the equal-order pair (Codina 2000, 2001). The matrix depends on the
+//!   shape alone; conjugate gradients with multigrid ([`tombolo_deform::linear::Multigrid`]),
+//!   semi-definite where there is no outlet.
+//! - Outlets: pressure through the traction, with zero viscous traction (in the Laplacian form, `mu
+//!   du/dn = 0`); backflow is damped (Bazilevs et al. 2009).
+//! - A wall that starts or stops within one step acts by an impulse: the velocity is projected onto
+//!   the new boundary values before the step (Gresho and Sani 1998, on impulsive starts). The
+//!   impulse is no part of the reported pressure.
 //!
 //! # What is guaranteed, and what is not
 //!
-//! - A uniform stream stays uniform to rounding, whatever the mesh does: all terms act on differences of nodal values.
-//! - Mass: the flux of the velocity through the whole boundary is 0 to the tolerance of the pressure solve, in every step,
-//!   walls that move included. No pressure is prescribed strongly, so that the equation of continuity is tested with
-//!   every shape function, those at the outlet included. Within the domain it holds weakly.
-//! - The same bits whatever the number of threads. On several ranks the same bits each time; the preconditioners depend on the parts,
-//!   so that from one number of ranks to another fields agree to the tolerances of the solves.
+//! - A uniform stream stays uniform to rounding, whatever the mesh does: all terms act on
+//!   differences of nodal values.
+//! - Mass: the flux of the velocity through the whole boundary is 0 to the tolerance of the
+//!   pressure solve, in every step, walls that move included. No pressure is prescribed strongly,
+//!   so that the equation of continuity is tested with every shape function, those at the outlet
+//!   included. Within the domain it holds weakly.
+//! - The same bits whatever the number of threads. On several ranks the same bits each time; the
+//!   preconditioners depend on the parts, so that from one number of ranks to another fields agree
+//!   to the tolerances of the solves.
 //! - Momentum is not conserved to rounding: the convective form is used.
-//! - No turbulence model, and no shock capturing: at cell Reynolds numbers far above one a jet's edges may overshoot.
+//! - No turbulence model, and no shock capturing: at cell Reynolds numbers far above one a jet's
+//!   edges may overshoot.
 #![warn(missing_docs)]
 #![expect(
     clippy::needless_range_loop,
@@ -37,6 +47,7 @@
 mod boundary;
 pub mod case;
 mod error;
+mod fluid;
 mod geometry;
 pub mod history;
 pub mod linear;
@@ -44,10 +55,12 @@ mod momentum;
 pub mod partition;
 pub mod parts;
 pub mod program;
+mod ranks;
 pub mod report;
 mod solver;
 mod topology;
 
 pub use boundary::{Condition, Patch, Place, Value};
 pub use error::SolverError;
-pub use solver::{Fluid, Motion, Settings, Solver, StepOutcome};
+pub use fluid::Fluid;
+pub use solver::{Motion, Settings, Solver, StepOutcome};

@@ -7,22 +7,23 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Parser;
-use tombolo::Solvers;
-use tombolo::comm::{Communicator, Solo};
+use tombolo::communicator::{Communicator, Solo};
+use tombolo::deform::linear::{BuiltIn, Solvers};
 use tombolo_flow::parts::{Dealing, Ranks};
 use tombolo_flow::program::{Options, Run};
 
-/// Solves incompressible flow on a mesh of tetrahedra that can be steered: watched in a browser, and given another shape while
-/// it runs.
+/// Solves incompressible flow on a mesh of tetrahedra that can be steered: watched in a browser,
+/// and given another shape while it runs.
 ///
-/// Built with the feature `distributed` it runs under mpirun too: each rank gets a part of the mesh.
+/// Built with the feature `distributed` it runs under mpirun too: each rank gets a part of the
+/// mesh.
 #[derive(Debug, Parser)]
 #[command(name = "flow", version)]
 struct Arguments {
     /// The case: mesh, fluid, boundary conditions, time step
     #[arg(long, value_name = "CASE.json")]
     case: PathBuf,
-    /// What to stream, watch and write; without it what the case names
+    /// Pipelines to stream, watch and write; without them those that the case names
     #[arg(long, value_name = "PIPELINES.json")]
     pipelines: Option<PathBuf>,
     /// Orders and commands to carry out at stated steps or times; a journal is one too
@@ -40,7 +41,8 @@ struct Arguments {
     /// Write the final state (final.vtu), and what the pipelines write, into this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Write the flow at the end of each step (pressure drop, mass in and out) and the seconds since the start, as a table
+    /// Write the flow at the end of each step (pressure drop, mass in and out) and the seconds
+    /// since the start, as a table
     #[arg(long, value_name = "HISTORY.csv")]
     history: Option<PathBuf>,
     /// Where viewers connect to, in place of what the pipelines say; port 0 takes any free one
@@ -81,20 +83,19 @@ fn under_mpirun() -> bool {
         .any(|name| std::env::var_os(name).is_some())
 }
 
-/// Does the work on the ranks that mpirun started, or on this process. The message is empty where the first rank has said what is wrong.
+/// Does the work on the ranks that mpirun started, or on this process. The message is empty where
+/// the first rank has said what is wrong.
 #[cfg(feature = "distributed")]
 fn on_ranks(
-    work: impl FnOnce(Ranks, Option<Solvers>) -> Result<(), Box<dyn std::error::Error>>,
+    work: impl FnOnce(Ranks, Arc<dyn Solvers>) -> Result<(), Box<dyn std::error::Error>>,
 ) -> Result<(), String> {
     use tombolo::{
-        comm::{
-            Alarm,
-            mpi::{Mpi, rsmpi},
-        },
-        distributed::Petsc,
+        communicator::Alarm,
+        mpi::{Mpi, rsmpi},
+        petsc::Petsc,
     };
     if !under_mpirun() {
-        return work(Arc::new(Solo), None).map_err(|error| error.to_string());
+        return work(Arc::new(Solo), Arc::new(BuiltIn)).map_err(|error| error.to_string());
     }
     let (universe, _) = rsmpi::initialize_with_threading(rsmpi::Threading::Funneled)
         .ok_or_else(|| "MPI could not be initialized".to_owned())?;
@@ -103,7 +104,7 @@ fn on_ranks(
     let _alarm = Alarm::among(&ranks);
     let is_first = ranks.rank() == 0;
     let solvers = Petsc::solvers(&universe.world(), None).map_err(|error| error.to_string())?;
-    work(ranks, Some(solvers)).map_err(|error| {
+    work(ranks, solvers).map_err(|error| {
         // Before MPI is finalized: once a rank has failed and gone, mpirun ends the others.
         if is_first {
             eprintln!("flow: {error}");
@@ -114,7 +115,7 @@ fn on_ranks(
 
 #[cfg(not(feature = "distributed"))]
 fn on_ranks(
-    work: impl FnOnce(Ranks, Option<Solvers>) -> Result<(), Box<dyn std::error::Error>>,
+    work: impl FnOnce(Ranks, Arc<dyn Solvers>) -> Result<(), Box<dyn std::error::Error>>,
 ) -> Result<(), String> {
     let ranks = std::env::var("OMPI_COMM_WORLD_SIZE").or_else(|_| std::env::var("PMI_SIZE"));
     if under_mpirun() && ranks.is_ok_and(|ranks| ranks != "1") {
@@ -122,13 +123,13 @@ fn on_ranks(
             "started on several ranks, but built for one process; build it with `--features distributed`".into()
         );
     }
-    work(Arc::new(Solo), None).map_err(|error| error.to_string())
+    work(Arc::new(Solo), Arc::new(BuiltIn)).map_err(|error| error.to_string())
 }
 
 fn run(
     arguments: Arguments,
     ranks: Ranks,
-    solvers: Option<Solvers>,
+    solvers: Arc<dyn Solvers>,
 ) -> Result<(), Box<dyn std::error::Error>> {
     let is_first = ranks.rank() == 0;
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);

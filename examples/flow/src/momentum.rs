@@ -1,14 +1,17 @@
 //! Assembly of the momentum equation.
 
 use rayon::prelude::*;
+use tombolo_deform::communicator::Halo;
+use tombolo_deform::linear::SparseMatrix;
 use tombolo_deform::mesh::Vector;
+use tombolo_deform::vector::dot;
 
-use crate::Fluid;
-use crate::geometry::{Element, Geometry, dot, row_slices};
-use crate::linear::{Halo, Matrix, for_each_chunk};
+use crate::fluid::Fluid;
+use crate::geometry::{Element, Geometry};
+use crate::linear::for_each;
 use crate::topology::Topology;
 
-/// What one element contributes beside its shape.
+/// The contributions of one element beside its shape.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ElementState {
     /// The mean convecting velocity, u - w.
@@ -60,7 +63,8 @@ pub(crate) fn element_states(
         .collect_into_vec(states);
 }
 
-/// The intrinsic time of an element (Tezduyar 2003): what is fastest of the step, the flow across and diffusion rules.
+/// The intrinsic time of an element (Tezduyar 2003): what is fastest of the step, the flow across
+/// and diffusion rules.
 fn intrinsic_time(element: &Element, convecting: Vector, known: &Known) -> f64 {
     let across: f64 =
         element.gradients.iter().map(|&gradient| dot(convecting, gradient).abs()).sum();
@@ -78,18 +82,19 @@ fn mean(corners: [Vector; 4]) -> Vector {
 
 /// Fills the matrix of one velocity component, which all three share, and the right-hand sides.
 ///
-/// Galerkin with exact integrals of the linear convecting velocity, and SUPG (Brooks and Hughes 1982) with the residual of the
-/// momentum equation, time derivative and known pressure gradient included.
+/// Galerkin with exact integrals of the linear convecting velocity, and SUPG (Brooks and Hughes
+/// 1982) with the residual of the momentum equation, time derivative and known pressure gradient
+/// included.
 pub(crate) fn assemble(
     topology: &Topology,
     geometry: &Geometry,
     known: &Known,
     states: &[ElementState],
-    matrix: &mut Matrix,
+    matrix: &mut SparseMatrix<1>,
     right: &mut [Vector],
 ) {
     let Fluid { density, viscosity } = known.fluid;
-    let rows = row_slices(&topology.pattern.starts, &mut matrix.values);
+    let rows = topology.own_rows(matrix);
     rows.into_par_iter().zip(right.par_iter_mut()).enumerate().with_min_len(512).for_each(
         |(row, (values, right))| {
             values.fill(0.0);
@@ -131,23 +136,21 @@ pub(crate) fn divergence(
     velocity: &[Vector],
     result: &mut [f64],
 ) {
-    for_each_chunk(result, |start, chunk| {
-        for (offset, value) in chunk.iter_mut().enumerate() {
-            *value = topology
-                .around(start + offset)
-                .iter()
-                .map(|incidence| {
-                    let element = &geometry.elements[incidence.element as usize];
-                    let vertices = topology.elements[incidence.element as usize];
-                    let divergence: f64 = vertices
-                        .iter()
-                        .zip(&element.gradients)
-                        .map(|(&vertex, &gradient)| dot(velocity[vertex as usize], gradient))
-                        .sum();
-                    0.25 * element.volume * divergence
-                })
-                .sum();
-        }
+    for_each(result, |index, value| {
+        *value = topology
+            .around(index)
+            .iter()
+            .map(|incidence| {
+                let element = &geometry.elements[incidence.element as usize];
+                let vertices = topology.elements[incidence.element as usize];
+                let divergence: f64 = vertices
+                    .iter()
+                    .zip(&element.gradients)
+                    .map(|(&vertex, &gradient)| dot(velocity[vertex as usize], gradient))
+                    .sum();
+                0.25 * element.volume * divergence
+            })
+            .sum();
     });
 }
 
@@ -158,25 +161,24 @@ pub(crate) fn gradient(
     field: &[f64],
     result: &mut [Vector],
 ) {
-    for_each_chunk(result, |start, chunk| {
-        for (offset, value) in chunk.iter_mut().enumerate() {
-            let mut total = [0.0; 3];
-            for incidence in topology.around(start + offset) {
-                let element = &geometry.elements[incidence.element as usize];
-                let corners = topology.elements[incidence.element as usize]
-                    .map(|vertex| field[vertex as usize]);
-                let own = element.gradient(corners);
-                for axis in 0..3 {
-                    total[axis] += 0.25 * element.volume * own[axis];
-                }
+    for_each(result, |index, value| {
+        let mut total = [0.0; 3];
+        for incidence in topology.around(index) {
+            let element = &geometry.elements[incidence.element as usize];
+            let corners =
+                topology.elements[incidence.element as usize].map(|vertex| field[vertex as usize]);
+            let own = element.gradient(corners);
+            for axis in 0..3 {
+                total[axis] += 0.25 * element.volume * own[axis];
             }
-            *value = total;
         }
+        *value = total;
     });
 }
 
-/// Subtracts the pressure's stabilisation from the continuity equation: the integral of each shape function's gradient times the
-/// part of the pressure gradient that is orthogonal to linear fields, scaled by the intrinsic time (Codina 2000). Collective.
+/// Subtracts the pressure's stabilisation from the continuity equation: the integral of each shape
+/// function's gradient times the part of the pressure gradient that is orthogonal to linear fields,
+/// scaled by the intrinsic time (Codina 2000). Collective.
 pub(crate) fn subtract_pressure_stabilisation(
     topology: &Topology,
     geometry: &Geometry,
@@ -187,36 +189,30 @@ pub(crate) fn subtract_pressure_stabilisation(
     result: &mut [f64],
 ) {
     projected.resize(topology.vertex_count(), [0.0; 3]);
-    for_each_chunk(&mut projected[..topology.rows()], |start, chunk| {
-        for (offset, value) in chunk.iter_mut().enumerate() {
-            let mut total = [0.0; 3];
-            for incidence in topology.around(start + offset) {
-                let element = incidence.element as usize;
-                for axis in 0..3 {
-                    total[axis] += 0.25
-                        * geometry.elements[element].volume
-                        * states[element].pressure_gradient[axis];
-                }
+    for_each(&mut projected[..topology.rows()], |index, value| {
+        let mut total = [0.0; 3];
+        for incidence in topology.around(index) {
+            let element = incidence.element as usize;
+            for axis in 0..3 {
+                total[axis] += 0.25
+                    * geometry.elements[element].volume
+                    * states[element].pressure_gradient[axis];
             }
-            let volume = geometry.vertex_volumes[start + offset];
-            *value = total.map(|value| if volume > 0.0 { value / volume } else { 0.0 });
         }
+        let volume = geometry.vertex_volumes[index];
+        *value = total.map(|value| if volume > 0.0 { value / volume } else { 0.0 });
     });
-    halo.update(projected);
+    halo.update(3, projected.as_flattened_mut());
     let projected = &*projected;
-    for_each_chunk(result, |start, chunk| {
-        for (offset, value) in chunk.iter_mut().enumerate() {
-            for incidence in topology.around(start + offset) {
-                let element = incidence.element as usize;
-                let (shape, state) = (&geometry.elements[element], &states[element]);
-                let smooth =
-                    mean(topology.elements[element].map(|vertex| projected[vertex as usize]));
-                let rough =
-                    std::array::from_fn(|axis| state.pressure_gradient[axis] - smooth[axis]);
-                *value -= state.intrinsic_time / density
-                    * shape.volume
-                    * dot(shape.gradients[incidence.local as usize], rough);
-            }
+    for_each(result, |index, value| {
+        for incidence in topology.around(index) {
+            let element = incidence.element as usize;
+            let (shape, state) = (&geometry.elements[element], &states[element]);
+            let smooth = mean(topology.elements[element].map(|vertex| projected[vertex as usize]));
+            let rough = std::array::from_fn(|axis| state.pressure_gradient[axis] - smooth[axis]);
+            *value -= state.intrinsic_time / density
+                * shape.volume
+                * dot(shape.gradients[incidence.local as usize], rough);
         }
     });
 }

@@ -11,7 +11,8 @@ pub enum PartitionError {
     Metis(String),
 }
 
-/// The rank of each cell, for `ranks` ranks: by METIS, with as few faces between parts as it can find.
+/// The rank of each cell, for `ranks` ranks: by METIS, with as few faces between parts as it can
+/// find.
 ///
 /// # Errors
 /// [`PartitionError::Metis`].
@@ -43,8 +44,8 @@ pub fn partition(mesh: &Mesh, ranks: usize) -> Result<Vec<usize>, PartitionError
     Ok(of_cells.into_iter().map(|rank| usize::try_from(rank).unwrap_or(0)).collect())
 }
 
-/// The rank of each cell, for `ranks` ranks: by recursive bisection of the cells' centres along the longest extent (Berger and
-/// Bokhari 1987).
+/// The rank of each cell, for `ranks` ranks: by recursive bisection of the cells' centres along the
+/// longest extent (Berger and Bokhari 1987).
 ///
 /// # Errors
 /// None.
@@ -55,7 +56,6 @@ pub fn partition(mesh: &Mesh, ranks: usize) -> Result<Vec<usize>, PartitionError
 
 fn bisected(mesh: &Mesh, ranks: usize) -> Vec<usize> {
     let cells = mesh.cells();
-    #[expect(clippy::cast_precision_loss, reason = "a few vertices")]
     let centre = |cell: usize| -> Vector {
         let vertices = cells.vertices(cell);
         let sum = |axis: usize| {

@@ -2,14 +2,13 @@
 
 use std::sync::Arc;
 
-use tombolo_deform::mesh::{Cells, FeatureSource, Mesh, MeshError, TaggedFaces, Vector};
+use tombolo_deform::communicator::{Communicator, Reduction, agree};
+use tombolo_deform::distributed::{DistributedError, Part};
+use tombolo_deform::mesh::{Cells, Mesh, MeshError, SharedVertices, Vector};
 use tombolo_deform::quality::quality;
 use tombolo_deform::surface::Surface;
-use tombolo_pipelines::communicator::{Communicator, Reduction, agree};
-use tombolo_pipelines::distributed::{DistributedError, Part, SharedVertices};
 
 use crate::Patch;
-use crate::linear::Values;
 use crate::partition::{PartitionError, partition};
 use crate::report::MeshReport;
 
@@ -20,7 +19,8 @@ pub struct Dealing {
     pub empty_rank: Option<usize>,
     /// Numbers the vertices and cells of each part at random, from this seed.
     pub shuffle: Option<u64>,
-    /// Keeps from the adaptor which vertices of the ranks are the same, so that it must find out by their places.
+    /// Keeps from the adaptor which vertices of the ranks are the same, so that it must find out by
+    /// their places.
     pub without_numbers: bool,
 }
 
@@ -44,7 +44,7 @@ pub enum DealError {
     Mesh(#[from] MeshError),
 }
 
-/// What one rank has of a mesh, and how it hangs together with the others.
+/// One rank's share of a mesh, and how it hangs together with the others.
 #[derive(Debug)]
 pub struct Share {
     /// Its part: its own cells, and the others' that touch one of them.
@@ -58,13 +58,14 @@ pub struct Share {
 }
 
 impl Share {
-    /// Cuts a mesh, which every rank has read, and finds out what the ranks have in common. Collective. `patches` hold the triangles of
-    /// the whole boundary in the numbers of `mesh`; what comes back are those of this part, in its own.
+    /// Cuts a mesh, which every rank has read, and finds out what the ranks have in common.
+    /// Collective. `patches` hold the triangles of the whole boundary in the numbers of `mesh`;
+    /// what comes back are those of this part, in its own.
     ///
     /// # Errors
     /// [`DistributedError`], the same on all ranks.
     pub fn of(
-        communicator: &dyn Communicator,
+        communicator: &Arc<dyn Communicator>,
         mesh: &Mesh,
         surface: &Surface,
         patches: Vec<Patch>,
@@ -93,9 +94,9 @@ impl Share {
             .iter()
             .map(|eight| usize::try_from(u64::from_le_bytes(*eight)).unwrap_or(0))
             .collect();
-        let cut = Part::cut(mesh, &of_cells, rank, true).and_then(|part| match dealing.shuffle {
+        let cut = Part::cut(mesh, &of_cells, rank, true).map(|part| match dealing.shuffle {
             Some(seed) => shuffled(&part, seed + rank as u64),
-            None => Ok(part),
+            None => part,
         });
         let made = cut.and_then(|part| Ok((part.view().to_mesh()?, part.own_cells(), part)));
         let (own_mesh, own, part) = agree(communicator, made)?;
@@ -122,21 +123,16 @@ impl Share {
     #[must_use]
     pub fn measure(&self, communicator: &dyn Communicator, points: &[Vector]) -> MeshReport {
         let shape = quality(&self.own, points);
-        #[expect(clippy::cast_precision_loss, reason = "counts below 2^53")]
-        let mut sums = [self.own.len() as f64, shape.inverted as f64];
+        let (cells, inverted) =
+            (communicator.total(self.own.len()), communicator.total(shape.inverted));
         let mut least = [if self.own.is_empty() { f64::INFINITY } else { shape.min }];
-        if communicator.size() > 1 {
-            communicator.reduce(Reduction::Sum, &mut sums);
-            communicator.reduce(Reduction::Minimum, &mut least);
-        }
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts")]
-        let [cells, inverted] = sums.map(|count| count as usize);
+        communicator.reduce(Reduction::Minimum, &mut least);
         let vertices = usize::try_from(self.shared.count()).unwrap_or(usize::MAX);
         MeshReport { vertices, cells, inverted, min_scaled_jacobian: least[0] }
     }
 
-    /// Brings what the ranks have at their vertices together on rank 0, where it takes the place of `all`, in the numbers of the mesh
-    /// that was dealt out. Collective; `None` on the other ranks.
+    /// Brings what the ranks have at their vertices together on rank 0, where it takes the place of
+    /// `all`, in the numbers of the mesh that was dealt out. Collective; `None` on the other ranks.
     #[must_use]
     pub fn gather(
         &self,
@@ -152,16 +148,17 @@ impl Share {
         for ((vertex, value), number) in (0..).zip(values).zip(numbers) {
             if self.shared.owns(vertex) {
                 message.extend(number.to_le_bytes());
-                value.write(&mut message);
+                value.iter().for_each(|value| message.extend(value.to_le_bytes()));
             }
         }
         let gathered = communicator.gather(0, &message)?;
         for entry in gathered.iter().flat_map(|message| message.as_chunks::<32>().0) {
-            let (number, value) = entry.split_at(8);
-            let number = number.first_chunk().map_or(u64::MAX, |eight| u64::from_le_bytes(*eight));
+            let [number, value @ ..] = [0, 1, 2, 3]
+                .map(|index: usize| std::array::from_fn(|byte| entry[8 * index + byte]));
+            let number = u64::from_le_bytes(number);
             if let Some(place) = usize::try_from(number).ok().and_then(|number| all.get_mut(number))
             {
-                *place = Vector::read(value);
+                *place = value.map(f64::from_le_bytes);
             }
         }
         Some(all)
@@ -213,50 +210,11 @@ fn sorted(mut triangle: [u32; 3]) -> [u32; 3] {
     triangle
 }
 
-/// The same part with its vertices and cells in another order.
-fn shuffled(part: &Part, seed: u64) -> Result<Part, MeshError> {
+/// A part with its vertices and cells in another order.
+fn shuffled(part: &Part, seed: u64) -> Part {
     let vertices = order(part.points.len(), seed);
     let cells = order(part.cells.len(), seed ^ 0x5DEE_CE66);
-    let mut numbers = vec![0_u32; vertices.len()];
-    (0..).zip(&vertices).for_each(|(number, &vertex)| numbers[vertex] = number);
-    let renumbered =
-        |of: &[u32]| of.iter().map(|&vertex| numbers[vertex as usize]).collect::<Vec<u32>>();
-    let mut own = Cells::new();
-    for &cell in &cells {
-        match part.cells.polyhedron_faces(cell) {
-            [] => own.push(part.cells.cell_type(cell), &renumbered(part.cells.vertices(cell)))?,
-            faces => {
-                own.push_polyhedron(&faces.iter().map(|face| renumbered(face)).collect::<Vec<_>>())?
-            }
-        }
-    }
-    let features = match &part.features {
-        FeatureSource::SharpEdges => FeatureSource::SharpEdges,
-        FeatureSource::Vertices(tags) => {
-            FeatureSource::Vertices(vertices.iter().map(|&vertex| tags[vertex]).collect())
-        }
-        FeatureSource::Faces(tagged) => {
-            let mut faces = Cells::new();
-            for (cell_type, vertices) in tagged.faces.iter() {
-                faces.push(cell_type, &renumbered(vertices))?;
-            }
-            FeatureSource::Faces(TaggedFaces {
-                faces,
-                tags: tagged.tags.clone(),
-                names: tagged.names.clone(),
-            })
-        }
-    };
-    let picked =
-        |numbers: &Vec<u64>, order: &[usize]| order.iter().map(|&place| numbers[place]).collect();
-    Ok(Part {
-        points: vertices.iter().map(|&vertex| part.points[vertex]).collect(),
-        cells: own,
-        features,
-        global_vertices: part.global_vertices.as_ref().map(|numbers| picked(numbers, &vertices)),
-        global_cells: part.global_cells.as_ref().map(|numbers| picked(numbers, &cells)),
-        ghosts: part.ghosts.as_ref().map(|ghosts| cells.iter().map(|&cell| ghosts[cell]).collect()),
-    })
+    part.reordered(&vertices, &cells)
 }
 
 /// A random order (Fisher and Yates) from a seed (splitmix64).
@@ -268,8 +226,7 @@ fn order(length: usize, mut seed: u64) -> Vec<usize> {
         mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
         mixed ^= mixed >> 31;
-        #[expect(clippy::cast_possible_truncation, reason = "below the length")]
-        order.swap(last, (mixed % (last as u64 + 1)) as usize);
+        order.swap(last, usize::try_from(mixed % (last as u64 + 1)).unwrap_or(last));
     }
     order
 }

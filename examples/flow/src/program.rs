@@ -5,28 +5,28 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use tombolo::comm::{Communicator, RankError, Solo, agree_on};
+use tombolo::communicator::{Communicator, RankError, Solo};
 use tombolo::{
-    Adaptor, ExecuteError, FinalizeError, InitializeError, JournalError, Settings, Solvers, Step,
+    Adaptor, ExecuteError, FinalizeError, InitializeError, JournalError, Settings, Step,
 };
-use tombolo_deform::mesh::{ArrayView, Mesh, MeshError, NumberType, Vector};
-use tombolo_deform::surface::{FeatureSettings, Surface, SurfaceError};
-use tombolo_pipelines::distributed::DistributedError;
+use tombolo_deform::distributed::DistributedError;
+use tombolo_deform::features::FeatureSettings;
+use tombolo_deform::linear::{BuiltIn, Solvers};
+use tombolo_deform::mesh::{Mesh, MeshError, NumberType, Vector};
+use tombolo_deform::surface::{Surface, SurfaceError};
 use tombolo_pipelines::extract::{Association, Channel, Field, FieldView};
 use tombolo_pipelines::files::{self, Compression, FileError};
-use tombolo_pipelines::language::{
-    self, Config, LanguageError, ReadError, StreamServer, TimedCommand,
-};
-use tombolo_pipelines::limits::{DOCUMENT, WAITING_BYTES};
+use tombolo_pipelines::language::{Config, ReadError, StreamServer, TimedCommand};
 
 use crate::case::{Case, CaseError};
 use crate::history::{History, Through};
 use crate::parts::{Dealing, Share};
+use crate::ranks::agreed;
 use crate::report::{FlowReport, MeshReport, Report};
 use crate::solver::{Motion, Settings as SolverSettings, Solver};
 use crate::{Patch, SolverError};
 
-/// What a run is asked to do.
+/// The options of a run.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
     /// The case file.
@@ -64,10 +64,7 @@ pub enum ProgramError {
         /// Why not.
         source: std::io::Error,
     },
-    /// The pipelines or the orders make no sense.
-    #[error(transparent)]
-    Language(#[from] LanguageError),
-    /// A file of pipelines or orders cannot be read.
+    /// A file of pipelines or orders cannot be read, or makes no sense.
     #[error(transparent)]
     Read(#[from] ReadError),
     /// The mesh cannot be read, or the result not written.
@@ -122,7 +119,7 @@ pub struct Run {
     history: Option<History>,
 }
 
-/// What every rank reads from files.
+/// The input that every rank reads from files.
 struct Read {
     case: Case,
     config: Config,
@@ -156,8 +153,8 @@ impl Run {
         Self::on(Arc::new(Solo), options)
     }
 
-    /// The same on several ranks, each of which gets a part of the mesh. Collective, as everything is that a run does; the first
-    /// rank has the server and writes the files.
+    /// A run on several ranks, each of which gets a part of the mesh. Collective, as everything is
+    /// that a run does; the first rank has the server and writes the files.
     ///
     /// Every rank reads the mesh file and keeps its part.
     ///
@@ -167,32 +164,27 @@ impl Run {
         communicator: Arc<dyn Communicator>,
         options: &Options,
     ) -> Result<Self, ProgramError> {
-        Self::solved_by(communicator, None, options)
+        Self::solved_by(communicator, Arc::new(BuiltIn), options)
     }
 
-    /// The same with other solvers for the motion of the mesh, such as PETSc's.
+    /// Starts a run with another choice of solvers for the motion of the mesh, such as PETSc's.
     ///
     /// # Errors
     /// As [`Run::on`].
     pub fn solved_by(
         communicator: Arc<dyn Communicator>,
-        solvers: Option<Solvers>,
+        solvers: Arc<dyn Solvers>,
         options: &Options,
     ) -> Result<Self, ProgramError> {
         let is_first = communicator.rank() == 0;
         let read = agreed(&*communicator, Read::new(options, is_first))?;
         let Read { case, config, orders, mesh, surface, patches, history } = read;
-        let (share, patches) =
-            Share::of(&*communicator, &mesh, &surface, patches, options.dealing)?;
+        let (share, patches) = Share::of(&communicator, &mesh, &surface, patches, options.dealing)?;
         let whole = (is_first && options.out.is_some()).then_some(mesh);
         let declared = case.declared_parameters();
         let parameters: Vec<f64> = declared.iter().map(|parameter| parameter.value).collect();
         let (fluid, settings) = (case.fluid(&parameters), SolverSettings::default());
-        let mut solver = if communicator.size() == 1 {
-            Solver::new(&share.mesh, patches, fluid, settings)?
-        } else {
-            Solver::of_part(&communicator, &share.shared, &share.mesh, patches, fluid, settings)?
-        };
+        let mut solver = Solver::new(&share.mesh, share.shared.halo(), patches, fluid, settings)?;
         solver.set_parameters(&parameters);
         let (velocity, pressure) = case.initial_values();
         solver.initialise(&velocity, &pressure);
@@ -279,16 +271,8 @@ impl Run {
         while self.steps.is_none_or(|steps| self.solver.cycle() < steps) {
             let step = Step { cycle: self.solver.cycle(), time: self.solver.time(), time_step };
             let fields = [
-                FieldView {
-                    name: "velocity",
-                    association: Association::Vertex,
-                    values: ArrayView::vectors(&velocity),
-                },
-                FieldView {
-                    name: "pressure",
-                    association: Association::Vertex,
-                    values: ArrayView::scalars(&pressure),
-                },
+                FieldView::vertex("velocity", &velocity),
+                FieldView::vertex("pressure", &pressure),
             ];
             let mesh = self.share.view(&self.points);
             let steering =
@@ -296,7 +280,7 @@ impl Run {
             if steering.stop {
                 break;
             }
-            for (name, value) in steering.parameters {
+            for (name, value) in &steering.parameters {
                 if let Some(index) = self.case.parameters.keys().position(|known| known == name) {
                     self.parameters[index] = *value;
                 }
@@ -309,7 +293,7 @@ impl Run {
             }
             let moved = match steering.motion {
                 Some(motion) => {
-                    self.points.copy_from_slice(motion.coordinates);
+                    self.points.copy_from_slice(&motion.coordinates);
                     true
                 }
                 None => false,
@@ -339,8 +323,8 @@ impl Run {
         Ok(())
     }
 
-    /// Writes the mesh as it is, its features, the velocity and the pressure, in the numbers of the file it was read from. Collective;
-    /// the first rank writes.
+    /// Writes the mesh as it is, its features, the velocity and the pressure, in the numbers of the
+    /// file it was read from. Collective; the first rank writes.
     fn write(&self, file: &Path) -> Result<(), ProgramError> {
         let communicator = &*self.communicator;
         let before = || self.whole.as_ref().map_or(Vec::new(), |mesh| mesh.points().to_vec());
@@ -375,14 +359,6 @@ impl Run {
     }
 }
 
-/// On one process the outcome as it is; on several, where it failed on one, an error on all.
-fn agreed<T>(
-    communicator: &dyn Communicator,
-    mine: Result<T, ProgramError>,
-) -> Result<T, ProgramError> {
-    if communicator.size() == 1 { mine } else { Ok(agree_on(communicator, mine)?) }
-}
-
 fn unwritten((file, source): (PathBuf, std::io::Error)) -> ProgramError {
     ProgramError::File { file, source }
 }
@@ -390,9 +366,7 @@ fn unwritten((file, source): (PathBuf, std::io::Error)) -> ProgramError {
 fn config(options: &Options, case: &Case) -> Result<Config, ProgramError> {
     let mut config = match options.pipelines.as_ref().or(case.pipelines.as_ref()) {
         None => Settings::default().config,
-        Some(file) => {
-            language::parse(&language::read_text(file, DOCUMENT)?, &file.display().to_string())?
-        }
+        Some(file) => Settings::from_file(file)?.config,
     };
     if options.headless {
         config.stream = None;
@@ -408,9 +382,6 @@ fn config(options: &Options, case: &Case) -> Result<Config, ProgramError> {
 fn orders(options: &Options, case: &Case) -> Result<Vec<TimedCommand>, ProgramError> {
     match options.orders.as_ref().or(case.orders.as_ref()) {
         None => Ok(Vec::new()),
-        Some(file) => Ok(language::parse_orders(
-            &language::read_text(file, WAITING_BYTES)?,
-            &file.display().to_string(),
-        )?),
+        Some(file) => Ok(Settings::default().orders_from_file(file)?.orders),
     }
 }

@@ -18,13 +18,13 @@ pub struct Report {
     pub time: f64,
     /// The mesh, the worst of all its shapes.
     pub mesh: MeshReport,
-    /// What became of each order.
+    /// The outcome of each order.
     pub orders: Vec<OrderReport>,
     /// Seconds of a step of the solver.
     pub step_seconds: Spread,
     /// Seconds in the adaptor, by part.
     pub adaptor_seconds: BTreeMap<&'static str, Spread>,
-    /// What was streamed.
+    /// The frames that were streamed.
     pub stream: StreamCounts,
     /// The flow.
     pub flow: FlowReport,
@@ -53,7 +53,8 @@ pub struct FlowReport {
     pub mass_in: f64,
     /// Volume per time that flows out where the pressure is prescribed.
     pub mass_out: f64,
-    /// The greatest flux through the whole boundary in any step, relative to what flowed through it then.
+    /// The greatest flux through the whole boundary in any step, relative to what flowed through it
+    /// then.
     pub worst_imbalance: f64,
     /// Mean pressure where the velocity is prescribed less that where the pressure is.
     pub pressure_drop: f64,

@@ -1,35 +1,29 @@
 //! One time step after the other.
 
-use std::sync::Arc;
+mod measures;
+mod projection;
 
+use tombolo_deform::communicator::Halo;
+use tombolo_deform::linear::SparseMatrix;
 use tombolo_deform::mesh::{Mesh, Vector};
-use tombolo_pipelines::communicator::Communicator;
-use tombolo_pipelines::distributed::SharedVertices;
+use tombolo_deform::vector::{dot, length};
 
 use crate::SolverError;
 use crate::boundary::{Boundary, Patch, Place, Rule, Value};
-use crate::geometry::{Geometry, dot};
-use crate::linear::{
-    BiCgStab, BlockIncompleteLu, ConjugateGradients, Halo, Matrix, Outcome, Pattern, Schwarz,
-    for_each_chunk, sum,
-};
+use crate::fluid::Fluid;
+use crate::geometry::Geometry;
+use crate::linear::{BiCgStab, BlockIncompleteLu, Outcome, for_each, sum};
 use crate::momentum::{self, ElementState, Known};
+use crate::ranks::{agreed, total};
 use crate::topology::Topology;
+use projection::Projection;
 
-/// How much of the energy that flows in at an outlet is damped; one half makes the energy of the scheme bounded.
+/// How much of the energy that flows in at an outlet is damped; one half makes the energy of the
+/// scheme bounded.
 const BACKFLOW: f64 = 0.5;
 
 /// How often the velocity is projected at the beginning of a step with an impulse.
 const IMPULSE_PROJECTIONS: usize = 4;
-
-/// An incompressible Newtonian fluid.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Fluid {
-    /// Mass per volume.
-    pub density: f64,
-    /// The dynamic viscosity.
-    pub viscosity: f64,
-}
 
 /// How the equations are solved.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,7 +32,7 @@ pub struct Settings {
     pub momentum_tolerance: f64,
     /// The residual of the pressure equation, relative to its right-hand side.
     pub pressure_tolerance: f64,
-    /// No solve takes more iterations than this.
+    /// No solve takes more iterations than this, with the preconditioner that it begins with.
     pub iteration_limit: usize,
 }
 
@@ -55,14 +49,15 @@ pub struct Motion<'a> {
     pub points: &'a [Vector],
 }
 
-/// What one step came to.
+/// The outcome of one step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepOutcome {
     /// The solve of the momentum equation.
     pub momentum: Outcome,
     /// The solve of the pressure equation; both solves where the step began with an impulse.
     pub pressure: Outcome,
-    /// The flux of the velocity out through the whole boundary; 0 up to the tolerance of the pressure solve.
+    /// The flux of the velocity out through the whole boundary; 0 up to the tolerance of the
+    /// pressure solve.
     pub imbalance: f64,
 }
 
@@ -70,8 +65,8 @@ pub struct StepOutcome {
 ///
 /// Arrays go in and come out in the mesh's numbering; within, the solver has its own.
 ///
-/// On several ranks each has a part of the mesh ([`Solver::of_part`]); then [`Solver::new`] and all that steps, changes or measures
-/// the whole is collective, and errors are the same on all ranks.
+/// On several ranks each has a part of the mesh; then [`Solver::new`] and all that steps, changes
+/// or measures the whole is collective, and errors are the same on all ranks.
 #[derive(Debug)]
 pub struct Solver {
     settings: Settings,
@@ -95,8 +90,7 @@ pub struct Solver {
     /// How many steps of the present, unbroken history there are for the time derivative.
     history_length: u32,
 
-    momentum: Matrix,
-    momentum_diagonal: Vec<usize>,
+    momentum: SparseMatrix<1>,
     momentum_preconditioner: BlockIncompleteLu,
     momentum_solver: BiCgStab,
     projection: Projection,
@@ -107,85 +101,44 @@ pub struct Solver {
     scratch: Vec<Vector>,
 }
 
-/// The pressure equation.
-#[derive(Debug)]
-struct Projection {
-    matrix: Matrix,
-    diagonal: Vec<usize>,
-    preconditioner: Schwarz,
-    /// Whether the preconditioner was set up for another shape than the matrix.
-    stale: bool,
-    /// How many iterations a full solve took with a fresh preconditioner.
-    usual_iterations: usize,
-    solver: ConjugateGradients,
-    right: Vec<f64>,
-}
-
 impl Solver {
-    /// A fluid at rest on a mesh of tetrahedra.
+    /// A fluid at rest on a mesh of tetrahedra, of which each rank may have a part. Collective.
+    ///
+    /// On one process the halo is [`Halo::none`]. On several ranks `mesh` is this rank's part, its
+    /// own cells and those of others that touch one of them by a vertex, and `halo` says which
+    /// vertices other ranks have too; a part may be empty. The patches are the same on all ranks,
+    /// with those of their triangles here that belong to a cell of the part. What is wrong is told
+    /// by the part's own numbers.
     ///
     /// # Errors
-    /// [`SolverError`] for a mesh that is not of tetrahedra, that has an inverted one, or for a fluid that is none.
+    /// [`SolverError`] for a mesh that is not of tetrahedra, that has an inverted one, or for a
+    /// fluid that is none; on several ranks [`SolverError::Rank`], the same on all.
     pub fn new(
         mesh: &Mesh,
+        halo: &Halo,
         patches: Vec<Patch>,
         fluid: Fluid,
         settings: Settings,
     ) -> Result<Self, SolverError> {
-        check_fluid(fluid)?;
-        let topology = Topology::new(mesh)?;
-        let halo = Halo::alone(topology.vertex_count());
-        Self::set_up(mesh, Ok(topology), halo, patches, fluid, settings)
-    }
-
-    /// A fluid at rest on a mesh of tetrahedra of which each rank has a part. Collective.
-    ///
-    /// `mesh` is this rank's part: its own cells and those of other ranks that touch one of them by a vertex. It may be empty. The
-    /// patches are the same on all ranks, with those of their triangles here that belong to a cell of the part. What is wrong is
-    /// told by the part's own numbers.
-    ///
-    /// # Errors
-    /// [`SolverError::Rank`], the same on all ranks; see [`Solver::new`].
-    pub fn of_part(
-        communicator: &Arc<dyn Communicator>,
-        shared: &SharedVertices,
-        mesh: &Mesh,
-        patches: Vec<Patch>,
-        fluid: Fluid,
-        settings: Settings,
-    ) -> Result<Self, SolverError> {
-        check_fluid(fluid)?;
-        let topology = Topology::of_part(mesh, |vertex| shared.owns(vertex));
-        let order = topology.as_ref().map_or(&[][..], |topology| &topology.vertex_order);
-        let halo = Halo::new(Arc::clone(communicator), shared, order);
-        Self::set_up(mesh, topology, halo, patches, fluid, settings)
-    }
-
-    fn set_up(
-        mesh: &Mesh,
-        topology: Result<Topology, SolverError>,
-        halo: Halo,
-        patches: Vec<Patch>,
-        fluid: Fluid,
-        settings: Settings,
-    ) -> Result<Self, SolverError> {
+        fluid.check()?;
+        let communicator = halo.communicator();
+        let mut owners = vec![communicator.rank() as u64; mesh.points().len()];
+        halo.update(1, &mut owners);
+        let topology = agreed(communicator, Topology::new(mesh, &owners, communicator.rank()))?;
+        if !communicator.any(!topology.elements.is_empty()) {
+            return Err(SolverError::NoCells);
+        }
+        let halo = halo.of(&topology.vertex_order);
         // What can fail on one rank alone, before anything that all do together.
-        let own = topology.and_then(|topology| {
-            let geometry = Geometry::new(&topology, topology.to_solver(mesh.points()));
-            check_elements(&topology, &geometry, 0)?;
-            let boundary = Boundary::new(&topology, patches, &halo)?;
-            let momentum = diagonal_of(&topology.pattern)
-                .zip(BlockIncompleteLu::new(&topology.pattern))
-                .ok_or(SolverError::NoCells)?;
-            Ok((topology, geometry, boundary, momentum))
-        });
-        let (topology, geometry, mut boundary, (momentum_diagonal, momentum_preconditioner)) =
-            halo.agree(own)?;
-        boundary.measure(&geometry, &halo);
+        let geometry = Geometry::new(&topology, topology.to_solver(mesh.points()));
+        let own = check_elements(&topology, &geometry, 0)
+            .and_then(|()| Boundary::new(&topology, patches));
+        let mut boundary = agreed(communicator, own)?;
+        boundary.measure(&topology, &geometry, halo.communicator());
         let (vertices, rows) = (topology.vertex_count(), topology.rows());
-        let momentum = Matrix::zeros(Arc::clone(&topology.pattern));
         let projection =
-            Projection::new(&topology, &geometry, &boundary, &halo, momentum_diagonal.clone());
+            Projection::new(&topology, &geometry, &boundary, &halo, settings.iteration_limit);
+        let projection = agreed(halo.communicator(), projection.map_err(SolverError::from))?;
         Ok(Self {
             settings,
             fluid,
@@ -200,9 +153,8 @@ impl Solver {
             moving: false,
             jump: true,
             history_length: 0,
-            momentum,
-            momentum_diagonal,
-            momentum_preconditioner,
+            momentum: topology.zeros.clone(),
+            momentum_preconditioner: BlockIncompleteLu::new(&topology.zeros, &topology.diagonal),
             momentum_solver: BiCgStab::default(),
             projection,
             states: Vec::new(),
@@ -228,7 +180,8 @@ impl Solver {
         self.jump = true;
     }
 
-    /// Sets the parameters that boundary values may depend on; a change acts from the next step on, as a jump.
+    /// Sets the parameters that boundary values may depend on; a change acts from the next step on,
+    /// as a jump.
     pub fn set_parameters(&mut self, parameters: &[f64]) {
         if self.parameters != parameters {
             self.parameters = parameters.to_vec();
@@ -241,19 +194,21 @@ impl Solver {
     /// # Errors
     /// [`SolverError::NotPositive`]; the fluid then stays as it is.
     pub fn set_fluid(&mut self, fluid: Fluid) -> Result<(), SolverError> {
-        check_fluid(fluid)?;
+        fluid.check()?;
         self.fluid = fluid;
         Ok(())
     }
 
     /// Goes on by one time step; `motion` says where the mesh is at its end, where it moves.
     ///
-    /// The mesh velocity over the step is the displacement divided by the time step. No-slip walls take the fluid with them;
-    /// a prescribed velocity is taken as it stands.
+    /// The mesh velocity over the step is the displacement divided by the time step. No-slip walls
+    /// take the fluid with them; a prescribed velocity is taken as it stands.
     ///
     /// # Errors
-    /// [`SolverError::Inverted`] for a motion that turns an element inside out, and [`SolverError::Length`]: the solver then
-    /// is as before. [`SolverError::Diverged`] where the solution is no longer finite: there is no going on from there.
+    /// [`SolverError::Inverted`] for a motion that turns an element inside out, and
+    /// [`SolverError::Length`]: the solver then is as before. [`SolverError::Diverged`] where the
+    /// solution is no longer finite, and [`SolverError::Pressure`] where a mesh is so distorted
+    /// that its Laplacian is not: there is no going on from there.
     pub fn step(
         &mut self,
         time_step: f64,
@@ -274,7 +229,7 @@ impl Solver {
                 end,
                 &self.parameters,
             );
-            self.halo.update(&mut self.velocity);
+            self.halo.update(3, self.velocity.as_flattened_mut());
             pressure_outcome = Some(self.apply_impulse());
         }
         let second_order = !impulse && !moves && self.history_length >= 2;
@@ -282,19 +237,18 @@ impl Solver {
         self.assemble(time_step, rate, end);
 
         std::mem::swap(&mut self.previous_velocity, &mut self.velocity);
-        // `scratch` is the first guess: the solution extrapolated, with the boundary values of the end of the step.
+        // `scratch` is the first guess: the solution extrapolated, with the boundary values of the
+        // end of the step.
         std::mem::swap(&mut self.velocity, &mut self.scratch);
         let momentum = self.solve_momentum();
         self.boundary.impose_slip(&mut self.velocity, &self.mesh_velocity);
-        self.halo.update(&mut self.velocity);
+        self.halo.update(3, self.velocity.as_flattened_mut());
 
         let mut pressure = self.project(Some(self.fluid.density));
         let scale = self.fluid.density * rate;
         let potential = &self.potential;
-        for_each_chunk(&mut self.pressure, |start, chunk| {
-            for (offset, value) in chunk.iter_mut().enumerate() {
-                *value += scale * potential[start + offset];
-            }
+        for_each(&mut self.pressure, |index, value| {
+            *value += scale * potential[index];
         });
         if !self.boundary.is_open() {
             self.centre_pressure();
@@ -312,7 +266,8 @@ impl Solver {
         Ok(StepOutcome { momentum, pressure, imbalance: self.imbalance() })
     }
 
-    /// Projects the velocity onto its new boundary values. The projection is approximate where the velocity jumps, hence repeated.
+    /// Projects the velocity onto its new boundary values. The projection is approximate where the
+    /// velocity jumps, hence repeated.
     fn apply_impulse(&mut self) -> Outcome {
         let mut total = Outcome { converged: true, ..Outcome::default() };
         for _ in 0..IMPULSE_PROJECTIONS {
@@ -334,7 +289,7 @@ impl Solver {
             }
             return Ok(false);
         };
-        let geometry = self.halo.agree(self.moved(motion))?;
+        let geometry = agreed(self.halo.communicator(), self.moved(motion))?;
         let mut moves = false;
         for (velocity, (new, old)) in
             self.mesh_velocity.iter_mut().zip(geometry.points.iter().zip(&self.geometry.points))
@@ -343,9 +298,10 @@ impl Solver {
             moves |= *velocity != [0.0; 3];
         }
         self.geometry = geometry;
-        self.boundary.measure(&self.geometry, &self.halo);
-        self.projection.reassemble(&self.topology, &self.geometry, &self.boundary);
-        Ok(self.halo.maximum(f64::from(u8::from(moves))) > 0.0)
+        self.boundary.measure(&self.topology, &self.geometry, self.halo.communicator());
+        let renewed = self.projection.renew(&self.topology, &self.geometry, &self.boundary);
+        agreed(self.halo.communicator(), renewed.map_err(SolverError::from))?;
+        Ok(self.halo.communicator().any(moves))
     }
 
     /// The shape of the mesh at the end of a motion.
@@ -363,31 +319,25 @@ impl Solver {
         Ok(geometry)
     }
 
-    /// Prepares the known part of the time derivative, the convecting velocity and the first guess (in `scratch`); the rate.
+    /// Prepares the known part of the time derivative, the convecting velocity and the first guess
+    /// (in `scratch`); the rate.
     fn predict(&mut self, time_step: f64, second_order: bool) -> f64 {
         let (now, before, mesh) = (&self.velocity, &self.previous_velocity, &self.mesh_velocity);
         self.scratch.resize(now.len(), [0.0; 3]);
         let (last, weights) = if second_order { (-1.0, [2.0, -0.5]) } else { (0.0, [1.0, 0.0]) };
-        for_each_chunk(&mut self.history, |start, chunk| {
-            for (offset, value) in chunk.iter_mut().enumerate() {
-                let (now, before) = (now[start + offset], before[start + offset]);
-                *value = std::array::from_fn(|c| {
-                    (weights[0] * now[c] + weights[1] * before[c]) / time_step
-                });
-            }
+        for_each(&mut self.history, |index, value| {
+            let (now, before) = (now[index], before[index]);
+            *value =
+                std::array::from_fn(|c| (weights[0] * now[c] + weights[1] * before[c]) / time_step);
         });
-        for_each_chunk(&mut self.scratch, |start, chunk| {
-            for (offset, value) in chunk.iter_mut().enumerate() {
-                let (now, before) = (now[start + offset], before[start + offset]);
-                *value = std::array::from_fn(|c| now[c] + last * (before[c] - now[c]));
-            }
+        for_each(&mut self.scratch, |index, value| {
+            let (now, before) = (now[index], before[index]);
+            *value = std::array::from_fn(|c| now[c] + last * (before[c] - now[c]));
         });
         let guess = &self.scratch;
-        for_each_chunk(&mut self.convecting, |start, chunk| {
-            for (offset, value) in chunk.iter_mut().enumerate() {
-                let (guess, mesh) = (guess[start + offset], mesh[start + offset]);
-                *value = std::array::from_fn(|c| guess[c] - mesh[c]);
-            }
+        for_each(&mut self.convecting, |index, value| {
+            let (guess, mesh) = (guess[index], mesh[index]);
+            *value = std::array::from_fn(|c| guess[c] - mesh[c]);
         });
         if second_order { 1.5 / time_step } else { 1.0 / time_step }
     }
@@ -418,10 +368,11 @@ impl Solver {
             for axis in 0..3 {
                 self.right[vertex][axis] += outlet.area[axis] * (self.pressure[vertex] - given);
             }
-            // Inflow both through space and through the mesh: a stream that leaves is not damped because the outlet moves.
+            // Inflow both through space and through the mesh: a stream that leaves is not damped
+            // because the outlet moves.
             let outward = dot(self.convecting[vertex], outlet.area)
                 .max(dot(self.scratch[vertex], outlet.area));
-            self.momentum.values[self.momentum_diagonal[vertex]] -=
+            self.momentum.values_mut()[self.topology.diagonal[vertex]][0][0] -=
                 BACKFLOW * self.fluid.density * outward.min(0.0);
         }
         self.boundary.impose(
@@ -433,8 +384,10 @@ impl Solver {
         );
         for (vertex, rule) in self.boundary.rules.iter().enumerate().take(self.topology.rows()) {
             if *rule != Rule::Free {
-                self.momentum.values[self.topology.pattern.row(vertex)].fill(0.0);
-                self.momentum.values[self.momentum_diagonal[vertex]] = 1.0;
+                let offsets = self.topology.zeros.offsets();
+                let values = self.momentum.values_mut();
+                values[offsets[vertex]..offsets[vertex + 1]].fill([[0.0]]);
+                values[self.topology.diagonal[vertex]] = [[1.0]];
                 self.right[vertex] = self.scratch[vertex];
             } else {
                 for axis in (0..3).filter(|&axis| self.boundary.held[vertex][axis]) {
@@ -454,7 +407,7 @@ impl Solver {
             }
             total
         });
-        let squares = self.halo.sum(squares);
+        let squares = total(self.halo.communicator(), squares);
         let tolerance = self.settings.momentum_tolerance * squares[0].sqrt().max(f64::MIN_POSITIVE);
         self.momentum_solver.solve(
             &self.momentum,
@@ -468,14 +421,15 @@ impl Solver {
         )
     }
 
-    /// Makes the velocity satisfy continuity: solves for the potential and subtracts its gradient. With a density, continuity is
-    /// stabilised by the states of the present step.
+    /// Makes the velocity satisfy continuity: solves for the potential and subtracts its gradient.
+    /// With a density, continuity is stabilised by the states of the present step.
     fn project(&mut self, stabilised: Option<f64>) -> Outcome {
+        let rows = self.topology.rows();
         momentum::divergence(
             &self.topology,
             &self.geometry,
             &self.velocity,
-            &mut self.projection.right,
+            &mut self.projection.right[..rows],
         );
         self.projection.right.iter_mut().for_each(|value| *value = -*value);
         if let Some(density) = stabilised {
@@ -486,7 +440,7 @@ impl Solver {
                 density,
                 &self.halo,
                 &mut self.scratch,
-                &mut self.projection.right,
+                &mut self.projection.right[..rows],
             );
         }
         let through: f64 = self.fluxes().into_iter().map(f64::abs).sum();
@@ -494,23 +448,23 @@ impl Solver {
             &self.topology,
             &self.halo,
             &mut self.potential,
-            &self.settings,
+            self.settings.pressure_tolerance,
             through,
             self.boundary.is_open(),
         );
         self.scratch.resize(self.velocity.len(), [0.0; 3]);
-        let rows = self.topology.rows();
         momentum::gradient(
             &self.topology,
             &self.geometry,
             &self.potential,
             &mut self.scratch[..rows],
         );
-        // At an outlet, the part normal to it is that which the pressure equation took into its balance.
+        // At an outlet, the part normal to it is that which the pressure equation took into its
+        // balance.
         for outlet in &self.boundary.outlets {
             let vertex = outlet.vertex as usize;
             let (own, area) = (&mut self.scratch[vertex], outlet.area);
-            let size = dot(area, area).sqrt();
+            let size = length(area);
             let normal = area.map(|value| value / size);
             let driven =
                 self.geometry.vertex_volumes[vertex] * outlet.yield_rate * self.potential[vertex];
@@ -520,18 +474,15 @@ impl Solver {
             }
         }
         let (gradient, geometry, boundary) = (&self.scratch, &self.geometry, &self.boundary);
-        for_each_chunk(&mut self.velocity[..rows], |start, chunk| {
-            for (offset, value) in chunk.iter_mut().enumerate() {
-                let vertex = start + offset;
-                if boundary.rules[vertex] == Rule::Free {
-                    for axis in (0..3).filter(|&axis| !boundary.held[vertex][axis]) {
-                        value[axis] -= gradient[vertex][axis] / geometry.vertex_volumes[vertex];
-                    }
+        for_each(&mut self.velocity[..rows], |vertex, value| {
+            if boundary.rules[vertex] == Rule::Free {
+                for axis in (0..3).filter(|&axis| !boundary.held[vertex][axis]) {
+                    value[axis] -= gradient[vertex][axis] / geometry.vertex_volumes[vertex];
                 }
             }
         });
         self.boundary.impose_slip(&mut self.velocity, &self.mesh_velocity);
-        self.halo.update(&mut self.velocity);
+        self.halo.update(3, self.velocity.as_flattened_mut());
         outcome
     }
 
@@ -545,21 +496,21 @@ impl Solver {
             }
             parts
         });
-        let [total, whole] = self.halo.sum(sums);
-        self.pressure.iter_mut().for_each(|value| *value -= total / whole);
+        let [integral, whole] = total(self.halo.communicator(), sums);
+        self.pressure.iter_mut().for_each(|value| *value -= integral / whole);
     }
 
     fn check_finite(&self) -> Result<(), SolverError> {
         let (velocity, pressure) = (&self.velocity, &self.pressure);
-        let total = sum(pressure.len(), |range| {
+        let zero = sum(pressure.len(), |range| {
             [range
                 .map(|v| (velocity[v][0] + velocity[v][1] + velocity[v][2] + pressure[v]) * 0.0)
                 .sum()]
         });
-        if self.halo.sum(total) == [0.0] {
+        if total(self.halo.communicator(), zero) == [0.0] {
             return Ok(());
         }
-        self.halo.agree(self.first_non_finite())
+        agreed(self.halo.communicator(), self.first_non_finite())
     }
 
     fn first_non_finite(&self) -> Result<(), SolverError> {
@@ -576,230 +527,13 @@ impl Solver {
                     time: self.time,
                     quantity: if component < 3 { "velocity" } else { "pressure" },
                     vertex: vertex as usize,
-                    place: self.geometry.points[rank],
+                    position: self.geometry.points[rank],
                     value: values[component],
                 });
             }
         }
         Ok(())
     }
-
-    fn imbalance(&self) -> f64 {
-        self.fluxes().into_iter().sum()
-    }
-
-    /// How many steps have been done.
-    #[must_use]
-    pub fn cycle(&self) -> u64 {
-        self.cycle
-    }
-
-    /// The time reached.
-    #[must_use]
-    pub fn time(&self) -> f64 {
-        self.time
-    }
-
-    /// The fluid.
-    #[must_use]
-    pub fn fluid(&self) -> Fluid {
-        self.fluid
-    }
-
-    /// The velocity at each vertex.
-    #[must_use]
-    pub fn velocity(&self) -> Vec<Vector> {
-        self.topology.to_mesh(&self.velocity)
-    }
-
-    /// The pressure at each vertex.
-    #[must_use]
-    pub fn pressure(&self) -> Vec<f64> {
-        self.topology.to_mesh(&self.pressure)
-    }
-
-    /// As [`Solver::velocity`], into a vector that is there already.
-    pub fn velocity_into(&self, values: &mut Vec<Vector>) {
-        values.clear();
-        values.extend(self.topology.vertex_rank.iter().map(|&rank| self.velocity[rank as usize]));
-    }
-
-    /// As [`Solver::pressure`], into a vector that is there already.
-    pub fn pressure_into(&self, values: &mut Vec<f64>) {
-        values.clear();
-        values.extend(self.topology.vertex_rank.iter().map(|&rank| self.pressure[rank as usize]));
-    }
-
-    /// The coordinates of each vertex.
-    #[must_use]
-    pub fn points(&self) -> Vec<Vector> {
-        self.topology.to_mesh(&self.geometry.points)
-    }
-
-    /// The patches, in the order in which they were given; their triangles in the solver's own numbering.
-    #[must_use]
-    pub fn patches(&self) -> &[Patch] {
-        &self.boundary.patches
-    }
-
-    /// The flux of the velocity out through each patch (volume per time).
-    #[must_use]
-    pub fn fluxes(&self) -> Vec<f64> {
-        self.boundary.fluxes(&self.velocity, &self.geometry.points, &self.halo)
-    }
-
-    /// The mean pressure over each patch, and the patch's area.
-    #[must_use]
-    pub fn mean_pressures(&self) -> Vec<(f64, f64)> {
-        self.boundary.means(&self.pressure, &self.geometry.points, &self.halo)
-    }
-
-    /// The greatest velocity of any vertex.
-    #[must_use]
-    pub fn max_velocity(&self) -> f64 {
-        self.halo.maximum(
-            self.velocity
-                .iter()
-                .map(|&velocity| dot(velocity, velocity))
-                .fold(0.0, f64::max)
-                .sqrt(),
-        )
-    }
-
-    /// The largest Courant number of any element for a time step: how many elements the fluid crosses in it.
-    #[must_use]
-    pub fn courant(&self, time_step: f64) -> f64 {
-        let across = |(vertices, element): (&[u32; 4], &crate::geometry::Element)| {
-            let mean: Vector = std::array::from_fn(|axis| {
-                0.25 * vertices
-                    .iter()
-                    .map(|&vertex| self.velocity[vertex as usize][axis])
-                    .sum::<f64>()
-            });
-            0.5 * time_step
-                * element.gradients.iter().map(|&gradient| dot(mean, gradient).abs()).sum::<f64>()
-        };
-        let elements = self.topology.elements.iter().zip(&self.geometry.elements);
-        self.halo.maximum(elements.map(across).fold(0.0, f64::max))
-    }
-}
-
-impl Projection {
-    fn new(
-        topology: &Topology,
-        geometry: &Geometry,
-        boundary: &Boundary,
-        halo: &Halo,
-        diagonal: Vec<usize>,
-    ) -> Self {
-        let matrix = pressure_matrix(topology, geometry, boundary, &diagonal);
-        Self {
-            preconditioner: Schwarz::new(&matrix, halo),
-            right: vec![0.0; topology.rows()],
-            matrix,
-            diagonal,
-            stale: false,
-            usual_iterations: 0,
-            solver: ConjugateGradients::default(),
-        }
-    }
-
-    fn reassemble(&mut self, topology: &Topology, geometry: &Geometry, boundary: &Boundary) {
-        self.matrix = pressure_matrix(topology, geometry, boundary, &self.diagonal);
-        self.stale = true;
-    }
-
-    /// Solves for the potential; `through` is the sum of the fluxes through the boundary's parts, which says what is small.
-    fn solve(
-        &mut self,
-        topology: &Topology,
-        halo: &Halo,
-        potential: &mut [f64],
-        settings: &Settings,
-        through: f64,
-        open: bool,
-    ) -> Outcome {
-        let rows = self.right.len();
-        if !open {
-            // Only a right-hand side without a mean has a solution.
-            let used = (0..rows).filter(|&row| !topology.around(row).is_empty()).count();
-            let [total] = sum(rows, |range| [self.right[range].iter().sum()]);
-            #[expect(clippy::cast_precision_loss, reason = "a count of vertices")]
-            let [total, used] = halo.sum([total, used as f64]);
-            let mean = total / used.max(1.0);
-            self.right.iter_mut().for_each(|value| *value -= mean);
-        }
-        for row in (0..rows).filter(|&row| topology.around(row).is_empty()) {
-            self.right[row] = 0.0;
-        }
-        let [square] =
-            sum(rows, |range| [self.right[range].iter().map(|value| value * value).sum()]);
-        #[expect(clippy::cast_precision_loss, reason = "a count of vertices")]
-        let [square, vertices] = halo.sum([square, rows as f64]);
-        let small = 1e-9 * through / vertices.sqrt();
-        let tolerance = (settings.pressure_tolerance * square.sqrt()).max(small);
-        let solve = |this: &mut Self, potential: &mut [f64], limit| {
-            let (matrix, preconditioner) = (&this.matrix, &mut this.preconditioner);
-            this.solver.solve(
-                matrix,
-                preconditioner,
-                halo,
-                &this.right,
-                potential,
-                tolerance,
-                limit,
-            )
-        };
-        // An old preconditioner still serves a mesh that has moved a little; conjugate gradients have the true matrix.
-        if self.stale {
-            let limit = self.usual_iterations + self.usual_iterations / 2 + 2;
-            let first = solve(self, potential, limit);
-            if first.converged {
-                return first;
-            }
-            self.preconditioner = Schwarz::new(&self.matrix, halo);
-            self.stale = false;
-            self.usual_iterations = 0;
-            let mut second = solve(self, potential, settings.iteration_limit);
-            self.usual_iterations = second.iterations;
-            second.iterations += first.iterations;
-            return second;
-        }
-        let outcome = solve(self, potential, settings.iteration_limit);
-        self.usual_iterations = self.usual_iterations.max(outcome.iterations);
-        outcome
-    }
-}
-
-fn diagonal_of(pattern: &Pattern) -> Option<Vec<usize>> {
-    pattern.diagonal()
-}
-
-/// The Laplacian, and at outlets the flux that a potential drives out of each vertex.
-fn pressure_matrix(
-    topology: &Topology,
-    geometry: &Geometry,
-    boundary: &Boundary,
-    diagonal: &[usize],
-) -> Matrix {
-    let mut matrix = geometry.laplacian(topology);
-    for outlet in &boundary.outlets {
-        let vertex = outlet.vertex as usize;
-        matrix.values[diagonal[vertex]] += outlet.yield_rate * dot(outlet.area, outlet.area).sqrt();
-    }
-    for vertex in (0..topology.rows()).filter(|&vertex| topology.around(vertex).is_empty()) {
-        matrix.values[diagonal[vertex]] = 1.0;
-    }
-    matrix
-}
-
-fn check_fluid(fluid: Fluid) -> Result<(), SolverError> {
-    for (what, value) in [("the density", fluid.density), ("the viscosity", fluid.viscosity)] {
-        if !(value > 0.0 && value.is_finite()) {
-            return Err(SolverError::NotPositive { what, value });
-        }
-    }
-    Ok(())
 }
 
 fn check_elements(topology: &Topology, geometry: &Geometry, cycle: u64) -> Result<(), SolverError> {
@@ -808,7 +542,7 @@ fn check_elements(topology: &Topology, geometry: &Geometry, cycle: u64) -> Resul
     Err(SolverError::Inverted {
         cycle,
         cell: topology.element_order[element] as usize,
-        place: std::array::from_fn(|axis| {
+        position: std::array::from_fn(|axis| {
             0.25 * corners.iter().map(|corner| corner[axis]).sum::<f64>()
         }),
         volume: geometry.elements[element].volume,

@@ -1,18 +1,17 @@
 //! The parts of a tetrahedral mesh that stay when it moves.
 
-use std::collections::VecDeque;
-use std::sync::Arc;
-
 use rayon::prelude::*;
+use tombolo_deform::linear::{SparseMatrix, reverse_cuthill_mckee};
 use tombolo_deform::mesh::{CellType, Mesh};
 
 use crate::SolverError;
-use crate::linear::Pattern;
 
-/// The tetrahedra of a mesh in the solver's own numbering, and the sparsity of every matrix on them.
+/// The tetrahedra of a mesh in the solver's own numbering, and the sparsity of every matrix on
+/// them.
 ///
-/// Vertices are numbered anew by reverse Cuthill-McKee (Cuthill and McKee 1969), tetrahedra by their lowest vertex, so that
-/// what is near in space is near in memory. On several ranks the vertices that this one owns come first; they alone have rows.
+/// Vertices are numbered anew by reverse Cuthill-McKee (Cuthill and McKee 1969), tetrahedra by
+/// their lowest vertex, so that what is near in space is near in memory. On several ranks the
+/// vertices that this one owns come first; they alone have rows.
 #[derive(Debug)]
 pub struct Topology {
     /// The mesh's number of each of the solver's vertices.
@@ -23,8 +22,16 @@ pub struct Topology {
     pub element_order: Vec<u32>,
     /// The vertices of each element, in the solver's numbers.
     pub elements: Vec<[u32; 4]>,
-    /// Where two vertices share an element, in the rows of the vertices that this rank owns.
-    pub pattern: Arc<Pattern>,
+    /// A matrix of zeros with entries where two vertices share an element, in the rows of the
+    /// vertices that this rank owns; in those of others the diagonal alone.
+    pub zeros: SparseMatrix<1>,
+    /// The positions of the entries on the diagonal, in the rows of the vertices that this rank
+    /// owns.
+    pub diagonal: Vec<usize>,
+    /// The rank that owns each vertex, in the solver's numbers.
+    owners: Vec<u64>,
+    /// This rank.
+    rank: u64,
     /// Row starts into `incidences`.
     pub incidence_starts: Vec<usize>,
     /// For each vertex, the elements around it.
@@ -38,25 +45,18 @@ pub struct Incidence {
     pub element: u32,
     /// Which of the element's vertices it is seen from.
     pub local: u8,
-    /// For each of the element's vertices, the position of its column within the row, where there is one.
+    /// For each of the element's vertices, the position of its column within the row, where there
+    /// is one.
     pub slots: [u16; 4],
 }
 
 impl Topology {
-    /// Numbers the tetrahedra of a mesh. Cells of lower dimension are passed over.
+    /// Numbers the tetrahedra of a mesh, or of a rank's part of one; it may have none. Cells of
+    /// lower dimension are passed over. `owners` are the ranks that own the vertices.
     ///
     /// # Errors
-    /// [`SolverError::CellType`] for a volume cell that is not a tetrahedron, [`SolverError::NoCells`] where there is none.
-    pub fn new(mesh: &Mesh) -> Result<Self, SolverError> {
-        let topology = Self::of_part(mesh, |_| true)?;
-        if topology.elements.is_empty() { Err(SolverError::NoCells) } else { Ok(topology) }
-    }
-
-    /// The same of a rank's part of a mesh, of which it owns some vertices; it may be empty.
-    ///
-    /// # Errors
-    /// [`SolverError::CellType`].
-    pub fn of_part(mesh: &Mesh, owns: impl Fn(u32) -> bool) -> Result<Self, SolverError> {
+    /// [`SolverError::CellType`] for a volume cell that is not a tetrahedron.
+    pub fn new(mesh: &Mesh, owners: &[u64], rank: usize) -> Result<Self, SolverError> {
         let mut cells: Vec<([u32; 4], u32)> = Vec::new();
         for (cell, (cell_type, vertices)) in mesh.cells().iter().enumerate() {
             match (cell_type, vertices) {
@@ -66,10 +66,13 @@ impl Topology {
             }
         }
         let vertex_count = mesh.points().len();
-        let natural =
+        let (starts, columns) =
             adjacency(vertex_count, vertex_count, cells.iter().map(|(vertices, _)| vertices));
-        let (mut vertex_order, others): (Vec<u32>, Vec<u32>) =
-            reverse_cuthill_mckee(&natural).into_iter().partition(|&vertex| owns(vertex));
+        let around = |vertex: u32| &columns[starts[vertex as usize]..starts[vertex as usize + 1]];
+        let order = reverse_cuthill_mckee(vertex_count, around);
+        let rank = rank as u64;
+        let owns = |vertex: &u32| owners[*vertex as usize] == rank;
+        let (mut vertex_order, others): (Vec<u32>, Vec<u32>) = order.into_iter().partition(owns);
         let rows = vertex_order.len();
         vertex_order.extend(others);
         let mut vertex_rank = vec![0u32; vertex_count];
@@ -81,7 +84,13 @@ impl Topology {
         }
         cells.sort_by_key(|&(vertices, cell)| (vertices.into_iter().min(), cell));
         let elements: Vec<[u32; 4]> = cells.iter().map(|&(vertices, _)| vertices).collect();
-        let pattern = adjacency(vertex_count, rows, elements.iter());
+        let (starts, columns) = adjacency(vertex_count, rows, elements.iter());
+        let zeros = SparseMatrix::zeros(starts, columns);
+        let diagonal = (0..rows).map(|row| {
+            let before = zeros.row(row).0.partition_point(|&column| (column as usize) < row);
+            zeros.offsets()[row] + before
+        });
+        let diagonal = diagonal.collect();
 
         let mut incidence_starts = vec![0usize; vertex_count + 1];
         for &vertex in elements.iter().flatten() {
@@ -95,9 +104,7 @@ impl Topology {
             vec![Incidence { element: 0, local: 0, slots: [0; 4] }; elements.len() * 4];
         for (element, vertices) in elements.iter().enumerate() {
             for (local, &vertex) in vertices.iter().enumerate() {
-                let row =
-                    if (vertex as usize) < rows { pattern.row(vertex as usize) } else { 0..0 };
-                let row = &pattern.columns[row];
+                let row = zeros.row(vertex as usize).0;
                 let slots = vertices.map(|column| {
                     let slot = row.partition_point(|&entry| entry < column);
                     u16::try_from(slot).unwrap_or(u16::MAX)
@@ -113,11 +120,14 @@ impl Topology {
             }
         }
         Ok(Self {
-            vertex_order,
             vertex_rank,
             element_order: cells.iter().map(|&(_, cell)| cell).collect(),
             elements,
-            pattern: Arc::new(pattern),
+            zeros,
+            diagonal,
+            owners: vertex_order.iter().map(|&vertex| owners[vertex as usize]).collect(),
+            rank,
+            vertex_order,
             incidence_starts,
             incidences,
         })
@@ -126,7 +136,29 @@ impl Topology {
     /// How many vertices this rank owns: they are the first.
     #[must_use]
     pub fn rows(&self) -> usize {
-        self.pattern.rows()
+        self.diagonal.len()
+    }
+
+    /// The entries of a matrix like [`Topology::zeros`], row by row, in the rows of the vertices
+    /// that this rank owns.
+    #[must_use]
+    pub fn own_rows<'a>(&self, matrix: &'a mut SparseMatrix<1>) -> Vec<&'a mut [f64]> {
+        let mut entries = matrix.values_mut().as_flattened_mut().as_flattened_mut();
+        let mut rows = Vec::with_capacity(self.rows());
+        for bounds in self.zeros.offsets()[..=self.rows()].windows(2) {
+            let (row, rest) = entries.split_at_mut(bounds[1] - bounds[0]);
+            rows.push(row);
+            entries = rest;
+        }
+        rows
+    }
+
+    /// Whether a triangle that other ranks may have too is counted here: by the lowest of the ranks
+    /// that own its corners, which has all cells around that corner, and so the triangle.
+    #[must_use]
+    pub fn counts(&self, triangle: &[u32; 3]) -> bool {
+        let owner = triangle.iter().filter_map(|&vertex| self.owners.get(vertex as usize)).min();
+        owner == Some(&self.rank)
     }
 
     /// How many vertices there are.
@@ -159,12 +191,13 @@ fn number(index: usize) -> u32 {
     index as u32
 }
 
-/// Which vertices share an element, each with itself, in the first `row_count` rows.
+/// Which vertices share an element, each with itself, in the first `row_count` rows; in the others
+/// each has itself alone. Row starts, and columns.
 fn adjacency<'a>(
     vertex_count: usize,
     row_count: usize,
     elements: impl Iterator<Item = &'a [u32; 4]> + Clone,
-) -> Pattern {
+) -> (Vec<usize>, Vec<u32>) {
     let mut starts = vec![0usize; vertex_count + 1];
     for &vertex in elements.clone().flatten() {
         starts[vertex as usize + 1] += 4;
@@ -181,10 +214,13 @@ fn adjacency<'a>(
             next[row as usize] += 4;
         }
     }
-    let rows: Vec<Vec<u32>> = (0..row_count)
+    let rows: Vec<Vec<u32>> = (0..vertex_count)
         .into_par_iter()
         .map(|row| {
             let mut columns = all[starts[row]..starts[row + 1]].to_vec();
+            if row >= row_count {
+                columns.clear();
+            }
             if columns.is_empty() {
                 columns.push(number(row));
             }
@@ -193,58 +229,10 @@ fn adjacency<'a>(
             columns
         })
         .collect();
-    let mut offsets = Vec::with_capacity(row_count + 1);
+    let mut offsets = Vec::with_capacity(vertex_count + 1);
     offsets.push(0);
     for row in &rows {
         offsets.push(offsets[offsets.len() - 1] + row.len());
     }
-    Pattern { starts: offsets, columns: rows.concat() }
-}
-
-fn reverse_cuthill_mckee(pattern: &Pattern) -> Vec<u32> {
-    let rows = pattern.rows();
-    let degree = |row: u32| pattern.row(row as usize).len();
-    let mut visited = vec![false; rows];
-    let mut order: Vec<u32> = Vec::with_capacity(rows);
-    let mut starts: Vec<u32> = (0..rows).map(number).collect();
-    starts.sort_by_key(|&row| (degree(row), row));
-    for start in starts {
-        if visited[start as usize] {
-            continue;
-        }
-        let root = far_end(pattern, far_end(pattern, start));
-        let mut queue = VecDeque::from([root]);
-        visited[root as usize] = true;
-        while let Some(row) = queue.pop_front() {
-            order.push(row);
-            let mut next: Vec<u32> = pattern.columns[pattern.row(row as usize)]
-                .iter()
-                .copied()
-                .filter(|&c| !visited[c as usize])
-                .collect();
-            next.sort_by_key(|&column| (degree(column), column));
-            for column in next {
-                visited[column as usize] = true;
-                queue.push_back(column);
-            }
-        }
-    }
-    order.reverse();
-    order
-}
-
-/// The last vertex that a breadth-first walk from `start` reaches.
-fn far_end(pattern: &Pattern, start: u32) -> u32 {
-    let mut visited = std::collections::HashSet::from([start]);
-    let mut queue = VecDeque::from([start]);
-    let mut last = start;
-    while let Some(row) = queue.pop_front() {
-        last = row;
-        for &column in &pattern.columns[pattern.row(row as usize)] {
-            if visited.insert(column) {
-                queue.push_back(column);
-            }
-        }
-    }
-    last
+    (offsets, rows.concat())
 }

@@ -3,11 +3,11 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use tombolo_deform::communicator::{Communicator, Halo, threads};
 use tombolo_deform::mesh::{FeatureSource, Mesh, Vector};
 use tombolo_deform::shapes::{BOX_FEATURES, box_of_tets};
+use tombolo_deform::{distributed::Part, mesh::SharedVertices};
 use tombolo_flow::{Condition, Fluid, Motion, Patch, Settings, Solver, SolverError, Value};
-use tombolo_pipelines::communicator::{Communicator, threads};
-use tombolo_pipelines::distributed::{Part, SharedVertices};
 
 const WATERY: Fluid = Fluid { density: 1.0, viscosity: 0.01 };
 
@@ -33,8 +33,8 @@ fn outlet() -> Condition {
     Condition::Pressure(Value::Uniform(0.0))
 }
 
-/// The root mean square over the mesh of the difference between the linear velocity field and `exact`, by the quadrature of
-/// second order that samples the middles of edges and the vertices.
+/// The root mean square over the mesh of the difference between the linear velocity field and
+/// `exact`, by the quadrature of second order that samples the middles of edges and the vertices.
 fn mean_square(mesh: &Mesh, velocity: &[Vector], exact: impl Fn(Vector) -> Vector) -> f64 {
     let (mut total, mut whole) = (0.0, 0.0);
     for (_, vertices) in mesh.cells().iter() {
@@ -77,8 +77,9 @@ fn random(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// Plane Poiseuille flow between walls at y = 0 and y = 1, driven by its inlet profile, on a mesh whose inner vertices are
-/// shaken by `shake` edge lengths, lest a regular mesh flatter the scheme; mean velocity 2/3.
+/// Plane Poiseuille flow between walls at y = 0 and y = 1, driven by its inlet profile, on a mesh
+/// whose inner vertices are shaken by `shake` edge lengths, lest a regular mesh flatter the scheme;
+/// mean velocity 2/3.
 fn poiseuille(counts: [usize; 3], shake: f64) -> (Mesh, Solver) {
     let upper = [2.0, 1.0, 0.25];
     let mesh = box_of_tets(counts, [0.0; 3], upper);
@@ -98,7 +99,8 @@ fn poiseuille(counts: [usize; 3], shake: f64) -> (Mesh, Solver) {
         [inlet, outlet(), Condition::NoSlip, Condition::NoSlip, Condition::Slip, Condition::Slip],
     );
     let fluid = Fluid { density: 1.0, viscosity: 0.1 };
-    let mut solver = Solver::new(&mesh, patches, fluid, Settings::default()).unwrap();
+    let mut solver =
+        Solver::new(&mesh, &Halo::none(), patches, fluid, Settings::default()).unwrap();
     solver.initialise(
         &[profile(), Value::Uniform(0.0), Value::Uniform(0.0)],
         &Value::function(|place, _| 0.8 * (2.0 - place[0])),
@@ -157,15 +159,16 @@ fn uniform_stream_stays_uniform_whatever_the_mesh_does() {
     let conditions =
         [uniform(stream), outlet(), outlet(), uniform(stream), uniform(stream), uniform(stream)];
     let mut solver =
-        Solver::new(&mesh, sides(&mesh, conditions), WATERY, Settings::default()).unwrap();
+        Solver::new(&mesh, &Halo::none(), sides(&mesh, conditions), WATERY, Settings::default())
+            .unwrap();
     solver.initialise(&stream.map(Value::Uniform), &Value::Uniform(0.0));
     let inside = |point: Vector| {
         [1.5, 1.0, 0.8].iter().zip(point).all(|(upper, value)| value > 1e-9 && value < upper - 1e-9)
     };
     let mut number = random(7);
     for step in 0..60 {
-        // Up to the largest random motion that keeps every element; now and then the mesh rests, or the whole box is
-        // sheared and stretched at once.
+        // Up to the largest random motion that keeps every element; now and then the mesh rests, or
+        // the whole box is sheared and stretched at once.
         let amplitude = if step % 3 == 0 { 0.04 } else { 0.02 };
         let shear = if step % 10 == 5 { 0.8 } else { 0.1 * (step as f64).sin() };
         let points: Vec<Vector> = mesh
@@ -195,8 +198,8 @@ fn uniform_stream_stays_uniform_whatever_the_mesh_does() {
     assert!(pressure < 1e-9, "{pressure:e}");
 }
 
-/// A piston at x = s(t) pushes the fluid in a duct with frictionless walls: u = s'(t) everywhere, and the pressure falls linearly
-/// from -(density) s'' (x - 1) to 0 at the open end.
+/// A piston at x = s(t) pushes the fluid in a duct with frictionless walls: u = s'(t) everywhere,
+/// and the pressure falls linearly from -(density) s'' (x - 1) to 0 at the open end.
 #[test]
 fn piston_accelerates_the_fluid_with_the_pressure_of_newton() {
     let mesh = box_of_tets([10, 3, 3], [0.0; 3], [1.0, 0.3, 0.3]);
@@ -210,7 +213,8 @@ fn piston_accelerates_the_fluid_with_the_pressure_of_newton() {
     ];
     let fluid = Fluid { density: 2.0, viscosity: 0.01 };
     let mut solver =
-        Solver::new(&mesh, sides(&mesh, conditions), fluid, Settings::default()).unwrap();
+        Solver::new(&mesh, &Halo::none(), sides(&mesh, conditions), fluid, Settings::default())
+            .unwrap();
     let (time_step, acceleration) = (0.01, 0.8);
     let place = |time: f64| 0.5 * acceleration * time * time;
     for step in 1..=60 {
@@ -235,12 +239,14 @@ fn piston_accelerates_the_fluid_with_the_pressure_of_newton() {
     }
 }
 
-/// Decaying Taylor-Green vortices in a periodic cell's quarter (frictionless walls), on a fixed mesh and on a shaken one.
+/// Decaying Taylor-Green vortices in a periodic cell's quarter (frictionless walls), on a fixed
+/// mesh and on a shaken one.
 fn vortex_error(n: usize, time_step: f64, amplitude: f64) -> f64 {
     let mesh = box_of_tets([n, n, 2], [0.0; 3], [1.0, 1.0, 2.0 / n as f64]);
     let slip = || Condition::Slip;
     let mut solver = Solver::new(
         &mesh,
+        &Halo::none(),
         sides(&mesh, [slip(), slip(), slip(), slip(), slip(), slip()]),
         WATERY,
         Settings::default(),
@@ -320,7 +326,8 @@ fn survives_a_wall_that_jumps() {
         [inlet, outlet(), Condition::NoSlip, Condition::NoSlip, Condition::Slip, Condition::Slip];
     let fluid = Fluid { density: 1.0, viscosity: 1e-3 };
     let mut solver =
-        Solver::new(&mesh, sides(&mesh, conditions), fluid, Settings::default()).unwrap();
+        Solver::new(&mesh, &Halo::none(), sides(&mesh, conditions), fluid, Settings::default())
+            .unwrap();
     let time_step = 0.05;
     for _ in 0..40 {
         solver.step(time_step, None).unwrap();
@@ -332,7 +339,8 @@ fn survives_a_wall_that_jumps() {
         .map(|&[x, y, z]| [x, y * (1.0 - 0.25 * (1.0 - (PI * x / 2.0).cos())), z])
         .collect();
     let outcome = solver.step(time_step, Some(Motion { points: &pinched })).unwrap();
-    // What the wall displaces leaves with the stream: half of the closing volume's 0.25 * 4 * 0.5 per step.
+    // What the wall displaces leaves with the stream: half of the closing volume's 0.25 * 4 * 0.5
+    // per step.
     let displaced = 0.5 / time_step;
     assert!(
         (solver.fluxes()[1] - before - displaced).abs() < 0.03 * displaced,
@@ -345,7 +353,8 @@ fn survives_a_wall_that_jumps() {
     }
     let fastest = solver.velocity().iter().map(|&v| length(v)).fold(0.0, f64::max);
     assert!(fastest > 1.9 && fastest < 3.5, "{fastest}");
-    // What flows in flows out and not through the walls, of which one slopes away from the inlet now.
+    // What flows in flows out and not through the walls, of which one slopes away from the inlet
+    // now.
     let fluxes: Vec<f64> = solver.fluxes();
     assert!((fluxes[0] + before).abs() < 2e-4 * before, "{fluxes:?}");
     assert!((fluxes[1] + fluxes[0]).abs() < 1e-6 * before, "{fluxes:?}");
@@ -369,7 +378,7 @@ fn refuses_what_it_cannot_solve() {
     assert!(solver.set_fluid(Fluid { density: -1.0, viscosity: 1.0 }).is_err());
 
     let hexahedra = tombolo_deform::shapes::box_of_hexahedra([1, 1, 1], [0.0; 3], [1.0; 3]);
-    let refused = Solver::new(&hexahedra, Vec::new(), WATERY, Settings::default());
+    let refused = Solver::new(&hexahedra, &Halo::none(), Vec::new(), WATERY, Settings::default());
     assert!(matches!(refused, Err(SolverError::CellType { .. })));
 
     let conditions = [
@@ -385,7 +394,8 @@ fn refuses_what_it_cannot_solve() {
         Condition::Slip,
     ];
     let mut solver =
-        Solver::new(&mesh, sides(&mesh, conditions), WATERY, Settings::default()).unwrap();
+        Solver::new(&mesh, &Halo::none(), sides(&mesh, conditions), WATERY, Settings::default())
+            .unwrap();
     solver.step(0.1, None).unwrap();
     solver.step(0.1, None).unwrap();
     match solver.step(0.1, None) {
@@ -394,8 +404,9 @@ fn refuses_what_it_cannot_solve() {
     }
 }
 
-/// Parts on several ranks make the same equations as the whole: solved well, the same flow. Through an outlet, past walls of each kind,
-/// while all of the mesh moves; and in a closed box that is squeezed without losing volume.
+/// Parts on several ranks make the same equations as the whole: solved well, the same flow. Through
+/// an outlet, past walls of each kind, while all of the mesh moves; and in a closed box that is
+/// squeezed without losing volume.
 #[test]
 fn ranks_solve_the_same_equations() {
     let settings =
@@ -433,7 +444,9 @@ fn ranks_solve_the_same_equations() {
                 assert!(outcome.momentum.converged && outcome.pressure.converged, "{outcome:?}");
             }
         };
-        let mut whole = Solver::new(&mesh, sides(&mesh, conditions()), WATERY, settings).unwrap();
+        let mut whole =
+            Solver::new(&mesh, &Halo::none(), sides(&mesh, conditions()), WATERY, settings)
+                .unwrap();
         advance(&mut whole, mesh.points());
         let (velocity, pressure) = (whole.velocity(), whole.pressure());
         let largest = velocity.iter().map(|&velocity| length(velocity)).fold(0.0, f64::max);
@@ -442,11 +455,10 @@ fn ranks_solve_the_same_equations() {
         let apart = threads::run(3, |ranks| {
             let communicator: Arc<dyn Communicator> = Arc::new(ranks);
             let part = Part::cut(&mesh, &of_cells, communicator.rank(), true).unwrap();
-            let shared = SharedVertices::find(&*communicator, &part).unwrap();
+            let shared = SharedVertices::find(&communicator, &part).unwrap();
             let own = part.view().to_mesh().unwrap();
             let patches = sides(&own, conditions());
-            let mut solver =
-                Solver::of_part(&communicator, &shared, &own, patches, WATERY, settings).unwrap();
+            let mut solver = Solver::new(&own, shared.halo(), patches, WATERY, settings).unwrap();
             advance(&mut solver, own.points());
             let numbers = part.global_vertices.unwrap();
             let mut apart = [0.0_f64; 2];

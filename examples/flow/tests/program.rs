@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use tombolo_deform::communicator::threads;
 use tombolo_deform::mesh::FeatureSource;
 use tombolo_deform::shapes::{BOX_FEATURES, box_of_tets};
 use tombolo_flow::case::{Case, CaseError};
 use tombolo_flow::parts::Dealing;
 use tombolo_flow::program::{Options, Run};
 use tombolo_flow::report::Report;
-use tombolo_pipelines::communicator::threads;
 use tombolo_pipelines::files::{self, Compression};
 
 const CASE: &str = r#"{
@@ -202,7 +202,8 @@ fn every_case_that_comes_with_the_program_is_well_formed() {
     }
 }
 
-/// A uniform stream through a box whose walls let it pass, and pipelines that stop the run at the first step at which it is not one.
+/// A uniform stream through a box whose walls let it pass, and pipelines that stop the run at the
+/// first step at which it is not one.
 #[test]
 fn a_uniform_stream_stays_uniform_through_any_schedule() {
     const STREAM: &str = r#"{
@@ -287,7 +288,7 @@ fn a_uniform_stream_stays_uniform_through_any_schedule() {
     }
 }
 
-/// The same run on several ranks, which are threads here; the report of the first.
+/// Runs the options on several ranks, which are threads here; gives the report of the first.
 fn run_on(ranks: usize, options: &Options) -> Report {
     let reports = threads::run(ranks, |communicator| {
         Run::on(Arc::new(communicator), options).unwrap().finish().unwrap()
@@ -295,7 +296,8 @@ fn run_on(ranks: usize, options: &Options) -> Report {
     reports.into_iter().next().unwrap()
 }
 
-/// How far the fields and coordinates of two files are apart, relative to the largest value of each.
+/// How far the fields and coordinates of two files are apart, relative to the largest value of
+/// each.
 fn difference(a: &Path, b: &Path) -> Vec<(String, f64)> {
     let [a, b] = [a, b].map(|file| files::read_mesh(file).unwrap());
     assert_eq!(a.mesh.cells(), b.mesh.cells());
@@ -342,7 +344,8 @@ fn ranks_solve_what_one_process_solves() {
             &folder.path().join("alone/final.vtu"),
             &folder.path().join("ranks/final.vtu"),
         ) {
-            // The solves stop at residuals of 1e-6 and 1e-7; `ranks_solve_the_same_equations` asks for more.
+            // The solves stop at residuals of 1e-6 and 1e-7; `ranks_solve_the_same_equations` asks
+            // for more.
             let tolerance = if name == "coordinates" { 1e-8 } else { 5e-5 };
             assert!(apart <= tolerance, "{ranks} ranks, {dealing:?}: {name} is {apart:e} apart");
         }

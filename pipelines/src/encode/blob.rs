@@ -1,6 +1,7 @@
 //! One array's bytes as a zstd frame, and back.
 
-/// The most bytes that a frame's arrays may unfold to: far more than any view, far less than memory.
+/// The most bytes that a frame's arrays may unfold to: far more than any view, far less than
+/// memory.
 pub(super) const MOST_BYTES: usize = 1 << 30;
 
 /// The first bytes of a zstd frame (RFC 8878).
@@ -53,7 +54,8 @@ pub(super) fn decompress(blob: &[u8], expected: usize) -> Result<Vec<u8>, String
     check(bytes, expected)
 }
 
-/// The bytes behind a blob, which must be `expected` many. Never holds many more than that and one window of zstd.
+/// The bytes behind a blob, which must be `expected` many. Never holds many more than that and one
+/// window of zstd.
 #[cfg(all(not(feature = "compression"), feature = "decompression"))]
 pub(super) fn decompress(blob: &[u8], expected: usize) -> Result<Vec<u8>, String> {
     use std::io::Read;

@@ -3,11 +3,10 @@
 use tombolo_deform::mesh::{NumberType, Vector};
 use tombolo_deform::surface::Surface;
 
-use super::blob::{MOST_BYTES, decompress};
+use super::arrays::{DecodeError, error, unpacked, values};
 use super::surface;
 use super::wire::{
-    Array, DATA, DataHeader, Kind, MAGIC, PREAMBLE, SURFACE, TOPOLOGY, TopologyHeader, VERSION,
-    integers,
+    DATA, DataHeader, MAGIC, PREAMBLE, SURFACE, TOPOLOGY, TopologyHeader, VERSION, integers,
 };
 use crate::extract::{Association, Field};
 
@@ -56,21 +55,8 @@ pub struct DataFrame {
     pub fields: Vec<Field>,
 }
 
-/// Why bytes are no frame.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{place}: {message}")]
-pub struct DecodeError {
-    /// Where: the preamble, the header, or an array.
-    pub place: String,
-    /// What was found, and what was expected.
-    pub message: String,
-}
-
-pub(super) fn error(place: impl Into<String>, message: impl Into<String>) -> DecodeError {
-    DecodeError { place: place.into(), message: message.into() }
-}
-
-/// Decodes one binary message. Any bytes are answered with a frame or an error, and no more memory is taken than the frame needs.
+/// Decodes one binary message. Any bytes are answered with a frame or an error, and no more memory
+/// is taken than the frame needs.
 ///
 /// # Errors
 /// [`DecodeError`].
@@ -101,43 +87,12 @@ pub fn decode(bytes: &[u8]) -> Result<Decoded, DecodeError> {
     }
 }
 
-/// Each array with its bytes, decompressed.
-pub(super) fn arrays(
-    headers: Vec<Array>,
-    mut blobs: &[u8],
-) -> Result<Vec<(Array, Vec<u8>)>, DecodeError> {
-    let mut total = 0usize;
-    let mut arrays = Vec::new();
-    for array in headers {
-        let place = |message: String| error(format!("array `{:.60}`", array.name), message);
-        if array.components == 0 || array.components > 9 {
-            return Err(place(format!("{} components, expected 1 to 9", array.components)));
-        }
-        let size = array.count.checked_mul(array.components * array.kind.size());
-        let size = size.filter(|&size| size <= MOST_BYTES);
-        total = total.saturating_add(size.unwrap_or(usize::MAX));
-        let Some(size) = size.filter(|_| total <= MOST_BYTES) else {
-            return Err(place(format!("more than {MOST_BYTES} bytes in one frame")));
-        };
-        let (blob, rest) = blobs
-            .split_at_checked(array.bytes)
-            .ok_or_else(|| place("the frame is truncated".into()))?;
-        blobs = rest;
-        let bytes = decompress(blob, size).map_err(place)?;
-        arrays.push((array, bytes));
-    }
-    if !blobs.is_empty() {
-        return Err(error("arrays", format!("{} bytes after the last one", blobs.len())));
-    }
-    Ok(arrays)
-}
-
 fn topology(header: TopologyHeader, blobs: &[u8]) -> Result<TopologyFrame, DecodeError> {
     let (mut triangles, mut lines, mut triangle_features) = (Vec::new(), Vec::new(), None);
-    for (array, bytes) in arrays(header.arrays, blobs)? {
-        let place = format!("array `{:.60}`", array.name);
+    for (array, bytes) in unpacked(header.arrays, blobs)? {
+        let part = format!("array `{:.60}`", array.name);
         let values = integers(&bytes, array.kind, array.filter)
-            .ok_or_else(|| error(&place, "expected integers"))?;
+            .ok_or_else(|| error(&part, "expected integers"))?;
         let expected = match array.name.as_str() {
             "triangles" => 3,
             "lines" => 2,
@@ -146,13 +101,13 @@ fn topology(header: TopologyHeader, blobs: &[u8]) -> Result<TopologyFrame, Decod
         };
         if array.components != expected {
             return Err(error(
-                place,
+                part,
                 format!("{} components, expected {expected}", array.components),
             ));
         }
         let outside = values.iter().find(|&&point| point as usize >= header.points);
         if let (2.., Some(point)) = (expected, outside) {
-            return Err(error(place, format!("point {point} of {}", header.points)));
+            return Err(error(part, format!("point {point} of {}", header.points)));
         }
         let at = |index: usize, component: usize| values[component * array.count + index];
         match expected {
@@ -173,7 +128,7 @@ fn topology(header: TopologyHeader, blobs: &[u8]) -> Result<TopologyFrame, Decod
 
 fn data(header: DataHeader, blobs: &[u8]) -> Result<DataFrame, DecodeError> {
     let (mut points, mut fields) = (Vec::new(), Vec::new());
-    for (array, bytes) in arrays(header.arrays, blobs)? {
+    for (array, bytes) in unpacked(header.arrays, blobs)? {
         let values = values(&array, &bytes)?;
         if array.name == "points" {
             if array.components != 3 {
@@ -196,35 +151,4 @@ fn data(header: DataHeader, blobs: &[u8]) -> Result<DataFrame, DecodeError> {
     }
     let DataHeader { view, topology, cycle, time, .. } = header;
     Ok(DataFrame { view, topology, cycle, time, points, fields })
-}
-
-/// The values of an array, tuple after tuple.
-pub(super) fn values(array: &Array, bytes: &[u8]) -> Result<Vec<f64>, DecodeError> {
-    let planar: Vec<f64> = match array.kind {
-        Kind::F32 => {
-            bytes.as_chunks().0.iter().map(|&chunk| f64::from(f32::from_le_bytes(chunk))).collect()
-        }
-        Kind::F64 => bytes.as_chunks().0.iter().map(|&chunk| f64::from_le_bytes(chunk)).collect(),
-        kind => {
-            let place = || format!("array `{:.60}`", array.name);
-            let per_component = |numbers: &Option<Vec<f64>>, name: &str| {
-                let numbers = numbers.clone().filter(|numbers| numbers.len() == array.components);
-                numbers.ok_or_else(|| {
-                    error(place(), format!("expected {} values of `{name}`", array.components))
-                })
-            };
-            let quantum = per_component(&array.quantum, "quantum")?;
-            let offset = per_component(&array.offset, "offset")?;
-            let integers = integers(bytes, kind, array.filter).unwrap_or_default();
-            let value = |(index, integer): (usize, u32)| {
-                let component = index / array.count;
-                offset[component] + quantum[component] * f64::from(integer)
-            };
-            integers.into_iter().enumerate().map(value).collect()
-        }
-    };
-    let (count, components) = (array.count, array.components);
-    Ok((0..planar.len())
-        .map(|index| planar[index % components * count + index / components])
-        .collect())
 }

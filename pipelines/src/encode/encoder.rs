@@ -42,7 +42,7 @@ pub enum EncodeError {
         array: String,
         /// The point or cell of the extract.
         entity: usize,
-        /// What was found.
+        /// The value found.
         value: f64,
     },
     /// A field does not fit the points or cells.
@@ -71,7 +71,8 @@ pub enum EncodeError {
     Header(#[from] serde_json::Error),
 }
 
-/// Encodes the frames of views, one encoder for each view. What depends on the cells alone is kept as long as they stay the same.
+/// Encodes the frames of views, one encoder for each view. What depends on the cells alone is kept
+/// as long as they stay the same.
 #[derive(Debug, Default)]
 pub struct Encoder {
     topology: Option<Topology>,

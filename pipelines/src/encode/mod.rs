@@ -1,12 +1,13 @@
 //! Frames for viewers: an extract as few bytes, each number within a stated error, and back.
 //!
-//! A frame is `TMBL`, version 1, kind (1 topology, 2 data, 3 reference surface), two zero bytes, the length of a JSON header (32 bits, little endian),
-//! the header, and one blob for each of its arrays, each a zstd frame of its own. A value is `offset + quantum * integer`; the
-//! integers stand component after component, each as the zigzag of its difference to the one before (with wrap-around in the
-//! array's type). Arrays of type `f32` and `f64` hold the values themselves.
+//! A frame is `TMBL`, version 1, kind (1 topology, 2 data, 3 reference surface), two zero bytes,
+//! the length of a JSON header (32 bits, little endian), the header, and one blob for each of its
+//! arrays, each a zstd frame of its own. A value is `offset + quantum * integer`; the integers
+//! stand component after component, each as the zigzag of its difference to the one before (with
+//! wrap-around in the array's type). Arrays of type `f32` and `f64` hold the values themselves.
 //!
-//! Without the feature `compression` the blobs are zstd frames that hold their bytes as they are; compressed ones are read with
-//! the feature `decompression`, which is written in Rust alone.
+//! Without the feature `compression` the blobs are zstd frames that hold their bytes as they are;
+//! compressed ones are read with the feature `decompression`, which is written in Rust alone.
 //!
 //! ```
 //! use std::sync::Arc;
@@ -29,6 +30,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod arrays;
 mod blob;
 mod decode;
 mod encoder;
@@ -36,6 +38,7 @@ mod quantize;
 mod surface;
 mod wire;
 
-pub use decode::{DataFrame, DecodeError, Decoded, TopologyFrame, decode};
+pub use arrays::DecodeError;
+pub use decode::{DataFrame, Decoded, TopologyFrame, decode};
 pub use encoder::{EncodeError, Encoded, Encoder, encode};
 pub use surface::encode_surface;

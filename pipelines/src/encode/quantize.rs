@@ -19,10 +19,12 @@ pub(super) fn range(values: &[f64], components: usize, component: usize) -> [f64
     values.fold([first, first], |[least, largest], &value| [least.min(value), largest.max(value)])
 }
 
-/// Packs finite tuples so that no value changes by more than the bound. `extent` is what a relative bound is relative to.
+/// Packs finite tuples so that no value changes by more than the bound. `extent` is what a relative
+/// bound is relative to.
 ///
-/// The bound is kept by trial: each value is worked out as the decoder will, and where one would be off by more (values far larger
-/// than the bound, beyond what double precision resolves; ranges that overflow) the array is sent in single or double precision.
+/// The bound is kept by trial: each value is worked out as the decoder will, and where one would be
+/// off by more (values far larger than the bound, beyond what double precision resolves; ranges
+/// that overflow) the array is sent in single or double precision.
 pub(super) fn pack(values: &[f64], components: usize, bound: ErrorBound, extent: f64) -> Packed {
     let bound = match bound {
         // A range that overflows is at least the largest number.
@@ -46,8 +48,8 @@ fn quantized(values: &[f64], components: usize, bound: f64) -> Option<Packed> {
     let mut largest_integer = 0u32;
     for component in 0..components {
         let [least, largest] = range(values, components, component);
-        // A little under twice the bound: rounding to the nearest leaves half a quantum, and rounding of the numbers themselves
-        // a trace more.
+        // A little under twice the bound: rounding to the nearest leaves half a quantum, and
+        // rounding of the numbers themselves a trace more.
         let quantum = if least == largest { 0.0 } else { 2.0 * bound * (1.0 - 1e-9) };
         if least != largest
             && !(quantum.is_normal() && ((largest - least) / quantum) < f64::from(u32::MAX))

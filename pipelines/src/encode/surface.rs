@@ -1,21 +1,23 @@
-//! A reference surface as a frame: every bit of it, so that edits of the copy give what edits of the original give.
+//! A reference surface as a frame: every bit of it, so that edits of the copy give what edits of
+//! the original give.
 
 use tombolo_deform::mesh::{CellType, Cells};
 use tombolo_deform::surface::Surface;
 
-use super::decode::{DecodeError, arrays, error, values};
+use super::arrays::{DecodeError, error, unpacked, values};
 use super::encoder::{EncodeError, Message, TOPOLOGY_LEVEL};
 use super::wire::{SURFACE, SurfaceHeader, integers};
 use crate::extract::Association;
 use crate::language::ErrorBound;
 
-/// Encodes a surface without loss: points in double precision, mesh vertex numbers, faces and features. About 32 bytes a vertex.
+/// Encodes a surface without loss: points in double precision, mesh vertex numbers, faces and
+/// features. About 32 bytes a vertex.
 ///
 /// # Errors
 /// [`EncodeError`] where the compressor fails.
 ///
 /// ```
-/// use tombolo_deform::{shapes, surface::{FeatureSettings, Surface}};
+/// use tombolo_deform::{shapes, features::FeatureSettings, surface::Surface};
 /// use tombolo_pipelines::encode::{Decoded, decode, encode_surface};
 ///
 /// let surface = Surface::extract(&shapes::box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]), &FeatureSettings::default())?;
@@ -43,8 +45,8 @@ pub fn encode_surface(surface: &Surface) -> Result<Vec<u8>, EncodeError> {
 pub(super) fn decode(header: SurfaceHeader, blobs: &[u8]) -> Result<Surface, DecodeError> {
     let mut points = Vec::new();
     let [mut vertices, mut sizes, mut corners, mut features] = [const { Vec::new() }; 4];
-    for (array, bytes) in arrays(header.arrays, blobs)? {
-        let place = format!("array `{:.60}`", array.name);
+    for (array, bytes) in unpacked(header.arrays, blobs)? {
+        let part = format!("array `{:.60}`", array.name);
         let (target, components) = match array.name.as_str() {
             "points" => (None, 3),
             "vertices" => (Some(&mut vertices), 1),
@@ -55,14 +57,14 @@ pub(super) fn decode(header: SurfaceHeader, blobs: &[u8]) -> Result<Surface, Dec
         };
         if array.components != components {
             return Err(error(
-                place,
+                part,
                 format!("{} components, expected {components}", array.components),
             ));
         }
         match target {
             Some(target) => {
                 *target = integers(&bytes, array.kind, array.filter)
-                    .ok_or_else(|| error(place, "expected integers"))?;
+                    .ok_or_else(|| error(part, "expected integers"))?;
             }
             None => points = values(&array, &bytes)?.as_chunks().0.to_vec(),
         }
@@ -96,7 +98,7 @@ fn faces(sizes: &[u32], mut corners: &[u32]) -> Result<Cells, String> {
 #[cfg(test)]
 mod tests {
     use tombolo_deform::mesh::{FeatureSource, Mesh};
-    use tombolo_deform::{shapes, surface::FeatureSettings};
+    use tombolo_deform::{features::FeatureSettings, shapes};
 
     use super::super::{Decoded, decode};
     use super::*;
@@ -147,10 +149,10 @@ mod tests {
         for length in 0..bytes.len() {
             assert!(decode(&bytes[..length]).is_err(), "cut to {length} bytes");
         }
-        for place in 0..bytes.len() {
+        for byte in 0..bytes.len() {
             for bit in 0..8 {
                 let mut damaged = bytes.clone();
-                damaged[place] ^= 1 << bit;
+                damaged[byte] ^= 1 << bit;
                 // Whatever it says: no panic, and nothing that is no surface.
                 if let Ok(Decoded::Surface(surface)) = decode(&damaged) {
                     assert!(

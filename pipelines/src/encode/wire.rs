@@ -88,7 +88,8 @@ pub(super) enum Filter {
     None,
 }
 
-/// Integers as the little-endian zigzag of each one's difference to the one before, in 1, 2 or 4 bytes.
+/// Integers as the little-endian zigzag of each one's difference to the one before, in 1, 2 or 4
+/// bytes.
 pub(super) fn delta(integers: impl ExactSizeIterator<Item = u32>, kind: Kind) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(integers.len() * kind.size());
     let mut previous = 0u32;

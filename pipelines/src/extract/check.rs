@@ -1,4 +1,4 @@
-//! What is wrong with a channel as a solver lends it.
+//! The checks of a channel as a solver lends it.
 
 use tombolo_deform::mesh::MeshError;
 
@@ -19,7 +19,7 @@ pub enum ChannelError {
     Mesh {
         /// The channel.
         channel: String,
-        /// What is wrong with it.
+        /// The flaw.
         source: MeshError,
     },
     /// A field has another number of tuples than its mesh has vertices or cells.
@@ -32,7 +32,7 @@ pub enum ChannelError {
         channel: String,
         /// The field.
         field: String,
-        /// What it has one tuple for.
+        /// The entities that it has one tuple for.
         association: Association,
         /// How many tuples it has.
         found: usize,
@@ -67,7 +67,8 @@ impl Channel<'_> {
         self.fields.iter().try_for_each(|field| self.check_field(field))
     }
 
-    /// Refuses cells that name vertices beyond the last, and coordinates that are not finite. One pass over the mesh.
+    /// Refuses cells that name vertices beyond the last, and coordinates that are not finite. One
+    /// pass over the mesh.
     ///
     /// # Errors
     /// [`ChannelError::Mesh`].
@@ -93,7 +94,7 @@ impl Channel<'_> {
     }
 }
 
-/// Refuses a field that has not one tuple for each of the vertices or of the cells, of which there are so many.
+/// Refuses a field whose number of tuples is not that of the vertices or of the cells.
 ///
 /// # Errors
 /// [`ChannelError::FieldLength`].

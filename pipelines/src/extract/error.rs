@@ -1,7 +1,9 @@
 //! Why something could not be taken out of a channel.
 
-use tombolo_deform::mesh::MeshError;
+use tombolo_deform::mesh::{MeshError, Vector};
+use tombolo_deform::names::nearest;
 use tombolo_deform::surface::SurfaceError;
+use tombolo_deform::vector::Position;
 
 use super::Association;
 
@@ -16,21 +18,61 @@ pub enum ExtractError {
     FieldNotFinite {
         /// The field.
         field: String,
-        /// What it has one value for.
+        /// The entities that it has one value for.
         association: Association,
         /// The vertex or cell of the solver's mesh.
         entity: usize,
-        /// What was found.
+        /// The value found.
         value: f64,
         /// The cycle.
         cycle: u64,
+    },
+    /// A field that decides what is taken holds NaN or an infinity.
+    #[error(
+        "cycle {cycle}: field `{field}` is {value} at {association} {entity}; nothing is taken by it"
+    )]
+    DecidingNotFinite {
+        /// The field.
+        field: String,
+        /// The entities that it has one value for.
+        association: Association,
+        /// The vertex or cell of the solver's mesh.
+        entity: usize,
+        /// The value found.
+        value: f64,
+        /// The cycle.
+        cycle: u64,
+    },
+    /// The channel has no field of this name.
+    #[error("{0}")]
+    UnknownField(String),
+    /// A field of another association than is needed.
+    #[error("field `{field}` has values for {association} entities, expected a vertex field")]
+    NotOfVertices {
+        /// The field.
+        field: String,
+        /// Its association.
+        association: Association,
+    },
+    /// Points of a probe lie in no cell.
+    #[error(
+        "{outside} of {points} points lie in no cell and are left out, first {}",
+        Position(*first)
+    )]
+    OutsidePoints {
+        /// How many.
+        outside: usize,
+        /// How many points there are.
+        points: usize,
+        /// The first of them.
+        first: Vector,
     },
     /// A coordinate is NaN or infinite.
     #[error("cycle {cycle}: a coordinate of vertex {vertex} is {value}")]
     PointNotFinite {
         /// The vertex.
         vertex: usize,
-        /// What was found.
+        /// The value found.
         value: f64,
         /// The cycle.
         cycle: u64,
@@ -54,14 +96,15 @@ pub enum ExtractError {
     Mesh(#[from] MeshError),
     /// The parts that the ranks have do not make a mesh.
     #[error(transparent)]
-    Distributed(#[from] crate::distributed::DistributedError),
+    Distributed(#[from] tombolo_deform::distributed::DistributedError),
     /// The mesh has no surface that could be taken.
     #[error(transparent)]
     Surface(#[from] SurfaceError),
 }
 
 impl ExtractError {
-    /// The field that the error is about: only that field is missing from the extract. `None` where there is no extract.
+    /// The field that the error is about: only that field is missing from the extract. `None` where
+    /// there is no extract.
     #[must_use]
     pub fn field(&self) -> Option<&str> {
         match self {
@@ -70,4 +113,18 @@ impl ExtractError {
             _ => None,
         }
     }
+}
+
+/// A text that says that there is no such field, which there are, and the nearest.
+pub(crate) fn unknown_field<'a>(
+    name: &str,
+    known: impl Iterator<Item = &'a str> + Clone,
+) -> String {
+    let hint = nearest(name, known.clone())
+        .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+    let known: Vec<&str> = known.collect();
+    if known.is_empty() {
+        return format!("the channel has no field `{name}`, nor any other");
+    }
+    format!("the channel has no field `{name}`; its fields are {}{hint}", known.join(", "))
 }

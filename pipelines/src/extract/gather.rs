@@ -2,7 +2,6 @@
 
 use tombolo_deform::mesh::{ArrayView, NumberType, Vector};
 
-use super::slice::Crossing;
 use super::{ABSENT, Association, Channel, ExtractError, Field, FieldView, is_absent};
 
 /// Where the points of an extract come from.
@@ -13,6 +12,57 @@ pub(super) enum Points<'a> {
     Vertices(&'a [u32]),
     /// Between vertices.
     Crossings(&'a [Crossing]),
+    /// Among several vertices.
+    Rows(&'a Rows),
+}
+
+/// Points as weighted sums of vertices, in compressed rows.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Rows {
+    offsets: Vec<usize>,
+    entries: Vec<(u32, f64)>,
+}
+
+impl Default for Rows {
+    fn default() -> Self {
+        Self { offsets: vec![0], entries: Vec::new() }
+    }
+}
+
+impl Rows {
+    /// Appends a point: its vertices and their weights, whose sum is 1.
+    pub(super) fn push(&mut self, entries: impl IntoIterator<Item = (u32, f64)>) {
+        self.entries.extend(entries);
+        self.offsets.push(self.entries.len());
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    /// The vertices of a point and their weights.
+    pub(super) fn row(&self, point: usize) -> &[(u32, f64)] {
+        &self.entries[self.offsets[point]..self.offsets[point + 1]]
+    }
+}
+
+/// A point between the two ends of an edge, or a vertex where they are one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Crossing {
+    /// The ends, the lower number first.
+    pub(super) edge: [u32; 2],
+    /// How far from the first to the second, 0 to 1.
+    pub(super) fraction: f64,
+}
+
+impl Crossing {
+    /// Linear between the values at the ends, and never outside them.
+    pub(super) fn between(&self, first: f64, second: f64) -> f64 {
+        if self.edge[0] == self.edge[1] || first == second {
+            return first;
+        }
+        first * (1.0 - self.fraction) + second * self.fraction
+    }
 }
 
 /// Where the cells of an extract come from.
@@ -21,6 +71,8 @@ pub(super) enum Owners<'a> {
     All,
     /// These cells.
     Cells(&'a [u32]),
+    /// These cells, one for each point, which gets their values.
+    OfPoints(&'a [u32]),
 }
 
 /// The coordinates of these vertices.
@@ -112,7 +164,7 @@ fn field(
         (Association::Mesh, ..) | (Association::Element, _, Owners::All) => {
             copy(&mut (0..view.values.len()))?
         }
-        (Association::Element, _, Owners::Cells(cells)) => {
+        (Association::Element, _, Owners::Cells(cells) | Owners::OfPoints(cells)) => {
             copy(&mut cells.iter().map(|&cell| cell as usize))?
         }
         (Association::Vertex, Points::Crossings(crossings), _) => {
@@ -131,14 +183,40 @@ fn field(
                 }
             }
         }
+        (Association::Vertex, Points::Rows(rows), _) => {
+            values.reserve(rows.len() * components);
+            number = if number.is_real() { number } else { NumberType::F64 };
+            for row in (0..rows.len()).map(|point| rows.row(point)) {
+                for component in 0..components {
+                    values.push(match *row {
+                        [(vertex, _)] => read(vertex as usize, component)?,
+                        _ => weighted(row, |vertex| read(vertex as usize, component))?,
+                    });
+                }
+            }
+        }
     }
-    let mut field = Field {
-        name: view.name.to_owned(),
-        association: view.association,
-        components,
-        number,
-        values,
+    let association = match (view.association, owners) {
+        (Association::Element, Owners::OfPoints(_)) => Association::Vertex,
+        (association, _) => association,
     };
+    let mut field = Field { name: view.name.to_owned(), association, components, number, values };
     field.settle();
     Ok(field)
+}
+
+/// A weighted sum of values; absent where one of them is.
+fn weighted(
+    row: &[(u32, f64)],
+    read: impl Fn(u32) -> Result<f64, ExtractError>,
+) -> Result<f64, ExtractError> {
+    let mut sum = 0.0;
+    for &(vertex, weight) in row {
+        let value = read(vertex)?;
+        if is_absent(value) {
+            return Ok(ABSENT);
+        }
+        sum += weight * value;
+    }
+    Ok(sum)
 }

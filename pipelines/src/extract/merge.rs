@@ -4,22 +4,24 @@ use std::{collections::HashMap, sync::Arc};
 
 use tombolo_deform::mesh::{CellType, Cells, NumberType, Vector};
 
-use super::source::{Origin, Whole};
+use super::layout::Layout;
+use super::source::{Origin, Support, Whole};
 use super::{ABSENT, Association, Extract, Extracted, Field, is_absent};
-use crate::communicator::{Communicator, agree};
-use crate::distributed::{DistributedError, Reader, Writer};
+use tombolo_deform::communicator::{Communicator, Garbled, Reader, Writer, agree};
+use tombolo_deform::distributed::DistributedError;
 
-/// What one rank brings.
-struct Piece {
+/// The piece that one rank brings.
+struct RankPiece {
     points: Vec<Vector>,
-    /// Points and what all ranks call them: the vertices of the edge that they lie on; and whether other ranks may bring them too.
-    named: Vec<(u32, [u32; 2], bool)>,
+    /// Points and what all ranks call them: the vertices of the edge that they lie on; and whether
+    /// other ranks may bring them too.
+    named: Vec<(u32, Support, bool)>,
     cells: Cells,
     fields: Vec<Field>,
 }
 
-/// The extract that the pieces of the ranks make, on rank 0. Points on the borders of the parts come once; of what several ranks
-/// have there, the lowest rank's holds. Collective.
+/// The extract that the pieces of the ranks make, on rank 0. Points on the borders of the parts
+/// come once; of what several ranks have there, the lowest rank's holds. Collective.
 ///
 /// A field is there where every rank that has vertices (or cells) in the extract brings it.
 ///
@@ -35,7 +37,8 @@ pub(crate) fn merged(
     let result = match &piece.origin {
         Origin::Whole => return Ok(Some(Arc::clone(&piece.extract))),
         Origin::Boundary => on_boundary(communicator, whole, piece),
-        Origin::Vertices | Origin::Edges(_) => anywhere(communicator, whole, piece),
+        Origin::Vertices | Origin::Between(_) => anywhere(communicator, whole, piece),
+        Origin::Probe(layout, indices) => probed(communicator, layout, indices, piece),
     };
     Ok(agree(communicator, result)?)
 }
@@ -47,10 +50,10 @@ fn on_boundary(
     piece: &Extracted,
 ) -> Result<Option<Arc<Extract>>, DistributedError> {
     let extract = &piece.extract;
-    let owned: Vec<usize> = whole.boundary.owned_places().collect();
+    let owned: Vec<usize> = whole.boundary.owned_indices().collect();
     let mut message = Writer::default();
-    owned.iter().for_each(|&place| message.f64s(&extract.points[place]));
-    write_fields(&mut message, &extract.fields, &mut owned.iter().copied());
+    owned.iter().for_each(|&index| message.f64s(&extract.points[index]));
+    write_fields(&mut message, &extract.fields, &owned);
     let gathered = communicator.gather(0, &message.into_bytes());
     let (Some(root), Some(surface), Some(messages)) =
         (whole.boundary.root(), &whole.surface, gathered)
@@ -61,7 +64,7 @@ fn on_boundary(
     let mut merging = Fields::default();
     for (rank, bytes) in messages.iter().enumerate() {
         let mut reader = Reader::new(rank, bytes);
-        let (owned, faces) = (&root.owned[rank], &root.faces[rank]);
+        let (owned, faces) = (root.owned(rank), root.faces(rank));
         for &vertex in owned {
             points[vertex as usize] = reader.vector()?;
         }
@@ -88,50 +91,86 @@ fn anywhere(
     let mut points = Vec::new();
     let mut cells = Cells::new();
     let mut merging = Fields::default();
-    let mut by_name: HashMap<[u32; 2], u32> = HashMap::new();
+    let mut by_name: HashMap<Support, u32> = HashMap::new();
     let mut vertices = Vec::new();
     for (rank, bytes) in messages.iter().enumerate() {
-        let piece = Piece::read(rank, bytes)?;
+        let piece = RankPiece::read(rank, bytes)?;
         let mut numbers = vec![u32::MAX; piece.points.len()];
         let mut names = piece.named.into_iter().peekable();
-        for (place, point) in (0..).zip(&piece.points) {
+        for (index, point) in (0..).zip(&piece.points) {
             #[expect(clippy::cast_possible_truncation, reason = "points are numbered with 32 bits")]
             let next = points.len() as u32;
-            let named = names.next_if(|(named, ..)| *named == place);
+            let named = names.next_if(|(named, ..)| *named == index);
             let name = named.map(|(_, name, _)| name);
             let number = match named {
                 Some((_, name, true)) => *by_name.entry(name).or_insert(next),
                 _ => next,
             };
-            numbers[place as usize] = number;
+            numbers[index as usize] = number;
             if number == next {
                 points.push(*point);
-                vertices.push(name.map_or(u32::MAX, |name| name[0]));
+                vertices.push(name.map_or(u32::MAX, |name| name.vertices[0]));
             }
         }
         let first_cell = cells.len();
-        let mut renumbered = Vec::new();
-        for (cell, (cell_type, of_cell)) in piece.cells.iter().enumerate() {
-            let renumber =
-                |of: &[u32]| of.iter().map(|&point| numbers[point as usize]).collect::<Vec<u32>>();
-            match piece.cells.polyhedron_faces(cell) {
-                [] => {
-                    renumbered.clear();
-                    renumbered.extend(of_cell.iter().map(|&point| numbers[point as usize]));
-                    cells.push(cell_type, &renumbered)?;
-                }
-                faces => cells.push_polyhedron(
-                    &faces.iter().map(|face| renumber(face)).collect::<Vec<_>>(),
-                )?,
+        let renumbered = piece.cells.with_vertices(&numbers);
+        for (cell, (cell_type, vertices)) in renumbered.iter().enumerate() {
+            match renumbered.polyhedron_faces(cell) {
+                [] => cells.push(cell_type, vertices)?,
+                faces => cells.push_polyhedron(faces)?,
             }
         }
         #[expect(clippy::cast_possible_truncation, reason = "cells are numbered with 32 bits")]
-        let places: Vec<u32> = (first_cell as u32..cells.len() as u32).collect();
-        merging.add(piece.fields, &numbers, &places);
+        let merged_cells: Vec<u32> = (first_cell as u32..cells.len() as u32).collect();
+        merging.add(piece.fields, &numbers, &merged_cells);
     }
     let fields = merging.finish(points.len(), cells.len());
     let vertices = matches!(piece.origin, Origin::Vertices).then(|| vertices.into());
     Ok(Some(Arc::new(Extract { points, vertices, cells: Arc::new(cells), features: None, fields })))
+}
+
+/// Of a probe all is known but which rank has found which point.
+fn probed(
+    communicator: &dyn Communicator,
+    layout: &Layout,
+    indices: &[u32],
+    piece: &Extracted,
+) -> Result<Option<Arc<Extract>>, DistributedError> {
+    let extract = &piece.extract;
+    let mut message = Writer::default();
+    message.u32s(indices);
+    extract.points.iter().for_each(|point| message.f64s(point));
+    write_fields(&mut message, &extract.fields, &(0..indices.len()).collect::<Vec<_>>());
+    let Some(messages) = communicator.gather(0, &message.into_bytes()) else { return Ok(None) };
+    let mut pieces = Vec::with_capacity(messages.len());
+    let mut numbers = vec![u32::MAX; layout.points];
+    for (rank, bytes) in messages.iter().enumerate() {
+        let mut reader = Reader::new(rank, bytes);
+        let indices = reader.u32s()?;
+        for &index in &indices {
+            *numbers.get_mut(index as usize).ok_or(reader.garbled())? = 0;
+        }
+        let points = indices.iter().map(|_| reader.vector()).collect::<Result<Vec<_>, _>>()?;
+        let fields = read_fields(&mut reader, indices.len(), 0)?;
+        pieces.push((indices, points, fields));
+    }
+    let found = numbers.iter_mut().filter(|number| **number == 0);
+    let count = (0..).zip(found).map(|(number, slot)| *slot = number).count();
+    let mut points = vec![[0.0; 3]; count];
+    let mut merging = Fields::default();
+    for (indices, of_rank, fields) in pieces {
+        let indices: Vec<u32> = indices.iter().map(|&index| numbers[index as usize]).collect();
+        indices.iter().zip(of_rank).for_each(|(&index, point)| points[index as usize] = point);
+        merging.add(fields, &indices, &[]);
+    }
+    let cells = layout.cells(&numbers)?;
+    Ok(Some(Arc::new(Extract {
+        fields: merging.finish(count, cells.len()),
+        points,
+        vertices: None,
+        cells: Arc::new(cells),
+        features: None,
+    })))
 }
 
 /// A rank's piece as it is sent.
@@ -139,32 +178,33 @@ fn described(whole: &Whole, piece: &Extracted) -> Vec<u8> {
     let extract = &piece.extract;
     let numbers = whole.shared.numbers();
     let number = |vertex: u32| numbers[vertex as usize];
-    // Ends of an edge that other ranks have too are shared; of a vertex extract all are named, for their own sake.
-    let name = |place: usize| match &piece.origin {
-        Origin::Edges(edges) => {
-            let edge = edges[place].map(|vertex| vertex as usize);
-            edge.iter().all(|&vertex| whole.is_shared[vertex]).then(|| {
-                let [a, b] = edge.map(|vertex| numbers[vertex]);
-                ([a.min(b), a.max(b)], true)
+    // Points between vertices that other ranks have too are shared; of a vertex extract all are
+    // named, for their own sake.
+    let name = |index: usize| match &piece.origin {
+        Origin::Between(supports) => {
+            let support = supports[index];
+            support.vertices().all(|vertex| whole.is_shared[vertex as usize]).then(|| {
+                let vertices: Vec<u32> = support.vertices().map(number).collect();
+                (Support::new(&vertices, support.layer), true)
             })
         }
         _ => extract.vertices.as_ref().map(|vertices| {
-            let vertex = vertices[place];
-            ([number(vertex); 2], whole.is_shared[vertex as usize])
+            let vertex = vertices[index];
+            (Support::new(&[number(vertex)], 0), whole.is_shared[vertex as usize])
         }),
     };
-    let named = (0..extract.points.len()).filter_map(|place| Some((place, name(place)?)));
-    let named: Vec<(usize, ([u32; 2], bool))> = named.collect();
+    let named = (0..extract.points.len()).filter_map(|index| Some((index, name(index)?)));
+    let named: Vec<(usize, (Support, bool))> = named.collect();
     let mut message =
         Writer::with_capacity(32 * extract.points.len() + 4 * extract.cells.connectivity().len());
     message.u64(extract.points.len() as u64);
     extract.points.iter().for_each(|point| message.f64s(point));
     message.u64(named.len() as u64);
-    for (place, ([a, b], is_shared)) in named {
+    for (index, (support, is_shared)) in named {
         #[expect(clippy::cast_possible_truncation, reason = "points are numbered with 32 bits")]
-        message.u32(place as u32);
-        message.u32(a);
-        message.u32(b);
+        message.u32(index as u32);
+        support.vertices.iter().for_each(|&vertex| message.u32(vertex));
+        message.u64(support.layer);
         message.u8(u8::from(is_shared));
     }
     message.u64(extract.cells.len() as u64);
@@ -178,19 +218,26 @@ fn described(whole: &Whole, piece: &Extracted) -> Vec<u8> {
             }
         }
     }
-    write_fields(&mut message, &extract.fields, &mut (0..extract.points.len()));
+    write_fields(&mut message, &extract.fields, &(0..extract.points.len()).collect::<Vec<_>>());
     message.into_bytes()
 }
 
-impl Piece {
+impl RankPiece {
     fn read(rank: usize, bytes: &[u8]) -> Result<Self, DistributedError> {
-        let garbled = || DistributedError::Garbled { rank };
+        let garbled = || DistributedError::from(Garbled { rank });
         let mut reader = Reader::new(rank, bytes);
         let count = reader.count(24)?;
         let points = (0..count).map(|_| reader.vector()).collect::<Result<Vec<_>, _>>()?;
-        let count = reader.count(13)?;
-        let named = (0..count)
-            .map(|_| Ok((reader.u32()?, [reader.u32()?, reader.u32()?], reader.u8()? != 0)));
+        let count = reader.count(29)?;
+        let named = (0..count).map(|_| {
+            let index = reader.u32()?;
+            let mut vertices = [0; 4];
+            for vertex in &mut vertices {
+                *vertex = reader.u32()?;
+            }
+            let support = Support { vertices, layer: reader.u64()? };
+            Ok((index, support, reader.u8()? != 0))
+        });
         let named = named.collect::<Result<Vec<_>, DistributedError>>()?;
         let mut cells = Cells::new();
         for _ in 0..reader.count(1)? {
@@ -213,12 +260,7 @@ impl Piece {
 }
 
 /// The fields, of the points only these.
-fn write_fields(
-    message: &mut Writer,
-    fields: &[Field],
-    points: &mut (dyn ExactSizeIterator<Item = usize> + '_),
-) {
-    let points: Vec<usize> = points.collect();
+fn write_fields(message: &mut Writer, fields: &[Field], points: &[usize]) {
     message.u64(fields.len() as u64);
     for field in fields {
         message.text(&field.name);
@@ -232,7 +274,7 @@ fn write_fields(
             }
             Association::Element => message.f64s(&field.values),
             Association::Vertex => {
-                for &point in &points {
+                for &point in points {
                     message.f64s(
                         &field.values[point * field.components..(point + 1) * field.components],
                     );
@@ -283,15 +325,16 @@ struct Fields {
     fields: Vec<(Field, usize)>,
     points: usize,
     cells: usize,
-    /// What belongs to the mesh as a whole, from the lowest rank that brings it.
+    /// Fields of the mesh as a whole, from the lowest rank that brings it.
     of_mesh: Vec<Field>,
 }
 
 impl Fields {
-    /// Takes in what one rank brings for these points and cells of the whole. What a lower rank brought for a point stays.
+    /// Takes in what one rank brings for these points and cells of the whole. What a lower rank
+    /// brought for a point stays.
     fn add(&mut self, fields: Vec<Field>, points: &[u32], cells: &[u32]) {
         for field in fields {
-            let (places, before) = match field.association {
+            let (indices, before) = match field.association {
                 Association::Mesh => {
                     if self.of_mesh.iter().all(|known| known.name != field.name) {
                         self.of_mesh.push(field);
@@ -301,7 +344,7 @@ impl Fields {
                 Association::Vertex => (points, self.points),
                 Association::Element => (cells, self.cells),
             };
-            if places.is_empty() {
+            if indices.is_empty() {
                 continue;
             }
             let same = |(known, _): &(Field, usize)| {
@@ -332,8 +375,8 @@ impl Fields {
                 known.number = NumberType::F64;
             }
             let components = known.components;
-            for (place, values) in places.iter().zip(field.values.chunks(components.max(1))) {
-                let start = *place as usize * components;
+            for (index, values) in indices.iter().zip(field.values.chunks(components.max(1))) {
+                let start = *index as usize * components;
                 if known.values.len() < start + components {
                     known.values.resize(start + components, ABSENT);
                 }
@@ -341,13 +384,13 @@ impl Fields {
                     known.values[start..start + components].copy_from_slice(values);
                 }
             }
-            *set = before + places.len();
+            *set = before + indices.len();
         }
         self.points += points.len();
         self.cells += cells.len();
     }
 
-    /// Those that all ranks have brought.
+    /// The fields that all ranks have brought.
     fn finish(self, points: usize, cells: usize) -> Vec<Field> {
         let (all_points, all_cells) = (self.points, self.cells);
         let whole = |(mut field, set): (Field, usize)| {

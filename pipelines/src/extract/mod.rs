@@ -1,31 +1,47 @@
-//! What is taken out of a running solver: surfaces, slices and fields, from borrowed arrays to compact copies.
+//! Extracts of a running solver: surfaces, cuts, parts and fields, from borrowed arrays to compact
+//! copies.
 //!
-//! [`Source`] keeps what does not change while a channel's cells stay the same; [`Source::surface`], [`Source::slice`] and
-//! [`Source::whole`] then make an [`Extract`] of the channel as it is now.
+//! [`Source`] keeps what does not change while a channel's cells stay the same;
+//! [`Source::surface`], [`Source::slice`], [`Source::contour`], [`Source::threshold`],
+//! [`Source::clip`], [`Source::probe`] and [`Source::whole`] then make an [`Extract`] of the channel
+//! as it is now. The parts of an extract that depend on the mesh alone stay in a [`Kept`].
 
 mod check;
+mod clip;
+mod cut;
+mod decompose;
 mod error;
+mod function;
 mod gather;
+mod layout;
 mod merge;
-mod slice;
+mod pattern;
+mod positions;
+mod probe;
+mod skin;
 mod source;
 mod statistics;
+mod take;
+mod tree;
 
 pub use check::{ChannelError, check_field_length, check_names};
 pub use error::ExtractError;
+pub(crate) use error::unknown_field;
 pub(crate) use gather::check_length;
 pub(crate) use merge::merged;
+pub use pattern::{Input, Kept};
+pub(crate) use skin::skin;
 pub use source::{Extracted, MeshKey, Source};
-pub use statistics::{FieldStatistics, statistics, statistics_of};
+pub use statistics::{FieldStatistics, statistics};
 
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use tombolo_deform::mesh::{ArrayView, Cells, MeshView, NumberType, Vector};
 
-use crate::language::nearest;
+use tombolo_deform::names::nearest;
 
-/// What a field has one value for.
+/// The entities that a field has one value for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Association {
@@ -33,7 +49,8 @@ pub enum Association {
     Vertex,
     /// Each cell.
     Element,
-    /// The mesh as a whole: any number of values, whatever the number of vertices and cells. Viewers do not get them.
+    /// The mesh as a whole: any number of values, whatever the number of vertices and cells.
+    /// Viewers do not get them.
     Mesh,
 }
 
@@ -52,18 +69,20 @@ impl std::fmt::Display for Association {
 pub struct Field {
     /// Its name.
     pub name: String,
-    /// What it has one value for.
+    /// The entities that it has one value for.
     pub association: Association,
     /// Components of each value: 1 for a scalar, 3 for a vector, up to 9.
     pub components: usize,
-    /// The type of number that files hold; the values are those of this type. Whole numbers beyond 2^53 are rounded.
+    /// The type of number that files hold; the values are those of this type. Whole numbers beyond
+    /// 2^53 are rounded.
     pub number: NumberType,
     /// The values, tuple after tuple: `components` times as many as there are vertices or cells.
     pub values: Vec<f64>,
 }
 
 impl Field {
-    /// Keeps to a type of number that has what was put in: no whole numbers where a value is absent.
+    /// Keeps to a type of number that has what was put in: no whole numbers where a value is
+    /// absent.
     pub(crate) fn settle(&mut self) {
         if !self.number.is_real() && self.values.iter().any(|&value| is_absent(value)) {
             self.number = NumberType::F64;
@@ -71,11 +90,13 @@ impl Field {
     }
 }
 
-/// The element field, and vertex field, that says in VTK's bits what is a copy of another rank's (1) and what is not to be shown.
+/// The name of the element or vertex field that marks ghosts in VTK's bits: copies of another
+/// rank's (1), and what is not to be shown.
 pub const GHOST_FIELD: &str = "vtkGhostType";
 
-/// Stands in a field where it has no value, as on a block of the mesh that lacks it: a NaN of its own bits, so that one that the
-/// solver computed is still told. It is not measured, files have NaN there, and viewers do not get the field.
+/// The mark of a missing value in a field, as on a block of the mesh that lacks the field: a NaN of
+/// its own bits, so that one that the solver computed is still told. It is not measured, files have
+/// NaN there, and viewers do not get the field.
 pub const ABSENT: f64 = f64::from_bits(0x7ff8_6162_7365_6e74);
 
 /// Whether a value is [`ABSENT`].
@@ -89,10 +110,32 @@ pub fn is_absent(value: f64) -> bool {
 pub struct FieldView<'a> {
     /// Its name.
     pub name: &'a str,
-    /// What it has one value for.
+    /// The entities that it has one value for.
     pub association: Association,
     /// The values, one tuple for each vertex or cell of the channel's mesh.
     pub values: ArrayView<'a>,
+}
+
+impl<'a> FieldView<'a> {
+    /// A field with a value for each vertex: a scalar, or a tuple of up to 9 components.
+    ///
+    /// ```
+    /// use tombolo_pipelines::extract::FieldView;
+    ///
+    /// let (temperature, velocity) = (vec![293.15; 8], vec![[0.0_f32; 3]; 8]);
+    /// assert_eq!(FieldView::vertex("temperature", &temperature).values.components(), 1);
+    /// assert_eq!(FieldView::vertex("velocity", &velocity).values.components(), 3);
+    /// ```
+    #[must_use]
+    pub fn vertex(name: &'a str, values: impl Into<ArrayView<'a>>) -> Self {
+        Self { name, association: Association::Vertex, values: values.into() }
+    }
+
+    /// A field with a value for each cell: a scalar, or a tuple of up to 9 components.
+    #[must_use]
+    pub fn element(name: &'a str, values: impl Into<ArrayView<'a>>) -> Self {
+        Self { name, association: Association::Element, values: values.into() }
+    }
 }
 
 /// One mesh of the solver with its fields, borrowed for the length of one call.
@@ -107,6 +150,12 @@ pub struct Channel<'a> {
 }
 
 impl<'a> Channel<'a> {
+    /// A mesh by the name of its channel, with its fields.
+    #[must_use]
+    pub fn new(name: &'a str, mesh: MeshView<'a>, fields: &'a [FieldView<'a>]) -> Self {
+        Self { name, mesh, fields }
+    }
+
     /// The channel of this name; without one the first.
     ///
     /// # Errors
@@ -151,16 +200,18 @@ pub struct ExtractFeatures {
     pub of_cells: Vec<u32>,
 }
 
-/// What a source stage took out of a channel: a copy of its own, small against the mesh unless it is the whole mesh.
+/// An extract, taken out of a channel by a source stage: a copy of its own, small against the mesh
+/// unless it is the whole mesh.
 ///
-/// Invariants: cells name only points that exist, fields have one tuple for each point or cell, every number is finite, or in a
-/// field [`ABSENT`].
-/// What stays the same from step to step is shared, not copied.
+/// Invariants: cells name only points that exist, fields have one tuple for each point or cell,
+/// every number is finite, or in a field [`ABSENT`]. What stays the same from step to step is
+/// shared, not copied.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Extract {
     /// The coordinates of each point.
     pub points: Vec<Vector>,
-    /// The vertex of the solver's mesh that each point is; `None` where points lie between vertices, as in a slice.
+    /// The vertex of the solver's mesh that each point is; `None` where points lie between
+    /// vertices, as in a slice.
     pub vertices: Option<Arc<[u32]>>,
     /// The cells by the numbers of the points.
     pub cells: Arc<Cells>,

@@ -3,46 +3,75 @@
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
-use tombolo_deform::mesh::{Cells, Mesh, MeshView, NumberType, Vector};
+use tombolo_deform::features::FeatureSettings;
+use tombolo_deform::mesh::{Cells, Mesh, MeshView, NumberType, Vector, ghosts};
 use tombolo_deform::quality::{Quality, quality, scaled_jacobians};
-use tombolo_deform::surface::{FeatureSettings, Surface, SurfaceError};
+use tombolo_deform::surface::{Surface, SurfaceError};
 
 use super::gather::{self, Owners, Points};
-use super::{
-    Association, Channel, Extract, ExtractError, ExtractFeatures, Field, GHOST_FIELD, slice,
-};
-use crate::communicator::{Communicator, agree};
-use crate::distributed::{DistributedError, Part, PartBoundary, SharedVertices};
-use crate::language::Slice;
+use super::layout::Layout;
+use super::positions::Positions;
+use super::{Association, Channel, Extract, ExtractError, ExtractFeatures, Field, GHOST_FIELD};
+use tombolo_deform::communicator::{Communicator, agree};
+use tombolo_deform::distributed::{DistributedError, Part, PartBoundary};
+use tombolo_deform::mesh::SharedVertices;
 
-/// An extract, and what was wrong with the fields that it lacks.
+/// An extract, and the errors of the fields that it lacks.
 #[derive(Debug, Clone)]
 pub struct Extracted {
     /// The extract.
     pub extract: Arc<Extract>,
-    /// The solver's cell that each cell of the extract is, lies on or is cut from.
+    /// The solver's cell that each cell of the extract is, lies on or is cut from; of a probe, that
+    /// each point lies in.
     pub owners: Arc<[u32]>,
     /// One error for each field that was wanted and could not be taken.
     pub errors: Vec<ExtractError>,
-    /// What its points are in the solver's mesh.
+    /// The origin of its points in the solver's mesh.
     pub(crate) origin: Origin,
 }
 
-/// What the points of an extract are in the solver's mesh.
+/// The origin of the points of an extract in the solver's mesh.
 #[derive(Debug, Clone)]
 pub(crate) enum Origin {
     /// All vertices of all ranks: it needs no merging.
     Whole,
-    /// Those of the boundary.
+    /// Vertices of the boundary.
     Boundary,
     /// Other vertices.
     Vertices,
-    /// On edges between these vertices.
-    Edges(Vec<[u32; 2]>),
+    /// Between vertices.
+    Between(Arc<[Support]>),
+    /// The points of a probe, by their numbers there.
+    Probe(Layout, Arc<[u32]>),
+}
+
+/// A point that was cut out, known by the vertices between which it lies and by what cut it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct Support {
+    /// Up to four vertices, rising; `u32::MAX` where there is none.
+    pub(crate) vertices: [u32; 4],
+    /// What tells it from other points between these vertices.
+    pub(crate) layer: u64,
+}
+
+impl Support {
+    /// The point between these vertices, at most four.
+    pub(crate) fn new(vertices: &[u32], layer: u64) -> Self {
+        let mut all = [u32::MAX; 4];
+        all.iter_mut().zip(vertices).for_each(|(slot, vertex)| *slot = *vertex);
+        all.sort_unstable();
+        Self { vertices: all, layer }
+    }
+
+    /// Its vertices.
+    pub(crate) fn vertices(&self) -> impl Iterator<Item = u32> + '_ {
+        self.vertices.iter().copied().filter(|&vertex| vertex != u32::MAX)
+    }
 }
 
 impl Extracted {
-    /// Adds an element field given for each cell of the solver's mesh. Cells without a value (NaN) have 0.
+    /// Adds an element field given for each cell of the solver's mesh. Cells without a value (NaN)
+    /// have 0.
     pub fn add_element_field(&mut self, name: &str, of_cells: &[f64]) {
         let value = |&cell: &u32| {
             of_cells.get(cell as usize).copied().filter(|value| value.is_finite()).unwrap_or(0.0)
@@ -51,7 +80,10 @@ impl Extracted {
         fields.retain(|field| field.name != name);
         fields.push(Field {
             name: name.to_owned(),
-            association: Association::Element,
+            association: match self.origin {
+                Origin::Probe(..) => Association::Vertex,
+                _ => Association::Element,
+            },
             components: 1,
             number: NumberType::F64,
             values: self.owners.iter().map(value).collect(),
@@ -59,8 +91,9 @@ impl Extracted {
     }
 }
 
-/// A channel's cells, checked and owned, and its surface. Both are taken anew when the solver hands over other cells, which shows
-/// in where they lie in memory, their number, or the generation that the solver counts up.
+/// A channel's cells, checked and owned, and its surface. Both are taken anew when the solver hands
+/// over other cells, which shows in where they lie in memory, their number, or the generation that
+/// the solver counts up.
 #[derive(Debug)]
 pub struct Source {
     key: MeshKey,
@@ -69,21 +102,26 @@ pub struct Source {
     /// As they are measured, once they are.
     right_handed: OnceLock<Arc<Cells>>,
     boundary: Option<Boundary>,
-    /// What sets own cells apart from others: on several ranks, and where there are ghosts.
+    /// Where the vertices were when something was last cut.
+    pub(super) positions: Positions,
+    /// The knowledge that sets own cells apart from others: on several ranks, and where there are
+    /// ghosts.
     whole: Option<Box<Whole>>,
     /// Whether other ranks have parts too.
     is_part: bool,
 }
 
-/// What a rank knows of a mesh of which it has a part.
+/// The whole mesh, as a rank knows it that has a part.
 #[derive(Debug)]
 pub(crate) struct Whole {
     /// Whether this is rank 0.
     is_first: bool,
-    ghosts: Option<Vec<bool>>,
-    /// For each vertex whether it belongs to ghosts alone.
-    is_ghostly: Vec<bool>,
-    /// The cells but the ghosts.
+    ghosts: Option<Vec<u8>>,
+    /// Whether any rank has cells of its own that are hidden.
+    has_hidden: bool,
+    /// For each vertex whether it belongs to no cell of this rank's own, but to others.
+    pub(super) is_ghostly: Vec<bool>,
+    /// The cells that are this rank's own.
     own: Cells,
     pub(crate) shared: SharedVertices,
     /// For each vertex whether other ranks have it too.
@@ -95,8 +133,8 @@ pub(crate) struct Whole {
     no_surface: Option<SurfaceError>,
 }
 
-/// What tells, without a look at a value, that a solver lends the same cells as before: where they lie in memory, how many cells and
-/// vertices there are, and the generation that the solver counts up.
+/// The identity of lent cells, told without a look at a value: where they lie in memory, how many
+/// cells and vertices there are, and the generation that the solver counts up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MeshKey {
     identity: (usize, usize),
@@ -106,7 +144,7 @@ pub struct MeshKey {
 }
 
 impl MeshKey {
-    /// That of a mesh as it is lent now.
+    /// The key of a mesh as it is lent now.
     #[must_use]
     pub fn of(mesh: &MeshView) -> Self {
         Self {
@@ -120,7 +158,6 @@ impl MeshKey {
 
 #[derive(Debug)]
 pub(crate) struct Boundary {
-    surface: Arc<Surface>,
     pub(crate) cells: Arc<Cells>,
     pub(crate) vertices: Arc<[u32]>,
     owners: Arc<[u32]>,
@@ -128,7 +165,7 @@ pub(crate) struct Boundary {
 }
 
 impl Boundary {
-    fn new(surface: Arc<Surface>) -> Self {
+    fn new(surface: &Surface) -> Self {
         let features = surface.features();
         let features = ExtractFeatures {
             names: features.names().to_vec(),
@@ -139,17 +176,16 @@ impl Boundary {
             vertices: surface.vertices().into(),
             owners: surface.owner_cells().into(),
             features: Arc::new(features),
-            surface,
         }
     }
 }
 
 impl Whole {
-    fn is_ghost(&self, cell: usize) -> bool {
-        self.ghosts.as_ref().is_some_and(|ghosts| ghosts.get(cell).is_some_and(|&ghost| ghost))
+    pub(super) fn ghost_bits(&self, cell: usize) -> u8 {
+        self.ghosts.as_ref().and_then(|bits| bits.get(cell)).copied().unwrap_or(0)
     }
 
-    /// What this rank has of the surface.
+    /// The piece of the surface that this rank has.
     fn piece_of_surface(
         &self,
         channel: &Channel,
@@ -159,11 +195,11 @@ impl Whole {
         if let Some(error) = &self.no_surface {
             return Err(error.clone().into());
         }
-        let (vertices, faces) = (self.boundary.vertices(), self.boundary.faces());
+        let (vertices, face_cells) = (self.boundary.vertices(), self.boundary.face_cells());
         let points = gather::points(&channel.mesh.points, vertices, cycle)?;
         let from = Points::Vertices(vertices);
         let (fields, errors) =
-            gather::fields(channel, cycle, wanted, &from, &Owners::Cells(&faces.cells));
+            gather::fields(channel, cycle, wanted, &from, &Owners::Cells(face_cells));
         let cells = Cells::new();
         let extract = Extract {
             points,
@@ -172,11 +208,12 @@ impl Whole {
             features: None,
             fields,
         };
-        let owners = faces.cells.as_slice().into();
+        let owners = face_cells.into();
         Ok(Extracted { extract: Arc::new(extract), owners, errors, origin: Origin::Boundary })
     }
 
-    /// What this rank has of all cells.
+    /// The piece of all cells that this rank has: those but copies of others. Where some are
+    /// hidden, it says which.
     fn piece(
         &self,
         channel: &Channel,
@@ -188,26 +225,32 @@ impl Whole {
             clippy::cast_possible_truncation,
             reason = "vertices and cells are numbered with 32 bits"
         )]
-        let owners: Vec<u32> =
-            (0..cells.len()).filter(|&cell| !self.is_ghost(cell)).map(|cell| cell as u32).collect();
-        // Vertices of ghosts alone, and what no cell has, are somebody else's.
-        let mut places = vec![u32::MAX; channel.mesh.points.len()];
-        self.own.connectivity().iter().for_each(|&vertex| places[vertex as usize] = 0);
+        let owners: Vec<u32> = (0..cells.len())
+            .filter(|&cell| self.ghost_bits(cell) & ghosts::DUPLICATE == 0)
+            .map(|cell| cell as u32)
+            .collect();
+        let taken = cells.subset(owners.iter().map(|&cell| cell as usize));
+        // Vertices of copies alone, and what no cell has, are somebody else's.
+        let mut numbers = vec![u32::MAX; channel.mesh.points.len()];
+        taken.connectivity().iter().for_each(|&vertex| numbers[vertex as usize] = 0);
         let vertices: Vec<u32> = (0..)
-            .zip(&places)
-            .filter(|(_, place)| **place == 0)
+            .zip(&numbers)
+            .filter(|(_, number)| **number == 0)
             .map(|(vertex, _)| vertex)
             .collect();
-        (0..).zip(&vertices).for_each(|(place, &vertex)| places[vertex as usize] = place);
-        let own = self.own.as_given().with_vertices(&places);
+        (0..).zip(&vertices).for_each(|(number, &vertex)| numbers[vertex as usize] = number);
+        let taken = taken.with_vertices(&numbers);
         let points = gather::points(&channel.mesh.points, &vertices, cycle)?;
         let from = Points::Vertices(&vertices);
-        let (fields, errors) =
+        let (mut fields, errors) =
             gather::fields(channel, cycle, wanted, &from, &Owners::Cells(&owners));
+        if self.has_hidden {
+            tell_ghosts(&mut fields, owners.iter().map(|&cell| self.ghost_bits(cell as usize)));
+        }
         let extract = Extract {
             points,
             vertices: Some(vertices.into()),
-            cells: Arc::new(own),
+            cells: Arc::new(taken),
             features: None,
             fields,
         };
@@ -218,6 +261,18 @@ impl Whole {
             origin: Origin::Vertices,
         })
     }
+}
+
+/// Has the fields say which cells are ghosts or hidden, by their bits.
+fn tell_ghosts(fields: &mut Vec<Field>, bits: impl Iterator<Item = u8>) {
+    fields.retain(|field| field.name != GHOST_FIELD || field.association != Association::Element);
+    fields.push(Field {
+        name: GHOST_FIELD.to_owned(),
+        association: Association::Element,
+        components: 1,
+        number: NumberType::U8,
+        values: bits.map(f64::from).collect(),
+    });
 }
 
 impl Source {
@@ -231,38 +286,44 @@ impl Source {
         Ok(Self::of(MeshKey::of(&channel.mesh), cells, OnceLock::new(), None, false))
     }
 
-    /// Knows the cells of a channel of which each of several ranks has a part, or one process all, ghosts among them. What is taken
-    /// is then of the rank's own cells, and makes one extract on rank 0 when it is merged; the whole mesh of one process has its
-    /// ghosts too, and says which they are. Collective.
+    /// The cells of a channel of which each of several ranks has a part, or one process all, ghosts
+    /// among them. Collective.
+    ///
+    /// Extracts are then of the rank's own cells, and are merged into one on rank 0; the whole mesh
+    /// of one process has its ghosts too, and says which they are.
     ///
     /// # Errors
     /// [`ExtractError::Distributed`], the same on all ranks; on one process as [`new`](Self::new).
     pub fn distributed(
         channel: &Channel,
-        communicator: &dyn Communicator,
+        communicator: &Arc<dyn Communicator>,
     ) -> Result<Self, ExtractError> {
         let is_part = communicator.size() > 1;
-        if !is_part && !channel.mesh.ghost_cells.is_some_and(|ghosts| ghosts.contains(&true)) {
+        if !is_part && channel.mesh.is_plain() {
             return Self::new(channel);
         }
         let part = agree(communicator, Part::of(&channel.mesh)).map_err(DistributedError::from)?;
         let own = part.own_cells();
         let (shared, boundary, error) = PartBoundary::shown(communicator, &part)?;
         let mut is_shared = vec![false; part.points.len()];
-        shared.shared().for_each(|vertex| is_shared[vertex as usize] = true);
-        let surface = boundary.surface().map(|surface| Boundary::new(Arc::clone(surface)));
+        shared.halo().shared().iter().for_each(|&vertex| is_shared[vertex as usize] = true);
+        let surface = boundary.surface().map(|surface| Boundary::new(surface));
         // Rank 0 tells it for all.
         let no_surface = error.filter(|_| communicator.rank() == 0);
         let mut is_ghostly = vec![false; part.points.len()];
-        let of_ghosts = part.cells.iter().enumerate().filter(|(cell, _)| part.is_ghost(*cell));
+        let of_ghosts = part.cells.iter().enumerate().filter(|(cell, _)| !part.is_own(*cell));
         of_ghosts.for_each(|(_, (_, vertices))| {
             vertices.iter().for_each(|&vertex| is_ghostly[vertex as usize] = true)
         });
         own.connectivity().iter().for_each(|&vertex| is_ghostly[vertex as usize] = false);
         let is_first = communicator.rank() == 0;
+        let is_hidden = |&bits: &u8| bits & ghosts::DUPLICATE == 0 && !ghosts::is_visible(bits);
+        let has_hidden = communicator.any(part.ghosts.iter().flatten().any(is_hidden));
+        let ghosts = part.ghosts;
         let whole = Whole {
             is_first,
-            ghosts: part.ghosts,
+            ghosts,
+            has_hidden,
             is_ghostly,
             own,
             shared,
@@ -283,19 +344,28 @@ impl Source {
         whole: Option<Box<Whole>>,
         is_part: bool,
     ) -> Self {
-        Self { key, cells: Arc::new(cells), right_handed, boundary: None, whole, is_part }
+        Self {
+            key,
+            cells: Arc::new(cells),
+            right_handed,
+            boundary: None,
+            positions: Positions::default(),
+            whole,
+            is_part,
+        }
     }
 
-    /// What is known of the whole mesh where this is a part of one.
+    /// The whole mesh, where this is a part of one.
     pub(crate) fn whole_mesh(&self) -> Option<&Whole> {
         self.whole.as_deref()
     }
 
-    /// Whether a vertex or cell counts to this rank: each counts to one. What belongs to the mesh as a whole counts to rank 0.
+    /// Whether this rank owns a vertex or cell: each has one owner. What belongs to the mesh as a
+    /// whole is rank 0's.
     #[must_use]
     pub fn counts(&self, association: Association, entity: usize) -> bool {
         self.whole.as_ref().is_none_or(|whole| match association {
-            Association::Element => !whole.is_ghost(entity),
+            Association::Element => ghosts::is_own(whole.ghost_bits(entity)),
             Association::Vertex => {
                 let is_ghostly = whole.is_ghostly.get(entity).is_some_and(|&is_ghostly| is_ghostly);
                 !is_ghostly && u32::try_from(entity).is_ok_and(|vertex| whole.shared.owns(vertex))
@@ -316,17 +386,10 @@ impl Source {
         &self.cells
     }
 
-    /// Takes a surface that was extracted from the same cells elsewhere, so that it need not be done twice.
-    pub fn set_surface(&mut self, surface: Arc<Surface>) {
+    /// Takes a surface that was extracted from the same cells elsewhere, so that it need not be
+    /// done twice.
+    pub fn set_surface(&mut self, surface: &Surface) {
         self.boundary = Some(Boundary::new(surface));
-    }
-
-    /// The surface of the mesh as it was when it was first asked for: its features and topology.
-    ///
-    /// # Errors
-    /// [`ExtractError::Mesh`] or [`ExtractError::Surface`] for a mesh without one.
-    pub fn surface_of(&mut self, channel: &Channel) -> Result<Arc<Surface>, ExtractError> {
-        Ok(Arc::clone(&self.boundary(channel)?.surface))
     }
 
     fn boundary(&mut self, channel: &Channel) -> Result<&Boundary, ExtractError> {
@@ -336,17 +399,19 @@ impl Source {
                 let points = channel.mesh.points.to_vectors();
                 let mesh =
                     Mesh::new(points, Cells::clone(&self.cells), channel.mesh.features.clone())?;
-                Boundary::new(Arc::new(Surface::extract(&mesh, &FeatureSettings::default())?))
+                Boundary::new(&Surface::extract(&mesh, &FeatureSettings::default())?)
             }
         };
         Ok(self.boundary.insert(boundary))
     }
 
-    /// The boundary of the mesh at its present coordinates, with the fields whose names are `wanted`.
+    /// The boundary of the mesh at its present coordinates, with the fields whose names are
+    /// `wanted`.
     ///
     /// # Errors
-    /// As [`surface_of`](Self::surface_of), and [`ExtractError::PointNotFinite`]. A field that cannot be taken is no error of
-    /// the extract: it is left out and named in [`Extracted::errors`].
+    /// [`ExtractError::Mesh`] or [`ExtractError::Surface`] for a mesh without one,
+    /// [`ExtractError::PointNotFinite`]. A field that cannot be taken is no error of the extract:
+    /// it is left out and named in [`Extracted::errors`].
     pub fn surface(
         &mut self,
         channel: &Channel,
@@ -372,38 +437,7 @@ impl Source {
         Ok(Extracted { extract: Arc::new(extract), owners, errors, origin: Origin::Boundary })
     }
 
-    /// The cut of the mesh with a plane: polygons that turn counter-clockwise about its normal (lines where the mesh is a
-    /// surface), vertex fields interpolated linearly along the cut edges, element fields carried over. Cells that share an edge
-    /// share its point. `furthest_of_all` makes of a number the largest that any rank has; on one process it gives it back.
-    ///
-    /// # Errors
-    /// [`ExtractError::PointNotFinite`]; fields as in [`surface`](Self::surface).
-    pub fn slice(
-        &self,
-        channel: &Channel,
-        plane: &Slice,
-        cycle: u64,
-        wanted: &dyn Fn(&str) -> bool,
-        furthest_of_all: &dyn Fn(f64) -> f64,
-    ) -> Result<Extracted, ExtractError> {
-        let counts = |cell: usize| self.counts(Association::Element, cell);
-        let cut =
-            slice::cut(&self.cells, &channel.mesh.points, plane, cycle, &counts, furthest_of_all)?;
-        let from = Points::Crossings(&cut.crossings);
-        let (fields, errors) =
-            gather::fields(channel, cycle, wanted, &from, &Owners::Cells(&cut.owners));
-        let extract = Extract {
-            points: cut.points,
-            vertices: None,
-            cells: Arc::new(cut.cells),
-            features: None,
-            fields,
-        };
-        let origin = Origin::Edges(cut.crossings.iter().map(|crossing| crossing.edge).collect());
-        Ok(Extracted { extract: Arc::new(extract), owners: cut.owners.into(), errors, origin })
-    }
-
-    /// The whole mesh.
+    /// An extract of the whole mesh.
     ///
     /// # Errors
     /// [`ExtractError::PointNotFinite`]; fields as in [`surface`](Self::surface).
@@ -422,17 +456,10 @@ impl Source {
         let wanted = |name: &str| name == GHOST_FIELD || wanted(name);
         let (mut fields, errors) =
             gather::fields(channel, cycle, &wanted, &Points::All, &Owners::All);
-        let ghosts = channel.mesh.ghost_cells.filter(|ghosts| ghosts.contains(&true));
-        let is_told =
-            |field: &Field| field.name == GHOST_FIELD && field.association == Association::Element;
-        if let Some(ghosts) = ghosts.filter(|_| !fields.iter().any(is_told)) {
-            fields.push(Field {
-                name: GHOST_FIELD.to_owned(),
-                association: Association::Element,
-                components: 1,
-                number: NumberType::U8,
-                values: ghosts.iter().map(|&is_ghost| f64::from(u8::from(is_ghost))).collect(),
-            });
+        if let Some(bits) =
+            channel.mesh.ghost_cells.filter(|bits| bits.iter().any(|&bits| bits != 0))
+        {
+            tell_ghosts(&mut fields, bits.iter().copied());
         }
         #[expect(
             clippy::cast_possible_truncation,

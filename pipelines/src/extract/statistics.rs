@@ -1,8 +1,7 @@
 //! Measures of a field over the whole mesh.
 
-use super::gather::check_length;
-use super::{Channel, ExtractError, FieldView, is_absent};
-use crate::communicator::{Communicator, Reduction};
+use super::{FieldView, is_absent};
+use tombolo_deform::communicator::{Communicator, Reduction};
 
 /// Measures of a field: of its value for a scalar, of its magnitude for a vector or tensor.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,7 +14,8 @@ pub struct FieldStatistics {
     pub mean: f64,
     /// The root of the mean square; NaN where there is no finite value.
     pub l2: f64,
-    /// How many vertices or cells have a component that is NaN or infinite. They are left out of the other measures.
+    /// How many vertices or cells have a component that is NaN or infinite. They are left out of
+    /// the other measures.
     pub non_finite: u64,
     /// The first of them on this rank, and what was found there.
     pub first_non_finite: Option<(usize, f64)>,
@@ -24,22 +24,12 @@ pub struct FieldStatistics {
 /// How many tuples are added up before their sum is: the sums lose less to rounding.
 const CHUNK: usize = 4096;
 
-/// Measures a field over all ranks.
+/// The statistics of a field over the vertices or cells of all ranks for which `counts` holds.
+/// Collective.
 ///
-/// # Errors
-/// [`ExtractError::FieldLength`].
+/// The field must fit its mesh: there is nothing to go wrong then, so that no rank waits for
+/// another.
 pub fn statistics(
-    channel: &Channel,
-    field: &FieldView,
-    communicator: &dyn Communicator,
-) -> Result<FieldStatistics, ExtractError> {
-    check_length(channel, field)?;
-    Ok(statistics_of(field, communicator, &|_| true))
-}
-
-/// The same over the vertices or cells for which `counts` holds. Of a field that fits its mesh: there is nothing to go wrong, so
-/// that no rank waits for another.
-pub fn statistics_of(
     field: &FieldView,
     communicator: &dyn Communicator,
     counts: &dyn Fn(usize) -> bool,

@@ -2,15 +2,15 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, TaggedFaces, Vector};
+use tombolo_deform::mesh::{Cells, FeatureSource, Mesh, TaggedFaces, Vector};
 
 use super::MeshFile;
 use super::error::Flaw;
 use crate::extract::{Association, Field};
 
-/// What a file holds, as it stands there.
+/// The contents of a mesh file, as they stand there.
 #[derive(Default)]
-pub(super) struct Parts {
+pub(super) struct FileContents {
     pub points: Vec<Vector>,
     /// Cells of all dimensions.
     pub cells: Cells,
@@ -26,11 +26,20 @@ pub(super) struct Parts {
     pub notes: Vec<String>,
 }
 
-impl Parts {
-    /// The cells of the highest dimension make the mesh, those of dimension 2 with a tag make its features.
+impl FileContents {
+    /// The cells of the highest dimension make the mesh, those of dimension 2 with a tag make its
+    /// features.
     pub fn assemble(self) -> Result<MeshFile, Flaw> {
-        let Parts { points, cells, cell_tags, point_tags, names, left_out, mut fields, mut notes } =
-            self;
+        let FileContents {
+            points,
+            cells,
+            cell_tags,
+            point_tags,
+            names,
+            left_out,
+            mut fields,
+            mut notes,
+        } = self;
         cells.validate(points.len())?;
         let is_left_out =
             |cell: usize| left_out.as_ref().is_some_and(|out| out.get(cell) == Some(&true));
@@ -44,7 +53,7 @@ impl Parts {
         let kept: Vec<usize> = (0..cells.len())
             .filter(|&cell| !is_left_out(cell) && cells.cell_type(cell).dimension() == dimension)
             .collect();
-        let tagged: Vec<(usize, i64)> = (0..cells.len())
+        let mut tagged: Vec<(usize, i64)> = (0..cells.len())
             .filter(|&cell| !is_left_out(cell) && cells.cell_type(cell).dimension() == 2)
             .filter_map(|cell| Some((cell, tag(cell)?)))
             .collect();
@@ -77,7 +86,6 @@ impl Parts {
             }
         }
         note_count(&mut notes, points.len() - vertices.len(), "vertices that no cell uses");
-        let renumber = Renumber { new_numbers: &new_numbers };
         let select_points = vertices.len() < points.len();
         let select_cells = kept.len() < cells.len();
         for field in &mut fields {
@@ -88,17 +96,16 @@ impl Parts {
             }
         }
         let features = if !tagged.is_empty() {
-            let mut faces = Cells::new();
-            let mut tags = Vec::with_capacity(tagged.len());
-            let mut loose = 0;
-            for (cell, tag) in tagged {
-                if renumber.push(&cells, cell, &mut faces)? {
-                    tags.push(tag);
-                } else {
-                    loose += 1;
-                }
-            }
-            note_count(&mut notes, loose, "tagged faces with vertices that no cell uses");
+            let count = tagged.len();
+            let is_numbered = |&vertex: &u32| new_numbers[vertex as usize] != u32::MAX;
+            tagged.retain(|(cell, _)| cells.vertices(*cell).iter().all(is_numbered));
+            note_count(
+                &mut notes,
+                count - tagged.len(),
+                "tagged faces with vertices that no cell uses",
+            );
+            let (numbers, tags): (Vec<usize>, Vec<i64>) = tagged.into_iter().unzip();
+            let faces = cells.subset(numbers).with_vertices(&new_numbers);
             let names = names.into_iter().filter(|(number, _)| tags.contains(number)).collect();
             FeatureSource::Faces(TaggedFaces { faces, tags, names })
         } else if let Some(tags) = point_tags {
@@ -108,47 +115,16 @@ impl Parts {
         } else {
             FeatureSource::SharpEdges
         };
-        let mut mesh_cells = Cells::new();
-        if select_cells || select_points {
-            for &cell in &kept {
-                renumber.push(&cells, cell, &mut mesh_cells)?;
-            }
+        let mesh_cells = if select_cells || select_points {
+            cells.subset(kept).with_vertices(&new_numbers)
         } else {
-            mesh_cells = cells;
-        }
+            cells
+        };
         let mesh_points =
             vertices.iter().filter_map(|&vertex| points.get(vertex).copied()).collect();
         let mesh = Mesh::new(mesh_points, mesh_cells, features)?;
         notes.extend(mesh.cells().handedness_note());
         Ok(MeshFile { mesh, fields, notes })
-    }
-}
-
-struct Renumber<'a> {
-    new_numbers: &'a [u32],
-}
-
-impl Renumber<'_> {
-    fn of(&self, vertex: u32) -> Option<u32> {
-        self.new_numbers.get(vertex as usize).copied().filter(|&number| number != u32::MAX)
-    }
-
-    fn row(&self, old: &[u32]) -> Option<Vec<u32>> {
-        old.iter().map(|&vertex| self.of(vertex)).collect()
-    }
-
-    /// Appends a cell with its vertices' new numbers; false where one of them has none.
-    fn push(&self, from: &Cells, cell: usize, to: &mut Cells) -> Result<bool, Flaw> {
-        if from.cell_type(cell) == CellType::Polyhedron {
-            let faces: Option<Vec<Vec<u32>>> =
-                from.polyhedron_faces(cell).iter().map(|face| self.row(face)).collect();
-            let Some(faces) = faces else { return Ok(false) };
-            to.push_polyhedron(&faces)?;
-        } else {
-            let Some(row) = self.row(from.vertices(cell)) else { return Ok(false) };
-            to.push(from.cell_type(cell), &row)?;
-        }
-        Ok(true)
     }
 }
 
@@ -169,7 +145,8 @@ fn note_count(notes: &mut Vec<String>, count: usize, what: &str) {
     }
 }
 
-/// Which of the `cells` has each face, by the face's sorted vertices; the lowest number where two do.
+/// Which of the `cells` has each face, by the face's sorted vertices; the lowest number where two
+/// do.
 pub(super) fn owners_of_faces(cells: &Cells) -> HashMap<Vec<u32>, usize> {
     let mut owners = HashMap::new();
     for cell in 0..cells.len() {

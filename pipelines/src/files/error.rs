@@ -6,20 +6,20 @@ use tombolo_deform::mesh::MeshError;
 
 /// Why a file could not be read or written: which file, where in it, and what is wrong there.
 #[derive(Debug, thiserror::Error)]
-#[error("{}{place}: {problem}", file.display())]
+#[error("{}{position}: {problem}", file.display())]
 pub struct FileError {
     /// The file.
     pub file: PathBuf,
     /// Where in the file.
-    pub place: Place,
-    /// What is wrong.
+    pub position: Position,
+    /// The problem.
     #[source]
     pub problem: Box<Problem>,
 }
 
-/// A place in a file.
+/// A position in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
+pub enum Position {
     /// The file as a whole.
     Whole,
     /// A line of text, counted from 1.
@@ -35,18 +35,18 @@ pub enum Place {
     Byte(usize),
 }
 
-impl std::fmt::Display for Place {
+impl std::fmt::Display for Position {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Place::Whole => Ok(()),
-            Place::Line(line) => write!(f, ", line {line}"),
-            Place::Column { line, column } => write!(f, ", line {line}, column {column}"),
-            Place::Byte(byte) => write!(f, ", byte {byte}"),
+            Position::Whole => Ok(()),
+            Position::Line(line) => write!(f, ", line {line}"),
+            Position::Column { line, column } => write!(f, ", line {line}, column {column}"),
+            Position::Byte(byte) => write!(f, ", byte {byte}"),
         }
     }
 }
 
-/// What is wrong with a file.
+/// A problem of a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Problem {
@@ -64,15 +64,15 @@ pub enum Problem {
     /// Something else stands where something is needed.
     #[error("found {found} where {expected} is needed")]
     Unexpected {
-        /// What stands there.
+        /// The thing found.
         found: String,
-        /// What is needed.
+        /// The thing expected.
         expected: String,
     },
     /// The file ends, or the bytes of an array do, before all was there that it announced.
     #[error("{what} needs {needed} bytes, but only {left} are left")]
     Truncated {
-        /// What is cut off.
+        /// The thing that is cut off.
         what: String,
         /// How many bytes it needs at least.
         needed: u64,
@@ -82,7 +82,7 @@ pub enum Problem {
     /// Two counts that must agree do not.
     #[error("{what}: {found} where there must be {expected}")]
     Count {
-        /// What is counted.
+        /// The things counted.
         what: String,
         /// The one count.
         found: u64,
@@ -92,9 +92,9 @@ pub enum Problem {
     /// Something that the format allows and this reader or writer does not.
     #[error("{what} cannot be used; {instead}")]
     Unsupported {
-        /// What it is.
+        /// The thing that cannot be read.
         what: String,
-        /// What to do.
+        /// The remedy.
         instead: &'static str,
     },
     /// The file is well formed and its mesh is not.
@@ -105,19 +105,23 @@ pub enum Problem {
 /// A [`FileError`] before it knows its file.
 #[derive(Debug)]
 pub(super) struct Flaw {
-    pub place: Place,
+    pub position: Position,
     pub problem: Problem,
 }
 
 impl Flaw {
     pub fn in_file(self, file: &Path) -> FileError {
-        FileError { file: file.to_path_buf(), place: self.place, problem: Box::new(self.problem) }
+        FileError {
+            file: file.to_path_buf(),
+            position: self.position,
+            problem: Box::new(self.problem),
+        }
     }
 }
 
 impl<P: Into<Problem>> From<P> for Flaw {
     fn from(problem: P) -> Self {
-        Flaw { place: Place::Whole, problem: problem.into() }
+        Flaw { position: Position::Whole, problem: problem.into() }
     }
 }
 
@@ -131,6 +135,23 @@ impl Problem {
             (false, true) => format!("{text:?}..."),
             (false, false) => format!("{text:?}"),
         };
-        Problem::Unexpected { found, expected: expected.into() }
+        Problem::wrong(found, expected)
+    }
+
+    /// One thing, described, where another is needed.
+    pub(super) fn wrong(found: impl Into<String>, expected: impl Into<String>) -> Self {
+        Problem::Unexpected { found: found.into(), expected: expected.into() }
+    }
+
+    /// Refuses a count that is not the one that it must be.
+    pub(super) fn check_count(
+        what: impl Into<String>,
+        found: usize,
+        expected: usize,
+    ) -> Result<(), Self> {
+        if found == expected {
+            return Ok(());
+        }
+        Err(Problem::Count { what: what.into(), found: found as u64, expected: expected as u64 })
     }
 }

@@ -7,23 +7,27 @@
 //! | VTK `.vtk` (legacy) | text and binary, file versions 1 to 5 | |
 //! | ParaView `.pvd` | | [`Series`] |
 //!
-//! Displacements of a surface are read from and written to plain text and VTK: [`read_displacement`], [`write_displacement`].
+//! Displacements of a surface are read from and written to plain text and VTK:
+//! [`read_displacement`], [`write_displacement`].
 //!
 //! # Features
-//! Physical surfaces of Gmsh become [`FeatureSource::Faces`]. In a VTK file a cell array named `features` says which feature each
-//! face belongs to (a negative number: none), on cells of dimension 2 beside the volume cells or on the cells of a surface; a
-//! point array of that name becomes [`FeatureSource::Vertices`]. A feature's name is the name of a field-data array of two integers:
-//! its number, and 2, the dimension of its faces. That is how meshio keeps the names of physical groups. In such a name `"`, `%`, `&`,
-//! `<` and `>` stand as `%` and two hexadecimal digits. A field-data array of text, `feature_names`, is read as well: feature 0 first,
-//! or in the order of the numbers in `feature_numbers` where that is there.
+//! Physical surfaces of Gmsh become [`FeatureSource::Faces`]. In a VTK file a cell array named
+//! `features` says which feature each face belongs to (a negative number: none), on cells of
+//! dimension 2 beside the volume cells or on the cells of a surface; a point array of that name
+//! becomes [`FeatureSource::Vertices`]. A feature's name is the name of a field-data array of two
+//! integers: its number, and 2, the dimension of its faces. That is how meshio keeps the names of
+//! physical groups. In such a name `"`, `%`, `&`, `<` and `>` stand as `%` and two hexadecimal
+//! digits. A field-data array of text, `feature_names`, is read as well: feature 0 first, or in the
+//! order of the numbers in `feature_numbers` where that is there.
 //!
 //! # What is left out
-//! The cells of the highest dimension make the mesh. Other cells but tagged faces, ghost cells, and vertices that no cell uses
-//! are left out; [`MeshFile::notes`] says how many.
+//! The cells of the highest dimension make the mesh. Other cells but tagged faces, ghost cells, and
+//! vertices that no cell uses are left out; [`MeshFile::notes`] says how many.
 //!
 //! # Trouble
-//! Whatever the bytes, reading ends with a mesh or with a [`FileError`] that says which file, where in it, what stands there and
-//! what is needed. It never panics, and sets no memory aside that the size of the file does not warrant.
+//! Whatever the bytes, reading ends with a mesh or with a [`FileError`] that says which file, where
+//! in it, what stands there and what is needed. It never panics, and sets no memory aside that the
+//! size of the file does not warrant.
 //!
 //! [`FeatureSource::Faces`]: tombolo_deform::mesh::FeatureSource::Faces
 //! [`FeatureSource::Vertices`]: tombolo_deform::mesh::FeatureSource::Vertices
@@ -46,7 +50,7 @@ pub use displacement::{
     SurfaceDisplacement, TOLERANCE, UnreadFile, check_displacement_name, parse_displacement,
     read_displacement, read_displacements, write_displacement,
 };
-pub use error::{FileError, Place, Problem};
+pub use error::{FileError, Position, Problem};
 pub use vtk::{Compression, Series};
 
 use crate::extract::{Extract, Field};
@@ -59,15 +63,15 @@ pub struct MeshFile {
     pub mesh: Mesh,
     /// The arrays on its vertices and cells, as the file has them: they may hold NaN.
     pub fields: Vec<Field>,
-    /// What a person should know: what was left out and why.
+    /// Notes for people: the things left out, and why.
     pub notes: Vec<String>,
 }
 
 /// Reads a mesh by its file's extension: `.msh`, `.vtu`, `.vtp` or `.vtk`.
 ///
 /// # Errors
-/// [`FileError`] where the file cannot be opened, is not of its format, uses something that is not read here (elements of higher
-/// order, other kinds of dataset), or holds a mesh that is none.
+/// [`FileError`] where the file cannot be opened, is not of its format, uses something that is not
+/// read here (elements of higher order, other kinds of dataset), or holds a mesh that is none.
 ///
 /// ```no_run
 /// # fn main() -> Result<(), tombolo_pipelines::files::FileError> {
@@ -112,23 +116,24 @@ fn unknown_extension(found: &str, expected: &'static str) -> Flaw {
     Problem::Extension { found: found.to_owned(), expected }.into()
 }
 
-/// Writes an extract: as `.vtp`, which holds cells up to dimension 2, or `.vtu`, which holds any. Folders are made where they are
-/// missing, and the file takes its place in one step, so that no reader ever sees half of it.
+/// Writes an extract: as `.vtp`, which holds cells up to dimension 2, or `.vtu`, which holds any.
+/// Folders are made where they are missing, and the file takes its place in one step, so that no
+/// reader ever sees half of it.
 ///
-/// A file that ends in `.vtpd`, `.pvtu` or `.pvtp` names one that holds the data: of `out.vtpd` that is `out/out_0.vtu`. It takes its
-/// place after the other, which it must be kept beside.
+/// A file that ends in `.vtpd`, `.pvtu` or `.pvtp` names one that holds the data: of `out.vtpd`
+/// that is `out/out_0.vtu`. It takes its place after the other, which it must be kept beside.
 ///
-/// Fields are written as numbers of their type, coordinates in double precision. In a `.vtp` file cells stand in VTK's order of kinds: vertices, lines,
-/// polygons, strips.
+/// Fields are written as numbers of their type, coordinates in double precision. In a `.vtp` file
+/// cells stand in VTK's order of kinds: vertices, lines, polygons, strips.
 ///
 /// # Errors
-/// [`FileError`] for another extension, for volume cells in a `.vtp`, for fields whose length is not that of the mesh, and where
-/// the file cannot be written.
+/// [`FileError`] for another extension, for volume cells in a `.vtp`, for fields whose length is
+/// not that of the mesh, and where the file cannot be written.
 pub fn write(path: impl AsRef<Path>, extract: &Extract) -> Result<(), FileError> {
     write_compressed(path, extract, Compression::None)
 }
 
-/// As [`write`](fn@write), with the arrays compressed.
+/// Writes an extract to a file with its arrays compressed.
 ///
 /// # Errors
 /// As [`write`](fn@write).
@@ -155,9 +160,9 @@ pub fn write_compressed(
     }
 }
 
-/// Writes a whole mesh with its fields to a `.vtu` (or, a surface mesh, `.vtp`) file, so that [`read_mesh`] gives the same again,
-/// features included: tagged faces are written as cells behind the mesh's own. Element fields take on such a face the value of the
-/// cell it belongs to.
+/// Writes a whole mesh with its fields to a `.vtu` (or, a surface mesh, `.vtp`) file, so that
+/// [`read_mesh`] gives the same again, features included: tagged faces are written as cells behind
+/// the mesh's own. Element fields take on such a face the value of the cell it belongs to.
 ///
 /// # Errors
 /// As [`write`](fn@write).
@@ -175,7 +180,8 @@ pub fn write_mesh(
     write_atomically(path, |file| file.write_all(&bytes))
 }
 
-/// Whether [`write_mesh`] takes a mesh of these cells for a file of this name: for whoever wants to know before long work.
+/// Whether [`write_mesh`] takes a mesh of these cells for a file of this name: for whoever wants to
+/// know before long work.
 ///
 /// # Errors
 /// [`FileError`] for another extension, and for volume cells in a `.vtp`.
@@ -196,7 +202,7 @@ fn is_polygonal(path: &Path) -> Result<bool, FileError> {
     }
 }
 
-/// Writes a file beside its place, then puts it there.
+/// Writes a file under another name beside it, then renames it.
 fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut std::fs::File) -> std::io::Result<()>,

@@ -1,13 +1,13 @@
 //! Walks over a file's bytes: words, lines and blocks, never beyond the end.
 
-use super::error::{Flaw, Place, Problem};
+use super::error::{Flaw, Position, Problem};
 
 /// A position in a file, whose text and binary parts may alternate.
 #[derive(Clone)]
 pub(super) struct Scanner<'a> {
     bytes: &'a [u8],
     position: usize,
-    /// Whether places are told as bytes rather than lines.
+    /// Whether errors name bytes rather than lines.
     pub binary: bool,
 }
 
@@ -16,7 +16,7 @@ impl<'a> Scanner<'a> {
         Self { bytes, position: 0, binary: false }
     }
 
-    /// What has not been read yet.
+    /// The bytes that have not been read yet.
     pub fn rest(&self) -> &'a [u8] {
         self.bytes.get(self.position..).unwrap_or(&[])
     }
@@ -32,13 +32,13 @@ impl<'a> Scanner<'a> {
 
     /// This problem, there.
     pub fn flaw_at(&self, position: usize, problem: impl Into<Problem>) -> Flaw {
-        let place = if self.binary {
-            Place::Byte(position)
+        let position = if self.binary {
+            Position::Byte(position)
         } else {
             let before = self.bytes.get(..position).unwrap_or(self.bytes);
-            Place::Line(1 + before.iter().filter(|&&byte| byte == b'\n').count())
+            Position::Line(1 + before.iter().filter(|&&byte| byte == b'\n').count())
         };
-        Flaw { place, problem: problem.into() }
+        Flaw { position, problem: problem.into() }
     }
 
     pub fn skip_spaces(&mut self) {
@@ -79,7 +79,7 @@ impl<'a> Scanner<'a> {
             .ok_or_else(|| self.flaw_at(start, Problem::unexpected(word, expected)))
     }
 
-    /// What is left of this line, without its end.
+    /// The rest of this line, without its end.
     pub fn line(&mut self) -> &'a [u8] {
         let rest = self.rest();
         let length = rest.iter().position(|&byte| byte == b'\n');
@@ -103,7 +103,8 @@ impl<'a> Scanner<'a> {
         Ok(taken)
     }
 
-    /// A count of things that take at least `bytes_each` bytes of what is left, so that memory may be set aside for them.
+    /// A count of things that take at least `bytes_each` bytes of what is left, so that memory may
+    /// be set aside for them.
     pub fn check_count(&self, count: u64, bytes_each: usize, what: &str) -> Result<usize, Flaw> {
         let left = self.rest().len();
         let needed = count.saturating_mul(bytes_each as u64);

@@ -1,18 +1,16 @@
 //! A configuration: the views to stream, the monitors to watch, and how orders become mesh motion.
 
-use std::borrow::Cow;
 use std::net::SocketAddr;
 use std::num::NonZeroU32;
 
-use super::DeformStage;
-use schemars::{JsonSchema, Schema, SchemaGenerator};
+use super::{Clip, Contour, Deformation, Derived, Formula, Integrate, Probe, Slice, Threshold};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tombolo_deform::mesh::Vector;
+use tombolo_deform::edit::{
+    Affine, Displacement, Edit, Rotate, ScaleDirection, ScaleNormals, SkeletonEdit, Translate,
+};
 use tombolo_deform::quality::Guard;
 use tombolo_deform::schedule::{Every, Schedule};
-use tombolo_deform::surface::{
-    Affine, Displacement, Edit, Rotate, ScaleDirection, ScaleNormals, Skeleton, Translate,
-};
 
 /// A whole configuration file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -24,14 +22,14 @@ pub struct Config {
     /// The server that viewers connect to; left out, there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stream: Option<StreamServer>,
-    /// The file that every command and its outcome is written to, one JSON object a line. It can be given as a file of orders
-    /// to another run.
+    /// The file that every command and its outcome is written to, one JSON object a line. It can be
+    /// given as a file of orders to another run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub journal: Option<String>,
     /// How orders from viewers are carried out.
     #[serde(default)]
     pub steering: Steering,
-    /// What is done at which steps.
+    /// The pipelines, each with the steps at which it runs.
     #[serde(default)]
     pub pipelines: Vec<Pipeline>,
 }
@@ -40,10 +38,12 @@ pub struct Config {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct StreamServer {
-    /// The address and port to listen on. Port 0 takes any free one. Anything but a loopback address is open to the network.
+    /// The address and port to listen on. Port 0 takes any free one. Anything but a loopback
+    /// address is open to the network.
     #[schemars(with = "String")]
     pub listen: SocketAddr,
-    /// The token that viewers must show: 16 to 128 letters, digits, `-` or `_`. Left out, a new one is made for each run.
+    /// The token that viewers must show: 16 to 128 letters, digits, `-` or `_`. Left out, a new one
+    /// is made for each run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub token: Option<String>,
 }
@@ -58,14 +58,16 @@ impl Default for StreamServer {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Steering {
-    /// Whether the solver keeps stepping while a new shape is computed. The motion then starts at the first step after it is
-    /// ready, so that the cycle depends on the machine's speed; otherwise the solver waits and the cycle is that of the order.
+    /// Whether the solver keeps stepping while a new shape is computed. The motion then starts at
+    /// the first step after it is ready, so that the cycle depends on the machine's speed;
+    /// otherwise the solver waits and the cycle is that of the order.
     pub background: bool,
     /// Whether the solver waits before its first step until a viewer has connected. Needs `stream`.
     pub wait_for_viewer: bool,
-    /// On several ranks: at every how many calls of `execute` the ranks come together to hear what was asked for and whether one of
-    /// them has an error, by one reduction of six numbers. In between a call returns at once, and what falls due waits for the
-    /// next such call. While the mesh moves they come together at every call.
+    /// On several ranks: at every how many calls of `execute` the ranks come together to hear what
+    /// was asked for and whether one of them has an error, by one reduction of six numbers. In
+    /// between a call returns at once, and what falls due waits for the next such call. While the
+    /// mesh moves they come together at every call.
     pub poll_steps: NonZeroU32,
 }
 
@@ -76,20 +78,22 @@ impl Default for Steering {
 }
 
 /// Stages that run one after the other at some steps.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "PipelineFields", into = "PipelineFields")]
 pub struct Pipeline {
     /// Its name, which is also that of its view; no two pipelines share one.
     pub name: String,
-    /// The channel it reads, and of one that runs on orders the channel whose mesh they change; `None` is the solver's first.
+    /// The channel it reads, and of one that runs on orders the channel whose mesh they change;
+    /// `None` is the solver's first.
     pub channel: Option<String>,
     /// When it runs.
     pub due: Due,
-    /// What it does.
+    /// Its stages, in order.
     pub stages: Vec<Stage>,
-    /// The condition, over the monitors of its stages, under which `then` is done. Without one, `then` is always done.
+    /// The condition, over the monitors of its stages, under which `then` is done. Without one,
+    /// `then` is always done.
     pub when: Option<String>,
-    /// What is done when the condition holds.
+    /// The actions taken when the condition holds.
     pub then: Vec<Action>,
 }
 
@@ -120,7 +124,8 @@ impl At {
     pub fn has_come(self, cycle: u64, time: f64) -> bool {
         match self {
             At::Cycle(at) => cycle >= at,
-            // Time steps add up with rounding: a moment that is a billionth away is not worth a step's wait.
+            // Time steps add up with rounding: a moment that is a billionth away is not worth a
+            // step's wait.
             At::Time(at) => time >= at - 1e-9 * at.abs(),
         }
     }
@@ -129,35 +134,37 @@ impl At {
 /// A pipeline as it stands in JSON.
 #[derive(Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(rename = "Pipeline")]
 struct PipelineFields {
     /// Its name, which is also that of its view; no two pipelines share one.
     name: String,
-    /// The channel it reads; left out, the solver's first. Of a pipeline with `"on": "order"`, the channel whose mesh orders change.
+    /// The channel it reads; left out, the solver's first. Of a pipeline with `"on": "order"`, the
+    /// channel whose mesh orders change.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     channel: Option<String>,
-    /// How often it runs. At most one of `every`, `at` and `on` is given; without any it runs at every step.
+    /// How often it runs. At most one of `every`, `at` and `on` is given; without any it runs at
+    /// every step.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     every: Option<Every>,
     /// The one moment at which it runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     at: Option<At>,
-    /// The event at which it runs: the stages of a pipeline with `"on": "order"` (`deform`, `guard`, `schedule`) are the
-    /// settings of orders that bring none.
+    /// The event at which it runs: the stages of a pipeline with `"on": "order"` (`deform`,
+    /// `guard`, `schedule`) are the settings of orders that bring none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     on: Option<Event>,
-    /// What it does, in this order. Each stage is an object with one key, the stage's name.
+    /// Its stages, in order. Each stage is an object with one key, the stage's name.
     stages: Vec<Stage>,
-    /// A condition over the monitors of its stages, such as `quality.min < 0.05 || velocity.max > 100`. `cycle` and `time` may be
-    /// named too.
+    /// A condition over the monitors of its stages, such as
+    /// `quality.min < 0.05 || velocity.max > 100`. `cycle` and `time` may be named too.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     when: Option<String>,
-    /// What is done when the condition holds; without a condition, whenever the pipeline has run.
+    /// The actions taken when the condition holds; without a condition, whenever the pipeline has
+    /// run.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     then: Vec<Action>,
 }
 
-/// What a pipeline can wait for.
+/// An event that a pipeline can wait for.
 #[derive(Clone, Copy, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 enum Event {
@@ -197,32 +204,52 @@ impl From<Pipeline> for PipelineFields {
     }
 }
 
-impl JsonSchema for Pipeline {
-    fn schema_name() -> Cow<'static, str> {
-        PipelineFields::schema_name()
-    }
-
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        PipelineFields::json_schema(generator)
-    }
-}
-
 /// One stage of a pipeline.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Stage {
-    /// Takes the boundary of the mesh, with its features. Must come first.
+    /// Takes the boundary of the mesh, with its features. A source stage: it comes before any other
+    /// but those that derive fields.
     Surface {},
-    /// Cuts the mesh with a plane. Must come first.
+    /// Cuts the mesh with a plane, several planes, a cylinder or a sphere. A source stage.
     Slice(Slice),
+    /// Takes the surfaces on which a vertex field has given values. A source stage.
+    Contour(Contour),
+    /// Takes the cells in which a field keeps to a range. A source stage.
+    Threshold(Threshold),
+    /// Takes the part of the volume on one side of a plane, in or around a box or a sphere, or by a
+    /// field. A source stage.
+    Clip(Clip),
+    /// Takes the fields at points, on a line or on a grid. A source stage.
+    Probe(Probe),
+    /// Derives the gradient of a field: of each component its derivatives along x, y and z. At a
+    /// vertex it is the mean over the cells around; an element field is first brought to the
+    /// vertices as the mean over the cells around each.
+    Gradient(Derived),
+    /// Derives the vorticity of a vector field, the curl; from derivatives as `gradient` has them.
+    Vorticity(Derived),
+    /// Derives the divergence of a vector field, from derivatives as `gradient` has them.
+    Divergence(Derived),
+    /// Derives the Q criterion of a velocity, `-(g_xx^2 + g_yy^2 + g_zz^2) / 2 - g_xy g_yx - g_xz
+    /// g_zx - g_yz g_zy`, from derivatives `g` as `gradient` has them: above 0 a vortex turns
+    /// faster than it is strained.
+    QCriterion(Derived),
+    /// Derives the magnitude of a field.
+    Magnitude(Derived),
+    /// Derives a field by formulas.
+    Expression(Formula),
     /// Leaves only some fields.
     Select(Select),
-    /// Measures the cells: monitors `quality.min`, `quality.mean`, `quality.max` and `quality.inverted`, and the element field
-    /// `scaled_jacobian`.
+    /// Measures the cells: monitors `quality.min`, `quality.mean`, `quality.max` and
+    /// `quality.inverted`, and the element field `scaled_jacobian`.
     Quality {},
-    /// Measures a field: monitors `<field>.min`, `.max`, `.mean`, `.l2` (of the magnitude, for a vector) and `.non_finite`.
+    /// Measures a field: monitors `<field>.min`, `.max`, `.mean`, `.l2` (of the magnitude, for a
+    /// vector) and `.non_finite`.
     Statistics(Statistics),
-    /// Sends the extract to the viewers as the view of this pipeline.
+    /// Integrates over the extract, or over the whole mesh where no stage has taken one: monitors
+    /// `<name>.size` (length, area or volume), and those of a scalar and of a vector field.
+    Integrate(Integrate),
+    /// Sends the extract to the viewers as the view of this pipeline; of volume cells their outside.
     Stream(StreamStage),
     /// Writes the extract, or the whole mesh where no stage has extracted anything, to a file.
     Write(Write),
@@ -239,12 +266,12 @@ pub enum Stage {
     /// An edit of the shape, for `order`.
     Displacement(Displacement),
     /// An edit of the shape, for `order`.
-    Skeleton(Skeleton),
+    Skeleton(SkeletonEdit),
     /// Orders the edits of the stages before it.
     Order(OrderStage),
     /// How the motion of the surface is carried into the volume. Only with `"on": "order"`.
-    Deform(DeformStage),
-    /// What the mesh must keep to. Only with `"on": "order"`.
+    Deform(Deformation),
+    /// The guard that the mesh must keep to. Only with `"on": "order"`.
     Guard(Guard),
     /// In how many steps the shape is reached. Only with `"on": "order"`.
     Schedule(Schedule),
@@ -261,9 +288,20 @@ impl Stage {
         match self {
             Stage::Surface {} => "surface",
             Stage::Slice(_) => "slice",
+            Stage::Contour(_) => "contour",
+            Stage::Threshold(_) => "threshold",
+            Stage::Clip(_) => "clip",
+            Stage::Probe(_) => "probe",
+            Stage::Gradient(_) => "gradient",
+            Stage::Vorticity(_) => "vorticity",
+            Stage::Divergence(_) => "divergence",
+            Stage::QCriterion(_) => "q_criterion",
+            Stage::Magnitude(_) => "magnitude",
+            Stage::Expression(_) => "expression",
             Stage::Select(_) => "select",
             Stage::Quality {} => "quality",
             Stage::Statistics(_) => "statistics",
+            Stage::Integrate(_) => "integrate",
             Stage::Stream(_) => "stream",
             Stage::Write(_) => "write",
             Stage::Translate(_) => "translate",
@@ -279,6 +317,40 @@ impl Stage {
             Stage::Schedule(_) => "schedule",
             Stage::Pause {} => "pause",
             Stage::Stop {} => "stop",
+        }
+    }
+
+    /// Whether the stage takes an extract out of the mesh.
+    #[must_use]
+    pub fn is_source(&self) -> bool {
+        matches!(
+            self,
+            Stage::Surface {}
+                | Stage::Slice(_)
+                | Stage::Contour(_)
+                | Stage::Threshold(_)
+                | Stage::Clip(_)
+                | Stage::Probe(_)
+        )
+    }
+
+    /// Whether the stage takes faces out of a mesh of volume cells: a boundary or a cut.
+    #[must_use]
+    pub fn takes_faces(&self) -> bool {
+        matches!(self, Stage::Surface {} | Stage::Slice(_) | Stage::Contour(_))
+    }
+
+    /// The name of the field that the stage derives, if it derives one.
+    #[must_use]
+    pub fn derived_name(&self) -> Option<&str> {
+        match self {
+            Stage::Gradient(derived)
+            | Stage::Vorticity(derived)
+            | Stage::Divergence(derived)
+            | Stage::QCriterion(derived)
+            | Stage::Magnitude(derived) => Some(derived.name.as_deref().unwrap_or(self.name())),
+            Stage::Expression(formula) => Some(&formula.name),
+            _ => None,
         }
     }
 
@@ -298,7 +370,7 @@ impl Stage {
     }
 }
 
-/// What a pipeline does when its condition holds.
+/// An action of a pipeline whose condition holds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Action {
@@ -328,16 +400,6 @@ impl Action {
     }
 }
 
-/// A plane that cuts the mesh.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Slice {
-    /// A point of the plane.
-    pub origin: Vector,
-    /// The direction across the plane, of any length but 0.
-    pub normal: Vector,
-}
-
 /// Fields to keep.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -360,7 +422,8 @@ pub struct Statistics {
 pub struct StreamStage {
     /// By how much a field's value may differ in the viewer.
     pub error: ErrorBound,
-    /// By how much a point's coordinates may differ in the viewer; `relative` is to the diagonal of the bounding box.
+    /// By how much a point's coordinates may differ in the viewer; `relative` is to the diagonal of
+    /// the bounding box.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub positions: Option<ErrorBound>,
 }
@@ -387,13 +450,15 @@ impl Default for ErrorBound {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Write {
-    /// The file, ending in `.vtu` or `.vtp`, or in `.vtpd`, `.pvtu` or `.pvtp`, which name a file in a folder beside them that holds
-    /// the data. `{cycle}` and `{time}` stand for those of the step; `{cycle:4}` has four digits or more instead of six, `{time:3}`
-    /// three behind the point. A relative one lies in the run's output directory.
+    /// The file, ending in `.vtu` or `.vtp`, or in `.vtpd`, `.pvtu` or `.pvtp`, which name a file
+    /// in a folder beside them that holds the data. `{cycle}` and `{time}` stand for those of the
+    /// step; `{cycle:4}` has four digits or more instead of six, `{time:3}` three behind the point.
+    /// A relative one lies in the run's output directory.
     pub file: String,
 }
 
-/// How the edits of a pipeline are ordered. What is left out is taken from the pipeline with `"on": "order"`.
+/// How the edits of a pipeline are ordered. What is left out is taken from the pipeline with
+/// `"on": "order"`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct OrderStage {
@@ -402,8 +467,8 @@ pub struct OrderStage {
     pub schedule: Option<Schedule>,
     /// How the motion of the surface is carried into the volume.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub deform: Option<DeformStage>,
-    /// What the mesh must keep to.
+    pub deform: Option<Deformation>,
+    /// The guard that the mesh must keep to.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub guard: Option<Guard>,
 }

@@ -2,9 +2,10 @@
 
 use serde_path_to_error::Segment;
 
+use super::nearest;
 use super::scan::{Node, Value};
 
-/// What is wrong in a JSON text, and where.
+/// An error in a JSON text, with its position.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{file}:{line}:{column}: {}{message}{}", prefix(path), hint(suggestion.as_deref()))]
 pub struct LanguageError {
@@ -14,9 +15,10 @@ pub struct LanguageError {
     pub line: usize,
     /// The column of its first character, from 1.
     pub column: usize,
-    /// The way from the outermost value to it, as in `pipelines[1].stages[0].slice.normal`; empty for the outermost.
+    /// The path from the outermost value to it, as in `pipelines[1].stages[0].slice.normal`; empty
+    /// for the outermost.
     pub path: String,
-    /// What was found, and what was expected.
+    /// The thing found, and the thing expected.
     pub message: String,
     /// The known name that is nearest to a misspelt one.
     pub suggestion: Option<String>,
@@ -30,14 +32,15 @@ fn hint(suggestion: Option<&str>) -> String {
     suggestion.map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
 }
 
-/// One step of the way to a value.
+/// One step of the path to a value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Step {
     Key(String),
     Index(usize),
 }
 
-/// Something that is well-formed but means nothing, found after parsing. The way to it is built from the inside outwards.
+/// A well-formed value that means nothing, found after parsing. The path to it is built
+/// from the inside outwards.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Problem {
     /// From the innermost step to the outermost.
@@ -52,27 +55,27 @@ impl Problem {
         Self { path: Vec::new(), message: message.into(), suggestion: None }
     }
 
-    /// The same with the name that was likely meant.
+    /// Adds the name that was likely meant.
     #[must_use]
     pub fn suggest(self, suggestion: Option<&str>) -> Self {
         Self { suggestion: suggestion.map(str::to_owned), ..self }
     }
 
-    /// The same, seen from the object that has it under `key`.
+    /// Puts the problem below `key` of an object.
     #[must_use]
     pub fn within(mut self, key: &str) -> Self {
         self.path.push(Step::Key(key.to_owned()));
         self
     }
 
-    /// The same, seen from the array that has it at `index`.
+    /// Puts the problem below `index` of an array.
     #[must_use]
     pub fn at(mut self, index: usize) -> Self {
         self.path.push(Step::Index(index));
         self
     }
 
-    /// The same, seen from the object that has it at the end of a way such as `region.box.lower[0]`.
+    /// Puts the problem below a path in an object, such as `region.box.lower[0]`.
     #[must_use]
     pub fn within_path(mut self, path: &str) -> Self {
         for part in path.rsplit('.') {
@@ -103,7 +106,16 @@ impl std::fmt::Display for Problem {
 
 impl std::error::Error for Problem {}
 
-/// The deepest node on the way, and the key of the step that led nowhere or last.
+/// Refuses NaN and infinities.
+pub(super) fn finite(value: f64) -> Result<(), Problem> {
+    if value.is_finite() {
+        Ok(())
+    } else {
+        Err(Problem::new(format!("found {value}, expected a finite number")))
+    }
+}
+
+/// The deepest node on a path, and where the key of the last step stands.
 fn walk<'a>(root: &'a Node, steps: &[Step]) -> (&'a Node, Option<usize>) {
     let (mut node, mut key) = (root, None);
     for step in steps {
@@ -157,7 +169,8 @@ pub(super) fn error(
     }
 }
 
-/// Translates an error of serde, which speaks of Rust's types, into one that speaks of the text.
+/// Translates an error of serde, which names Rust's types, into one that names what stands in the
+/// text.
 pub(super) fn from_serde(
     failure: &serde_path_to_error::Error<serde_json::Error>,
     root: &Node,
@@ -249,7 +262,7 @@ fn describe(node: &Node, text: &str) -> String {
     }
 }
 
-/// What serde expected, in the words of JSON.
+/// Says in the words of JSON what serde expected.
 fn humane(expected: &str) -> String {
     if let Some((least, most)) = whole_number(expected) {
         return format!("a whole number from {least} to {most}");
@@ -293,32 +306,4 @@ fn whole_number(name: &str) -> Option<(i64, u64)> {
         (_, Some(bits)) => Some((i64::MIN >> (64 - bits), u64::MAX >> (65 - bits))),
         _ => None,
     }
-}
-
-/// The known name that a misspelt one is nearest to, if it is near at all.
-///
-/// # Example
-/// ```
-/// use tombolo_pipelines::language::nearest;
-///
-/// assert_eq!(nearest("presure", ["velocity", "pressure"]), Some("pressure"));
-/// assert_eq!(nearest("zebra", ["velocity", "pressure"]), None);
-/// ```
-#[must_use]
-pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    // Names longer than any of ours cannot be near one; measuring them would cost the square of their length.
-    if name.len() > 200 {
-        return None;
-    }
-    let plain = |name: &str| name.to_lowercase().replace(['-', ' '], "_");
-    let name = plain(name);
-    let longest_slip = (name.chars().count() * 2 / 5).max(1);
-    known
-        .into_iter()
-        .map(|candidate| (strsim::damerau_levenshtein(&name, &plain(candidate)), candidate))
-        .filter(|&(distance, candidate)| {
-            distance <= longest_slip || (name.len() >= 4 && plain(candidate).starts_with(&name))
-        })
-        .min_by_key(|&(distance, _)| distance)
-        .map(|(_, candidate)| candidate)
 }

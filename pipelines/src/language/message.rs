@@ -1,4 +1,4 @@
-//! What a viewer says.
+//! Messages of viewers.
 
 use serde::Deserialize;
 
@@ -29,7 +29,8 @@ enum Wheel {
 
 /// Reads a message: an object with one key, and an `id` beside it at will.
 ///
-/// The id is there also where the message says nothing that is understood, so that the answer can name it.
+/// The id is there also where the message says nothing that is understood, so that the answer can
+/// name it.
 ///
 /// ```
 /// use tombolo_pipelines::language::{Command, Message, parse_message};

@@ -1,8 +1,9 @@
-//! The JSON language: configurations, pipelines, stages, orders, and errors that point at their token.
+//! The JSON language: configurations, pipelines, stages, orders, and errors that point at their
+//! token.
 //!
-//! Every type is declared once; from it come the parser, the JSON Schema ([`config_schema`], [`order_schema`]) and the reference
-//! pages. [`parse`] reads a configuration, [`parse_orders`] a file of orders or a journal, [`parse_json`] any other type with the
-//! same errors.
+//! Every type is declared once; from it come the parser, the JSON Schema ([`config_schema`],
+//! [`order_schema`]) and the reference pages. [`parse`] reads a configuration, [`parse_orders`] a
+//! file of orders or a journal, [`parse_json`] any other type with the same errors.
 //!
 //! ```
 //! let failure = tombolo_pipelines::language::parse(
@@ -14,36 +15,46 @@
 //! assert_eq!(
 //!     failure.to_string(),
 //!     "views.json:2:68: pipelines[0].stages[0].slice.nromal: found the unknown key `nromal`, \
-//!      expected `origin` or `normal`; did you mean `normal`?"
+//!      expected `origin`, `normal`, `planes`, `cylinder` or `sphere`; did you mean `normal`?"
 //! );
 //! ```
 
-mod beside;
 mod config;
-mod deform;
+mod derived;
 mod error;
+mod extracts;
 mod message;
 mod order;
 mod parse;
+mod probe;
+mod reductions;
+mod relative_files;
 mod scan;
+mod timed;
 mod tree;
 mod validate;
 
-pub use beside::place_beside;
 pub use config::{
-    Action, At, Config, Due, ErrorBound, OrderStage, Pipeline, Select, Slice, Stage, Statistics,
-    Steering, StreamServer, StreamStage, Write,
+    Action, At, Config, Due, ErrorBound, OrderStage, Pipeline, Select, Stage, Statistics, Steering,
+    StreamServer, StreamStage, Write,
 };
-pub use deform::DeformStage;
-pub use error::{LanguageError, Problem, nearest};
+pub(crate) use derived::GIVEN;
+pub use derived::{Derived, Formula};
+pub use error::{LanguageError, Problem};
+pub use extracts::{
+    Clip, ClipBy, ClipField, Contour, Cylinder, Plane, Quantifier, Slice, Threshold,
+};
 pub use message::{Message, parse_message};
-pub use order::{
-    Change, Command, JournalEntry, Order, OrderStatus, Parameter, Question, TimedCommand,
-    parse_orders,
-};
+pub use order::{Change, Command, Order, Parameter, Question};
 pub use parse::{ReadError, Validate, parse_json, parse_valid, read_text, text};
+pub use probe::{Probe, ProbeAt, ProbeGrid, ProbeLine, ProbeMethod};
+pub use reductions::Integrate;
+pub use relative_files::resolve_files;
+pub use timed::{JournalEntry, OrderStatus, TimedCommand, parse_orders};
+pub use tombolo_deform::names::nearest;
+pub use tombolo_deform::shape::Deformation;
+pub use validate::file_pattern;
 pub(crate) use validate::monitor_names;
-pub use validate::{check_stack, file_pattern};
 
 /// Reads and checks a configuration.
 ///
@@ -53,7 +64,7 @@ pub use validate::{check_stack, file_pattern};
 /// A [`LanguageError`] at the first token that is wrong.
 pub fn parse(text: &str, file: &str) -> Result<Config, LanguageError> {
     let mut config = parse_valid(text, file)?;
-    beside::place_config(&mut config, file);
+    relative_files::resolve_config_files(&mut config, file);
     Ok(config)
 }
 

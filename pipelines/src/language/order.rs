@@ -1,33 +1,31 @@
 //! Orders of a new shape and the other commands that steer a run.
 
-use std::borrow::Cow;
 use std::num::NonZeroU32;
 
-use schemars::{JsonSchema, Schema, SchemaGenerator};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tombolo_deform::edit::Edit;
 use tombolo_deform::quality::Guard;
 use tombolo_deform::schedule::Schedule;
-use tombolo_deform::surface::Edit;
 
-use super::parse::{Document, Validate, check_length, parse_valid};
-use super::{At, DeformStage, LanguageError, Problem};
-use crate::limits::{Exceeded, WAITING, WAITING_BYTES};
+use super::Deformation;
 
-/// An order of a new shape: what becomes of the stack of edits, and how the mesh gets there.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// An order of a new shape: exactly one of `edits`, `stack` and `undo`, and settings for this order
+/// alone.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "OrderFields", into = "OrderFields")]
 pub struct Order {
-    /// What becomes of the stack.
+    /// The change of the stack of edits.
     pub change: Change,
-    /// In how many steps the shape is reached; `None` is the configuration's.
+    /// In how many steps the shape is reached; `None` for the schedule of the configuration.
     pub schedule: Option<Schedule>,
     /// How the motion of the surface is carried into the volume; `None` is the configuration's.
-    pub deform: Option<DeformStage>,
-    /// What the mesh must keep to; `None` is the configuration's.
+    pub deform: Option<Deformation>,
+    /// The guard that the mesh must keep to; `None` is the configuration's.
     pub guard: Option<Guard>,
 }
 
-/// What an order does to the stack of edits.
+/// A change of the stack of edits.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Change {
     /// Puts these edits on top.
@@ -39,10 +37,28 @@ pub enum Change {
 }
 
 impl Order {
-    /// Whether any of its edits drags the skeleton.
+    /// Whether any edit of the order drags the skeleton.
     #[must_use]
     pub fn drags_skeleton(&self) -> bool {
         self.edits().iter().any(|edit| matches!(edit, Edit::Skeleton(_)))
+    }
+
+    /// The edits that the order brings.
+    #[must_use]
+    pub fn edits(&self) -> &[Edit] {
+        match &self.change {
+            Change::Edits(edits) | Change::Stack(edits) => edits,
+            Change::Undo(_) => &[],
+        }
+    }
+
+    /// The edits that the order brings, to be changed.
+    #[must_use]
+    pub fn edits_mut(&mut self) -> &mut [Edit] {
+        match &mut self.change {
+            Change::Edits(edits) | Change::Stack(edits) => edits,
+            Change::Undo(_) => &mut [],
+        }
     }
 }
 
@@ -53,10 +69,10 @@ impl From<Change> for Order {
     }
 }
 
-/// An order of a new shape: exactly one of `edits`, `stack` and `undo`, and settings for this order alone.
+/// An order as it stands in JSON.
 #[derive(Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(rename = "Order", extend("oneOf" = [{"required": ["edits"]}, {"required": ["stack"]}, {"required": ["undo"]}]))]
+#[schemars(extend("oneOf" = [{"required": ["edits"]}, {"required": ["stack"]}, {"required": ["undo"]}]))]
 struct OrderFields {
     /// Edits that are put on top of the stack, applied one after the other.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -72,8 +88,8 @@ struct OrderFields {
     schedule: Option<Schedule>,
     /// How the motion of the surface is carried into the volume.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    deform: Option<DeformStage>,
-    /// What the mesh must keep to.
+    deform: Option<Deformation>,
+    /// The guard that the mesh must keep to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     guard: Option<Guard>,
 }
@@ -87,7 +103,9 @@ impl TryFrom<OrderFields> for Order {
             (None, Some(stack), None) => Change::Stack(stack),
             (None, None, Some(undo)) => Change::Undo(undo),
             (None, None, None) => {
-                return Err("found none of `edits`, `stack` and `undo`, expected exactly one".into());
+                return Err(
+                    "found none of `edits`, `stack` and `undo`, expected exactly one".into()
+                );
             }
             _ => {
                 return Err(
@@ -112,17 +130,7 @@ impl From<Order> for OrderFields {
     }
 }
 
-impl JsonSchema for Order {
-    fn schema_name() -> Cow<'static, str> {
-        OrderFields::schema_name()
-    }
-
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        OrderFields::json_schema(generator)
-    }
-}
-
-/// What a viewer or a file of orders can say.
+/// A command of a viewer or of a file of orders.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Command {
@@ -138,11 +146,23 @@ pub enum Command {
     Parameter(Parameter),
 }
 
-/// What a viewer can ask without steering.
+impl Command {
+    /// The first edit that names a file, and the file.
+    #[must_use]
+    pub fn file(&self) -> Option<(usize, &str)> {
+        let Command::Order(order) = self else { return None };
+        order.edits().iter().enumerate().find_map(|(index, edit)| match edit {
+            Edit::Displacement(import) => Some((index, import.file.as_deref()?)),
+            _ => None,
+        })
+    }
+}
+
+/// A question that a viewer may ask without steering.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Question {
-    /// What an order would come to, were it given now.
+    /// Asks what an order would come to, were it given now.
     Forecast(Order),
 }
 
@@ -154,331 +174,4 @@ pub struct Parameter {
     pub name: String,
     /// Its new value.
     pub value: f64,
-}
-
-/// A command and when it is carried out.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "TimedFields", into = "TimedFields")]
-pub struct TimedCommand {
-    /// When; `None` is the first step.
-    pub at: Option<At>,
-    /// A name for it in reports.
-    pub id: Option<String>,
-    /// What.
-    pub command: Command,
-}
-
-/// Declares the JSON form of a type that holds a command among other keys, so that unknown keys stay errors (serde's `flatten`
-/// would let them pass).
-macro_rules! with_command {
-    ($(#[$attribute:meta])* struct $name:ident { $($(#[$field_attribute:meta])* $field:ident: $type:ty,)* }) => {
-        #[derive(Clone, Default, Serialize, Deserialize, JsonSchema)]
-        #[serde(deny_unknown_fields)]
-        $(#[$attribute])*
-        struct $name {
-            $(#[serde(default, skip_serializing_if = "Option::is_none")] $(#[$field_attribute])* $field: Option<$type>,)*
-            /// A new shape.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
-            order: Option<Order>,
-            /// The solver waits inside `execute` until it is resumed.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
-            pause: Option<Empty>,
-            /// The solver goes on.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
-            resume: Option<Empty>,
-            /// The solver is asked to end.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
-            stop: Option<Empty>,
-            /// A parameter that the solver has declared gets a new value.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
-            parameter: Option<Parameter>,
-        }
-
-        impl $name {
-            /// The command, if there is one; an error where there are several.
-            fn take_command(&mut self) -> Result<Option<Command>, String> {
-                let mut commands: Vec<Command> = [
-                    self.order.take().map(Command::Order),
-                    self.pause.take().map(|_| Command::Pause {}),
-                    self.resume.take().map(|_| Command::Resume {}),
-                    self.stop.take().map(|_| Command::Stop {}),
-                    self.parameter.take().map(Command::Parameter),
-                ]
-                .into_iter()
-                .flatten()
-                .collect();
-                if commands.len() > 1 {
-                    return Err(format!("found {} commands, expected exactly one of {COMMANDS}", commands.len()));
-                }
-                Ok(commands.pop())
-            }
-
-            fn set_command(&mut self, command: Command) {
-                match command {
-                    Command::Order(order) => self.order = Some(order),
-                    Command::Pause {} => self.pause = Some(Empty {}),
-                    Command::Resume {} => self.resume = Some(Empty {}),
-                    Command::Stop {} => self.stop = Some(Empty {}),
-                    Command::Parameter(parameter) => self.parameter = Some(parameter),
-                }
-            }
-        }
-    };
-}
-
-const COMMANDS: &str = "`order`, `pause`, `resume`, `stop` and `parameter`";
-
-/// No settings.
-#[derive(Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct Empty {}
-
-with_command! {
-    /// A command and when it is carried out: exactly one of `order`, `pause`, `resume`, `stop` and `parameter`.
-    #[schemars(rename = "TimedCommand")]
-    struct TimedFields {
-        /// When; left out, at the first step.
-        at: At,
-        /// A name for it in reports.
-        id: String,
-    }
-}
-
-impl TryFrom<TimedFields> for TimedCommand {
-    type Error = String;
-
-    fn try_from(mut fields: TimedFields) -> Result<Self, String> {
-        let command = fields
-            .take_command()?
-            .ok_or(format!("found no command, expected one of {COMMANDS}"))?;
-        Ok(Self { at: fields.at, id: fields.id, command })
-    }
-}
-
-impl From<TimedCommand> for TimedFields {
-    fn from(timed: TimedCommand) -> Self {
-        let mut fields = Self { at: timed.at, id: timed.id, ..Self::default() };
-        fields.set_command(timed.command);
-        fields
-    }
-}
-
-impl JsonSchema for TimedCommand {
-    fn schema_name() -> Cow<'static, str> {
-        TimedFields::schema_name()
-    }
-
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        TimedFields::json_schema(generator)
-    }
-}
-
-/// What has become of a command.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum OrderStatus {
-    /// It is well-formed and waits for a safe point.
-    Accepted,
-    /// It has taken effect.
-    Applied,
-    /// It has not and will not take effect.
-    Rejected,
-}
-
-/// One line of a journal. A command has a line when it is accepted, which holds the command, and a line of the same id when it is
-/// applied or rejected.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "JournalFields", into = "JournalFields")]
-pub struct JournalEntry {
-    /// The command's id.
-    pub id: String,
-    /// What has become of it.
-    pub status: OrderStatus,
-    /// The cycle at which that was so; for an applied order, the one at which its motion began.
-    pub cycle: u64,
-    /// The simulated time then.
-    pub time: f64,
-    /// The command; in the line that says it was accepted.
-    pub command: Option<Command>,
-    /// Why it was rejected.
-    pub reason: Option<String>,
-    /// The least scaled Jacobian on the path; of an order that the guard rejected, what it would have come to.
-    pub min_scaled_jacobian: Option<f64>,
-    /// The fraction of an order's amounts that was done, where the guard clamped it; of a rejected one, what would pass.
-    pub fraction: Option<f64>,
-}
-
-with_command! {
-    /// One line of a journal.
-    #[schemars(rename = "JournalEntry")]
-    struct JournalFields {
-        /// The command's id.
-        id: String,
-        /// What has become of it.
-        status: OrderStatus,
-        /// The cycle at which that was so.
-        cycle: u64,
-        /// The simulated time then.
-        time: f64,
-        /// Why it was rejected.
-        reason: String,
-        /// The least scaled Jacobian on the path; of an order that the guard rejected, what it would have come to.
-        min_scaled_jacobian: f64,
-        /// The fraction of an order's amounts that was done, where the guard clamped it; of a rejected one, what would pass.
-        fraction: f64,
-    }
-}
-
-impl TryFrom<JournalFields> for JournalEntry {
-    type Error = String;
-
-    fn try_from(mut fields: JournalFields) -> Result<Self, String> {
-        let command = fields.take_command()?;
-        let status = fields.status.ok_or("the key `status` is missing")?;
-        if command.is_none() && status == OrderStatus::Accepted {
-            return Err(format!("found no command, expected one of {COMMANDS}"));
-        }
-        Ok(Self {
-            id: fields.id.ok_or("the key `id` is missing")?,
-            status,
-            cycle: fields.cycle.ok_or("the key `cycle` is missing")?,
-            time: fields.time.ok_or("the key `time` is missing")?,
-            command,
-            reason: fields.reason,
-            min_scaled_jacobian: fields.min_scaled_jacobian,
-            fraction: fields.fraction,
-        })
-    }
-}
-
-impl From<JournalEntry> for JournalFields {
-    fn from(entry: JournalEntry) -> Self {
-        let mut fields = Self {
-            id: Some(entry.id),
-            status: Some(entry.status),
-            cycle: Some(entry.cycle),
-            time: Some(entry.time),
-            reason: entry.reason,
-            min_scaled_jacobian: entry.min_scaled_jacobian,
-            fraction: entry.fraction,
-            ..Self::default()
-        };
-        if let Some(command) = entry.command {
-            fields.set_command(command);
-        }
-        fields
-    }
-}
-
-impl Validate for Vec<TimedCommand> {
-    fn validate(&self) -> Result<(), Problem> {
-        WAITING.check(self.len())?;
-        self.iter()
-            .enumerate()
-            .try_for_each(|(index, timed)| timed.validate().map_err(|problem| problem.at(index)))
-    }
-}
-
-impl Validate for JournalEntry {
-    fn validate(&self) -> Result<(), Problem> {
-        self.command.as_ref().map_or(Ok(()), Validate::validate)
-    }
-}
-
-/// Reads a file of orders: a JSON array of timed commands, one timed command, or the lines of a journal.
-///
-/// From a journal come the commands that were accepted and not rejected, at the cycle at which each took effect, or was accepted
-/// where the run ended before. A last line that a killed run left half-written is passed over.
-///
-/// Files that edits name lie beside `file` where they are relative.
-///
-/// # Errors
-/// A [`LanguageError`] at the first token that is wrong.
-///
-/// # Example
-/// ```
-/// use tombolo_pipelines::language::{At, parse_orders};
-///
-/// let journal = r#"{"id":"a","status":"accepted","cycle":3,"time":0.3,"order":{"undo":1}}
-/// {"id":"a","status":"applied","cycle":5,"time":0.5}
-/// {"id":"b","status":"acc"#;
-/// let orders = parse_orders(journal, "journal.jsonl").unwrap();
-/// assert_eq!(orders.len(), 1);
-/// assert_eq!(orders[0].at, Some(At::Cycle(5)));
-/// ```
-pub fn parse_orders(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageError> {
-    check_length(text.len(), file, WAITING_BYTES)?;
-    let mut commands = parse_commands(text, file)?;
-    super::beside::place_orders(&mut commands, file);
-    Ok(commands)
-}
-
-fn parse_commands(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageError> {
-    let start = text.trim_start_matches(['\u{feff}', ' ', '\t', '\r', '\n']);
-    if start.is_empty() {
-        return Ok(Vec::new());
-    }
-    if start.starts_with('[') {
-        return parse_valid(text, file);
-    }
-    match Document::read(text, file) {
-        Ok(document) if !is_of_journal(&document) => {
-            document.valid::<TimedCommand>().map(|timed| vec![timed])
-        }
-        _ => parse_lines(text, file),
-    }
-}
-
-fn is_of_journal(line: &Document<'_>) -> bool {
-    line.root.member("status").is_some()
-}
-
-fn parse_lines(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageError> {
-    let mut commands: Vec<TimedCommand> = Vec::new();
-    let mut places = std::collections::HashMap::new();
-    let mut rejected = std::collections::HashSet::new();
-    let ends_whole = text.ends_with('\n');
-    let count = text.lines().count();
-    for (number, content) in text.lines().enumerate() {
-        if content.trim_start_matches('\u{feff}').trim().is_empty() {
-            continue;
-        }
-        let moved =
-            |failure: LanguageError| LanguageError { line: failure.line + number, ..failure };
-        let line = match Document::read(content, file) {
-            Err(_) if number + 1 == count && number > 0 && !ends_whole => break,
-            line => line.map_err(moved)?,
-        };
-        let too_many = |exceeded: Exceeded| moved(line.locate(exceeded.into()));
-        WAITING.check(commands.len() + 1).map_err(too_many)?;
-        if !is_of_journal(&line) {
-            commands.push(line.valid().map_err(moved)?);
-            continue;
-        }
-        let entry: JournalEntry = line.valid().map_err(moved)?;
-        let at = Some(At::Cycle(entry.cycle));
-        match (entry.status, entry.command) {
-            (OrderStatus::Accepted, Some(command)) => {
-                places.insert(entry.id.clone(), commands.len());
-                commands.push(TimedCommand { at, id: Some(entry.id), command });
-            }
-            (OrderStatus::Applied, command) => match (places.get(&entry.id), command) {
-                (Some(&place), _) => commands[place].at = at,
-                (None, Some(command)) => {
-                    commands.push(TimedCommand { at, id: Some(entry.id), command })
-                }
-                (None, None) => {}
-            },
-            (OrderStatus::Rejected, _) => {
-                rejected.extend(places.get(&entry.id).copied());
-            }
-            (OrderStatus::Accepted, None) => {}
-        }
-    }
-    let mut place = 0;
-    commands.retain(|_| {
-        place += 1;
-        !rejected.contains(&(place - 1))
-    });
-    Ok(commands)
 }

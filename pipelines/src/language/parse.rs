@@ -19,7 +19,7 @@ pub trait Validate {
     fn validate(&self) -> Result<(), Problem>;
 }
 
-/// The text behind bytes that should be UTF-8.
+/// Bytes as text, which must be UTF-8.
 ///
 /// # Errors
 /// A [`LanguageError`] at the first byte that is not.
@@ -32,7 +32,7 @@ pub fn text<'a>(bytes: &'a [u8], file: &str) -> Result<&'a str, LanguageError> {
     })
 }
 
-/// Why there is no text of a file.
+/// Why a file could not be read as text.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReadError {
@@ -49,7 +49,8 @@ pub enum ReadError {
     Text(#[from] LanguageError),
 }
 
-/// Reads the text of a file of at most so many bytes: [`DOCUMENT`], or of orders [`WAITING_BYTES`](crate::limits::WAITING_BYTES).
+/// Reads the text of a file of at most so many bytes: [`DOCUMENT`], or of orders
+/// [`WAITING_BYTES`](crate::limits::WAITING_BYTES).
 ///
 /// # Errors
 /// [`ReadError`], which names the file. No more than the limit is read of it.
@@ -77,8 +78,9 @@ pub(super) fn check_length(found: usize, file: &str, limit: Limit) -> Result<(),
 
 /// Reads one value of any type from JSON.
 ///
-/// Stricter than serde_json: no key may stand twice in an object, an array is never taken for a struct, every number must be finite
-/// in double precision, and the document must keep to the [limits](crate::limits).
+/// Stricter than serde_json: no key may stand twice in an object, an array is never taken for a
+/// struct, every number must be finite in double precision, and the document must keep to the
+/// [limits](crate::limits).
 ///
 /// # Errors
 /// A [`LanguageError`] whose line and column are those of the token at fault.
@@ -102,7 +104,7 @@ pub fn parse_json<T: DeserializeOwned>(text: &str, file: &str) -> Result<T, Lang
 /// Reads one value and checks its meaning.
 ///
 /// # Errors
-/// As [`parse_json`]; the first [`Problem`] at its place.
+/// As [`parse_json`]; the first [`Problem`] at its position in the text.
 pub fn parse_valid<T: DeserializeOwned + Validate>(
     text: &str,
     file: &str,

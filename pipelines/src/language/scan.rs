@@ -1,10 +1,13 @@
-//! Where everything in a JSON text stands.
+//! Reading JSON with the span of every key and value.
 //!
-//! serde_json tells at best where it stopped reading, which is past the token at fault, and lets a key stand twice where a type
-//! does not mind. This reader keeps the place of each key and value, so that an error of meaning can point at its token.
+//! serde_json tells at best where it stopped reading, which is past the token at fault, and lets a
+//! key stand twice where a type does not mind. This reader keeps the span of each key and value, so
+//! that an error of meaning can point at its token.
 
 use std::collections::HashSet;
 use std::ops::Range;
+
+use serde_json::Number;
 
 use crate::limits::{DEPTH, Exceeded, TEXT, VALUES};
 
@@ -18,14 +21,12 @@ pub(super) struct Node {
     pub(super) value: Value,
 }
 
-/// A value of JSON. Whole numbers are kept whole where they fit.
+/// A value of JSON.
 #[derive(Debug)]
 pub(super) enum Value {
     Null,
     Boolean(bool),
-    Unsigned(u64),
-    Signed(i64),
-    Float(f64),
+    Number(Number),
     String(String),
     Array(Vec<Node>),
     Object(Vec<Member>),
@@ -48,7 +49,7 @@ impl Node {
         }
     }
 
-    /// The item of an array at this place.
+    /// The item of an array with this index.
     pub(super) fn item(&self, index: usize) -> Option<&Node> {
         match &self.value {
             Value::Array(items) => items.get(index),
@@ -57,7 +58,7 @@ impl Node {
     }
 }
 
-/// A place where the text is not JSON.
+/// An error where the text is not JSON.
 #[derive(Debug)]
 pub(super) struct SyntaxError {
     pub(super) at: usize,
@@ -103,7 +104,7 @@ impl Scanner<'_> {
         }
     }
 
-    /// What stands here, in words.
+    /// The next character of the text, in words.
     fn found(&self) -> String {
         match self.text.get(self.at..).and_then(|rest| rest.chars().next()) {
             None => "the end of the text".into(),
@@ -191,70 +192,30 @@ impl Scanner<'_> {
         Err(self.error(message))
     }
 
-    fn digits(&mut self) -> usize {
-        let start = self.at;
-        while matches!(self.peek(), Some(b'0'..=b'9')) {
-            self.at += 1;
-        }
-        self.at - start
-    }
-
     fn number(&mut self) -> Result<Value, SyntaxError> {
-        let start = self.at;
-        if self.peek() == Some(b'-') {
-            self.at += 1;
+        let rest = &self.text[self.at..];
+        let is_part = |c: char| c.is_ascii_digit() || matches!(c, '+' | '-' | '.' | 'e' | 'E');
+        let token = &rest[..rest.find(|c| !is_part(c)).unwrap_or(rest.len())];
+        let failure = match serde_json::from_str(token) {
+            Ok(number) => {
+                self.at += token.len();
+                return Ok(Value::Number(number));
+            }
+            Err(failure) => failure,
+        };
+        if token.parse::<f64>().is_ok_and(f64::is_infinite) {
+            let shown: String = token.chars().take(40).collect();
+            return Err(self.error(format!("{shown} is beyond the range of double precision")));
         }
-        let leading_zero = self.peek() == Some(b'0');
-        let whole = self.digits();
-        let not_a_number =
-            |scanner: &Self| scanner.error(format!("found {}, expected a digit", scanner.found()));
-        if whole == 0 {
-            let negative_infinity = self.text[self.at..].starts_with(['I', 'i']);
-            return Err(match negative_infinity {
-                true => self.error("found an infinity, expected a finite number".into()),
-                false => not_a_number(self),
-            });
-        }
-        if leading_zero && whole > 1 {
-            self.at = start;
+        let digits = token.strip_prefix('-').unwrap_or(token).as_bytes();
+        if let [b'0', b'0'..=b'9', ..] = digits {
             return Err(self.error("found a number that starts with 0".into()));
         }
-        let mut is_whole = true;
-        if self.peek() == Some(b'.') {
-            is_whole = false;
-            self.at += 1;
-            if self.digits() == 0 {
-                return Err(not_a_number(self));
-            }
+        self.at += if failure.is_eof() { token.len() } else { failure.column().saturating_sub(1) };
+        if token == "-" && self.text[self.at..].starts_with(['I', 'i']) {
+            return Err(self.error("found an infinity, expected a finite number".into()));
         }
-        if matches!(self.peek(), Some(b'e' | b'E')) {
-            is_whole = false;
-            self.at += 1;
-            if matches!(self.peek(), Some(b'+' | b'-')) {
-                self.at += 1;
-            }
-            if self.digits() == 0 {
-                return Err(not_a_number(self));
-            }
-        }
-        let token = &self.text[start..self.at];
-        if is_whole {
-            if let Ok(value) = token.parse() {
-                return Ok(Value::Unsigned(value));
-            }
-            // "-0" has a sign that only a floating point number keeps.
-            if let Some(value) = token.parse().ok().filter(|&value: &i64| value != 0) {
-                return Ok(Value::Signed(value));
-            }
-        }
-        match token.parse::<f64>() {
-            Ok(value) if value.is_finite() => Ok(Value::Float(value)),
-            _ => {
-                let shown: String = token.chars().take(40).collect();
-                self.at = start;
-                Err(self.error(format!("{shown} is beyond the range of double precision")))
-            }
-        }
+        Err(self.error(format!("found {}, expected a digit", self.found())))
     }
 
     /// The text between the quotes, its escapes resolved.
@@ -272,7 +233,8 @@ impl Scanner<'_> {
                 }
                 Some(b'"') => break,
                 Some(b'\\') => {
-                    // The byte after may be the first of several; the others are skipped one by one as any are.
+                    // The byte after may be the first of several; the others are skipped one by one
+                    // as any are.
                     self.at += 2;
                     is_plain = false;
                 }
@@ -305,7 +267,7 @@ impl Scanner<'_> {
         Ok(())
     }
 
-    /// What an array or object came to.
+    /// Leaves an array or object, whose value this is.
     fn leave(&mut self, value: Value) -> Value {
         self.at += 1;
         self.way.pop();

@@ -1,7 +1,8 @@
 //! Values read from a scanned text.
 //!
-//! Differs from serde_json's own reader in two ways, both so that what is likely a slip is not taken for something else: an array
-//! is never a struct, and an object with several keys is never an enum.
+//! Differs from serde_json's own reader in two ways, both so that what is likely a slip is not
+//! taken for something else: an array is never a struct, and an object with several keys is never
+//! an enum.
 
 use serde::de::value::{
     BorrowedStrDeserializer, MapAccessDeserializer, MapDeserializer, SeqDeserializer,
@@ -31,9 +32,11 @@ impl Node {
         match &self.value {
             Value::Null => Unexpected::Unit,
             Value::Boolean(value) => Unexpected::Bool(*value),
-            Value::Unsigned(value) => Unexpected::Unsigned(*value),
-            Value::Signed(value) => Unexpected::Signed(*value),
-            Value::Float(value) => Unexpected::Float(*value),
+            Value::Number(value) => match (value.as_u64(), value.as_i64()) {
+                (Some(value), _) => Unexpected::Unsigned(value),
+                (None, Some(value)) => Unexpected::Signed(value),
+                (None, None) => Unexpected::Float(value.as_f64().unwrap_or_default()),
+            },
             Value::String(value) => Unexpected::Str(value),
             Value::Array(_) => Unexpected::Seq,
             Value::Object(_) => Unexpected::Map,
@@ -48,9 +51,7 @@ impl<'de> Deserializer<'de> for &'de Node {
         match &self.value {
             Value::Null => visitor.visit_unit(),
             Value::Boolean(value) => visitor.visit_bool(*value),
-            Value::Unsigned(value) => visitor.visit_u64(*value),
-            Value::Signed(value) => visitor.visit_i64(*value),
-            Value::Float(value) => visitor.visit_f64(*value),
+            Value::Number(value) => value.deserialize_any(visitor),
             Value::String(value) => visitor.visit_borrowed_str(value),
             Value::Array(items) => {
                 let mut sequence = SeqDeserializer::new(items.iter());

@@ -1,20 +1,24 @@
-//! What a well-formed configuration must keep to so that it means something.
+//! The rules that a well-formed configuration must keep to mean something.
 
 use std::collections::HashSet;
 
+use tombolo_deform::edit::Edit;
 use tombolo_deform::number::Number;
 use tombolo_deform::quality::Guard;
 use tombolo_deform::schedule::Schedule;
-use tombolo_deform::surface::Edit;
+use tombolo_deform::shape::check_stack;
 
 use super::config::{
     Action, Config, Due, ErrorBound, OrderStage, Pipeline, Stage, StreamStage, Write,
 };
-use super::order::{Change, Command, Order, Question, TimedCommand};
+use super::derived::check_name;
+use super::error::finite;
+use super::order::{Change, Command, Order, Question};
 use super::parse::Validate;
-use super::{At, DeformStage, Problem, nearest};
+use super::timed::TimedCommand;
+use super::{At, Deformation, Integrate, Problem, nearest};
 use crate::expression::Expression;
-use crate::limits::{EDITS, Exceeded, LISTED, NAME};
+use crate::limits::{Exceeded, NAME};
 
 impl From<Exceeded> for Problem {
     fn from(exceeded: Exceeded) -> Self {
@@ -74,7 +78,7 @@ impl Validate for Pipeline {
         if let Due::At(At::Time(time)) = self.due {
             finite(time).map_err(|problem| problem.within("time").within("at"))?;
         }
-        let mut state = State::default();
+        let mut state = Made::default();
         for (index, stage) in self.stages.iter().enumerate() {
             state
                 .check(stage, self.due)
@@ -135,17 +139,25 @@ pub(crate) fn monitor_names(pipeline: &Pipeline) -> Vec<String> {
                         .map(|name| format!("{field}.{name}")),
                 );
             }
+            Stage::Integrate(integrate) => {
+                let has_faces = pipeline.stages.iter().any(Stage::takes_faces);
+                names.extend(integrate.monitors(has_faces));
+            }
             _ => {}
         }
     }
     names
 }
 
-/// What the stages so far have made.
+/// The things that the stages of a pipeline have made so far.
 #[derive(Default)]
-struct State {
+struct Made {
     stages: usize,
     extract: bool,
+    /// The key of the source stage.
+    source: Option<&'static str>,
+    /// The names of the fields that were derived.
+    derived: HashSet<String>,
     quality: bool,
     measured: HashSet<String>,
     settings: HashSet<&'static str>,
@@ -153,7 +165,7 @@ struct State {
     unordered: Option<(usize, &'static str)>,
 }
 
-impl State {
+impl Made {
     fn check(&mut self, stage: &Stage, due: Due) -> Result<(), Problem> {
         let index = self.stages;
         self.stages += 1;
@@ -173,17 +185,22 @@ impl State {
             self.unordered = Some((index, stage.name()));
             return Ok(());
         }
+        if stage.is_source() {
+            self.source.get_or_insert(stage.name());
+        }
         match stage {
             Stage::Surface {} => self.source(),
-            Stage::Slice(slice) => {
-                self.source()?;
-                let length = slice.normal.iter().fold(0.0_f64, |sum, x| sum.hypot(*x));
-                if !(length.is_normal()) {
-                    return Err(Problem::new("expected a direction, whose length is not 0")
-                        .within("normal"));
-                }
-                Ok(())
-            }
+            Stage::Slice(slice) => self.source().and_then(|()| slice.check()),
+            Stage::Contour(contour) => self.source().and_then(|()| contour.check()),
+            Stage::Threshold(threshold) => self.source().and_then(|()| threshold.check()),
+            Stage::Clip(clip) => self.source().and_then(|()| clip.check()),
+            Stage::Probe(probe) => self.source().and_then(|()| probe.check()),
+            Stage::Gradient(_)
+            | Stage::Vorticity(_)
+            | Stage::Divergence(_)
+            | Stage::QCriterion(_)
+            | Stage::Magnitude(_) => self.derives(stage),
+            Stage::Expression(formula) => self.derives(stage).and_then(|()| formula.check()),
             Stage::Select(select) => {
                 let mut known = HashSet::new();
                 match select.fields.iter().position(|field| !known.insert(field)) {
@@ -205,10 +222,11 @@ impl State {
                 Err(Problem::new("a field of this name cannot be told from other monitors")
                     .within("field"))
             }
+            Stage::Integrate(integrate) => self.integrate(integrate),
             Stage::Stream(stream) => self.stream(stream),
             Stage::Write(write) => self.write(write),
             Stage::Order(order) => self.order(order),
-            Stage::Deform(deform) => deform.check(),
+            Stage::Deform(deform) => check_deformation(deform),
             Stage::Guard(guard) => check_guard(guard),
             Stage::Schedule(schedule) => check_schedule(schedule),
             _ => Ok(()),
@@ -216,22 +234,49 @@ impl State {
     }
 
     fn source(&mut self) -> Result<(), Problem> {
-        if self.stages > 1 {
-            let message = if self.extract {
-                "a pipeline has one source stage"
-            } else {
-                "a source stage must come first"
-            };
+        if self.extract {
+            return Err(Problem::new("a pipeline has one source stage"));
+        }
+        if self.stages > self.derived.len() + 1 {
+            let message = "a source stage must come first; only stages that derive fields may \
+                           stand before it";
             return Err(Problem::new(message));
         }
         self.extract = true;
         Ok(())
     }
 
+    /// A stage that derives a field.
+    fn derives(&mut self, stage: &Stage) -> Result<(), Problem> {
+        if self.stages > self.derived.len() + 1 {
+            let message = "a stage that derives a field must come before all others";
+            return Err(Problem::new(message));
+        }
+        let name = stage.derived_name().unwrap_or_default();
+        check_name(name).map_err(|problem| problem.within("name"))?;
+        if !self.derived.insert(name.to_owned()) {
+            let message = format!("two stages derive a field `{name}`");
+            return Err(Problem::new(message).within("name"));
+        }
+        Ok(())
+    }
+
+    fn integrate(&mut self, integrate: &Integrate) -> Result<(), Problem> {
+        integrate.check(self.source == Some("surface"))?;
+        if self.source == Some("probe") {
+            return Err(Problem::new("the points of a `probe` have no size to integrate over"));
+        }
+        if !self.measured.insert(integrate.name.clone()) {
+            let message = format!("another stage has monitors named `{}`", integrate.name);
+            return Err(Problem::new(message).within("name"));
+        }
+        Ok(())
+    }
+
     fn stream(&self, stream: &StreamStage) -> Result<(), Problem> {
         if !self.extract {
             return Err(Problem::new(
-                "nothing to stream, expected a `surface` or `slice` stage first",
+                "nothing to stream, expected a source stage such as `surface` first",
             ));
         }
         check_bound(stream.error).map_err(|problem| problem.within("error"))?;
@@ -244,7 +289,7 @@ impl State {
     fn write(&self, write: &Write) -> Result<(), Problem> {
         let surface_only = write.file.to_ascii_lowercase().ends_with(".vtp") && !self.extract;
         if surface_only {
-            let message = "a `.vtp` file holds surfaces, expected a `surface` or `slice` stage first, or a `.vtu` file";
+            let message = "a `.vtp` file holds surfaces, expected a source stage such as `surface` first, or a `.vtu` file";
             return Err(Problem::new(message).within("file"));
         }
         check_file(&write.file).map_err(|problem| problem.within("file"))
@@ -255,14 +300,6 @@ impl State {
             return Err(Problem::new("nothing to order, expected an edit stage before it"));
         }
         check_settings(order.deform.as_ref(), order.guard.as_ref(), order.schedule.as_ref())
-    }
-}
-
-fn finite(value: f64) -> Result<(), Problem> {
-    if value.is_finite() {
-        Ok(())
-    } else {
-        Err(Problem::new(format!("found {value}, expected a finite number")))
     }
 }
 
@@ -304,11 +341,11 @@ fn check_schedule(schedule: &Schedule) -> Result<(), Problem> {
 }
 
 fn check_settings(
-    deform: Option<&DeformStage>,
+    deform: Option<&Deformation>,
     guard: Option<&Guard>,
     schedule: Option<&Schedule>,
 ) -> Result<(), Problem> {
-    deform.map_or(Ok(()), DeformStage::check).map_err(|problem| problem.within("deform"))?;
+    deform.map_or(Ok(()), check_deformation).map_err(|problem| problem.within("deform"))?;
     guard.map_or(Ok(()), check_guard).map_err(|problem| problem.within("guard"))?;
     schedule.map_or(Ok(()), check_schedule).map_err(|problem| problem.within("schedule"))
 }
@@ -322,18 +359,28 @@ fn check_edits(edits: &[Edit]) -> Result<(), Problem> {
     edits.iter().enumerate().try_for_each(|(index, edit)| located(index, edit))
 }
 
-/// Whether a stack may hold all of these edits.
-///
-/// # Errors
-/// [`Exceeded`] for too many edits, or too many vertices and faces that they list.
-pub fn check_stack<'a>(edits: impl IntoIterator<Item = &'a Edit>) -> Result<(), Exceeded> {
-    let (mut count, mut listed) = (0, 0_usize);
-    for edit in edits {
-        count += 1;
-        listed = listed.saturating_add(edit.listed());
+/// Checks of a deformation what can be checked without a mesh.
+fn check_deformation(stage: &Deformation) -> Result<(), Problem> {
+    stage.equation.validate().map_err(|error| Problem::new(error.to_string()))?;
+    for (key, names) in [("sliding", &stage.sliding), ("free", &stage.free)] {
+        for (index, name) in names.iter().enumerate() {
+            if names[..index].contains(name) {
+                return Err(Problem::new("found the same feature twice").at(index).within(key));
+            }
+        }
     }
-    EDITS.check(count)?;
-    LISTED.check(listed)
+    if stage.surface_only && stage.lets_go() {
+        let key = if stage.free.is_empty() { "sliding" } else { "free" };
+        let message = "found features although `method` is `surface`: no volume is moved that they could follow";
+        return Err(Problem::new(message).within(key));
+    }
+    match stage.free.iter().position(|name| stage.sliding.contains(name)) {
+        Some(index) => {
+            let message = format!("found `{}`, which is among `sliding` too", stage.free[index]);
+            Err(Problem::new(message).at(index).within("free"))
+        }
+        None => Ok(()),
+    }
 }
 
 fn check_file(pattern: &str) -> Result<(), Problem> {
@@ -349,8 +396,9 @@ fn check_file(pattern: &str) -> Result<(), Problem> {
     file_pattern(pattern, 0, 0.0).map(|_| ())
 }
 
-/// The file that a pattern stands for at a step: `{cycle}` becomes the cycle with six digits or more, `{cycle:4}` with four or more,
-/// `{time}` the time, `{time:3}` the time with three digits after its point.
+/// The file that a pattern stands for at a step: `{cycle}` becomes the cycle with six digits or
+/// more, `{cycle:4}` with four or more, `{time}` the time, `{time:3}` the time with three digits
+/// after its point.
 ///
 /// ```
 /// use tombolo_pipelines::language::file_pattern;
@@ -446,6 +494,9 @@ impl Validate for Question {
 
 impl Validate for TimedCommand {
     fn validate(&self) -> Result<(), Problem> {
+        if let Some(At::Time(time)) = self.at {
+            finite(time).map_err(|problem| problem.within("time").within("at"))?;
+        }
         self.command.validate()
     }
 }

@@ -9,10 +9,10 @@ use std::sync::Arc;
 
 use tombolo_deform::surface::Surface;
 
-use crate::communicator::{Communicator, Reduction, Solo, agree};
-use crate::extract::{Channel, ExtractError, Snapshot, Source};
+use crate::extract::{Channel, Snapshot, Source};
 use crate::language::{Config, Due, Problem, Stage, Validate};
 use pipeline::Prepared;
+use tombolo_deform::communicator::{Communicator, Solo, agree};
 
 pub use output::{Encoding, Frame, MonitorValues, Output, View, ViewKind};
 
@@ -22,9 +22,10 @@ pub use output::{Encoding, Frame, MonitorValues, Output, View, ViewKind};
 /// ```
 /// use tombolo_deform::{mesh::MeshView, shapes};
 /// use tombolo_pipelines::extract::{Channel, Snapshot};
+/// use tombolo_pipelines::language::{Command, parse};
 /// use tombolo_pipelines::run::{Output, Runner};
 ///
-/// let config = tombolo_pipelines::language::parse(
+/// let config = parse(
 ///     r#"{"version": 1, "pipelines": [
 ///         {"name": "health", "every": {"steps": 10}, "stages": [{"quality": {}}],
 ///          "when": "quality.min < 0.9", "then": [{"stop": {}}]}]}"#,
@@ -37,7 +38,7 @@ pub use output::{Encoding, Frame, MonitorValues, Output, View, ViewKind};
 /// let mesh = shapes::box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
 /// let channels = [Channel { name: "fluid", mesh: MeshView::from(&mesh), fields: &[] }];
 /// let outputs = runner.run(&Snapshot { cycle: 20, time: 2.0, channels: &channels });
-/// assert!(matches!(outputs[..], [Output::Monitor(_), Output::Stop { .. }]));
+/// assert!(matches!(outputs[..], [Output::Monitor(_), Output::Command { command: Command::Stop {}, .. }]));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Runner {
@@ -77,9 +78,9 @@ impl Runner {
             .filter(|prepared| prepared.streams())
             .map(|prepared| View {
                 name: prepared.pipeline.name.clone(),
-                kind: match prepared.pipeline.stages.first() {
-                    Some(Stage::Slice(_)) => ViewKind::Slice,
-                    _ => ViewKind::Surface,
+                kind: match prepared.pipeline.stages.iter().find(|stage| stage.is_source()) {
+                    Some(Stage::Surface {}) | None => ViewKind::Surface,
+                    Some(_) => ViewKind::Slice,
                 },
                 channel: prepared.pipeline.channel.clone(),
             })
@@ -93,8 +94,8 @@ impl Runner {
         self.pipelines.iter().any(|prepared| prepared.is_chosen && prepared.due.is_due(cycle, time))
     }
 
-    /// Whether any pipeline that is due at this step looks at the channel of this name; `is_first` says whether it is the first that
-    /// the solver shows.
+    /// Whether any pipeline that is due at this step looks at the channel of this name; `is_first`
+    /// says whether it is the first that the solver shows.
     #[must_use]
     pub fn reads(&self, cycle: u64, time: f64, channel: &str, is_first: bool) -> bool {
         let reads = |name: Option<&str>| name.map_or(is_first, |name| name == channel);
@@ -105,8 +106,8 @@ impl Runner {
         due.map(|prepared| prepared.pipeline.channel.as_deref()).any(reads)
     }
 
-    /// Lets only those pipelines run from now on whose names are chosen; the others wait, and are due again once they are chosen. On
-    /// all processes alike.
+    /// Runs only the chosen pipelines from now on. A pipeline that was left out is due again once
+    /// it is chosen. To be called on all processes alike.
     pub fn choose(&mut self, is_chosen: impl Fn(&str) -> bool) {
         for prepared in &mut self.pipelines {
             prepared.is_chosen = is_chosen(&prepared.pipeline.name);
@@ -115,8 +116,8 @@ impl Runner {
 
     /// Runs the pipelines that are due, in the order of the configuration. Collective.
     ///
-    /// What goes wrong in one pipeline comes out as [`Output::Error`] and stops neither the others nor the solver. An error that
-    /// lasts is told once, and again after it has been gone.
+    /// A failure of one pipeline comes out as [`Output::Error`] and stops neither the others nor
+    /// the solver. An error that lasts is told once, and again after it has been gone.
     pub fn run(&mut self, snapshot: &Snapshot) -> Vec<Output> {
         let mut outputs = Vec::new();
         for prepared in &mut self.pipelines {
@@ -125,9 +126,9 @@ impl Runner {
             }
             prepared.due.take(snapshot.cycle, snapshot.time);
             let name = prepared.pipeline.channel.as_deref();
-            match source(&mut self.sources, snapshot.channels, name, &*self.communicator) {
+            match source(&mut self.sources, snapshot.channels, name, &self.communicator) {
                 Ok((channel, source)) => {
-                    prepared.run(snapshot, channel, source, &*self.communicator, &mut outputs);
+                    prepared.run(snapshot, channel, source, &self.communicator, &mut outputs);
                 }
                 Err(message) => {
                     prepared.report(snapshot.cycle, vec![("channel".into(), message)], &mut outputs)
@@ -135,20 +136,6 @@ impl Runner {
             }
         }
         outputs
-    }
-
-    /// The surface of a channel (`None`: the first), worked out once for as long as its cells stay the same and shared with the
-    /// pipelines that need it.
-    ///
-    /// # Errors
-    /// A text that names the channel or what is wrong with its mesh.
-    pub fn surface(
-        &mut self,
-        channels: &[Channel],
-        name: Option<&str>,
-    ) -> Result<Arc<Surface>, String> {
-        let (channel, source) = source(&mut self.sources, channels, name, &*self.communicator)?;
-        source.surface_of(channel).map_err(|error| error.to_string())
     }
 
     /// Lets the pipelines use a surface that was extracted from the same channel elsewhere.
@@ -159,9 +146,9 @@ impl Runner {
         &mut self,
         channels: &[Channel],
         name: Option<&str>,
-        surface: Arc<Surface>,
+        surface: &Surface,
     ) -> Result<(), String> {
-        let (_, source) = source(&mut self.sources, channels, name, &*self.communicator)?;
+        let (_, source) = source(&mut self.sources, channels, name, &self.communicator)?;
         source.set_surface(surface);
         Ok(())
     }
@@ -172,35 +159,23 @@ fn source<'a, 'c>(
     sources: &'a mut HashMap<String, Source>,
     channels: &'c [Channel<'c>],
     name: Option<&str>,
-    communicator: &dyn Communicator,
+    communicator: &Arc<dyn Communicator>,
 ) -> Result<(&'c Channel<'c>, &'a mut Source), String> {
     let found = Channel::find(channels, name);
-    if communicator.size() > 1 {
-        let channel = agree(communicator, found).map_err(|error| error.to_string())?;
-        // Taken anew where the cells of any rank have changed.
-        let is_of = sources.get(channel.name).is_some_and(|source| source.is_of(channel));
-        let mut changed = [f64::from(u8::from(!is_of))];
-        communicator.reduce(Reduction::Maximum, &mut changed);
-        if changed[0] > 0.0 {
-            let source = Source::distributed(channel, communicator);
-            let source = source.map_err(|error| format!("channel `{}`: {error}", channel.name))?;
-            sources.insert(channel.name.to_owned(), source);
-        }
-        return match sources.get_mut(channel.name) {
-            Some(source) => Ok((channel, source)),
-            None => Err(format!("channel `{}` is not known", channel.name)),
-        };
-    }
-    let channel = found?;
-    let describe = |error: ExtractError| format!("channel `{}`: {error}", channel.name);
-    if !sources.get(channel.name).is_some_and(|source| source.is_of(channel)) {
+    let channel = if communicator.size() == 1 {
+        found?
+    } else {
+        agree(communicator, found).map_err(|error| error.to_string())?
+    };
+    // Taken anew where the cells of any rank have changed.
+    if communicator.any(!sources.get(channel.name).is_some_and(|source| source.is_of(channel))) {
         sources.remove(channel.name);
+        let source = Source::distributed(channel, communicator);
+        let source = source.map_err(|error| format!("channel `{}`: {error}", channel.name))?;
+        sources.insert(channel.name.to_owned(), source);
     }
-    match sources.entry(channel.name.to_owned()) {
-        std::collections::hash_map::Entry::Occupied(entry) => Ok((channel, entry.into_mut())),
-        std::collections::hash_map::Entry::Vacant(entry) => {
-            let source = Source::distributed(channel, communicator).map_err(describe)?;
-            Ok((channel, entry.insert(source)))
-        }
+    match sources.get_mut(channel.name) {
+        Some(source) => Ok((channel, source)),
+        None => Err(format!("channel `{}` is not known", channel.name)),
     }
 }

@@ -1,11 +1,11 @@
-//! What comes of pipelines.
+//! The outputs of pipelines.
 
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
 use crate::extract::Extract;
-use crate::language::{ErrorBound, Order, StreamStage};
+use crate::language::{Command, ErrorBound, StreamStage};
 
 /// How exactly an extract is sent.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,7 +41,7 @@ pub struct Frame {
     pub cycle: u64,
     /// The simulated time.
     pub time: f64,
-    /// What to send.
+    /// The extract to send.
     pub extract: Arc<Extract>,
     /// How exactly.
     pub encoding: Encoding,
@@ -60,7 +60,7 @@ pub struct MonitorValues {
     pub values: Vec<(String, f64)>,
 }
 
-/// What a pipeline wants done.
+/// A thing that a pipeline wants done.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum Output {
@@ -76,31 +76,17 @@ pub enum Output {
         cycle: u64,
         /// The simulated time.
         time: f64,
-        /// What to write.
+        /// The extract to write.
         extract: Arc<Extract>,
     },
     /// Tell viewers and reports.
     Monitor(MonitorValues),
-    /// Pause the solver.
-    Pause {
+    /// Carry this out, as if a viewer had asked for it.
+    Command {
         /// The pipeline.
         pipeline: Arc<str>,
-        /// Its condition.
-        reason: String,
-    },
-    /// Ask the solver to stop.
-    Stop {
-        /// The pipeline.
-        pipeline: Arc<str>,
-        /// Its condition.
-        reason: String,
-    },
-    /// A new shape.
-    Order {
-        /// The pipeline.
-        pipeline: Arc<str>,
-        /// The order.
-        order: Order,
+        /// A pause, a stop, or an order of a new shape.
+        command: Command,
     },
     /// Something could not be done; tell viewers and the log.
     Error {
@@ -108,7 +94,7 @@ pub enum Output {
         pipeline: Arc<str>,
         /// The step.
         cycle: u64,
-        /// What, where, and what was expected.
+        /// The fault, where it is, and what was expected.
         message: String,
     },
 }
@@ -118,14 +104,14 @@ pub enum Output {
 pub struct View {
     /// The pipeline's name.
     pub name: String,
-    /// What it shows.
+    /// The kind of view.
     pub kind: ViewKind,
     /// The channel that it shows; left out, the solver's first.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel: Option<String>,
 }
 
-/// What a view shows.
+/// The kind of a view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ViewKind {

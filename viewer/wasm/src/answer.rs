@@ -18,7 +18,7 @@ pub enum Array {
 }
 
 impl Array {
-    /// Where it begins.
+    /// A pointer to the first byte of the array.
     #[must_use]
     pub fn as_ptr(&self) -> *const u8 {
         match self {
@@ -30,7 +30,7 @@ impl Array {
         }
     }
 
-    /// How many bytes it has.
+    /// The length of the array, in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         match self {

@@ -4,9 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use serde_json::json;
+use tombolo_deform::edit::{Edit, EditError, Editor};
 use tombolo_deform::mesh::{CellType, Cells, Vector};
 use tombolo_deform::skeleton::SkeletonError;
-use tombolo_deform::surface::{Edit, EditError, Editor, Surface, SurfaceError};
+use tombolo_deform::surface::{Surface, SurfaceError};
 use tombolo_pipelines::encode::{DecodeError, Decoded, decode};
 
 use crate::Array;
@@ -50,9 +51,9 @@ pub enum Failure {
     /// A frame of another kind than was asked for (`frame`).
     #[error("the frame holds {found}, expected {expected}")]
     Kind {
-        /// What it holds.
+        /// The kind that it holds.
         found: &'static str,
-        /// What it should hold.
+        /// The kind that was asked for.
         expected: &'static str,
     },
     /// Arrays that make no surface, or one that cannot be edited (`surface`).
@@ -67,7 +68,7 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// What kind of failure it is, in one word.
+    /// The kind of failure, in one word.
     #[must_use]
     pub fn kind(&self) -> &'static str {
         match self {
@@ -103,7 +104,7 @@ impl Kernel {
         &self.answer
     }
 
-    /// See [`open_surface`](crate::open_surface).
+    /// Opens the surface of a frame: [`open_surface`](crate::open_surface).
     pub fn open_surface(&mut self) -> u32 {
         self.open(|input| match decode(input)? {
             Decoded::Surface(surface) => Ok(*surface),
@@ -111,7 +112,7 @@ impl Kernel {
         })
     }
 
-    /// See [`create_surface`](crate::create_surface).
+    /// Opens the surface of arrays: [`create_surface`](crate::create_surface).
     pub fn create_surface(&mut self, points: usize, faces: usize, corners: usize) -> u32 {
         self.open(|input| surface_of_arrays(input, points, faces, corners))
     }
@@ -133,13 +134,14 @@ impl Kernel {
         }
     }
 
-    /// See [`close_surface`](crate::close_surface).
+    /// Forgets a surface: [`close_surface`](crate::close_surface).
     pub fn close_surface(&mut self, surface: u32) {
         self.settle(Ok(Vec::new()));
         self.surfaces.remove(&surface);
     }
 
-    /// See [`describe_surface`](crate::describe_surface).
+    /// Answers with the points, triangles and features of a surface:
+    /// [`describe_surface`](crate::describe_surface).
     pub fn describe_surface(&mut self, surface: u32) -> bool {
         let answer = self.surface(surface).map(|open| {
             let surface = open.editor.surface();
@@ -160,7 +162,8 @@ impl Kernel {
         self.settle(answer)
     }
 
-    /// See [`displacement`](crate::displacement).
+    /// Answers with the displacement that a stack of edits asks for:
+    /// [`displacement`](crate::displacement).
     pub fn displacement(&mut self, surface: u32) -> bool {
         let input = std::mem::take(&mut self.input);
         let answer =
@@ -172,7 +175,7 @@ impl Kernel {
         self.settle(answer)
     }
 
-    /// See [`check`](crate::check).
+    /// Answers with the fault of the shape of the last displacement: [`check`](crate::check).
     pub fn check(&mut self, surface: u32) -> bool {
         let answer = self.surface(surface).map(|open| {
             let surface = open.editor.surface();
@@ -204,7 +207,7 @@ impl Kernel {
         self.settle(answer)
     }
 
-    /// See [`skeleton`](crate::skeleton).
+    /// Answers with the skeleton of a surface: [`skeleton`](crate::skeleton).
     pub fn skeleton(&mut self, surface: u32) -> bool {
         let answer = self.surface(surface).and_then(|open| {
             let skeleton = open.editor.skeleton()?;
@@ -221,7 +224,7 @@ impl Kernel {
         self.settle(answer)
     }
 
-    /// See [`decode_frame`](crate::decode_frame).
+    /// Answers with the header and the arrays of a frame: [`decode_frame`](crate::decode_frame).
     pub fn decode_frame(&mut self) -> bool {
         let input = std::mem::take(&mut self.input);
         let answer = decode(&input).map_err(Failure::from).and_then(|decoded| match decoded {

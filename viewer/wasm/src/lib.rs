@@ -1,8 +1,10 @@
-//! The geometry kernel as a WebAssembly module: what the viewer previews is computed by the code that the solver runs.
+//! The geometry kernel as a WebAssembly module: what the viewer previews is computed by the code
+//! that the solver runs.
 //!
-//! The border is plain C and takes numbers only. A call's arguments beyond numbers are written into the room that [`input`]
-//! makes; what it answers stands in arrays of the module's memory until the next call. Every call that can fail returns 0 when it
-//! did, and its first array is then a text: one line with the kind of the [`Failure`], and the message behind it.
+//! The border is plain C and takes numbers only. A call's arguments beyond numbers are written into
+//! the room that [`input`] makes; what it answers stands in arrays of the module's memory until the
+//! next call. Every call that can fail returns 0 when it did, and its first array is then a text:
+//! one line with the kind of the [`Failure`], and the message behind it.
 //!
 //! | export | input | returns | arrays |
 //! |---|---|---|---|
@@ -16,11 +18,13 @@
 //! | [`decode_frame`] | a frame of kind 1 or 2 | 1 | its header (JSON), then the arrays that it names |
 //! | [`rehearse`] | | | |
 //!
-//! Nothing here panics on any input. Should the kernel do so all the same, the module traps: its memory can no longer be relied
-//! on, [`panic_text`] says what happened, and the caller makes a new instance.
+//! Nothing here panics on any input. Should the kernel do so all the same, the module traps: its
+//! memory can no longer be relied on, [`panic_text`] says what happened, and the caller makes a new
+//! instance.
 //!
-//! There is no `unsafe` block: the module reads only memory that it owns, through the vectors that own it. A pointer leaves it as a
-//! number; what the caller writes through it, it writes into its own sandbox.
+//! There is no `unsafe` block: the module reads only memory that it owns, through the vectors that
+//! own it. A pointer leaves it as a number; what the caller writes through it, it writes into its
+//! own sandbox.
 
 mod answer;
 mod kernel;
@@ -34,13 +38,14 @@ pub use kernel::{Failure, Kernel};
 static KERNEL: Mutex<Kernel> = Mutex::new(Kernel::new());
 static PANIC: Mutex<String> = Mutex::new(String::new());
 
-/// There is one thread, and a panic ends the instance: nobody ever sees a lock that is held or poisoned.
+/// There is one thread, and a panic ends the instance: nobody ever sees a lock that is held or
+/// poisoned.
 fn lock<T>(mutex: &'static Mutex<T>) -> MutexGuard<'static, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Room for the input of the next call, `bytes` long and zero; null where there is not so much memory. Valid until the next
-/// call of any kind.
+/// Room for the input of the next call, `bytes` long and zero; null where there is not so much
+/// memory. Valid until the next call of any kind.
 #[unsafe(no_mangle)]
 pub extern "C" fn input(bytes: usize) -> *mut u8 {
     static HOOK: Once = Once::new();
@@ -54,9 +59,10 @@ pub extern "C" fn open_surface() -> u32 {
     lock(&KERNEL).open_surface()
 }
 
-/// Opens the surface of these arrays, one after the other, little endian: the coordinates of its points (`3 * points` doubles),
-/// their mesh vertices (`points` 32-bit numbers, rising), the number of points of each face (`faces`), their points (`corners`),
-/// the feature of each face (`faces`), and the names of the features as a JSON list. Returns its number, 0 where it is none.
+/// Opens the surface of these arrays, one after the other, little endian: the coordinates of its
+/// points (`3 * points` doubles), their mesh vertices (`points` 32-bit numbers, rising), the number
+/// of points of each face (`faces`), their points (`corners`), the feature of each face (`faces`),
+/// and the names of the features as a JSON list. Returns its number, 0 where it is none.
 #[unsafe(no_mangle)]
 pub extern "C" fn create_surface(points: usize, faces: usize, corners: usize) -> u32 {
     lock(&KERNEL).create_surface(points, faces, corners)
@@ -68,7 +74,7 @@ pub extern "C" fn close_surface(surface: u32) {
     lock(&KERNEL).close_surface(surface);
 }
 
-/// What there is to draw of a surface.
+/// The points, triangles and features of a surface, to be drawn.
 #[unsafe(no_mangle)]
 pub extern "C" fn describe_surface(surface: u32) -> u32 {
     lock(&KERNEL).describe_surface(surface).into()
@@ -80,8 +86,8 @@ pub extern "C" fn displacement(surface: u32) -> u32 {
     lock(&KERNEL).displacement(surface).into()
 }
 
-/// What is wrong with the shape that the last [`displacement`] of a surface leads to, and which triangles are at fault: those of
-/// the faces that the report names.
+/// The fault of the shape that the last [`displacement`] of a surface leads to, and the triangles
+/// at fault: those of the faces that the report names.
 #[unsafe(no_mangle)]
 pub extern "C" fn check(surface: u32) -> u32 {
     lock(&KERNEL).check(surface).into()
@@ -93,39 +99,39 @@ pub extern "C" fn skeleton(surface: u32) -> u32 {
     lock(&KERNEL).skeleton(surface).into()
 }
 
-/// The header and the arrays of a frame: integers as they were before they were packed, all other values as they are
-/// drawn, in single precision; tuple after tuple.
+/// The header and the arrays of a frame: integers as they were before they were packed, all other
+/// values as they are drawn, in single precision; tuple after tuple.
 #[unsafe(no_mangle)]
 pub extern "C" fn decode_frame() -> u32 {
     lock(&KERNEL).decode_frame().into()
 }
 
-/// Makes a small edit of its own, so that the engine compiles the kernel well before somebody waits for it. Takes some 50
-/// milliseconds and changes nothing; returns how many vertices it moved.
+/// Makes a small edit of its own, so that the engine compiles the kernel well before somebody waits
+/// for it. Takes some 50 milliseconds and changes nothing; returns how many vertices it moved.
 #[unsafe(no_mangle)]
 pub extern "C" fn rehearse() -> usize {
     rehearsal::rehearse().iter().filter(|by| **by != [0.0; 3]).count()
 }
 
-/// How many arrays the last call has answered with.
+/// The number of arrays in the last answer.
 #[unsafe(no_mangle)]
 pub extern "C" fn arrays() -> usize {
     lock(&KERNEL).arrays().len()
 }
 
-/// Where an array of the last answer begins; null for one that is not there.
+/// A pointer to an array of the last answer; null for one that is not there.
 #[unsafe(no_mangle)]
 pub extern "C" fn array(index: usize) -> *const u8 {
     lock(&KERNEL).arrays().get(index).map_or(std::ptr::null(), Array::as_ptr)
 }
 
-/// How many bytes an array of the last answer has.
+/// The length of an array of the last answer, in bytes.
 #[unsafe(no_mangle)]
 pub extern "C" fn array_bytes(index: usize) -> usize {
     lock(&KERNEL).arrays().get(index).map_or(0, Array::bytes)
 }
 
-/// What panicked, after a trap; a text of [`panic_text_bytes`] bytes.
+/// The message of the panic, after a trap; a text of [`panic_text_bytes`] bytes.
 #[unsafe(no_mangle)]
 pub extern "C" fn panic_text() -> *const u8 {
     lock(&PANIC).as_ptr()

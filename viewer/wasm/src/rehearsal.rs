@@ -1,20 +1,23 @@
 //! A first edit that nobody waits for.
 //!
-//! An engine of WebAssembly begins with code that it made in a hurry, and compiles a function well only once it has run for a
-//! while: the first edit of a session would take twice as long as those after it. So the caller has a small one made while nobody
-//! looks, and what is compiled by it stays compiled.
+//! An engine of WebAssembly begins with code that it made in a hurry, and compiles a function well
+//! only once it has run for a while: the first edit of a session would take twice as long as those
+//! after it. So the caller has a small one made while nobody looks, and what is compiled by it
+//! stays compiled.
 
 use std::sync::Arc;
 
 use serde_json::json;
+use tombolo_deform::edit::{Edit, Editor};
 use tombolo_deform::shapes;
-use tombolo_deform::surface::{Edit, Editor, Surface};
+use tombolo_deform::surface::Surface;
 
-/// Faces around the ring and around the tube: enough that every loop of the kernel runs for long, few enough that all of it takes
-/// some 50 milliseconds.
+/// Faces around the ring and around the tube: enough that every loop of the kernel runs for long,
+/// few enough that all of it takes some 50 milliseconds.
 const FACES: [usize; 2] = [64, 32];
 
-/// Opens a torus and moves one side of it, at every harmonic order. Returns the displacement of the last.
+/// Opens a torus and moves one side of it, at every harmonic order. Returns the displacement of the
+/// last.
 pub fn rehearse() -> Vec<[f64; 3]> {
     let torus = shapes::torus(1.0, 0.4, FACES);
     let (points, faces) = (torus.points().to_vec(), torus.cells().clone());

@@ -5,10 +5,13 @@ use std::{num::NonZeroU32, path::PathBuf, sync::Arc, time::Instant};
 use clap::{ArgGroup, Args, ValueEnum};
 use serde::Serialize;
 use tombolo::{
+    deform::shape::{Forecast, Outcome as Expected, Refused, Request, Shaper},
     deform::{
+        distributed::DistributedError,
+        edit::{Edit, Layer},
         mesh::Mesh,
         quality::{Quality, quality},
-        surface::{BrokenSurface, Edit, Layer, SurfaceError},
+        surface::BrokenSurface,
         volume::Method,
     },
     pipelines::{
@@ -16,8 +19,7 @@ use tombolo::{
             Compression, check_displacement_name, check_mesh_name, read_displacements, read_mesh,
             write_displacement, write_mesh,
         },
-        language::{Change, Order, Validate, parse_valid, place_beside},
-        shape::{Forecast, Outcome as Expected, Place, Refused, Shaper},
+        language::{Change, Order, Validate, parse_valid, resolve_files},
     },
 };
 
@@ -29,23 +31,26 @@ pub(crate) struct Options {
     /// The mesh to start from: .vtu, .vtk, .vtp or .msh
     #[arg(long, value_name = "IN")]
     mesh: PathBuf,
-    /// A JSON list of edits, or an order: an object with `edits` and, at will, `deform`, `guard` and `schedule`
+    /// A JSON list of edits, or an order: an object with `edits` and, at will, `deform`, `guard`
+    /// and `schedule`
     #[arg(long, value_name = "EDITS.json")]
     edits: PathBuf,
     /// The file to write: .vtu, or .vtp for a surface
     #[arg(long, value_name = "OUT.vtu")]
     out: Option<PathBuf>,
-    /// Say what the edits would come to, and write nothing; it succeeds also where they would be rejected
+    /// Say what the edits would come to, and write nothing; it succeeds also where they would be
+    /// rejected
     #[arg(long, conflicts_with_all = ["out", "displacement"])]
     forecast: bool,
-    /// Write what each surface vertex was moved by, beside the mesh or alone: .txt, .csv or .vtp; an edit `displacement` reads it again
+    /// Write what each surface vertex was moved by, beside the mesh or alone: .txt, .csv or .vtp;
+    /// an edit `displacement` reads it again
     #[arg(long, value_name = "OUT.txt")]
     displacement: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
-    /// Name the parts between edges of this many degrees or more feature-1, feature-2, ..., whatever features the mesh names; see
-    /// `tombolo features`
+    /// Name the parts between edges of this many degrees or more feature-1, feature-2, ...,
+    /// whatever features the mesh names; see `tombolo features`
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     angle: Option<f64>,
     /// How the volume follows; wins over the order's
@@ -72,7 +77,7 @@ enum VolumeMethod {
 struct Outcome {
     status: &'static str,
     reason: Option<String>,
-    /// What is wrong with the surface, where that is why it was refused.
+    /// The fault of the surface, where that is why it was refused.
     surface: Option<BrokenSurface>,
     vertices: usize,
     cells: usize,
@@ -109,7 +114,8 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
     check_results(options, &mesh)?;
     let made = timed(&mut seconds.features, || {
         let surface = Arc::new(surface(&mesh, options.angle)?);
-        Ok::<_, SurfaceError>((Shaper::new(Arc::clone(&mesh), Arc::clone(&surface))?, surface))
+        let shaper = Shaper::new(&mesh, Arc::clone(&surface))?.with_clock(tombolo::steering::clock);
+        Ok::<_, DistributedError>((shaper, surface))
     });
     let (mut shaper, surface) = made?;
     read_displacements(&mut edits, &surface)?;
@@ -129,23 +135,27 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
         layers: Vec::new(),
         seconds,
     };
-    let (deform, guard, schedule) = (
-        order.deform.unwrap_or_default(),
-        order.guard.unwrap_or_default(),
-        order.schedule.unwrap_or_default(),
-    );
+    let request = Request {
+        deformation: order.deform.unwrap_or_default(),
+        guard: order.guard.unwrap_or_default(),
+        schedule: order.schedule.unwrap_or_default(),
+        ..Request::new(edits, Arc::clone(shaper.reference()))
+    };
 
     if options.forecast {
-        let here = Place::from(Arc::clone(shaper.reference()));
-        let forecast = shaper.forecast(&edits, 0, &here, &deform, &schedule, &guard);
-        return if options.json { json(&forecast) } else { foretell(&forecast, &outcome.before) };
+        let forecast = shaper.forecast(&request);
+        return if options.json {
+            json(&forecast)
+        } else {
+            print_forecast(&forecast, &outcome.before)
+        };
     }
-    let plan = shaper.plan(&edits, Arc::clone(shaper.reference()), &deform, &schedule, &guard);
+    let plan = shaper.plan(&request);
     let spent = shaper.spent();
     (outcome.seconds.surface, outcome.seconds.volume, outcome.seconds.guard) =
         (spent.surface, spent.volume, spent.guard);
     outcome.layers =
-        shaper.editor().and_then(|editor| editor.layers(&edits).ok()).unwrap_or_default();
+        shaper.editor().and_then(|editor| editor.layers(&request.stack).ok()).unwrap_or_default();
     let plan = match plan {
         Ok(plan) => plan,
         Err(refused) => {
@@ -176,7 +186,7 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
     if let Some(file) = &options.displacement {
         let whole = shaper.editor().filter(|_| target.fraction == 1.0);
         let displacement = if let Some(editor) = whole {
-            editor.displacement(&edits)?
+            editor.displacement(&request.stack)?
         } else {
             // Clamped: what was reached, and not what was asked for.
             let reached = |&vertex: &u32| {
@@ -221,7 +231,7 @@ fn read_order(options: &Options) -> Result<(Vec<Edit>, Order), Failure> {
     match &order.change {
         Change::Edits(edits) | Change::Stack(edits) => {
             let mut edits = edits.clone();
-            place_beside(&mut edits, &name);
+            resolve_files(&mut edits, &name);
             Ok((edits, order))
         }
         Change::Undo(_) => Err(Failure::Wrong(format!(
@@ -272,7 +282,7 @@ fn line(quality: &Quality) -> String {
     format!("least {:.4}, mean {:.4}, {} inverted", quality.min, quality.mean, quality.inverted)
 }
 
-fn foretell(forecast: &Forecast, before: &Quality) -> Result<(), Failure> {
+fn print_forecast(forecast: &Forecast, before: &Quality) -> Result<(), Failure> {
     match (forecast.outcome, &forecast.reason) {
         (Expected::Rejected, reason) => {
             say(format_args!(
@@ -311,7 +321,7 @@ fn tell(outcome: &Outcome, options: &Options) -> Result<(), Failure> {
     if let Some(after) = &outcome.after {
         say(format_args!("scaled Jacobian after:  {}", line(after)))?;
     }
-    for (place, layer) in outcome.layers.iter().enumerate() {
+    for (index, layer) in outcome.layers.iter().enumerate() {
         let Layer { edit, name, muted, handle_vertices, fixed_vertices, largest_displacement } =
             layer;
         let name = name.as_ref().map_or_else(String::new, |name| format!(" \"{name}\""));
@@ -321,12 +331,12 @@ fn tell(outcome: &Outcome, options: &Options) -> Result<(), Failure> {
             format!("moves the surface by at most {largest_displacement:.6}")
         };
         say(format_args!(
-            "edit {place} ({edit}){name}: {handle_vertices} vertices in the handle, {does}"
+            "edit {index} ({edit}){name}: {handle_vertices} vertices in the handle, {does}"
         ))?;
         // Those that say of each vertex where it goes move no others.
         if *fixed_vertices == 0 && !muted && !["displacement", "skeleton"].contains(edit) {
             say(format_args!(
-                "edit {place} holds nothing fixed, so that whole pieces of the surface go with its handle"
+                "edit {index} holds nothing fixed, so that whole pieces of the surface go with its handle"
             ))?;
         }
     }

@@ -6,8 +6,9 @@ use clap::Args;
 use serde::Serialize;
 use tombolo::{
     deform::{
+        features::{FeatureSettings, FeatureSize},
         mesh::{FeatureSource, Mesh, TaggedFaces},
-        surface::{FeatureSettings, FeatureSize, Surface, SurfaceError},
+        surface::{Surface, SurfaceError},
     },
     pipelines::files::{Compression, check_mesh_name, read_mesh, write_mesh},
 };
@@ -19,7 +20,8 @@ pub(crate) struct Options {
     /// The mesh: .vtu, .vtk, .vtp or .msh
     #[arg(long, value_name = "IN")]
     mesh: PathBuf,
-    /// Part the surface where it turns by this many degrees or more, from 0 to 180, whatever features the mesh names
+    /// Part the surface where it turns by this many degrees or more, from 0 to 180, whatever
+    /// features the mesh names
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     angle: Option<f64>,
     /// A surface file to write, with a cell array `features` and the names: .vtp or .vtu

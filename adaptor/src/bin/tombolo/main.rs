@@ -39,7 +39,8 @@ enum Task {
     Mesh(MeshTask),
     /// List the features of a mesh, the named parts of its surface that edits move or hold
     Features(features::Options),
-    /// Give a mesh another shape; exit code 2 where the order is refused, and nothing is written then
+    /// Give a mesh another shape; exit code 2 where the order is refused, and nothing is written
+    /// then
     Edit(edit::Options),
     /// Find the curve skeleton of a mesh's surface
     Skeleton(skeleton::Options),
@@ -97,7 +98,8 @@ fn main() -> ExitCode {
     }
 }
 
-/// Prints the help or version that was asked for, or what is wrong with the arguments: 1 then, because 2 says that a shape is refused.
+/// Prints the help or version that was asked for, or what is wrong with the arguments: 1 then,
+/// because 2 says that a shape is refused.
 fn answer(asked: &clap::Error) -> ExitCode {
     let printed = asked.print().is_ok();
     if printed && asked.exit_code() == 0 { ExitCode::SUCCESS } else { ExitCode::from(1) }

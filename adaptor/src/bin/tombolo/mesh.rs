@@ -5,9 +5,11 @@ use std::{collections::BTreeMap, path::Path};
 use serde::Serialize;
 use tombolo::{
     deform::{
+        bounds::Bounds,
+        features::{FeatureSettings, FeatureSize},
         mesh::{Mesh, Vector},
         quality::{Quality, quality},
-        surface::{FeatureSettings, Surface},
+        surface::Surface,
     },
     pipelines::files::read_mesh,
 };
@@ -41,8 +43,11 @@ pub(crate) fn info(file: &Path, as_json: bool) -> Result<(), Failure> {
         vertices: read.mesh.points().len(),
         cells: read.mesh.cells().len(),
         cell_types: cell_types(&read.mesh),
-        bounds: bounds(read.mesh.points()),
-        features: features(&surface),
+        bounds: match read.mesh.points() {
+            [] => [[0.0; 3]; 2],
+            points => Bounds::around(points.iter().copied()).corners(),
+        },
+        features: surface.feature_sizes().into_iter().map(feature).collect(),
         quality: quality(read.mesh.cells(), read.mesh.points()),
         notes: read.notes,
     };
@@ -74,27 +79,6 @@ fn cell_types(mesh: &Mesh) -> BTreeMap<&'static str, usize> {
     counts
 }
 
-fn bounds(points: &[Vector]) -> [Vector; 2] {
-    let Some(&first) = points.first() else { return [[0.0; 3]; 2] };
-    points.iter().fold([first; 2], |[lower, upper], point| {
-        [
-            std::array::from_fn(|axis| f64::min(lower[axis], point[axis])),
-            std::array::from_fn(|axis| f64::max(upper[axis], point[axis])),
-        ]
-    })
-}
-
-fn features(surface: &Surface) -> Vec<Feature> {
-    let features = surface.features();
-    let faces =
-        |feature: u32| features.face_features().iter().filter(|&&other| other == feature).count();
-    let vertices = |feature: u32| features.vertices(feature).len();
-    let named = features.names().iter().zip(0..);
-    named
-        .map(|(name, index)| Feature {
-            name: name.clone(),
-            faces: faces(index),
-            vertices: vertices(index),
-        })
-        .collect()
+fn feature(FeatureSize { name, faces, vertices, .. }: FeatureSize) -> Feature {
+    Feature { name, faces, vertices }
 }

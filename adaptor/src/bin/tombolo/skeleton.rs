@@ -5,9 +5,10 @@ use std::{path::PathBuf, sync::Arc, time::Instant};
 use serde::Serialize;
 use tombolo::{
     deform::{
+        features::FeatureSettings,
         mesh::{CellType, Cells},
         skeleton::{Skeleton, SkeletonSettings},
-        surface::{FeatureSettings, Surface},
+        surface::Surface,
     },
     pipelines::{
         extract::{Association, Extract, Field},
@@ -22,7 +23,8 @@ pub(crate) struct Options {
     /// The mesh: .vtu, .vtk, .vtp or .msh; its boundary is taken where it has volume cells
     #[arg(long, value_name = "IN")]
     mesh: PathBuf,
-    /// The file to write: .vtp or .vtu. Polylines with the fields `curve` (of the polyline), `node`, `degree` and `radius`
+    /// The file to write: .vtp or .vtu. Polylines with the fields `curve` (of the polyline),
+    /// `node`, `degree` and `radius`
     #[arg(long, value_name = "OUT.vtp")]
     out: Option<PathBuf>,
     /// Print one JSON object

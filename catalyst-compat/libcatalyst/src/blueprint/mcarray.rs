@@ -33,25 +33,21 @@ pub fn verify_values(node: &Node, report: &mut Report) {
     }
 }
 
-/// Whether the components are of one type and lie in turn in one piece of memory.
+/// Whether the components lie in turn in one piece of memory, as Conduit tells it: all have one stride, and each begins where the
+/// element of the component before it ends. One component alone is interleaved.
 #[must_use]
 pub fn is_interleaved(node: &Node) -> bool {
-    let count = i64::try_from(node.count()).unwrap_or(i64::MAX);
-    let Some(first) = node.child(0).filter(|first| first.kind().is_number()) else {
-        return false;
-    };
     let mut report = Report::new("mcarray");
     verify(node, &mut report);
-    let stride = first.datatype().element_bytes.saturating_mul(count);
-    report.is_valid()
-        && count > 1
-        && node.children().enumerate().all(|(index, (_, component))| {
-            let ahead = isize::try_from(index).unwrap_or(0)
-                * isize::try_from(first.datatype().element_bytes).unwrap_or(0);
-            component.kind() == first.kind()
-                && component.datatype().stride == stride
-                && component.element(0) == first.element(0).wrapping_offset(ahead)
-        })
+    let Some(first) = node.child(0).filter(|_| report.is_valid()) else { return false };
+    let mut ahead = 0_isize;
+    node.children().all(|(_, component)| {
+        let begins = first.element(0).wrapping_offset(ahead);
+        ahead = ahead.saturating_add(
+            isize::try_from(component.datatype().element_bytes).unwrap_or(isize::MAX),
+        );
+        component.datatype().stride == first.datatype().stride && component.element(0) == begins
+    })
 }
 
 /// How components are laid out in memory.

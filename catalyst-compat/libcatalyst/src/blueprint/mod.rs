@@ -7,6 +7,7 @@ pub mod mcarray;
 pub mod mesh;
 pub mod partition;
 pub mod parts;
+pub mod protocols;
 pub mod report;
 pub mod sets;
 pub mod table;
@@ -31,7 +32,7 @@ pub fn verify(protocol: &str, node: &Node, info: &mut Node) -> Result<bool> {
     let mut report = Report::new(first);
     match (first, rest) {
         ("mesh", "") => mesh::verify(node, &mut report),
-        ("mesh", part) => mesh::verify_part(part, node, &mut report),
+        ("mesh", part) => protocols::verify(part, node, &mut report),
         ("mcarray", "") => mcarray::verify(node, &mut report),
         ("table", "") => table::verify(node, &mut report),
         ("zfparray", "") => table::verify_compressed(node, &mut report),

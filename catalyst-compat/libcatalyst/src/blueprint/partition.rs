@@ -244,7 +244,9 @@ fn choose(
             return Ok(());
         }
         _ => {
-            return Err(Error::new(format!("'{kind}' is none of explicit, ranges, logical, field")));
+            return Err(Error::new(format!(
+                "'{kind}' is none of explicit, ranges, logical, field"
+            )));
         }
     };
     if let Some(wrong) = chosen.iter().find(|element| **element >= count) {

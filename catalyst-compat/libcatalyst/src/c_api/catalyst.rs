@@ -4,7 +4,8 @@ use std::ffi::c_int;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use super::{node_mut, run};
-use crate::loader::{self, Implementation, Status};
+use crate::implementation::{Implementation, Status};
+use crate::loader;
 use crate::node::Node;
 use crate::stub;
 

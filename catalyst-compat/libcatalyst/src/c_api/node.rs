@@ -277,8 +277,8 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_contiguous_with_address(
     a: *const Node,
     end: *mut c_void,
 ) -> c_int {
-    // SAFETY: the caller keeps to `c_api`'s rules; the address is only compared.
     run(0, || {
+        // SAFETY: the caller keeps to `c_api`'s rules; the address is only compared.
         Ok((!end.is_null() && unsafe { node(a)? }.contiguous_from(end.cast()).is_some()).into())
     })
 }

@@ -144,7 +144,7 @@ writers! {
     "to_summary_string": "yaml", Style::summary();
 }
 
-/// What is printed goes where `printf` of the C library goes, in the same order.
+/// Text goes where `printf` of the C library goes, in the same order.
 fn show(text: &str) {
     // SAFETY: a null stream flushes all that the C library holds back.
     unsafe { libc::fflush(ptr::null_mut()) };

@@ -233,8 +233,8 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_fetch_path_data_ptr(
     source: *mut Node,
     path: *const c_char,
 ) -> *mut c_void {
-    // SAFETY: the caller keeps to `c_api`'s rules.
     run(ptr::null_mut(), || {
+        // SAFETY: the caller keeps to `c_api`'s rules.
         Ok(unsafe { node(source)?.existing(&string(path, "the path")?)? }.data().cast())
     })
 }
@@ -254,8 +254,8 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_fetch_path_element_ptr(
     path: *const c_char,
     index: i64,
 ) -> *mut c_void {
-    // SAFETY: the caller keeps to `c_api`'s rules.
     run(ptr::null_mut(), || {
+        // SAFETY: the caller keeps to `c_api`'s rules.
         Ok(unsafe { node(source)?.existing(&string(path, "the path")?)? }.element(index).cast())
     })
 }
@@ -363,8 +363,8 @@ unsafe extern "C-unwind" fn catalyst_conduit_node_fetch_path_as_char8_str(
     source: *mut Node,
     path: *const c_char,
 ) -> *mut c_char {
-    // SAFETY: the caller keeps to `c_api`'s rules.
     run(ptr::null_mut(), || {
+        // SAFETY: the caller keeps to `c_api`'s rules.
         text_address(unsafe { node(source)?.existing(&string(path, "the path")?)? })
     })
 }

@@ -184,6 +184,10 @@ static void memory(void)
   CHECK(!conduit_blueprint_mcarray_is_interleaved(copy));
   CHECK(conduit_blueprint_mcarray_to_interleaved(copy, copy) && conduit_blueprint_mcarray_is_interleaved(copy));
   CHECK(conduit_blueprint_mcarray_to_contiguous(copy, copy) && conduit_node_is_contiguous(copy));
+  conduit_node* single = conduit_node_create();
+  conduit_node_set_path_external_float64_ptr(single, "x", values, 8);
+  CHECK(conduit_blueprint_mcarray_is_interleaved(single));
+  conduit_node_destroy(single);
   /* What is taken out of a compact tree keeps its memory. */
   conduit_node* taken = conduit_node_create();
   conduit_node_move(taken, conduit_node_fetch(copy, "y"));

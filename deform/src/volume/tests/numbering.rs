@@ -1,4 +1,5 @@
-//! What comes out does not depend on how vertices and cells are numbered, and errors name what the caller has.
+//! What comes out does not depend on how vertices and cells are numbered, and errors name what the
+//! caller has.
 
 use super::*;
 use crate::mesh::shuffled;
@@ -33,9 +34,16 @@ fn displacements_are_those_of_the_same_vertices() {
             held.iter().map(|&vertex| bent(&mesh.points()[vertex as usize])).collect();
         for method in [Method::Elasticity, Method::Harmonic] {
             let settings = Deform { method, stiffening: 0.5, ..TIGHT };
-            let plain = VolumeOperator::with_sliding(&mesh, &held, &sliding, &settings).unwrap();
-            let shuffled =
-                VolumeOperator::with_sliding(&other, &numbered(&held), &slides, &settings).unwrap();
+            let plain =
+                VolumeOperator::with_sliding(&mesh, &held, &sliding, &settings, &BuiltIn).unwrap();
+            let shuffled = VolumeOperator::with_sliding(
+                &other,
+                &numbered(&held),
+                &slides,
+                &settings,
+                &BuiltIn,
+            )
+            .unwrap();
             let expected = plain.solve(&motion).unwrap().displacement;
             let found = shuffled.solve(&motion).unwrap().displacement;
             let difference = largest_difference(&expected, &unshuffled(&found, &number));
@@ -89,7 +97,7 @@ fn errors_name_the_callers_vertices_and_cells() {
             .iter()
             .map(|&vertex| mesh.points()[vertex as usize])
             .collect();
-        crate::quality::tet_determinant(corners.try_into().unwrap()) <= 0.0
+        crate::mesh::cell_geometry::tet_determinant(corners.try_into().unwrap()) <= 0.0
     };
     let inverted: Vec<usize> = (0..mesh.cells().len()).filter(|&cell| is_inverted(cell)).collect();
     assert_eq!((cell, count), (inverted[0], inverted.len()));
@@ -133,8 +141,8 @@ fn untangling_and_improving_move_the_same_vertices() {
         assert!(difference < 1e-9, "{difference}");
 
         let (mut expected, mut found) = spoiled(0.12);
-        assert!(Untangler::new(&mesh, &boundary).untangle(&mesh, &mut expected, 0.0));
-        assert!(Untangler::new(&other, &other_boundary).untangle(&other, &mut found, 0.0));
+        assert!(Untangler::new(&mesh, &boundary).untangle(&mut expected, 0.0));
+        assert!(Untangler::new(&other, &other_boundary).untangle(&mut found, 0.0));
         // The equations of a step are solved to a hundredth.
         let difference = largest_difference(&expected, &unshuffled(&found, &number));
         assert!(difference < 0.02, "{difference}");

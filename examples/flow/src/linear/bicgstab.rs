@@ -1,15 +1,21 @@
 //! The stabilised bi-conjugate gradient method, for three right-hand sides of one matrix at once.
 
-use super::{BlockIncompleteLu, Halo, Matrix, Outcome, for_each_chunk, sum};
+use tombolo_deform::communicator::Halo;
+use tombolo_deform::linear::SparseMatrix;
+
+use super::{BlockIncompleteLu, Outcome, for_each, sum};
+use crate::ranks::total;
 
 /// One value of three components for each row.
 pub type Tuples = Vec<[f64; 3]>;
 
-/// BiCGStab (van der Vorst 1992), preconditioned from the right, for three systems that share a matrix.
+/// BiCGStab (van der Vorst 1992), preconditioned from the right, for three systems that share a
+/// matrix.
 ///
-/// Each component has its own scalars and rests once it has converged. `held` marks components of rows that are prescribed
-/// although the matrix does not say so: the operator is the identity there. On several ranks each has its rows of the matrix;
-/// `right` holds the values of its rows, `solution` those of all its vertices.
+/// Each component has its own scalars and rests once it has converged. `held` marks components of
+/// rows that are prescribed although the matrix does not say so: the operator is the identity
+/// there. On several ranks each has its own rows of the matrix first; `right` holds the values of
+/// its rows, `solution` those of all its vertices.
 #[derive(Debug, Default)]
 pub struct BiCgStab {
     residual: Tuples,
@@ -22,14 +28,15 @@ pub struct BiCgStab {
 }
 
 impl BiCgStab {
-    /// Improves `solution` until each component's residual is below its `tolerance` (absolute, Euclidean norm).
+    /// Improves `solution` until each component's residual is below its `tolerance` (absolute,
+    /// Euclidean norm).
     ///
-    /// Gives up after `limit` iterations; a breakdown restarts from the residual reached. NaN in, NaN out: the outcome then is
-    /// not converged. Collective.
+    /// Gives up after `limit` iterations; a breakdown restarts from the residual reached. NaN in,
+    /// NaN out: the outcome then is not converged. Collective.
     #[expect(clippy::too_many_arguments, reason = "the parts of one linear system")]
     pub fn solve(
         &mut self,
-        matrix: &Matrix,
+        matrix: &SparseMatrix<1>,
         preconditioner: &BlockIncompleteLu,
         halo: &Halo,
         held: &[[bool; 3]],
@@ -52,8 +59,8 @@ impl BiCgStab {
         for buffer in [&mut self.preconditioned, &mut self.second] {
             buffer.resize(solution.len(), [0.0; 3]);
         }
-        halo.update(solution);
-        let dot = |a: &[[f64; 3]], b: &[[f64; 3]]| halo.sum(dot(a, b));
+        halo.update(3, solution.as_flattened_mut());
+        let dot = |a: &[[f64; 3]], b: &[[f64; 3]]| total(halo.communicator(), dot(a, b));
         let mut iterations = 0;
         let mut norms = [f64::INFINITY; 3];
         while iterations < limit {
@@ -86,7 +93,7 @@ impl BiCgStab {
     #[expect(clippy::too_many_arguments, reason = "the parts of one linear system")]
     fn run(
         &mut self,
-        matrix: &Matrix,
+        matrix: &SparseMatrix<1>,
         preconditioner: &BlockIncompleteLu,
         halo: &Halo,
         held: &[[bool; 3]],
@@ -96,7 +103,7 @@ impl BiCgStab {
         limit: usize,
     ) -> usize {
         let rows = self.residual.len();
-        let dot = |a: &[[f64; 3]], b: &[[f64; 3]]| halo.sum(dot(a, b));
+        let dot = |a: &[[f64; 3]], b: &[[f64; 3]]| total(halo.communicator(), dot(a, b));
         self.shadow.copy_from_slice(&self.residual);
         self.direction.fill([0.0; 3]);
         self.image.fill([0.0; 3]);
@@ -106,25 +113,21 @@ impl BiCgStab {
             let beta = quotient(open, |c| next[c] * alpha[c], |c| rho[c] * omega[c]);
             rho = next;
             let (residual, image) = (&self.residual, &self.image);
-            for_each_chunk(&mut self.direction, |start, chunk| {
-                for (offset, value) in chunk.iter_mut().enumerate() {
-                    let row = start + offset;
-                    for c in 0..3 {
-                        value[c] =
-                            residual[row][c] + beta[c] * (value[c] - omega[c] * image[row][c]);
-                    }
+            for_each(&mut self.direction, |row, value| {
+                for c in 0..3 {
+                    value[c] = residual[row][c] + beta[c] * (value[c] - omega[c] * image[row][c]);
                 }
             });
-            preconditioner.apply(&self.direction, &mut self.preconditioned[..rows]);
-            halo.update(&mut self.preconditioned);
+            preconditioner.apply(matrix, &self.direction, &mut self.preconditioned[..rows]);
+            halo.update(3, self.preconditioned.as_flattened_mut());
             multiply(matrix, held, &self.preconditioned, &mut self.image);
             let against = dot(&self.shadow, &self.image);
             alpha = quotient(open, |c| rho[c], |c| against[c]);
             update(solution, alpha, &self.preconditioned);
             update(&mut self.residual, alpha.map(|value| -value), &self.image);
 
-            preconditioner.apply(&self.residual, &mut self.second[..rows]);
-            halo.update(&mut self.second);
+            preconditioner.apply(matrix, &self.residual, &mut self.second[..rows]);
+            halo.update(3, self.second.as_flattened_mut());
             multiply(matrix, held, &self.second, &mut self.second_image);
             let (top, bottom) = (
                 dot(&self.second_image, &self.residual),
@@ -148,7 +151,8 @@ impl BiCgStab {
     }
 }
 
-/// The quotient for the components that are still open; 0 for the others and where the divisor vanishes.
+/// The quotient for the components that are still open; 0 for the others and where the divisor
+/// vanishes.
 fn quotient(
     open: [bool; 3],
     top: impl Fn(usize) -> f64,
@@ -173,17 +177,27 @@ fn dot(a: &[[f64; 3]], b: &[[f64; 3]]) -> [f64; 3] {
 }
 
 fn update(values: &mut [[f64; 3]], factor: [f64; 3], by: &[[f64; 3]]) {
-    for_each_chunk(values, |start, chunk| {
-        for (offset, value) in chunk.iter_mut().enumerate() {
-            for c in 0..3 {
-                value[c] += factor[c] * by[start + offset][c];
-            }
+    for_each(values, |index, value| {
+        for c in 0..3 {
+            value[c] += factor[c] * by[index][c];
         }
     });
 }
 
-fn row_image(matrix: &Matrix, held: &[[bool; 3]], row: usize, vector: &[[f64; 3]]) -> [f64; 3] {
-    let mut value = matrix.row_times_tuples(row, vector);
+fn row_image(
+    matrix: &SparseMatrix<1>,
+    held: &[[bool; 3]],
+    row: usize,
+    vector: &[[f64; 3]],
+) -> [f64; 3] {
+    let (columns, entries) = matrix.row(row);
+    let mut value = [0.0; 3];
+    for (&column, [[entry]]) in columns.iter().zip(entries) {
+        let other = &vector[column as usize];
+        value[0] += entry * other[0];
+        value[1] += entry * other[1];
+        value[2] += entry * other[2];
+    }
     for c in 0..3 {
         if held[row][c] {
             value[c] = vector[row][c];
@@ -192,25 +206,26 @@ fn row_image(matrix: &Matrix, held: &[[bool; 3]], row: usize, vector: &[[f64; 3]
     value
 }
 
-fn multiply(matrix: &Matrix, held: &[[bool; 3]], vector: &[[f64; 3]], result: &mut [[f64; 3]]) {
-    for_each_chunk(result, |start, chunk| {
-        for (offset, value) in chunk.iter_mut().enumerate() {
-            *value = row_image(matrix, held, start + offset, vector);
-        }
+fn multiply(
+    matrix: &SparseMatrix<1>,
+    held: &[[bool; 3]],
+    vector: &[[f64; 3]],
+    result: &mut [[f64; 3]],
+) {
+    for_each(result, |index, value| {
+        *value = row_image(matrix, held, index, vector);
     });
 }
 
 fn subtract_product(
-    matrix: &Matrix,
+    matrix: &SparseMatrix<1>,
     held: &[[bool; 3]],
     right: &[[f64; 3]],
     vector: &[[f64; 3]],
     result: &mut [[f64; 3]],
 ) {
-    for_each_chunk(result, |start, chunk| {
-        for (offset, value) in chunk.iter_mut().enumerate() {
-            let image = row_image(matrix, held, start + offset, vector);
-            *value = std::array::from_fn(|c| right[start + offset][c] - image[c]);
-        }
+    for_each(result, |index, value| {
+        let image = row_image(matrix, held, index, vector);
+        *value = std::array::from_fn(|c| right[index][c] - image[c]);
     });
 }

@@ -1,27 +1,19 @@
-//! Sparse matrices and the iterative solvers of the flow solver.
+//! The iterative solver of the momentum equation, whose matrix is not symmetric; that of the
+//! pressure is the kernel's.
 //!
-//! Everything here gives the same bits whatever the number of threads: a row is summed by one thread in the order of its
-//! entries, and reductions are summed over chunks of a fixed length, and of several ranks in the order of a fixed tree ([`Halo`]).
+//! Everything here gives the same bits whatever the number of threads: a row is summed by one
+//! thread in the order of its entries, and reductions are summed over chunks of a fixed length, and
+//! of several ranks in the order of a fixed tree.
 
 mod bicgstab;
-mod conjugate_gradients;
-mod halo;
 mod incomplete_lu;
-mod matrix;
-mod multigrid;
-mod schwarz;
 mod vectors;
 
 pub use bicgstab::{BiCgStab, Tuples};
-pub use conjugate_gradients::ConjugateGradients;
-pub use halo::{Halo, Values};
 pub use incomplete_lu::BlockIncompleteLu;
-pub use matrix::{Matrix, Pattern};
-pub use multigrid::Multigrid;
-pub use schwarz::Schwarz;
-pub use vectors::{CHUNK, for_each_chunk, norm, sum};
+pub use vectors::{CHUNK, for_each, sum};
 
-/// What an iterative solve came to.
+/// The outcome of an iterative solve.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Outcome {
     /// How many iterations it took.

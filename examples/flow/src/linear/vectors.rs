@@ -1,4 +1,5 @@
-//! Loops and sums over long vectors, threaded and with the same bits whatever the number of threads.
+//! Loops and sums over long vectors, threaded and with the same bits whatever the number of
+//! threads.
 
 use rayon::prelude::*;
 
@@ -8,17 +9,18 @@ pub const CHUNK: usize = 2048;
 /// Below this length a second thread costs more than it gains.
 const SERIAL: usize = 2 * CHUNK;
 
-/// Calls `visit` with each chunk of `values` and the index of its first entry.
-pub fn for_each_chunk<T: Send>(values: &mut [T], visit: impl Fn(usize, &mut [T]) + Sync) {
+/// Calls `visit` with each entry of `values` and its index.
+pub fn for_each<T: Send>(values: &mut [T], visit: impl Fn(usize, &mut T) + Sync) {
+    let visit_all = |first: usize, values: &mut [T]| {
+        (first..).zip(values).for_each(|(index, value)| visit(index, value))
+    };
     if values.len() <= SERIAL {
-        for (chunk, slice) in values.chunks_mut(CHUNK).enumerate() {
-            visit(chunk * CHUNK, slice);
-        }
+        visit_all(0, values);
     } else {
         values
             .par_chunks_mut(CHUNK)
             .enumerate()
-            .for_each(|(chunk, slice)| visit(chunk * CHUNK, slice));
+            .for_each(|(chunk, slice)| visit_all(chunk * CHUNK, slice));
     }
 }
 
@@ -42,12 +44,4 @@ pub fn sum<const N: usize>(
     let parts: Vec<[f64; N]> =
         (0..chunks).into_par_iter().map(|chunk| part(range(chunk))).collect();
     parts.into_iter().fold([0.0; N], add)
-}
-
-/// The Euclidean norm.
-#[must_use]
-pub fn norm(values: &[f64]) -> f64 {
-    let [square] =
-        sum(values.len(), |range| [values[range].iter().map(|value| value * value).sum()]);
-    square.sqrt()
 }

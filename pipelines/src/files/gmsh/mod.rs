@@ -1,7 +1,7 @@
 //! Gmsh's .msh files, versions 2.2 and 4.1, text and binary of either byte order.
 //!
-//! The format is that of the Gmsh reference manual, "Gmsh file formats". Physical surfaces become features. Of the several
-//! physical groups that version 4.1 allows an entity, the first counts.
+//! The format is that of the Gmsh reference manual, "Gmsh file formats". Physical surfaces become
+//! features. Of the several physical groups that version 4.1 allows an entity, the first counts.
 
 mod elements;
 mod version2;
@@ -9,17 +9,17 @@ mod version4;
 
 use std::collections::{BTreeMap, HashMap};
 
-use tombolo_deform::mesh::{Cells, Vector};
+use tombolo_deform::mesh::Vector;
 
 use super::MeshFile;
-use super::assemble::Parts;
+use super::assemble::FileContents;
 use super::error::{Flaw, Problem};
 use super::scanner::Scanner;
 
 /// Reads a .msh file.
 pub(super) fn parse(bytes: &[u8]) -> Result<MeshFile, Flaw> {
     let mut reader = Reader::start(bytes)?;
-    let mut parts = Parts { cells: Cells::new(), ..Parts::default() };
+    let mut contents = FileContents::default();
     let mut nodes = None;
     let mut entities = version4::PhysicalTags::default();
     let mut elements = false;
@@ -35,7 +35,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<MeshFile, Flaw> {
             }
         };
         match section {
-            b"PhysicalNames" => parts.names = reader.physical_names()?,
+            b"PhysicalNames" => contents.names = reader.physical_names()?,
             b"Entities" if reader.is_version_4 => entities.read(&mut reader, false)?,
             b"PartitionedEntities" if reader.is_version_4 => entities.read(&mut reader, true)?,
             b"Nodes" => {
@@ -43,7 +43,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<MeshFile, Flaw> {
                     true => version4::nodes(&mut reader)?,
                     false => version2::nodes(&mut reader)?,
                 };
-                parts.points = points;
+                contents.points = points;
                 nodes = Some(numbers);
             }
             b"Elements" => {
@@ -52,18 +52,21 @@ pub(super) fn parse(bytes: &[u8]) -> Result<MeshFile, Flaw> {
                         .scanner
                         .flaw(Problem::unexpected(b"$Elements", "$Nodes, which elements refer to,"))
                 })?;
-                parts.cell_tags = Some(match reader.is_version_4 {
-                    true => version4::elements(&mut reader, nodes, &entities, &mut parts.cells)?,
-                    false => {
-                        version2::elements(&mut reader, nodes, &mut parts.cells, &mut parts.notes)?
-                    }
+                contents.cell_tags = Some(match reader.is_version_4 {
+                    true => version4::elements(&mut reader, nodes, &entities, &mut contents.cells)?,
+                    false => version2::elements(
+                        &mut reader,
+                        nodes,
+                        &mut contents.cells,
+                        &mut contents.notes,
+                    )?,
                 });
                 elements = true;
             }
             b"Periodic" | b"Comments" | b"GhostElements" | b"Parametrizations" => {}
-            other => {
-                parts.notes.push(format!("left out: section ${}", String::from_utf8_lossy(other)))
-            }
+            other => contents
+                .notes
+                .push(format!("left out: section ${}", String::from_utf8_lossy(other))),
         }
         let end = [b"$End", section].concat();
         if !reader.scanner.skip_behind(&end) {
@@ -74,7 +77,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<MeshFile, Flaw> {
     if !elements {
         return Err(reader.scanner.flaw(Problem::unexpected(b"the end of the file", "$Elements")));
     }
-    parts.assemble()
+    contents.assemble()
 }
 
 /// Numbers from either kind of .msh file.
@@ -180,7 +183,8 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// A count of things that take so many bytes each in a binary file, and so many numbers each in a text file.
+    /// A count of things that take so many bytes each in a binary file, and so many numbers each in
+    /// a text file.
     fn count(&self, count: u64, bytes: usize, numbers: usize, what: &str) -> Result<usize, Flaw> {
         self.scanner.check_count(count, if self.scanner.binary { bytes } else { 2 * numbers }, what)
     }

@@ -89,14 +89,8 @@ pub(super) fn nodes(reader: &mut Reader) -> Result<(Vec<Vector>, NodeNumbers), F
             }
         }
     }
-    if points.len() != count {
-        let what = "nodes in the blocks of $Nodes".to_owned();
-        return Err(reader.scanner.flaw(Problem::Count {
-            what,
-            found: points.len() as u64,
-            expected: count as u64,
-        }));
-    }
+    Problem::check_count("nodes in the blocks of $Nodes", points.len(), count)
+        .map_err(|problem| reader.scanner.flaw(problem))?;
     Ok((points, numbers))
 }
 
@@ -138,13 +132,7 @@ pub(super) fn elements(
             tags.push(tag);
         }
     }
-    if tags.len() != count {
-        let what = "elements in the blocks of $Elements".to_owned();
-        return Err(reader.scanner.flaw(Problem::Count {
-            what,
-            found: tags.len() as u64,
-            expected: count as u64,
-        }));
-    }
+    Problem::check_count("elements in the blocks of $Elements", tags.len(), count)
+        .map_err(|problem| reader.scanner.flaw(problem))?;
     Ok(tags)
 }

@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use proptest::prelude::*;
+use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::mesh::{NumberType, Vector};
 use tombolo_deform::shapes::{box_of_hexahedra, box_of_tets, torus};
-use tombolo_deform::surface::{FeatureSettings, Surface};
+use tombolo_deform::surface::Surface;
 
 use super::super::{
     parse_displacement, read_displacement, read_mesh, write_displacement, write_mesh,

@@ -2,8 +2,8 @@
 
 use super::*;
 
-/// A prism under a pyramid's neighbour, written by hand in each form: two volume cells, tagged and untagged faces, a node that
-/// nothing uses, node tags with gaps.
+/// A prism under a pyramid's neighbour, written by hand in each form: two volume cells, tagged and
+/// untagged faces, a node that nothing uses, node tags with gaps.
 const NODES: [(u64, Vector); 8] = [
     (3, [0.0, 0.0, 0.0]),
     (10, [1.0, 0.0, 0.0]),

@@ -99,7 +99,8 @@ fn meshio_reads_what_is_written() {
     }
 }
 
-/// Features keep their numbers and names on the way through meshio, as physical groups of Gmsh's format too.
+/// Features keep their numbers and names on the way through meshio, as physical groups of Gmsh's
+/// format too.
 #[test]
 fn what_meshio_writes_is_read() {
     let folder = tempfile::tempdir().unwrap();

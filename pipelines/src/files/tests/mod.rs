@@ -13,7 +13,8 @@ use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, NumberType, Tag
 use super::{Compression, MeshFile, parse_mesh, read_mesh, write_mesh};
 use crate::extract::{Association, Extract, ExtractFeatures, Field};
 
-/// One cell of each type of a dimension, none sharing a vertex, at coordinates that no short decimal gives exactly.
+/// One cell of each type of a dimension, none sharing a vertex, at coordinates that no short
+/// decimal gives exactly.
 fn one_of_each(dimension: usize) -> Mesh {
     let mut points: Vec<Vector> = Vec::new();
     let mut cells = Cells::new();

@@ -85,7 +85,8 @@ fn negative_tags_keep_their_names() {
     assert_eq!(back.names, [(back.tags[0], "feature--5".to_owned())]);
 }
 
-/// Names that stand in an array of text, as they were written up to now and as other programs may write them.
+/// Names that stand in an array of text, as they were written up to now and as other programs may
+/// write them.
 #[test]
 fn names_as_text_are_read() {
     let text = |field_data: &str| {
@@ -162,7 +163,8 @@ fn a_series_is_whole_after_every_entry() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
-/// Runs `tests/vtk/read_back.py` with Debian's VTK; `None` where the environment says that there is none.
+/// Runs `tests/vtk/read_back.py` with Debian's VTK; `None` where the environment says that there is
+/// none.
 fn vtk(arguments: &[&Path]) -> Option<String> {
     if std::env::var_os("TOMBOLO_WITHOUT_VTK").is_some() {
         eprintln!("skipped: TOMBOLO_WITHOUT_VTK is set, so VTK reads nothing back");
@@ -265,7 +267,8 @@ fn vtk_reads_what_is_written() {
     }
 }
 
-/// A file that names another is read by VTK as that other is, but for field data, which VTK does not look for there.
+/// A file that names another is read by VTK as that other is, but for field data, which VTK does
+/// not look for there.
 #[test]
 fn vtk_finds_the_data_that_an_index_names() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,143 +1,123 @@
 //! Arrays of VTK files: any number type, or text.
 
+use std::str::FromStr;
+
 use tombolo_deform::mesh::NumberType;
 
-use super::super::error::Problem;
+use super::super::error::{Flaw, Problem};
 use super::super::scanner::Scanner;
 
-/// A number type of VTK, by its width in bytes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Scalar {
-    Signed(usize),
-    Unsigned(usize),
-    Float(usize),
+/// The name of a type of number in VTK.
+pub(super) fn number_name(number: NumberType) -> &'static str {
+    match number {
+        NumberType::I8 => "Int8",
+        NumberType::I16 => "Int16",
+        NumberType::I32 => "Int32",
+        NumberType::I64 => "Int64",
+        NumberType::U8 => "UInt8",
+        NumberType::U16 => "UInt16",
+        NumberType::U32 => "UInt32",
+        NumberType::U64 => "UInt64",
+        NumberType::F32 => "Float32",
+        NumberType::F64 => "Float64",
+    }
 }
 
-impl Scalar {
-    /// The type that XML files call so.
-    pub fn from_xml(name: &str) -> Option<Self> {
-        Some(match name {
-            "Int8" => Scalar::Signed(1),
-            "Int16" => Scalar::Signed(2),
-            "Int32" => Scalar::Signed(4),
-            "Int64" => Scalar::Signed(8),
-            "UInt8" => Scalar::Unsigned(1),
-            "UInt16" => Scalar::Unsigned(2),
-            "UInt32" => Scalar::Unsigned(4),
-            "UInt64" => Scalar::Unsigned(8),
-            "Float32" => Scalar::Float(4),
-            "Float64" => Scalar::Float(8),
-            _ => return None,
-        })
-    }
+/// The type of number that XML files call so.
+pub(super) fn from_xml(name: &str) -> Option<NumberType> {
+    NumberType::ALL.into_iter().find(|number| number_name(*number) == name)
+}
 
-    /// The type that legacy files call so.
-    pub fn from_legacy(name: &str) -> Option<Self> {
-        Some(match name.to_ascii_lowercase().as_str() {
-            "char" | "signed_char" => Scalar::Signed(1),
-            "unsigned_char" => Scalar::Unsigned(1),
-            "short" => Scalar::Signed(2),
-            "unsigned_short" => Scalar::Unsigned(2),
-            // Legacy files store VTK's identifiers as 32-bit numbers.
-            "int" | "vtkidtype" => Scalar::Signed(4),
-            "unsigned_int" => Scalar::Unsigned(4),
-            "long" | "vtktypeint64" | "long_long" => Scalar::Signed(8),
-            "unsigned_long" | "vtktypeuint64" | "unsigned_long_long" => Scalar::Unsigned(8),
-            "float" => Scalar::Float(4),
-            "double" => Scalar::Float(8),
-            _ => return None,
-        })
-    }
+/// The type of number that legacy files call so.
+pub(super) fn from_legacy(name: &str) -> Option<NumberType> {
+    Some(match name.to_ascii_lowercase().as_str() {
+        "char" | "signed_char" => NumberType::I8,
+        "unsigned_char" => NumberType::U8,
+        "short" => NumberType::I16,
+        "unsigned_short" => NumberType::U16,
+        // Legacy files store VTK's identifiers as 32-bit numbers.
+        "int" | "vtkidtype" => NumberType::I32,
+        "unsigned_int" => NumberType::U32,
+        "long" | "vtktypeint64" | "long_long" => NumberType::I64,
+        "unsigned_long" | "vtktypeuint64" | "unsigned_long_long" => NumberType::U64,
+        "float" => NumberType::F32,
+        "double" => NumberType::F64,
+        _ => return None,
+    })
+}
 
-    /// The type that fields of it have.
-    pub fn number(self) -> NumberType {
-        match self {
-            Scalar::Signed(1) => NumberType::I8,
-            Scalar::Signed(2) => NumberType::I16,
-            Scalar::Signed(4) => NumberType::I32,
-            Scalar::Signed(_) => NumberType::I64,
-            Scalar::Unsigned(1) => NumberType::U8,
-            Scalar::Unsigned(2) => NumberType::U16,
-            Scalar::Unsigned(4) => NumberType::U32,
-            Scalar::Unsigned(_) => NumberType::U64,
-            Scalar::Float(4) => NumberType::F32,
-            Scalar::Float(_) => NumberType::F64,
+/// Numbers from their bytes; bytes beyond the last whole number are not looked at.
+pub(super) fn decode(kind: NumberType, bytes: &[u8], big_endian: bool) -> Result<Numbers, Problem> {
+    fn all<const N: usize, T>(
+        bytes: &[u8],
+        big_endian: bool,
+        number: impl Fn([u8; N]) -> T,
+    ) -> Vec<T> {
+        let in_order = |mut word: [u8; N]| {
+            if big_endian {
+                word.reverse();
+            }
+            number(word)
+        };
+        bytes.as_chunks().0.iter().copied().map(in_order).collect()
+    }
+    Ok(match kind {
+        NumberType::I8 => {
+            Numbers::Integer(all(bytes, big_endian, |word| i8::from_le_bytes(word).into()))
         }
-    }
-
-    pub fn width(self) -> usize {
-        match self {
-            Scalar::Signed(width) | Scalar::Unsigned(width) | Scalar::Float(width) => width,
+        NumberType::I16 => {
+            Numbers::Integer(all(bytes, big_endian, |word| i16::from_le_bytes(word).into()))
         }
-    }
+        NumberType::I32 => {
+            Numbers::Integer(all(bytes, big_endian, |word| i32::from_le_bytes(word).into()))
+        }
+        NumberType::I64 => Numbers::Integer(all(bytes, big_endian, i64::from_le_bytes)),
+        NumberType::U8 => {
+            Numbers::Integer(all(bytes, big_endian, |word| u8::from_le_bytes(word).into()))
+        }
+        NumberType::U16 => {
+            Numbers::Integer(all(bytes, big_endian, |word| u16::from_le_bytes(word).into()))
+        }
+        NumberType::U32 => {
+            Numbers::Integer(all(bytes, big_endian, |word| u32::from_le_bytes(word).into()))
+        }
+        NumberType::U64 => {
+            let number = |word: u64| {
+                let expected = || format!("a number up to {}", i64::MAX);
+                i64::try_from(word)
+                    .map_err(|_| Problem::unexpected(word.to_string().as_bytes(), expected()))
+            };
+            let words = all(bytes, big_endian, u64::from_le_bytes);
+            Numbers::Integer(words.into_iter().map(number).collect::<Result<_, _>>()?)
+        }
+        NumberType::F32 => {
+            Numbers::Float(all(bytes, big_endian, |word| f32::from_le_bytes(word).into()))
+        }
+        NumberType::F64 => Numbers::Float(all(bytes, big_endian, f64::from_le_bytes)),
+    })
+}
 
-    /// Numbers from their bytes; bytes beyond the last whole number are not looked at.
-    pub fn decode(self, bytes: &[u8], big_endian: bool) -> Result<Numbers, Problem> {
-        let chunks = bytes.chunks_exact(self.width()).map(|chunk| {
-            let mut word = [0; 8];
-            for (index, &byte) in chunk.iter().enumerate() {
-                let place = if big_endian { chunk.len() - 1 - index } else { index };
-                if let Some(slot) = word.get_mut(place) {
-                    *slot = byte;
-                }
-            }
-            u64::from_le_bytes(word)
-        });
-        Ok(match self {
-            #[expect(clippy::cast_possible_truncation, reason = "the word holds 4 bytes")]
-            Scalar::Float(4) => {
-                Numbers::Float(chunks.map(|word| f64::from(f32::from_bits(word as u32))).collect())
-            }
-            Scalar::Float(_) => Numbers::Float(chunks.map(f64::from_bits).collect()),
-            Scalar::Signed(width) => {
-                let unused = 64 - 8 * width;
-                Numbers::Integer(
-                    chunks.map(|word| (word << unused).cast_signed() >> unused).collect(),
-                )
-            }
-            Scalar::Unsigned(_) => {
-                let values: Result<Vec<i64>, Problem> = chunks
-                    .map(|word| {
-                        i64::try_from(word).map_err(|_| {
-                            Problem::unexpected(
-                                word.to_string().as_bytes(),
-                                format!("a number up to {}", i64::MAX),
-                            )
-                        })
-                    })
-                    .collect();
-                Numbers::Integer(values?)
-            }
-        })
-    }
-
-    /// Numbers from text: all words of it, or the first `count`.
-    pub fn read_text(
-        self,
+/// Numbers from text: all words of it, or the first `count`.
+pub(super) fn read_text(
+    kind: NumberType,
+    scanner: &mut Scanner,
+    count: Option<usize>,
+) -> Result<Numbers, Flaw> {
+    fn all<T: FromStr>(
         scanner: &mut Scanner,
         count: Option<usize>,
-    ) -> Result<Numbers, super::super::error::Flaw> {
-        let count = count.unwrap_or(usize::MAX);
-        let more = |scanner: &Scanner, done: usize| {
-            done < count && (count < usize::MAX || !scanner.peek_word().is_empty())
-        };
-        Ok(match self {
-            Scalar::Float(_) => {
-                let mut values: Vec<f64> = Vec::new();
-                while more(scanner, values.len()) {
-                    values.push(scanner.number("a number")?);
-                }
-                Numbers::Float(values)
-            }
-            Scalar::Signed(_) | Scalar::Unsigned(_) => {
-                let mut values: Vec<i64> = Vec::new();
-                while more(scanner, values.len()) {
-                    values.push(scanner.number("an integer")?);
-                }
-                Numbers::Integer(values)
-            }
-        })
+        expected: &str,
+    ) -> Result<Vec<T>, Flaw> {
+        let mut values = Vec::new();
+        while count.map_or(!scanner.peek_word().is_empty(), |count| values.len() < count) {
+            values.push(scanner.number(expected)?);
+        }
+        Ok(values)
     }
+    if kind.is_real() {
+        return Ok(Numbers::Float(all(scanner, count, "a number")?));
+    }
+    Ok(Numbers::Integer(all(scanner, count, "an integer")?))
 }
 
 /// The values of an array.

@@ -2,22 +2,21 @@
 
 use std::collections::BTreeMap;
 
-use tombolo_deform::mesh::{CellType, Cells, MeshError, Vector};
+use tombolo_deform::mesh::{CellType, Cells, MeshError, Vector, ghosts};
 
 use super::super::MeshFile;
-use super::super::assemble::Parts;
+use super::super::assemble::FileContents;
 use super::super::error::{Flaw, Problem};
 use super::array::{Array, Numbers};
 use super::names::decoded;
 use super::{FACE_DIMENSION, FEATURE_NAMES, FEATURE_NUMBERS, FEATURES};
 use crate::extract::{Association, Field};
 
-/// Bits of `vtkGhostType` on cells: a copy of another rank's, or not to be shown.
-const GHOST_OR_HIDDEN: i64 = 1 | 32;
 /// Components that a field may have.
 const MOST_COMPONENTS: usize = 9;
 
 /// An unstructured grid or polygonal data as a file has it.
+#[derive(Default)]
 pub(super) struct Dataset {
     pub points: Vec<Vector>,
     pub cells: Cells,
@@ -25,19 +24,6 @@ pub(super) struct Dataset {
     pub cell_arrays: Vec<Array>,
     pub field_arrays: Vec<Array>,
     pub notes: Vec<String>,
-}
-
-impl Default for Dataset {
-    fn default() -> Self {
-        Self {
-            points: Vec::new(),
-            cells: Cells::new(),
-            point_arrays: Vec::new(),
-            cell_arrays: Vec::new(),
-            field_arrays: Vec::new(),
-            notes: Vec::new(),
-        }
-    }
 }
 
 impl Dataset {
@@ -48,11 +34,8 @@ impl Dataset {
         ] {
             for array in arrays {
                 let expected = array.components.saturating_mul(count);
-                if array.numbers.len() != expected {
-                    let what = format!("values of array '{}' on {count} {what}", array.name);
-                    let (found, expected) = (array.numbers.len() as u64, expected as u64);
-                    return Err(Problem::Count { what, found, expected }.into());
-                }
+                let what = format!("values of array '{}' on {count} {what}", array.name);
+                Problem::check_count(what, array.numbers.len(), expected)?;
             }
         }
         let left_out = self.ghost_cells()?;
@@ -86,7 +69,7 @@ impl Dataset {
                 }
             }
         }
-        Parts {
+        FileContents {
             points: self.points,
             cells: self.cells,
             cell_tags,
@@ -104,7 +87,11 @@ impl Dataset {
         take(&mut self.point_arrays, "vtkGhostLevels");
         if let Some(array) = take(&mut self.cell_arrays, "vtkGhostType") {
             return Ok(Some(
-                array.integers()?.into_iter().map(|bits| bits & GHOST_OR_HIDDEN != 0).collect(),
+                array
+                    .integers()?
+                    .into_iter()
+                    .map(|bits| !ghosts::is_own(ghosts::of_integer(bits)))
+                    .collect(),
             ));
         }
         match take(&mut self.cell_arrays, "vtkGhostLevels") {
@@ -134,34 +121,29 @@ impl Dataset {
             Some(numbers) => numbers.integers()?,
             None => (0..).take(names.len()).collect(),
         };
-        if numbers.len() != names.len() {
-            let what = format!("values of array '{FEATURE_NUMBERS}'");
-            return Err(Problem::Count {
-                what,
-                found: numbers.len() as u64,
-                expected: names.len() as u64,
-            });
-        }
+        Problem::check_count(
+            format!("values of array '{FEATURE_NUMBERS}'"),
+            numbers.len(),
+            names.len(),
+        )?;
         Ok(numbers.into_iter().zip(names).collect())
     }
 
     /// Puts another piece of the same file behind this one.
     pub fn append(&mut self, piece: Dataset) -> Result<(), Problem> {
-        let base = u32::try_from(self.points.len()).map_err(|_| too_large())?;
-        for cell in 0..piece.cells.len() {
-            let shift = |vertices: &[u32]| -> Result<Vec<u32>, Problem> {
-                vertices
-                    .iter()
-                    .map(|&vertex| vertex.checked_add(base).ok_or_else(too_large))
-                    .collect()
-            };
-            if piece.cells.cell_type(cell) == CellType::Polyhedron {
-                let faces: Result<Vec<_>, _> =
-                    piece.cells.polyhedron_faces(cell).iter().map(|face| shift(face)).collect();
-                self.cells.push_polyhedron(&faces?)?;
-            } else {
-                self.cells
-                    .push(piece.cells.cell_type(cell), &shift(piece.cells.vertices(cell))?)?;
+        piece.cells.validate(piece.points.len())?;
+        let end = u32::try_from(self.points.len() + piece.points.len()).map_err(|_| {
+            Problem::Unsupported {
+                what: format!("a mesh of more than {} points", u32::MAX),
+                instead: "split it into parts, one for each rank",
+            }
+        })?;
+        let numbers: Vec<u32> = (0..end).skip(self.points.len()).collect();
+        let cells = piece.cells.with_vertices(&numbers);
+        for (cell, (cell_type, vertices)) in cells.iter().enumerate() {
+            match cells.polyhedron_faces(cell) {
+                [] => self.cells.push(cell_type, vertices)?,
+                faces => self.cells.push_polyhedron(faces)?,
             }
         }
         self.points.extend(piece.points);
@@ -195,7 +177,8 @@ fn append_arrays(first: &mut Vec<Array>, second: Vec<Array>, notes: &mut Vec<Str
     });
 }
 
-/// The features that a field-data array names by its own name: pairs of a number and the dimension of faces.
+/// The features that a field-data array names by its own name: pairs of a number and the dimension
+/// of faces.
 fn named_features(array: &Array) -> impl Iterator<Item = (i64, String)> {
     let (pairs, rest) = match &array.numbers {
         Numbers::Integer(numbers) => numbers.as_chunks::<2>(),
@@ -210,27 +193,17 @@ fn take(arrays: &mut Vec<Array>, name: &str) -> Option<Array> {
     Some(arrays.remove(index))
 }
 
-fn too_large() -> Problem {
-    Problem::Unsupported {
-        what: format!("a mesh of more than {} points", u32::MAX),
-        instead: "split it into parts, one for each rank",
-    }
-}
-
 /// Points from three coordinates each.
 pub(super) fn points(array: Array) -> Result<Vec<Vector>, Problem> {
-    let length = array.numbers.len();
-    let values = array.into_floats().unwrap_or_default();
-    let (vectors, rest) = values.as_chunks::<3>();
-    if !rest.is_empty() || vectors.len() * 3 != length {
-        let what = "numbers of point coordinates".to_owned();
-        return Err(Problem::Count {
-            what,
-            found: length as u64,
-            expected: length.next_multiple_of(3) as u64,
-        });
-    }
-    Ok(vectors.to_vec())
+    let values = array
+        .into_floats()
+        .ok_or_else(|| Problem::unexpected(b"text", "the coordinates of points"))?;
+    Problem::check_count(
+        "numbers of point coordinates",
+        values.len(),
+        values.len().next_multiple_of(3),
+    )?;
+    Ok(values.as_chunks().0.to_vec())
 }
 
 /// Appends a cell of a VTK type number, its vertices as signed numbers.
@@ -251,7 +224,8 @@ pub(super) fn push_cell(cells: &mut Cells, number: i64, vertices: &[i64]) -> Res
     Ok(cells.push(cell_type, &row?)?)
 }
 
-/// Appends a polyhedron from a stream of numbers: how many faces, then for each how many vertices and which.
+/// Appends a polyhedron from a stream of numbers: how many faces, then for each how many vertices
+/// and which.
 pub(super) fn push_polyhedron(cells: &mut Cells, stream: &[i64]) -> Result<(), Problem> {
     let cell = cells.len();
     let mut rest = stream;
@@ -270,11 +244,8 @@ pub(super) fn push_polyhedron(cells: &mut Cells, stream: &[i64]) -> Result<(), P
         }
         faces.push(face);
     }
-    if !rest.is_empty() {
-        let what = format!("numbers for the faces of polyhedron {cell}");
-        let expected = (stream.len() - rest.len()) as u64;
-        return Err(Problem::Count { what, found: stream.len() as u64, expected });
-    }
+    let what = format!("numbers for the faces of polyhedron {cell}");
+    Problem::check_count(what, stream.len(), stream.len() - rest.len())?;
     Ok(cells.push_polyhedron(&faces)?)
 }
 

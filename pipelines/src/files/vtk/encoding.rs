@@ -2,6 +2,9 @@
 
 use std::io::Read;
 
+use base64::engine::{GeneralPurpose, GeneralPurposeConfig};
+use base64::{DecodeError, Engine as _, alphabet};
+
 use super::super::error::Problem;
 
 /// How the blocks of an array are compressed.
@@ -21,7 +24,8 @@ pub(super) struct Encoding {
     pub compressor: Compressor,
 }
 
-/// The bytes of an array as they stand in the file, from its first one on; what follows it may be there too.
+/// The bytes of an array as they stand in the file, from its first one on; what follows it may be
+/// there too.
 #[derive(Clone, Copy)]
 pub(super) enum Wrapped<'a> {
     Raw(&'a [u8]),
@@ -29,6 +33,14 @@ pub(super) enum Wrapped<'a> {
 }
 
 impl<'a> Wrapped<'a> {
+    /// The data from so many bytes on.
+    pub fn behind(self, offset: usize) -> Option<Self> {
+        match self {
+            Wrapped::Raw(bytes) => bytes.get(offset..).map(Wrapped::Raw),
+            Wrapped::Base64(text) => text.get(offset..).map(Wrapped::Base64),
+        }
+    }
+
     /// At least the first `count` bytes.
     fn first(self, count: u64) -> Result<std::borrow::Cow<'a, [u8]>, Problem> {
         let bytes = match self {
@@ -136,42 +148,39 @@ fn slice(bytes: &[u8], start: u64, length: u64) -> Result<&[u8], Problem> {
     })
 }
 
-/// Decodes base64 until there are at least `count` bytes or the text ends. Padding may stand anywhere: writers encode the header
-/// of an array apart from its blocks.
+/// Base64 as any writer has it: bits that no byte needs are not looked at.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &alphabet::STANDARD,
+    GeneralPurposeConfig::new().with_decode_allow_trailing_bits(true),
+);
+
+/// Decodes base64 until there are at least `count` bytes or the text ends. Padding may end any
+/// group of four characters: writers encode the header of an array apart from its blocks.
 fn decode_base64(text: &[u8], count: u64) -> Result<Vec<u8>, Problem> {
+    let mut text = text.iter().copied().filter(|character| !character.is_ascii_whitespace());
     let mut bytes = Vec::new();
-    let mut group = 0u32;
-    let mut characters = 0;
-    let mut padding = 0;
-    for &character in text {
-        let value = match character {
-            b'A'..=b'Z' => character - b'A',
-            b'a'..=b'z' => character - b'a' + 26,
-            b'0'..=b'9' => character - b'0' + 52,
-            b'+' => 62,
-            b'/' => 63,
-            b'=' => {
-                padding += 1;
-                0
-            }
-            space if space.is_ascii_whitespace() => continue,
-            other => return Err(Problem::unexpected(&[other], "base64")),
-        };
-        if padding > 2 || (padding > 0 && character != b'=') {
-            return Err(Problem::unexpected(&[character], "base64 padding at the end of a group"));
+    loop {
+        // No more than is wanted, and up to padding, behind which another text begins.
+        let wanted = count.saturating_sub(bytes.len() as u64).div_ceil(3);
+        let mut part = Vec::new();
+        while (part.len() as u64) < wanted.saturating_mul(4)
+            && !(part.len() % 4 == 0 && part.last() == Some(&b'='))
+        {
+            let Some(character) = text.next() else { break };
+            part.push(character);
         }
-        group = (group << 6) | u32::from(value);
-        characters += 1;
-        if characters == 4 {
-            let [_, decoded @ ..] = group.to_be_bytes();
-            bytes.extend(decoded.iter().take(3 - padding));
-            (group, characters, padding) = (0, 0, 0);
-            if bytes.len() as u64 >= count {
-                break;
-            }
+        if part.is_empty() {
+            return Ok(bytes);
         }
+        // Characters that begin a group and do not fill it are no bytes.
+        part.truncate(part.len() / 4 * 4);
+        BASE64.decode_vec(&part, &mut bytes).map_err(|error| match error {
+            DecodeError::InvalidByte(at, _) if part[at] != b'=' && !part[..at].contains(&b'=') => {
+                Problem::unexpected(&part[at..=at], "base64")
+            }
+            _ => Problem::unexpected(b"=", "base64 padding at the end of a group"),
+        })?;
     }
-    Ok(bytes)
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! Files that name the file which holds the data, as programs want it that expect one file from each rank.
+//! Files that name the file which holds the data, as programs want it that expect one file from
+//! each rank.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -6,7 +7,7 @@ use std::path::{Path, PathBuf};
 use quick_xml::escape::escape;
 
 use super::FEATURES;
-use super::write::number_name;
+use super::array::number_name;
 use crate::extract::{Association, Extract};
 
 /// A kind of such a file.
@@ -31,7 +32,8 @@ impl Index {
         }
     }
 
-    /// Where the data lies, relative to the folder of the file itself: what VTK calls it, in a folder of the file's name.
+    /// Where the data lies, relative to the folder of the file itself: what VTK calls it, in a
+    /// folder of the file's name.
     pub(in super::super) fn piece(self, path: &Path) -> PathBuf {
         let stem =
             path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
@@ -39,7 +41,7 @@ impl Index {
         Path::new(&stem).join(format!("{stem}_0.{extension}"))
     }
 
-    /// What the file says of its one piece, which holds `extract`.
+    /// The text of the index of one piece, which holds `extract`.
     pub(in super::super) fn text(self, piece: &Path, extract: &Extract) -> String {
         let piece = piece.to_string_lossy();
         let piece = escape(piece.as_ref());

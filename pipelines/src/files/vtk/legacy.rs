@@ -1,14 +1,15 @@
-//! VTK's legacy files (.vtk): unstructured grids and polygonal data, text and binary, file versions 1 to 5.
+//! VTK's legacy files (.vtk): unstructured grids and polygonal data, text and binary, file versions
+//! 1 to 5.
 
 use tombolo_deform::mesh::NumberType;
 
 use super::super::MeshFile;
 use super::super::error::{Flaw, Problem};
 use super::super::scanner::Scanner;
-use super::array::{Array, Numbers, Scalar};
+use super::array::{Array, Numbers, decode, from_legacy, read_text};
 use super::dataset::{Dataset, points, push_cell, push_polyhedron, row};
+use super::kind::Kind;
 use super::names::decoded;
-use super::xml::Kind;
 
 /// Reads a .vtk file.
 pub(in super::super) fn parse(bytes: &[u8]) -> Result<MeshFile, Flaw> {
@@ -36,7 +37,7 @@ pub(in super::super) fn parse(bytes: &[u8]) -> Result<MeshFile, Flaw> {
     legacy.dataset.into_mesh_file()
 }
 
-/// What attributes belong to.
+/// The owner of attributes.
 #[derive(Clone, Copy)]
 enum Owner {
     Dataset,
@@ -47,7 +48,8 @@ enum Owner {
 struct Legacy<'a> {
     scanner: Scanner<'a>,
     dataset: Dataset,
-    /// The cells before their types are known, by the section they stand in; `None` in an unstructured grid.
+    /// The cells before their types are known, by the section they stand in; `None` in an
+    /// unstructured grid.
     rows: Vec<(Option<Kind>, Vec<i64>)>,
     types: Vec<i64>,
     unstructured: bool,
@@ -71,12 +73,8 @@ impl Legacy<'_> {
                     let kind = self.scalar()?;
                     let numbers =
                         self.numbers(kind, count.saturating_mul(3), "point coordinates")?;
-                    let array = Array {
-                        name: "points".into(),
-                        components: 3,
-                        number: kind.number(),
-                        numbers,
-                    };
+                    let array =
+                        Array { name: "points".into(), components: 3, number: kind, numbers };
                     self.dataset.points =
                         points(array).map_err(|problem| self.scanner.flaw(problem))?;
                 }
@@ -87,7 +85,7 @@ impl Legacy<'_> {
                 b"TRIANGLE_STRIPS" => self.rows(Some(Kind::Strips))?,
                 b"CELL_TYPES" => {
                     let count: u64 = self.scanner.number("the number of cell types")?;
-                    self.types = self.integers(Scalar::Signed(4), count, "cell types")?;
+                    self.types = self.integers(NumberType::I32, count, "cell types")?;
                 }
                 b"POINT_DATA" => {
                     self.scanner.number::<u64>("the number of points")?;
@@ -128,28 +126,28 @@ impl Legacy<'_> {
         while !self.scanner.rest().is_empty() && !self.scanner.line().trim_ascii().is_empty() {}
     }
 
-    fn scalar(&mut self) -> Result<Scalar, Flaw> {
+    fn scalar(&mut self) -> Result<NumberType, Flaw> {
         let start = self.scanner.position();
         let name = self.scanner.text("a number type")?;
-        Scalar::from_legacy(name).ok_or_else(|| {
+        from_legacy(name).ok_or_else(|| {
             self.scanner
                 .flaw_at(start, Problem::unexpected(name.as_bytes(), "a number type of VTK"))
         })
     }
 
     /// So many numbers from the next line on.
-    fn numbers(&mut self, kind: Scalar, count: u64, what: &str) -> Result<Numbers, Flaw> {
+    fn numbers(&mut self, kind: NumberType, count: u64, what: &str) -> Result<Numbers, Flaw> {
         if self.scanner.binary {
             self.scanner.line();
-            self.scanner.check_count(count, kind.width(), what)?;
-            let bytes = self.scanner.take(count.saturating_mul(kind.width() as u64), what)?;
-            return kind.decode(bytes, true).map_err(|problem| self.scanner.flaw(problem));
+            self.scanner.check_count(count, kind.bytes(), what)?;
+            let bytes = self.scanner.take(count.saturating_mul(kind.bytes() as u64), what)?;
+            return decode(kind, bytes, true).map_err(|problem| self.scanner.flaw(problem));
         }
         let count = self.scanner.check_count(count, 2, what)?;
-        kind.read_text(&mut self.scanner, Some(count))
+        read_text(kind, &mut self.scanner, Some(count))
     }
 
-    fn integers(&mut self, kind: Scalar, count: u64, what: &str) -> Result<Vec<i64>, Flaw> {
+    fn integers(&mut self, kind: NumberType, count: u64, what: &str) -> Result<Vec<i64>, Flaw> {
         match self.numbers(kind, count, what)? {
             Numbers::Integer(values) => Ok(values),
             _ => Err(self
@@ -158,7 +156,8 @@ impl Legacy<'_> {
         }
     }
 
-    /// Cells: each with its count in front, or (from file version 5 on) as offsets and connectivity.
+    /// Cells: each with its count in front, or (from file version 5 on) as offsets and
+    /// connectivity.
     fn rows(&mut self, kind: Option<Kind>) -> Result<(), Flaw> {
         let first: u64 = self.scanner.number("the number of cells")?;
         let size: u64 = self.scanner.number("the size of the cells")?;
@@ -191,7 +190,7 @@ impl Legacy<'_> {
             }
             return Ok(());
         }
-        let numbers = self.integers(Scalar::Signed(4), size, "cells")?;
+        let numbers = self.integers(NumberType::I32, size, "cells")?;
         let mut start = 0;
         for cell in 0..first {
             let cell = usize::try_from(cell).unwrap_or(usize::MAX);
@@ -208,23 +207,13 @@ impl Legacy<'_> {
 
     /// Cells from their rows and types.
     fn cells(&mut self) -> Result<(), Flaw> {
-        if self.unstructured && self.types.len() != self.rows.len() {
-            let (found, expected) = (self.types.len() as u64, self.rows.len() as u64);
-            return Err(self.scanner.flaw(Problem::Count {
-                what: "cell types".into(),
-                found,
-                expected,
-            }));
+        if self.unstructured {
+            Problem::check_count("cell types", self.types.len(), self.rows.len())
+                .map_err(|it| self.scanner.flaw(it))?;
         }
-        // VTK numbers the cells of polygonal data by kind, in this order whatever the order of the file.
-        let order = |kind: &Option<Kind>| match kind {
-            None | Some(Kind::Vertices) => 0,
-            Some(Kind::Lines) => 1,
-            Some(Kind::Polygons) => 2,
-            Some(Kind::Strips) => 3,
-        };
         if !self.unstructured {
-            self.rows.sort_by_key(|(kind, _)| order(kind));
+            // VTK numbers the cells of polygonal data by kind, whatever the order of the file.
+            self.rows.sort_by_key(|(kind, _)| *kind);
         }
         let cells = &mut self.dataset.cells;
         for (cell, (kind, vertices)) in self.rows.iter().enumerate() {
@@ -279,12 +268,12 @@ impl Legacy<'_> {
         };
         let numbers = self.numbers(kind, tuples.saturating_mul(components), &name)?;
         let components = usize::try_from(components).unwrap_or(usize::MAX);
-        self.push(owner, Array { name, components, number: kind.number(), numbers });
+        self.push(owner, Array { name, components, number: kind, numbers });
         Ok(true)
     }
 
-    fn colour(&self) -> Scalar {
-        if self.scanner.binary { Scalar::Unsigned(1) } else { Scalar::Float(8) }
+    fn colour(&self) -> NumberType {
+        if self.scanner.binary { NumberType::U8 } else { NumberType::F64 }
     }
 
     /// A list of arrays.
@@ -310,7 +299,7 @@ impl Legacy<'_> {
                 (NumberType::default(), Numbers::Text(self.strings(values)?))
             } else {
                 let kind = self.scalar()?;
-                (kind.number(), self.numbers(kind, values, &name)?)
+                (kind, self.numbers(kind, values, &name)?)
             };
             let components = usize::try_from(components).unwrap_or(usize::MAX);
             self.push(owner, Array { name, components, number, numbers });

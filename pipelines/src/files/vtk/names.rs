@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-/// A name whose special characters stand as % and two hexadecimal digits, as VTK writes names into legacy files.
+/// A name whose special characters stand as % and two hexadecimal digits, as VTK writes names into
+/// legacy files.
 pub(super) fn decoded(name: &str) -> String {
     let mut bytes = Vec::with_capacity(name.len());
     let mut rest = name.as_bytes();
@@ -23,7 +24,8 @@ pub(super) fn decoded(name: &str) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// A name for an array of XML: what has a meaning there is encoded, because VTK itself writes names as they are.
+/// A name for an array of XML: what has a meaning there is encoded, because VTK itself writes names
+/// as they are.
 pub(super) fn encoded(name: &str) -> String {
     name.chars().fold(String::new(), |mut text, letter| {
         if letter.is_ascii_control() || "\"%&<>".contains(letter) {

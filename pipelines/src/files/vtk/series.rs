@@ -12,8 +12,8 @@ const TAIL: &str = "</Collection>\n</VTKFile>\n";
 
 /// A .pvd file that grows by one entry at a time.
 ///
-/// Whenever a run is killed, the file on disk is whole: each change is written beside it and takes its place in one step. The
-/// memory used does not grow with the number of entries.
+/// Whenever a run is killed, the file on disk is whole: each change is written beside it and takes
+/// its place in one step. The memory used does not grow with the number of entries.
 ///
 /// ```no_run
 /// # use std::path::Path;
@@ -43,13 +43,14 @@ impl Series {
         Ok(Self { path: path.to_path_buf(), length: HEAD.len() as u64 })
     }
 
-    /// Where the series is.
+    /// The path of the series.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Adds a file that shows the state at this time. The entry is relative to the series where the file lies beside or below it.
+    /// Adds a file that shows the state at this time. The entry is relative to the series where the
+    /// file lies beside or below it.
     ///
     /// # Errors
     /// [`FileError`] where the series cannot be read back or written.

@@ -3,26 +3,16 @@
 use std::borrow::Cow;
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap};
-use std::fmt::Write as _;
-use std::io::Write as _;
 
 use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, NumberType, TaggedFaces, Vector};
 
 use super::super::assemble::{owners_of_faces, sorted};
 use super::super::error::Problem;
+use super::kind::Kind;
 use super::names::encoded;
+use super::xml_file::{Array, Compression, Values, XmlFile};
 use super::{FACE_DIMENSION, FEATURES};
 use crate::extract::{Association, Extract, Field};
-
-/// How arrays are compressed in the file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Compression {
-    /// Not at all: fastest to write.
-    #[default]
-    None,
-    /// zlib, which every VTK reads.
-    Zlib,
-}
 
 /// An extract as the bytes of a .vtp (`polygonal`) or .vtu file.
 pub(in super::super) fn from_extract(
@@ -103,7 +93,8 @@ pub(in super::super) fn from_mesh(
     grid.write(polygonal, compression)
 }
 
-/// The field with values for the faces behind the cells: those of the cell that a face belongs to, NaN where there is none.
+/// The field with values for the faces behind the cells: those of the cell that a face belongs to,
+/// NaN where there is none.
 fn with_faces(
     field: &Field,
     cell_count: usize,
@@ -129,7 +120,8 @@ fn with_faces(
     Ok(field)
 }
 
-/// Tags and names, negative numbers put behind the others: in a file they say that a cell has no feature.
+/// Tags and names, negative numbers put behind the others: in a file they say that a cell has no
+/// feature.
 fn with_natural_numbers(tagged: &TaggedFaces) -> (Vec<i64>, Vec<(i64, String)>) {
     let highest = tagged
         .tags
@@ -155,11 +147,7 @@ fn with_natural_numbers(tagged: &TaggedFaces) -> (Vec<i64>, Vec<(i64, String)>) 
 }
 
 fn check_length(name: &str, found: usize, expected: usize) -> Result<(), Problem> {
-    if found == expected {
-        return Ok(());
-    }
-    let what = format!("values of array '{name}'");
-    Err(Problem::Count { what, found: found as u64, expected: expected as u64 })
+    Problem::check_count(format!("values of array '{name}'"), found, expected)
 }
 
 /// Refuses cells that polygonal data cannot hold.
@@ -171,19 +159,6 @@ pub(in super::super) fn check_polygonal(cells: &Cells) -> Result<(), Problem> {
         what: "a volume cell in polygonal data (.vtp)".into(),
         instead: "write it as .vtu, or take its surface",
     })
-}
-
-enum Values<'a> {
-    /// Values of a field, which are written as numbers of this type.
-    Numbers(Cow<'a, [f64]>, NumberType),
-    Integers(Vec<i64>),
-    Bytes(Vec<u8>),
-}
-
-struct Array<'a> {
-    name: &'a str,
-    components: usize,
-    values: Values<'a>,
 }
 
 struct Grid<'a> {
@@ -232,7 +207,7 @@ impl<'a> Grid<'a> {
         if polygonal {
             check_polygonal(&self.cells)?;
         }
-        let mut file = File { text: String::new(), appended: Vec::new(), compression };
+        let mut file = XmlFile::new(compression);
         let kind = if polygonal { "PolyData" } else { "UnstructuredGrid" };
         let compressor = match compression {
             Compression::None => "",
@@ -244,23 +219,24 @@ impl<'a> Grid<'a> {
         ));
         file.line(format_args!("<{kind}>"));
         self.write_field_data(&mut file)?;
-        let sections = if polygonal { Sections::new(&self.cells) } else { Sections::default() };
-        let counts = if polygonal {
-            sections.counts()
-        } else {
-            format!(" NumberOfCells=\"{}\"", self.cells.len())
+        let sections = if polygonal { sections(&self.cells) } else { Vec::new() };
+        let count =
+            |(name, cells): &(&str, Vec<usize>)| format!(" NumberOf{name}=\"{}\"", cells.len());
+        let counts = match polygonal {
+            true => sections.iter().map(count).collect(),
+            false => format!(" NumberOfCells=\"{}\"", self.cells.len()),
         };
         file.line(format_args!("<Piece NumberOfPoints=\"{}\"{counts}>", self.points.len()));
         file.section("PointData", &self.point_arrays)?;
         if polygonal {
-            let order = sections.order();
+            let order: Vec<usize> = sections.iter().flat_map(|(_, cells)| cells).copied().collect();
             self.cell_arrays.iter_mut().for_each(|array| array.permute(&order));
         }
         file.section("CellData", &self.cell_arrays)?;
         let points = Values::Numbers(Cow::Borrowed(self.points.as_flattened()), NumberType::F64);
         file.section("Points", &[Array { name: "Points", components: 3, values: points }])?;
         if polygonal {
-            for (name, cells) in sections.named() {
+            for (name, cells) in &sections {
                 file.section(name, &polygonal_rows(&self.cells, cells))?;
             }
         } else {
@@ -271,7 +247,7 @@ impl<'a> Grid<'a> {
         Ok(file.finish())
     }
 
-    fn write_field_data(&self, file: &mut File) -> Result<(), Problem> {
+    fn write_field_data(&self, file: &mut XmlFile) -> Result<(), Problem> {
         let names = self.names_by_text();
         if names.is_empty() && self.field_arrays.is_empty() {
             return Ok(());
@@ -291,8 +267,9 @@ impl<'a> Grid<'a> {
         Ok(())
     }
 
-    /// For each name an array that is called so, of the feature's number and the dimension of its faces: what meshio takes for the
-    /// name of a physical group. An array of text would be refused there.
+    /// For each name an array that is called so, of the feature's number and the dimension of its
+    /// faces: what meshio takes for the name of a physical group. An array of text would be refused
+    /// there.
     fn names_by_text(&self) -> BTreeMap<String, Vec<i64>> {
         let mut numbers: BTreeMap<String, Vec<i64>> = BTreeMap::new();
         for (number, name) in self.names.iter().filter(|(_, name)| !name.is_empty()) {
@@ -302,76 +279,11 @@ impl<'a> Grid<'a> {
     }
 }
 
-impl Array<'_> {
-    fn tuples(&self) -> usize {
-        let values = match &self.values {
-            Values::Numbers(values, _) => values.len(),
-            Values::Integers(values) => values.len(),
-            Values::Bytes(values) => values.len(),
-        };
-        values / self.components.max(1)
-    }
-
-    /// Puts the tuples into this order.
-    fn permute(&mut self, order: &[usize]) {
-        fn permuted<T: Copy>(values: &[T], components: usize, order: &[usize]) -> Vec<T> {
-            let tuple = |&tuple: &usize| {
-                values.get(tuple * components..(tuple + 1) * components).unwrap_or(&[])
-            };
-            order.iter().flat_map(tuple).copied().collect()
-        }
-        match &mut self.values {
-            Values::Numbers(values, _) => {
-                *values = Cow::Owned(permuted(values, self.components, order))
-            }
-            Values::Integers(values) => *values = permuted(values, self.components, order),
-            Values::Bytes(values) => *values = permuted(values, self.components, order),
-        }
-    }
-}
-
-/// The cells of polygonal data by the element of the file that they stand in.
-#[derive(Default)]
-struct Sections {
-    vertices: Vec<usize>,
-    lines: Vec<usize>,
-    polygons: Vec<usize>,
-    strips: Vec<usize>,
-}
-
-impl Sections {
-    fn new(cells: &Cells) -> Self {
-        let mut sections = Self::default();
-        for (cell, cell_type) in cells.types().iter().enumerate() {
-            match cell_type {
-                CellType::Vertex | CellType::PolyVertex => sections.vertices.push(cell),
-                CellType::Line | CellType::PolyLine => sections.lines.push(cell),
-                CellType::TriangleStrip => sections.strips.push(cell),
-                _ => sections.polygons.push(cell),
-            }
-        }
-        sections
-    }
-
-    fn named(&self) -> [(&'static str, &[usize]); 4] {
-        [
-            ("Verts", &self.vertices),
-            ("Lines", &self.lines),
-            ("Polys", &self.polygons),
-            ("Strips", &self.strips),
-        ]
-    }
-
-    fn counts(&self) -> String {
-        self.named().iter().fold(String::new(), |mut text, (name, cells)| {
-            let _ = write!(text, " NumberOf{name}=\"{}\"", cells.len());
-            text
-        })
-    }
-
-    fn order(&self) -> Vec<usize> {
-        self.named().iter().flat_map(|(_, cells)| cells.iter().copied()).collect()
-    }
+/// The cells of polygonal data, by the element of the file that holds them.
+fn sections(cells: &Cells) -> Vec<(&'static str, Vec<usize>)> {
+    let of_kind =
+        |kind| (0..cells.len()).filter(|&cell| Kind::of(cells.cell_type(cell)) == kind).collect();
+    Kind::ALL.into_iter().map(|kind| (kind.element(), of_kind(kind))).collect()
 }
 
 fn polygonal_rows(cells: &Cells, section: &[usize]) -> Vec<Array<'static>> {
@@ -419,140 +331,4 @@ fn unstructured_rows(cells: &Cells) -> Vec<Array<'static>> {
 
 fn integers(name: &'static str, values: Vec<i64>) -> Array<'static> {
     Array { name, components: 1, values: Values::Integers(values) }
-}
-
-/// What VTK calls a type of number.
-pub(super) fn number_name(number: NumberType) -> &'static str {
-    match number {
-        NumberType::I8 => "Int8",
-        NumberType::I16 => "Int16",
-        NumberType::I32 => "Int32",
-        NumberType::I64 => "Int64",
-        NumberType::U8 => "UInt8",
-        NumberType::U16 => "UInt16",
-        NumberType::U32 => "UInt32",
-        NumberType::U64 => "UInt64",
-        NumberType::F32 => "Float32",
-        NumberType::F64 => "Float64",
-    }
-}
-
-/// The values as numbers of a type, which they are.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "the values are of the type that they are cast to"
-)]
-fn number_bytes(values: &[f64], number: NumberType) -> Vec<u8> {
-    fn all<const N: usize>(values: &[f64], bytes: impl Fn(f64) -> [u8; N]) -> Vec<u8> {
-        values.iter().flat_map(|&value| bytes(value)).collect()
-    }
-    match number {
-        NumberType::I8 => all(values, |value| (value as i8).to_le_bytes()),
-        NumberType::I16 => all(values, |value| (value as i16).to_le_bytes()),
-        NumberType::I32 => all(values, |value| (value as i32).to_le_bytes()),
-        NumberType::I64 => all(values, |value| (value as i64).to_le_bytes()),
-        NumberType::U8 => all(values, |value| (value as u8).to_le_bytes()),
-        NumberType::U16 => all(values, |value| (value as u16).to_le_bytes()),
-        NumberType::U32 => all(values, |value| (value as u32).to_le_bytes()),
-        NumberType::U64 => all(values, |value| (value as u64).to_le_bytes()),
-        NumberType::F32 => all(values, |value| (value as f32).to_le_bytes()),
-        NumberType::F64 => all(values, f64::to_le_bytes),
-    }
-}
-
-/// A file in the making: its elements, and the data that follow them.
-struct File {
-    text: String,
-    /// The data of each array, with where in the text its offset goes.
-    appended: Vec<(usize, Vec<u8>)>,
-    compression: Compression,
-}
-
-impl File {
-    fn line(&mut self, line: std::fmt::Arguments) {
-        let _ = writeln!(self.text, "{line}");
-    }
-
-    fn section(&mut self, name: &str, arrays: &[Array]) -> Result<(), Problem> {
-        self.line(format_args!("<{name}>"));
-        for array in arrays {
-            self.array(array, None)?;
-        }
-        self.line(format_args!("</{name}>"));
-        Ok(())
-    }
-
-    fn array(&mut self, array: &Array, tuples: Option<usize>) -> Result<(), Problem> {
-        let (kind, bytes): (_, Vec<u8>) = match &array.values {
-            Values::Numbers(values, number) => {
-                (number_name(*number), number_bytes(values, *number))
-            }
-            Values::Integers(values) => {
-                ("Int64", values.iter().flat_map(|value| value.to_le_bytes()).collect())
-            }
-            Values::Bytes(values) => ("UInt8", values.clone()),
-        };
-        // Control characters have no place in XML.
-        let name: String = array
-            .name
-            .chars()
-            .map(|letter| if letter.is_control() { ' ' } else { letter })
-            .collect();
-        let name = quick_xml::escape::escape(&name);
-        // One component goes without saying: meshio makes columns of arrays that say it.
-        let components = match array.components {
-            1 => String::new(),
-            count => format!(" NumberOfComponents=\"{count}\""),
-        };
-        let tuples = tuples.map_or(String::new(), |count| format!(" NumberOfTuples=\"{count}\""));
-        let _ = write!(
-            self.text,
-            "<DataArray type=\"{kind}\" Name=\"{name}\"{components}{tuples} format=\"appended\" offset=\""
-        );
-        let data = match self.compression {
-            Compression::None => [&(bytes.len() as u64).to_le_bytes()[..], &bytes].concat(),
-            Compression::Zlib => compressed(&bytes)?,
-        };
-        self.appended.push((self.text.len(), data));
-        self.line(format_args!("\"/>"));
-        Ok(())
-    }
-
-    /// The data stand in the opposite order of the elements: meshio renumbers the offsets one by one, and would take an array that it has
-    /// renumbered for a later one.
-    fn finish(self) -> Vec<u8> {
-        let mut offset = self.appended.iter().map(|(_, data)| data.len()).sum::<usize>();
-        let mut bytes = Vec::with_capacity(self.text.len() + offset + 32 * self.appended.len());
-        let mut written = 0;
-        for (place, data) in &self.appended {
-            offset -= data.len();
-            bytes.extend(self.text.as_bytes().get(written..*place).unwrap_or(&[]));
-            bytes.extend(offset.to_string().as_bytes());
-            written = *place;
-        }
-        bytes.extend(self.text.as_bytes().get(written..).unwrap_or(&[]));
-        bytes.extend(b"<AppendedData encoding=\"raw\">\n_");
-        self.appended.iter().rev().for_each(|(_, data)| bytes.extend(data));
-        bytes.extend(b"\n</AppendedData>\n</VTKFile>\n");
-        bytes
-    }
-}
-
-/// The blocks of an array by zlib, behind the counts that say where each ends.
-fn compressed(bytes: &[u8]) -> Result<Vec<u8>, Problem> {
-    const BLOCK: usize = 1 << 20;
-    let mut packed = Vec::new();
-    let mut header =
-        vec![bytes.len().div_ceil(BLOCK) as u64, BLOCK as u64, (bytes.len() % BLOCK) as u64];
-    for block in bytes.chunks(BLOCK) {
-        let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
-        encoder.write_all(block)?;
-        let block = encoder.finish()?;
-        header.push(block.len() as u64);
-        packed.extend(block);
-    }
-    let mut data: Vec<u8> = header.iter().flat_map(|number| number.to_le_bytes()).collect();
-    data.extend(packed);
-    Ok(data)
 }

@@ -1,18 +1,19 @@
 //! VTK's XML files: unstructured grids (.vtu) and polygonal data (.vtp).
 //!
-//! Text, inline base64 and appended data (raw or base64), either byte order, 32- and 64-bit headers, plain or compressed with zlib
-//! or LZ4.
+//! Text, inline base64 and appended data (raw or base64), either byte order, 32- and 64-bit
+//! headers, plain or compressed with zlib or LZ4.
 
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
-use tombolo_deform::mesh::Cells;
+use tombolo_deform::mesh::{Cells, NumberType};
 
 use super::super::MeshFile;
-use super::super::error::{Flaw, Place, Problem};
+use super::super::error::{Flaw, Position, Problem};
 use super::super::scanner::Scanner;
-use super::array::{Array, Numbers, Scalar};
+use super::array::{Array, Numbers, decode, from_xml, read_text};
 use super::dataset::{Dataset, points, push_cell, push_polyhedron, row};
 use super::encoding::{Compressor, Encoding, Wrapped};
+use super::kind::Kind;
 
 /// Reads a .vtu or .vtp file.
 pub(in super::super) fn parse(bytes: &[u8]) -> Result<MeshFile, Flaw> {
@@ -52,29 +53,24 @@ struct Element<'a> {
 enum Form<'a> {
     Text(&'a [u8]),
     Base64(&'a [u8]),
-    Appended(u64),
+    Appended(usize),
 }
 
-struct Piece {
-    point_count: u64,
-    cell_count: Option<u64>,
-}
-
-enum Appended<'a> {
-    Raw(&'a [u8]),
-    Base64(&'a [u8]),
+struct XmlPiece {
+    point_count: usize,
+    cell_count: Option<usize>,
 }
 
 struct Document<'a> {
     polygonal: bool,
     encoding: Encoding,
-    pieces: Vec<Piece>,
+    pieces: Vec<XmlPiece>,
     elements: Vec<Element<'a>>,
-    appended: Option<Appended<'a>>,
+    appended: Option<Wrapped<'a>>,
 }
 
 fn at(position: usize) -> impl Fn(Problem) -> Flaw {
-    move |problem| Flaw { place: Place::Byte(position), problem }
+    move |problem| Flaw { position: Position::Byte(position), problem }
 }
 
 /// The value of an attribute, if it is there.
@@ -90,7 +86,7 @@ fn attribute(element: &BytesStart, name: &str) -> Result<Option<String>, Problem
 }
 
 /// A number in an attribute, if it is there.
-fn count(element: &BytesStart, name: &str) -> Result<Option<u64>, Problem> {
+fn count(element: &BytesStart, name: &str) -> Result<Option<usize>, Problem> {
     let Some(value) = attribute(element, name)? else { return Ok(None) };
     let number = value.trim().parse();
     number
@@ -182,7 +178,7 @@ impl<'a> Document<'a> {
     ) -> Result<(), Problem> {
         match name {
             "VTKFile" => self.root(element)?,
-            "Piece" => self.pieces.push(Piece {
+            "Piece" => self.pieces.push(XmlPiece {
                 point_count: count(element, "NumberOfPoints")?.unwrap_or(0),
                 cell_count: count(element, "NumberOfCells")?,
             }),
@@ -206,7 +202,7 @@ impl<'a> Document<'a> {
                     piece: self.pieces.len().checked_sub(1).filter(|_| in_piece),
                     section: open.last().cloned().unwrap_or_default(),
                     kind: attribute(element, "type")?.unwrap_or_default(),
-                    components: usize::try_from(components).unwrap_or(usize::MAX),
+                    components,
                     form,
                     position,
                 });
@@ -261,27 +257,23 @@ impl<'a> Document<'a> {
     }
 
     fn array(&self, element: &Element) -> Result<Array, Flaw> {
-        let numbers = self
-            .numbers(element)
-            .map_err(|problem| Flaw { place: Place::Byte(element.position), problem })?;
-        let number = Scalar::from_xml(&element.kind).map(Scalar::number).unwrap_or_default();
+        let numbers = self.numbers(element).map_err(at(element.position))?;
+        let number = from_xml(&element.kind).unwrap_or_default();
         Ok(Array { name: element.name.clone(), components: element.components, number, numbers })
     }
 
     fn numbers(&self, element: &Element) -> Result<Numbers, Problem> {
         // VTK stores text as the codes of its bytes, each string ended by a 0.
         let is_text = element.kind == "String";
-        let scalar = match is_text {
-            true => Scalar::Unsigned(1),
-            false => Scalar::from_xml(&element.kind).ok_or_else(|| {
-                let expected = format!("a number type of VTK for array '{}'", element.name);
-                Problem::unexpected(element.kind.as_bytes(), expected)
-            })?,
-        };
+        let kind = if is_text { Some(NumberType::U8) } else { from_xml(&element.kind) };
+        let kind = kind.ok_or_else(|| {
+            let expected = format!("a number type of VTK for array '{}'", element.name);
+            Problem::unexpected(element.kind.as_bytes(), expected)
+        })?;
         let wrapped = match element.form {
             Form::Text(text) => {
                 let numbers =
-                    scalar.read_text(&mut Scanner::new(text), None).map_err(|flaw| flaw.problem)?;
+                    read_text(kind, &mut Scanner::new(text), None).map_err(|flaw| flaw.problem)?;
                 return if is_text { Ok(strings(&numbers)) } else { Ok(numbers) };
             }
             // An array of no values may be written as no text at all.
@@ -290,15 +282,7 @@ impl<'a> Document<'a> {
             }
             Form::Base64(text) => Wrapped::Base64(text),
             Form::Appended(offset) => {
-                let from = |data: &'a [u8]| {
-                    usize::try_from(offset).ok().and_then(|offset| data.get(offset..))
-                };
-                let found = match self.appended {
-                    Some(Appended::Raw(data)) => from(data).map(Wrapped::Raw),
-                    Some(Appended::Base64(data)) => from(data).map(Wrapped::Base64),
-                    None => None,
-                };
-                found.ok_or_else(|| {
+                self.appended.and_then(|data| data.behind(offset)).ok_or_else(|| {
                     Problem::unexpected(
                         format!("offset {offset}").as_bytes(),
                         "an offset into the appended data",
@@ -307,7 +291,7 @@ impl<'a> Document<'a> {
             }
         };
         let bytes = wrapped.unwrap_array(&self.encoding)?;
-        let numbers = scalar.decode(&bytes, self.encoding.big_endian)?;
+        let numbers = decode(kind, &bytes, self.encoding.big_endian)?;
         if is_text { Ok(strings(&numbers)) } else { Ok(numbers) }
     }
 
@@ -321,21 +305,12 @@ impl<'a> Document<'a> {
         if let Some(array) = self.arrays(Some(index), "Points")?.into_iter().next() {
             dataset.points = points(array)?;
         }
-        if dataset.points.len() as u64 != piece.point_count {
-            let what = "points of a piece".to_owned();
-            let found = dataset.points.len() as u64;
-            return Err(Problem::Count { what, found, expected: piece.point_count }.into());
-        }
+        Problem::check_count("points of a piece", dataset.points.len(), piece.point_count)?;
         if self.polygonal {
             // Cell data are in the order in which VTK numbers the cells, which is this one.
-            for (section, kind) in [
-                ("Verts", Kind::Vertices),
-                ("Lines", Kind::Lines),
-                ("Polys", Kind::Polygons),
-                ("Strips", Kind::Strips),
-            ] {
-                let connectivity = self.integers(index, section, "connectivity")?;
-                let offsets = self.integers(index, section, "offsets")?;
+            for kind in Kind::ALL {
+                let connectivity = self.integers(index, kind.element(), "connectivity")?;
+                let offsets = self.integers(index, kind.element(), "offsets")?;
                 let mut start = 0;
                 for end in offsets {
                     let vertices = row(&connectivity, dataset.cells.len(), start, end)?;
@@ -345,14 +320,8 @@ impl<'a> Document<'a> {
             }
         } else {
             self.unstructured_cells(index, &mut dataset.cells)?;
-            if let Some(expected) = piece.cell_count
-                && dataset.cells.len() as u64 != expected
-            {
-                let what = "cells of a piece".to_owned();
-                return Err(
-                    Problem::Count { what, found: dataset.cells.len() as u64, expected }.into()
-                );
-            }
+            let count = dataset.cells.len();
+            Problem::check_count("cells of a piece", count, piece.cell_count.unwrap_or(count))?;
         }
         Ok(dataset)
     }
@@ -361,15 +330,7 @@ impl<'a> Document<'a> {
         let connectivity = self.integers(piece, "Cells", "connectivity")?;
         let offsets = self.integers(piece, "Cells", "offsets")?;
         let types = self.integers(piece, "Cells", "types")?;
-        if types.len() != offsets.len() {
-            let what = "cell types".to_owned();
-            return Err(Problem::Count {
-                what,
-                found: types.len() as u64,
-                expected: offsets.len() as u64,
-            }
-            .into());
-        }
+        Problem::check_count("cell types", types.len(), offsets.len())?;
         let polyhedra = Polyhedra {
             faces: self.integers(piece, "Cells", "faces")?,
             face_ends: self.integers(piece, "Cells", "faceoffsets")?,
@@ -411,7 +372,8 @@ impl<'a> Document<'a> {
     }
 }
 
-/// The faces of polyhedra: as streams, or (from file version 2.3 on) as two levels of compressed rows.
+/// The faces of polyhedra: as streams, or (from file version 2.3 on) as two levels of compressed
+/// rows.
 struct Polyhedra {
     faces: Vec<i64>,
     face_ends: Vec<i64>,
@@ -451,35 +413,11 @@ impl Polyhedra {
     }
 }
 
-/// Where a row starts and ends by the ends of all rows; the end is -1, which no row has, beyond the last.
+/// Where a row starts and ends by the ends of all rows; the end is -1, which no row has, beyond the
+/// last.
 fn ends(offsets: &[i64], index: usize) -> (i64, i64) {
     let start = index.checked_sub(1).map_or(Some(0), |before| offsets.get(before).copied());
     (start.unwrap_or(-1), offsets.get(index).copied().unwrap_or(-1))
-}
-
-/// The kinds of cells that polygonal data keep apart.
-#[derive(Clone, Copy)]
-pub(super) enum Kind {
-    Vertices,
-    Lines,
-    Polygons,
-    Strips,
-}
-
-impl Kind {
-    /// VTK's type number of a cell of this kind with so many vertices.
-    pub fn cell_type(self, vertices: usize) -> i64 {
-        match (self, vertices) {
-            (Kind::Vertices, 1) => 1,
-            (Kind::Vertices, _) => 2,
-            (Kind::Lines, 2) => 3,
-            (Kind::Lines, _) => 4,
-            (Kind::Polygons, 3) => 5,
-            (Kind::Polygons, 4) => 9,
-            (Kind::Polygons, _) => 7,
-            (Kind::Strips, _) => 6,
-        }
-    }
 }
 
 fn strings(numbers: &Numbers) -> Numbers {
@@ -499,17 +437,17 @@ fn strings(numbers: &Numbers) -> Numbers {
     )
 }
 
-fn appended<'a>(element: &BytesStart, rest: &'a [u8]) -> Result<Appended<'a>, Problem> {
+fn appended<'a>(element: &BytesStart, rest: &'a [u8]) -> Result<Wrapped<'a>, Problem> {
     let start = rest.iter().position(|&byte| byte == b'_').ok_or_else(|| {
         Problem::unexpected(b"no underscore", "the '_' in front of appended data")
     })?;
     let data = rest.get(start + 1..).unwrap_or(&[]);
     match attribute(element, "encoding")?.as_deref() {
-        Some("raw") => Ok(Appended::Raw(data)),
+        Some("raw") => Ok(Wrapped::Raw(data)),
         Some("base64") | None => {
             // The text ends where the closing tag begins.
             let end = data.iter().position(|&byte| byte == b'<').unwrap_or(data.len());
-            Ok(Appended::Base64(data.get(..end).unwrap_or(data)))
+            Ok(Wrapped::Base64(data.get(..end).unwrap_or(data)))
         }
         Some(other) => Err(Problem::unexpected(other.as_bytes(), "encoding raw or base64")),
     }

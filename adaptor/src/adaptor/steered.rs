@@ -1,0 +1,178 @@
+//! The mesh that orders change: how it is taken over at the first call, and let go.
+
+use std::sync::Arc;
+
+use serde_json::json;
+use tombolo_deform::{
+    communicator::{Communicator, RankError, agree},
+    distributed::{DistributedError, Part, domain},
+    features::FeatureSettings,
+    mesh::{Cells, MeshError},
+    shape::Shaper,
+    surface::Surface,
+};
+use tombolo_pipelines::extract::{Channel, ChannelError};
+
+use super::{Adaptor, description::features};
+use crate::{
+    error::ExecuteError,
+    steering::{Steerer, clock},
+    step::Step,
+    stream::ReferenceSurface,
+};
+
+/// The mesh that orders change: that of the channel which the pipeline that runs on orders names,
+/// or of the first.
+pub(super) enum SteeredMesh {
+    /// The first call will take it over.
+    Unknown,
+    /// Nobody can give an order, so that no copy is made.
+    Unsteered,
+    /// Orders cannot be carried out, for this reason.
+    Refused(String),
+    /// With its surface, which on several ranks rank 0 has.
+    Steered(Box<Steerer>, Option<Arc<Surface>>),
+}
+
+impl Adaptor {
+    /// Ends the steering of the shape, for a solver that has replaced its mesh. Views go on; orders
+    /// are rejected with this reason from now on. To be called on all ranks.
+    pub fn release_shape(&mut self, reason: &str) {
+        if matches!(self.mesh, SteeredMesh::Steered(..)) {
+            self.refuse(reason);
+        }
+    }
+
+    fn refuse(&mut self, reason: &str) {
+        if self.communicator.rank() == 0 {
+            self.complain(reason);
+        }
+        self.mesh = SteeredMesh::Refused(reason.to_owned());
+        self.describe();
+        self.tell_conditions();
+    }
+
+    /// Copies the mesh as it is now as the reference of all shapes, if anybody could ask for one.
+    pub(super) fn take_reference(
+        &mut self,
+        step: &Step,
+        channels: &[Channel<'_>],
+    ) -> Result<(), ExecuteError> {
+        let cycle = step.cycle;
+        let channel =
+            match agree(&*self.communicator, Channel::find(channels, self.steered_channel())) {
+                Ok(channel) => channel,
+                // The configuration's mistake, not the solver's.
+                Err(RankError { message, .. }) => {
+                    self.refuse(&format!("no shape can be changed: {message}"));
+                    return Ok(());
+                }
+            };
+        let checked =
+            self.check_features(channel).map_err(|error| of_channel(cycle, channel, error));
+        if self.communicator.size() == 1 {
+            checked?;
+        } else {
+            agree(&*self.communicator, checked)?;
+        }
+        self.mesh =
+            if self.config.stream.is_none() && self.timed.is_empty() && !self.pipelines.can_order()
+            {
+                SteeredMesh::Unsteered
+            } else {
+                match self.take_over(cycle, channel)? {
+                    Ok(steerer) => {
+                        self.lent.take_reference(channel);
+                        let surface = steerer.surface();
+                        if let Some(surface) =
+                            surface.as_ref().filter(|_| self.communicator.size() == 1)
+                        {
+                            self.pipelines.share_surface(channels, channel.name, surface);
+                        }
+                        SteeredMesh::Steered(Box::new(steerer), surface)
+                    }
+                    Err(reason) => {
+                        let reason = format!("the shape of this mesh cannot be changed: {reason}");
+                        self.complain(&reason);
+                        SteeredMesh::Refused(reason)
+                    }
+                }
+            };
+        let fields = channel.fields.iter().map(
+            |field| json!({"name": field.name, "association": field.association, "components": field.values.components()}),
+        );
+        self.told.channel = channel.name.to_owned();
+        self.told.fields = fields.collect();
+        if let SteeredMesh::Steered(steerer, Some(surface)) = &self.mesh {
+            self.told.features = features(surface);
+            if let Some(hub) = &self.hub {
+                if let Some(forecaster) = steerer.forecaster() {
+                    let _ = self.forecaster.set(forecaster);
+                }
+                let surface = ReferenceSurface::new(Arc::clone(surface));
+                self.told.surface = surface.described();
+                hub.offer_surface(Arc::new(surface));
+            }
+        }
+        self.describe();
+        self.tell_conditions();
+        Ok(())
+    }
+
+    /// Says in the log which types of cells any rank has left-handed. Collective.
+    fn tell_handedness(&self, cells: &Cells) {
+        let note = cells.handedness_note().unwrap_or_default();
+        let notes = self.communicator.gather(0, note.as_bytes()).unwrap_or_default();
+        if let Some(note) = notes.iter().find(|note| !note.is_empty()) {
+            log::warn!("{}", String::from_utf8_lossy(note));
+        }
+    }
+
+    /// Takes over a mesh, or this rank's part of one; the inner error says why its shape cannot be
+    /// changed. Collective.
+    fn take_over(
+        &self,
+        cycle: u64,
+        channel: &Channel<'_>,
+    ) -> Result<Result<Steerer, String>, ExecuteError> {
+        let refused = |error| of_channel(cycle, channel, error);
+        let settings = FeatureSettings::default();
+        let shaper = if self.communicator.size() > 1 || !channel.mesh.is_plain() {
+            let part = agree(&*self.communicator, Part::of(&channel.mesh).map_err(refused))?;
+            self.tell_handedness(&part.cells);
+            domain(&self.communicator, &part, &settings)
+                .and_then(|(domain, boundary)| Shaper::new(domain, boundary))
+                .map(|shaper| shaper.with_solvers(Arc::clone(&self.solvers)))
+                .map_err(|error| error.to_string())
+        } else {
+            let mesh = channel.mesh.to_mesh().map_err(refused)?;
+            self.tell_handedness(mesh.cells());
+            let surface = Surface::extract(&mesh, &settings).map_err(DistributedError::from);
+            surface
+                .and_then(|surface| Shaper::new(mesh, Arc::new(surface)))
+                .map_err(|error| error.to_string())
+        };
+        // Whoever drives can drag the skeleton at any time.
+        let skeleton = self.config.stream.is_some()
+            || self.timed.drags_skeleton()
+            || self.pipelines.drags_skeleton();
+        let (log, queue) = (Arc::clone(&self.log), Arc::clone(&self.queue));
+        Ok(shaper.and_then(|shaper| {
+            let shaper = shaper.with_clock(clock);
+            let mut steerer = Steerer::new(shaper, self.defaults.clone(), log, queue, skeleton)
+                .map_err(|error| format!("a thread could not be started: {error}"))?;
+            // Nobody may ever come to a run that is only watched over.
+            if !self.timed.is_empty() || self.pipelines.can_order() {
+                steerer.make_ready();
+            }
+            Ok(steerer)
+        }))
+    }
+}
+
+fn of_channel(cycle: u64, channel: &Channel<'_>, source: MeshError) -> ExecuteError {
+    ExecuteError::Channel {
+        cycle,
+        source: ChannelError::Mesh { channel: channel.name.into(), source },
+    }
+}

@@ -1,0 +1,246 @@
+//! Arrays by their addresses, and how they are lent to the adaptor.
+
+use std::marker::PhantomData;
+
+pub use tombolo_deform::mesh::NumberType;
+use tombolo_deform::mesh::{Indices, Values};
+
+/// The type that Conduit gives this number, as does `tombolo.h`; `None` where it is that of no type
+/// of numbers.
+#[must_use]
+pub fn conduit_type(number: i64) -> Option<NumberType> {
+    use NumberType::{F32, F64, I8, I16, I32, I64, U8, U16, U32, U64};
+    let index = usize::try_from(number.checked_sub(3)?).ok()?;
+    [I8, I16, I32, I64, U8, U16, U32, U64, F32, F64].get(index).copied()
+}
+
+/// Numbers of any type at any distance from each other, borrowed from the solver for the length of
+/// one call.
+#[derive(Debug, Clone, Copy)]
+pub struct Array<'call> {
+    first: *const u8,
+    count: usize,
+    stride: usize,
+    number: NumberType,
+    swapped: bool,
+    call: PhantomData<&'call [u8]>,
+}
+
+impl<'call> Array<'call> {
+    /// Numbers at an address, of which those of a big-endian machine are turned round as they are
+    /// read.
+    ///
+    /// # Safety
+    /// From `first` on there are `count` numbers of this type, `stride` bytes apart (not aligned,
+    /// it may be), that live and do not change during `'call`; `count * stride` is at most
+    /// `isize::MAX`.
+    pub unsafe fn new(
+        first: *const u8,
+        count: usize,
+        stride: usize,
+        number: NumberType,
+        big_endian: bool,
+    ) -> Self {
+        let swapped = big_endian && cfg!(target_endian = "little");
+        Self { first, count, stride, number, swapped, call: PhantomData }
+    }
+
+    /// How many numbers there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// The type of the numbers.
+    #[must_use]
+    pub fn number(&self) -> NumberType {
+        self.number
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    fn read<const N: usize>(&self, index: usize) -> [u8; N] {
+        assert!(index < self.count && N == self.number.bytes(), "element {index}");
+        // SAFETY: the element is there (`new`), and bytes need no alignment.
+        let mut bytes: [u8; N] =
+            unsafe { self.first.add(index * self.stride).cast::<[u8; N]>().read_unaligned() };
+        if self.swapped {
+            bytes.reverse();
+        }
+        bytes
+    }
+
+    /// A value as double precision.
+    ///
+    /// # Panics
+    /// Where `index` is out of range.
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "fields of large integers are shown, not computed with"
+    )]
+    #[must_use]
+    pub fn get(&self, index: usize) -> f64 {
+        match self.number {
+            NumberType::I8 => f64::from(i8::from_ne_bytes(self.read(index))),
+            NumberType::I16 => f64::from(i16::from_ne_bytes(self.read(index))),
+            NumberType::I32 => f64::from(i32::from_ne_bytes(self.read(index))),
+            NumberType::I64 => i64::from_ne_bytes(self.read(index)) as f64,
+            NumberType::U8 => f64::from(u8::from_ne_bytes(self.read(index))),
+            NumberType::U16 => f64::from(u16::from_ne_bytes(self.read(index))),
+            NumberType::U32 => f64::from(u32::from_ne_bytes(self.read(index))),
+            NumberType::U64 => u64::from_ne_bytes(self.read(index)) as f64,
+            NumberType::F32 => f64::from(f32::from_ne_bytes(self.read(index))),
+            NumberType::F64 => f64::from_ne_bytes(self.read(index)),
+        }
+    }
+
+    /// A value as an integer; `None` for a real number that is none.
+    ///
+    /// # Panics
+    /// Where `index` is out of range.
+    #[must_use]
+    pub fn integer(&self, index: usize) -> Option<i64> {
+        match self.number {
+            NumberType::I64 => Some(i64::from_ne_bytes(self.read(index))),
+            NumberType::U64 => i64::try_from(u64::from_ne_bytes(self.read(index))).ok(),
+            _ => {
+                let value = self.get(index);
+                #[expect(clippy::cast_possible_truncation, reason = "a whole number below 2^53")]
+                (value.fract() == 0.0 && value.abs() < 9.0e15).then_some(value as i64)
+            }
+        }
+    }
+
+    /// A value as a whole number from 0 on.
+    ///
+    /// # Panics
+    /// Where `index` is out of range.
+    #[must_use]
+    pub fn whole(&self, index: usize) -> Option<u64> {
+        self.integer(index).and_then(|value| u64::try_from(value).ok())
+    }
+
+    /// The values in memory as a slice, where they can be seen as one: every `stride`-th of it is
+    /// one of them.
+    fn slice<T>(&self) -> Option<(&'call [T], usize)> {
+        let size = size_of::<T>();
+        if size != self.number.bytes() || self.swapped {
+            return None;
+        }
+        if self.count == 0 {
+            return Some((&[], 1));
+        }
+        let stride = if self.count == 1 { size } else { self.stride };
+        if !stride.is_multiple_of(size)
+            || stride == 0
+            || !self.first.addr().is_multiple_of(align_of::<T>())
+        {
+            return None;
+        }
+        let length = (self.count - 1) * (stride / size) + 1;
+        // SAFETY: aligned; the last of the values is the last element of the slice, and what lies
+        // between two of them lies between two addresses of the solver's array (`new`), live and
+        // unchanged during the call. Every pattern of bits is a number.
+        Some((unsafe { std::slice::from_raw_parts(self.first.cast::<T>(), length) }, stride / size))
+    }
+
+    /// The values as the adaptor borrows them, with the distance between two; `None` where they
+    /// have to be copied.
+    pub(super) fn values(&self) -> Option<(Values<'call>, usize)> {
+        match self.number {
+            NumberType::F32 => self.slice().map(|(values, stride)| (Values::F32(values), stride)),
+            NumberType::F64 => self.slice().map(|(values, stride)| (Values::F64(values), stride)),
+            NumberType::I32 => self.slice().map(|(values, stride)| (Values::I32(values), stride)),
+            NumberType::I64 => self.slice().map(|(values, stride)| (Values::I64(values), stride)),
+            NumberType::U8 => self.slice().map(|(values, stride)| (Values::U8(values), stride)),
+            NumberType::I8
+            | NumberType::I16
+            | NumberType::U16
+            | NumberType::U32
+            | NumberType::U64 => None,
+        }
+    }
+
+    /// The values as vertex numbers, one beside the other; `None` where they have to be copied.
+    pub(super) fn indices(&self) -> Option<Indices<'call>> {
+        if self.count > 1 && self.stride != self.number.bytes() {
+            return None;
+        }
+        match self.number {
+            NumberType::I32 => self.slice().map(|(values, _)| Indices::I32(values)),
+            NumberType::I64 => self.slice().map(|(values, _)| Indices::I64(values)),
+            NumberType::U32 => self.slice().map(|(values, _)| Indices::U32(values)),
+            NumberType::U64 => self.slice().map(|(values, _)| Indices::U64(values)),
+            _ => None,
+        }
+    }
+
+    /// Where the first and the last value lie: the bounds of the memory that is lent.
+    pub(super) fn ends(&self) -> Option<[(*const u8, usize); 2]> {
+        let last = self.first.wrapping_add(self.count.checked_sub(1)? * self.stride);
+        Some([(self.first, self.number.bytes()), (last, self.number.bytes())])
+    }
+
+    /// The address of the first value.
+    pub(super) fn address(&self) -> usize {
+        self.first.addr()
+    }
+
+    /// Whether its values are whole numbers by their type.
+    #[must_use]
+    pub fn is_integer(&self) -> bool {
+        !self.number.is_real()
+    }
+
+    /// Takes the values into a fingerprint.
+    pub(super) fn fingerprint(&self, into: &mut Fingerprint) {
+        into.add(self.count as u64);
+        if self.stride == self.number.bytes() && self.count > 0 {
+            // SAFETY: the values lie one beside the other (`new`), and any bytes are bytes.
+            into.bytes(unsafe { std::slice::from_raw_parts(self.first, self.count * self.stride) });
+        } else {
+            (0..self.count).for_each(|index| into.add(self.get(index).to_bits()));
+        }
+    }
+}
+
+/// Tells arrays apart that differ: of arrays that solvers hand over, not of ones made to deceive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Fingerprint([u64; 4]);
+
+impl Default for Fingerprint {
+    fn default() -> Self {
+        Self([
+            0x9e37_79b9_7f4a_7c15,
+            0xbf58_476d_1ce4_e5b9,
+            0x94d0_49bb_1331_11eb,
+            0x2545_f491_4f6c_dd1d,
+        ])
+    }
+}
+
+impl Fingerprint {
+    fn mix(state: u64, word: u64) -> u64 {
+        (state ^ word).wrapping_mul(0x9fb2_1c65_1e98_df25).rotate_left(29)
+    }
+
+    pub(super) fn add(&mut self, word: u64) {
+        self.0[0] = Self::mix(self.0[0], word);
+        self.0.rotate_left(1);
+    }
+
+    fn bytes(&mut self, bytes: &[u8]) {
+        let (blocks, rest) = bytes.as_chunks::<32>();
+        for block in blocks {
+            let (words, _) = block.as_chunks::<8>();
+            for (state, word) in self.0.iter_mut().zip(words) {
+                *state = Self::mix(*state, u64::from_ne_bytes(*word));
+            }
+        }
+        rest.iter().for_each(|byte| self.add(u64::from(*byte)));
+    }
+}

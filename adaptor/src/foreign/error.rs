@@ -1,0 +1,113 @@
+//! What can be wrong with a call of a solver in another language.
+
+use tombolo_deform::mesh::MeshError;
+use tombolo_pipelines::extract::ChannelError;
+use tombolo_pipelines::language::{LanguageError, ReadError};
+
+use crate::{ExecuteError, FinalizeError, InitializeError};
+
+/// Why a run did not begin, or a call of it was refused.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RunError {
+    /// A path that is needed is not there.
+    #[error("'{path}' is missing; expected {expected}")]
+    Missing {
+        /// The path.
+        path: String,
+        /// The content that is needed there.
+        expected: &'static str,
+    },
+    /// A path holds something else than is needed.
+    #[error("'{path}': found {found}; expected {expected}")]
+    Wrong {
+        /// The path.
+        path: String,
+        /// The content that was found.
+        found: String,
+        /// The content that is needed.
+        expected: String,
+    },
+    /// Cells are wrong.
+    #[error("'{path}': {source}")]
+    Cells {
+        /// The path.
+        path: String,
+        /// The mistake in them.
+        source: MeshError,
+    },
+    /// An argument, or an array that was named, makes no sense.
+    #[error("{what}: found {found}; expected {expected}")]
+    Argument {
+        /// The name of the argument.
+        what: String,
+        /// Its value.
+        found: String,
+        /// The values that it can have.
+        expected: String,
+    },
+    /// The configuration cannot be read.
+    #[error("{0}")]
+    Configuration(String),
+    /// Another rank cannot go on.
+    #[error("rank {rank}: {message}")]
+    Rank {
+        /// The lowest rank with an error.
+        rank: usize,
+        /// Its error.
+        message: String,
+        /// Whether [`RunError::is_failure`] of its error.
+        is_failure: bool,
+    },
+    /// Ranks let different pipelines run.
+    #[error(
+        "the pipelines that are to run: found other names on other ranks; expected the same on all"
+    )]
+    Choices,
+    /// The adaptor could not be set up.
+    #[error(transparent)]
+    Initialize(#[from] InitializeError),
+    /// A channel's arrays do not fit together.
+    #[error(transparent)]
+    Channel(#[from] ChannelError),
+    /// The adaptor refused a step.
+    #[error(transparent)]
+    Execute(#[from] ExecuteError),
+    /// Something was not written.
+    #[error(transparent)]
+    Finalize(#[from] FinalizeError),
+}
+
+impl From<LanguageError> for RunError {
+    fn from(error: LanguageError) -> Self {
+        Self::Configuration(error.to_string())
+    }
+}
+
+impl From<ReadError> for RunError {
+    fn from(error: ReadError) -> Self {
+        Self::Configuration(error.to_string())
+    }
+}
+
+impl RunError {
+    /// The error that a path holds something else than is needed.
+    #[must_use]
+    pub fn wrong(path: impl ToString, found: impl ToString, expected: impl ToString) -> Self {
+        Self::Wrong {
+            path: path.to_string(),
+            found: found.to_string(),
+            expected: expected.to_string(),
+        }
+    }
+
+    /// Whether the run could not do what it was told, rather than was given what makes no sense.
+    #[must_use]
+    pub fn is_failure(&self) -> bool {
+        match self {
+            RunError::Rank { is_failure, .. } => *is_failure,
+            RunError::Initialize(_) | RunError::Finalize(_) => true,
+            _ => false,
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! A channel: one mesh, several blocks, or overlapping grids.
+
+use tombolo_deform::bounds::Bounds;
+
+use super::domain::Domain;
+use super::field::Field;
+use super::levels::{Grid, Mask};
+use crate::foreign::array::Fingerprint;
+use crate::foreign::error::RunError;
+use crate::foreign::memory;
+
+/// One mesh of a channel.
+#[derive(Debug)]
+pub struct Block<'call> {
+    /// Its name; empty where the channel is one mesh.
+    pub name: String,
+    /// The mesh.
+    pub domain: Domain<'call>,
+    /// Which of its cells finer grids cover.
+    pub mask: Mask,
+}
+
+impl Block<'_> {
+    /// How many vertices it has.
+    #[must_use]
+    pub fn vertex_count(&self) -> usize {
+        self.domain.coordset.vertex_count()
+    }
+}
+
+/// A channel as the solver shows it in one call.
+#[derive(Debug, Default)]
+pub struct Channel<'call> {
+    /// Its name.
+    pub name: String,
+    /// Its name in errors.
+    pub path: String,
+    /// Its meshes; none on a rank without data.
+    pub blocks: Vec<Block<'call>>,
+    /// Names of features by their numbers.
+    pub feature_names: Vec<(i64, String)>,
+    /// Fields of the mesh as a whole.
+    pub of_mesh: Vec<Field<'call>>,
+    /// The grids of levels that the blocks are; none of a channel without levels.
+    pub grids: Vec<Option<Grid>>,
+    /// The boxes that the grids of all ranks fill, as far as they are known here.
+    pub boxes: Vec<Bounds>,
+    /// Parts that are passed over, for the log.
+    pub notes: Vec<String>,
+}
+
+impl<'call> Channel<'call> {
+    /// The grids of levels here.
+    pub fn grids(&self) -> impl Iterator<Item = Grid> {
+        self.grids.iter().flatten().copied()
+    }
+
+    /// Takes in the grids that there are, and leaves out the cells that finer ones cover.
+    pub fn cover(&mut self, grids: &[Grid]) {
+        // One grid has no neighbour.
+        if grids.len() > 1 {
+            self.boxes = grids.iter().map(Grid::bounds).collect();
+        }
+        for (block, own) in self.blocks.iter_mut().zip(&self.grids) {
+            if let Some(own) = own {
+                block.mask.settle(own, grids);
+            }
+        }
+    }
+
+    /// Whether its blocks are grids of levels, whose vertices at one point are one.
+    pub(super) fn has_levels(&self) -> bool {
+        self.grids.iter().any(Option::is_some)
+    }
+
+    /// How many vertices it has.
+    #[must_use]
+    pub fn vertex_count(&self) -> usize {
+        self.blocks.iter().map(Block::vertex_count).sum()
+    }
+
+    /// The one mesh that is lent as it is.
+    pub(super) fn single(&self) -> Option<&Domain<'call>> {
+        match self.blocks.as_slice() {
+            [Block { domain, mask, .. }] if *mask == Mask::default() => Some(domain),
+            _ => None,
+        }
+    }
+
+    /// A fingerprint by which these cells are told from others.
+    pub(super) fn fingerprint(&self) -> Fingerprint {
+        let mut fingerprint = Fingerprint::default();
+        for block in &self.blocks {
+            block.domain.fingerprint(&mut fingerprint);
+            block.mask.words().for_each(|word| fingerprint.add(word));
+        }
+        let corners = self.boxes.iter().flat_map(Bounds::corners).flatten();
+        corners.for_each(|coordinate| fingerprint.add(coordinate.to_bits()));
+        fingerprint
+    }
+
+    /// Refuses arrays whose memory cannot be read.
+    pub(super) fn check_memory(&self) -> Result<(), RunError> {
+        self.blocks.iter().try_for_each(|block| block.domain.check_memory())?;
+        for field in &self.of_mesh {
+            for array in &field.components {
+                memory::check(array, format_args!("{}/state/fields/{}", self.path, field.name))?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,53 @@
+//! Fields, and arrays of components as the adaptor is lent them.
+
+use tombolo_deform::mesh::{ArrayView, Values};
+use tombolo_pipelines::extract::{Association, GHOST_FIELD};
+
+use crate::foreign::array::{Array, NumberType};
+
+/// Most components that a tuple can have.
+pub const COMPONENTS: usize = 9;
+
+/// Values at the vertices of a mesh, in its cells, or of the mesh as a whole.
+#[derive(Debug, Clone)]
+pub struct Field<'call> {
+    /// Its name.
+    pub name: String,
+    /// Whether it has values at vertices, in cells, or of the mesh.
+    pub association: Association,
+    /// Its components, of one length.
+    pub components: Vec<Array<'call>>,
+    /// The type of number in files.
+    pub number: NumberType,
+}
+
+/// The type of all components; double precision where they differ.
+fn number(components: &[Array<'_>]) -> NumberType {
+    let first = components.first().map_or(NumberType::F64, Array::number);
+    if components.iter().all(|array| array.number() == first) { first } else { NumberType::F64 }
+}
+
+/// Components as they lie in the solver's memory, where each can be lent.
+pub(super) fn lent<'call>(components: &[Array<'call>]) -> Option<ArrayView<'call>> {
+    let mut columns: [(Values<'call>, usize, usize); COMPONENTS] =
+        [(Values::U8(&[]), 0, 1); COMPONENTS];
+    for (column, array) in columns.iter_mut().zip(components) {
+        let (values, stride) = array.values()?;
+        *column = (values, 0, stride);
+    }
+    ArrayView::strided(components.first()?.len(), columns.get(..components.len())?).ok()
+}
+
+impl<'call> Field<'call> {
+    /// A field of these components.
+    #[must_use]
+    pub fn new(name: String, association: Association, components: Vec<Array<'call>>) -> Self {
+        Self { name, association, number: number(&components), components }
+    }
+
+    /// The field by VTK's name for what says which cells or vertices are ghosts, and of VTK's type.
+    #[must_use]
+    pub fn of_ghosts(self) -> Self {
+        Self { name: GHOST_FIELD.to_owned(), number: NumberType::U8, ..self }
+    }
+}

@@ -1,0 +1,366 @@
+//! What is kept of a channel from step to step: whatever cannot be lent as it lies in the solver's
+//! memory.
+
+use std::collections::HashMap;
+
+use tombolo_deform::bounds::Bounds;
+use tombolo_deform::mesh::{
+    ArrayView, Cells, CellsView, FeatureSource, Indices, MeshView, TaggedFaces, Values, Vector,
+    ghosts,
+};
+use tombolo_pipelines::extract::{ABSENT, Association, FieldView, GHOST_FIELD};
+
+use super::channel::Channel;
+use super::domain::Domain;
+use super::field::{self, Field};
+use crate::foreign::array::{Array, Fingerprint, NumberType};
+use crate::foreign::error::RunError;
+
+/// A field that had to be copied.
+#[derive(Debug, Default)]
+struct Copied {
+    name: String,
+    association: Option<Association>,
+    components: usize,
+    number: NumberType,
+    values: Vec<f64>,
+}
+
+impl Copied {
+    /// Begins anew with a field of this kind.
+    fn begin(&mut self, field: &Field<'_>) {
+        field.name.clone_into(&mut self.name);
+        self.association = Some(field.association);
+        self.components = field.components.len();
+        self.number = field.number;
+        self.values.clear();
+    }
+
+    fn is_of(&self, field: &Field<'_>) -> bool {
+        field.name == self.name
+            && Some(field.association) == self.association
+            && field.components.len() == self.components
+    }
+
+    fn append(&mut self, field: &Field<'_>, entity: usize) {
+        self.values.extend(field.components.iter().map(|array| array.get(entity)));
+    }
+}
+
+/// The numbers and marks that a mesh brings, copied.
+#[derive(Debug, Default)]
+struct Marks {
+    features: FeatureSource,
+    ghosts: Option<Vec<u8>>,
+    global_vertices: Option<Vec<u64>>,
+    global_cells: Option<Vec<u64>>,
+}
+
+/// The copies and marks that are kept of one channel.
+#[derive(Debug, Default)]
+pub(crate) struct Kept {
+    fingerprint: Option<Fingerprint>,
+    counts: (usize, usize),
+    address: usize,
+    generation: u64,
+    cells: Option<Cells>,
+    points: Vec<Vector>,
+    marks: Marks,
+    boxes: Vec<Bounds>,
+    fields: Vec<Copied>,
+}
+
+impl Kept {
+    /// Brings what is kept up to date with what the solver shows. Where nobody will look at the
+    /// values of this step (`looked_at`), nothing is copied or compared unless the mesh has another
+    /// size. Says whether the cells are others than before.
+    pub(crate) fn update(
+        &mut self,
+        channel: &Channel<'_>,
+        looked_at: bool,
+    ) -> Result<bool, RunError> {
+        let counts = (
+            channel.vertex_count(),
+            channel.blocks.iter().map(|block| block.domain.topology.cell_count()).sum(),
+        );
+        if !looked_at && self.fingerprint.is_some() && counts == self.counts {
+            return Ok(false);
+        }
+        channel.check_memory()?;
+        let single = channel.single();
+        let lent_cells = single.and_then(|domain| domain.topology.lent().map(|_| address(domain)));
+        let fingerprint = channel.fingerprint();
+        let is_same = self.fingerprint == Some(fingerprint);
+        let is_other = self.fingerprint.is_some() && !is_same;
+        self.counts = counts;
+        let lent_points = single.is_some_and(|domain| domain.coordset.lent().is_some());
+        if !lent_points || (!is_same && lent_cells.is_none()) {
+            self.points.clear();
+            if self.points.try_reserve(counts.0).is_err() {
+                let path = format_args!("{}/data", channel.path);
+                let found = format!("{} vertices", counts.0);
+                return Err(RunError::wrong(path, found, "as many as there is memory for"));
+            }
+            for block in &channel.blocks {
+                block.domain.coordset.append(&mut self.points);
+            }
+        }
+        if !is_same {
+            self.fingerprint = None;
+            self.generation += 1;
+            self.cells = None;
+            self.address = lent_cells.unwrap_or(0);
+            // Those that are lent are checked by the adaptor.
+            if lent_cells.is_none() {
+                self.cells = Some(cells(channel, &self.points)?);
+            }
+            self.marks = marks(channel)?;
+            self.boxes.clone_from(&channel.boxes);
+            self.fingerprint = Some(fingerprint);
+        } else if let Some(address) = lent_cells
+            && self.cells.is_none()
+            && address != self.address
+        {
+            // A solver that copies its cells anew for each step: one copy here, by which they are
+            // known from now on.
+            self.cells = Some(cells(channel, &self.points_of(channel))?);
+        }
+        if lent_points {
+            self.points = Vec::new();
+        }
+        self.copy_fields(channel);
+        Ok(is_other)
+    }
+
+    fn points_of(&self, channel: &Channel<'_>) -> Vec<Vector> {
+        let mut points = Vec::new();
+        channel.blocks.iter().for_each(|block| block.domain.coordset.append(&mut points));
+        points
+    }
+
+    /// Copies the fields that cannot be lent.
+    fn copy_fields(&mut self, channel: &Channel<'_>) {
+        let mut of_blocks: Vec<&Field<'_>> = Vec::new();
+        if let Some(domain) = channel.single() {
+            of_blocks.extend(
+                domain.fields.iter().filter(|field| field::lent(&field.components).is_none()),
+            );
+        } else {
+            for field in channel.blocks.iter().flat_map(|block| &block.domain.fields) {
+                if !of_blocks.iter().any(|known| known.name == field.name) {
+                    of_blocks.push(field);
+                }
+            }
+        }
+        let of_mesh =
+            channel.of_mesh.iter().filter(|field| field::lent(&field.components).is_none());
+        let of_mesh: Vec<&Field<'_>> = of_mesh.collect();
+        self.fields.resize_with(of_blocks.len() + of_mesh.len(), Copied::default);
+        let mut copies = self.fields.iter_mut();
+        for (first, copied) in of_blocks.into_iter().zip(copies.by_ref()) {
+            copied.begin(first);
+            for block in &channel.blocks {
+                let entities = match first.association {
+                    Association::Vertex => block.domain.coordset.vertex_count(),
+                    Association::Element => block.domain.topology.cell_count(),
+                    Association::Mesh => 0,
+                };
+                let of_block = block.domain.fields.iter().find(|field| copied.is_of(field));
+                if of_block.is_some_and(|field| field.number != copied.number) {
+                    copied.number = NumberType::F64;
+                }
+                for entity in 0..entities {
+                    if first.association == Association::Element && !block.mask.keeps(entity) {
+                        continue;
+                    }
+                    match of_block {
+                        Some(field) => copied.append(field, entity),
+                        // Where a block says nothing of ghosts there are none.
+                        None if copied.name == GHOST_FIELD => copied.values.push(0.0),
+                        // A block that lacks the field has no values to show.
+                        None => {
+                            copied.values.extend(std::iter::repeat_n(ABSENT, copied.components))
+                        }
+                    }
+                }
+            }
+        }
+        for (field, copied) in of_mesh.into_iter().zip(copies) {
+            copied.begin(field);
+            (0..field.components.first().map_or(0, Array::len))
+                .for_each(|tuple| copied.append(field, tuple));
+        }
+    }
+
+    /// The mesh and its fields, as the adaptor is lent them.
+    pub(crate) fn views<'a>(
+        &'a self,
+        channel: &'a Channel<'a>,
+        fields: &mut Vec<FieldView<'a>>,
+    ) -> MeshView<'a> {
+        let single = channel.single();
+        let points = single.and_then(|domain| domain.coordset.lent());
+        let points = points.unwrap_or_else(|| ArrayView::vectors(&self.points));
+        let cells = match (&self.cells, single.and_then(|domain| domain.topology.lent())) {
+            (None, Some(lent)) => lent,
+            (Some(kept), _) => CellsView::Owned(kept),
+            (None, None) => CellsView::Uniform {
+                cell_type: tombolo_deform::mesh::CellType::Tetra,
+                connectivity: Indices::U32(&[]),
+            },
+        };
+        for field in single.iter().flat_map(|domain| &domain.fields).chain(&channel.of_mesh) {
+            if let Some(values) = field::lent(&field.components) {
+                let values = values.copied_from(field.number);
+                fields.push(FieldView {
+                    name: &field.name,
+                    association: field.association,
+                    values,
+                });
+            }
+        }
+        for copied in &self.fields {
+            let values =
+                ArrayView::interleaved(Values::F64(&copied.values), copied.components.max(1));
+            if let (Ok(values), Some(association)) = (values, copied.association) {
+                let values = values.copied_from(copied.number);
+                fields.push(FieldView { name: &copied.name, association, values });
+            }
+        }
+        let Marks { features, ghosts, global_vertices, global_cells } = &self.marks;
+        MeshView {
+            points,
+            cells,
+            features,
+            generation: self.generation,
+            global_vertices: global_vertices.as_deref().map(Indices::U64),
+            global_cells: global_cells.as_deref().map(Indices::U64),
+            ghost_cells: ghosts.as_deref(),
+            grid_boxes: &self.boxes,
+        }
+    }
+}
+
+fn address(domain: &Domain<'_>) -> usize {
+    domain.topology.arrays().first().map_or(0, |array| array.address())
+}
+
+/// The cells of all blocks, one block after the other.
+fn cells(channel: &Channel<'_>, points: &[Vector]) -> Result<Cells, RunError> {
+    let mut cells = Cells::new();
+    let mut base = 0;
+    for block in &channel.blocks {
+        let end = base + block.vertex_count();
+        let so_far = points.get(..end).unwrap_or(points);
+        block.domain.topology.append(&mut cells, base, so_far, &|cell| block.mask.keeps(cell))?;
+        base = end;
+    }
+    if channel.has_levels() { joined(&cells, points, channel) } else { Ok(cells) }
+}
+
+/// The cells of grids of levels by the first of the vertices at each place, so that what lies
+/// between two grids is no surface.
+fn joined(cells: &Cells, points: &[Vector], channel: &Channel<'_>) -> Result<Cells, RunError> {
+    let finest = channel.grids().map(|grid| grid.least_spacing()).fold(f64::INFINITY, f64::min);
+    // Grids of one mesh have their points on one lattice, but for rounding.
+    let unit = if finest.is_finite() && finest > 0.0 { finest / 8.0 } else { 1.0 };
+    let lowest = Bounds::around(points.iter().copied()).lower;
+    let mut first: HashMap<[i64; 3], u32> = HashMap::new();
+    let numbers: Vec<u32> = (0..)
+        .zip(points)
+        .map(|(number, point)| {
+            #[expect(
+                clippy::cast_possible_truncation,
+                reason = "eighths of the finest cell that fit into the mesh"
+            )]
+            let place =
+                std::array::from_fn(|axis| ((point[axis] - lowest[axis]) / unit).round() as i64);
+            *first.entry(place).or_insert(number)
+        })
+        .collect();
+    let mut joined = Cells::new();
+    for (cell_type, vertices) in cells.iter() {
+        let vertices: Vec<u32> =
+            vertices.iter().filter_map(|&vertex| numbers.get(vertex as usize).copied()).collect();
+        joined.push(cell_type, &vertices).map_err(|error| {
+            RunError::wrong(
+                format_args!("{}/data", channel.path),
+                error,
+                "grids whose points lie apart",
+            )
+        })?;
+    }
+    Ok(joined)
+}
+
+fn marks(channel: &Channel<'_>) -> Result<Marks, RunError> {
+    let mut marks =
+        Marks { features: features(channel)?, ghosts: ghost_bits(channel), ..Marks::default() };
+    let Some(domain) = channel.single() else { return Ok(marks) };
+    let roles = &domain.roles;
+    let numbers = |array: &Array<'_>| -> Result<Vec<u64>, RunError> {
+        (0..array.len())
+            .map(|index| {
+                array.whole(index).ok_or_else(|| {
+                    let found = format!("the global number {}", array.get(index));
+                    RunError::wrong(
+                        format_args!("{}/data/fields", channel.path),
+                        found,
+                        "whole numbers from 0 on",
+                    )
+                })
+            })
+            .collect()
+    };
+    marks.global_vertices = roles.global_vertices.as_ref().map(numbers).transpose()?;
+    marks.global_cells = roles.global_cells.as_ref().map(numbers).transpose()?;
+    Ok(marks)
+}
+
+/// The bits of the `vtkGhostType` of the cells that are kept.
+fn ghost_bits(channel: &Channel<'_>) -> Option<Vec<u8>> {
+    channel.blocks.iter().find(|block| block.domain.roles.ghosts.is_some())?;
+    let bits = |array: &Array<'_>, cell: usize| {
+        if cell < array.len() { array.integer(cell).map_or(0, ghosts::of_integer) } else { 0 }
+    };
+    if let Some(domain) = channel.single() {
+        // As many as there are: the adaptor refuses too few and too many.
+        let ghosts = domain.roles.ghosts.as_ref()?;
+        return Some((0..ghosts.len()).map(|cell| bits(ghosts, cell)).collect());
+    }
+    let of_blocks = channel.blocks.iter().flat_map(|block| {
+        let (ghosts, cells) =
+            (block.domain.roles.ghosts.as_ref(), block.domain.topology.cell_count());
+        let kept = (0..cells).filter(|&cell| block.mask.keeps(cell));
+        kept.map(move |cell| ghosts.map_or(0, |array| bits(array, cell)))
+    });
+    Some(of_blocks.collect())
+}
+
+/// Where the features come from: tagged faces, numbers at vertices, else sharp edges.
+fn features(channel: &Channel<'_>) -> Result<FeatureSource, RunError> {
+    if let Some(domain) = channel.single()
+        && let Some(numbers) = &domain.roles.vertex_features
+        && channel.blocks.iter().all(|block| block.domain.faces.is_empty())
+    {
+        return Ok(FeatureSource::Vertices(
+            (0..numbers.len()).map(|at| numbers.integer(at).unwrap_or(0)).collect(),
+        ));
+    }
+    let mut tagged = TaggedFaces { names: channel.feature_names.clone(), ..TaggedFaces::default() };
+    let mut base = 0;
+    let mut points = Vec::new();
+    for block in &channel.blocks {
+        for faces in &block.domain.faces {
+            points.resize(base + block.vertex_count(), Vector::default());
+            faces.topology.append(&mut tagged.faces, base, &points, &|_| true)?;
+            tagged.tags.extend((0..faces.tags.len()).map(|at| faces.tags.integer(at).unwrap_or(0)));
+        }
+        base += block.vertex_count();
+    }
+    Ok(if tagged.tags.is_empty() {
+        FeatureSource::SharpEdges
+    } else {
+        FeatureSource::Faces(tagged)
+    })
+}

@@ -1,0 +1,164 @@
+//! Rows of different lengths: what `connectivity`, `sizes` and `offsets` describe.
+
+use std::fmt::Arguments;
+
+use tombolo_deform::mesh::MeshError;
+
+use crate::foreign::array::{Array, Fingerprint};
+use crate::foreign::error::RunError;
+
+/// Rows of whole numbers.
+#[derive(Debug, Clone)]
+pub struct Rows<'call> {
+    connectivity: Array<'call>,
+    sizes: Array<'call>,
+    offsets: Option<Array<'call>>,
+    path: String,
+}
+
+impl<'call> Rows<'call> {
+    /// Rows of these sizes, which begin at the `offsets`, or else one behind the other; `path` is
+    /// what errors call them.
+    #[must_use]
+    pub fn new(
+        connectivity: Array<'call>,
+        sizes: Array<'call>,
+        offsets: Option<Array<'call>>,
+        path: String,
+    ) -> Self {
+        Self { connectivity, sizes, offsets, path }
+    }
+
+    /// How many rows there are.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.sizes.len()
+    }
+
+    /// Calls `visit` with each row, whose entries are vertices, of which there are `vertices`.
+    pub(super) fn for_each_of_vertices(
+        &self,
+        vertices: usize,
+        visit: impl FnMut(usize, &[u32]) -> Result<(), RunError>,
+    ) -> Result<(), RunError> {
+        let path = format_args!("{}/connectivity", self.path);
+        self.for_each_of(
+            |entry, cell| vertex(&self.connectivity, path, entry, cell, vertices),
+            visit,
+        )
+    }
+
+    /// Calls `visit` with each row, whose entries are below `limit`.
+    pub(super) fn for_each(
+        &self,
+        limit: usize,
+        visit: impl FnMut(usize, &[u32]) -> Result<(), RunError>,
+    ) -> Result<(), RunError> {
+        self.for_each_of(
+            |entry, _| self.at(&self.connectivity, "connectivity", entry, limit as u64),
+            visit,
+        )
+    }
+
+    fn for_each_of(
+        &self,
+        read: impl Fn(usize, usize) -> Result<u32, RunError>,
+        mut visit: impl FnMut(usize, &[u32]) -> Result<(), RunError>,
+    ) -> Result<(), RunError> {
+        let mut row = Vec::new();
+        let mut next = 0;
+        for index in 0..self.count() {
+            let size: usize = self.at(&self.sizes, "sizes", index, u64::from(u32::MAX))?;
+            let start: usize = match &self.offsets {
+                Some(offsets) => {
+                    self.at(offsets, "offsets", index, self.connectivity.len() as u64 + 1)?
+                }
+                None => next,
+            };
+            let end = start.checked_add(size).filter(|end| *end <= self.connectivity.len());
+            let Some(end) = end else {
+                let entries = self.connectivity.len();
+                return Err(RunError::wrong(
+                    format_args!("{}/connectivity", self.path),
+                    format_args!(
+                        "{entries} entries, but row {index} begins at {start} and has {size}"
+                    ),
+                    "rows that end within it",
+                ));
+            };
+            next = end;
+            row.clear();
+            for entry in start..end {
+                row.push(read(entry, index)?);
+            }
+            visit(index, &row)?;
+        }
+        Ok(())
+    }
+
+    fn at<T: TryFrom<u64>>(
+        &self,
+        array: &Array,
+        name: &str,
+        index: usize,
+        limit: u64,
+    ) -> Result<T, RunError> {
+        entry(array, format_args!("{}/{name}", self.path), index, limit)
+    }
+
+    /// That a cell names a vertex that does not exist.
+    pub(super) fn no_such_vertex(&self, cell: usize, vertex: u32, vertices: usize) -> RunError {
+        no_such_vertex(format_args!("{}/connectivity", self.path), cell, vertex.into(), vertices)
+    }
+
+    pub(super) fn error(&self, index: usize, found: String, expected: &str) -> RunError {
+        RunError::wrong(&self.path, format_args!("{found} in row {index}"), expected)
+    }
+
+    pub(super) fn fingerprint(&self, into: &mut Fingerprint) {
+        self.arrays().for_each(|array| array.fingerprint(into));
+    }
+
+    pub(super) fn arrays(&self) -> impl Iterator<Item = &Array<'call>> {
+        [&self.connectivity, &self.sizes].into_iter().chain(&self.offsets)
+    }
+}
+
+/// One whole number of an array that is below `limit`.
+fn entry<T: TryFrom<u64>>(
+    array: &Array,
+    path: Arguments<'_>,
+    index: usize,
+    limit: u64,
+) -> Result<T, RunError> {
+    let value =
+        array.whole(index).filter(|value| *value < limit).and_then(|value| T::try_from(value).ok());
+    value.ok_or_else(|| {
+        let expected = match limit {
+            0 => "no entry, as there is nothing to name".to_owned(),
+            _ => format!("whole numbers from 0 to {}", limit - 1),
+        };
+        RunError::wrong(path, format_args!("{} at entry {index}", array.get(index)), expected)
+    })
+}
+
+/// The vertex of a cell, of which there are `vertices`.
+pub(super) fn vertex(
+    array: &Array,
+    path: Arguments<'_>,
+    index: usize,
+    cell: usize,
+    vertices: usize,
+) -> Result<u32, RunError> {
+    match array.integer(index).map(i64::cast_unsigned) {
+        Some(vertex) if vertex >= vertices as u64 => {
+            Err(no_such_vertex(path, cell, vertex, vertices))
+        }
+        _ => entry(array, path, index, vertices as u64),
+    }
+}
+
+fn no_such_vertex(path: Arguments<'_>, cell: usize, vertex: u64, vertices: usize) -> RunError {
+    let source = MeshError::VertexNumber { cell, vertex, vertex_count: vertices };
+    RunError::Cells { path: path.to_string(), source }
+}

@@ -1,0 +1,162 @@
+//! The processes that run together, and how they agree about what each was given.
+
+use std::sync::Arc;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use tombolo_deform::communicator::{Communicator, Reduction, Solo, first_failure};
+
+use crate::foreign::error::RunError;
+
+/// In place of a communicator's handle: all ranks there are, with MPI or without.
+#[cfg(feature = "distributed")]
+const WORLD: i32 = -1;
+
+/// The communicator of this Fortran handle; without one or with -1, MPI's world where MPI runs,
+/// else this process by itself.
+///
+/// # Errors
+/// [`RunError::Configuration`] where the handle is that of no usable communicator.
+///
+/// # Safety
+/// The handle is -1, or one that MPI gave out and that has not been freed, or that of
+/// `MPI_COMM_NULL`.
+#[cfg(feature = "distributed")]
+pub unsafe fn communicator(handle: Option<i32>) -> Result<Arc<dyn Communicator>, RunError> {
+    use crate::mpi;
+    let unusable =
+        |error: mpi::MpiError| RunError::Configuration(format!("the communicator: {error}"));
+    match handle.filter(|&handle| handle != WORLD) {
+        // SAFETY: the caller's promise; a null one is told.
+        Some(handle) => Ok(Arc::new(unsafe { mpi::Mpi::from_fortran(handle) }.map_err(unusable)?)),
+        None => {
+            use mpi::rsmpi::environment::{is_finalized, is_initialized};
+            if !is_initialized() || is_finalized() {
+                return Ok(Arc::new(Solo));
+            }
+            // SAFETY: the world is alive between MPI's initialization and its end.
+            let world = unsafe { mpi::Mpi::from_raw(mpi::rsmpi::ffi::RSMPI_COMM_WORLD) };
+            Ok(Arc::new(world.map_err(unusable)?))
+        }
+    }
+}
+
+/// This process by itself, as this is built without the feature `distributed`.
+///
+/// # Errors
+/// [`RunError::Configuration`] where several ranks run.
+///
+/// # Safety
+/// None is needed here; with the feature `distributed` the handle must be one that MPI gave out.
+#[cfg(not(feature = "distributed"))]
+pub unsafe fn communicator(_: Option<i32>) -> Result<Arc<dyn Communicator>, RunError> {
+    let size = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MV2_COMM_WORLD_SIZE"]
+        .into_iter()
+        .find_map(|name| std::env::var(name).ok()?.parse::<usize>().ok());
+    match size {
+        Some(size) if size > 1 => Err(RunError::Configuration(format!(
+            "{size} ranks run, but this library was built without MPI; expected a build with the feature 'distributed'"
+        ))),
+        _ => Ok(Arc::new(Solo)),
+    }
+}
+
+/// Goes on where all ranks can; where one cannot, all get its error. Collective.
+///
+/// # Errors
+/// The error of the lowest rank that has one, on all ranks.
+pub fn agree<T>(ranks: &dyn Communicator, mine: Result<T, RunError>) -> Result<T, RunError> {
+    agree_and_ask(ranks, mine, false, 0).map(|(mine, _)| mine)
+}
+
+/// Goes on where all ranks can; says too whether any rank says yes, and is an error where not all
+/// have the same `choice` of pipelines.
+pub(super) fn agree_and_ask<T>(
+    ranks: &dyn Communicator,
+    mine: Result<T, RunError>,
+    yes: bool,
+    choice: u32,
+) -> Result<(T, bool), RunError> {
+    if ranks.size() == 1 {
+        return mine.map(|mine| (mine, yes));
+    }
+    let choice = u64::from(choice);
+    let mut said = [u64::from(mine.is_err()), u64::from(yes), choice, u64::MAX - choice];
+    ranks.reduce_integers(Reduction::Maximum, &mut said);
+    let [failing, any, highest, lowest] = said;
+    let told = mine
+        .as_ref()
+        .err()
+        .map(|error| format!("{} {error}", u8::from(error.is_failure())).into_bytes());
+    let failure = if failing > 0 { first_failure(ranks, 0, told) } else { None };
+    let Some((rank, bytes)) = failure else {
+        if highest != u64::MAX - lowest {
+            return Err(RunError::Choices);
+        }
+        return mine.map(|mine| (mine, any > 0));
+    };
+    // On the rank itself its own error says it all.
+    match mine {
+        Err(error) if rank == ranks.rank() => Err(error),
+        _ => {
+            let told = String::from_utf8_lossy(&bytes).into_owned();
+            let (is_failure, message) = told.split_once(' ').unwrap_or(("0", told.as_str()));
+            Err(RunError::Rank { rank, message: message.into(), is_failure: is_failure == "1" })
+        }
+    }
+}
+
+/// Whether any rank that has something says yes of it. Collective.
+pub(super) fn ask<T, E>(
+    ranks: &dyn Communicator,
+    mine: Result<T, E>,
+    is_so: impl Fn(&T) -> bool,
+) -> (Result<T, E>, bool) {
+    let any = ranks.any(mine.as_ref().is_ok_and(is_so));
+    (mine, any)
+}
+
+/// The values of all ranks, in their order. Collective.
+pub(super) fn gathered<O: DeserializeOwned>(
+    ranks: &dyn Communicator,
+    own: &impl Serialize,
+) -> Vec<O> {
+    let mut bytes = Vec::new();
+    if let Some(parts) = ranks.gather(0, &serde_json::to_vec(own).unwrap_or_default()) {
+        let lists = parts.iter().map(|part| serde_json::from_slice(part).unwrap_or_default());
+        let all: Vec<serde_json::Value> =
+            lists.flat_map(|list: Vec<serde_json::Value>| list).collect();
+        bytes = serde_json::to_vec(&all).unwrap_or_default();
+    }
+    ranks.broadcast(0, &mut bytes);
+    serde_json::from_slice(&bytes).unwrap_or_default()
+}
+
+/// The names of all ranks' channels, in the order of their ranks and there in their own.
+/// Collective.
+#[must_use]
+pub fn union(ranks: &dyn Communicator, own: &[&str]) -> Vec<String> {
+    let mut bytes = own.join("\n").into_bytes();
+    // Most often all have the same.
+    let hash = bytes.iter().fold(bytes.len() as u64, |hash, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
+    });
+    let mut spread = [hash, u64::MAX - hash];
+    ranks.reduce_integers(Reduction::Minimum, &mut spread);
+    if spread[0] == u64::MAX - spread[1] {
+        return own.iter().map(|name| (*name).to_owned()).collect();
+    }
+    if let Some(all) = ranks.gather(0, &bytes) {
+        let mut names: Vec<String> = Vec::new();
+        for part in &all {
+            for name in String::from_utf8_lossy(part).lines() {
+                if !names.iter().any(|known| known == name) {
+                    names.push(name.to_owned());
+                }
+            }
+        }
+        bytes = names.join("\n").into_bytes();
+    }
+    ranks.broadcast(0, &mut bytes);
+    String::from_utf8_lossy(&bytes).lines().map(str::to_owned).collect()
+}

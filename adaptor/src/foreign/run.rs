@@ -1,0 +1,268 @@
+//! One run: the adaptor, what is kept for it of each channel, and what it asks of the solver.
+
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+
+use tombolo_deform::communicator::{Alarm, Communicator};
+use tombolo_deform::mesh::MeshView;
+use tombolo_pipelines::extract::{self, FieldView};
+
+use crate::foreign::asked::Asked;
+use crate::foreign::error::RunError;
+use crate::foreign::mesh::{Block, Channel, Grid, Kept};
+use crate::foreign::ranks;
+use crate::{Adaptor, FinalizeError, OrderReport, Report, Settings, Step};
+
+/// Why orders are rejected from then on.
+const OTHER_MESH: &str = "the solver has made another mesh: shapes are measured from the mesh of the first step, so its cells must stay the same";
+
+/// A run under way: the adaptor, and what it asks of a solver that reads it later.
+pub struct Run {
+    adaptor: Adaptor,
+    communicator: Arc<dyn Communicator>,
+    kept: HashMap<String, Kept>,
+    /// The channel that orders change.
+    steered: String,
+    /// Its meshes and how many vertices each has.
+    blocks: Vec<(String, usize)>,
+    last_time: Option<f64>,
+    time_step: f64,
+    asked: Asked,
+    /// The hash of the chosen pipelines' names; 0 where all run.
+    choice: u32,
+    /// The notes on what is passed over that were logged: each is logged once.
+    told: HashSet<String>,
+}
+
+impl Run {
+    /// Begins. Collective.
+    ///
+    /// # Errors
+    /// [`RunError::Initialize`].
+    pub fn new(settings: Settings) -> Result<Self, RunError> {
+        crate::logging::start();
+        let asked = Asked::of(&settings.parameters);
+        let communicator = Arc::clone(&settings.communicator);
+        let adaptor = Adaptor::initialize(settings)?;
+        Ok(Self {
+            adaptor,
+            communicator,
+            kept: HashMap::new(),
+            steered: String::new(),
+            blocks: Vec::new(),
+            last_time: None,
+            time_step: 0.0,
+            asked,
+            choice: 0,
+            told: HashSet::new(),
+        })
+    }
+
+    /// To be held while all ranks are in a call.
+    pub fn alarm(&self) -> Alarm {
+        Alarm::among(&self.communicator)
+    }
+
+    /// Lets only these of the solver's pipelines run from now on, and all others; `None`: all.
+    pub fn choose(&mut self, names: Option<&[&str]>, of_solver: &dyn Fn(&str) -> bool) {
+        let choice = names.map_or(0, |names| {
+            let bytes = names.iter().flat_map(|name| name.bytes().chain([b'\n']));
+            // Not 0, which is all of them.
+            bytes
+                .fold(0x811c_9dc5, |hash: u32, byte| {
+                    (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
+                })
+                .max(1)
+        });
+        if choice != self.choice {
+            self.choice = choice;
+            self.adaptor.choose_pipelines(|name| {
+                !of_solver(name) || names.is_none_or(|names| names.contains(&name))
+            });
+        }
+    }
+
+    /// Whether anything is due that looks at the mesh and its fields.
+    #[must_use]
+    pub fn looks_at(&self, step: &Step) -> bool {
+        self.adaptor.looks_at(step)
+    }
+
+    /// The link that a viewer opens.
+    #[must_use]
+    pub fn link(&self) -> Option<String> {
+        self.adaptor.link()
+    }
+
+    /// The steering of the step that follows.
+    #[must_use]
+    pub fn asked(&self) -> &Asked {
+        &self.asked
+    }
+
+    /// The channel that orders change, its meshes and how many vertices each has.
+    #[must_use]
+    pub fn steered(&self) -> (&str, &[(String, usize)]) {
+        (&self.steered, &self.blocks)
+    }
+
+    /// The orders so far and what became of each.
+    #[must_use]
+    pub fn orders(&self) -> Vec<OrderReport> {
+        self.adaptor.orders()
+    }
+
+    /// The length of the step to come, where the solver does not say: that of the step that has
+    /// been.
+    #[must_use]
+    pub fn likely_time_step(&self, time: f64) -> f64 {
+        match self.last_time {
+            Some(last) if time > last => time - last,
+            Some(last) if time < last => 0.0,
+            _ => self.time_step,
+        }
+    }
+
+    /// Shows a step to the adaptor. Collective.
+    ///
+    /// `given` is what the solver shows, or why it cannot be shown; then nothing was done, on any
+    /// rank. Says whether any rank showed a channel; where none did, nothing was done either.
+    ///
+    /// # Errors
+    /// The mistake in what is given, on any rank: then all ranks have an error.
+    /// [`RunError::Choices`], and what the adaptor refuses.
+    pub fn execute<'call>(
+        &mut self,
+        given: Result<(Step, Vec<Channel<'call>>), RunError>,
+    ) -> Result<bool, RunError> {
+        // What can be wrong here alone is agreed upon before anything that all do together.
+        let mut is_other = false;
+        let prepared = self.cover(given).and_then(|(step, channels)| {
+            let looked_at = self.adaptor.looks_at(&step);
+            for channel in &channels {
+                let changed = self.update(channel, looked_at)?;
+                is_other |= changed && channel.name == self.steered;
+            }
+            Ok((step, channels))
+        });
+        let ((step, mut channels), is_other) =
+            ranks::agree_and_ask(&*self.communicator, prepared, is_other, self.choice)?;
+        if is_other {
+            self.adaptor.release_shape(OTHER_MESH);
+        }
+        self.time_step = step.time_step;
+        self.last_time = Some(step.time);
+        self.complete(&mut channels)?;
+        self.tell(&channels);
+        // A solver that shows nothing yet is asked for nothing.
+        if channels.is_empty() {
+            self.asked.rest();
+            return Ok(false);
+        }
+        let named = self.adaptor.steered_channel();
+        let steered = channels.iter().find(|channel| named.is_none_or(|name| channel.name == name));
+        self.steered.clear();
+        self.blocks.clear();
+        if let Some(channel) = steered {
+            self.steered.push_str(&channel.name);
+            self.blocks.extend(
+                channel
+                    .blocks
+                    .iter()
+                    .map(|block: &Block| (block.name.clone(), block.vertex_count())),
+            );
+        }
+        let Self { adaptor, kept, asked, .. } = self;
+        let mut fields: Vec<Vec<FieldView<'_>>> = channels.iter().map(|_| Vec::new()).collect();
+        let mut meshes: Vec<MeshView<'_>> = Vec::with_capacity(channels.len());
+        for (channel, fields) in channels.iter().zip(&mut fields) {
+            if let Some(kept) = kept.get(&channel.name) {
+                meshes.push(kept.views(channel, fields));
+            }
+        }
+        let parts = channels.iter().zip(meshes).zip(&fields);
+        let views: Vec<extract::Channel<'_>> = parts
+            .map(|((channel, mesh), fields)| extract::Channel { name: &channel.name, mesh, fields })
+            .collect();
+        // What an earlier step asked for is not asked again.
+        asked.rest();
+        asked.take(&adaptor.execute(&step, &views)?);
+        Ok(true)
+    }
+
+    fn update(&mut self, channel: &Channel<'_>, looked_at: bool) -> Result<bool, RunError> {
+        self.kept.entry(channel.name.clone()).or_default().update(channel, looked_at)
+    }
+
+    /// Leaves out the cells that finer grids of other ranks cover. Collective.
+    fn cover<'call>(
+        &self,
+        given: Result<(Step, Vec<Channel<'call>>), RunError>,
+    ) -> Result<(Step, Vec<Channel<'call>>), RunError> {
+        if self.communicator.size() == 1 {
+            return given;
+        }
+        let has_grids = |channels: &[Channel<'_>]| {
+            channels.iter().any(|channel| channel.grids().next().is_some())
+        };
+        let (mut given, any) = ranks::ask(&*self.communicator, given, |(step, channels)| {
+            self.adaptor.looks_at(step) && has_grids(channels)
+        });
+        if any {
+            let own: Vec<(&str, Vec<Grid>)> = given
+                .iter()
+                .flat_map(|(_, channels)| channels)
+                .map(|channel| (channel.name.as_str(), channel.grids().collect()))
+                .collect();
+            let all: Vec<(String, Vec<Grid>)> = ranks::gathered(&*self.communicator, &own);
+            for channel in given.iter_mut().flat_map(|(_, channels)| channels) {
+                let of_channel = all.iter().filter(|(name, _)| *name == channel.name);
+                let grids: Vec<Grid> =
+                    of_channel.flat_map(|(_, grids)| grids.iter().copied()).collect();
+                channel.cover(&grids);
+            }
+        }
+        given
+    }
+
+    /// Says once what is passed over.
+    fn tell(&mut self, channels: &[Channel<'_>]) {
+        for note in channels.iter().flat_map(|channel| &channel.notes) {
+            if self.communicator.rank() == 0 && self.told.insert(note.clone()) {
+                log::warn!("{note}");
+            }
+        }
+    }
+
+    /// Gives every rank the channels of all, empty where it has none, in one order. Collective.
+    fn complete(&mut self, channels: &mut Vec<Channel<'_>>) -> Result<(), RunError> {
+        if self.communicator.size() == 1 {
+            return Ok(());
+        }
+        let own: Vec<&str> = channels.iter().map(|channel| channel.name.as_str()).collect();
+        let names = ranks::union(&*self.communicator, &own);
+        let mut given = std::mem::take(channels);
+        for name in names {
+            channels.push(match given.iter().position(|channel| channel.name == name) {
+                Some(place) => given.swap_remove(place),
+                None => {
+                    let nothing = Channel { name, ..Channel::default() };
+                    self.update(&nothing, true)?;
+                    nothing
+                }
+            });
+        }
+        Ok(())
+    }
+
+    /// Ends the run. Collective. The report is there even where a file could not be written.
+    pub fn finalize(self) -> (Report, Result<(), RunError>) {
+        match self.adaptor.finalize() {
+            Ok(report) => (report, Ok(())),
+            Err(error) => {
+                let FinalizeError::Files { report, .. } = &error;
+                ((**report).clone(), Err(error.into()))
+            }
+        }
+    }
+}

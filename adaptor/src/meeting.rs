@@ -1,0 +1,133 @@
+//! The meeting of all ranks at the beginning of a call.
+
+use tombolo_deform::communicator::{Communicator, RankError, Reduction, first_failure};
+use tombolo_pipelines::language::{Command, parse_json};
+
+use crate::{error::ExecuteError, step::Moment};
+
+/// Finds out whether all ranks are at the same cycle and time and none has a fault, and whether
+/// rank 0 was called to look at something. One reduction of six numbers; a message more where there
+/// is a fault. Collective.
+///
+/// # Errors
+/// One of these, on all ranks: [`ExecuteError::Cycles`], [`ExecuteError::Times`], or
+/// [`ExecuteError::Rank`] with the fault of the lowest rank that has one.
+pub(crate) fn meet(
+    communicator: &dyn Communicator,
+    moment: Moment,
+    fault: Option<ExecuteError>,
+    called: bool,
+) -> Result<bool, ExecuteError> {
+    let told = fault.map(|fault| fault.to_string().into_bytes());
+    let (cycle, time) = (moment.cycle, position_of(moment.time));
+    let called = u64::from(called && communicator.rank() == 0);
+    let mut said = [u64::from(told.is_some()), called, cycle, !cycle, time, !time];
+    communicator.reduce_integers(Reduction::Maximum, &mut said);
+    let [failing, called, highest, lowest, latest, earliest] = said;
+    let (lowest, latest, earliest) = (!lowest, number_at(latest), number_at(!earliest));
+    if failing > 0
+        && let Some((rank, message)) = first_failure(communicator, 0, told)
+    {
+        return Err(
+            RankError { rank, message: String::from_utf8_lossy(&message).into_owned() }.into()
+        );
+    }
+    if highest != lowest {
+        return Err(ExecuteError::Cycles { lowest, highest });
+    }
+    if latest > earliest {
+        return Err(ExecuteError::Times { cycle, earliest, latest });
+    }
+    Ok(called > 0)
+}
+
+const SIGN: u64 = 1 << 63;
+
+/// The position of a number among all, as an integer that is larger where the number is.
+fn position_of(number: f64) -> u64 {
+    let bits = number.to_bits();
+    if bits & SIGN == 0 { bits | SIGN } else { !bits }
+}
+
+/// The number at a position among all.
+fn number_at(position: u64) -> f64 {
+    f64::from_bits(if position & SIGN == 0 { !position } else { position ^ SIGN })
+}
+
+/// Gives every rank the commands that rank 0 has taken in, so that they take effect at the same
+/// cycle on all. Collective; free on one process.
+///
+/// # Errors
+/// A text, on all ranks, where the commands cannot be read back.
+pub(crate) fn share(
+    communicator: &dyn Communicator,
+    commands: Vec<(String, Command)>,
+) -> Result<Vec<(String, Command)>, String> {
+    if communicator.size() == 1 {
+        return Ok(commands);
+    }
+    let mut bytes = if communicator.rank() == 0 {
+        serde_json::to_vec(&commands).unwrap_or_default()
+    } else {
+        Vec::new()
+    };
+    communicator.broadcast(0, &mut bytes);
+    // Every rank reads the same bytes, rank 0 too: what one cannot read, none obeys.
+    let text = std::str::from_utf8(&bytes)
+        .map_err(|error| format!("commands were lost between ranks: {error}"))?;
+    parse_json(text, "broadcast")
+        .map_err(|error| format!("commands were lost between ranks: {error}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use tombolo_deform::communicator::threads;
+
+    use super::*;
+
+    #[test]
+    fn numbers_keep_their_order_as_integers() {
+        let rising = [
+            f64::NEG_INFINITY,
+            -1e300,
+            -1.0,
+            -f64::MIN_POSITIVE,
+            -0.0,
+            0.0,
+            1e-310,
+            0.5,
+            1e300,
+            f64::INFINITY,
+        ];
+        assert!(rising.map(position_of).is_sorted());
+        assert!(
+            rising
+                .iter()
+                .all(|&number| number_at(position_of(number)).to_bits() == number.to_bits())
+        );
+    }
+
+    #[test]
+    fn faults_are_the_same_everywhere() {
+        let at = |cycle: u64| Moment { cycle, time: 0.0 };
+        let met = threads::run(3, |ranks| meet(&ranks, at(4), None, ranks.rank() == 0));
+        assert!(met.into_iter().all(|called| called.is_ok_and(|called| called)));
+        let said = threads::run(3, |ranks| {
+            let fault = (ranks.rank() > 0).then_some(ExecuteError::NoChannel { cycle: 4 });
+            meet(&ranks, at(4), fault, false).unwrap_err().to_string()
+        });
+        assert!(
+            said.iter().all(|said| said.starts_with("rank 1: cycle 4: no channel was given")),
+            "{said:?}"
+        );
+        let said = threads::run(3, |ranks| {
+            meet(&ranks, at(4 + ranks.rank() as u64), None, false).unwrap_err().to_string()
+        });
+        assert!(said.iter().all(|said| said.contains("from 4 to 6")), "{said:?}");
+        let said = threads::run(3, |ranks| {
+            let time = if ranks.rank() == 1 { 0.25 } else { 0.5 };
+            meet(&ranks, Moment { cycle: 4, time }, None, false).unwrap_err().to_string()
+        });
+        assert!(said.iter().all(|said| said.contains("from 0.25 to 0.5")), "{said:?}");
+    }
+}

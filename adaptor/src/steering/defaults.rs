@@ -1,0 +1,62 @@
+//! The settings of orders that bring none.
+
+use tombolo_deform::{
+    quality::Guard,
+    schedule::Schedule,
+    shape::{CurrentShape, Request},
+};
+use tombolo_pipelines::language::{Config, Deformation, Due, Order, Stage};
+
+use super::stack::{EditStack, ShapeSettings, StackError};
+
+/// The settings of orders that bring none.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Defaults {
+    pub(crate) deform: Deformation,
+    pub(crate) guard: Guard,
+    pub(crate) schedule: Schedule,
+}
+
+impl Defaults {
+    /// The settings of the pipeline that waits for orders, else the kernel's.
+    pub(crate) fn of(config: &Config) -> Self {
+        let mut defaults = Self::default();
+        let stages = config
+            .pipelines
+            .iter()
+            .filter(|pipeline| pipeline.due == Due::OnOrder)
+            .flat_map(|it| &it.stages);
+        for stage in stages {
+            match stage {
+                Stage::Deform(deform) => defaults.deform.clone_from(deform),
+                Stage::Guard(guard) => defaults.guard = *guard,
+                Stage::Schedule(schedule) => defaults.schedule = *schedule,
+                _ => {}
+            }
+        }
+        defaults
+    }
+
+    /// The stack that an order makes of `stack`, and the request for its shape from the present
+    /// one.
+    pub(super) fn request(
+        &self,
+        stack: &EditStack,
+        start: CurrentShape,
+        order: &Order,
+    ) -> Result<(EditStack, Request), StackError> {
+        let default = ShapeSettings { deform: self.deform.clone(), guard: self.guard };
+        let (after, settings) =
+            stack.after(&order.change, order.deform.as_ref(), order.guard, &default)?;
+        let ShapeSettings { deform, guard } = settings;
+        let request = Request {
+            stack: after.edits(),
+            kept: stack.shared(&after),
+            start,
+            deformation: deform,
+            schedule: order.schedule.unwrap_or(self.schedule),
+            guard,
+        };
+        Ok((after, request))
+    }
+}

@@ -1,0 +1,190 @@
+//! Shapes on their way to the solver: each is handed out when it is due, and the next call shows
+//! whether the solver went there.
+
+use std::sync::Arc;
+
+use tombolo_deform::{
+    mesh::{ArrayView, Vector},
+    quality::{Guard, judge},
+    shape::{CurrentShape, Judged, Plan},
+    vector::subtract,
+};
+
+use super::Steerer;
+use crate::{
+    lock::lock,
+    steering::{MeshMotion, NotFollowed, OrderStatus, SurfaceMotion, lent::HandedOut},
+    step::Moment,
+};
+
+/// A schedule under way.
+pub(super) struct Motion {
+    pub(super) id: String,
+    pub(super) plan: Plan,
+    pub(super) guard: Guard,
+    pub(super) begun: Moment,
+    /// Shapes that were handed out.
+    pub(super) taken: u32,
+    /// The shape that the mesh has, which is the last one taken if that was followed.
+    pub(super) reached: u32,
+}
+
+/// The last shape that was handed out, until the next call shows whether the solver went there.
+pub(super) struct Pending {
+    handed: HandedOut,
+    /// Where the shape was before, and its quality.
+    before: (CurrentShape, Option<(f64, f64)>),
+    reached: u32,
+    id: String,
+    shape: u32,
+    moment: Moment,
+}
+
+impl Steerer {
+    /// Finds out where the solver has moved the mesh since the last call: whether it followed what
+    /// was handed out, and what motion of its own there is. Collective.
+    pub(crate) fn observe(&mut self, lent: &ArrayView<'_>) {
+        if let Some(Pending { handed, before, reached, id, shape, moment }) = self.pending.take() {
+            let outcome = self.rounding.compare(&handed, lent, &self.domain);
+            let distance = outcome.distance;
+            if outcome.is_followed {
+                self.log.deviates(&id, distance);
+            } else {
+                self.log.not_followed(
+                    &id,
+                    moment,
+                    NotFollowed { cycle: moment.cycle, shape, distance },
+                );
+                (self.here, self.quality) = before;
+                lock(&self.present).here.clone_from(&self.here);
+                if let Some(motion) = self.motion.as_mut().filter(|motion| motion.id == id) {
+                    motion.reached = reached;
+                }
+            }
+        }
+        self.own = self.rounding.own(&self.here.points, lent, &self.domain);
+        lock(&self.present).own.clone_from(&self.own.offsets);
+    }
+
+    /// Notes that the run ends, and that no call will show whether the solver went to the last
+    /// shape that it was handed.
+    pub(crate) fn end(&mut self) {
+        if let Some(Pending { id, shape, moment, .. }) = self.pending.take() {
+            self.log.not_confirmed(&id, moment, shape);
+        }
+    }
+
+    /// The motion that was handed out last.
+    pub(crate) fn motion(&self) -> &MeshMotion {
+        &self.handed_out
+    }
+
+    /// Takes the next shape of the schedule under way for the coming step, if it is due; says
+    /// whether it was.
+    pub(crate) fn next_shape(&mut self, moment: Moment, time_step: f64) -> bool {
+        if self.computing.as_ref().is_some_and(|computing| computing.resting) {
+            return false;
+        }
+        let Some(motion) = self.motion.as_mut() else { return false };
+        let (cycles, time) =
+            (moment.cycle.saturating_sub(motion.begun.cycle), moment.time - motion.begun.time);
+        if !motion.plan.schedule().is_due(motion.taken, cycles, time) {
+            return false;
+        }
+        let next = motion.taken + 1;
+        if !motion.plan.is_straight(motion.reached, next) {
+            let reason = format!(
+                "the mesh stayed at shape {}, from which shape {next} is not a straight step",
+                motion.reached
+            );
+            self.give_up(&reason);
+            return false;
+        }
+        let last = next >= motion.plan.shapes();
+        let points: Arc<[Vector]> = if last {
+            Arc::clone(motion.plan.end())
+        } else {
+            let mut points = vec![[0.0; 3]; self.here.points.len()];
+            motion.plan.write_shape(next, &mut points);
+            points.into()
+        };
+        let before = self.own.lent.as_ref().unwrap_or(&self.here.points);
+        let carried: Option<Arc<[Vector]>> = self.own.lent.as_ref().map(|lent| {
+            let shapes = self.here.points.iter().zip(&*points);
+            lent.iter()
+                .zip(shapes)
+                .map(|(&lent, (&now, &next))| self.rounding.carried(lent, now, next))
+                .collect()
+        });
+        let after = carried.as_ref().unwrap_or(&points);
+        // The shape was judged as it is; what the mesh will be with the solver's own motion was
+        // known up to the last call at most.
+        if self.own.offsets.is_some() && motion.plan.judged() == Judged::Volume {
+            let judged = judge(&self.domain, before, after, &[1.0], &motion.guard);
+            if let Err(refusal) = judged {
+                let reason =
+                    format!("shape {next} is not handed out; with the mesh's own motion {refusal}");
+                self.give_up(&reason);
+                return false;
+            }
+        }
+        let MeshMotion { coordinates, displacement, velocity, surface, .. } = &mut self.handed_out;
+        *coordinates = Arc::clone(after);
+        refill(displacement, after.len(), |vertex| subtract(after[vertex], before[vertex]));
+        let per_time = |by: f64| if time_step > 0.0 { by / time_step } else { 0.0 };
+        refill(velocity, after.len(), |vertex| displacement[vertex].map(per_time));
+        let SurfaceMotion { vertices, coordinates: of_surface, displacement: by, velocity: speed } =
+            surface;
+        let at = |all: &[Vector], index: usize| all[vertices[index] as usize];
+        refill(of_surface, vertices.len(), |index| at(coordinates, index));
+        refill(by, vertices.len(), |index| at(displacement, index));
+        refill(speed, vertices.len(), |index| at(velocity, index));
+        self.pending = Some(Pending {
+            handed: HandedOut { from: Arc::clone(before), to: Arc::clone(after) },
+            before: (self.here.clone(), self.quality),
+            reached: motion.reached,
+            id: motion.id.clone(),
+            shape: next,
+            moment,
+        });
+        (motion.taken, motion.reached) = (next, next);
+        self.handed_out.shape = (motion.taken, motion.plan.shapes());
+        self.handed_out.order.clone_from(&motion.id);
+        self.here = motion.plan.reached(motion.taken, points);
+        lock(&self.present).here.clone_from(&self.here);
+        let quality = motion.plan.quality().shapes.get(motion.taken as usize - 1);
+        self.quality = quality.map(|quality| (quality.min, quality.mean));
+        let taken = motion.taken;
+        self.log.update(&motion.id, |order| {
+            order.shape = taken;
+            if last {
+                order.status = OrderStatus::Applied;
+            }
+        });
+        if last {
+            self.motion = None;
+        }
+        true
+    }
+
+    /// Ends the schedule under way where the mesh is.
+    fn give_up(&mut self, reason: &str) {
+        let Some(motion) = self.motion.take() else { return };
+        self.log.update(&motion.id, |order| {
+            order.status = OrderStatus::Applied;
+            order.reason = Some(format!(
+                "ended at shape {} of {}: {reason}",
+                motion.reached,
+                motion.plan.shapes()
+            ));
+        });
+    }
+}
+
+/// Writes vectors anew, into the same memory where nobody has kept it.
+fn refill(vectors: &mut Arc<[Vector]>, count: usize, vector: impl Fn(usize) -> Vector) {
+    match Arc::get_mut(vectors).filter(|kept| kept.len() == count) {
+        Some(kept) => kept.iter_mut().enumerate().for_each(|(index, kept)| *kept = vector(index)),
+        None => *vectors = (0..count).map(vector).collect(),
+    }
+}

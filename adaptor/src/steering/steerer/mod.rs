@@ -1,0 +1,383 @@
+//! The shape of one mesh and the orders that change it.
+
+mod handing;
+
+use std::{
+    collections::VecDeque,
+    sync::{Arc, Mutex},
+    time::Instant,
+};
+
+use tombolo_deform::{
+    mesh::Domain,
+    quality::{Quality, quality},
+    shape::{CurrentShape, Forecast, Plan, Shaper},
+    surface::Surface,
+};
+use tombolo_pipelines::language::Order;
+
+use super::{
+    Defaults, EditStack, Forecaster, Log, MeshMotion, OrderStatus, Queue, SurfaceMotion,
+    forecaster::Present,
+    lent::{Own, Rounding},
+    planner::{PlanRequest, Planner, Rejection},
+    stack::StackError,
+    worker::{Done, Worker},
+};
+use crate::{lock::lock, step::Moment};
+use handing::{Motion, Pending};
+
+/// An order waiting for its turn.
+struct Task {
+    id: String,
+    order: Order,
+    background: bool,
+}
+
+/// An order whose plan is being made.
+struct Computing {
+    id: String,
+    stack: EditStack,
+    asked: PlanRequest,
+    /// Whether the mesh stays where it is until the plan is made, because the one before started
+    /// elsewhere.
+    resting: bool,
+}
+
+/// The shape of one mesh and the orders that change it.
+pub(crate) struct Steerer {
+    log: Arc<Log>,
+    defaults: Defaults,
+    planner: Arc<Mutex<Planner>>,
+    worker: Option<Worker>,
+    /// Whether the operator of the volume was set up, or is being set up.
+    is_ready: bool,
+    /// Extracts the skeleton, where an order could need it.
+    skeleton: Option<Box<dyn FnOnce() + Send>>,
+    /// The stack and the present shape once more, for other threads.
+    present: Arc<Mutex<Present>>,
+    /// Whether the next order of a file was looked ahead to from the present shape.
+    looked_ahead: bool,
+    stack: EditStack,
+    here: CurrentShape,
+    waiting: VecDeque<Task>,
+    computing: Option<Computing>,
+    motion: Option<Motion>,
+    /// The motion that was handed out last.
+    handed_out: MeshMotion,
+    domain: Domain,
+    rounding: Rounding,
+    pending: Option<Pending>,
+    /// The mesh as it was lent last, against the shape.
+    own: Own,
+    /// The quality of the present shape as far as it is known: least and mean scaled Jacobian.
+    quality: Option<(f64, f64)>,
+    reference_quality: Option<(f64, f64, usize)>,
+}
+
+impl Steerer {
+    /// Takes over a mesh at its reference shape. `skeleton` says whether an order could drag the
+    /// skeleton.
+    ///
+    /// On one process orders are planned on other threads. On several ranks no other thread could
+    /// speak with them, so that orders are planned when their turn comes, on all ranks in the same
+    /// call. Collective, as are [`Steerer::advance`] and whatever else makes plans.
+    pub(crate) fn new(
+        shaper: Shaper,
+        defaults: Defaults,
+        log: Arc<Log>,
+        queue: Arc<Queue>,
+        skeleton: bool,
+    ) -> std::io::Result<Self> {
+        let domain = shaper.domain().clone();
+        if domain.communicator().size() > 1 {
+            let quality = quality(domain.mesh().cells(), shaper.reference()).gathered(&domain);
+            let mut steerer = Self::of_shaper(shaper, defaults, log);
+            steerer.reference_quality = Some((quality.min, quality.mean, quality.inverted));
+            return Ok(steerer);
+        }
+        let in_advance = shaper.skeleton_in_advance().filter(|_| skeleton);
+        let mut steerer = Self::of_shaper(shaper, defaults, log);
+        steerer.worker = Some(Worker::start(Arc::clone(&steerer.planner), queue)?);
+        steerer.skeleton = in_advance.map(|extract| Box::new(extract) as Box<_>);
+        Ok(steerer)
+    }
+
+    /// Sets up what no order changes, so that the first one need not wait for it: the operator of
+    /// the volume and, where an order could need it, the skeleton. On one process another thread
+    /// does. Without this the first order does. Collective.
+    pub(crate) fn make_ready(&mut self) {
+        if std::mem::replace(&mut self.is_ready, true) {
+            return;
+        }
+        match &mut self.worker {
+            Some(worker) => {
+                worker.prepare(self.defaults.deform.clone());
+                if let Some(Err(error)) = self.skeleton.take().map(|extract| worker.beside(extract))
+                {
+                    log::warn!("the first drag will extract the skeleton: {error}");
+                }
+            }
+            None if self.domain.communicator().size() > 1 => {
+                lock(&self.planner).prepare(&self.defaults.deform);
+            }
+            None => {}
+        }
+    }
+
+    /// Whether [`Steerer::make_ready`] was called.
+    pub(crate) fn is_ready(&self) -> bool {
+        self.is_ready
+    }
+
+    fn of_shaper(shaper: Shaper, defaults: Defaults, log: Arc<Log>) -> Self {
+        let here: CurrentShape = Arc::clone(shaper.reference()).into();
+        let domain = shaper.domain().clone();
+        let boundary = shaper.boundary_vertices().into();
+        let rounding = Rounding::of(shaper.reference(), domain.communicator());
+        let planner = Arc::new(Mutex::new(Planner::new(shaper)));
+        let stack = EditStack::default();
+        let present =
+            Arc::new(Mutex::new(Present { stack: stack.clone(), here: here.clone(), own: None }));
+        Self {
+            domain,
+            rounding,
+            pending: None,
+            own: Own::default(),
+            log,
+            defaults,
+            planner,
+            worker: None,
+            is_ready: false,
+            skeleton: None,
+            present,
+            looked_ahead: false,
+            stack,
+            here,
+            waiting: VecDeque::new(),
+            computing: None,
+            motion: None,
+            handed_out: MeshMotion {
+                surface: SurfaceMotion { vertices: boundary, ..SurfaceMotion::default() },
+                ..MeshMotion::default()
+            },
+            quality: None,
+            reference_quality: None,
+        }
+    }
+
+    /// The surface of the mesh, where this process has it.
+    pub(crate) fn surface(&self) -> Option<Arc<Surface>> {
+        lock(&self.planner).shaper().surface().cloned()
+    }
+
+    /// A forecaster for other threads; `None` where the worker has ended.
+    pub(crate) fn forecaster(&self) -> Option<Forecaster> {
+        let jobs = Arc::clone(self.worker.as_ref()?.jobs());
+        Some(Forecaster {
+            defaults: self.defaults.clone(),
+            present: Arc::clone(&self.present),
+            jobs,
+        })
+    }
+
+    /// The forecast of an order, made at once. Collective.
+    pub(crate) fn forecast(&self, order: &Order) -> Forecast {
+        match self.asked(order) {
+            Ok((_, asked)) => lock(&self.planner).forecast(&asked),
+            Err(error) => {
+                let Rejection { reason, seconds, .. } = Rejection::from(error);
+                Forecast::rejected(reason, None, None, seconds)
+            }
+        }
+    }
+
+    /// Has the plan of an order that will come made ahead, as far as it can be known now; once for
+    /// each shape.
+    pub(crate) fn look_ahead(&mut self, order: Option<&Order>) {
+        let Some(order) =
+            order.filter(|_| !self.looked_ahead && self.is_at_rest() && self.computing.is_none())
+        else {
+            return;
+        };
+        self.looked_ahead = true;
+        // An order with a fault is refused at its own cycle, not here.
+        if let (Some(worker), Ok((_, asked))) = (&self.worker, self.asked(order)) {
+            worker.look_ahead(asked);
+        }
+    }
+
+    fn asked(&self, order: &Order) -> Result<(EditStack, PlanRequest), StackError> {
+        let (stack, request) = self.defaults.request(&self.stack, self.here.clone(), order)?;
+        Ok((stack, PlanRequest { request, own: self.own.offsets.clone() }))
+    }
+
+    /// How many vertices the mesh has.
+    pub(crate) fn vertex_count(&self) -> usize {
+        self.here.points.len()
+    }
+
+    /// Whether nothing is under way and nothing waits.
+    #[inline]
+    pub(crate) fn is_at_rest(&self) -> bool {
+        self.motion.is_none() && self.waiting.is_empty() && self.pending.is_none()
+    }
+
+    /// Whether it will compare the mesh as it is lent now with the shape that it was asked to have.
+    pub(crate) fn looks_at_mesh(&self) -> bool {
+        !self.is_at_rest() || self.computing.is_some()
+    }
+
+    pub(crate) fn stack(&self) -> &EditStack {
+        &self.stack
+    }
+
+    /// The least and the mean scaled Jacobian of the present shape and its inverted elements, as
+    /// far as they are known.
+    pub(crate) fn quality(&self) -> Option<(f64, f64, usize)> {
+        // A shape that passed the guard holds no inverted element; of a volume that is the solver's
+        // nothing is known.
+        let reference = self.reference_quality.filter(|_| !self.here.surface_only);
+        self.quality.map(|(min, mean)| (min, mean, 0)).or(reference)
+    }
+
+    /// Puts an order at the end of the queue.
+    pub(crate) fn take(&mut self, id: String, order: Order, background: bool) {
+        self.waiting.push_back(Task { id, order, background: background && self.worker.is_some() });
+    }
+
+    /// Brings orders as far as they can come now; says whether anything changed. Called at safe
+    /// points only.
+    pub(crate) fn advance(&mut self, moment: Moment, step_seconds: Option<f64>) -> bool {
+        let mut changed = false;
+        loop {
+            changed |= self.collect(moment, step_seconds);
+            if self.computing.is_some() {
+                // An order that must take effect at this cycle waits for the one before it.
+                if self.waiting.iter().all(|task| task.background) {
+                    return changed;
+                }
+                let done = self.worker.as_ref().map(Worker::take);
+                if let Some(done) = done {
+                    self.finish(done, moment, step_seconds);
+                }
+                changed = true;
+                continue;
+            }
+            let Some(task) = self.waiting.pop_front() else { return changed };
+            self.start(task, moment, step_seconds);
+            changed = true;
+        }
+    }
+
+    /// Takes what the worker has finished.
+    fn collect(&mut self, moment: Moment, step_seconds: Option<f64>) -> bool {
+        let mut changed = false;
+        while let Some(done) = self.worker.as_ref().and_then(Worker::try_take) {
+            let is_gone = matches!(done, Done::Planned(_)) && self.computing.is_none();
+            self.finish(done, moment, step_seconds);
+            if is_gone {
+                self.worker = None;
+            }
+            changed = true;
+        }
+        changed
+    }
+
+    fn start(&mut self, task: Task, moment: Moment, step_seconds: Option<f64>) {
+        let Task { id, order, background } = task;
+        let (stack, asked) = match self.asked(&order) {
+            Ok(asked) => asked,
+            Err(error) => return self.log.reject(&id, moment, &error.into()),
+        };
+        self.log.update(&id, |order| order.status = OrderStatus::Computing);
+        let computing = Computing { id, stack, asked, resting: false };
+        match &self.worker {
+            Some(worker) if background => {
+                worker.plan(computing.asked.clone());
+                self.computing = Some(computing);
+            }
+            _ => {
+                let begun = Instant::now();
+                let plan = lock(&self.planner).plan(&computing.asked);
+                self.commit(computing, plan, moment, begun, step_seconds);
+            }
+        }
+    }
+
+    fn finish(&mut self, done: Done, moment: Moment, step_seconds: Option<f64>) {
+        match done {
+            Done::Prepared(quality) => {
+                let Quality { min, mean, inverted, .. } = *quality;
+                self.reference_quality = Some((min, mean, inverted));
+            }
+            Done::Planned(plan) => {
+                if let Some(mut computing) = self.computing.take() {
+                    let is_stale = plan
+                        .as_ref()
+                        .as_ref()
+                        .is_ok_and(|plan| !Arc::ptr_eq(plan.start(), &self.here.points));
+                    if let Some(worker) = self.worker.as_ref().filter(|_| is_stale) {
+                        // The worker may be at a forecast: the mesh waits for the way from here,
+                        // not the solver.
+                        computing.asked.request.start = self.here.clone();
+                        computing.asked.own.clone_from(&self.own.offsets);
+                        computing.resting = true;
+                        worker.plan(computing.asked.clone());
+                        self.computing = Some(computing);
+                        return;
+                    }
+                    self.commit(computing, *plan, moment, Instant::now(), step_seconds);
+                }
+            }
+        }
+    }
+
+    /// Makes a plan the motion under way, or says why not.
+    fn commit(
+        &mut self,
+        computing: Computing,
+        plan: Result<Plan, Rejection>,
+        moment: Moment,
+        begun: Instant,
+        step_seconds: Option<f64>,
+    ) {
+        let Computing { id, stack, asked, .. } = computing;
+        let plan = match plan {
+            Ok(plan) => plan,
+            Err(rejection) => return self.log.reject(&id, moment, &rejection),
+        };
+        if let Some(before) = self.motion.take() {
+            self.log.update(&before.id, |order| {
+                order.status = OrderStatus::Applied;
+                order.reason = Some(format!("order {id} went on from shape {}", before.taken));
+            });
+        }
+        let fraction = plan.target().fraction;
+        self.stack =
+            if fraction < 1.0 { stack.clamped(asked.request.kept, fraction) } else { stack };
+        self.looked_ahead = false;
+        lock(&self.present).stack.clone_from(&self.stack);
+        let clamped = (fraction < 1.0).then_some(fraction);
+        self.log.begin(&id, moment, plan.min_scaled_jacobian(), clamped);
+        self.log.update(&id, |order| {
+            order.status = OrderStatus::Applying;
+            order.cycle_applied = Some(moment.cycle);
+            order.shapes = plan.shapes();
+            order.min_scaled_jacobian = plan.min_scaled_jacobian();
+            order.judged = Some(plan.judged());
+            order.largest_displacement = Some(plan.largest_displacement());
+            order.fraction = Some(fraction);
+            order.seconds = plan.seconds();
+            order.added_steps = step_seconds.map(|step| begun.elapsed().as_secs_f64() / step);
+        });
+        self.motion = Some(Motion {
+            id,
+            plan,
+            guard: asked.request.guard,
+            begun: moment,
+            taken: 0,
+            reached: 0,
+        });
+    }
+}

@@ -1,0 +1,155 @@
+//! `tombolo_execute` and what it gives back.
+
+use std::ffi::{c_char, c_int, c_uint};
+use std::ptr;
+
+use tombolo::deform::mesh::Vector;
+use tombolo::pipelines::language::nearest;
+use tombolo::{ExecuteError, MeshMotion, OrderReport, Step};
+
+use crate::export::{Out, Text, export};
+use crate::{Fault, Handle, Opened, Stage, c_string, with};
+
+/// Something of the motion that is asked for; `none` where the mesh stays.
+fn motion<T>(
+    run: *mut Handle,
+    none: T,
+    part: impl FnOnce(&MeshMotion, &Opened) -> T,
+) -> Result<T, Fault> {
+    with(run, |run| {
+        Ok(run.under_way()?.asked().motion.as_ref().map_or(none, |motion| part(motion, run)))
+    })
+}
+
+fn first(vectors: &[Vector]) -> *const f64 {
+    vectors.as_ptr().cast()
+}
+
+fn orders(run: &Opened) -> Vec<OrderReport> {
+    match (&run.stage, &run.report) {
+        (Stage::UnderWay(under_way), _) => under_way.orders(),
+        (_, Some((report, _))) => report.orders.clone(),
+        _ => Vec::new(),
+    }
+}
+
+export! {
+    fn tombolo_execute(run: *mut Handle, cycle: u64, time: f64, time_step: f64) {
+        with(run, |run| {
+            run.begin()?;
+            run.orders.clear();
+            let Stage::UnderWay(under_way) = &mut run.stage else { return Err(Opened::after_the_end()) };
+            let _alarm = under_way.alarm();
+            // SAFETY: as the crate's page says: the arrays live while this call runs.
+            let channels: Result<Vec<_>, _> = run.channels.iter().map(|named| unsafe { named.channel() }).collect();
+            let given = channels.map(|channels| (Step { cycle, time, time_step }, channels));
+            if !under_way.execute(given)? {
+                return Err(ExecuteError::NoChannel { cycle }.into());
+            }
+            run.channels.iter_mut().for_each(|named| named.is_shown = true);
+            let order = under_way.asked().motion.as_ref().map(|motion| motion.order.as_str());
+            if let Some(order) = order.filter(|order| run.motion_order.to_bytes() != order.as_bytes()) {
+                run.motion_order = c_string(order);
+            }
+            Ok(())
+        })
+    }
+
+    fn tombolo_coordinates(run: *mut Handle) -> (*const f64 = ptr::null()) {
+        motion(run, ptr::null(), |motion, _| first(&motion.coordinates))
+    }
+
+    fn tombolo_displacement(run: *mut Handle) -> (*const f64 = ptr::null()) {
+        motion(run, ptr::null(), |motion, _| first(&motion.displacement))
+    }
+
+    fn tombolo_velocity(run: *mut Handle) -> (*const f64 = ptr::null()) {
+        motion(run, ptr::null(), |motion, _| first(&motion.velocity))
+    }
+
+    fn tombolo_motion_count(run: *mut Handle) -> (usize = 0) {
+        motion(run, 0, |motion, _| motion.coordinates.len())
+    }
+
+    fn tombolo_surface_coordinates(run: *mut Handle) -> (*const f64 = ptr::null()) {
+        motion(run, ptr::null(), |motion, _| first(&motion.surface.coordinates))
+    }
+
+    fn tombolo_surface_displacement(run: *mut Handle) -> (*const f64 = ptr::null()) {
+        motion(run, ptr::null(), |motion, _| first(&motion.surface.displacement))
+    }
+
+    fn tombolo_surface_velocity(run: *mut Handle) -> (*const f64 = ptr::null()) {
+        motion(run, ptr::null(), |motion, _| first(&motion.surface.velocity))
+    }
+
+    fn tombolo_surface_vertices(run: *mut Handle) -> (*const u32 = ptr::null()) {
+        motion(run, ptr::null(), |motion, _| motion.surface.vertices.as_ptr())
+    }
+
+    fn tombolo_surface_count(run: *mut Handle) -> (usize = 0) {
+        motion(run, 0, |motion, _| motion.surface.vertices.len())
+    }
+
+    fn tombolo_motion_order(run: *mut Handle) -> (*const c_char = ptr::null()) {
+        motion(run, ptr::null(), |_, run| run.motion_order.as_ptr())
+    }
+
+    fn tombolo_motion_shape(run: *mut Handle, shape: Out<c_uint>, shapes: Out<c_uint>) {
+        let (shape, shapes) = (shape.get("shape or shapes")?, shapes.get("shape or shapes")?);
+        (*shape, *shapes) = (0, 0);
+        (*shape, *shapes) = motion(run, (0, 0), |motion, _| motion.shape)?;
+        Ok(())
+    }
+
+    fn tombolo_parameter_value(run: *mut Handle, name: Text, value: Out<f64>) {
+        let (name, value) = (name.get("the parameter's name")?, value.get("value")?);
+        with(run, |run| {
+            let known = &run.under_way()?.asked().parameters;
+            *value = *known.get(&name).ok_or_else(|| {
+                let names = known.keys().map(String::as_str);
+                let expected = match nearest(&name, names.clone()) {
+                    Some(near) => format!("one that tombolo_parameter declared; did you mean '{near}'?"),
+                    None if known.is_empty() => "one that tombolo_parameter declared; none was".into(),
+                    None => format!("one of: {}", names.collect::<Vec<_>>().join(", ")),
+                };
+                Fault::invalid("parameter", format!("'{name}'"), expected)
+            })?;
+            Ok(())
+        })
+    }
+
+    fn tombolo_stopped(run: *mut Handle) -> (c_int = 1) {
+        // A solver whose run is not there any more is not to go on for ever.
+        with(run, |run| match &run.stage {
+            Stage::Opened(_) => Ok(0),
+            Stage::UnderWay(under_way) => Ok(c_int::from(under_way.asked().stop)),
+            Stage::Ended => Ok(1),
+        })
+    }
+
+    fn tombolo_order_count(run: *mut Handle) -> (usize = 0) {
+        with(run, |run| Ok(orders(run).len()))
+    }
+
+    fn tombolo_order(run: *mut Handle, index: usize) -> (*const c_char = ptr::null()) {
+        with(run, |run| {
+            let orders = orders(run);
+            let order = orders.get(index).ok_or_else(|| {
+                let expected = match orders.len() {
+                    0 => "no index, as there are no orders".into(),
+                    count => format!("an index from 0 to {}", count - 1),
+                };
+                Fault::invalid("order", index, expected)
+            })?;
+            let text = c_string(&serde_json::to_string(order).unwrap_or_default());
+            // A caller may hold the address of the text that was given before: it is replaced only
+            // where the order went on.
+            let kept = run.orders.entry(index).or_default();
+            if *kept != text {
+                *kept = text;
+            }
+            Ok(kept.as_ptr())
+        })
+    }
+}

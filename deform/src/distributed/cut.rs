@@ -1,0 +1,134 @@
+//! Cutting a whole mesh into parts.
+
+use crate::mesh::{Cells, FeatureSource, Mesh, MeshError, TaggedFaces, ghosts as bits};
+
+use super::Part;
+use crate::topology::{indices, marked, marks};
+
+impl Part {
+    /// The part that `rank` has of a mesh whose cells are dealt out to the ranks `of_cells`, with
+    /// the global numbers of its vertices and cells. With `ghosts` come copies of the other ranks'
+    /// cells that touch its own by a vertex.
+    ///
+    /// ```
+    /// use tombolo_deform::shapes::box_of_tets;
+    /// use tombolo_deform::distributed::Part;
+    ///
+    /// let mesh = box_of_tets([2, 1, 1], [0.0; 3], [2.0, 1.0, 1.0]);
+    /// let of_cells: Vec<usize> = (0..mesh.cells().len()).map(|cell| cell * 2 / mesh.cells().len()).collect();
+    /// let part = Part::cut(&mesh, &of_cells, 1, false)?;
+    /// assert_eq!((part.cells.len(), part.global_cells.as_deref().map(|cells| cells[0])), (mesh.cells().len() / 2, Some(6)));
+    /// # Ok::<(), tombolo_deform::mesh::MeshError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`MeshError::ArrayLength`] where there is not one rank for each cell.
+    pub fn cut(
+        mesh: &Mesh,
+        of_cells: &[usize],
+        rank: usize,
+        ghosts: bool,
+    ) -> Result<Self, MeshError> {
+        let (cells, points) = (mesh.cells(), mesh.points());
+        if of_cells.len() != cells.len() {
+            let (found, expected) = (of_cells.len(), cells.len());
+            return Err(MeshError::ArrayLength { name: "ranks of cells".into(), found, expected });
+        }
+        let own = of_cells.iter().enumerate().filter(|(_, of)| **of == rank);
+        let touched = marks(points.len(), own.flat_map(|(cell, _)| cells.vertices(cell)));
+        let touches =
+            |cell: usize| cells.vertices(cell).iter().any(|&vertex| touched[vertex as usize]);
+        let taken: Vec<usize> = (0..cells.len())
+            .filter(|&cell| of_cells[cell] == rank || ghosts && touches(cell))
+            .collect();
+        let used = marks(points.len(), taken.iter().flat_map(|&cell| cells.vertices(cell)));
+        let vertices = marked(&used);
+        let numbers = indices(points.len(), &vertices);
+        let renumbered =
+            |of: &[u32]| of.iter().map(|&vertex| numbers[vertex as usize]).collect::<Vec<u32>>();
+        let own = cells.subset(taken.iter().copied()).with_vertices(&numbers);
+        let features = match mesh.features() {
+            FeatureSource::SharpEdges => FeatureSource::SharpEdges,
+            FeatureSource::Vertices(tags) => FeatureSource::Vertices(
+                vertices.iter().map(|&vertex| tags[vertex as usize]).collect(),
+            ),
+            FeatureSource::Faces(tagged) => {
+                let mut mine = TaggedFaces {
+                    faces: Cells::new(),
+                    tags: Vec::new(),
+                    names: tagged.names.clone(),
+                };
+                for ((cell_type, vertices), &tag) in tagged.faces.iter().zip(&tagged.tags) {
+                    if vertices.iter().all(|&vertex| used[vertex as usize]) {
+                        mine.faces.push(cell_type, &renumbered(vertices))?;
+                        mine.tags.push(tag);
+                    }
+                }
+                FeatureSource::Faces(mine)
+            }
+        };
+        Ok(Self {
+            points: vertices.iter().map(|&vertex| points[vertex as usize]).collect(),
+            cells: own,
+            features,
+            global_vertices: Some(vertices.iter().map(|&vertex| u64::from(vertex)).collect()),
+            global_cells: Some(taken.iter().map(|&cell| cell as u64).collect()),
+            grid_boxes: Vec::new(),
+            ghosts: ghosts.then(|| {
+                taken
+                    .iter()
+                    .map(|&cell| if of_cells[cell] == rank { 0 } else { bits::DUPLICATE })
+                    .collect()
+            }),
+        })
+    }
+
+    /// As the solver's arrays that it is a copy of.
+    #[must_use]
+    pub fn view(&self) -> crate::mesh::MeshView<'_> {
+        use crate::mesh::{ArrayView, CellsView, Indices, MeshView};
+        MeshView {
+            global_vertices: self.global_vertices.as_deref().map(Indices::U64),
+            global_cells: self.global_cells.as_deref().map(Indices::U64),
+            ghost_cells: self.ghosts.as_deref(),
+            grid_boxes: &self.grid_boxes,
+            ..MeshView::new(ArrayView::vectors(&self.points), CellsView::Owned(&self.cells))
+                .with_features(&self.features)
+        }
+    }
+
+    /// The part with its vertices and cells in another order: of each the old indices.
+    ///
+    /// # Panics
+    /// Where these are not those of the part.
+    #[must_use]
+    pub fn reordered(&self, vertices: &[usize], cells: &[usize]) -> Self {
+        let mut new = vec![0; vertices.len()];
+        (0..).zip(vertices).for_each(|(number, &vertex)| new[vertex] = number);
+        let features = match &self.features {
+            FeatureSource::Faces(tagged) => {
+                let faces = tagged.faces.with_vertices(&new);
+                FeatureSource::Faces(TaggedFaces { faces, ..tagged.clone() })
+            }
+            FeatureSource::Vertices(tags) => {
+                FeatureSource::Vertices(vertices.iter().map(|&old| tags[old]).collect())
+            }
+            FeatureSource::SharpEdges => FeatureSource::SharpEdges,
+        };
+        let pick = |numbers: &Option<Vec<u64>>, order: &[usize]| {
+            numbers.as_ref().map(|numbers| order.iter().map(|&old| numbers[old]).collect())
+        };
+        Self {
+            points: vertices.iter().map(|&vertex| self.points[vertex]).collect(),
+            cells: self.cells.subset(cells.iter().copied()).with_vertices(&new),
+            features,
+            global_vertices: pick(&self.global_vertices, vertices),
+            global_cells: pick(&self.global_cells, cells),
+            grid_boxes: self.grid_boxes.clone(),
+            ghosts: self
+                .ghosts
+                .as_ref()
+                .map(|ghosts| cells.iter().map(|&cell| ghosts[cell]).collect()),
+        }
+    }
+}

@@ -1,0 +1,457 @@
+//! Shapes that one linear solve from the reference does not reach.
+
+use std::{cell::OnceCell, sync::Arc};
+
+use crate::{
+    edit::{Advance, Edit, Editor},
+    mesh::Vector,
+    quality::{Guard, Otherwise, SurfaceRule, turns_over},
+    schedule::Schedule,
+    volume::{BoundaryMotion, FollowError, Route, Untangler, Volume, follow, with_boundary},
+};
+
+use super::body::Body;
+use super::carry::Carrier;
+use super::plan::{CurrentShape, Plan, travel};
+use super::{
+    Deformation, Refused, Request, ShapeSeconds, Shaper, Target, check_stack, displaced, moved,
+};
+use crate::communicator::Communicator;
+
+/// Mended shapes that are kept: the newest ones.
+const KEPT: usize = 4;
+
+/// Fractions that are tried for the largest feasible one, and how finely it is found where it has
+/// to be searched for.
+const PROBES: usize = 9;
+const FINE: f64 = 1.0 / 128.0;
+
+/// A shape and all that it is a function of.
+pub(super) struct Mended {
+    stack: Vec<Edit>,
+    deform: Deformation,
+    guard: Guard,
+    target: Target,
+}
+
+/// An edit evaluated on the reference surface, as it is for a shape of one solve. Positions and
+/// displacements are those of the boundary's vertices.
+struct OnReference<'a> {
+    editor: Option<&'a mut Editor>,
+    /// Where a part of the surface is let go: what says where it ends.
+    carrier: Option<Arc<Carrier>>,
+    body: Arc<Body>,
+    /// Where the boundary lies in the reference.
+    positions: Vec<Vector>,
+    stack: Vec<Edit>,
+    edit: Edit,
+    /// Where the boundary lies before the edit and its displacement there, where that is not what
+    /// the stack says.
+    ground: Option<(Vec<Vector>, Vec<Vector>)>,
+    rule: SurfaceRule,
+}
+
+impl BoundaryMotion for OnReference<'_> {
+    type Error = Refused;
+
+    fn at(&mut self, _: f64, to: f64, _: &[Vector]) -> Result<Vec<Vector>, Refused> {
+        if let Some(last) = self.stack.last_mut() {
+            *last = self.edit.scaled(to);
+        }
+        let editor = self.editor.as_deref_mut();
+        let displacement = displacement(editor, &self.body, &self.stack, self.carrier.as_deref())?;
+        Ok(match &self.ground {
+            None => self
+                .positions
+                .iter()
+                .zip(&displacement)
+                .map(|(&point, &by)| moved(point, by))
+                .collect(),
+            Some((positions, ground)) => positions
+                .iter()
+                .zip(ground.iter().zip(&displacement))
+                .map(|(&position, (ground, by))| {
+                    moved(position, std::array::from_fn(|axis| by[axis] - ground[axis]))
+                })
+                .collect(),
+        })
+    }
+
+    fn is_sound(&self, shape: &[Vector]) -> bool {
+        let gathered = self.body.gather(shape);
+        gathered.and_then(|shape| self.body.require_sound(&shape, self.rule)).is_ok()
+    }
+
+    fn folds(&self, shape: &[Vector], positions: &[Vector]) -> bool {
+        folds(&self.body, shape, positions)
+    }
+}
+
+/// An edit evaluated on the shape reached: each sub-step's motion of the handle is carried to the
+/// free surface as that lies then. A surface that follows in this way does not fold as long as no
+/// sub-step folds it.
+struct OnShape<'a> {
+    on_reference: OnReference<'a>,
+    /// Where the surface is.
+    advance: Option<Advance>,
+}
+
+impl BoundaryMotion for OnShape<'_> {
+    type Error = Refused;
+
+    fn at(&mut self, from: f64, to: f64, shape: &[Vector]) -> Result<Vec<Vector>, Refused> {
+        let positions = self.on_reference.at(from, to, shape)?;
+        let body = &self.on_reference.body;
+        let now = body.gather(shape)?;
+        let mut wanted = body.gather(&with_boundary(body.vertices(), shape, &positions))?;
+        let carried = match &self.advance {
+            Some(advance) => {
+                advance.carry(&now, &mut wanted).map(|()| wanted).map_err(Refused::from)
+            }
+            None => Ok(Vec::new()),
+        };
+        body.scatter(carried)
+    }
+
+    fn is_stated(&self) -> bool {
+        false
+    }
+
+    fn folds(&self, shape: &[Vector], positions: &[Vector]) -> bool {
+        self.on_reference.folds(shape, positions)
+    }
+}
+
+/// The displacement of the boundary that a stack makes, with what is let go of it where it ends.
+fn displacement(
+    editor: Option<&mut Editor>,
+    body: &Body,
+    stack: &[Edit],
+    carrier: Option<&Carrier>,
+) -> Result<Vec<Vector>, Refused> {
+    let displacement = body.scatter(displaced(editor, stack))?;
+    match carrier {
+        Some(carrier) => carrier.settle(displacement),
+        None => Ok(displacement),
+    }
+}
+
+/// Whether a triangle of the surface turns over, as far as this process can say.
+fn folds(body: &Body, shape: &[Vector], positions: &[Vector]) -> bool {
+    let gathered = body.gather(shape).and_then(|before| {
+        let after = body.gather(&with_boundary(body.vertices(), shape, positions))?;
+        Ok((before, after))
+    });
+    let (Ok((before, after)), Some(surface)) = (gathered, body.surface()) else { return false };
+    surface.triangles().iter().any(|triangle| {
+        let at = |shape: &[Vector]| triangle.map(|vertex| shape[vertex as usize]);
+        turns_over(&at(&before), &at(&after))
+    })
+}
+
+impl Shaper {
+    /// The way to the shape that is asked for, as the guard has it: the shape of one linear solve,
+    /// else what [`Guard::otherwise`] says.
+    ///
+    /// The shape depends on the reference mesh and on the request's stack, deformation and guard
+    /// alone; with [`Otherwise::Clamp`], how far it goes depends on the start and the schedule too.
+    ///
+    /// # Errors
+    /// [`Refused`], with what was reached, where it broke, and what fraction would pass.
+    pub fn plan(&mut self, request: &Request) -> Result<Plan, Refused> {
+        self.spent = ShapeSeconds::default();
+        let Request { stack, start, deformation, schedule, guard, .. } = request;
+        check_stack(stack)?;
+        schedule.check()?;
+        match guard.otherwise {
+            Otherwise::Untangle if !deformation.surface_only => {
+                let target = self.settled(stack, deformation, guard)?;
+                let shape = self.body.gather(&target.points)?;
+                self.body.require_sound(&shape, guard.surface)?;
+                self.go(start, &target, schedule, guard)
+            }
+            Otherwise::Clamp => self.clamped(request),
+            _ => {
+                let target = self.target(stack, deformation, guard.surface)?;
+                self.go(start, &target, schedule, guard)
+            }
+        }
+    }
+
+    /// The way from `start` to a target.
+    ///
+    /// # Errors
+    /// [`Refused::Guard`], [`Refused::Limit`].
+    pub fn go(
+        &mut self,
+        start: &CurrentShape,
+        target: &Target,
+        schedule: &Schedule,
+        guard: &Guard,
+    ) -> Result<Plan, Refused> {
+        schedule.check()?;
+        let watch = self.stopwatch();
+        if target.surface_only || start.surface_only {
+            let plan = self.along_surface(start, target, schedule, guard);
+            let spent = watch.seconds();
+            self.spent.guard += spent;
+            let seconds = ShapeSeconds { guard: target.seconds.guard + spent, ..target.seconds };
+            return Ok(plan?.finished(&self.body, seconds));
+        }
+        // Of several ranks all say the same, each with its own cells' numbers in it.
+        let plan = self.body.agree(travel(&self.body, start, target, schedule, guard));
+        let spent = watch.seconds();
+        self.spent.guard += spent;
+        let seconds = ShapeSeconds { guard: target.seconds.guard + spent, ..target.seconds };
+        Ok(plan?.finished(&self.body, seconds))
+    }
+
+    /// The shape of a stack: of one linear solve from the reference where the guard lets that
+    /// through, else the shape of the edits below the last one, from which the last one is followed
+    /// in sub-steps.
+    fn settled(
+        &mut self,
+        stack: &[Edit],
+        deform: &Deformation,
+        guard: &Guard,
+    ) -> Result<Target, Refused> {
+        let mut lower = stack.len();
+        let mut target = loop {
+            let known = |mended: &&Mended| {
+                mended.stack == stack[..lower] && mended.deform == *deform && mended.guard == *guard
+            };
+            if let Some(found) = self.mended.iter().find(known) {
+                break Target { seconds: ShapeSeconds::default(), ..found.target.clone() };
+            }
+            let mut linear = match self.target(&stack[..lower], deform, guard.surface) {
+                // Followed in sub-steps, the surface may come out sound, and a solve that broke
+                // down may be smaller ones that do not.
+                Err(refused) if (refused.is_surface() || refused.breaks_down()) && lower > 0 => {
+                    lower -= 1;
+                    continue;
+                }
+                linear => linear?,
+            };
+            let watch = self.stopwatch();
+            let holds = lower == 0 || self.body.keeps(&self.reference, &linear.points, guard);
+            linear.seconds.guard += watch.seconds();
+            self.spent.guard += linear.seconds.guard;
+            if holds {
+                linear.way = vec![Arc::clone(&linear.points)];
+                break linear;
+            }
+            lower -= 1;
+        };
+        for index in lower..stack.len() {
+            target = self.followed(&stack[..=index], target, deform, guard)?;
+            if self.mended.len() >= KEPT {
+                self.mended.remove(0);
+            }
+            let stack = stack[..=index].to_vec();
+            self.mended.push(Mended {
+                stack,
+                deform: deform.clone(),
+                guard: *guard,
+                target: target.clone(),
+            });
+        }
+        Ok(target)
+    }
+
+    /// The shape of a stack whose edits below the last one make the shape `base`.
+    fn followed(
+        &mut self,
+        stack: &[Edit],
+        base: Target,
+        deform: &Deformation,
+        guard: &Guard,
+    ) -> Result<Target, Refused> {
+        let Some((edit, below)) = stack.split_last().filter(|(edit, _)| !edit.muted()) else {
+            return Ok(base);
+        };
+        let watch = self.stopwatch();
+        let body = Arc::clone(&self.body);
+        let positions = body.positions(&base.points);
+        let set_up = self.operator(deform)?;
+        // Sub-steps prescribe the whole boundary, also where the deformation lets go of some of it.
+        let at_reference = Arc::ptr_eq(&base.points, &self.reference) && !deform.lets_go();
+        let operator = at_reference.then(|| Arc::clone(set_up.operator()));
+        let carrier = deform.lets_go().then_some(set_up);
+        let known = self.untangler.clone().map_or_else(OnceCell::new, OnceCell::from);
+        let untangler = || {
+            let made = || Arc::new(Untangler::new(&body.domain, body.vertices()));
+            Arc::clone(known.get_or_init(made))
+        };
+        let ground = displacement(self.editor.as_mut(), &body, below, carrier.as_deref())?;
+        let reference = body.positions(&self.reference);
+        let stated = reference.iter().zip(&ground).map(|(&point, &by)| moved(point, by));
+        let as_stated = body.communicator().all(stated.eq(positions.iter().copied()));
+        let mut motion = OnReference {
+            editor: self.editor.as_mut(),
+            carrier,
+            body: Arc::clone(&body),
+            positions: reference,
+            stack: stack.to_vec(),
+            edit: edit.clone(),
+            ground: (!as_stated).then_some((positions, ground)),
+            rule: guard.surface,
+        };
+        let volume = Volume {
+            domain: &body.domain,
+            boundary: body.vertices(),
+            solvers: &*body.solvers,
+            operator: operator.as_ref(),
+        };
+        let mut route =
+            follow(volume, &base.points, &mut motion, &deform.equation, guard, Some(&untangler));
+        // No volume can follow a surface that folds or shrinks to nothing: it is asked for in
+        // another way.
+        if matches!(route, Err(FollowError::Stalled(_))) && !deform.lets_go() {
+            let advance = body
+                .surface()
+                .map(|surface| Advance::new(surface, edit, stack.len() - 1))
+                .transpose();
+            let advance = body.agree(advance.map_err(Refused::from))?.flatten();
+            if body.of_root(usize::from(advance.is_some())) > 0 {
+                let mut motion = OnShape { on_reference: motion, advance };
+                let second = follow(
+                    volume,
+                    &base.points,
+                    &mut motion,
+                    &deform.equation,
+                    guard,
+                    Some(&untangler),
+                );
+                if further(&second) > further(&route) {
+                    route = second;
+                }
+            }
+        }
+        self.untangler = known.into_inner();
+        let index = stack.len() - 1;
+        let mut target = match route {
+            Ok(route) => extended(base, with_ghosts(&body, route)),
+            Err(error) => {
+                self.spent.volume += watch.seconds();
+                return body.agree(Err(refused(error, index, edit)));
+            }
+        };
+        if let Some(improved) = self.improved(&target.points, deform)
+            && body.keeps(&target.points, &improved, guard)
+        {
+            target.points = Arc::clone(&improved);
+            target.way.push(improved);
+        }
+        let seconds = watch.seconds();
+        self.spent.volume += seconds;
+        target.seconds.volume += seconds;
+        Ok(target)
+    }
+
+    /// The largest fraction of the edits after those that are kept that the guard lets through.
+    fn clamped(&mut self, request: &Request) -> Result<Plan, Refused> {
+        let Request { stack, kept, start, deformation: deform, schedule, guard } = request;
+        let kept = *kept;
+        let whole = self.target(stack, deform, guard.surface);
+        let refused = match whole.and_then(|whole| self.go(start, &whole, schedule, guard)) {
+            Err(refused)
+                if (refused.is_quality() || refused.is_surface()) && kept < stack.len() =>
+            {
+                refused
+            }
+            other => return other,
+        };
+        let mut part = |fraction: f64| -> Result<Option<Plan>, Refused> {
+            let scaled: Vec<Edit> = stack
+                .iter()
+                .enumerate()
+                .map(
+                    |(index, edit)| if index < kept { edit.clone() } else { edit.scaled(fraction) },
+                )
+                .collect();
+            let target = self.target(&scaled, deform, guard.surface);
+            match target
+                .and_then(|target| self.go(start, &Target { fraction, ..target }, schedule, guard))
+            {
+                Ok(plan) => Ok(Some(plan)),
+                Err(refused) if refused.is_quality() || refused.is_surface() => Ok(None),
+                Err(other) => Err(other),
+            }
+        };
+        // The shapes of most edits lie on a straight way, on which the fraction is known.
+        let (mut low, mut high, mut best) = (0.0, 1.0, None::<Plan>);
+        let mut guess = refused.feasible_fraction().unwrap_or(0.5) * (1.0 - 1e-6);
+        for _ in 0..PROBES {
+            if !(guess > 1e-6 && guess < 1.0) {
+                guess = 0.5 * (low + high);
+            }
+            let before = std::mem::replace(&mut guess, f64::NAN);
+            match part(before)? {
+                Some(plan) => {
+                    if best.is_none() {
+                        guess = before + FINE;
+                    }
+                    (low, best) = (before, Some(plan));
+                }
+                None => high = before,
+            }
+            if high - low <= FINE {
+                break;
+            }
+        }
+        best.ok_or(refused)
+    }
+}
+
+/// How far a way came.
+fn further<E>(route: &Result<Route, FollowError<E>>) -> f64 {
+    match route {
+        Ok(_) => 1.0,
+        Err(FollowError::Stalled(stalled)) => stalled.fraction(),
+        Err(_) => -1.0,
+    }
+}
+
+fn refused(error: FollowError<Refused>, edit: usize, what: &Edit) -> Refused {
+    match error {
+        FollowError::Boundary(error) => error,
+        FollowError::Volume(error) => error.into(),
+        FollowError::Stalled(stalled) => Refused::Stalled {
+            edit,
+            name: what.name(),
+            fraction: stalled.fraction(),
+            folds: stalled.folds,
+            refusal: stalled.refusal,
+            impossible: stalled.impossible.map(Box::new),
+            end_is_valid: stalled.end_is_valid,
+        },
+    }
+}
+
+/// The route with the vertices of ghost cells, which did not come along, where their owners have
+/// them.
+fn with_ghosts(body: &Body, mut route: Route) -> Route {
+    if body.communicator().size() > 1 {
+        for waypoint in &mut route.waypoints {
+            let mut points = waypoint.points.to_vec();
+            body.update(&mut points);
+            waypoint.points = points.into();
+        }
+    }
+    route
+}
+
+/// The target that a route from `base` leads to.
+fn extended(base: Target, route: Route) -> Target {
+    let mut target = base;
+    target.iterations += route.iterations;
+    target.sub_steps += route.waypoints.len();
+    if Arc::ptr_eq(&target.points, &target.reference) {
+        target.way.clear();
+    }
+    target.way.extend(route.waypoints.into_iter().map(|waypoint| waypoint.points));
+    if let Some(last) = target.way.last() {
+        target.points = Arc::clone(last);
+    }
+    target
+}

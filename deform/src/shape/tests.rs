@@ -1,0 +1,386 @@
+//! Shapes of meshes in parts against those of the same meshes on one process.
+
+use crate::{
+    communicator::Halo,
+    linear::{Convergence, LinearError, LinearSolver, Solver, SparseMatrix, Tolerance},
+    quality::{Otherwise, Refusal, judge, quality},
+    shapes::{box_of_hexahedra, box_of_tets},
+    volume::{Deform, Method},
+};
+use serde_json::json;
+
+use super::*;
+use crate::communicator::{Communicator, threads};
+use crate::distributed::tests::{dealt, renumbered};
+use crate::distributed::{Part, domain};
+use crate::features::FeatureSettings;
+
+/// How a mesh is dealt out.
+#[derive(Clone, Copy)]
+struct Deal {
+    ranks: usize,
+    empty: Option<usize>,
+    ghosts: bool,
+    shuffle: u64,
+    numbers: bool,
+}
+
+const PLAIN: Deal = Deal { ranks: 2, empty: None, ghosts: false, shuffle: 0, numbers: true };
+
+const DEALS: [Deal; 5] = [
+    Deal { ranks: 1, ..PLAIN },
+    PLAIN,
+    Deal { ranks: 3, empty: Some(1), ghosts: true, ..PLAIN },
+    Deal { ranks: 4, shuffle: 3, numbers: false, ..PLAIN },
+    Deal { ranks: 4, empty: Some(0), ghosts: true, shuffle: 5, ..PLAIN },
+];
+
+fn stack(edits: serde_json::Value) -> Vec<Edit> {
+    serde_json::from_value(edits).unwrap()
+}
+
+/// What each rank makes of its part, with the number in the whole mesh of each of its vertices.
+fn on_ranks<T: Send>(
+    mesh: &Mesh,
+    of_cells: &[usize],
+    deal: Deal,
+    work: impl Fn(&mut Shaper, &[usize]) -> T + Sync,
+) -> Vec<T> {
+    threads::run(deal.ranks, |ranks| {
+        let mut part = Part::cut(mesh, of_cells, ranks.rank(), deal.ghosts).unwrap();
+        if deal.shuffle > 0 {
+            part = renumbered(&part, deal.shuffle + ranks.rank() as u64);
+        }
+        let numbers: Vec<usize> =
+            part.global_vertices.iter().flatten().map(|&number| number as usize).collect();
+        if !deal.numbers {
+            (part.global_vertices, part.global_cells) = (None, None);
+        }
+        let ranks: Arc<dyn Communicator> = Arc::new(ranks);
+        let mut shaper = of_part(&ranks, &part);
+        work(&mut shaper, &numbers)
+    })
+}
+
+/// A request from the reference on.
+fn asked(shaper: &Shaper, edits: &[Edit], deformation: &Deformation) -> Request {
+    Request {
+        deformation: deformation.clone(),
+        ..Request::new(edits, Arc::clone(shaper.reference()))
+    }
+}
+
+fn of_part(ranks: &Arc<dyn Communicator>, part: &Part) -> Shaper {
+    let (domain, boundary) = domain(ranks, part, &FeatureSettings::default()).unwrap();
+    Shaper::new(domain, boundary).unwrap()
+}
+
+fn alone(mesh: &Mesh) -> Shaper {
+    let mesh = Arc::new(mesh.clone());
+    let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).unwrap());
+    Shaper::new(mesh, surface).unwrap()
+}
+
+/// The largest difference of a coordinate.
+fn apart(part: &[Vector], numbers: &[usize], whole: &[Vector]) -> f64 {
+    let pairs = part.iter().zip(numbers);
+    pairs
+        .flat_map(|(a, &number)| (0..3).map(move |k| (a[k] - whole[number][k]).abs()))
+        .fold(0.0, f64::max)
+}
+
+fn tight(deform: serde_json::Value) -> Deformation {
+    let stage: Deformation = serde_json::from_value(deform).unwrap();
+    Deformation { equation: Deform { tolerance: 1e-10, ..stage.equation }, ..stage }
+}
+
+#[test]
+fn shapes_are_those_of_one_process() {
+    let lowered = json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.05, 0.02, -0.3]}}]);
+    let stretched = json!([{"scale_direction": {"features": ["z-max"], "fixed": ["z-min"], "factors": [1.2, 0.9, 1.0]}}]);
+    for (mesh, edits, deform) in [
+        (box_of_tets([9, 8, 7], [0.0; 3], [1.0; 3]), &lowered, json!({})),
+        (box_of_tets([9, 8, 7], [0.0; 3], [1.0; 3]), &stretched, json!({"method": "harmonic"})),
+        (
+            box_of_hexahedra([5, 5, 5], [0.0; 3], [1.0; 3]),
+            &lowered,
+            json!({"method": "harmonic", "improve": 0}),
+        ),
+        (
+            box_of_hexahedra([5, 6, 5], [0.0; 3], [1.0; 3]),
+            &lowered,
+            json!({"sliding": ["x-min", "y-max"]}),
+        ),
+        (
+            box_of_tets([6, 6, 5], [0.0; 3], [1.0; 3]),
+            &lowered,
+            json!({"method": "harmonic", "sliding": ["x-max"], "free": ["y-min"]}),
+        ),
+    ] {
+        let (edits, deform) = (stack(edits.clone()), tight(deform));
+        let mut serial = alone(&mesh);
+        let plan = serial.plan(&asked(&serial, &edits, &deform)).unwrap();
+        let forecast = serial.forecast_of(&plan);
+        for deal in DEALS {
+            let of_cells = dealt(&mesh, deal.ranks, deal.empty);
+            on_ranks(&mesh, &of_cells, deal, |shaper, numbers| {
+                let found = shaper.plan(&asked(shaper, &edits, &deform)).unwrap();
+                let off = apart(found.end(), numbers, plan.end());
+                assert!(off <= 1e-8 * 0.3, "{} ranks, {deform:?}: {off:e}", deal.ranks);
+                assert!(
+                    (found.quality().min_scaled_jacobian - plan.quality().min_scaled_jacobian)
+                        .abs()
+                        < 1e-7
+                );
+                assert!((found.largest_displacement() - plan.largest_displacement()).abs() < 1e-8);
+                let of_parts = shaper.forecast_of(&found);
+                let (quality, expected) =
+                    (of_parts.quality.unwrap(), forecast.quality.clone().unwrap());
+                assert_eq!((quality.cells, quality.inverted), (expected.cells, 0));
+                assert!((quality.mean - expected.mean).abs() < 1e-7);
+                let (change, expected) = (of_parts.change.unwrap(), forecast.change.unwrap());
+                assert!((change.volume_ratio.mean - expected.volume_ratio.mean).abs() < 1e-7);
+                // Back: exactly.
+                let there = found.reached(found.shapes(), Arc::clone(found.end()));
+                let request = Request { deformation: deform.clone(), ..Request::new([], there) };
+                let back = shaper.plan(&request).unwrap();
+                assert_eq!(back.end(), shaper.reference());
+            });
+        }
+    }
+}
+
+/// The same points are judged alike, whatever parts they are in.
+#[test]
+fn quality_is_that_of_one_process() {
+    let mesh = box_of_tets([6, 5, 4], [0.0; 3], [1.0; 3]);
+    let wave = |p: &Vector, size: f64| {
+        [
+            p[0] + size * (7.0 * p[1]).sin(),
+            p[1] + size * (9.0 * p[2]).sin(),
+            p[2] + size * (8.0 * p[0]).cos(),
+        ]
+    };
+    let guard = Guard { min_scaled_jacobian: 0.05, ..Guard::default() };
+    for size in [0.02, 0.3] {
+        let moved: Vec<Vector> = mesh.points().iter().map(|point| wave(point, size)).collect();
+        let serial = quality(mesh.cells(), &moved);
+        let verdict = judge(&mesh, mesh.points(), &moved, &[0.5, 1.0], &guard);
+        for deal in DEALS.into_iter().filter(|deal| deal.numbers) {
+            let of_cells = dealt(&mesh, deal.ranks, deal.empty);
+            on_ranks(&mesh, &of_cells, deal, |shaper, numbers| {
+                let points: Vec<Vector> = numbers.iter().map(|&number| moved[number]).collect();
+                let domain = shaper.domain().clone();
+                let found = quality(shaper.mesh().cells(), &points).gathered(&domain);
+                assert_eq!((found.cells, found.inverted), (serial.cells, serial.inverted));
+                assert_eq!(
+                    (found.min, found.max, found.histogram),
+                    (serial.min, serial.max, serial.histogram)
+                );
+                assert!((found.mean - serial.mean).abs() < 1e-12);
+                let measured = |quality: &crate::quality::Quality| {
+                    quality.worst.iter().map(|worst| worst.scaled_jacobian).collect::<Vec<f64>>()
+                };
+                assert_eq!(measured(&found), measured(&serial));
+                let start = shaper.reference();
+                match (judge(&domain, start, &points, &[0.5, 1.0], &guard), &verdict) {
+                    (Ok(found), Ok(verdict)) => {
+                        assert_eq!(found.min_scaled_jacobian, verdict.min_scaled_jacobian);
+                        assert!((found.shapes[0].mean - verdict.shapes[0].mean).abs() < 1e-12);
+                    }
+                    (Err(Refusal::Quality(found)), Err(Refusal::Quality(verdict))) => {
+                        assert_eq!(
+                            (found.failing, found.inverted),
+                            (verdict.failing, verdict.inverted)
+                        );
+                        assert_eq!(found.feasible_fraction, verdict.feasible_fraction);
+                        assert_eq!(found.folded_faces, verdict.folded_faces);
+                        assert_eq!(found.worst[0].cell, verdict.worst[0].cell);
+                    }
+                    (found, verdict) => panic!("{found:?} {verdict:?}"),
+                }
+            });
+        }
+    }
+}
+
+/// One rank has the core alone, so that no vertex of its own is prescribed.
+#[test]
+fn a_rank_without_boundary_follows_the_others() {
+    let mesh = box_of_tets([8, 8, 8], [0.0; 3], [1.0; 3]);
+    let is_core = |vertices: &[u32]| {
+        vertices
+            .iter()
+            .all(|&vertex| mesh.points()[vertex as usize].iter().all(|&x| (0.2..=0.8).contains(&x)))
+    };
+    let of_cells: Vec<usize> =
+        mesh.cells().iter().map(|(_, vertices)| usize::from(is_core(vertices))).collect();
+    let edits = stack(
+        json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -0.3]}}]),
+    );
+    let deform = tight(json!({}));
+    let mut serial = alone(&mesh);
+    let plan = serial.plan(&asked(&serial, &edits, &deform)).unwrap();
+    let vertices = on_ranks(&mesh, &of_cells, PLAIN, |shaper, numbers| {
+        let found = shaper.plan(&asked(shaper, &edits, &deform)).unwrap();
+        let off = apart(found.end(), numbers, plan.end());
+        assert!(off <= 1e-8 * 0.3, "{off:e}");
+        shaper.boundary_vertices().len()
+    });
+    assert!(vertices[0] > 300 && vertices[1] == 0, "{vertices:?}");
+}
+
+/// Sub-steps, the inversion-free solve and clamping take the same decisions on all ranks as on one.
+#[test]
+fn what_one_solve_does_not_reach_is_mended_alike() {
+    let mesh = box_of_tets([4, 4, 8], [0.0; 3], [1.0, 1.0, 2.0]);
+    let turned = stack(
+        json!([{"rotate": {"features": ["z-max"], "fixed": ["z-min"], "axis": [0, 0, 1], "degrees": 130}}]),
+    );
+    for otherwise in [Otherwise::Untangle, Otherwise::Clamp, Otherwise::Reject] {
+        let guard = Guard { min_scaled_jacobian: 0.05, otherwise, surface: SurfaceRule::Allow };
+        let reach = |shaper: &mut Shaper| {
+            shaper.plan(&Request { guard, ..asked(shaper, &turned, &tight(json!({}))) })
+        };
+        let serial = reach(&mut alone(&mesh));
+        for deal in [PLAIN, Deal { ranks: 3, ghosts: true, ..PLAIN }] {
+            let of_cells = dealt(&mesh, deal.ranks, deal.empty);
+            let outcomes = on_ranks(&mesh, &of_cells, deal, |shaper, numbers| {
+                match (reach(shaper), &serial) {
+                    (Ok(found), Ok(plan)) => {
+                        assert_eq!(found.target().sub_steps, plan.target().sub_steps);
+                        assert_eq!(found.shapes(), plan.shapes());
+                        assert!((found.target().fraction - plan.target().fraction).abs() < 1e-6);
+                        let off = apart(found.end(), numbers, plan.end());
+                        assert!(off <= 1e-5, "{otherwise:?} {} ranks: {off:e}", deal.ranks);
+                        "done".to_owned()
+                    }
+                    (Err(found), Err(refused)) => {
+                        assert!(
+                            (found.feasible_fraction().unwrap()
+                                - refused.feasible_fraction().unwrap())
+                            .abs()
+                                < 1e-5
+                        );
+                        found.to_string()
+                    }
+                    (found, refused) => panic!(
+                        "{otherwise:?}: {:?} {:?}",
+                        found.map(drop),
+                        refused.as_ref().map(drop)
+                    ),
+                }
+            });
+            assert!(outcomes.iter().all(|outcome| *outcome == outcomes[0]), "{outcomes:?}");
+        }
+    }
+}
+
+/// What is wrong on one rank alone is told on all of them, in the same words.
+#[test]
+fn an_error_of_one_rank_is_that_of_all() {
+    let mesh = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+    let mut points = mesh.points().to_vec();
+    // The middle vertex beyond its neighbours.
+    let middle = points.iter().position(|point| *point == [0.5; 3]).unwrap();
+    points[middle][0] = 0.9;
+    let broken = mesh.with_points(points).unwrap();
+    let of_cells = dealt(&mesh, 3, None);
+    let down = stack(
+        json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -0.1]}}]),
+    );
+    let plan = |shaper: &mut Shaper, edits: &[Edit], method: Method| {
+        let deform = Deformation {
+            equation: Deform { method, ..Deform::default() },
+            ..Deformation::default()
+        };
+        shaper.plan(&asked(shaper, edits, &deform)).map(drop).map_err(|refused| refused.to_string())
+    };
+    for method in [Method::Elasticity, Method::Harmonic] {
+        let told = on_ranks(&broken, &of_cells, Deal { ranks: 3, ..PLAIN }, |shaper, _| {
+            plan(shaper, &down, method)
+        });
+        let message = told[0].clone().unwrap_err();
+        assert!(message.contains("no positive volume"), "{message}");
+        assert!(told.iter().all(|told| told.as_ref() == Err(&message)), "{told:?}");
+    }
+    // An edit that makes no sense; one that goes through the floor.
+    for edits in [
+        json!([{"translate": {"features": ["z-mox"], "fixed": ["z-min"], "by": [0.0, 0.0, -0.1]}}]),
+        json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -3.0]}}]),
+    ] {
+        let edits = stack(edits);
+        let expected = plan(&mut alone(&mesh), &edits, Method::Elasticity).unwrap_err();
+        let told = on_ranks(&mesh, &of_cells, Deal { ranks: 3, ..PLAIN }, |shaper, _| {
+            plan(shaper, &edits, Method::Elasticity)
+        });
+        assert!(told.iter().all(|told| told.as_ref() == Err(&expected)), "{told:?}, {expected}");
+    }
+}
+
+/// A choice of solvers that never come to an end.
+#[derive(Debug)]
+struct Failing;
+
+impl Solvers for Failing {
+    fn scalar(&self, matrix: Arc<SparseMatrix<1>>, halo: &Halo, _: &[Vector]) -> Solver<1> {
+        crate::linear::solver(matrix, halo)
+    }
+
+    fn vector(&self, matrix: Arc<SparseMatrix<3>>, _: &Halo, _: &[Vector]) -> Solver<3> {
+        Ok(Box::new(Never(matrix.rows())))
+    }
+}
+
+#[derive(Debug)]
+struct Never(usize);
+
+impl LinearSolver<3> for Never {
+    fn unknowns(&self) -> usize {
+        self.0
+    }
+
+    fn solve_from(
+        &self,
+        _: &[Vector],
+        _: &mut [Vector],
+        _: Tolerance,
+    ) -> Result<Convergence, LinearError> {
+        Err(LinearError::NotFinite { iteration: 0 })
+    }
+
+    fn renewed(&self, _: Arc<SparseMatrix<3>>) -> Result<Box<dyn LinearSolver<3>>, LinearError> {
+        Ok(Box::new(Never(self.0)))
+    }
+}
+
+/// A first solve that fails is followed in sub-steps on several ranks as on one: the order is done
+/// by untangling alone, or refused with how much of it can be done.
+#[test]
+fn a_solve_that_fails_on_several_ranks_says_how_far_the_order_can_go() {
+    let mesh = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+    let guard = Guard { otherwise: Otherwise::Untangle, ..Guard::default() };
+    let of_cells: Vec<usize> =
+        (0..mesh.cells().len()).map(|cell| 2 * cell / mesh.cells().len()).collect();
+    let outcomes = threads::run(2, |ranks| {
+        let part = Part::cut(&mesh, &of_cells, ranks.rank(), false).unwrap();
+        let ranks: Arc<dyn Communicator> = Arc::new(ranks);
+        let mut shaper = of_part(&ranks, &part).with_solvers(Arc::new(Failing));
+        [-0.2, -1.5].map(|by| {
+            let edits = stack(json!([{"translate": {
+                "features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, by], "harmonic_order": 1}}]));
+            let request = Request { guard, ..asked(&shaper, &edits, &Deformation::default()) };
+            shaper.plan(&request).map(|_| ())
+        })
+    });
+    for [moderate, beyond] in outcomes {
+        assert_eq!(moderate.map_err(|refused| refused.to_string()), Ok(()));
+        let refused = beyond.unwrap_err();
+        let text = refused.to_string();
+        assert!(text.contains("edit 0 (translate) can be done to"), "{text}");
+        assert!(
+            refused.feasible_fraction().is_some_and(|fraction| fraction > 0.2 && fraction < 0.67),
+            "{text}"
+        );
+    }
+}

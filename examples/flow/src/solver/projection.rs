@@ -1,0 +1,148 @@
+//! The pressure equation, by which the velocity is made to satisfy continuity.
+
+use std::sync::Arc;
+
+use tombolo_deform::communicator::Halo;
+use tombolo_deform::linear::{
+    LinearError, LinearSolver, Multigrid, MultigridSettings, NullSpace, SparseMatrix, Tolerance,
+};
+use tombolo_deform::vector::length;
+
+use crate::boundary::Boundary;
+use crate::geometry::Geometry;
+use crate::linear::{Outcome, sum};
+use crate::ranks::total;
+use crate::topology::Topology;
+
+/// The pressure equation.
+#[derive(Debug)]
+pub(super) struct Projection {
+    solver: Multigrid<1>,
+    /// Whether the preconditioner was set up for another shape than the matrix.
+    is_stale: bool,
+    /// Whether the solves take many more iterations for that.
+    is_worn: bool,
+    /// How many iterations a solve takes at most with a fresh preconditioner.
+    usual_iterations: usize,
+    /// Of this rank: zero at the vertices of others.
+    pub(super) right: Vec<f64>,
+}
+
+impl Projection {
+    pub(super) fn new(
+        topology: &Topology,
+        geometry: &Geometry,
+        boundary: &Boundary,
+        halo: &Halo,
+        iteration_limit: usize,
+    ) -> Result<Self, LinearError> {
+        let null_space = if boundary.is_open() { NullSpace::Zero } else { NullSpace::Constants };
+        let settings =
+            MultigridSettings { max_iterations: iteration_limit, null_space, ..Default::default() };
+        let matrix = pressure_matrix(topology, geometry, boundary);
+        let solver = Multigrid::distributed(halo.clone(), matrix, settings)?;
+        let right = vec![0.0; topology.vertex_count()];
+        Ok(Self { solver, is_stale: false, is_worn: false, usual_iterations: 0, right })
+    }
+
+    /// Brings the matrix up to date with the coordinates. Collective.
+    ///
+    /// An old preconditioner still serves a mesh that has moved a little; conjugate gradients have
+    /// the true matrix.
+    pub(super) fn renew(
+        &mut self,
+        topology: &Topology,
+        geometry: &Geometry,
+        boundary: &Boundary,
+    ) -> Result<(), LinearError> {
+        let matrix = Arc::new(pressure_matrix(topology, geometry, boundary));
+        self.is_stale = true;
+        if self.is_worn {
+            return self.refresh(matrix);
+        }
+        self.solver = self.solver.of_similar_matrix(matrix);
+        Ok(())
+    }
+
+    /// Sets the preconditioner up for this matrix. Collective.
+    fn refresh(&mut self, matrix: Arc<SparseMatrix<1>>) -> Result<(), LinearError> {
+        self.solver = self.solver.of_like_matrix(matrix)?;
+        (self.is_stale, self.is_worn, self.usual_iterations) = (false, false, 0);
+        Ok(())
+    }
+
+    /// Counts the iterations of a solve, to see whether the preconditioner still serves.
+    fn count(&mut self, iterations: usize) {
+        if self.is_stale {
+            self.is_worn = iterations > self.usual_iterations + self.usual_iterations / 2 + 2;
+        } else {
+            self.usual_iterations = self.usual_iterations.max(iterations);
+        }
+    }
+
+    /// Solves for the potential; `through` is the sum of the fluxes through the boundary's parts,
+    /// which says what is small.
+    pub(super) fn solve(
+        &mut self,
+        topology: &Topology,
+        halo: &Halo,
+        potential: &mut [f64],
+        pressure_tolerance: f64,
+        through: f64,
+        open: bool,
+    ) -> Outcome {
+        for row in (0..topology.rows()).filter(|&row| topology.around(row).is_empty()) {
+            self.right[row] = 0.0;
+        }
+        let sums = sum(topology.rows(), |range| {
+            let used = range.clone().filter(|&row| !topology.around(row).is_empty()).count();
+            let right = &self.right[range];
+            [right.iter().map(|value| value * value).sum(), right.iter().sum(), used as f64]
+        });
+        let [square, whole, used] = total(halo.communicator(), sums);
+        // Without an outlet only a right-hand side without a mean has a solution; the solver leaves
+        // the mean out.
+        let square = if open { square } else { (square - whole * whole / used.max(1.0)).max(0.0) };
+        let size = square.sqrt();
+        let small = 1e-9 * through / used.max(1.0).sqrt();
+        // The residual is a loss of mass, and as such says alone what is good enough.
+        let tolerance =
+            Tolerance { relative: 0.0, absolute: (pressure_tolerance * size).max(small) };
+        if self.is_worn && self.refresh(Arc::new(self.solver.matrix().clone())).is_err() {
+            // The old one has served so far, if slowly.
+            self.is_worn = false;
+        }
+        let (right, potential) = (self.right.as_chunks().0, potential.as_chunks_mut().0);
+        let outcome = match self.solver.solve_from(right, potential, tolerance) {
+            Ok(found) => Outcome {
+                iterations: found.iterations,
+                residual: found.residual * size,
+                converged: true,
+            },
+            Err(LinearError::NotConverged { iterations, residual, .. }) => {
+                Outcome { iterations, residual: residual * size, converged: false }
+            }
+            Err(_) => Outcome { iterations: 0, residual: size, converged: false },
+        };
+        self.count(outcome.iterations);
+        outcome
+    }
+}
+
+/// The Laplacian, and at outlets the flux that a potential drives out of each vertex.
+fn pressure_matrix(
+    topology: &Topology,
+    geometry: &Geometry,
+    boundary: &Boundary,
+) -> SparseMatrix<1> {
+    let mut matrix = geometry.laplacian(topology);
+    let values = matrix.values_mut();
+    for outlet in &boundary.outlets {
+        let vertex = outlet.vertex as usize;
+        values[topology.diagonal[vertex]][0][0] += outlet.yield_rate * length(outlet.area);
+    }
+    for vertex in (0..topology.rows()).filter(|&vertex| topology.around(vertex).is_empty()) {
+        values[topology.diagonal[vertex]] = [[1.0]];
+    }
+    matrix
+}

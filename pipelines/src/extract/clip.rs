@@ -1,0 +1,437 @@
+//! The part of a mesh in which all of some functions are at least 0, or that in which one is not.
+//!
+//! A cell that is cut is decomposed into tetrahedra. In a tetrahedron a function is linear: what is left of it is a tetrahedron, a pyramid or a wedge. With
+//! several functions these are decomposed in turn, by the names of their points.
+
+use tombolo_deform::mesh::{CellType, Cells, MeshError, Vector};
+use tombolo_deform::vector::{add, determinant, scale, subtract};
+
+use super::cut::{ByVertices, mixed};
+use super::decompose::Faces;
+use super::function::Samples;
+use super::gather::Rows;
+use super::pattern::{Base, Pattern};
+use super::source::{Origin, Support};
+
+/// A vertex, or a point that was cut out.
+#[derive(Clone, Copy)]
+struct Node {
+    /// The vertices it lies between, and the nodes between which it was cut out, as one number that
+    /// all ranks find.
+    support: Support,
+    /// The weights of the vertices of the support.
+    weights: [f64; 4],
+    /// By bits, the functions that are 0 there.
+    zero: u8,
+    /// Its number among the points of the extract; `u32::MAX` before it is used.
+    number: u32,
+}
+
+/// A cell by its nodes.
+#[derive(Clone, Copy)]
+struct Piece {
+    cell_type: CellType,
+    nodes: [u32; 6],
+}
+
+impl Piece {
+    fn new(cell_type: CellType, nodes: &[u32]) -> Self {
+        let mut all = [u32::MAX; 6];
+        all.iter_mut().zip(nodes).for_each(|(slot, node)| *slot = *node);
+        Self { cell_type, nodes: all }
+    }
+
+    fn nodes(&self) -> &[u32] {
+        &self.nodes[..self.cell_type.vertex_count().unwrap_or(0)]
+    }
+}
+
+/// The signs of the functions at a vertex.
+#[derive(Clone, Copy)]
+struct Signs {
+    /// By bits, the functions that are below 0.
+    below: u8,
+    /// By bits, the functions that are 0 or below.
+    not_above: u8,
+    /// Whether a function is NaN.
+    is_lacking: bool,
+}
+
+/// Clips cell after cell.
+pub(super) struct Clipper<'a> {
+    cells: &'a Cells,
+    points: &'a [Vector],
+    /// The values of at most eight functions at the vertices.
+    samples: &'a [Samples],
+    /// The numbers of the vertices in the whole mesh, where this is a part of one.
+    numbers: Option<&'a [u32]>,
+    invert: bool,
+    signs: Vec<Signs>,
+    nodes: Vec<Node>,
+    of_vertices: Vec<u32>,
+    /// Nodes by the two between which they lie, and the function that is 0 there.
+    between: ByVertices<(u32, u32, usize)>,
+    faces: Faces,
+    cell: u32,
+    made: Cells,
+    owners: Vec<u32>,
+    /// The node of each point.
+    used: Vec<u32>,
+}
+
+impl<'a> Clipper<'a> {
+    pub(super) fn new(
+        cells: &'a Cells,
+        points: &'a [Vector],
+        samples: &'a [Samples],
+        numbers: Option<&'a [u32]>,
+        invert: bool,
+    ) -> Self {
+        let bits = |vertex: usize, test: &dyn Fn(f64) -> bool| {
+            let bit = |(index, values): (usize, &Samples)| u8::from(test(values[vertex])) << index;
+            samples.iter().enumerate().map(bit).fold(0, |bits, bit| bits | bit)
+        };
+        let signs = |vertex: usize| Signs {
+            below: bits(vertex, &|value| value < 0.0),
+            not_above: bits(vertex, &|value| value <= 0.0),
+            is_lacking: samples.iter().any(|values| values[vertex].is_nan()),
+        };
+        let count = if samples.iter().any(Vec::is_empty) { 0 } else { points.len() };
+        Self {
+            cells,
+            points,
+            samples,
+            numbers,
+            invert,
+            signs: (0..count).map(signs).collect(),
+            nodes: Vec::new(),
+            of_vertices: vec![u32::MAX; count],
+            between: ByVertices::default(),
+            faces: Faces::default(),
+            cell: 0,
+            made: Cells::new(),
+            owners: Vec::new(),
+            used: Vec::new(),
+        }
+    }
+
+    /// Takes what is to be kept of one cell.
+    pub(super) fn cell(&mut self, cell: usize) -> Result<(), MeshError> {
+        let dimension = self.cells.cell_type(cell).dimension();
+        let vertices = self.cells.vertices(cell);
+        let (mut below, mut not_above, mut is_lacking) = (0, u8::MAX, false);
+        for &vertex in vertices {
+            let signs = self.signs[vertex as usize];
+            below |= signs.below;
+            not_above &= signs.not_above;
+            is_lacking |= signs.is_lacking;
+        }
+        if is_lacking || dimension < 2 {
+            return Ok(());
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "cells are numbered with 32 bits")]
+        {
+            self.cell = cell as u32;
+        }
+        let (is_inside, is_outside) = (below == 0, below & not_above != 0);
+        match (is_inside, is_outside) {
+            (true, _) if self.invert => Ok(()),
+            (_, true) if !self.invert => Ok(()),
+            (true, _) | (_, true) => self.whole(cell),
+            _ => self.decomposed(cell, dimension),
+        }
+    }
+
+    fn whole(&mut self, cell: usize) -> Result<(), MeshError> {
+        let cells = self.cells;
+        match cells.polyhedron_faces(cell) {
+            [] => {
+                let vertices = self.numbered(cells.vertices(cell));
+                self.made.push(cells.cell_type(cell), &vertices)?;
+            }
+            faces => {
+                let faces: Vec<Vec<u32>> = faces.iter().map(|face| self.numbered(face)).collect();
+                self.made.push_polyhedron(&faces)?;
+            }
+        }
+        self.owners.push(self.cell);
+        Ok(())
+    }
+
+    fn decomposed(&mut self, cell: usize, dimension: usize) -> Result<(), MeshError> {
+        let numbers = self.numbers;
+        let key = |vertex: u32| numbers.map_or(vertex, |numbers| numbers[vertex as usize]);
+        let mut simplices = Vec::new();
+        self.faces.decompose(self.cells, cell, key, &mut simplices);
+        let cell_type = if dimension == 3 { CellType::Tetra } else { CellType::Triangle };
+        for simplex in simplices {
+            let nodes = simplex.map(|v| if v == u32::MAX { v } else { self.vertex(v) });
+            self.simplex(Piece::new(cell_type, &nodes), 0)?;
+        }
+        Ok(())
+    }
+
+    /// Takes what is to be kept of a simplex, by the functions from this one on.
+    fn simplex(&mut self, simplex: Piece, from: usize) -> Result<(), MeshError> {
+        let functions = from..self.samples.len();
+        let is_below = |function: &usize| {
+            simplex.nodes().iter().any(|&node| self.value(node, *function) < 0.0)
+        };
+        let Some(function) = functions.clone().find(is_below) else {
+            return if self.invert { Ok(()) } else { self.push(&simplex) };
+        };
+        if self.invert
+            && let Some(outside) = self.part(&simplex, function, -1.0)
+        {
+            self.push(&outside)?;
+        }
+        let Some(inside) = self.part(&simplex, function, 1.0) else { return Ok(()) };
+        let is_cut = (function + 1..functions.end)
+            .any(|next| inside.nodes().iter().any(|&node| self.value(node, next) < 0.0));
+        if !is_cut {
+            return if self.invert { Ok(()) } else { self.push(&inside) };
+        }
+        for simplex in self.simplices(&inside) {
+            self.simplex(simplex, function + 1)?;
+        }
+        Ok(())
+    }
+
+    /// The part of a simplex in which the function, times a sign, is above 0.
+    fn part(&mut self, simplex: &Piece, function: usize, sign: f64) -> Option<Piece> {
+        let mut ahead = Vec::with_capacity(4);
+        let mut behind = Vec::with_capacity(4);
+        let mut is_above = false;
+        for &node in simplex.nodes() {
+            let value = sign * self.value(node, function);
+            is_above |= value > 0.0;
+            if value >= 0.0 { ahead.push(node) } else { behind.push(node) }
+        }
+        if !is_above {
+            return None;
+        }
+        let is_zero = |nodes: &Self, node: u32| nodes.value(node, function) == 0.0;
+        let piece = match (ahead.as_slice(), behind.as_slice()) {
+            (_, []) => *simplex,
+            (&[a], &[b, c]) => {
+                let [ab, ac] = [b, c].map(|other| self.between(a, other, function));
+                Piece::new(CellType::Triangle, &[a, ab, ac])
+            }
+            (&[a, b], &[c]) => {
+                let (a, b) = if is_zero(self, b) { (b, a) } else { (a, b) };
+                let bc = self.between(b, c, function);
+                if is_zero(self, a) {
+                    Piece::new(CellType::Triangle, &[a, b, bc])
+                } else {
+                    let ac = self.between(a, c, function);
+                    Piece::new(CellType::Quad, &[a, b, bc, ac])
+                }
+            }
+            (&[a], &[b, c, d]) => {
+                let [ab, ac, ad] = [b, c, d].map(|other| self.between(a, other, function));
+                Piece::new(CellType::Tetra, &[a, ab, ac, ad])
+            }
+            (&[a, b], &[c, d]) => {
+                let (a, b) = if is_zero(self, b) { (b, a) } else { (a, b) };
+                let [bc, bd] = [c, d].map(|other| self.between(b, other, function));
+                if is_zero(self, a) {
+                    Piece::new(CellType::Tetra, &[b, bc, bd, a])
+                } else {
+                    let [ac, ad] = [c, d].map(|other| self.between(a, other, function));
+                    Piece::new(CellType::Wedge, &[a, ac, ad, b, bc, bd])
+                }
+            }
+            (&[a, b, c], &[d]) => {
+                // Those at which the function is 0 first.
+                let mut corners = [a, b, c];
+                corners.sort_by_key(|&corner| !is_zero(self, corner));
+                let [a, b, c] = corners;
+                match corners.iter().filter(|&&corner| is_zero(self, corner)).count() {
+                    0 => {
+                        let [ad, bd, cd] = corners.map(|near| self.between(near, d, function));
+                        Piece::new(CellType::Wedge, &[a, b, c, ad, bd, cd])
+                    }
+                    1 => {
+                        let [bd, cd] = [b, c].map(|near| self.between(near, d, function));
+                        Piece::new(CellType::Pyramid, &[b, c, cd, bd, a])
+                    }
+                    _ => {
+                        let cd = self.between(c, d, function);
+                        Piece::new(CellType::Tetra, &[a, b, c, cd])
+                    }
+                }
+            }
+            _ => return None,
+        };
+        Some(piece)
+    }
+
+    /// The simplices of a piece.
+    fn simplices(&mut self, piece: &Piece) -> Vec<Piece> {
+        if matches!(piece.cell_type, CellType::Tetra | CellType::Triangle) {
+            return vec![*piece];
+        }
+        let mut faces = std::mem::take(&mut self.faces);
+        faces.clear();
+        let mut simplices = Vec::new();
+        let key = |node: u32| self.nodes[node as usize].support.layer;
+        let cell_type = if piece.cell_type == CellType::Quad {
+            faces.push(piece.nodes());
+            faces.triangles(key, &mut simplices);
+            CellType::Triangle
+        } else {
+            for face in piece.cell_type.faces() {
+                let nodes: Vec<u32> = face.iter().map(|&local| piece.nodes[local]).collect();
+                faces.push(&nodes);
+            }
+            faces.tetrahedra(key, &mut simplices);
+            CellType::Tetra
+        };
+        self.faces = faces;
+        simplices.iter().map(|nodes| Piece::new(cell_type, nodes)).collect()
+    }
+
+    fn value(&self, node: u32, function: usize) -> f64 {
+        let Node { support, weights, zero, .. } = &self.nodes[node as usize];
+        if zero >> function & 1 == 1 {
+            return 0.0;
+        }
+        let values = &self.samples[function];
+        let parts = support.vertices().zip(weights);
+        parts.map(|(vertex, weight)| weight * values[vertex as usize]).sum()
+    }
+
+    /// The node of a vertex.
+    fn vertex(&mut self, vertex: u32) -> u32 {
+        if self.of_vertices[vertex as usize] == u32::MAX {
+            let Signs { below, not_above, .. } = self.signs[vertex as usize];
+            let number = self.numbers.map_or(vertex, |numbers| numbers[vertex as usize]);
+            self.of_vertices[vertex as usize] = self.add(Node {
+                support: Support::new(&[vertex], mixed(0, u64::from(number))),
+                weights: [1.0, 0.0, 0.0, 0.0],
+                zero: not_above & !below,
+                number: u32::MAX,
+            });
+        }
+        self.of_vertices[vertex as usize]
+    }
+
+    fn add(&mut self, node: Node) -> u32 {
+        self.nodes.push(node);
+        #[expect(clippy::cast_possible_truncation, reason = "a few nodes for each vertex")]
+        {
+            (self.nodes.len() - 1) as u32
+        }
+    }
+
+    /// The node between two others at which the function is 0.
+    fn between(&mut self, near: u32, far: u32, function: usize) -> u32 {
+        let (at_near, at_far) = (self.value(near, function), self.value(far, function));
+        if at_near == 0.0 {
+            return near;
+        }
+        let key = (near.min(far), near.max(far), function);
+        if let Some(&known) = self.between.get(&key) {
+            return known;
+        }
+        let fraction = at_near / (at_near - at_far);
+        let [a, b] = [near, far].map(|node| self.nodes[node as usize]);
+        let mut vertices: Vec<u32> = a.support.vertices().chain(b.support.vertices()).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        let [one, other] = [a, b].map(|node| node.support.layer);
+        let name = mixed(mixed(one.min(other), one.max(other)), function as u64);
+        let support = Support::new(&vertices, name);
+        let weight = |node: &Node, vertex: u32| {
+            let mut parts = node.support.vertices().zip(node.weights);
+            parts.find(|(known, _)| *known == vertex).map_or(0.0, |(_, weight)| weight)
+        };
+        let mut weights = [0.0; 4];
+        for (slot, &vertex) in weights.iter_mut().zip(&vertices) {
+            *slot = (1.0 - fraction) * weight(&a, vertex) + fraction * weight(&b, vertex);
+        }
+        let zero = a.zero & b.zero | 1 << function;
+        let node = self.add(Node { support, weights, zero, number: u32::MAX });
+        self.between.insert(key, node);
+        node
+    }
+
+    fn position(&self, node: u32) -> Vector {
+        let Node { support, weights, .. } = &self.nodes[node as usize];
+        let mut parts = support.vertices().zip(weights);
+        let part = |(vertex, weight): (u32, &f64)| scale(self.points[vertex as usize], *weight);
+        let first = parts.next().map_or([0.0; 3], part);
+        parts.map(part).fold(first, add)
+    }
+
+    fn number(&mut self, node: u32) -> u32 {
+        let number = &mut self.nodes[node as usize].number;
+        if *number == u32::MAX {
+            #[expect(clippy::cast_possible_truncation, reason = "no more points than nodes")]
+            {
+                *number = self.used.len() as u32;
+            }
+            self.used.push(node);
+        }
+        *number
+    }
+
+    /// The points at vertices.
+    fn numbered(&mut self, vertices: &[u32]) -> Vec<u32> {
+        let number = |&vertex: &u32| {
+            let node = self.vertex(vertex);
+            self.number(node)
+        };
+        vertices.iter().map(number).collect()
+    }
+
+    /// Appends a piece, turned right-handed.
+    fn push(&mut self, piece: &Piece) -> Result<(), MeshError> {
+        let at = |local: usize| self.position(piece.nodes[local]);
+        let along = |from: usize, to: usize| subtract(at(to), at(from));
+        let volume = match piece.cell_type {
+            CellType::Tetra => determinant(along(0, 1), along(0, 2), along(0, 3)),
+            CellType::Pyramid => determinant(along(0, 1), along(0, 3), along(0, 4)),
+            CellType::Wedge => determinant(
+                along(0, 1),
+                along(0, 2),
+                add(along(0, 3), add(along(1, 4), along(2, 5))),
+            ),
+            _ => 1.0,
+        };
+        let mut nodes = piece.nodes;
+        if volume < 0.0 {
+            match piece.cell_type {
+                CellType::Pyramid => nodes.swap(1, 3),
+                CellType::Wedge => {
+                    nodes.swap(1, 2);
+                    nodes.swap(4, 5);
+                }
+                _ => nodes.swap(1, 2),
+            }
+        }
+        let count = piece.nodes().len();
+        let points: Vec<u32> = nodes[..count].iter().map(|&node| self.number(node)).collect();
+        self.made.push(piece.cell_type, &points)?;
+        self.owners.push(self.cell);
+        Ok(())
+    }
+
+    pub(super) fn finish(self) -> Pattern {
+        let points = self.used.iter().map(|&node| self.position(node)).collect();
+        let mut rows = Rows::default();
+        let mut supports = Vec::with_capacity(self.used.len());
+        for Node { support, weights, .. } in self.used.iter().map(|&node| self.nodes[node as usize])
+        {
+            rows.push(support.vertices().zip(weights));
+            supports.push(support);
+        }
+        Pattern {
+            points,
+            base: Base::Rows(rows),
+            cells: self.made.into(),
+            owners: self.owners.into(),
+            origin: Origin::Between(supports.into()),
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! The functions that are 0 where a mesh is cut.
+
+use tombolo_deform::communicator::{Communicator, Reduction};
+use tombolo_deform::edit::{BoxRegion, SphereRegion};
+use tombolo_deform::mesh::Vector;
+use tombolo_deform::vector::{dot, subtract};
+
+use crate::language::{Cylinder, Plane, Slice};
+
+/// A function of space.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Function {
+    /// The distance from a plane, above 0 where the normal, of length 1, points.
+    Plane { origin: Vector, normal: Vector },
+    /// The square of the distance from an axis, of direction of length 1, less the radius's.
+    Cylinder { origin: Vector, axis: Vector, radius: f64 },
+    /// The square of the distance from a point, less the radius's.
+    Sphere { center: Vector, radius: f64 },
+}
+
+impl Function {
+    fn value(&self, point: Vector) -> f64 {
+        match *self {
+            Function::Plane { origin, normal } => dot(subtract(point, origin), normal),
+            Function::Cylinder { origin, axis, radius } => {
+                let from = subtract(point, origin);
+                dot(from, from) - dot(from, axis).powi(2) - radius * radius
+            }
+            Function::Sphere { center, radius } => {
+                let from = subtract(point, center);
+                dot(from, from) - radius * radius
+            }
+        }
+    }
+
+    /// The functions of a slice, one for each surface.
+    pub(super) fn of_slice(slice: &Slice) -> Vec<Self> {
+        match slice {
+            Slice::Plane(plane) => vec![plane.into()],
+            Slice::Planes(planes) => planes.iter().map(Self::from).collect(),
+            Slice::Cylinder(Cylinder { origin, axis, radius }) => {
+                vec![Function::Cylinder { origin: *origin, axis: unit(*axis), radius: *radius }]
+            }
+            Slice::Sphere(sphere) => vec![sphere.into()],
+        }
+    }
+
+    /// The functions of a box, each at least 0 inside.
+    pub(super) fn of_box(region: &BoxRegion) -> Vec<Self> {
+        let side = |axis: usize, origin: Vector, sign: f64| {
+            let mut normal = [0.0; 3];
+            normal[axis] = sign;
+            Function::Plane { origin, normal }
+        };
+        let sides =
+            (0..3).flat_map(|axis| [side(axis, region.lower, 1.0), side(axis, region.upper, -1.0)]);
+        sides.collect()
+    }
+}
+
+impl From<&Plane> for Function {
+    fn from(plane: &Plane) -> Self {
+        Function::Plane { origin: plane.origin, normal: unit(plane.normal) }
+    }
+}
+
+impl From<&SphereRegion> for Function {
+    fn from(sphere: &SphereRegion) -> Self {
+        Function::Sphere { center: sphere.center, radius: sphere.radius }
+    }
+}
+
+fn unit(direction: Vector) -> Vector {
+    let length = direction.iter().fold(0.0_f64, |sum, x| sum.hypot(*x));
+    direction.map(|x| x / length)
+}
+
+/// What one function is at each vertex.
+pub(super) type Samples = Vec<f64>;
+
+/// The values of a function at each point.
+pub(super) fn samples(function: &Function, points: &[Vector]) -> Samples {
+    points.iter().map(|point| function.value(*point)).collect()
+}
+
+/// How far from 0 a value may be that is 0 but for rounding, for each of `count` functions: slivers
+/// beside a vertex would mean nothing. Collective.
+pub(super) fn slacks(
+    count: usize,
+    sample: &dyn Fn(usize) -> Samples,
+    communicator: &dyn Communicator,
+) -> Vec<f64> {
+    // `max` passes NaN over.
+    let furthest =
+        |index: usize| sample(index).iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    let mut furthest: Vec<f64> = (0..count).map(furthest).collect();
+    communicator.reduce(Reduction::Maximum, &mut furthest);
+    furthest.iter().map(|furthest| 1e-12 * furthest).collect()
+}
+
+/// The values, those that are 0 but for rounding put to 0.
+pub(super) fn settled(mut values: Samples, slack: f64) -> Samples {
+    for value in values.iter_mut().filter(|value| value.abs() <= slack) {
+        *value = 0.0;
+    }
+    values
+}

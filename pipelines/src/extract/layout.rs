@@ -1,0 +1,59 @@
+//! How the points of a probe hang together.
+
+use tombolo_deform::mesh::{CellType, Cells, MeshError, Vector};
+
+use super::ExtractError;
+
+/// How the points of a probe hang together, and how many of them lie outside of the mesh.
+#[derive(Debug, Clone)]
+pub(crate) struct Layout {
+    /// How many points there are along each axis; `None` for loose points.
+    pub(super) counts: Option<[usize; 3]>,
+    pub(crate) points: usize,
+    pub(super) outside: usize,
+    /// The first point outside, on the rank that tells of it.
+    pub(super) told: Option<Vector>,
+}
+
+impl Layout {
+    /// The cells between the points that were found: vertices, lines, quadrilaterals or hexahedra.
+    /// A point that was not found has the number `u32::MAX`.
+    pub(crate) fn cells(&self, numbers: &[u32]) -> Result<Cells, MeshError> {
+        let mut cells = Cells::new();
+        let mut push = |cell_type: CellType, points: &[usize]| {
+            let points: Vec<u32> = points.iter().map(|&point| numbers[point]).collect();
+            if points.contains(&u32::MAX) { Ok(()) } else { cells.push(cell_type, &points) }
+        };
+        let Some(counts) = self.counts else {
+            (0..self.points).try_for_each(|point| push(CellType::Vertex, &[point]))?;
+            return Ok(cells);
+        };
+        let strides = [1, counts[0], counts[0] * counts[1]];
+        let along: Vec<usize> = (0..3).filter(|&axis| counts[axis] > 1).collect();
+        let is_last =
+            |point: usize, axis: usize| point / strides[axis] % counts[axis] + 1 == counts[axis];
+        for point in (0..self.points).filter(|&p| !along.iter().any(|&axis| is_last(p, axis))) {
+            let at = |steps: &[usize]| {
+                point + steps.iter().map(|&step| strides[along[step]]).sum::<usize>()
+            };
+            match along.len() {
+                0 => push(CellType::Vertex, &[point])?,
+                1 => push(CellType::Line, &[point, at(&[0])])?,
+                2 => push(CellType::Quad, &[point, at(&[0]), at(&[0, 1]), at(&[1])])?,
+                _ => {
+                    let bottom = [point, at(&[0]), at(&[0, 1]), at(&[1])];
+                    let all: Vec<usize> =
+                        bottom.iter().copied().chain(bottom.map(|p| p + strides[2])).collect();
+                    push(CellType::Hexahedron, &all)?;
+                }
+            }
+        }
+        Ok(cells)
+    }
+
+    /// What is told of points outside of the mesh.
+    pub(super) fn error(&self) -> Option<ExtractError> {
+        let Self { outside, points, .. } = *self;
+        self.told.map(|first| ExtractError::OutsidePoints { outside, points, first })
+    }
+}

@@ -1,0 +1,121 @@
+//! Extracts but for their fields, which can be kept as long as the mesh does not move.
+
+use std::sync::Arc;
+
+use tombolo_deform::mesh::{Cells, Vector};
+
+use super::cut::Cut;
+use super::gather::{self, Crossing, Owners, Points, Rows};
+use super::layout::Layout;
+use super::source::{Extracted, Origin, Support};
+use super::{Channel, Extract};
+use tombolo_deform::communicator::Communicator;
+
+/// What a source stage takes an extract from.
+#[derive(Clone, Copy)]
+pub struct Input<'a> {
+    /// The channel at this step.
+    pub channel: &'a Channel<'a>,
+    /// The step.
+    pub cycle: u64,
+    /// Whether a field of this name is wanted.
+    pub wanted: &'a dyn Fn(&str) -> bool,
+    /// The ranks that have parts of the mesh.
+    pub communicator: &'a dyn Communicator,
+}
+
+/// The part of one stage's extract that depends on the mesh alone, kept until the mesh moves.
+#[derive(Debug, Default)]
+pub struct Kept {
+    version: u64,
+    pattern: Option<Arc<Pattern>>,
+}
+
+impl Kept {
+    /// What was made of this version of the mesh.
+    pub(super) fn of(&self, version: u64) -> Option<Arc<Pattern>> {
+        self.pattern.clone().filter(|_| self.version == version)
+    }
+
+    pub(super) fn keep(&mut self, version: u64, pattern: &Arc<Pattern>) {
+        *self = Self { version, pattern: Some(Arc::clone(pattern)) };
+    }
+}
+
+/// Where the points of an extract lie.
+#[derive(Debug)]
+pub(super) enum Base {
+    /// At these vertices.
+    Vertices(Arc<[u32]>),
+    /// On edges.
+    Crossings(Vec<Crossing>),
+    /// Among several vertices.
+    Rows(Rows),
+    /// In these cells, among or at vertices: the points of a probe.
+    Probe(Layout, Rows),
+}
+
+/// An extract but for its fields.
+#[derive(Debug)]
+pub(super) struct Pattern {
+    pub(super) points: Vec<Vector>,
+    pub(super) base: Base,
+    pub(super) cells: Arc<Cells>,
+    /// The solver's cell for each cell, or of a probe for each point.
+    pub(super) owners: Arc<[u32]>,
+    pub(super) origin: Origin,
+}
+
+impl Pattern {
+    /// The extract with the fields of this step.
+    pub(super) fn fill(&self, input: &Input) -> Extracted {
+        let points = match &self.base {
+            Base::Vertices(vertices) => Points::Vertices(vertices),
+            Base::Crossings(crossings) => Points::Crossings(crossings),
+            Base::Rows(rows) | Base::Probe(_, rows) => Points::Rows(rows),
+        };
+        let owners = match &self.base {
+            Base::Probe(..) => Owners::OfPoints(&self.owners),
+            _ => Owners::Cells(&self.owners),
+        };
+        let Input { channel, cycle, wanted, .. } = *input;
+        let (fields, mut errors) = gather::fields(channel, cycle, wanted, &points, &owners);
+        if let Base::Probe(layout, _) = &self.base {
+            errors.extend(layout.error());
+        }
+        let vertices = match &self.base {
+            Base::Vertices(vertices) => Some(Arc::clone(vertices)),
+            _ => None,
+        };
+        let extract = Extract {
+            points: self.points.clone(),
+            vertices,
+            cells: Arc::clone(&self.cells),
+            features: None,
+            fields,
+        };
+        Extracted {
+            extract: Arc::new(extract),
+            owners: Arc::clone(&self.owners),
+            errors,
+            origin: self.origin.clone(),
+        }
+    }
+}
+
+impl From<Cut> for Pattern {
+    fn from(cut: Cut) -> Self {
+        let Cut { points, crossings, layers, cells, owners } = cut;
+        let supports = crossings.iter().zip(layers).map(|(crossing, layer)| {
+            let [a, b] = crossing.edge;
+            Support::new(&crossing.edge[usize::from(a == b)..], u64::from(layer))
+        });
+        Self {
+            origin: Origin::Between(supports.collect()),
+            points,
+            base: Base::Crossings(crossings),
+            cells: Arc::new(cells),
+            owners: owners.into(),
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! The fields at given points: in which cell each lies, and between which vertices.
+
+use std::sync::Arc;
+
+use tombolo_deform::bounds::Bounds;
+use tombolo_deform::communicator::Reduction;
+use tombolo_deform::mesh::{CellType, Cells, Vector};
+use tombolo_deform::number::real;
+use tombolo_deform::vector::distance;
+
+use super::decompose::Faces;
+use super::gather::Rows;
+use super::layout::Layout;
+use super::pattern::{Base, Input, Pattern};
+use super::source::{Origin, Source};
+use super::tree::Tree;
+use super::{Association, ExtractError};
+use crate::interpolation::{is_inside, locate, shape};
+use crate::language::{Probe, ProbeAt, ProbeGrid, ProbeLine, ProbeMethod};
+
+/// How far beside a cell a point may lie that is in it but for rounding: in parametric coordinates,
+/// and in diagonals of the cells' bounding box.
+const SLACK: f64 = 1e-9;
+
+/// The points of a probe.
+fn points(at: &ProbeAt) -> (Vec<Vector>, Option<[usize; 3]>) {
+    let between = |from: Vector, to: Vector, fraction: f64| -> Vector {
+        std::array::from_fn(|axis| from[axis] * (1.0 - fraction) + to[axis] * fraction)
+    };
+    match at {
+        ProbeAt::Points(points) => (points.clone(), None),
+        ProbeAt::Line(ProbeLine { from, to, count }) => {
+            let fraction = |index: usize| real(index) / real(count - 1);
+            let points = (0..*count).map(|index| between(*from, *to, fraction(index)));
+            (points.collect(), Some([*count, 1, 1]))
+        }
+        ProbeAt::Grid(ProbeGrid { lower, upper, counts }) => {
+            let along = |axis: usize, index: usize| match counts[axis] {
+                1 => lower[axis],
+                count => {
+                    let fraction = real(index) / real(count - 1);
+                    lower[axis] * (1.0 - fraction) + upper[axis] * fraction
+                }
+            };
+            let all = (0..counts[2]).flat_map(|k| {
+                (0..counts[1]).flat_map(move |j| (0..counts[0]).map(move |i| [i, j, k]))
+            });
+            let points = all.map(|at| [0, 1, 2].map(|axis| along(axis, at[axis])));
+            (points.collect(), Some(*counts))
+        }
+    }
+}
+
+/// The points that this rank answers for: those whose cell of the lowest number is its own.
+/// Collective.
+pub(super) fn pattern(
+    source: &Source,
+    input: &Input,
+    probe: &Probe,
+    fault: Result<(), ExtractError>,
+) -> Result<Pattern, ExtractError> {
+    let communicator = input.communicator;
+    let (points, counts) = points(&probe.at);
+    let finder = fault.map(|()| Finder::new(source, probe.method));
+    let numbers = input.channel.mesh.global_cells;
+    let numbers = numbers.filter(|numbers| numbers.len() == source.cells().len());
+    let is_numbered = !communicator.any(numbers.is_none() && !source.cells().is_empty());
+    let key = |cell: u32| match numbers.filter(|_| is_numbered) {
+        Some(numbers) => numbers.get(cell as usize),
+        None => (communicator.rank() as u64) << 32 | u64::from(cell),
+    };
+    let mut found: Vec<Option<Found>> = match &finder {
+        Ok(finder) => points.iter().map(|point| finder.find(*point, &key)).collect(),
+        Err(_) => vec![None; points.len()],
+    };
+    let key_of = |found: &Option<Found>| found.as_ref().map_or(u64::MAX, |found| key(found.cell));
+    let own: Vec<u64> = found.iter().map(key_of).collect();
+    let mut least = own.clone();
+    communicator.reduce_integers(Reduction::Minimum, &mut least);
+    finder?;
+
+    let is_outside = |index: &usize| least[*index] == u64::MAX;
+    let first_outside = (0..points.len()).find(is_outside).map(|index| points[index]);
+    let layout = Layout {
+        counts,
+        points: points.len(),
+        outside: (0..points.len()).filter(is_outside).count(),
+        told: first_outside.filter(|_| communicator.rank() == 0),
+    };
+    let mut rows = Rows::default();
+    let (mut indices, mut owners, mut taken) = (Vec::new(), Vec::new(), Vec::new());
+    let mut numbers = vec![u32::MAX; points.len()];
+    for (index, &point) in points.iter().enumerate() {
+        if own[index] != least[index] {
+            continue;
+        }
+        let Some(Found { cell, row }) = found[index].take() else { continue };
+        #[expect(clippy::cast_possible_truncation, reason = "a limited number of points")]
+        {
+            numbers[index] = taken.len() as u32;
+            indices.push(index as u32);
+        }
+        rows.push(row);
+        owners.push(cell);
+        taken.push(point);
+    }
+    // Those of several ranks hang together once they are merged.
+    let cells = if communicator.size() > 1 { Cells::new() } else { layout.cells(&numbers)? };
+    Ok(Pattern {
+        points: taken,
+        base: Base::Probe(layout.clone(), rows),
+        cells: Arc::new(cells),
+        owners: owners.into(),
+        origin: Origin::Probe(layout, indices.into()),
+    })
+}
+
+/// The cell that a point lies in, and the vertices that its values come from, with their weights.
+#[derive(Clone)]
+struct Found {
+    cell: u32,
+    row: Vec<(u32, f64)>,
+}
+
+struct Finder<'a> {
+    source: &'a Source,
+    method: ProbeMethod,
+    /// The own cells.
+    cells: Vec<u32>,
+    tree: Tree,
+    slack: f64,
+}
+
+impl<'a> Finder<'a> {
+    fn new(source: &'a Source, method: ProbeMethod) -> Self {
+        let (cells, points) = (source.cells(), &source.positions.points);
+        #[expect(clippy::cast_possible_truncation, reason = "cells are numbered with 32 bits")]
+        let own: Vec<u32> = (0..cells.len())
+            .filter(|&cell| {
+                cells.cell_type(cell).dimension() >= 2 && source.counts(Association::Element, cell)
+            })
+            .map(|cell| cell as u32)
+            .collect();
+        let bounds = |&cell: &u32| {
+            let vertices = cells.vertices(cell as usize);
+            Bounds::around(vertices.iter().map(|&vertex| points[vertex as usize]))
+        };
+        let boxes: Vec<Bounds> = own.iter().map(bounds).collect();
+        let all = boxes.iter().fold(Bounds::EMPTY, |all, bounds| all.join(bounds));
+        let slack = if own.is_empty() { 0.0 } else { SLACK * all.diagonal() };
+        Self { source, method, cells: own, tree: Tree::new(boxes), slack }
+    }
+
+    /// Of the cells that a point lies in, that of the lowest key.
+    fn find(&self, point: Vector, key: &dyn Fn(u32) -> u64) -> Option<Found> {
+        let mut candidates = Vec::new();
+        self.tree.at(point, self.slack, |index| candidates.push(self.cells[index as usize]));
+        candidates.sort_unstable_by_key(|&cell| key(cell));
+        let found = |cell: u32| self.row(cell as usize, point).map(|row| Found { cell, row });
+        let mut found = candidates.into_iter().find_map(found)?;
+        if self.method == ProbeMethod::Nearest {
+            let vertices = self.source.cells().vertices(found.cell as usize);
+            let from = |vertex: u32| distance(self.source.positions.points[vertex as usize], point);
+            let nearest = vertices.iter().copied().min_by(|&a, &b| from(a).total_cmp(&from(b)))?;
+            found.row = vec![(nearest, 1.0)];
+        }
+        Some(found)
+    }
+
+    /// The weights of a cell's vertices at a point in it.
+    fn row(&self, cell: usize, point: Vector) -> Option<Vec<(u32, f64)>> {
+        let cells = self.source.cells();
+        let (cell_type, vertices) = (cells.cell_type(cell), cells.vertices(cell));
+        if shape(cell_type, [0.0; 3]).is_some() {
+            return self.within(cell_type, vertices, point);
+        }
+        // Others are linear in their tetrahedra or triangles.
+        let mut simplices = Vec::new();
+        Faces::default().decompose(cells, cell, |vertex| vertex, &mut simplices);
+        simplices.iter().find_map(|simplex| match simplex {
+            [vertices @ .., u32::MAX] => self.within(CellType::Triangle, vertices, point),
+            vertices => self.within(CellType::Tetra, vertices, point),
+        })
+    }
+
+    fn within(
+        &self,
+        cell_type: CellType,
+        vertices: &[u32],
+        point: Vector,
+    ) -> Option<Vec<(u32, f64)>> {
+        let mut points = [[0.0; 3]; 8];
+        for (slot, &vertex) in points.iter_mut().zip(vertices) {
+            *slot = self.source.positions.points[vertex as usize];
+        }
+        let at = locate(cell_type, &points[..vertices.len()], point)?;
+        let is_beside = cell_type.dimension() == 2 && at[2].abs() > self.slack;
+        if is_beside || !is_inside(cell_type, at, SLACK) {
+            return None;
+        }
+        let shape = shape(cell_type, at)?;
+        Some(vertices.iter().copied().zip(shape.weights().iter().copied()).collect())
+    }
+}

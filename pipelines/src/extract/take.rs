@@ -1,0 +1,316 @@
+//! The source stages: what is taken out of a channel's mesh.
+
+use std::sync::Arc;
+
+use tombolo_deform::mesh::{Vector, ghosts};
+
+use super::clip::Clipper;
+use super::cut::cut;
+use super::function::{Function, Samples, samples, settled, slacks};
+use super::gather::check_length;
+use super::pattern::{Base, Input, Kept, Pattern};
+use super::probe;
+use super::source::{Extracted, Origin, Source};
+use super::{Association, ExtractError, FieldView, is_absent, unknown_field};
+use crate::language::{Clip, ClipBy, Contour, Probe, Quantifier, Slice, Threshold};
+
+impl Source {
+    /// The cut of the mesh with planes, a cylinder or a sphere: polygons that turn
+    /// counter-clockwise about the normal, or seen from outside (lines where the mesh is a
+    /// surface), vertex fields interpolated linearly along the cut edges, element fields carried
+    /// over. Cells that share an edge share its point. As long as the mesh does not move, what is
+    /// `kept` of the last slice is filled with the fields of this step. Collective.
+    ///
+    /// # Errors
+    /// [`ExtractError::PointNotFinite`]; fields as in [`surface`](Self::surface).
+    pub fn slice(
+        &mut self,
+        input: &Input,
+        slice: &Slice,
+        kept: &mut Kept,
+    ) -> Result<Extracted, ExtractError> {
+        self.kept(input, kept, |source, fault| {
+            let functions = Function::of_slice(slice);
+            let sample = |index: usize| samples(&functions[index], &source.positions.points);
+            let slacks = slacks(functions.len(), &sample, input.communicator);
+            fault?;
+            source.cut(&slacks, &sample)
+        })
+    }
+
+    /// The surfaces on which a vertex field has given values, cut out as a slice is; they are
+    /// counter-clockwise seen from where the field is larger. Collective.
+    ///
+    /// # Errors
+    /// [`ExtractError::UnknownField`], [`ExtractError::NotOfVertices`] or
+    /// [`ExtractError::DecidingNotFinite`], and as [`slice`](Self::slice).
+    pub fn contour(&mut self, input: &Input, contour: &Contour) -> Result<Extracted, ExtractError> {
+        let values = self.update(input).and_then(|()| self.vertex_values(input, &contour.field));
+        let known = values.as_deref().unwrap_or_default();
+        let sample = |index: usize| less(known, contour.values[index]);
+        let slacks = slacks(contour.values.len(), &sample, input.communicator);
+        values.as_ref().map_err(Clone::clone)?;
+        Ok(self.cut(&slacks, &sample)?.fill(input))
+    }
+
+    /// The cells in which a field keeps to a range, whole, with their fields. Collective.
+    ///
+    /// # Errors
+    /// As [`contour`](Self::contour); the field may be one of elements.
+    pub fn threshold(
+        &mut self,
+        input: &Input,
+        threshold: &Threshold,
+    ) -> Result<Extracted, ExtractError> {
+        self.update(input)?;
+        let keeps = |value: f64| {
+            threshold.min.is_none_or(|min| value >= min)
+                && threshold.max.is_none_or(|max| value <= max)
+        };
+        let Some(view) = self.field(input, &threshold.field)? else {
+            return Ok(self.whole_cells(Vec::new())?.fill(input));
+        };
+        if view.association == Association::Mesh {
+            let (field, association) = (view.name.to_owned(), view.association);
+            return Err(ExtractError::NotOfVertices { field, association });
+        }
+        let of_elements = view.association == Association::Element;
+        let values = self.deciding(input, view)?;
+        let is_in = |cell: &u32| {
+            let cell = *cell as usize;
+            let vertices = self.cells().vertices(cell);
+            let mut of_vertices = vertices.iter().map(|&vertex| values[vertex as usize]);
+            self.counts(Association::Element, cell)
+                && match threshold.vertices {
+                    _ if of_elements => keeps(values[cell]),
+                    Quantifier::All => of_vertices.all(keeps),
+                    Quantifier::Any => of_vertices.any(keeps),
+                }
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "cells are numbered with 32 bits")]
+        let cells = (0..self.cells().len() as u32).filter(is_in).collect();
+        Ok(self.whole_cells(cells)?.fill(input))
+    }
+
+    /// The part of the mesh on one side of a surface. Cells that are cut become tetrahedra,
+    /// pyramids and wedges (triangles and quadrilaterals where the mesh is a surface), by a
+    /// decomposition that two cells with a common face have in common; others stay as they are.
+    /// Cells of lower dimension are passed over. As long as the mesh does not move, what is `kept`
+    /// of the last clip by a plane, box or sphere is filled with the fields of this step.
+    /// Collective.
+    ///
+    /// # Errors
+    /// As [`contour`](Self::contour).
+    pub fn clip(
+        &mut self,
+        input: &Input,
+        clip: &Clip,
+        kept: &mut Kept,
+    ) -> Result<Extracted, ExtractError> {
+        let functions = match &clip.by {
+            ClipBy::Field(field) => {
+                let values =
+                    self.update(input).and_then(|()| self.vertex_values(input, &field.name));
+                let known = values.as_deref().unwrap_or_default();
+                let sample = |_: usize| less(known, field.value);
+                let slacks = slacks(1, &sample, input.communicator);
+                values.as_ref().map_err(Clone::clone)?;
+                return Ok(self.clipped(&slacks, &sample, clip.invert)?.fill(input));
+            }
+            ClipBy::Plane(plane) => vec![Function::from(plane)],
+            ClipBy::Sphere(sphere) => vec![Function::from(sphere)],
+            ClipBy::Box(region) => Function::of_box(region),
+        };
+        // Inside a sphere its function is below 0.
+        let is_sphere = matches!(clip.by, ClipBy::Sphere(_));
+        self.kept(input, kept, |source, fault| {
+            let sample = |index: usize| {
+                let mut values = samples(&functions[index], &source.positions.points);
+                if is_sphere {
+                    values.iter_mut().for_each(|value| *value = -*value);
+                }
+                values
+            };
+            let slacks = slacks(functions.len(), &sample, input.communicator);
+            fault?;
+            source.clipped(&slacks, &sample, clip.invert)
+        })
+    }
+
+    /// The fields at points. Those that lie in no cell are left out, and named in
+    /// [`Extracted::errors`]. As long as the mesh does not move, what is `kept` of the last probe
+    /// is filled with the fields of this step. Collective.
+    ///
+    /// # Errors
+    /// As [`slice`](Self::slice).
+    pub fn probe(
+        &mut self,
+        input: &Input,
+        stage: &Probe,
+        kept: &mut Kept,
+    ) -> Result<Extracted, ExtractError> {
+        self.kept(input, kept, |source, fault| probe::pattern(source, input, stage, fault))
+    }
+
+    /// Takes note of where the vertices are now.
+    ///
+    /// # Errors
+    /// [`ExtractError::PointNotFinite`]; there are no points then.
+    pub(crate) fn update(&mut self, input: &Input) -> Result<(), ExtractError> {
+        self.positions.update(&input.channel.mesh.points, input.cycle)
+    }
+
+    /// Where the vertices were when it was last taken note of.
+    pub(crate) fn points(&self) -> &[Vector] {
+        &self.positions.points
+    }
+
+    /// Adds up what the ranks have of the vertices that they share, `width` values for each vertex.
+    /// Collective.
+    pub(crate) fn sum_shared(&self, width: usize, values: &mut [f64]) {
+        if let Some(whole) = self.whole_mesh() {
+            whole.shared.halo().sum(width, values);
+        }
+    }
+
+    /// What is kept of this mesh, or is made anew on all ranks, with the fields of this step.
+    fn kept(
+        &mut self,
+        input: &Input,
+        kept: &mut Kept,
+        make: impl FnOnce(&Self, Result<(), ExtractError>) -> Result<Pattern, ExtractError>,
+    ) -> Result<Extracted, ExtractError> {
+        let fault = self.update(input);
+        let version = self.positions.version;
+        let known = kept.of(version).filter(|_| fault.is_ok());
+        let is_known = !input.communicator.any(known.is_none());
+        let pattern = match known.filter(|_| is_known) {
+            Some(pattern) => pattern,
+            None => {
+                let pattern = Arc::new(make(self, fault)?);
+                kept.keep(version, &pattern);
+                pattern
+            }
+        };
+        Ok(pattern.fill(input))
+    }
+
+    /// Cuts with functions, of which each has its slack.
+    fn cut(
+        &self,
+        slacks: &[f64],
+        sample: &dyn Fn(usize) -> Samples,
+    ) -> Result<Pattern, ExtractError> {
+        let counts = |cell: usize| self.counts(Association::Element, cell);
+        let sample = |index: usize| settled(sample(index), slacks[index]);
+        Ok(cut(self.cells(), &self.positions.points, slacks.len(), &sample, &counts)?.into())
+    }
+
+    fn clipped(
+        &self,
+        slacks: &[f64],
+        sample: &dyn Fn(usize) -> Samples,
+        invert: bool,
+    ) -> Result<Pattern, ExtractError> {
+        let samples: Vec<Samples> =
+            (0..).zip(slacks).map(|(index, slack)| settled(sample(index), *slack)).collect();
+        let numbers = self.whole_mesh().map(|whole| whole.shared.numbers());
+        let mut clipper =
+            Clipper::new(self.cells(), &self.positions.points, &samples, numbers, invert);
+        for cell in 0..self.cells().len() {
+            if self.counts(Association::Element, cell) {
+                clipper.cell(cell)?;
+            }
+        }
+        Ok(clipper.finish())
+    }
+
+    /// These cells, with the vertices that they have.
+    fn whole_cells(&self, owners: Vec<u32>) -> Result<Pattern, ExtractError> {
+        let points = &self.positions.points;
+        let cells = self.cells().subset(owners.iter().map(|&cell| cell as usize));
+        let mut numbers = vec![u32::MAX; points.len()];
+        cells.connectivity().iter().for_each(|&vertex| numbers[vertex as usize] = 0);
+        let vertices: Vec<u32> = (0..)
+            .zip(&numbers)
+            .filter(|(_, number)| **number == 0)
+            .map(|(vertex, _)| vertex)
+            .collect();
+        (0..).zip(&vertices).for_each(|(number, &vertex)| numbers[vertex as usize] = number);
+        Ok(Pattern {
+            points: vertices.iter().map(|&vertex| points[vertex as usize]).collect(),
+            cells: Arc::new(cells.with_vertices(&numbers)),
+            base: Base::Vertices(vertices.into()),
+            owners: owners.into(),
+            origin: Origin::Vertices,
+        })
+    }
+
+    /// The field of this name; `None` on a rank that has nothing of the mesh.
+    fn field<'a>(
+        &self,
+        input: &Input<'a>,
+        name: &str,
+    ) -> Result<Option<&'a FieldView<'a>>, ExtractError> {
+        let channel = input.channel;
+        match channel.fields.iter().find(|view| view.name == name) {
+            Some(view) => check_length(channel, view).map(|()| Some(view)),
+            None if input.communicator.size() > 1 && channel.mesh.points.is_empty() => Ok(None),
+            None => {
+                let known = channel.fields.iter().map(|field| field.name);
+                Err(ExtractError::UnknownField(unknown_field(name, known)))
+            }
+        }
+    }
+
+    /// What a vertex field decides by, at each vertex.
+    fn vertex_values(&self, input: &Input, name: &str) -> Result<Vec<f64>, ExtractError> {
+        match self.field(input, name)? {
+            None => Ok(Vec::new()),
+            Some(view) if view.association == Association::Vertex => self.deciding(input, view),
+            Some(view) => {
+                let association = view.association;
+                Err(ExtractError::NotOfVertices { field: name.to_owned(), association })
+            }
+        }
+    }
+
+    /// The values of a scalar field, and the magnitudes of any other; NaN where it is absent.
+    fn deciding(&self, input: &Input, view: &FieldView) -> Result<Vec<f64>, ExtractError> {
+        let components = view.values.components();
+        let mut values = Vec::with_capacity(view.values.len());
+        for entity in 0..view.values.len() {
+            let value = match components {
+                1 => view.values.get(entity, 0),
+                _ => (0..components)
+                    .fold(0.0_f64, |sum, component| sum.hypot(view.values.get(entity, component))),
+            };
+            let is_lacking = || is_absent(view.values.get(entity, 0));
+            if !value.is_finite() && !is_lacking() && self.shows(view.association, entity) {
+                return Err(ExtractError::DecidingNotFinite {
+                    field: view.name.to_owned(),
+                    association: view.association,
+                    entity,
+                    value,
+                    cycle: input.cycle,
+                });
+            }
+            values.push(if value.is_finite() { value } else { f64::NAN });
+        }
+        Ok(values)
+    }
+
+    /// Whether a cell is this rank's own, or a vertex one of such a cell.
+    pub(crate) fn shows(&self, association: Association, entity: usize) -> bool {
+        self.whole_mesh().is_none_or(|whole| match association {
+            Association::Element => ghosts::is_own(whole.ghost_bits(entity)),
+            Association::Vertex => !whole.is_ghostly[entity],
+            Association::Mesh => false,
+        })
+    }
+}
+
+/// By how much the values are above a level.
+fn less(values: &[f64], level: f64) -> Samples {
+    values.iter().map(|value| value - level).collect()
+}

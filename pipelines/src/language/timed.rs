@@ -1,0 +1,347 @@
+//! Commands given beforehand: files of orders, and the journals of other runs.
+
+use std::collections::{HashMap, HashSet};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::order::{Command, Order, Parameter};
+use super::parse::{Document, Validate, check_length, parse_valid};
+use super::relative_files::resolve_files;
+use super::{At, LanguageError, Problem};
+use crate::limits::{Exceeded, WAITING, WAITING_BYTES};
+
+/// A command and when it is carried out: exactly one of `order`, `pause`, `resume`, `stop` and
+/// `parameter`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "TimedFields", into = "TimedFields")]
+pub struct TimedCommand {
+    /// When; `None` is the first step.
+    pub at: Option<At>,
+    /// A name for it in reports.
+    pub id: Option<String>,
+    /// The command.
+    pub command: Command,
+}
+
+/// Declares the JSON form of a type that holds a command among other keys, so that unknown keys
+/// stay errors (serde's `flatten` would let them pass).
+macro_rules! with_command {
+    ($(#[$attribute:meta])* struct $name:ident { $($(#[$field_attribute:meta])* $field:ident: $type:ty,)* }) => {
+        #[derive(Clone, Default, Serialize, Deserialize, JsonSchema)]
+        #[serde(deny_unknown_fields)]
+        $(#[$attribute])*
+        struct $name {
+            $(#[serde(default, skip_serializing_if = "Option::is_none")] $(#[$field_attribute])* $field: Option<$type>,)*
+            /// A new shape.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            order: Option<Order>,
+            /// The solver waits inside `execute` until it is resumed.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pause: Option<Empty>,
+            /// The solver goes on.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            resume: Option<Empty>,
+            /// The solver is asked to end.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            stop: Option<Empty>,
+            /// A parameter that the solver has declared gets a new value.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            parameter: Option<Parameter>,
+        }
+
+        impl $name {
+            /// The command, if there is one; an error where there are several.
+            fn take_command(&mut self) -> Result<Option<Command>, String> {
+                let mut commands: Vec<Command> = [
+                    self.order.take().map(Command::Order),
+                    self.pause.take().map(|_| Command::Pause {}),
+                    self.resume.take().map(|_| Command::Resume {}),
+                    self.stop.take().map(|_| Command::Stop {}),
+                    self.parameter.take().map(Command::Parameter),
+                ]
+                .into_iter()
+                .flatten()
+                .collect();
+                if commands.len() > 1 {
+                    return Err(format!("found {} commands, expected exactly one of {COMMANDS}", commands.len()));
+                }
+                Ok(commands.pop())
+            }
+
+            fn set_command(&mut self, command: Command) {
+                match command {
+                    Command::Order(order) => self.order = Some(order),
+                    Command::Pause {} => self.pause = Some(Empty {}),
+                    Command::Resume {} => self.resume = Some(Empty {}),
+                    Command::Stop {} => self.stop = Some(Empty {}),
+                    Command::Parameter(parameter) => self.parameter = Some(parameter),
+                }
+            }
+        }
+    };
+}
+
+const COMMANDS: &str = "`order`, `pause`, `resume`, `stop` and `parameter`";
+
+/// No settings.
+#[derive(Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Empty {}
+
+with_command! {
+    /// A timed command as it stands in JSON.
+    struct TimedFields {
+        /// When; left out, at the first step.
+        at: At,
+        /// A name for it in reports.
+        id: String,
+    }
+}
+
+impl TryFrom<TimedFields> for TimedCommand {
+    type Error = String;
+
+    fn try_from(mut fields: TimedFields) -> Result<Self, String> {
+        let command = fields
+            .take_command()?
+            .ok_or(format!("found no command, expected one of {COMMANDS}"))?;
+        Ok(Self { at: fields.at, id: fields.id, command })
+    }
+}
+
+impl From<TimedCommand> for TimedFields {
+    fn from(timed: TimedCommand) -> Self {
+        let mut fields = Self { at: timed.at, id: timed.id, ..Self::default() };
+        fields.set_command(timed.command);
+        fields
+    }
+}
+
+/// The state that a command has reached.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OrderStatus {
+    /// It is well-formed and waits for a safe point.
+    Accepted,
+    /// It has taken effect.
+    Applied,
+    /// It has not and will not take effect.
+    Rejected,
+    /// It was applied, but the solver has not moved its mesh to a shape that it was handed.
+    NotFollowed,
+    /// It was applied, but the run ended before a call could show whether the solver went to the
+    /// last shape that it was handed.
+    NotConfirmed,
+}
+
+/// One line of a journal. A command has a line when it is accepted, which holds the command, and a
+/// line of the same id when it is applied or rejected; one more where the solver did not follow, or
+/// where nobody could see whether it did.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "JournalFields", into = "JournalFields")]
+pub struct JournalEntry {
+    /// The command's id.
+    pub id: String,
+    /// The state that it has reached.
+    pub status: OrderStatus,
+    /// The cycle at which it was reached; for an applied order, the one at which its motion began,
+    /// and for one that was not followed or not confirmed, the one that handed the shape out.
+    pub cycle: u64,
+    /// The simulated time then.
+    pub time: f64,
+    /// The command; in the line that says it was accepted.
+    pub command: Option<Command>,
+    /// Why it was rejected.
+    pub reason: Option<String>,
+    /// The least scaled Jacobian on the path; of an order that the guard rejected, what it would
+    /// have come to.
+    pub min_scaled_jacobian: Option<f64>,
+    /// The fraction of an order's amounts that was done, where the guard clamped it; of a rejected
+    /// one, what would pass.
+    pub fraction: Option<f64>,
+}
+
+with_command! {
+    /// A line of a journal as it stands in JSON.
+    struct JournalFields {
+        /// The command's id.
+        id: String,
+        /// The state that it has reached.
+        status: OrderStatus,
+        /// The cycle at which it was reached.
+        cycle: u64,
+        /// The simulated time then.
+        time: f64,
+        /// Why it was rejected.
+        reason: String,
+        /// The least scaled Jacobian on the path; of an order that the guard rejected, what it
+        /// would have come to.
+        min_scaled_jacobian: f64,
+        /// The fraction of an order's amounts that was done, where the guard clamped it; of a
+        /// rejected one, what would pass.
+        fraction: f64,
+    }
+}
+
+impl TryFrom<JournalFields> for JournalEntry {
+    type Error = String;
+
+    fn try_from(mut fields: JournalFields) -> Result<Self, String> {
+        let command = fields.take_command()?;
+        let status = fields.status.ok_or("the key `status` is missing")?;
+        if command.is_none() && status == OrderStatus::Accepted {
+            return Err(format!("found no command, expected one of {COMMANDS}"));
+        }
+        Ok(Self {
+            id: fields.id.ok_or("the key `id` is missing")?,
+            status,
+            cycle: fields.cycle.ok_or("the key `cycle` is missing")?,
+            time: fields.time.ok_or("the key `time` is missing")?,
+            command,
+            reason: fields.reason,
+            min_scaled_jacobian: fields.min_scaled_jacobian,
+            fraction: fields.fraction,
+        })
+    }
+}
+
+impl From<JournalEntry> for JournalFields {
+    fn from(entry: JournalEntry) -> Self {
+        let mut fields = Self {
+            id: Some(entry.id),
+            status: Some(entry.status),
+            cycle: Some(entry.cycle),
+            time: Some(entry.time),
+            reason: entry.reason,
+            min_scaled_jacobian: entry.min_scaled_jacobian,
+            fraction: entry.fraction,
+            ..Self::default()
+        };
+        if let Some(command) = entry.command {
+            fields.set_command(command);
+        }
+        fields
+    }
+}
+
+impl Validate for Vec<TimedCommand> {
+    fn validate(&self) -> Result<(), Problem> {
+        WAITING.check(self.len())?;
+        self.iter()
+            .enumerate()
+            .try_for_each(|(index, timed)| timed.validate().map_err(|problem| problem.at(index)))
+    }
+}
+
+impl Validate for JournalEntry {
+    fn validate(&self) -> Result<(), Problem> {
+        self.command.as_ref().map_or(Ok(()), Validate::validate)
+    }
+}
+
+/// Reads a file of orders: a JSON array of timed commands, one timed command, or the lines of a
+/// journal.
+///
+/// From a journal come the commands that were accepted and not rejected, at the cycle at which each
+/// took effect, or was accepted where the run ended before. A last line that a killed run left
+/// half-written is passed over.
+///
+/// Files that edits name lie beside `file` where they are relative.
+///
+/// # Errors
+/// A [`LanguageError`] at the first token that is wrong.
+///
+/// # Example
+/// ```
+/// use tombolo_pipelines::language::{At, parse_orders};
+///
+/// let journal = r#"{"id":"a","status":"accepted","cycle":3,"time":0.3,"order":{"undo":1}}
+/// {"id":"a","status":"applied","cycle":5,"time":0.5}
+/// {"id":"b","status":"acc"#;
+/// let orders = parse_orders(journal, "journal.jsonl").unwrap();
+/// assert_eq!(orders.len(), 1);
+/// assert_eq!(orders[0].at, Some(At::Cycle(5)));
+/// ```
+pub fn parse_orders(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageError> {
+    check_length(text.len(), file, WAITING_BYTES)?;
+    let mut commands = parse_commands(text, file)?;
+    for command in &mut commands {
+        if let Command::Order(order) = &mut command.command {
+            resolve_files(order.edits_mut(), file);
+        }
+    }
+    Ok(commands)
+}
+
+fn parse_commands(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageError> {
+    let start = text.trim_start_matches(['\u{feff}', ' ', '\t', '\r', '\n']);
+    if start.is_empty() {
+        return Ok(Vec::new());
+    }
+    if start.starts_with('[') {
+        return parse_valid(text, file);
+    }
+    match Document::read(text, file) {
+        Ok(document) if !is_of_journal(&document) => {
+            document.valid::<TimedCommand>().map(|timed| vec![timed])
+        }
+        _ => parse_lines(text, file),
+    }
+}
+
+fn is_of_journal(line: &Document<'_>) -> bool {
+    line.root.member("status").is_some()
+}
+
+fn parse_lines(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageError> {
+    let mut commands: Vec<TimedCommand> = Vec::new();
+    let mut indices = HashMap::new();
+    let mut rejected = HashSet::new();
+    let ends_whole = text.ends_with('\n');
+    let count = text.lines().count();
+    for (number, content) in text.lines().enumerate() {
+        if content.trim_start_matches('\u{feff}').trim().is_empty() {
+            continue;
+        }
+        let moved =
+            |failure: LanguageError| LanguageError { line: failure.line + number, ..failure };
+        let line = match Document::read(content, file) {
+            Err(_) if number + 1 == count && number > 0 && !ends_whole => break,
+            line => line.map_err(moved)?,
+        };
+        let too_many = |exceeded: Exceeded| moved(line.locate(exceeded.into()));
+        WAITING.check(commands.len() + 1).map_err(too_many)?;
+        if !is_of_journal(&line) {
+            commands.push(line.valid().map_err(moved)?);
+            continue;
+        }
+        let entry: JournalEntry = line.valid().map_err(moved)?;
+        let at = Some(At::Cycle(entry.cycle));
+        match (entry.status, entry.command) {
+            (OrderStatus::Accepted, Some(command)) => {
+                indices.insert(entry.id.clone(), commands.len());
+                commands.push(TimedCommand { at, id: Some(entry.id), command });
+            }
+            (OrderStatus::Applied, command) => match (indices.get(&entry.id), command) {
+                (Some(&index), _) => commands[index].at = at,
+                (None, Some(command)) => {
+                    commands.push(TimedCommand { at, id: Some(entry.id), command })
+                }
+                (None, None) => {}
+            },
+            (OrderStatus::Rejected, _) => {
+                rejected.extend(indices.get(&entry.id).copied());
+            }
+            // What became of the mesh; the replaying solver does with it what it does.
+            (OrderStatus::Accepted, None)
+            | (OrderStatus::NotFollowed | OrderStatus::NotConfirmed, _) => {}
+        }
+    }
+    let mut index = 0;
+    commands.retain(|_| {
+        index += 1;
+        !rejected.contains(&(index - 1))
+    });
+    Ok(commands)
+}

@@ -1,0 +1,123 @@
+//! The stages that measure: their numbers are monitors.
+
+use tombolo_deform::{
+    communicator::{Reduction, agree},
+    mesh::ArrayView,
+};
+
+use super::{Prepared, Progress, QUALITY_FIELD};
+use crate::derive::with_derived;
+use crate::extract::{Channel, FieldView, Input, check_length, statistics, unknown_field};
+use crate::language::Integrate;
+use crate::reduce::{Region, integrate};
+
+impl Prepared {
+    /// Measures the cells.
+    pub(super) fn quality(&self, progress: &mut Progress) {
+        let quality = progress.source.quality(progress.channel);
+        #[expect(clippy::cast_precision_loss, reason = "counts below 2^53")]
+        let [mut cells, mut inverted] = [quality.cells as f64, quality.inverted as f64];
+        let (mut min, mut max, mut mean) = (quality.min, quality.max, quality.mean);
+        if progress.communicator.size() > 1 {
+            let none = quality.cells == 0;
+            let mut extremes = if none { [f64::NEG_INFINITY; 2] } else { [-min, max] };
+            progress.communicator.reduce(Reduction::Maximum, &mut extremes);
+            let mut sums = [cells, inverted, mean * cells];
+            progress.communicator.reduce(Reduction::Sum, &mut sums);
+            [cells, inverted] = [sums[0], sums[1]];
+            (min, max) = if cells > 0.0 { (-extremes[0], extremes[1]) } else { (1.0, 1.0) };
+            mean = if cells > 0.0 { sums[2] / cells } else { 1.0 };
+        }
+        progress.values.extend([min, mean, max, inverted]);
+        let wanted = self.wants(QUALITY_FIELD);
+        if let Some(extracted) = progress.extracted.as_mut().filter(|_| wanted) {
+            extracted.add_element_field(
+                QUALITY_FIELD,
+                &progress.source.scaled_jacobians(progress.channel),
+            );
+        }
+    }
+
+    /// Measures a field.
+    pub(super) fn statistics(field: &str, progress: &mut Progress) {
+        let cycle = progress.snapshot.cycle;
+        let fields = with_derived(progress.channel, &progress.derived);
+        let channel = Channel { fields: &fields, ..*progress.channel };
+        let known = || fields.iter().map(|field| field.name);
+        let found = fields.iter().find(|view| view.name == field);
+        // A rank with nothing of the mesh need not have its fields.
+        let none = FieldView::vertex(field, ArrayView::scalars(&[]));
+        let view = match found {
+            None if progress.is_bare() => Ok(&none),
+            None => Err(format!("statistics: {}", unknown_field(field, known()))),
+            Some(view) => check_length(&channel, view)
+                .map(|()| view)
+                .map_err(|error| format!("statistics: {error}")),
+        };
+        // Where one rank has nothing to measure, none measures.
+        let may_measure = agree(progress.communicator, view.as_ref().map(|_| ()));
+        match view {
+            Err(message) => {
+                progress.errors.push((format!("statistics {field}"), message));
+                progress.values.extend([f64::NAN; 5]);
+            }
+            Ok(_) if may_measure.is_err() => progress.values.extend([f64::NAN; 5]),
+            Ok(view) => {
+                let source = &*progress.source;
+                let counts = |entity: usize| source.counts(view.association, entity);
+                let measured = statistics(view, progress.communicator, &counts);
+                if let Some((entity, value)) = measured.first_non_finite {
+                    let message = format!(
+                        "cycle {cycle}: field `{field}` is not finite in {} places, first {value} at {} {entity}",
+                        measured.non_finite, view.association
+                    );
+                    progress.errors.push((format!("not finite {field}"), message));
+                }
+                #[expect(clippy::cast_precision_loss, reason = "a count below 2^53")]
+                let non_finite = measured.non_finite as f64;
+                progress.values.extend([
+                    measured.min,
+                    measured.max,
+                    measured.mean,
+                    measured.l2,
+                    non_finite,
+                ]);
+            }
+        }
+    }
+
+    /// Integrates over what the source stage has taken, or over the whole mesh.
+    pub(super) fn integrate(&self, stage: &Integrate, progress: &mut Progress) {
+        let fields = with_derived(progress.channel, &progress.derived);
+        let channel = Channel { fields: &fields, ..*progress.channel };
+        let (cycle, communicator) = (progress.snapshot.cycle, progress.communicator);
+        let input = Input { channel: &channel, cycle, wanted: &|_: &str| true, communicator };
+        let source_stage = self.pipeline.stages.iter().find(|stage| stage.is_source());
+        let is_known = source_stage.is_some() || {
+            let found = progress.source.update(&input);
+            let is_known = !communicator.any(found.is_err());
+            if let Err(error) = found {
+                progress.errors.push(("extract".into(), error.to_string()));
+            }
+            is_known
+        };
+        if !is_known {
+            let monitors = stage.monitors(false).len();
+            return progress.values.extend(vec![f64::NAN; monitors]);
+        }
+        let region = Region {
+            channel: &channel,
+            source: &*progress.source,
+            stage: source_stage,
+            extracted: progress.extracted.as_ref(),
+            unselected: &progress.unselected,
+            communicator,
+        };
+        let (values, error) = integrate(stage, &region);
+        progress.values.extend(values);
+        if let Some(message) = error {
+            let key = format!("integrate {}", stage.name);
+            progress.errors.push((key, format!("integrate `{}`: {message}", stage.name)));
+        }
+    }
+}
