@@ -5,7 +5,7 @@
 //! inside. The boxes that the grids fill do.
 
 use super::Part;
-use crate::bounds::Bounds;
+use crate::bounds::BoxTree;
 use crate::mesh::Vector;
 use crate::surface::BoundaryFaces;
 use crate::vector::{add, cross, length, scale, subtract};
@@ -19,14 +19,15 @@ pub(super) fn outside_of_grids(faces: BoundaryFaces, part: &Part) -> BoundaryFac
     if part.grid_boxes.is_empty() {
         return faces;
     }
-    let boxes = Boxes::new(&part.grid_boxes);
+    let boxes = BoxTree::new(&part.grid_boxes);
     let corners: Vec<Vec<Vector>> = faces
         .faces
         .iter()
         .map(|(_, vertices)| vertices.iter().map(|&vertex| part.points[vertex as usize]).collect())
         .collect();
     faces.of_faces(|face| {
-        !probes(&corners[face]).is_some_and(|probes| probes.iter().all(|&probe| boxes.hold(probe)))
+        !probes(&corners[face])
+            .is_some_and(|probes| probes.iter().all(|&probe| boxes.contains(probe)))
     })
 }
 
@@ -47,35 +48,4 @@ fn probes(corners: &[Vector]) -> Option<Vec<Vector>> {
     let probe = |&corner: &Vector| add(scale(add(corner, center), 0.5), scale(normal, OUTSIDE));
     let probes: Vec<Vector> = corners.iter().map(probe).collect();
     probes.iter().flatten().all(|coordinate| coordinate.is_finite()).then_some(probes)
-}
-
-/// Boxes by their lowest x.
-struct Boxes {
-    rising: Vec<Bounds>,
-    /// The highest x of each box and those before it.
-    highest: Vec<f64>,
-}
-
-impl Boxes {
-    fn new(boxes: &[Bounds]) -> Self {
-        let mut rising = boxes.to_vec();
-        rising.sort_by(|a, b| a.lower[0].total_cmp(&b.lower[0]));
-        let mut so_far = f64::NEG_INFINITY;
-        let highest = rising
-            .iter()
-            .map(|bounds| {
-                so_far = so_far.max(bounds.upper[0]);
-                so_far
-            })
-            .collect();
-        Self { rising, highest }
-    }
-
-    /// Whether a point lies in one of them.
-    fn hold(&self, point: Vector) -> bool {
-        let end = self.rising.partition_point(|bounds| bounds.lower[0] <= point[0]);
-        let start = self.highest.partition_point(|&highest| highest < point[0]).min(end);
-        let point = Bounds { lower: point, upper: point };
-        self.rising[start..end].iter().rev().any(|bounds| bounds.meets(&point))
-    }
 }

@@ -1,13 +1,12 @@
 //! The flaws of a deformed surface: faces without area, faces folded over, and self-intersections.
 
 use super::Surface;
-use super::hierarchy::Hierarchy;
 use super::inside_out::turned_inside_out;
 use super::report::{
     BrokenSurface, FlawedFace, FlawedFaces, Intersection, Intersections, SurfaceReport,
 };
 use super::triangle_pair::{Shared, common_point};
-use crate::bounds::Bounds;
+use crate::bounds::{Bounds, BoxTree, Boxed};
 use crate::mesh::Vector;
 use crate::parallel;
 use crate::topology::{Groups, triangles_at};
@@ -16,7 +15,7 @@ use crate::vector::{cross, dot, subtract, triangle_normal};
 /// How many flaws of each kind are named.
 const NAMED: usize = 16;
 
-/// How many leaves of the hierarchy are looked at together.
+/// How many leaves of the tree are looked at together.
 const CHUNK: usize = 256;
 
 /// After how many intersections such a part is left.
@@ -47,7 +46,7 @@ const CLOSED: f64 = 1.0;
 ///   reference (to 10⁻⁹ of their size): parts in contact may move together.
 ///
 /// Pairs of triangles none of which moves are not looked at. Cost: a sort of the triangles and, for
-/// each, its neighbours in a hierarchy of boxes; on all threads. The same input gives the same
+/// each, its neighbours in a tree of boxes; on all threads. The same input gives the same
 /// report whatever their number.
 ///
 /// It does not say whether the volume can follow, nor whether the surface passes through itself on
@@ -182,6 +181,34 @@ fn bisect(surface: &Surface, reference: &[Vector], shape: &[Vector]) -> f64 {
     low
 }
 
+/// The box of some triangles, and whether any of them moves.
+#[derive(Clone, Copy)]
+struct MovingBox {
+    bounds: Bounds,
+    moves: bool,
+}
+
+impl MovingBox {
+    #[inline]
+    fn may_meet(&self, other: &Self) -> bool {
+        (self.moves | other.moves) && self.bounds.meets(&other.bounds)
+    }
+}
+
+impl Boxed for MovingBox {
+    const NONE: Self = Self { bounds: Bounds::EMPTY, moves: false };
+
+    #[inline]
+    fn bounds(&self) -> &Bounds {
+        &self.bounds
+    }
+
+    #[inline]
+    fn join(&self, other: &Self) -> Self {
+        Self { bounds: self.bounds.join(&other.bounds), moves: self.moves | other.moves }
+    }
+}
+
 /// The triangles of a surface in two shapes.
 struct Shapes<'a> {
     triangles: &'a [[u32; 3]],
@@ -244,17 +271,20 @@ impl Shapes<'_> {
                 chosen.push(number as u32);
             }
         }
-        let hierarchy =
-            Hierarchy::new(self.shape, self.triangles, &chosen, |triangle| self.moves(triangle));
-        let parts = parallel::map_chunks(hierarchy.leaves(), CHUNK, |leaves| {
+        let boxes: Vec<MovingBox> = chosen.iter().map(|&number| self.moving_box(number)).collect();
+        let tree = BoxTree::new(&boxes);
+        let parts = parallel::map_chunks(tree.leaves(), CHUNK, |leaves| {
             let mut part = Part::default();
             for leaf in leaves {
                 if part.count >= ENOUGH {
                     part.more = true;
                     break;
                 }
-                hierarchy
-                    .for_each_pair(leaf, |a, b| self.look_at_pair([a.min(b), a.max(b)], &mut part));
+                tree.for_each_pair(leaf, MovingBox::may_meet, |a, b| {
+                    // Chosen in rising order.
+                    let pair = [a.min(b), a.max(b)].map(|index| chosen[index as usize]);
+                    self.look_at_pair(pair, &mut part);
+                });
             }
             part
         });
@@ -271,6 +301,11 @@ impl Shapes<'_> {
             found.flipped = self.flipped(&folds);
         }
         found
+    }
+
+    fn moving_box(&self, triangle: u32) -> MovingBox {
+        let corners = self.triangles[triangle as usize].map(|vertex| self.shape[vertex as usize]);
+        MovingBox { bounds: Bounds::around(corners), moves: self.moves(triangle) }
     }
 
     fn moves(&self, triangle: u32) -> bool {

@@ -25,7 +25,6 @@ mod boundary_of_tets;
 mod check;
 mod error;
 mod extraction;
-mod hierarchy;
 mod inside_out;
 mod orientation;
 mod report;

@@ -22,7 +22,6 @@ mod skin;
 mod source;
 mod statistics;
 mod take;
-mod tree;
 
 pub use check::{ChannelError, check_field_length, check_names};
 pub use error::ExtractError;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tombolo_deform::bounds::Bounds;
+use tombolo_deform::bounds::{Bounds, BoxTree};
 use tombolo_deform::communicator::Reduction;
 use tombolo_deform::mesh::{CellType, Cells, Vector};
 use tombolo_deform::number::real;
@@ -13,7 +13,6 @@ use super::gather::Rows;
 use super::layout::Layout;
 use super::pattern::{Base, Input, Pattern};
 use super::source::{Origin, Source};
-use super::tree::Tree;
 use super::{Association, ExtractError};
 use crate::interpolation::{is_inside, locate, shape};
 use crate::language::{Probe, ProbeAt, ProbeGrid, ProbeLine, ProbeMethod};
@@ -127,7 +126,7 @@ struct Finder<'a> {
     method: ProbeMethod,
     /// The own cells.
     cells: Vec<u32>,
-    tree: Tree,
+    tree: BoxTree,
     slack: f64,
 }
 
@@ -148,13 +147,13 @@ impl<'a> Finder<'a> {
         let boxes: Vec<Bounds> = own.iter().map(bounds).collect();
         let all = boxes.iter().fold(Bounds::EMPTY, |all, bounds| all.join(bounds));
         let slack = if own.is_empty() { 0.0 } else { SLACK * all.diagonal() };
-        Self { source, method, cells: own, tree: Tree::new(boxes), slack }
+        Self { source, method, cells: own, tree: BoxTree::new(&boxes), slack }
     }
 
     /// Of the cells that a point lies in, that of the lowest key.
     fn find(&self, point: Vector, key: &dyn Fn(u32) -> u64) -> Option<Found> {
         let mut candidates = Vec::new();
-        self.tree.at(point, self.slack, |index| candidates.push(self.cells[index as usize]));
+        self.tree.around(point, self.slack, |index| candidates.push(self.cells[index as usize]));
         candidates.sort_unstable_by_key(|&cell| key(cell));
         let found = |cell: u32| self.row(cell as usize, point).map(|row| Found { cell, row });
         let mut found = candidates.into_iter().find_map(found)?;

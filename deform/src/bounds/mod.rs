@@ -1,4 +1,8 @@
-//! Boxes along the axes.
+//! Boxes along the axes, and a tree of them.
+
+mod tree;
+
+pub use tree::{BoxTree, Boxed};
 
 use crate::vector::{Vector, subtract};
 
@@ -80,6 +84,16 @@ impl Bounds {
             let high = self.upper[axis].min(other.upper[axis]);
             low + 0.5 * (high - low)
         })
+    }
+
+    /// The square of the distance of a point from the box, 0 inside. Infinite for no box.
+    #[inline]
+    #[must_use]
+    pub fn squared_distance(&self, point: Vector) -> f64 {
+        let beside = |axis: usize| {
+            (self.lower[axis] - point[axis]).max(point[axis] - self.upper[axis]).max(0.0)
+        };
+        (0..3).map(|axis| beside(axis).powi(2)).sum()
     }
 
     /// Whether two boxes share a point.
