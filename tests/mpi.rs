@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use serde_json::{Value, json};
 use tombolo_deform::mesh::{Mesh, Vector};
+use tombolo_deform::vector::{cross, length, subtract};
 use tombolo_pipelines::files::{MeshFile, read_mesh};
 use tombolo_tests::{PATIENCE, Run, Small, Viewer, generated_mesh, project};
 
@@ -185,6 +186,105 @@ fn a_bypass_is_bent_alike_on_any_ranks() {
         orders[0]["order"]["schedule"] = json!({"steps": 2});
         small.write("orders.json", &orders);
         agrees(&small, &common, dealings);
+    }
+}
+
+/// The area of the faces of a cut, and the integral of each field over them; both by the corners.
+fn integrals(file: &MeshFile) -> Vec<f64> {
+    let (points, cells) = (file.mesh.points(), file.mesh.cells());
+    let mut integrals = vec![0.0; 1 + file.fields.len()];
+    for (_, vertices) in cells.iter() {
+        for pair in vertices.windows(2).skip(1) {
+            let corners = [vertices[0], pair[0], pair[1]].map(|vertex| vertex as usize);
+            let [a, b, c] = corners.map(|vertex| points[vertex]);
+            let area = 0.5 * length(cross(subtract(b, a), subtract(c, a)));
+            integrals[0] += area;
+            for (integral, field) in integrals[1..].iter_mut().zip(&file.fields) {
+                let size = |vertex: usize| {
+                    let tuple = &field.values[vertex * field.components..][..field.components];
+                    tuple.iter().map(|value| value * value).sum::<f64>().sqrt()
+                };
+                *integral += area * corners.map(size).iter().sum::<f64>() / 3.0;
+            }
+        }
+    }
+    integrals
+}
+
+/// Cuts, what is kept of cells, probes and derived fields of a mesh that orders move, on each number
+/// of ranks as on one process.
+#[test]
+fn extracts_of_any_ranks_are_alike() {
+    let small = Small::new();
+    let derive = json!({"expression": {"name": "range", "formula": "x^2 + 0.3 * y + z^2"}});
+    let extracts = [
+        ("slice.vtp", json!({"slice": {"origin": [0, 0, 0.011], "normal": [0.1, 0.2, 1]}})),
+        (
+            "cylinder.vtp",
+            json!({"slice": {"cylinder": {
+            "origin": [0, 0, 0], "axis": [0, 1, 0], "radius": 0.021}}}),
+        ),
+        ("contour.vtp", json!({"contour": {"field": "range", "values": [-0.05, 0.01]}})),
+        ("clip.vtu", json!({"clip": {"plane": {"origin": [0, 0, 0.011], "normal": [0, 0.3, 1]}}})),
+        ("threshold.vtu", json!({"threshold": {"field": "range", "min": 0.0}})),
+        (
+            "probe.vtu",
+            json!({"probe": {"grid": {
+            "lower": [-0.02, -0.5, -0.031], "upper": [0.021, 0.51, 0.034], "counts": [5, 8, 4]}}}),
+        ),
+    ];
+    let pipelines: Vec<Value> = extracts
+        .iter()
+        .map(|(file, stage)| {
+            json!({"name": file.replace('.', "-"), "at": {"cycle": 9},
+                "stages": [derive, stage, {"write": {"file": file}}]})
+        })
+        .collect();
+    small.write("pipelines.json", &json!({"version": 1, "pipelines": pipelines}));
+    small.write(
+        "orders.json",
+        &json!([{"at": {"cycle": 2}, "order": {
+            "edits": [{"translate": {
+                "features": ["throat"], "fixed": ["inlet", "outlet"], "by": [0, 0, 0.01]}}],
+            "schedule": {"steps": 2}}}]),
+    );
+    let arguments = ["--pipelines", "@pipelines.json", "--orders", "@orders.json"];
+    let arguments = small.arguments(&[&arguments[..], &["--headless", "--steps", "10"]].concat());
+    let (status, text) = Run::flow(&arguments).finish(PATIENCE);
+    assert!(status.success(), "{text}");
+    let files = || extracts.each_ref().map(|(file, _)| read(&small, &format!("out/{file}")));
+    let alone = files();
+    for (ranks, dealing) in dealings() {
+        std::fs::remove_dir_all(small.path("out")).expect("it was written");
+        let (_, text) = run_on(
+            ranks,
+            &small,
+            &[&arguments[6..].iter().map(String::as_str).collect::<Vec<_>>()[..], dealing].concat(),
+        );
+        for ((name, _), (found, expected)) in extracts.iter().zip(files().iter().zip(&alone)) {
+            let said = format!("{name} on {ranks} ranks, {dealing:?}: {text}");
+            assert_eq!(found.mesh.cells().len(), expected.mesh.cells().len(), "{said}");
+            assert_eq!(found.mesh.points().len(), expected.mesh.points().len(), "{said}");
+            let names = |file: &MeshFile| -> Vec<String> {
+                file.fields.iter().map(|field| field.name.clone()).collect()
+            };
+            assert_eq!(names(found), names(expected), "{said}");
+            if name.ends_with(".vtp") {
+                let (found, expected) = (integrals(found), integrals(expected));
+                assert!(expected.iter().all(|integral| *integral > 0.0), "{expected:?}");
+                // The area to rounding, the flow as well as its solves agree.
+                assert!(apart(&found[..1], &expected[..1]) < 1e-7, "{said}");
+                for (found, expected) in found.iter().zip(&expected) {
+                    assert!((found - expected).abs() < 1e-3 * expected, "{said}");
+                }
+            }
+            if name.starts_with("probe") {
+                for (field, other) in expected.fields.iter().zip(&found.fields) {
+                    let apart = apart(&field.values, &other.values);
+                    assert!(apart < 1e-3, "{said}: {} {apart:e} apart", field.name);
+                }
+            }
+        }
     }
 }
 
