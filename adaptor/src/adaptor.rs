@@ -5,6 +5,8 @@ mod contract;
 mod description;
 mod steered;
 mod tagged;
+#[cfg(test)]
+mod tests;
 
 use std::{
     net::SocketAddr,
