@@ -11,10 +11,12 @@
 //! cargo run --release -p tombolo-benchmarks -- catalyst --json
 //! cargo run --release -p tombolo-benchmarks -- untangle
 //! cargo run --release -p tombolo-benchmarks -- growth --json
+//! cargo run --release -p tombolo-benchmarks -- extract --json
 //! cargo run --release -p tombolo-benchmarks --features distributed -- volume --json
 //! ```
 
 mod catalyst;
+mod extract;
 mod growth;
 mod measure;
 mod overhead;
@@ -86,6 +88,8 @@ enum Name {
     Untangle,
     /// Volume motion at the sizes of the paper's meshes, beside the paper and PETSc.
     Volume,
+    /// Extracts and derived fields, beside VTK's filters.
+    Extract,
     /// The time and the memory of an order, from ten thousand cells to five million.
     Growth,
 }
@@ -112,6 +116,7 @@ fn main() -> ExitCode {
         Name::Skeleton => text(skeleton::run(), json),
         Name::Volume => text(volume::run(), json),
         Name::Growth => text(growth::run(), json),
+        Name::Extract => text(extract::run(), json),
     })
 }
 
