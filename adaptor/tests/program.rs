@@ -384,7 +384,7 @@ fn wrong_arguments_are_no_refusal() {
     wrong(&["--out", "out.vtu", "--stiffening", "nan"], "stiffening");
     wrong(&["--out", "out.vtu", "--min-quality", "5"], "min_scaled_jacobian");
     // Before the work, not after it.
-    wrong(&["--out", "out.stl"], "known are .vtu and .vtp");
+    wrong(&["--out", "out.stl"], "known are .vtu, .vtp and .vtk");
     wrong(&["--out", "out.vtp"], "write it as .vtu");
     wrong(&["--displacement", "out.stl"], ".txt, .csv and .vtp");
     wrong(&["--out", "same.vtu", "--displacement", "same.vtu"], ".txt, .csv and .vtp");

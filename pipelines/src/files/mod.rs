@@ -1,10 +1,11 @@
-//! Mesh files: Gmsh's .msh and VTK's .vtu, .vtp and .vtk are read, .vtu, .vtp and .pvd written.
+//! Mesh files: Gmsh's .msh and VTK's .vtu, .vtp and .vtk are read, .vtu, .vtp, .vtk and .pvd
+//! written.
 //!
 //! | format | read | written |
 //! |---|---|---|
 //! | Gmsh `.msh` | 2.2 and 4.1, text and binary of either byte order | |
 //! | VTK `.vtu`, `.vtp` | text, base64, appended; plain, zlib, LZ4; either byte order | appended raw, plain or zlib |
-//! | VTK `.vtk` (legacy) | text and binary, file versions 1 to 5 | |
+//! | VTK `.vtk` (legacy) | text and binary, file versions 1 to 5 | binary, by vtkio (feature `vtkio`) |
 //! | ParaView `.pvd` | | [`Series`] |
 //!
 //! Displacements of a surface are read from and written to plain text and VTK:
@@ -36,6 +37,8 @@ mod assemble;
 mod displacement;
 mod error;
 mod gmsh;
+#[cfg(feature = "vtkio")]
+mod model;
 mod scanner;
 #[cfg(test)]
 mod tests;
@@ -51,6 +54,8 @@ pub use displacement::{
     read_displacement, read_displacements, write_displacement,
 };
 pub use error::{FileError, Position, Problem};
+#[cfg(feature = "vtkio")]
+pub use model::{extract_from_vtkio, extract_to_vtkio, mesh_from_vtkio, mesh_to_vtkio};
 pub use vtk::{Compression, Series};
 
 use crate::extract::{Extract, Field};
@@ -116,7 +121,8 @@ fn unknown_extension(found: &str, expected: &'static str) -> Flaw {
     Problem::Extension { found: found.to_owned(), expected }.into()
 }
 
-/// Writes an extract: as `.vtp`, which holds cells up to dimension 2, or `.vtu`, which holds any.
+/// Writes an extract: as `.vtp`, which holds cells up to dimension 2, or as `.vtu` or legacy `.vtk`,
+/// which hold any.
 /// Folders are made where they are missing, and the file takes its place in one step, so that no
 /// reader ever sees half of it.
 ///
@@ -147,8 +153,8 @@ pub fn write_compressed(
     let piece = index.map(|index| index.piece(path));
     let data =
         piece.as_ref().map_or_else(|| path.to_path_buf(), |piece| path.with_file_name(piece));
-    let polygonal = is_polygonal(&data)?;
-    let bytes = vtk::from_extract(extract, polygonal, compression)
+    let format = format(&data)?;
+    let bytes = vtk::from_extract(extract, format, compression)
         .map_err(|error| Flaw::from(error).in_file(path))?;
     write_atomically(&data, |file| file.write_all(&bytes))?;
     match (index, piece) {
@@ -160,7 +166,7 @@ pub fn write_compressed(
     }
 }
 
-/// Writes a whole mesh with its fields to a `.vtu` (or, a surface mesh, `.vtp`) file, so that
+/// Writes a whole mesh with its fields to a `.vtu` or `.vtk` (or, a surface mesh, `.vtp`) file, so that
 /// [`read_mesh`] gives the same again, features included: tagged faces are written as cells behind
 /// the mesh's own. Element fields take on such a face the value of the cell it belongs to.
 ///
@@ -174,8 +180,8 @@ pub fn write_mesh(
 ) -> Result<(), FileError> {
     let path = path.as_ref();
     check_mesh_name(path, mesh.cells())?;
-    let polygonal = is_polygonal(path)?;
-    let bytes = vtk::from_mesh(mesh, fields, polygonal, compression)
+    let format = format(path)?;
+    let bytes = vtk::from_mesh(mesh, fields, format, compression)
         .map_err(|error| Flaw::from(error).in_file(path))?;
     write_atomically(path, |file| file.write_all(&bytes))
 }
@@ -189,16 +195,19 @@ pub fn check_mesh_name(path: impl AsRef<Path>, cells: &Cells) -> Result<(), File
     let path = path.as_ref();
     match extension(path).as_str() {
         "vtp" => vtk::check_polygonal(cells).map_err(|problem| Flaw::from(problem).in_file(path)),
-        "vtu" => Ok(()),
-        found => Err(unknown_extension(found, ".vtu and .vtp").in_file(path)),
+        "vtu" | "vtk" => Ok(()),
+        found => Err(unknown_extension(found, ".vtu, .vtp and .vtk").in_file(path)),
     }
 }
 
-fn is_polygonal(path: &Path) -> Result<bool, FileError> {
+fn format(path: &Path) -> Result<vtk::Format, FileError> {
     match extension(path).as_str() {
-        "vtp" => Ok(true),
-        "vtu" => Ok(false),
-        found => Err(unknown_extension(found, ".vtu, .vtp, .vtpd, .pvtu and .pvtp").in_file(path)),
+        "vtp" => Ok(vtk::Format::Polygonal),
+        "vtu" => Ok(vtk::Format::Unstructured),
+        "vtk" => Ok(vtk::Format::Legacy),
+        found => {
+            Err(unknown_extension(found, ".vtu, .vtp, .vtk, .vtpd, .pvtu and .pvtp").in_file(path))
+        }
     }
 }
 

@@ -450,8 +450,8 @@ impl Default for ErrorBound {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Write {
-    /// The file, ending in `.vtu` or `.vtp`, or in `.vtpd`, `.pvtu` or `.pvtp`, which name a file
-    /// in a folder beside them that holds the data. `{cycle}` and `{time}` stand for those of the
+    /// The file, ending in `.vtu`, `.vtp` or `.vtk`, or in `.vtpd`, `.pvtu` or `.pvtp`, which name a
+    /// file in a folder beside them that holds the data. `{cycle}` and `{time}` stand for those of the
     /// step; `{cycle:4}` has four digits or more instead of six, `{time:3}` three behind the point.
     /// A relative one lies in the run's output directory.
     pub file: String,

@@ -384,11 +384,11 @@ fn check_deformation(stage: &Deformation) -> Result<(), Problem> {
 }
 
 fn check_file(pattern: &str) -> Result<(), Problem> {
-    let extensions = ["vtu", "vtp", "vtpd", "pvtu", "pvtp"];
+    let extensions = ["vtu", "vtp", "vtk", "vtpd", "pvtu", "pvtp"];
     let extension = pattern.rsplit_once('.').map_or("", |(_, extension)| extension);
     if !extensions.contains(&extension) {
         let message = format!(
-            "found the file `{pattern}`, expected one that ends in `.vtu`, `.vtp`, `.vtpd`, `.pvtu` or `.pvtp`"
+            "found the file `{pattern}`, expected one that ends in `.vtu`, `.vtp`, `.vtk`, `.vtpd`, `.pvtu` or `.pvtp`"
         );
         return Err(Problem::new(message)
             .suggest(nearest(extension, extensions).filter(|_| !extension.is_empty())));

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use proptest::prelude::*;
 
 use super::*;
-use crate::files::vtk;
+use crate::files::vtk::{self, Format};
 
 /// Sound files of every form, by the extension that says how to read them.
 static SOUND: LazyLock<Vec<(&str, Vec<u8>)>> = LazyLock::new(|| {
@@ -14,14 +14,13 @@ static SOUND: LazyLock<Vec<(&str, Vec<u8>)>> = LazyLock::new(|| {
         super::gmsh_files::all_forms().into_iter().map(|(_, bytes)| ("a.msh", bytes)).collect();
     for compression in [Compression::None, Compression::Zlib] {
         let volume = one_of_each(3);
-        files.push((
-            "a.vtu",
-            vtk::from_mesh(&volume, &fields(&volume), false, compression).unwrap(),
-        ));
-        files.push((
-            "a.vtp",
-            vtk::from_extract(&extract(&one_of_each(2)), true, compression).unwrap(),
-        ));
+        for (name, format) in [("a.vtu", Format::Unstructured), ("a.vtk", Format::Legacy)] {
+            let bytes = vtk::from_mesh(&volume, &fields(&volume), format, compression).unwrap();
+            files.push((name, bytes));
+        }
+        let surface = extract(&one_of_each(2));
+        let bytes = vtk::from_extract(&surface, Format::Polygonal, compression).unwrap();
+        files.push(("a.vtp", bytes));
     }
     for (name, text) in
         [("a.vtk", LEGACY), ("a.vtk", LEGACY_NEW), ("a.vtu", INLINE), ("a.vtu", NEW_POLYHEDRA)]

@@ -6,13 +6,20 @@ use std::process::Command;
 use super::*;
 use crate::files::{Series, write, write_compressed};
 
+/// The files that hold meshes of any dimension.
+const WHOLE_MESHES: [(&str, Compression); 3] = [
+    ("mesh.vtu", Compression::None),
+    ("mesh.vtu", Compression::Zlib),
+    ("mesh.vtk", Compression::None),
+];
+
 #[test]
 fn a_mesh_comes_back_bit_for_bit() {
     let folder = tempfile::tempdir().unwrap();
     for dimension in 0..=3 {
         let mesh = one_of_each(dimension);
-        for compression in [Compression::None, Compression::Zlib] {
-            let path = folder.path().join("deep/mesh.vtu");
+        for (name, compression) in WHOLE_MESHES {
+            let path = folder.path().join("deep").join(name);
             write_mesh(&path, &mesh, &fields(&mesh), compression).unwrap();
             let back = read_mesh(&path).unwrap();
             assert_eq!(back.mesh, mesh, "dimension {dimension}");
@@ -40,8 +47,8 @@ fn numbers_keep_their_type() {
         .iter()
         .flat_map(|count| NumberType::ALL.map(|number| field(number, *count)))
         .collect();
-    for compression in [Compression::None, Compression::Zlib] {
-        let path = folder.path().join("mesh.vtu");
+    for (name, compression) in WHOLE_MESHES {
+        let path = folder.path().join(name);
         write_mesh(&path, &mesh, &all, compression).unwrap();
         assert_eq!(read_mesh(&path).unwrap().fields, all);
         let written = Extract { fields: all.clone(), ..extract(&mesh) };
@@ -206,13 +213,14 @@ pub(super) fn described(
 fn vtk_reads_what_is_written() {
     let folder = tempfile::tempdir().unwrap();
     for dimension in 0..=3 {
-        for polygonal in [false, true] {
+        for name in ["e.vtu", "e.vtp", "e.vtk"] {
+            let polygonal = name == "e.vtp";
             if polygonal && dimension == 3 {
                 continue;
             }
             for compression in [Compression::None, Compression::Zlib] {
                 let mesh = one_of_each(dimension);
-                let path = folder.path().join(if polygonal { "e.vtp" } else { "e.vtu" });
+                let path = folder.path().join(name);
                 let mut extract = extract(&mesh);
                 extract.fields[1].name = "p".into();
                 write_compressed(&path, &extract, compression).unwrap();
@@ -258,10 +266,7 @@ fn vtk_reads_what_is_written() {
                         ("field", "odd", 1, vec![1.0, 2.0]),
                     ],
                 );
-                assert_eq!(
-                    read, expected,
-                    "dimension {dimension}, polygonal {polygonal}, {compression:?}"
-                );
+                assert_eq!(read, expected, "dimension {dimension}, {name}, {compression:?}");
             }
         }
     }

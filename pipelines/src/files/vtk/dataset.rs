@@ -1,6 +1,8 @@
 //! From the arrays of a VTK file to a mesh.
 
 use std::collections::BTreeMap;
+#[cfg(feature = "vtkio")]
+use std::sync::Arc;
 
 use tombolo_deform::mesh::{CellType, Cells, MeshError, Vector, ghosts};
 
@@ -10,6 +12,8 @@ use super::super::error::{Flaw, Problem};
 use super::array::{Array, Numbers};
 use super::names::decoded;
 use super::{FACE_DIMENSION, FEATURE_NAMES, FEATURE_NUMBERS, FEATURES};
+#[cfg(feature = "vtkio")]
+use crate::extract::Extract;
 use crate::extract::{Association, Field};
 
 /// Components that a field may have.
@@ -28,16 +32,7 @@ pub(super) struct Dataset {
 
 impl Dataset {
     pub fn into_mesh_file(mut self) -> Result<MeshFile, Flaw> {
-        for (arrays, count, what) in [
-            (&self.point_arrays, self.points.len(), "points"),
-            (&self.cell_arrays, self.cells.len(), "cells"),
-        ] {
-            for array in arrays {
-                let expected = array.components.saturating_mul(count);
-                let what = format!("values of array '{}' on {count} {what}", array.name);
-                Problem::check_count(what, array.numbers.len(), expected)?;
-            }
-        }
+        self.check_lengths()?;
         let left_out = self.ghost_cells()?;
         let has_faces = self.cells.types().iter().any(|cell| cell.dimension() == 2);
         let mut cell_tags = None;
@@ -51,11 +46,56 @@ impl Dataset {
         };
         let has_tags = cell_tags.is_some() || point_tags.is_some();
         let names = if has_tags { self.feature_names()? } else { BTreeMap::new() };
+        let fields = self.take_fields();
+        FileContents {
+            points: self.points,
+            cells: self.cells,
+            cell_tags,
+            point_tags,
+            names,
+            left_out,
+            fields,
+            notes: self.notes,
+        }
+        .assemble()
+    }
+
+    /// Every point and cell with its arrays. The features stay an array of that name.
+    #[cfg(feature = "vtkio")]
+    pub fn into_extract(mut self) -> Result<Extract, Flaw> {
+        self.check_lengths()?;
+        self.cells.validate(self.points.len()).map_err(Problem::from)?;
+        let fields = self.take_fields();
+        Ok(Extract {
+            points: self.points,
+            vertices: None,
+            cells: Arc::new(self.cells),
+            features: None,
+            fields,
+        })
+    }
+
+    fn check_lengths(&self) -> Result<(), Problem> {
+        for (arrays, count, what) in [
+            (&self.point_arrays, self.points.len(), "points"),
+            (&self.cell_arrays, self.cells.len(), "cells"),
+        ] {
+            for array in arrays {
+                let expected = array.components.saturating_mul(count);
+                let what = format!("values of array '{}' on {count} {what}", array.name);
+                Problem::check_count(what, array.numbers.len(), expected)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes the arrays of numbers as fields; a note tells what is left out.
+    fn take_fields(&mut self) -> Vec<Field> {
         let mut fields = Vec::new();
         for (arrays, association) in [
-            (self.point_arrays, Association::Vertex),
-            (self.cell_arrays, Association::Element),
-            (self.field_arrays, Association::Mesh),
+            (std::mem::take(&mut self.point_arrays), Association::Vertex),
+            (std::mem::take(&mut self.cell_arrays), Association::Element),
+            (std::mem::take(&mut self.field_arrays), Association::Mesh),
         ] {
             for array in arrays {
                 let (name, components, number) =
@@ -69,17 +109,7 @@ impl Dataset {
                 }
             }
         }
-        FileContents {
-            points: self.points,
-            cells: self.cells,
-            cell_tags,
-            point_tags,
-            names,
-            left_out,
-            fields,
-            notes: self.notes,
-        }
-        .assemble()
+        fields
     }
 
     fn ghost_cells(&mut self) -> Result<Option<Vec<bool>>, Problem> {

@@ -7,6 +7,8 @@ mod encoding;
 mod index;
 mod kind;
 mod legacy;
+#[cfg(feature = "vtkio")]
+mod model;
 mod names;
 mod series;
 mod write;
@@ -15,8 +17,12 @@ mod xml_file;
 
 pub(super) use index::Index;
 pub(super) use legacy::parse as parse_legacy;
+#[cfg(feature = "vtkio")]
+pub(super) use model::{extract_of, mesh_of};
 pub use series::Series;
-pub(super) use write::{check_polygonal, from_extract, from_mesh};
+pub(super) use write::{Format, check_polygonal, from_extract, from_mesh};
+#[cfg(feature = "vtkio")]
+pub(super) use write::{extract_to_vtkio, mesh_to_vtkio};
 pub(super) use xml::parse as parse_xml;
 pub use xml_file::Compression;
 

@@ -37,6 +37,19 @@ pub(super) fn encoded(name: &str) -> String {
     })
 }
 
+/// A name for an array of a legacy file, as VTK encodes it: one word of printable characters.
+#[cfg(feature = "vtkio")]
+pub(super) fn encoded_for_legacy(name: &str) -> String {
+    name.bytes().fold(String::new(), |mut text, byte| {
+        if byte.is_ascii_graphic() && !b"\"%".contains(&byte) {
+            text.push(char::from(byte));
+        } else {
+            let _ = write!(text, "%{byte:02X}");
+        }
+        text
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,4 +1,5 @@
-//! Writes .vtu and .vtp: appended raw data, little endian, 64-bit headers, every number as it is.
+//! Writes .vtu and .vtp (appended raw data, little endian, 64-bit headers) and .vtk, every number
+//! as it is.
 
 use std::borrow::Cow;
 use std::collections::hash_map::Entry;
@@ -14,12 +15,58 @@ use super::xml_file::{Array, Compression, Values, XmlFile};
 use super::{FACE_DIMENSION, FEATURES};
 use crate::extract::{Association, Extract, Field};
 
-/// An extract as the bytes of a .vtp (`polygonal`) or .vtu file.
+/// What a file of VTK's holds, and how.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in super::super) enum Format {
+    /// A .vtu file.
+    Unstructured,
+    /// A .vtp file.
+    Polygonal,
+    /// A .vtk file.
+    Legacy,
+}
+
+/// An extract as the bytes of a file.
 pub(in super::super) fn from_extract(
     extract: &Extract,
-    polygonal: bool,
+    format: Format,
     compression: Compression,
 ) -> Result<Vec<u8>, Problem> {
+    grid_of_extract(extract)?.write(format, compression)
+}
+
+/// A mesh with its fields as the bytes of a file.
+pub(in super::super) fn from_mesh(
+    mesh: &Mesh,
+    fields: &[Field],
+    format: Format,
+    compression: Compression,
+) -> Result<Vec<u8>, Problem> {
+    let (mut grid, owners) = grid_of_mesh(mesh, fields)?;
+    let fields = with_faces(fields, mesh.cells().len(), &owners)?;
+    grid.add_fields(&fields)?;
+    grid.write(format, compression)
+}
+
+/// An extract as vtkio's model has it.
+#[cfg(feature = "vtkio")]
+pub(in super::super) fn extract_to_vtkio(extract: &Extract) -> Result<vtkio::Vtk, Problem> {
+    grid_of_extract(extract)?.to_vtkio()
+}
+
+/// A mesh with its fields as vtkio's model has it.
+#[cfg(feature = "vtkio")]
+pub(in super::super) fn mesh_to_vtkio(
+    mesh: &Mesh,
+    fields: &[Field],
+) -> Result<vtkio::Vtk, Problem> {
+    let (mut grid, owners) = grid_of_mesh(mesh, fields)?;
+    let fields = with_faces(fields, mesh.cells().len(), &owners)?;
+    grid.add_fields(&fields)?;
+    grid.to_vtkio()
+}
+
+fn grid_of_extract(extract: &Extract) -> Result<Grid<'_>, Problem> {
     let mut grid = Grid::new(&extract.points, Cow::Borrowed(&extract.cells));
     if let Some(features) = &extract.features {
         check_length(FEATURES, features.of_cells.len(), grid.cells.len())?;
@@ -32,16 +79,15 @@ pub(in super::super) fn from_extract(
         grid.names = (0..).zip(features.names.iter().cloned()).collect();
     }
     grid.add_fields(&extract.fields)?;
-    grid.write(polygonal, compression)
+    Ok(grid)
 }
 
-/// A mesh with its fields, its tagged faces as cells behind the mesh's own.
-pub(in super::super) fn from_mesh(
-    mesh: &Mesh,
+/// A mesh, its tagged faces as cells behind the mesh's own, and the cell that each of those belongs
+/// to where a field asks for it. The fields are not added.
+fn grid_of_mesh<'a>(
+    mesh: &'a Mesh,
     fields: &[Field],
-    polygonal: bool,
-    compression: Compression,
-) -> Result<Vec<u8>, Problem> {
+) -> Result<(Grid<'a>, Vec<Option<usize>>), Problem> {
     let mut grid = Grid::new(mesh.points(), mesh.cells().as_given());
     let mut owners = Vec::new();
     match mesh.features() {
@@ -85,17 +131,21 @@ pub(in super::super) fn from_mesh(
             });
         }
     }
-    let cell_count = mesh.cells().len();
-    let fields: Result<Vec<Field>, Problem> =
-        fields.iter().map(|field| with_faces(field, cell_count, &owners)).collect();
-    let fields = fields?;
-    grid.add_fields(&fields)?;
-    grid.write(polygonal, compression)
+    Ok((grid, owners))
+}
+
+/// The fields with values for the faces behind the cells.
+fn with_faces(
+    fields: &[Field],
+    cell_count: usize,
+    owners: &[Option<usize>],
+) -> Result<Vec<Field>, Problem> {
+    fields.iter().map(|field| field_with_faces(field, cell_count, owners)).collect()
 }
 
 /// The field with values for the faces behind the cells: those of the cell that a face belongs to,
 /// NaN where there is none.
-fn with_faces(
+fn field_with_faces(
     field: &Field,
     cell_count: usize,
     owners: &[Option<usize>],
@@ -161,12 +211,13 @@ pub(in super::super) fn check_polygonal(cells: &Cells) -> Result<(), Problem> {
     })
 }
 
-struct Grid<'a> {
-    points: &'a [Vector],
-    cells: Cow<'a, Cells>,
-    point_arrays: Vec<Array<'a>>,
-    cell_arrays: Vec<Array<'a>>,
-    field_arrays: Vec<Array<'a>>,
+/// Points and cells with their arrays, as VTK's files hold them.
+pub(super) struct Grid<'a> {
+    pub points: &'a [Vector],
+    pub cells: Cow<'a, Cells>,
+    pub point_arrays: Vec<Array<'a>>,
+    pub cell_arrays: Vec<Array<'a>>,
+    pub field_arrays: Vec<Array<'a>>,
     names: Vec<(i64, String)>,
 }
 
@@ -203,10 +254,31 @@ impl<'a> Grid<'a> {
         Ok(())
     }
 
-    fn write(mut self, polygonal: bool, compression: Compression) -> Result<Vec<u8>, Problem> {
-        if polygonal {
-            check_polygonal(&self.cells)?;
+    fn write(self, format: Format, compression: Compression) -> Result<Vec<u8>, Problem> {
+        match format {
+            Format::Unstructured => self.write_xml(false, compression),
+            Format::Polygonal => {
+                check_polygonal(&self.cells)?;
+                self.write_xml(true, compression)
+            }
+            Format::Legacy => self.write_legacy(),
         }
+    }
+
+    #[cfg(feature = "vtkio")]
+    fn write_legacy(&self) -> Result<Vec<u8>, Problem> {
+        self.to_legacy()
+    }
+
+    #[cfg(not(feature = "vtkio"))]
+    fn write_legacy(&self) -> Result<Vec<u8>, Problem> {
+        Err(Problem::Unsupported {
+            what: "a legacy file (.vtk)".into(),
+            instead: "build with the feature `vtkio`, or write a .vtu file",
+        })
+    }
+
+    fn write_xml(mut self, polygonal: bool, compression: Compression) -> Result<Vec<u8>, Problem> {
         let mut file = XmlFile::new(compression);
         let kind = if polygonal { "PolyData" } else { "UnstructuredGrid" };
         let compressor = match compression {
@@ -270,7 +342,7 @@ impl<'a> Grid<'a> {
     /// For each name an array that is called so, of the feature's number and the dimension of its
     /// faces: what meshio takes for the name of a physical group. An array of text would be refused
     /// there.
-    fn names_by_text(&self) -> BTreeMap<String, Vec<i64>> {
+    pub fn names_by_text(&self) -> BTreeMap<String, Vec<i64>> {
         let mut numbers: BTreeMap<String, Vec<i64>> = BTreeMap::new();
         for (number, name) in self.names.iter().filter(|(_, name)| !name.is_empty()) {
             numbers.entry(encoded(name)).or_default().extend([*number, FACE_DIMENSION]);
