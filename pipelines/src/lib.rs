@@ -6,6 +6,7 @@
 //! for WebAssembly.
 #![warn(missing_docs)]
 
+pub mod codec;
 mod derive;
 pub mod encode;
 pub mod expression;

@@ -1,0 +1,528 @@
+//! Fields: tuples of values at the points of a hierarchy, frame after frame.
+
+use super::CodecError;
+use super::bytes::{Input, put_block, put_count};
+use super::exact::{self, Precision};
+use super::hierarchy::Hierarchy;
+use super::mask;
+use super::plane::{Around, Plane};
+use super::temporal::{Modes, SPACE};
+
+/// By how much a finite value may differ after it was coded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Bound {
+    /// By this much at most.
+    Absolute(f64),
+    /// Not in one bit.
+    Exact,
+}
+
+/// The first byte of a frame: what follows, in the lowest two bits, and what goes with it.
+const CONSTANT: u8 = 0;
+const GRID: u8 = 1;
+const SINGLE: u8 = 2;
+const DOUBLE: u8 = 3;
+/// Earlier frames are used.
+const FOLLOWS: u8 = 1 << 2;
+/// The mask of the last frame holds.
+const SAME_MASK: u8 = 1 << 3;
+/// A mask follows.
+const NEW_MASK: u8 = 1 << 4;
+/// Values that no step reaches follow at the end.
+const EXCEPTIONS: u8 = 1 << 5;
+
+/// No value is further than this from its offset, in grid steps.
+const MOST_STEPS: f64 = 4_194_304.0;
+/// A little less than twice the bound, for the rounding of the numbers themselves.
+const NEARLY_TWICE: f64 = 2.0 * (1.0 - 1e-9);
+
+/// A field of which frame after frame is coded, or decoded: what both sides know of it.
+///
+/// ```
+/// use tombolo_pipelines::codec::{Bound, Field, Topology};
+///
+/// let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
+/// let coded = Topology::encode(&points, &[[0, 1, 2], [2, 1, 3]], None, &[], 1e-6)?;
+/// let mut message = Vec::new();
+/// let values = [1.0, f64::NAN, 3.0, 4.0];
+/// Field::new(1).encode(coded.topology.points(), &coded.points, &values, Bound::Absolute(0.01), &mut message)?;
+///
+/// let copy = Topology::decode(&coded.message)?;
+/// let decoded = Field::new(1).decode(copy.points(), &mut &message[..])?;
+/// for (place, value) in decoded.iter().enumerate() {
+///     let sent = values[coded.points[place] as usize];
+///     assert!((value - sent).abs() <= 0.01 || value.is_nan() && sent.is_nan());
+/// }
+/// # Ok::<(), tombolo_pipelines::codec::CodecError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Field {
+    components: usize,
+    known: Known,
+}
+
+/// The frame before, as both sides have it.
+#[derive(Debug, Clone)]
+enum Known {
+    Nothing,
+    Grid(Grid),
+    Exact(Precision, Vec<Vec<f64>>),
+}
+
+#[derive(Debug, Clone)]
+struct Grid {
+    /// A step of the grid is two to this; a step of a difference is so many of them.
+    exponent: i16,
+    steps: u8,
+    offsets: Vec<f64>,
+    planes: Vec<Plane>,
+    mask: Option<Mask>,
+    frames: u32,
+}
+
+#[derive(Debug, Clone)]
+struct Mask {
+    points: Vec<bool>,
+    tuple: Vec<f64>,
+}
+
+impl Field {
+    /// A field with tuples of so many values, of which nothing is known.
+    #[must_use]
+    pub fn new(components: usize) -> Self {
+        Self { components, known: Known::Nothing }
+    }
+
+    /// How many values a tuple has.
+    #[must_use]
+    pub fn components(&self) -> usize {
+        self.components
+    }
+
+    /// Forgets the earlier frames: the next one can be read by itself.
+    pub fn forget(&mut self) {
+        self.known = Known::Nothing;
+    }
+
+    /// Codes the next frame and appends it to a message. `order` says which tuple of `values` stands
+    /// at each place of the hierarchy.
+    ///
+    /// # Errors
+    /// [`CodecError::Length`] where the values or the order do not fit the hierarchy.
+    pub fn encode(
+        &mut self,
+        hierarchy: &Hierarchy,
+        order: &[u32],
+        values: &[f64],
+        bound: Bound,
+        message: &mut Vec<u8>,
+    ) -> Result<(), CodecError> {
+        let (found, expected) = (values.len(), hierarchy.len() * self.components);
+        let fits = order.len() == hierarchy.len()
+            && order.iter().all(|&tuple| (tuple as usize) < hierarchy.len());
+        if found != expected || !fits {
+            return Err(CodecError::Length { found, expected });
+        }
+        let first = values.get(..self.components).unwrap_or_default();
+        let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
+        if self.components == 0 || values.iter().zip(first.iter().cycle()).all(same) {
+            self.known = Known::Nothing;
+            message.push(CONSTANT);
+            message.extend(first.iter().flat_map(|value| value.to_le_bytes()));
+            if first.is_empty() {
+                message.extend([0; 8].repeat(self.components));
+            }
+            return Ok(());
+        }
+        if let Bound::Absolute(bound) = bound
+            && let Some((grid, follows)) = self.grid(hierarchy.len(), values, bound)
+        {
+            return self.encode_grid(grid, follows, hierarchy, order, values, bound, message);
+        }
+        self.encode_exact(hierarchy, order, values, message)
+    }
+
+    /// The grid for the next frame, and whether it goes on from the last. `None` where no grid has
+    /// steps small enough.
+    fn grid(&mut self, points: usize, values: &[f64], bound: f64) -> Option<(Grid, bool)> {
+        let mut offsets = Vec::with_capacity(self.components);
+        let mut span = 0.0_f64;
+        for component in 0..self.components {
+            let finite = values.iter().skip(component).step_by(self.components);
+            let finite = finite.filter(|value| value.is_finite());
+            let [least, largest] = finite
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[least, largest], &value| {
+                    [least.min(value), largest.max(value)]
+                });
+            let known = match &self.known {
+                Known::Grid(grid) => Some(grid.offsets[component]),
+                _ => None,
+            };
+            let middle = if least <= largest { least / 2.0 + largest / 2.0 } else { 0.0 };
+            let offset = known.unwrap_or(middle);
+            span = span.max((least - offset).abs().min(f64::MAX));
+            span = span.max((largest - offset).abs().min(f64::MAX));
+            offsets.push(offset);
+        }
+        let step = NEARLY_TWICE * bound;
+        let floor_log2 = |value: f64| (value.to_bits() >> 52 & 0x7ff) as i32 - 1023;
+        if !step.is_normal() {
+            return None;
+        }
+        let least = if span == 0.0 { -900 } else { floor_log2(span / MOST_STEPS) + 1 };
+        let exponent = (floor_log2(step) - 6).max(least);
+        if exponent.abs() > 900 {
+            return None;
+        }
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "between 0 and 127"
+        )]
+        let steps = (step * two_to(-exponent)).floor().min(127.0) as u8;
+        if steps == 0 {
+            let was_known = matches!(self.known, Known::Grid(_));
+            self.known = Known::Nothing;
+            // Around an offset of its own it may yet fit.
+            return if was_known { self.grid(points, values, bound) } else { None };
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "checked above")]
+        let exponent = exponent as i16;
+        if let Known::Grid(mut grid) = std::mem::replace(&mut self.known, Known::Nothing)
+            && grid.follow(exponent)
+        {
+            grid.steps = steps;
+            return Some((grid, true));
+        }
+        Some((Grid::new(exponent, steps, offsets, points), false))
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "those of `encode`, and its grid")]
+    fn encode_grid(
+        &mut self,
+        mut grid: Grid,
+        follows: bool,
+        hierarchy: &Hierarchy,
+        order: &[u32],
+        values: &[f64],
+        bound: f64,
+        message: &mut Vec<u8>,
+    ) -> Result<(), CodecError> {
+        let stencils = hierarchy.stencils();
+        let components = self.components;
+        let start = message.len();
+        message.push(GRID | if follows { FOLLOWS } else { 0 });
+        message.extend(grid.exponent.to_le_bytes());
+        message.push(grid.steps);
+        if !follows {
+            message.extend(grid.offsets.iter().flat_map(|offset| offset.to_le_bytes()));
+        }
+        let mask = mask::find(values, components, order);
+        grid.mask = match (mask, grid.mask.take()) {
+            (None, _) => None,
+            (Some(points), last) => {
+                let place = points.iter().position(|&is_set| is_set).unwrap_or(0);
+                let tuple = &values[order[place] as usize * components..][..components];
+                let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
+                let last = last.filter(|last| {
+                    last.points == points && last.tuple.iter().zip(tuple).all(same)
+                });
+                if last.is_some() {
+                    message[start] |= SAME_MASK;
+                } else {
+                    message[start] |= NEW_MASK;
+                    message.extend(tuple.iter().flat_map(|value| value.to_le_bytes()));
+                    put_block(message, &mask::encode(stencils, &points)?);
+                }
+                Some(Mask { points, tuple: tuple.to_vec() })
+            }
+        };
+        grid.set_masked();
+        let (unit, per_unit) = (grid.unit(), two_to(-i32::from(grid.exponent)));
+        let mask = grid.mask.as_ref().map(|mask| &mask.points[..]);
+        let mut exceptions = Vec::new();
+        let mut scaled = vec![0.0; order.len()];
+        for component in 0..components {
+            let offset = grid.offsets[component];
+            for (scaled, &tuple) in scaled.iter_mut().zip(order) {
+                *scaled = (values[tuple as usize * components + component] - offset) * per_unit;
+            }
+            let (before, plane) = grid.planes.split_at_mut(component);
+            let plane = &mut plane[0];
+            let step = f32::from(grid.steps);
+            let beside = before.last().map(|plane| &plane.nodes[..]);
+            let around = Around { stencils, mask, beside, step };
+            let modes = if follows {
+                for (place, (node, &value)) in plane.nodes.iter_mut().zip(&scaled).enumerate() {
+                    if mask.is_some_and(|mask| mask[place]) {
+                        continue;
+                    }
+                    #[expect(clippy::cast_possible_truncation, reason = "to compare with")]
+                    let value = value as f32;
+                    // Where nothing can be compared, nothing has changed.
+                    node[0] = if value.is_finite() { value } else { node[1] };
+                }
+                Modes::best(&plane.nodes, stencils, mask, step)
+            } else {
+                Modes::uniform(SPACE)
+            };
+            plane.encode(around, &modes, &scaled, message);
+            for (place, (node, &tuple)) in plane.nodes.iter().zip(order).enumerate() {
+                let value = values[tuple as usize * components + component];
+                let coded = offset + f64::from(node[0]) * unit;
+                let is_masked = mask.is_some_and(|mask| mask[place]);
+                // Not `>`: a NaN must not pass.
+                if !is_masked && !((coded - value).abs() <= bound) {
+                    exceptions.push((place * components + component, value));
+                }
+            }
+        }
+        if !exceptions.is_empty() {
+            message[start] |= EXCEPTIONS;
+            put_exceptions(exceptions, message);
+        }
+        grid.frames = grid.frames.saturating_add(1);
+        self.known = Known::Grid(grid);
+        Ok(())
+    }
+
+    fn encode_exact(
+        &mut self,
+        hierarchy: &Hierarchy,
+        order: &[u32],
+        values: &[f64],
+        message: &mut Vec<u8>,
+    ) -> Result<(), CodecError> {
+        let stencils = hierarchy.stencils();
+        let precision = exact::precision(values);
+        let planes: Vec<Vec<f64>> = (0..self.components)
+            .map(|component| {
+                let value = |&tuple: &u32| values[tuple as usize * self.components + component];
+                order.iter().map(value).collect()
+            })
+            .collect();
+        let alone = |last: Option<&Vec<Vec<f64>>>| -> Result<Vec<Vec<u8>>, CodecError> {
+            let coded = planes.iter().enumerate().map(|(component, plane)| {
+                let last = last.map(|last| &last[component][..]);
+                exact::encode(stencils, plane, last, precision)
+            });
+            coded.collect()
+        };
+        let mut blocks = alone(None)?;
+        let mut follows = 0;
+        if let Known::Exact(last_precision, last) = &self.known
+            && *last_precision == precision
+        {
+            let following = alone(Some(last))?;
+            let size = |blocks: &[Vec<u8>]| blocks.iter().map(Vec::len).sum::<usize>();
+            if size(&following) <= size(&blocks) {
+                (blocks, follows) = (following, FOLLOWS);
+            }
+        }
+        let kind = if precision == Precision::Single { SINGLE } else { DOUBLE };
+        message.push(kind | follows);
+        blocks.iter().for_each(|block| put_block(message, block));
+        self.known = Known::Exact(precision, planes);
+        Ok(())
+    }
+
+    /// Reads the next frame and takes its bytes off the message. The tuples come in the order of the
+    /// hierarchy.
+    ///
+    /// # Errors
+    /// [`CodecError`]. What was known of earlier frames is forgotten then.
+    pub fn decode(
+        &mut self,
+        hierarchy: &Hierarchy,
+        message: &mut &[u8],
+    ) -> Result<Vec<f64>, CodecError> {
+        let mut input = Input(message);
+        let values = self.read(hierarchy, &mut input)?;
+        *message = input.0;
+        Ok(values)
+    }
+
+    fn read(
+        &mut self,
+        hierarchy: &Hierarchy,
+        input: &mut Input<'_>,
+    ) -> Result<Vec<f64>, CodecError> {
+        let known = std::mem::replace(&mut self.known, Known::Nothing);
+        let flags = input.byte()?;
+        let follows = flags & FOLLOWS != 0;
+        match flags & 3 {
+            CONSTANT => {
+                let tuple = doubles(self.components, input)?;
+                Ok(tuple.repeat(hierarchy.len()))
+            }
+            GRID => self.read_grid(known, flags, hierarchy, input),
+            kind => {
+                let precision = if kind == SINGLE { Precision::Single } else { Precision::Double };
+                let last = match known {
+                    Known::Exact(last, values) if last == precision && follows => Some(values),
+                    _ if follows => return Err(NOT_KNOWN),
+                    _ => None,
+                };
+                let planes = (0..self.components).map(|component| {
+                    let last = last.as_ref().map(|last| &last[component][..]);
+                    exact::decode(hierarchy.stencils(), last, precision, input.block()?)
+                });
+                let planes: Vec<Vec<f64>> = planes.collect::<Result<_, _>>()?;
+                let tuples = (0..hierarchy.len()).flat_map(|place| {
+                    planes.iter().map(move |plane| plane[place])
+                });
+                let values = tuples.collect();
+                self.known = Known::Exact(precision, planes);
+                Ok(values)
+            }
+        }
+    }
+
+    fn read_grid(
+        &mut self,
+        known: Known,
+        flags: u8,
+        hierarchy: &Hierarchy,
+        input: &mut Input<'_>,
+    ) -> Result<Vec<f64>, CodecError> {
+        let stencils = hierarchy.stencils();
+        let exponent = i16::from_le_bytes(input.array()?);
+        let steps = input.byte()?;
+        if !(-900..=900).contains(&exponent) {
+            return Err(CodecError::Damaged("a grid is too fine or too coarse"));
+        }
+        let mut grid = if flags & FOLLOWS == 0 {
+            let offsets = doubles(self.components, input)?;
+            Grid::new(exponent, steps, offsets, hierarchy.len())
+        } else {
+            let Known::Grid(mut grid) = known else { return Err(NOT_KNOWN) };
+            if !grid.follow(exponent) {
+                return Err(NOT_KNOWN);
+            }
+            grid.steps = steps;
+            grid
+        };
+        if flags & NEW_MASK != 0 {
+            let tuple = doubles(self.components, input)?;
+            let points = mask::decode(stencils, input.block()?)?;
+            grid.mask = Some(Mask { points, tuple });
+        } else if flags & SAME_MASK == 0 {
+            grid.mask = None;
+        } else if grid.mask.is_none() {
+            return Err(NOT_KNOWN);
+        }
+        grid.set_masked();
+        let mask = grid.mask.as_ref().map(|mask| &mask.points[..]);
+        for component in 0..self.components {
+            let (before, plane) = grid.planes.split_at_mut(component);
+            let beside = before.last().map(|plane| &plane.nodes[..]);
+            let around = Around { stencils, mask, beside, step: f32::from(grid.steps) };
+            plane[0].decode(around, input)?;
+        }
+        let mut values = grid.values();
+        if flags & EXCEPTIONS != 0 {
+            take_exceptions(&mut values, input)?;
+        }
+        grid.frames = grid.frames.saturating_add(1);
+        self.known = Known::Grid(grid);
+        Ok(values)
+    }
+}
+
+const NOT_KNOWN: CodecError = CodecError::Damaged("the frame goes on from one that is not known");
+
+impl Grid {
+    fn new(exponent: i16, steps: u8, offsets: Vec<f64>, points: usize) -> Self {
+        let planes = offsets.iter().map(|_| Plane::new(points)).collect();
+        Self { exponent, steps, offsets, planes, mask: None, frames: 0 }
+    }
+
+    /// Makes the last frame the one before. `false` where the grids are too different.
+    fn follow(&mut self, exponent: i16) -> bool {
+        let by = i32::from(self.exponent) - i32::from(exponent);
+        if by.abs() > 100 {
+            return false;
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "a power of two that it has")]
+        let scale = two_to(by) as f32;
+        let is_second = self.frames == 1;
+        self.planes.iter_mut().for_each(|plane| plane.shift(scale, is_second));
+        self.exponent = exponent;
+        true
+    }
+
+    /// A step of the grid.
+    fn unit(&self) -> f64 {
+        two_to(i32::from(self.exponent))
+    }
+
+    /// Gives points with a mask the value that is next to theirs in the grid.
+    fn set_masked(&mut self) {
+        let per_unit = two_to(-i32::from(self.exponent));
+        let Some(mask) = &self.mask else { return };
+        for (component, plane) in self.planes.iter_mut().enumerate() {
+            let value = (mask.tuple[component] - self.offsets[component]) * per_unit;
+            #[expect(clippy::cast_possible_truncation, reason = "the nearest will do")]
+            let value = if value.abs() <= 2.0 * MOST_STEPS { value.round_ties_even() } else { 0.0 };
+            for (node, _) in plane.nodes.iter_mut().zip(&mask.points).filter(|(_, set)| **set) {
+                node[0] = value as f32;
+                node[3] = 0.0;
+            }
+        }
+    }
+
+    fn values(&self) -> Vec<f64> {
+        let unit = self.unit();
+        let (points, components) = (self.planes.first(), self.planes.len());
+        let mut values = vec![0.0; points.map_or(0, |plane| plane.nodes.len()) * components];
+        for (component, plane) in self.planes.iter().enumerate() {
+            let offset = self.offsets[component];
+            let places = values.iter_mut().skip(component).step_by(components);
+            for (value, node) in places.zip(&plane.nodes) {
+                *value = offset + f64::from(node[0]) * unit;
+            }
+        }
+        if let Some(mask) = &self.mask {
+            let tuples = values.chunks_exact_mut(components);
+            for (tuple, _) in tuples.zip(&mask.points).filter(|(_, is_set)| **is_set) {
+                tuple.copy_from_slice(&mask.tuple);
+            }
+        }
+        values
+    }
+}
+
+/// Two to the power of a number between -1000 and 1000.
+#[expect(clippy::cast_sign_loss, reason = "the exponent of a double, from 23 on")]
+fn two_to(exponent: i32) -> f64 {
+    f64::from_bits(((exponent + 1023) as u64) << 52)
+}
+
+fn doubles(count: usize, input: &mut Input<'_>) -> Result<Vec<f64>, CodecError> {
+    let bytes = input.take(count.saturating_mul(8))?;
+    Ok(bytes.as_chunks().0.iter().map(|&bytes| f64::from_le_bytes(bytes)).collect())
+}
+
+/// Values by their place, the lowest first: each as how many lie between it and the one before.
+fn put_exceptions(mut exceptions: Vec<(usize, f64)>, message: &mut Vec<u8>) {
+    exceptions.sort_unstable_by_key(|exception| exception.0);
+    put_count(message, exceptions.len());
+    let mut next = 0;
+    for (place, value) in exceptions {
+        put_count(message, place - next);
+        message.extend(value.to_le_bytes());
+        next = place + 1;
+    }
+}
+
+fn take_exceptions(values: &mut [f64], input: &mut Input<'_>) -> Result<(), CodecError> {
+    let mut next = 0usize;
+    for _ in 0..input.count()? {
+        let place = next.saturating_add(input.count()?);
+        let value = input.double()?;
+        let there = values.get_mut(place);
+        *there.ok_or(CodecError::Damaged("a value stands beyond the last"))? = value;
+        next = place + 1;
+    }
+    Ok(())
+}
