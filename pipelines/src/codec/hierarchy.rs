@@ -9,7 +9,7 @@ const COARSEST: usize = 48;
 /// The most levels.
 const LEVELS: usize = 24;
 /// The weights of neighbours in a context, the nearest first.
-pub(super) const CONTEXT: [u8; 6] = [12, 6, 4, 3, 2, 2];
+pub(super) const CONTEXT: [u8; 6] = [9, 7, 6, 5, 4, 4];
 
 /// An order of points from coarse to fine. Each is predicted from up to eight that come earlier,
 /// the nearest in space among those that are near in the mesh, by ordinary kriging.

@@ -16,7 +16,7 @@ const EDGES: [u16; CLASSES - 1] =
     [1, 3, 5, 8, 12, 17, 25, 35, 49, 70, 101, 145, 232, 377, 638, 1160];
 /// The tables of the contexts before any are sent.
 const FIRST_TABLES: [u8; CLASSES] =
-    [5, 9, 11, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 24, 25, 27, 29];
+    [2, 7, 9, 10, 11, 11, 12, 14, 15, 16, 18, 19, 20, 21, 23, 25, 28];
 /// No difference counts for more than this in a context.
 const MOST: u32 = 64;
 /// What the difference of the last frame, and that of the component before, count for.

@@ -117,7 +117,7 @@ impl Table {
     fn new(width: f64) -> Self {
         let mut frequencies = [0u32; ESCAPE + 1];
         for (token, frequency) in frequencies[..ESCAPE].iter_mut().enumerate() {
-            let wider = probability(3.0 * width + 0.25, token);
+            let wider = probability(4.0 * width + 0.02, token);
             let mixed = (15.0 * probability(width, token) + wider) / 16.0;
             *frequency = (mixed * f64::from(TOTAL) + 0.5).floor() as u32;
         }
