@@ -7,6 +7,7 @@
 //! cargo run --release -p tombolo-benchmarks -- paper --json
 //! cargo run --release -p tombolo-benchmarks -- surface-wasm --json
 //! cargo run --release -p tombolo-benchmarks -- skeleton --json
+//! cargo run --release -p tombolo-benchmarks -- codec --json
 //! cargo run --release -p tombolo-benchmarks -- scaling --json
 //! cargo run --release -p tombolo-benchmarks -- catalyst --json
 //! cargo run --release -p tombolo-benchmarks -- untangle
@@ -17,6 +18,8 @@
 
 mod catalyst;
 mod extract;
+mod codec;
+mod codec_cases;
 mod growth;
 mod measure;
 mod overhead;
@@ -77,6 +80,8 @@ enum Name {
     SurfaceWasm,
     /// Curve skeletons, beside CGAL's.
     Skeleton,
+    /// The codec of topologies and fields, beside SZ3, zfp and zstd.
+    Codec,
     /// The quality of deformed meshes at several exponents of the stiffening.
     Stiffening,
     /// Surfaces of meshes in parts: the time it takes, and what goes from rank to rank.
@@ -113,6 +118,7 @@ fn main() -> ExitCode {
         Name::Overhead => text(overhead::run(), json),
         Name::Surface => text(surface::run(), json),
         Name::SurfaceWasm => text(surface_wasm::run(), json),
+        Name::Codec => text(codec::run(), json),
         Name::Skeleton => text(skeleton::run(), json),
         Name::Volume => text(volume::run(), json),
         Name::Growth => text(growth::run(), json),

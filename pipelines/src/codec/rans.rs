@@ -28,9 +28,8 @@ pub(super) const LANES: usize = 8;
 pub(super) struct Table {
     /// The frequency of each token, and the sum of those before it.
     frequencies: [(u32, u32); ESCAPE + 1],
-    /// For each value below the total: the token, its frequency less one (12 bits), and how far the
-    /// value is above the token's first (12 bits).
-    slots: Vec<u32>,
+    /// The token of each value below the total.
+    slots: Box<[u8; TOTAL as usize]>,
     /// The bits that each token costs, plain ones among them.
     costs: [f32; ESCAPE + 1],
 }
@@ -133,7 +132,7 @@ impl Table {
         frequencies[most] = frequencies[most] + TOTAL - sum;
 
         let mut start = 0;
-        let mut slots = Vec::with_capacity(TOTAL as usize);
+        let mut slots = Box::new([0; TOTAL as usize]);
         let starts = frequencies.map(|frequency| {
             start += frequency;
             (frequency, start - frequency)
@@ -144,8 +143,8 @@ impl Table {
             let frequency = if frequency == 0 { 2f32.powi(-32) } else { frequency as f32 };
             BITS as f32 - frequency.log2() + plain as f32
         });
-        for (token, (frequency, _)) in (0u32..).zip(starts) {
-            slots.extend((0..frequency).map(|above| token | (frequency - 1) << 8 | above << 20));
+        for (token, (frequency, start)) in (0u8..).zip(starts) {
+            slots[start as usize..(start + frequency) as usize].fill(token);
         }
         Self { frequencies: starts, slots, costs }
     }
@@ -281,9 +280,11 @@ impl<'bytes> Decoder<'bytes> {
     pub(super) fn next(&mut self, table: u8) -> u32 {
         let state = &mut self.states[self.index & self.mask & (LANES - 1)];
         self.index += 1;
-        let slot = self.tables[usize::from(table)].slots[(*state & (TOTAL - 1)) as usize];
-        let token = (slot & 0xff) as usize;
-        let mut next = ((slot >> 8 & 0xfff) + 1).wrapping_mul(*state >> BITS) + (slot >> 20);
+        let table = &self.tables[usize::from(table)];
+        let slot = *state & (TOTAL - 1);
+        let token = usize::from(table.slots[slot as usize]);
+        let (frequency, start) = table.frequencies[token];
+        let mut next = frequency.wrapping_mul(*state >> BITS).wrapping_add(slot - start);
         if next < LOW {
             let word = self.words.get(self.at).map_or(0, |&word| u16::from_le_bytes(word));
             next = next << 16 | u32::from(word);
@@ -336,8 +337,13 @@ mod tests {
     #[test]
     fn tables_are_complete_and_fit_their_distribution() {
         for (index, table) in tables().iter().enumerate() {
-            assert_eq!(table.slots.len(), TOTAL as usize, "table {index}");
+            let sum: u32 = table.frequencies.iter().map(|token| token.0).sum();
+            assert_eq!(sum, TOTAL, "table {index}");
             assert!(table.frequencies[0].0 >= table.frequencies[2].0);
+            for slot in 0..TOTAL {
+                let (frequency, start) = table.frequencies[usize::from(table.slots[slot as usize])];
+                assert!((start..start + frequency).contains(&slot));
+            }
         }
         let width = 10.0;
         let all: f64 = (0..ESCAPE).map(|token| probability(width, token)).sum();
