@@ -50,7 +50,7 @@ fn flow(
 ) -> Result<Vec<Case>, Box<dyn Error>> {
     let file = project().join(format!("examples/flow/cases/{name}.json"));
     let case = FlowCase::read(&file)?;
-    let mesh = read_mesh(&peer::mesh_file(mesh)?)?;
+    let mesh = read_mesh(&peer::mesh_file(mesh)?)?.mesh;
     let surface = Surface::extract(&mesh, &FeatureSettings::default())?;
     let patches = case.patches(&file, &surface)?;
     let parameters: Vec<f64> =
