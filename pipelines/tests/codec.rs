@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use proptest::prelude::*;
-use tombolo_pipelines::codec::{Bound, Coded, CodecError, Field, Topology};
+use tombolo_pipelines::codec::{Bound, Coded, CodecError, Field, Motion, Topology};
 
 /// Triangles with their lowest point first, in order.
 fn sorted(triangles: impl Iterator<Item = [u32; 3]>) -> Vec<[u32; 3]> {
@@ -183,6 +183,47 @@ fn grids_change_with_the_bound_and_with_the_range() {
             exchange(&mut fields, &coded, &values, Bound::Exact);
         }
     }
+}
+
+#[test]
+fn a_mesh_that_moves_in_a_line_sends_it_once() {
+    let (still, triangles) = sheet(40);
+    let bound = 1e-5;
+    let coded = check(&still, &triangles, &[], bound / 2.0);
+    let [mut motion, mut copy] = [Motion::new(&coded.topology), Motion::new(&coded.topology)];
+    // Two lines, one after the other, with stops; then round a circle.
+    let at = |frame: u32, [x, y, z]: [f64; 3]| {
+        let part = if y > 0.6 { (y - 0.6) * (1.0 + x) } else { 0.0 };
+        let along = |first: u32| f64::from(frame.clamp(first, first + 8) - first) * 0.03 * part;
+        let angle = f64::from(frame.max(24) - 24) * 0.1;
+        [x + along(2), y + along(2) * x + (angle.cos() - 1.0) * part, z - along(13) + angle.sin() * part]
+    };
+    let mut sizes = Vec::new();
+    for frame in 0..30 {
+        let points: Vec<[f64; 3]> = still.iter().map(|&point| at(frame, point)).collect();
+        let mut message = Vec::new();
+        motion.encode(&coded.topology, &coded.points, &points, bound, &mut message).unwrap();
+        let mut rest = &message[..];
+        let read = copy.decode(&coded.topology, &mut rest).unwrap();
+        assert!(rest.is_empty() && read == motion.positions());
+        for (read, &point) in read.iter().zip(&coded.points) {
+            for axis in 0..3 {
+                let off = (read[axis] - points[point as usize][axis]).abs();
+                assert!(off <= bound, "frame {frame}: {off}");
+            }
+        }
+        sizes.push(message.len());
+    }
+    assert_eq!(sizes[..3], [1; 3]);
+    assert_eq!(sizes[4..=10], [9; 7]);
+    assert_eq!(sizes[11..=13], [1; 3]);
+    assert_eq!(sizes[15..=21], [9; 7]);
+    assert_eq!(sizes[22..=24], [1; 3]);
+    // Most points never move.
+    let point = 8.0 / still.len() as f64;
+    assert!(sizes[3] as f64 * point < 30.0 && sizes[29] as f64 * point < 12.0, "{sizes:?}");
+    let lost = Motion::new(&coded.topology).decode(&coded.topology, &mut &[1; 9][..]).is_err();
+    assert!(lost, "nothing is known of the line");
 }
 
 #[test]
