@@ -78,7 +78,8 @@ pub fn run() -> Result<Report<Row>, Box<dyn Error>> {
         let coded = topology(&case)?;
         let seconds = start.elapsed().as_secs_f64();
         let triangles = case.triangles.len() as f64;
-        let alone = Topology::encode(&vec![[0.0; 3]; case.points.len()], &case.triangles, None, &[], 1.0)?;
+        let alone =
+            Topology::encode(&vec![[0.0; 3]; case.points.len()], &case.triangles, None, &[], 1.0)?;
         let bits = 8.0 * alone.message.len() as f64 / triangles;
         let name = |what: &str| format!("{}: {what}", case.name);
         let most = if case.name.contains("slice") { 5.2 } else { 3.0 };
@@ -89,7 +90,14 @@ pub fn run() -> Result<Report<Row>, Box<dyn Error>> {
         }
         for (field, components, frames) in &case.fields {
             let field = name(field);
-            jobs.push(job(directory.path(), jobs.len(), &field, &case.points, *components, frames)?);
+            jobs.push(job(
+                directory.path(),
+                jobs.len(),
+                &field,
+                &case.points,
+                *components,
+                frames,
+            )?);
             for bound in BOUNDS {
                 rows.push(series(&field, &coded, *components, &frames[..1], bound)?);
                 if frames.len() > FIRST {
@@ -126,18 +134,15 @@ pub fn run() -> Result<Report<Row>, Box<dyn Error>> {
 }
 
 fn topology(case: &Case) -> Result<Coded, Box<dyn Error>> {
-    let diagonal = (0..3)
-        .map(|axis| range(case.points.as_flattened(), 3, axis).powi(2))
-        .sum::<f64>()
-        .sqrt();
+    let diagonal =
+        (0..3).map(|axis| range(case.points.as_flattened(), 3, axis).powi(2)).sum::<f64>().sqrt();
     Ok(Topology::encode(&case.points, &case.triangles, None, &[], POSITIONS * diagonal)?)
 }
 
 fn range(values: &[f64], components: usize, component: usize) -> f64 {
     let values = values.iter().skip(component).step_by(components);
-    let [least, largest] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &value| {
-        [a.min(value), b.max(value)]
-    });
+    let [least, largest] = values
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &value| [a.min(value), b.max(value)]);
     largest - least
 }
 

@@ -156,5 +156,10 @@ fn made_up(name: &str, waves: u32) -> Case {
         points.iter().map(value).collect()
     };
     let frames = (0..3).map(|index| frame(0.01 * f64::from(index))).collect();
-    Case { name: name.into(), points: points.clone(), triangles, fields: vec![("value".into(), 1, frames)] }
+    Case {
+        name: name.into(),
+        points: points.clone(),
+        triangles,
+        fields: vec![("value".into(), 1, frames)],
+    }
 }

@@ -17,9 +17,9 @@
 //! ```
 
 mod catalyst;
-mod extract;
 mod codec;
 mod codec_cases;
+mod extract;
 mod growth;
 mod measure;
 mod overhead;

@@ -168,8 +168,8 @@ pub(super) fn walk<B: Bits, G: Guide<B>>(
                 }
                 fresh += 1;
                 outline.fresh();
-                let across = (fresh > 1)
-                    .then(|| Across { ends: [fresh - 2; 2], opposite: fresh - 2 });
+                let across =
+                    (fresh > 1).then(|| Across { ends: [fresh - 2; 2], opposite: fresh - 2 });
                 guide.point(bits, fresh - 1, across)?;
                 fresh - 1
             } else {
@@ -181,11 +181,13 @@ pub(super) fn walk<B: Bits, G: Guide<B>>(
         outline.count(triangle);
         let [a, b, c] = triangle;
         let base = outline.gates.len() as u32;
-        for (index, (from, to, opposite)) in [(b, a, c), (a, c, b), (c, b, a)].into_iter().enumerate()
+        for (index, (from, to, opposite)) in
+            [(b, a, c), (a, c, b), (c, b, a)].into_iter().enumerate()
         {
             let index = index as u32;
             let (before, after) = (base + (index + 2) % 3, base + (index + 1) % 3);
-            let gate = Gate { from, to, before, after, opposite, triangle: triangles, is_open: true };
+            let gate =
+                Gate { from, to, before, after, opposite, triangle: triangles, is_open: true };
             outline.push(gate);
         }
         triangles += 1;
@@ -204,7 +206,8 @@ pub(super) fn walk<B: Bits, G: Guide<B>>(
                 if has_after { at_after.to } else { NONE },
             ];
             let degree = |point: u32| usize::from(outline.degree[point as usize]).min(DEGREES - 1);
-            let context = (degree(x) * DEGREES + degree(y)) * 4 + 2 * last_was_new
+            let context = (degree(x) * DEGREES + degree(y)) * 4
+                + 2 * last_was_new
                 + usize::from(point_before == point_after);
 
             let third = guide.behind([x, y]);

@@ -224,9 +224,8 @@ impl Field {
                 let place = points.iter().position(|&is_set| is_set).unwrap_or(0);
                 let tuple = &values[order[place] as usize * components..][..components];
                 let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
-                let last = last.filter(|last| {
-                    last.points == points && last.tuple.iter().zip(tuple).all(same)
-                });
+                let last = last
+                    .filter(|last| last.points == points && last.tuple.iter().zip(tuple).all(same));
                 if last.is_some() {
                     message[start] |= SAME_MASK;
                 } else {
@@ -368,9 +367,8 @@ impl Field {
                     exact::decode(hierarchy.stencils(), last, precision, input.block()?)
                 });
                 let planes: Vec<Vec<f64>> = planes.collect::<Result<_, _>>()?;
-                let tuples = (0..hierarchy.len()).flat_map(|place| {
-                    planes.iter().map(move |plane| plane[place])
-                });
+                let tuples = (0..hierarchy.len())
+                    .flat_map(|place| planes.iter().map(move |plane| plane[place]));
                 let values = tuples.collect();
                 self.known = Known::Exact(precision, planes);
                 Ok(values)

@@ -113,7 +113,10 @@ impl Hierarchy {
         let mut builder = Builder {
             places,
             place_of: vec![0; count],
-            hierarchy: Self { order: Vec::with_capacity(count), stencils: Vec::with_capacity(count) },
+            hierarchy: Self {
+                order: Vec::with_capacity(count),
+                stencils: Vec::with_capacity(count),
+            },
         };
         for (index, &point) in points.iter().enumerate() {
             let earlier = &points[index.saturating_sub(COARSEST)..index];

@@ -86,7 +86,8 @@ impl Motion {
         if near(&self.now, &wanted) {
             message.push(STILL);
             self.is_free = false;
-        } else if let Some((number, along)) = self.along(&wanted).filter(|of| near(&of.1, &wanted)) {
+        } else if let Some((number, along)) = self.along(&wanted).filter(|of| near(&of.1, &wanted))
+        {
             message.push(ALONG);
             message.extend(number.to_le_bytes());
             self.now = along;

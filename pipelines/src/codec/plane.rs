@@ -77,7 +77,9 @@ pub(super) fn sums(nodes: &[Node], stencil: &Stencil) -> Node {
 pub(super) fn predict(sums: Node, node: Node, by: Coefficients) -> f32 {
     let [now, before, earlier, _] = sums;
     let [_, last, second, _] = node;
-    last + by[0] * (now - before) + by[1] * (now - last) + by[2] * (last - second)
+    last + by[0] * (now - before)
+        + by[1] * (now - last)
+        + by[2] * (last - second)
         + by[3] * (before - earlier)
 }
 

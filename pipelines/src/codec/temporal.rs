@@ -56,9 +56,11 @@ impl Modes {
 
     pub(super) fn write(&self, out: &mut Vec<u8>) {
         if self.modes.len() > 1 {
-            out.extend(self.modes.chunks(4).map(|four| {
-                four.iter().rev().fold(0, |byte, mode| byte << 2 | mode)
-            }));
+            out.extend(
+                self.modes
+                    .chunks(4)
+                    .map(|four| four.iter().rev().fold(0, |byte, mode| byte << 2 | mode)),
+            );
         }
         if self.uses_fit() {
             #[expect(clippy::cast_sign_loss, reason = "the bits are meant")]
@@ -111,9 +113,9 @@ impl Modes {
             }
             // The fit costs four bytes and other ways than one two bits a block: the last way
             // first, so that equals are all the same.
-            let best = (0u8..4).rev().min_by(|&a, &b| {
-                costs[usize::from(a)].total_cmp(&costs[usize::from(b)])
-            });
+            let best = (0u8..4)
+                .rev()
+                .min_by(|&a, &b| costs[usize::from(a)].total_cmp(&costs[usize::from(b)]));
             modes.push(best.unwrap_or(SPACE));
         }
         modes.dedup_if_uniform();

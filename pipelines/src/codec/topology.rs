@@ -419,9 +419,10 @@ fn code<B: Bits, S: Source>(
             } else {
                 let back = u64::from(fresh.wrapping_sub(1).wrapping_sub(wanted[end]));
                 let back = bits.number(&mut coding.walked.models.end, back)?;
-                let known = u32::try_from(back).ok().filter(|back| *back < fresh);
+                let newer = u32::try_from(back).ok().and_then(|back| back.checked_add(1));
+                let known = newer.and_then(|newer| fresh.checked_sub(newer));
                 let wrong = CodecError::Damaged("a line names a point that is not known yet");
-                ends[end] = fresh - 1 - known.ok_or(wrong)?;
+                ends[end] = known.ok_or(wrong)?;
             }
         }
         coding.walked.lines.push(ends);
