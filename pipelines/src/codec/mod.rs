@@ -14,7 +14,7 @@
 //! Guaranteed: no finite value is off by more than the bound, as double precision computes it. NaN,
 //! infinity and whatever else no step can reach come back bit by bit. Any bytes are answered with
 //! values or with a [`CodecError`], in memory that is bounded by the message and the topology.
-//! `docs/protocol.md` says it all again for whoever writes another decoder.
+//! `docs/codec.md` says it all again for whoever writes another decoder.
 
 mod bits;
 mod bytes;
