@@ -2,7 +2,7 @@
 //! prediction.
 
 use super::CodecError;
-use super::bits::{unzigzag, zigzag};
+use super::bits::unzigzag;
 use super::bytes::{Input, put_count};
 use super::hierarchy::{CONTEXT, Stencil};
 use super::kriging::NEIGHBOURS;
@@ -22,6 +22,8 @@ const MOST: u32 = 64;
 /// What the difference of the last frame, and that of the component before, count for.
 const LAST: f32 = 20.0;
 const BESIDE: f32 = 12.0;
+/// No difference is larger: in single precision all of them are exact.
+const MOST_STEPS: f64 = 16_777_216.0;
 /// The bits that another table costs.
 const TABLE_PRICE: f32 = 9.0;
 
@@ -50,7 +52,8 @@ pub(super) struct Around<'a> {
 
 /// The prediction of a value from its neighbours now and in the two frames before, and their
 /// magnitudes; the sums are taken from the nearest to the farthest, in single precision.
-#[inline(always)]
+// A function of its own: inlined, its lanes would be summed one by one.
+#[inline(never)]
 pub(super) fn sums(nodes: &[Node], stencil: &Stencil) -> Node {
     let (mut sums, mut context) = ([0.0f32; 4], 0.0);
     for index in 0..NEIGHBOURS {
@@ -154,25 +157,28 @@ impl Plane {
         let per_step = 1.0 / f64::from(around.step);
         let mut coded = Vec::with_capacity(points);
         let mut histograms = [const { Histogram::NEW }; CLASSES];
-        for point in 0..points {
-            if around.mask.is_some_and(|mask| mask[point]) {
-                continue;
+        for block in 0..points.div_ceil(BLOCK) {
+            let by = modes.of(block * BLOCK);
+            for point in block * BLOCK..points.min((block + 1) * BLOCK) {
+                if around.mask.is_some_and(|mask| mask[point]) {
+                    continue;
+                }
+                let sums = sums(&self.nodes, &around.stencils[point]);
+                let class = self.context(&around, point, sums);
+                let near = nearest(predict(sums, self.nodes[point], by));
+                let steps = nearest_double((values[point] - f64::from(near)) * per_step);
+                // NaN, too.
+                let steps = if steps.abs() < MOST_STEPS { steps as f32 } else { 0.0 };
+                #[expect(clippy::cast_possible_truncation, reason = "checked above")]
+                let difference = steps as i32;
+                self.nodes[point][0] = near + around.step * steps;
+                self.nodes[point][3] = difference.unsigned_abs().min(MOST) as f32;
+                #[expect(clippy::cast_sign_loss, reason = "the bits are meant")]
+                let number = (difference << 1 ^ difference >> 31) as u32;
+                histograms[class].add(number);
+                #[expect(clippy::cast_possible_truncation, reason = "there are 17")]
+                coded.push((class as u8, number));
             }
-            let sums = sums(&self.nodes, &around.stencils[point]);
-            let class = self.context(&around, point, sums);
-            let near = nearest(predict(sums, self.nodes[point], modes.of(point)));
-            let steps = nearest_double((values[point] - f64::from(near)) * per_step);
-            let steps = if steps.abs() < 1e9 { steps } else { 0.0 };
-            #[expect(clippy::cast_possible_truncation, reason = "checked above")]
-            let difference = steps as i32;
-            let now = near + around.step * difference as f32;
-            self.nodes[point][0] = now;
-            self.nodes[point][3] = difference.unsigned_abs().min(MOST) as f32;
-            #[expect(clippy::cast_possible_truncation, reason = "of 32 bits")]
-            let number = zigzag(i64::from(difference)) as u32;
-            histograms[class].add(number);
-            #[expect(clippy::cast_possible_truncation, reason = "there are 17")]
-            coded.push((class as u8, number));
         }
 
         let mut changed = 0u32;

