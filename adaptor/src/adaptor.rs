@@ -26,6 +26,7 @@ use tombolo_deform::{
 use tombolo_pipelines::{
     extract::Channel,
     language::{self, Config, Due, ReadError, Validate},
+    run::History,
 };
 
 use crate::{
@@ -36,7 +37,7 @@ use crate::{
     settings::Settings,
     stages::Pipelines,
     steering::{Defaults, Forecaster, Log, Parameters, Queue, Source, Steering, Timed},
-    step::{Moment, Step},
+    step::{Moment, Outside, Step},
     stream::{Hub, Server},
 };
 
@@ -59,6 +60,8 @@ pub struct Adaptor {
     server: Option<Server>,
     mesh: SteeredMesh,
     lent: Lent,
+    /// The step of the last call.
+    moment: Moment,
     told: Told,
     paused: bool,
     stopped: bool,
@@ -86,8 +89,8 @@ struct Told {
 }
 
 /// Where the time went.
-#[derive(Default)]
 struct Timing {
+    begun: Instant,
     cycles: u64,
     left: Option<Instant>,
     steps: Durations,
@@ -96,6 +99,22 @@ struct Timing {
     pipelines: Durations,
     steering: Durations,
     paused: Durations,
+}
+
+impl Default for Timing {
+    fn default() -> Self {
+        Self {
+            begun: Instant::now(),
+            cycles: 0,
+            left: None,
+            steps: Durations::default(),
+            execute: Durations::default(),
+            reference: Durations::default(),
+            pipelines: Durations::default(),
+            steering: Durations::default(),
+            paused: Durations::default(),
+        }
+    }
 }
 
 impl Settings {
@@ -174,6 +193,8 @@ impl Adaptor {
         config.validate().map_err(InitializeError::Configuration)?;
         orders.validate().map_err(InitializeError::Orders)?;
         let parameters = Parameters::new(parameters)?;
+        let known: Vec<&str> = parameters.all().iter().map(|known| &*known.name).collect();
+        language::check_parameters(&config, &known).map_err(InitializeError::Configuration)?;
         let first = communicator.rank() == 0;
         let journal = match config.journal.as_ref().filter(|_| first) {
             Some(path) => Journal::create(&output.join(path))?,
@@ -211,6 +232,7 @@ impl Adaptor {
             server,
             mesh: SteeredMesh::Unknown,
             lent: Lent::default(),
+            moment: Moment::default(),
             told: Told { schema: language::order_schema(), ..Told::default() },
             paused: false,
             stopped: false,
@@ -275,11 +297,19 @@ impl Adaptor {
             hub.clock.set(moment.cycle, moment.time);
         }
         let fault = self.check(step, moment, channels).err();
-        let moved = match self.meet(moment, fault)? {
-            Some(called) if !self.is_calm(moment, called) => {
-                self.act(step, moment, called, channels)?
+        self.moment = moment;
+        let moved = match self.meet(moment, fault, entered)? {
+            Some((called, outside)) => {
+                let is_calm = self.is_calm(moment, called);
+                let moved = !is_calm && self.act(step, moment, called, channels)?;
+                if self.pipelines.listens() {
+                    // What is due by the clock is so from the next step on: then it is known before
+                    // the step begins, on all ranks.
+                    self.pipelines.tell(outside);
+                }
+                moved
             }
-            _ => false,
+            None => false,
         };
         let left = Instant::now();
         self.timing.execute.add(left - entered);
@@ -338,6 +368,14 @@ impl Adaptor {
         self.log.reports()
     }
 
+    /// The monitors of a pipeline and what they have measured, as far back as is kept
+    /// ([`limits::HISTORY`](tombolo_pipelines::limits::HISTORY)); `None` where there is no pipeline of
+    /// this name.
+    #[must_use]
+    pub fn history(&self, pipeline: &str) -> Option<&History> {
+        self.pipelines.history(pipeline)
+    }
+
     /// Ends the run: viewers are disconnected, and every thread has ended when it returns.
     ///
     /// # Errors
@@ -349,6 +387,8 @@ impl Adaptor {
             steerer.end();
         }
         self.mesh = SteeredMesh::Unknown;
+        let asked = self.pipelines.end(self.moment, self.hub.as_ref());
+        asked.faults.iter().for_each(|fault| self.complain(fault));
         self.server = None;
         let faults = self.pipelines.finish();
         // Rank 0 writes: what was asked for is there before any rank goes on.
@@ -369,6 +409,7 @@ impl Adaptor {
                 .map(|(name, durations)| (name, durations.spread()))
                 .collect(),
             stream: self.hub.as_ref().map(|hub| hub.counts()).unwrap_or_default(),
+            pipelines: self.pipelines.reports(),
         };
         match faults.first() {
             None => Ok(report),
@@ -388,10 +429,16 @@ impl Adaptor {
         &mut self,
         moment: Moment,
         fault: Option<ExecuteError>,
-    ) -> Result<Option<bool>, ExecuteError> {
+        entered: Instant,
+    ) -> Result<Option<(bool, Outside)>, ExecuteError> {
         let called = self.queue.has_called();
+        let mut outside = Outside::default();
+        if self.pipelines.listens() {
+            outside.seconds = entered.duration_since(self.timing.begun).as_secs_f64();
+            outside.viewers = self.hub.as_ref().map_or(0, |hub| hub.arrivals());
+        }
         if self.communicator.size() == 1 {
-            return fault.map_or(Ok(Some(called)), Err);
+            return fault.map_or(Ok(Some((called, outside))), Err);
         }
         let due =
             self.meetings.calls.is_multiple_of(u64::from(self.config.steering.poll_steps.get()));
@@ -405,7 +452,7 @@ impl Adaptor {
             self.meetings.fault = fault;
             return Ok(None);
         }
-        meeting::meet(&*self.communicator, moment, fault, called).map(Some)
+        meeting::meet(&*self.communicator, moment, fault, called, outside).map(Some)
     }
 
     /// Whether there is nothing to do in this call.
@@ -446,7 +493,8 @@ impl Adaptor {
         }
         if self.pipelines.is_due(moment) {
             let begun = Instant::now();
-            let asked = self.pipelines.run(moment, channels, self.hub.as_ref());
+            let parameters = self.parameters.all();
+            let asked = self.pipelines.run(moment, channels, parameters, self.hub.as_ref());
             self.timing.pipelines.add(begun.elapsed());
             for fault in asked.faults {
                 self.complain(&fault);

@@ -60,12 +60,13 @@ mod stages;
 pub mod steering;
 mod step;
 pub mod stream;
+mod table;
 mod writer;
 
 pub use adaptor::Adaptor;
 pub use error::{ExecuteError, FinalizeError, InitializeError};
 pub use journal::JournalError;
-pub use report::{Report, Spread};
+pub use report::{MonitorReport, PipelineReport, Report, Spread};
 pub use settings::Settings;
 pub use steering::{
     MeshMotion, NotFollowed, ORDERS_KEPT, OrderReport, OrderStatus, Parameter, ParameterError,

@@ -3,11 +3,14 @@
 use tombolo_deform::communicator::{Communicator, RankError, Reduction, first_failure};
 use tombolo_pipelines::language::{Command, parse_json};
 
-use crate::{error::ExecuteError, step::Moment};
+use crate::{
+    error::ExecuteError,
+    step::{Moment, Outside},
+};
 
 /// Finds out whether all ranks are at the same cycle and time and none has a fault, and whether
-/// rank 0 was called to look at something. One reduction of six numbers; a message more where there
-/// is a fault. Collective.
+/// rank 0 was called to look at something, and what it knows of the world outside. One reduction of
+/// six numbers; a message more where there is a fault. Collective.
 ///
 /// # Errors
 /// One of these, on all ranks: [`ExecuteError::Cycles`], [`ExecuteError::Times`], or
@@ -17,10 +20,11 @@ pub(crate) fn meet(
     moment: Moment,
     fault: Option<ExecuteError>,
     called: bool,
-) -> Result<bool, ExecuteError> {
+    outside: Outside,
+) -> Result<(bool, Outside), ExecuteError> {
     let told = fault.map(|fault| fault.to_string().into_bytes());
     let (cycle, time) = (moment.cycle, position_of(moment.time));
-    let called = u64::from(called && communicator.rank() == 0);
+    let called = if communicator.rank() == 0 { packed(called, outside) } else { 0 };
     let mut said = [u64::from(told.is_some()), called, cycle, !cycle, time, !time];
     communicator.reduce_integers(Reduction::Maximum, &mut said);
     let [failing, called, highest, lowest, latest, earliest] = said;
@@ -38,7 +42,27 @@ pub(crate) fn meet(
     if latest > earliest {
         return Err(ExecuteError::Times { cycle, earliest, latest });
     }
-    Ok(called > 0)
+    Ok(unpacked(called))
+}
+
+/// Bits of the count of viewers, behind one bit for the call; the milliseconds have the others.
+const VIEWERS: u32 = 20;
+
+fn packed(called: bool, Outside { seconds, viewers }: Outside) -> u64 {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a conversion that saturates"
+    )]
+    let milliseconds = (seconds * 1e3) as u64;
+    milliseconds << (VIEWERS + 1) | viewers.min((1 << VIEWERS) - 1) << 1 | u64::from(called)
+}
+
+fn unpacked(packed: u64) -> (bool, Outside) {
+    #[expect(clippy::cast_precision_loss, reason = "milliseconds below 2^43")]
+    let seconds = (packed >> (VIEWERS + 1)) as f64 / 1e3;
+    let viewers = packed >> 1 & ((1 << VIEWERS) - 1);
+    (packed & 1 == 1, Outside { seconds, viewers })
 }
 
 const SIGN: u64 = 1 << 63;
@@ -110,23 +134,32 @@ mod tests {
     #[test]
     fn faults_are_the_same_everywhere() {
         let at = |cycle: u64| Moment { cycle, time: 0.0 };
-        let met = threads::run(3, |ranks| meet(&ranks, at(4), None, ranks.rank() == 0));
-        assert!(met.into_iter().all(|called| called.is_ok_and(|called| called)));
+        let met = threads::run(3, |ranks| {
+            let own = ranks.rank() as f64;
+            let outside = Outside { seconds: 12.5 + own, viewers: 3 };
+            meet(&ranks, at(4), None, ranks.rank() == 0, outside)
+        });
+        let of_first = (true, Outside { seconds: 12.5, viewers: 3 });
+        assert!(met.into_iter().all(|met| met.is_ok_and(|met| met == of_first)));
         let said = threads::run(3, |ranks| {
             let fault = (ranks.rank() > 0).then_some(ExecuteError::NoChannel { cycle: 4 });
-            meet(&ranks, at(4), fault, false).unwrap_err().to_string()
+            meet(&ranks, at(4), fault, false, Outside::default()).unwrap_err().to_string()
         });
         assert!(
             said.iter().all(|said| said.starts_with("rank 1: cycle 4: no channel was given")),
             "{said:?}"
         );
         let said = threads::run(3, |ranks| {
-            meet(&ranks, at(4 + ranks.rank() as u64), None, false).unwrap_err().to_string()
+            meet(&ranks, at(4 + ranks.rank() as u64), None, false, Outside::default())
+                .unwrap_err()
+                .to_string()
         });
         assert!(said.iter().all(|said| said.contains("from 4 to 6")), "{said:?}");
         let said = threads::run(3, |ranks| {
             let time = if ranks.rank() == 1 { 0.25 } else { 0.5 };
-            meet(&ranks, Moment { cycle: 4, time }, None, false).unwrap_err().to_string()
+            meet(&ranks, Moment { cycle: 4, time }, None, false, Outside::default())
+                .unwrap_err()
+                .to_string()
         });
         assert!(said.iter().all(|said| said.contains("from 0.25 to 0.5")), "{said:?}");
     }

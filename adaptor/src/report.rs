@@ -4,6 +4,11 @@ use std::{collections::BTreeMap, time::Duration};
 
 use serde::Serialize;
 
+use tombolo_pipelines::{
+    language::Monitor,
+    run::{Cost, History},
+};
+
 use crate::{steering::OrderReport, stream::StreamCounts};
 
 /// The report that [`Adaptor::finalize`](crate::Adaptor::finalize) hands back.
@@ -22,6 +27,68 @@ pub struct Report {
     pub adaptor_seconds: BTreeMap<&'static str, Spread>,
     /// The frames and bytes that were streamed.
     pub stream: StreamCounts,
+    /// What each pipeline has cost and measured.
+    pub pipelines: Vec<PipelineReport>,
+}
+
+/// What a pipeline has cost and measured.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PipelineReport {
+    /// Its name.
+    pub name: String,
+    /// How often it ran.
+    pub runs: u64,
+    /// Seconds inside its stages, on this rank.
+    pub seconds: f64,
+    /// Bytes of the extracts that were streamed and written, before they were encoded.
+    pub bytes: u64,
+    /// Bytes that it kept from run to run.
+    pub memory: u64,
+    /// It ran at each so manieth of its times in the end: 1, or more where it exceeded its budget.
+    pub every: u32,
+    /// Its monitors.
+    pub monitors: Vec<MonitorReport>,
+}
+
+/// What a monitor has measured.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MonitorReport {
+    /// Its name.
+    pub name: String,
+    /// Its unit, where one is given.
+    pub unit: Option<String>,
+    /// The value that was measured last; `None` where there is none, or it is not finite.
+    pub last: Option<f64>,
+    /// The least of those that are kept.
+    pub min: Option<f64>,
+    /// The largest of those that are kept.
+    pub max: Option<f64>,
+}
+
+impl PipelineReport {
+    pub(crate) fn new(name: &str, cost: Cost, history: Option<&History>) -> Self {
+        let Cost { runs, seconds, bytes, memory, every, .. } = cost;
+        let monitor = |(index, monitor): (usize, &Monitor)| {
+            let values = || {
+                let measured = history.into_iter().flat_map(History::measured);
+                measured
+                    .filter_map(move |measured| measured.values.get(index))
+                    .copied()
+                    .filter(|value| value.is_finite())
+            };
+            let last = history.and_then(History::last).and_then(|last| last.values.get(index));
+            MonitorReport {
+                name: monitor.name.clone(),
+                unit: monitor.unit.clone(),
+                last: last.copied().filter(|value| value.is_finite()),
+                min: values().reduce(f64::min),
+                max: values().reduce(f64::max),
+            }
+        };
+        let monitors = history.map(History::monitors).unwrap_or_default().iter();
+        let monitors = monitors.enumerate().map(monitor).collect();
+        Self { name: name.into(), runs, seconds, bytes, memory, every, monitors }
+    }
 }
 
 /// How a duration was spread over its occurrences.

@@ -87,6 +87,7 @@ impl Default for Settings {
     fn default() -> Self {
         let config = Config {
             version: 1,
+            description: None,
             stream: None,
             journal: None,
             steering: Default::default(),

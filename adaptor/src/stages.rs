@@ -12,16 +12,18 @@ use tombolo_deform::surface::Surface;
 use tombolo_pipelines::{
     encode::Encoder,
     extract::{Channel, Snapshot},
-    language::{Action, Command, Config, Stage},
-    run::{Frame, MonitorValues, Output, Runner},
+    language::{Action, Command, Config, LogLevel, Stage},
+    run::{Cost, Frame, History, MonitorValues, Output, Runner},
 };
 
 use crate::{
     error::InitializeError,
     lock::lock,
-    step::Moment,
+    report::PipelineReport,
+    steering::Parameter,
+    step::{Moment, Outside},
     stream::{Frame as EncodedFrame, Hub},
-    writer::Writer,
+    writer::{Content, Job, Writer},
 };
 
 /// The pipelines of a run.
@@ -32,6 +34,7 @@ pub(crate) struct Pipelines {
     description: Value,
     can_order: bool,
     drags_skeleton: bool,
+    listens: bool,
     output: PathBuf,
     writer: Writer,
 }
@@ -53,7 +56,7 @@ impl Pipelines {
     ) -> Result<Self, InitializeError> {
         let runner = Runner::with_communicator(config, communicator)
             .map_err(InitializeError::Configuration)?;
-        let views = runner.views();
+        let (views, listens) = (runner.views(), runner.listens());
         let can_order = config.pipelines.iter().any(|pipeline| {
             pipeline.stages.iter().any(|stage| matches!(stage, Stage::Order(_)))
                 || pipeline.then.iter().any(|action| matches!(action, Action::Order(_)))
@@ -65,6 +68,7 @@ impl Pipelines {
             can_order,
             drags_skeleton: (config.pipelines.iter().flat_map(|pipeline| &pipeline.stages))
                 .any(|stage| matches!(stage, Stage::Skeleton(_))),
+            listens,
             output: output.into(),
             writer: Writer::default(),
         })
@@ -111,24 +115,82 @@ impl Pipelines {
         self.runner.reads(moment.cycle, moment.time, channel, is_first)
     }
 
+    /// Whether a pipeline waits for what [`tell`](Self::tell) tells.
+    #[inline]
+    pub(crate) fn listens(&self) -> bool {
+        self.listens
+    }
+
+    /// Tells what goes on outside, alike on all ranks: it counts from the next step on.
+    pub(crate) fn tell(&mut self, outside: Outside) {
+        self.runner.tell(outside.seconds, outside.viewers);
+    }
+
+    /// What the pipelines have cost and measured.
+    pub(crate) fn reports(&self) -> Vec<PipelineReport> {
+        let report = |(name, cost): (&str, Cost)| {
+            let history = self.runner.history(name);
+            PipelineReport::new(name, cost, history)
+        };
+        self.runner.costs().map(report).collect()
+    }
+
+    /// The monitors of a pipeline and what they have measured.
+    pub(crate) fn history(&self, pipeline: &str) -> Option<&History> {
+        self.runner.history(pipeline)
+    }
+
     /// Runs what is due.
     pub(crate) fn run(
         &mut self,
         moment: Moment,
         channels: &[Channel<'_>],
+        parameters: &[Parameter],
         hub: Option<&Arc<Hub>>,
     ) -> Asked {
         let Moment { cycle, time } = moment;
+        let values = parameters.iter().map(|parameter| (&*parameter.name, parameter.value));
+        self.runner.set_parameters(values);
+        let outputs = self.runner.run(&Snapshot { cycle, time, channels });
+        let asked = self.hand_on(outputs, cycle, hub);
+        if let Some(hub) = hub {
+            hub.costs(self.runner.costs());
+        }
+        asked
+    }
+
+    /// Runs what waits for the end of the run.
+    pub(crate) fn end(&mut self, moment: Moment, hub: Option<&Arc<Hub>>) -> Asked {
+        let outputs = self.runner.finish(moment.cycle, moment.time);
+        self.hand_on(outputs, moment.cycle, hub)
+    }
+
+    fn hand_on(&mut self, outputs: Vec<Output>, cycle: u64, hub: Option<&Arc<Hub>>) -> Asked {
         let mut asked = Asked::default();
-        for output in self.runner.run(&Snapshot { cycle, time, channels }) {
+        for output in outputs {
             match output {
                 Output::Frame(frame) => {
                     if let Some(hub) = hub {
                         self.send(frame, hub);
                     }
                 }
-                Output::Write { pipeline, path, time, extract, .. } => {
-                    self.writer.write(&pipeline, self.output.join(path), time, extract);
+                Output::Write { pipeline, path, time, extract, keep, .. } => {
+                    let path = self.output.join(path);
+                    let content = Content::Extract(extract, keep);
+                    self.writer.write(Job { pipeline, path, time, content });
+                }
+                Output::Row { pipeline, table, cycle, time, values } => {
+                    let path = self.output.join(&table.file);
+                    let content = Content::Row(table, cycle, values);
+                    self.writer.write(Job { pipeline, path, time, content });
+                }
+                Output::Log { pipeline, level, message } => {
+                    let level = match level {
+                        LogLevel::Info => log::Level::Info,
+                        LogLevel::Warning => log::Level::Warn,
+                        LogLevel::Error => log::Level::Error,
+                    };
+                    log::log!(level, "cycle {cycle}, pipeline '{pipeline}': {message}");
                 }
                 Output::Monitor(values) => {
                     if let Some(hub) = hub {
@@ -177,5 +239,6 @@ impl Pipelines {
 fn monitor(values: &MonitorValues) -> Value {
     let by_name: Map<String, Value> =
         values.values.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
-    json!({"monitor": {"pipeline": &*values.pipeline, "cycle": values.cycle, "values": by_name}})
+    let (pipeline, cycle, time) = (&*values.pipeline, values.cycle, values.time);
+    json!({"monitor": {"pipeline": pipeline, "cycle": cycle, "time": time, "values": by_name}})
 }

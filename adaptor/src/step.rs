@@ -19,6 +19,15 @@ impl Step {
     }
 }
 
+/// What goes on outside the solver, as rank 0 knows it.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Outside {
+    /// Seconds since the run began.
+    pub(crate) seconds: f64,
+    /// How many viewers have come so far.
+    pub(crate) viewers: u64,
+}
+
 /// A cycle and its simulated time.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Moment {

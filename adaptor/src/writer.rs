@@ -1,7 +1,8 @@
 //! Writes files on a thread of its own.
 
 use std::{
-    collections::HashMap,
+    collections::{HashMap, VecDeque, hash_map::Entry},
+    num::NonZeroU32,
     path::{Path, PathBuf},
     sync::{
         Arc, Mutex,
@@ -13,20 +14,31 @@ use std::{
 use tombolo_pipelines::{
     extract::Extract,
     files::{self, Series},
+    run::Table,
 };
 
 use crate::lock::lock;
+use crate::table::OpenTable;
 
-/// Extracts that may wait to be written; the solver waits where the disk is slower than this.
+/// Files and rows that may wait to be written; the solver waits where the disk is slower than this.
 const WAITING: usize = 2;
 /// Faults that are kept.
 const FAULTS: usize = 100;
 
-struct Job {
-    pipeline: Arc<str>,
-    path: PathBuf,
-    time: f64,
-    extract: Arc<Extract>,
+/// A file that a pipeline asks for.
+pub(crate) struct Job {
+    pub(crate) pipeline: Arc<str>,
+    pub(crate) path: PathBuf,
+    pub(crate) time: f64,
+    pub(crate) content: Content,
+}
+
+/// What is written.
+pub(crate) enum Content {
+    /// A file of its own; of the pipeline only so many stay.
+    Extract(Arc<Extract>, Option<NonZeroU32>),
+    /// A row of a table.
+    Row(Arc<Table>, u64, Vec<f64>),
 }
 
 /// Starts its thread with the first file.
@@ -39,14 +51,7 @@ pub(crate) struct Writer {
 }
 
 impl Writer {
-    pub(crate) fn write(
-        &mut self,
-        pipeline: &Arc<str>,
-        path: PathBuf,
-        time: f64,
-        extract: Arc<Extract>,
-    ) {
-        let job = Job { pipeline: Arc::clone(pipeline), path, time, extract };
+    pub(crate) fn write(&mut self, job: Job) {
         if self.jobs.is_none() {
             let (jobs, next) = sync_channel(WAITING);
             let faults = Arc::clone(&self.faults);
@@ -96,38 +101,108 @@ fn note(faults: &Mutex<Vec<String>>, fault: String) {
     }
 }
 
+/// What has been written so far.
+#[derive(Default)]
+struct Written {
+    /// Of each pipeline.
+    files: HashMap<Arc<str>, Files>,
+    /// By path; `None` where a table cannot be written, which has been told.
+    tables: HashMap<PathBuf, Option<OpenTable>>,
+}
+
 /// The files that a pipeline has written: its first file, and the series once there is a second.
-enum Written {
+enum Files {
     One(PathBuf, f64),
     Many(Series),
+    /// The newest ones, the oldest first.
+    Kept(VecDeque<(PathBuf, f64)>),
 }
 
 fn work(jobs: &Receiver<Job>, faults: &Mutex<Vec<String>>) {
-    let mut written: HashMap<Arc<str>, Written> = HashMap::new();
+    let mut written = Written::default();
     while let Ok(job) = jobs.recv() {
-        if let Err(fault) = write(&job, &mut written) {
+        let outcome = match &job.content {
+            Content::Extract(extract, keep) => written.extract(&job, extract, *keep),
+            Content::Row(table, cycle, values) => written.row(&job, table, *cycle, values),
+        };
+        if let Err(fault) = outcome {
             note(faults, fault);
         }
     }
 }
 
-fn write(job: &Job, written: &mut HashMap<Arc<str>, Written>) -> Result<(), String> {
-    let told = |error: files::FileError| error.to_string();
-    files::write(&job.path, &job.extract).map_err(told)?;
-    match written.get_mut(&job.pipeline) {
-        None => {
-            written.insert(Arc::clone(&job.pipeline), Written::One(job.path.clone(), job.time));
+fn told(error: files::FileError) -> String {
+    error.to_string()
+}
+
+impl Written {
+    fn extract(
+        &mut self,
+        job: &Job,
+        extract: &Extract,
+        keep: Option<NonZeroU32>,
+    ) -> Result<(), String> {
+        files::write(&job.path, extract).map_err(told)?;
+        let series = || {
+            let directory = job.path.parent().unwrap_or(Path::new("."));
+            directory.join(format!("{}.pvd", job.pipeline))
+        };
+        if let Some(keep) = keep {
+            let files = self.files.entry(Arc::clone(&job.pipeline));
+            let Files::Kept(kept) = files.or_insert_with(|| Files::Kept(VecDeque::new())) else {
+                return Ok(());
+            };
+            if kept.back().is_some_and(|(path, _)| *path == job.path) {
+                kept.pop_back();
+            }
+            kept.push_back((job.path.clone(), job.time));
+            let mut gone = Vec::new();
+            while kept.len() > keep.get() as usize {
+                gone.extend(kept.pop_front());
+            }
+            // The series never names a file that is not there.
+            if kept.len() > 1 || !gone.is_empty() {
+                let shown = kept.iter().map(|(path, time)| (*time, &**path));
+                Series::of(&series(), shown).map_err(told)?;
+            }
+            return gone.iter().try_for_each(|(path, _)| files::remove(path).map_err(told));
         }
-        Some(Written::One(path, _)) if *path == job.path => {}
-        Some(Written::One(path, time)) => {
-            let directory = path.parent().unwrap_or(Path::new("."));
-            let mut series =
-                Series::create(&directory.join(format!("{}.pvd", job.pipeline))).map_err(told)?;
-            series.push(*time, path).map_err(told)?;
-            series.push(job.time, &job.path).map_err(told)?;
-            written.insert(Arc::clone(&job.pipeline), Written::Many(series));
+        match self.files.get_mut(&job.pipeline) {
+            None => {
+                let first = Files::One(job.path.clone(), job.time);
+                self.files.insert(Arc::clone(&job.pipeline), first);
+            }
+            Some(Files::One(path, _)) if *path == job.path => {}
+            Some(Files::One(path, time)) => {
+                let mut series = Series::create(&series()).map_err(told)?;
+                series.push(*time, path).map_err(told)?;
+                series.push(job.time, &job.path).map_err(told)?;
+                self.files.insert(Arc::clone(&job.pipeline), Files::Many(series));
+            }
+            Some(Files::Many(series)) => series.push(job.time, &job.path).map_err(told)?,
+            Some(Files::Kept(_)) => {}
         }
-        Some(Written::Many(series)) => series.push(job.time, &job.path).map_err(told)?,
+        Ok(())
     }
-    Ok(())
+
+    fn row(&mut self, job: &Job, table: &Table, cycle: u64, row: &[f64]) -> Result<(), String> {
+        let open = match self.tables.entry(job.path.clone()) {
+            Entry::Occupied(open) => open.into_mut(),
+            Entry::Vacant(place) => {
+                let opened = OpenTable::open(&job.path, table);
+                let (open, fault) = match opened {
+                    Ok(open) => (Some(open), Ok(())),
+                    Err(fault) => (None, Err(fault)),
+                };
+                let open = place.insert(open);
+                fault?;
+                open
+            }
+        };
+        let Some(opened) = open else { return Ok(()) };
+        opened.push(cycle, job.time, row).map_err(|fault| {
+            *open = None;
+            format!("{}: {fault}", job.path.display())
+        })
+    }
 }

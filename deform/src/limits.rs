@@ -95,8 +95,23 @@ pub const CUTS: Limit = limit("surfaces", 256, "the planes of a slice, or the va
 /// Points of a probe.
 pub const PROBES: Limit = limit("points", 1 << 20, "a probe");
 
+/// Bins of a histogram.
+pub const BINS: Limit = limit("bins", 1024, "a histogram");
+/// Measurements of monitors that are kept.
+pub const HISTORY: Limit = limit(
+    "measurements",
+    4096,
+    "the history of a pipeline's monitors, of which the oldest are forgotten first, and a spectrum",
+);
+/// Numbers in the history of one pipeline's monitors.
+pub const HISTORY_NUMBERS: Limit = limit(
+    "numbers",
+    1 << 20,
+    "the history of a pipeline's monitors: where they are many, fewer measurements are kept",
+);
+
 /// All of them.
-pub const ALL: [Limit; 15] = [
+pub const ALL: [Limit; 18] = [
     DOCUMENT,
     VALUES,
     DEPTH,
@@ -112,4 +127,7 @@ pub const ALL: [Limit; 15] = [
     WAITING_BYTES,
     CUTS,
     PROBES,
+    BINS,
+    HISTORY,
+    HISTORY_NUMBERS,
 ];

@@ -122,6 +122,44 @@ const REGIONS: &str = r#"
     {"name": "half", "stages": [{"clip": {"plane": {"origin": [0.9, 0.4, 0.5], "normal": [2, 0.6, -0.4]}}},
         {"integrate": {"name": "part", "field": "p", "vector": "u"}}, {"integrate": {"name": "part load", "field": "load"}}]}"#;
 
+/// Parts that the fields decide.
+const BY_FIELDS: &str = r#"
+    {"name": "level", "stages": [{"contour": {"field": "p", "values": [0.11]}},
+        {"integrate": {"name": "level", "field": "p", "vector": "u"}}, {"integrate": {"name": "level load", "field": "load"}}]},
+    {"name": "few", "stages": [{"threshold": {"field": "load", "min": 30, "max": 99}},
+        {"integrate": {"name": "few", "field": "p", "vector": "u"}}, {"integrate": {"name": "few load", "field": "load"}}]},
+    {"name": "inside", "stages": [{"clip": {"field": {"name": "p", "value": 0.2}}},
+        {"integrate": {"name": "inside", "field": "p", "vector": "u"}}, {"integrate": {"name": "inside load", "field": "load"}}]},
+    {"name": "friction", "stages": [{"surface": {}}, {"force": {"name": "drag", "velocity": "u", "viscosity": 1}}]}"#;
+
+/// A level and a clip by a linear field are those by a plane.
+#[test]
+fn parts_by_a_linear_field_are_those_by_a_plane() {
+    let scalar = |[x, y, z]: Vector| 1.0 + x - 3.0 * y + 2.0 * z;
+    let vector = |[x, y, z]: Vector| [x + y, 2.0 * y - z, 3.0 * z + 1.0];
+    let pipelines = r#"
+        {"name": "a", "stages": [{"contour": {"field": "p", "values": [1.75]}}, {"integrate": {"name": "level", "field": "p", "vector": "u"}}]},
+        {"name": "b", "stages": [{"slice": {"origin": [0.75, 0, 0], "normal": [1, -3, 2]}}, {"integrate": {"name": "plane", "field": "p", "vector": "u"}}]},
+        {"name": "c", "stages": [{"clip": {"field": {"name": "p", "value": 1.75}}}, {"integrate": {"name": "above", "field": "p", "vector": "u"}}]},
+        {"name": "d", "stages": [{"clip": {"plane": {"origin": [0.75, 0, 0], "normal": [1, -3, 2]}}}, {"integrate": {"name": "side", "field": "p", "vector": "u"}}]},
+        {"name": "e", "stages": [{"clip": {"field": {"name": "p", "value": 1.75}, "invert": true}}, {"integrate": {"name": "below", "field": "p", "vector": "u"}}]}"#;
+    let tets = warped(&box_of_tets([5, 4, 4], [0.0; 3], UPPER));
+    let mixed = box_of_mixed_cells([6, 4, 4], [0.0; 3], UPPER);
+    for mesh in [&tets, &mixed] {
+        let one = found(pipelines, &whole(mesh), Arc::new(Solo), scalar, vector);
+        assert!(one.1.is_empty(), "{:?}", one.1);
+        for (by_field, by_plane) in [("level", "plane"), ("above", "side")] {
+            for (name, value) in one.0.iter().filter(|(name, _)| name.starts_with(by_field)) {
+                is_near(*value, one.0[&name.replace(by_field, by_plane)], name);
+            }
+        }
+        is_near(one.0["level.mean"], 1.75, "level");
+        is_near(one.0["above.size"] + one.0["below.size"], 2.0, "both");
+        is_near(one.0["above.integral"] + one.0["below.integral"], 3.0, "both");
+        is_alike(&on_ranks(mesh, pipelines, scalar, vector), &one);
+    }
+}
+
 #[test]
 fn linear_fields_have_their_closed_forms() {
     let scalar = |[x, y, z]: Vector| 1.0 + x - 3.0 * y + 2.0 * z;
@@ -160,8 +198,9 @@ fn integrals_are_those_of_vtk() {
     let scalar = |[x, y, z]: Vector| x * y + z * z - 0.5 * x;
     let vector = |[x, y, z]: Vector| [y * z - 0.3 * x, (2.0 * x).sin() + z, 0.5 * x * x - y];
     let mesh = warped(&box_of_tets([5, 4, 4], [0.0; 3], UPPER));
-    let one = found(REGIONS, &whole(&mesh), Arc::new(Solo), scalar, vector);
-    is_alike(&on_ranks(&mesh, REGIONS, scalar, vector), &one);
+    let pipelines = format!("{REGIONS}, {BY_FIELDS}");
+    let one = found(&pipelines, &whole(&mesh), Arc::new(Solo), scalar, vector);
+    is_alike(&on_ranks(&mesh, &pipelines, scalar, vector), &one);
 
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("mesh.vtu");
@@ -187,7 +226,7 @@ fn integrals_are_those_of_vtk() {
         let (ours_value, theirs) = (one.0[ours], theirs.as_f64().unwrap());
         assert!((ours_value - theirs).abs() < 1e-6, "{ours}: {ours_value}, VTK has {theirs}");
     };
-    for region in ["whole", "surface", "cut", "part"] {
+    for region in ["whole", "surface", "cut", "part", "level", "few", "inside"] {
         near(&format!("{region}.size"), &theirs[region]["size"]);
         near(&format!("{region}.integral"), &theirs[region]["p"][0]);
         for (axis, letter) in ["x", "y", "z"].iter().enumerate() {
@@ -199,6 +238,12 @@ fn integrals_are_those_of_vtk() {
     near("cells.integral", &theirs["whole"]["load"][0]);
     near("cut load.integral", &theirs["cut"]["load"][0]);
     near("part load.integral", &theirs["part"]["load"][0]);
+    near("level load.integral", &theirs["level"]["load"][0]);
+    near("few load.integral", &theirs["few"]["load"][0]);
+    near("inside load.integral", &theirs["inside"]["load"][0]);
+    for (axis, letter) in ["x", "y", "z"].iter().enumerate() {
+        near(&format!("drag.{letter}"), &theirs["viscous"][axis]);
+    }
 }
 
 #[test]

@@ -68,7 +68,44 @@ clip.SetOutputPointsPrecision(vtk.vtkAlgorithm.DOUBLE_PRECISION)
 clip.SetClipFunction(plane)
 part = updated(clip, grid)
 
-results = {"whole": integrals(grid), "surface": integrals(surface), "cut": integrals(cut), "part": integrals(part)}
+def by_field(filter, name, association):
+    filter.SetInputArrayToProcess(0, 0, 0, association, name)
+    return filter
+
+
+level = by_field(vtk.vtkContourFilter(), "p", vtk.vtkDataObject.FIELD_ASSOCIATION_POINTS)
+level.SetOutputPointsPrecision(vtk.vtkAlgorithm.DOUBLE_PRECISION)
+level.SetValue(0, 0.11)
+few = by_field(vtk.vtkThreshold(), "load", vtk.vtkDataObject.FIELD_ASSOCIATION_CELLS)
+few.SetLowerThreshold(30)
+few.SetUpperThreshold(99)
+few.SetThresholdFunction(vtk.vtkThreshold.THRESHOLD_BETWEEN)
+inside = by_field(vtk.vtkTableBasedClipDataSet(), "p", vtk.vtkDataObject.FIELD_ASSOCIATION_POINTS)
+inside.SetOutputPointsPrecision(vtk.vtkAlgorithm.DOUBLE_PRECISION)
+inside.SetValue(0.2)
+
+
+def viscous(grid):
+    """The force of friction on the surface for a viscosity of 1: minus the gradient of `u` and its transpose, times the areas."""
+    gradients = by_field(vtk.vtkGradientFilter(), "u", vtk.vtkDataObject.FIELD_ASSOCIATION_POINTS)
+    gradients.SetResultArrayName("G")
+    faces = updated(vtk.vtkDataSetSurfaceFilter(), updated(gradients, grid))
+    total = [0.0] * 3
+    for number in range(faces.GetNumberOfCells()):
+        cell = faces.GetCell(number)
+        corners = [cell.GetPoints().GetPoint(corner) for corner in range(3)]
+        area = [0.0] * 3
+        vtk.vtkMath.Cross(*([q - p for p, q in zip(corners[0], corner)] for corner in corners[1:]), area)
+        for corner in range(3):
+            g = faces.GetPointData().GetArray("G").GetTuple(cell.GetPointId(corner))
+            for row in range(3):
+                total[row] -= sum((g[3 * row + column] + g[3 * column + row]) * area[column] for column in range(3)) / 6
+    return total
+
+
+results = {"level": integrals(updated(level, grid)), "few": integrals(updated(few, grid)), "inside": integrals(updated(inside, grid))}
+results["viscous"] = viscous(grid)
+results |= {"whole": integrals(grid), "surface": integrals(surface), "cut": integrals(cut), "part": integrals(part)}
 results["surface"]["flow_rate"] = flow_rate(surface)
 results["cut"]["flow_rate"] = flow_rate(cut, normal)
 json.dump(results, sys.stdout)

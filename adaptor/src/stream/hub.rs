@@ -17,6 +17,7 @@ use std::{
 use axum::body::Bytes;
 use serde_json::{Map, Value, json};
 use tokio::sync::Notify;
+use tombolo_pipelines::run::Cost;
 
 use super::{ReferenceSurface, StreamCounts};
 use crate::lock::{lock, wait};
@@ -152,6 +153,8 @@ struct HubState {
     driver: Option<u64>,
     /// When the driver's connection was lost, and whose it was.
     wheel_lost: Option<(Instant, u64)>,
+    /// What each pipeline has cost, by name.
+    costs: Vec<(String, Cost)>,
     last_status: Option<(u64, Instant)>,
     status_dirty: bool,
     closed: bool,
@@ -164,6 +167,7 @@ pub(crate) struct Hub {
     work: Condvar,
     pub(crate) clock: Clock,
     counters: Counters,
+    arrivals: AtomicU64,
 }
 
 /// The name of a viewer in messages.
@@ -190,6 +194,21 @@ impl Hub {
         let mut state = lock(&self.state);
         state.conditions = conditions;
         state.status_dirty = true;
+    }
+
+    /// Replaces what the status tells of the cost of pipelines.
+    pub(crate) fn costs<'a>(&self, costs: impl Iterator<Item = (&'a str, Cost)>) {
+        let mut state = lock(&self.state);
+        if state.clients.is_empty() {
+            return;
+        }
+        state.costs.clear();
+        state.costs.extend(costs.map(|(name, cost)| (name.to_owned(), cost)));
+    }
+
+    /// How many viewers have come so far.
+    pub(crate) fn arrivals(&self) -> u64 {
+        self.arrivals.load(Ordering::Relaxed)
     }
 
     /// Returns once a viewer is connected.
@@ -342,6 +361,7 @@ impl Hub {
             }
         }
         state.clients.insert(client.id, Arc::clone(&client));
+        self.arrivals.fetch_add(1, Ordering::Relaxed);
         state.status_dirty = true;
         drop(state);
         self.work.notify_one();
@@ -431,6 +451,11 @@ impl Hub {
         }
         status.insert("viewers".into(), state.clients.len().into());
         status.insert("driver".into(), state.driver.map(name).into());
+        let pipeline = |(name, cost): &(String, Cost)| {
+            json!({"name": name, "runs": cost.runs, "seconds": cost.seconds, "bytes": cost.bytes,
+                   "memory": cost.memory, "every": cost.every})
+        };
+        status.insert("pipelines".into(), state.costs.iter().map(pipeline).collect());
         let text: Arc<str> = json!({ "status": status }).to_string().into();
         for client in state.clients.values() {
             client.put(|outbox| outbox.status = Some(Arc::clone(&text)));

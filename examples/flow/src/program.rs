@@ -260,6 +260,7 @@ impl Run {
             step_seconds: adaptor.step_seconds,
             adaptor_seconds: adaptor.adaptor_seconds,
             stream: adaptor.stream,
+            pipelines: adaptor.pipelines,
             flow: self.flow,
             error,
         })

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use tombolo::stream::StreamCounts;
-use tombolo::{OrderReport, Spread};
+use tombolo::{OrderReport, PipelineReport, Spread};
 
 use crate::history::Through;
 use crate::solver::{Solver, StepOutcome};
@@ -26,6 +26,8 @@ pub struct Report {
     pub adaptor_seconds: BTreeMap<&'static str, Spread>,
     /// The frames that were streamed.
     pub stream: StreamCounts,
+    /// What each pipeline has cost and measured.
+    pub pipelines: Vec<PipelineReport>,
     /// The flow.
     pub flow: FlowReport,
     /// Why the run ended early, where it did.

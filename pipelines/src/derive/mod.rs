@@ -2,6 +2,8 @@
 
 mod formula;
 mod gradient;
+mod running;
+mod wall;
 
 use tombolo_deform::communicator::{Communicator, Reduction, agree};
 use tombolo_deform::mesh::{ArrayView, NumberType, Values};
@@ -10,6 +12,9 @@ use crate::extract::{
     ABSENT, Association, Channel, Field, FieldView, Source, check_length, is_absent, unknown_field,
 };
 use crate::language::{Derived, Stage};
+
+pub(crate) use running::{Running, follow};
+pub(crate) use wall::wall_shear_stress;
 
 /// What fields are derived from.
 #[derive(Clone, Copy)]

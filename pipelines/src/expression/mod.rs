@@ -86,7 +86,16 @@ impl Expression {
     /// # Errors
     /// As [`parse`](Self::parse).
     pub fn parse_open(text: &str) -> Result<(Self, Vec<String>), ExpressionError> {
-        let (program, names) = parse_open(text)?;
+        let (program, names) = parse_open(text, Kind::Number)?;
+        Ok((Self { program }, names))
+    }
+
+    /// Parses a condition that may use any name, and returns the names that it uses.
+    ///
+    /// # Errors
+    /// As [`parse`](Self::parse).
+    pub fn parse_open_condition(text: &str) -> Result<(Self, Vec<String>), ExpressionError> {
+        let (program, names) = parse_open(text, Kind::Condition)?;
         Ok((Self { program }, names))
     }
 

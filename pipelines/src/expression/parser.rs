@@ -25,11 +25,14 @@ pub(super) fn parse(
     parsed(Parser::new(text, names), expected).map(|parser| parser.program)
 }
 
-/// The operations of a formula whose value is a number and that may use any name, and the names
-/// that it uses: their positions are those of the values.
-pub(super) fn parse_open(text: &str) -> Result<(Vec<Operation>, Vec<String>), ExpressionError> {
+/// The operations of a formula that may use any name, and the names that it uses: their positions
+/// are those of the values.
+pub(super) fn parse_open(
+    text: &str,
+    expected: Kind,
+) -> Result<(Vec<Operation>, Vec<String>), ExpressionError> {
     let parser = Parser { found_names: Some(Vec::new()), ..Parser::new(text, &[]) };
-    let parser = parsed(parser, Kind::Number)?;
+    let parser = parsed(parser, expected)?;
     Ok((parser.program, parser.found_names.unwrap_or_default()))
 }
 

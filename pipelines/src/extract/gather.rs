@@ -30,6 +30,11 @@ impl Default for Rows {
 }
 
 impl Rows {
+    /// Bytes of memory.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.offsets) + size_of_val(&*self.entries)
+    }
+
     /// Appends a point: its vertices and their weights, whose sum is 1.
     pub(super) fn push(&mut self, entries: impl IntoIterator<Item = (u32, f64)>) {
         self.entries.extend(entries);

@@ -30,6 +30,7 @@ pub(crate) use gather::check_length;
 pub(crate) use merge::merged;
 pub use pattern::{Input, Kept};
 pub(crate) use skin::skin;
+pub(crate) use source::Walls;
 pub use source::{Extracted, MeshKey, Source};
 pub use statistics::{FieldStatistics, statistics};
 
@@ -218,4 +219,14 @@ pub struct Extract {
     pub features: Option<Arc<ExtractFeatures>>,
     /// The fields.
     pub fields: Vec<Field>,
+}
+
+impl Extract {
+    /// Bytes of its points, cells and fields.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let values: usize = self.fields.iter().map(|field| field.values.len()).sum();
+        let cells = 4 * self.cells.connectivity().len() + 8 * self.cells.offsets().len();
+        size_of::<Vector>() * self.points.len() + cells + 8 * values
+    }
 }

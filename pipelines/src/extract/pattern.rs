@@ -37,6 +37,11 @@ impl Kept {
         self.pattern.clone().filter(|_| self.version == version)
     }
 
+    /// Bytes of memory.
+    pub(crate) fn bytes(&self) -> usize {
+        self.pattern.as_ref().map_or(0, |pattern| pattern.bytes())
+    }
+
     pub(super) fn keep(&mut self, version: u64, pattern: &Arc<Pattern>) {
         *self = Self { version, pattern: Some(Arc::clone(pattern)) };
     }
@@ -67,6 +72,21 @@ pub(super) struct Pattern {
 }
 
 impl Pattern {
+    /// Bytes of its points, cells and weights.
+    fn bytes(&self) -> usize {
+        let base = match &self.base {
+            Base::Vertices(vertices) => 4 * vertices.len(),
+            Base::Crossings(crossings) => size_of::<Crossing>() * crossings.len(),
+            Base::Rows(rows) | Base::Probe(_, rows) => rows.bytes(),
+        };
+        let origin = match &self.origin {
+            Origin::Between(supports) => size_of::<Support>() * supports.len(),
+            _ => 0,
+        };
+        let cells = 4 * self.cells.connectivity().len() + 8 * self.cells.offsets().len();
+        size_of::<Vector>() * self.points.len() + 4 * self.owners.len() + base + cells + origin
+    }
+
     /// The extract with the fields of this step.
     pub(super) fn fill(&self, input: &Input) -> Extracted {
         let points = match &self.base {

@@ -139,6 +139,30 @@ pub fn write(path: impl AsRef<Path>, extract: &Extract) -> Result<(), FileError>
     write_compressed(path, extract, Compression::None)
 }
 
+/// Removes a file that [`write`](fn@write) has written, with the data that it names and their folder
+/// where that is empty then.
+///
+/// # Errors
+/// [`FileError`] where a file is there and cannot be removed.
+pub fn remove(path: impl AsRef<Path>) -> Result<(), FileError> {
+    let path = path.as_ref();
+    let gone = |path: &Path| match std::fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(Flaw::from(error).in_file(path))
+        }
+        _ => Ok(()),
+    };
+    gone(path)?;
+    let Some(index) = vtk::Index::of(&extension(path)) else { return Ok(()) };
+    let piece = path.with_file_name(index.piece(path));
+    gone(&piece)?;
+    if let Some(folder) = piece.parent() {
+        // What somebody else has put there stays.
+        let _ = std::fs::remove_dir(folder);
+    }
+    Ok(())
+}
+
 /// Writes an extract to a file with its arrays compressed.
 ///
 /// # Errors

@@ -3,14 +3,18 @@
 use std::net::SocketAddr;
 use std::num::NonZeroU32;
 
-use super::{Clip, Contour, Deformation, Derived, Formula, Integrate, Probe, Slice, Threshold};
+use super::{
+    Clip, Contour, Csv, Deformation, Derived, Difference, Force, Formula, Histogram, Integrate,
+    Log, Parameter, Pipeline, Probe, Slice, Spectrum, Statistics, Threshold, TimeStatistics,
+    WallShearStress,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tombolo_deform::edit::{
     Affine, Displacement, Edit, Rotate, ScaleDirection, ScaleNormals, SkeletonEdit, Translate,
 };
 use tombolo_deform::quality::Guard;
-use tombolo_deform::schedule::{Every, Schedule};
+use tombolo_deform::schedule::Schedule;
 
 /// A whole configuration file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -19,6 +23,9 @@ pub struct Config {
     /// The version of this language: 1.
     #[schemars(range(min = 1, max = 1))]
     pub version: u32,
+    /// What the file is for, in words for people.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub description: Option<String>,
     /// The server that viewers connect to; left out, there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stream: Option<StreamServer>,
@@ -77,133 +84,6 @@ impl Default for Steering {
     }
 }
 
-/// Stages that run one after the other at some steps.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(try_from = "PipelineFields", into = "PipelineFields")]
-pub struct Pipeline {
-    /// Its name, which is also that of its view; no two pipelines share one.
-    pub name: String,
-    /// The channel it reads, and of one that runs on orders the channel whose mesh they change;
-    /// `None` is the solver's first.
-    pub channel: Option<String>,
-    /// When it runs.
-    pub due: Due,
-    /// Its stages, in order.
-    pub stages: Vec<Stage>,
-    /// The condition, over the monitors of its stages, under which `then` is done. Without one,
-    /// `then` is always done.
-    pub when: Option<String>,
-    /// The actions taken when the condition holds.
-    pub then: Vec<Action>,
-}
-
-/// When a pipeline runs.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Due {
-    /// Again and again.
-    Every(Every),
-    /// Once.
-    At(At),
-    /// For each order: its stages are the settings of orders that bring none.
-    OnOrder,
-}
-
-/// A moment of the run.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum At {
-    /// The first step whose number is at least this.
-    Cycle(u64),
-    /// The first step whose time is at least this.
-    Time(f64),
-}
-
-impl At {
-    /// Whether the moment has come.
-    #[must_use]
-    pub fn has_come(self, cycle: u64, time: f64) -> bool {
-        match self {
-            At::Cycle(at) => cycle >= at,
-            // Time steps add up with rounding: a moment that is a billionth away is not worth a
-            // step's wait.
-            At::Time(at) => time >= at - 1e-9 * at.abs(),
-        }
-    }
-}
-
-/// A pipeline as it stands in JSON.
-#[derive(Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct PipelineFields {
-    /// Its name, which is also that of its view; no two pipelines share one.
-    name: String,
-    /// The channel it reads; left out, the solver's first. Of a pipeline with `"on": "order"`, the
-    /// channel whose mesh orders change.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    channel: Option<String>,
-    /// How often it runs. At most one of `every`, `at` and `on` is given; without any it runs at
-    /// every step.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    every: Option<Every>,
-    /// The one moment at which it runs.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    at: Option<At>,
-    /// The event at which it runs: the stages of a pipeline with `"on": "order"` (`deform`,
-    /// `guard`, `schedule`) are the settings of orders that bring none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    on: Option<Event>,
-    /// Its stages, in order. Each stage is an object with one key, the stage's name.
-    stages: Vec<Stage>,
-    /// A condition over the monitors of its stages, such as
-    /// `quality.min < 0.05 || velocity.max > 100`. `cycle` and `time` may be named too.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    when: Option<String>,
-    /// The actions taken when the condition holds; without a condition, whenever the pipeline has
-    /// run.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    then: Vec<Action>,
-}
-
-/// An event that a pipeline can wait for.
-#[derive(Clone, Copy, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-enum Event {
-    /// An order of a new shape.
-    Order,
-}
-
-impl TryFrom<PipelineFields> for Pipeline {
-    type Error = String;
-
-    fn try_from(fields: PipelineFields) -> Result<Self, String> {
-        let due = match (fields.every, fields.at, fields.on) {
-            (None, None, None) => Due::Every(Schedule::default().every),
-            (Some(every), None, None) => Due::Every(every),
-            (None, Some(at), None) => Due::At(at),
-            (None, None, Some(Event::Order)) => Due::OnOrder,
-            _ => {
-                return Err(
-                    "found more than one of `every`, `at` and `on`, expected at most one".into()
-                );
-            }
-        };
-        let PipelineFields { name, channel, stages, when, then, .. } = fields;
-        Ok(Self { name, channel, due, stages, when, then })
-    }
-}
-
-impl From<Pipeline> for PipelineFields {
-    fn from(pipeline: Pipeline) -> Self {
-        let (every, at, on) = match pipeline.due {
-            Due::Every(every) => (Some(every), None, None),
-            Due::At(at) => (None, Some(at), None),
-            Due::OnOrder => (None, None, Some(Event::Order)),
-        };
-        let Pipeline { name, channel, stages, when, then, .. } = pipeline;
-        Self { name, channel, every, at, on, stages, when, then }
-    }
-}
-
 /// One stage of a pipeline.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
@@ -249,10 +129,27 @@ pub enum Stage {
     /// Integrates over the extract, or over the whole mesh where no stage has taken one: monitors
     /// `<name>.size` (length, area or volume), and those of a scalar and of a vector field.
     Integrate(Integrate),
+    /// Counts how the values of a field are spread over the extract, or over the whole mesh where
+    /// no stage has taken one.
+    Histogram(Histogram),
+    /// Adds up the force of the fluid on the surface, by pressure and friction, and its moment.
+    Force(Force),
+    /// Derives the shear of the flow on the faces of the surface.
+    WallShearStress(WallShearStress),
+    /// Takes one monitor from another.
+    Difference(Difference),
+    /// Follows a monitor or a field over time.
+    TimeStatistics(TimeStatistics),
+    /// Finds the frequencies in a monitor.
+    Spectrum(Spectrum),
     /// Sends the extract to the viewers as the view of this pipeline; of volume cells their outside.
     Stream(StreamStage),
     /// Writes the extract, or the whole mesh where no stage has extracted anything, to a file.
     Write(Write),
+    /// Writes monitors to a table, a row each time.
+    Csv(Csv),
+    /// Says monitors in the log, a line each time.
+    Log(Log),
     /// An edit of the shape, for `order`.
     Translate(Translate),
     /// An edit of the shape, for `order`.
@@ -279,6 +176,8 @@ pub enum Stage {
     Pause {},
     /// Asks the solver to stop.
     Stop {},
+    /// Gives a parameter of the solver a new value.
+    Set(Parameter),
 }
 
 impl Stage {
@@ -302,8 +201,16 @@ impl Stage {
             Stage::Quality {} => "quality",
             Stage::Statistics(_) => "statistics",
             Stage::Integrate(_) => "integrate",
+            Stage::Histogram(_) => "histogram",
+            Stage::Force(_) => "force",
+            Stage::WallShearStress(_) => "wall_shear_stress",
+            Stage::Difference(_) => "difference",
+            Stage::TimeStatistics(_) => "time_statistics",
+            Stage::Spectrum(_) => "spectrum",
             Stage::Stream(_) => "stream",
             Stage::Write(_) => "write",
+            Stage::Csv(_) => "csv",
+            Stage::Log(_) => "log",
             Stage::Translate(_) => "translate",
             Stage::Rotate(_) => "rotate",
             Stage::ScaleDirection(_) => "scale_direction",
@@ -317,6 +224,7 @@ impl Stage {
             Stage::Schedule(_) => "schedule",
             Stage::Pause {} => "pause",
             Stage::Stop {} => "stop",
+            Stage::Set(_) => "set",
         }
     }
 
@@ -340,7 +248,7 @@ impl Stage {
         matches!(self, Stage::Surface {} | Stage::Slice(_) | Stage::Contour(_))
     }
 
-    /// The name of the field that the stage derives, if it derives one.
+    /// The name of the field that the stage derives from those of the mesh, if it derives one.
     #[must_use]
     pub fn derived_name(&self) -> Option<&str> {
         match self {
@@ -351,6 +259,18 @@ impl Stage {
             | Stage::Magnitude(derived) => Some(derived.name.as_deref().unwrap_or(self.name())),
             Stage::Expression(formula) => Some(&formula.name),
             _ => None,
+        }
+    }
+
+    /// The names of all fields that the stage adds to those of the solver.
+    #[must_use]
+    pub fn added_fields(&self) -> Vec<String> {
+        match self {
+            Stage::WallShearStress(stress) => vec![stress.name().to_owned()],
+            Stage::TimeStatistics(statistics) => {
+                statistics.fields().map(|(name, _)| name).collect()
+            }
+            _ => self.derived_name().map(str::to_owned).into_iter().collect(),
         }
     }
 
@@ -382,6 +302,12 @@ pub enum Action {
     Stream(StreamStage),
     /// Writes the extract, or the whole mesh where no stage has extracted anything, to a file.
     Write(Write),
+    /// Writes monitors to a table, a row each time.
+    Csv(Csv),
+    /// Says monitors in the log, a line each time.
+    Log(Log),
+    /// Gives a parameter of the solver a new value.
+    Set(Parameter),
     /// Orders the edits of the stages.
     Order(OrderStage),
 }
@@ -395,6 +321,9 @@ impl Action {
             Action::Stop {} => "stop",
             Action::Stream(_) => "stream",
             Action::Write(_) => "write",
+            Action::Csv(_) => "csv",
+            Action::Log(_) => "log",
+            Action::Set(_) => "set",
             Action::Order(_) => "order",
         }
     }
@@ -406,14 +335,6 @@ impl Action {
 pub struct Select {
     /// The names of the fields to keep.
     pub fields: Vec<String>,
-}
-
-/// A field to measure.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Statistics {
-    /// The field's name.
-    pub field: String,
 }
 
 /// How an extract is sent to viewers.
@@ -455,6 +376,10 @@ pub struct Write {
     /// step; `{cycle:4}` has four digits or more instead of six, `{time:3}` three behind the point.
     /// A relative one lies in the run's output directory.
     pub file: String,
+    /// How many files of the pipeline stay: older ones are deleted, and leave its `.pvd` series. Left
+    /// out, all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub keep: Option<NonZeroU32>,
 }
 
 /// How the edits of a pipeline are ordered. What is left out is taken from the pipeline with

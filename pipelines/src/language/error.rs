@@ -90,6 +90,12 @@ impl Problem {
         self
     }
 
+    /// Puts words before its message.
+    pub(super) fn after(mut self, words: &str) -> Self {
+        self.message.insert_str(0, words);
+        self
+    }
+
     pub(super) fn locate(self, root: &Node, text: &str, file: &str) -> LanguageError {
         let steps: Vec<Step> = self.path.into_iter().rev().collect();
         let (node, _) = walk(root, &steps);

@@ -23,20 +23,24 @@ mod config;
 mod derived;
 mod error;
 mod extracts;
+mod file_pattern;
 mod message;
+mod monitors;
 mod order;
 mod parse;
+mod pipeline;
 mod probe;
 mod reductions;
 mod relative_files;
 mod scan;
+mod sinks;
 mod timed;
 mod tree;
 mod validate;
 
 pub use config::{
-    Action, At, Config, Due, ErrorBound, OrderStage, Pipeline, Select, Stage, Statistics, Steering,
-    StreamServer, StreamStage, Write,
+    Action, Config, ErrorBound, OrderStage, Select, Stage, Steering, StreamServer, StreamStage,
+    Write,
 };
 pub(crate) use derived::GIVEN;
 pub use derived::{Derived, Formula};
@@ -44,17 +48,23 @@ pub use error::{LanguageError, Problem};
 pub use extracts::{
     Clip, ClipBy, ClipField, Contour, Cylinder, Plane, Quantifier, Slice, Threshold,
 };
+pub use file_pattern::file_pattern;
 pub use message::{Message, parse_message};
+pub(crate) use monitors::{Condition, Line, Scope, Slot, columns, line, monitors_of};
+pub use monitors::{Monitor, check_parameters, monitors};
 pub use order::{Change, Command, Order, Parameter, Question};
 pub use parse::{ReadError, Validate, parse_json, parse_valid, read_text, text};
+pub use pipeline::{AgainAfter, At, Budget, Cadence, Due, Pipeline};
 pub use probe::{Probe, ProbeAt, ProbeGrid, ProbeLine, ProbeMethod};
-pub use reductions::Integrate;
+pub use reductions::{
+    Difference, Force, Histogram, Integrate, Measure, Spectrum, Statistics, TimeStatistics,
+    Viscosity, WallShearStress, Weight,
+};
 pub use relative_files::resolve_files;
+pub use sinks::{Csv, Existing, Log, LogLevel};
 pub use timed::{JournalEntry, OrderStatus, TimedCommand, parse_orders};
 pub use tombolo_deform::names::nearest;
 pub use tombolo_deform::shape::Deformation;
-pub use validate::file_pattern;
-pub(crate) use validate::monitor_names;
 
 /// Reads and checks a configuration.
 ///

@@ -8,16 +8,16 @@ use tombolo_deform::quality::Guard;
 use tombolo_deform::schedule::Schedule;
 use tombolo_deform::shape::check_stack;
 
-use super::config::{
-    Action, Config, Due, ErrorBound, OrderStage, Pipeline, Stage, StreamStage, Write,
-};
+use super::config::{Action, Config, ErrorBound, OrderStage, Stage, StreamStage, Write};
 use super::derived::check_name;
 use super::error::finite;
+use super::file_pattern::check_file;
 use super::order::{Change, Command, Order, Question};
 use super::parse::Validate;
+use super::pipeline::{AgainAfter, At, Due, Pipeline};
+use super::reductions::check_monitor;
 use super::timed::TimedCommand;
-use super::{At, Deformation, Integrate, Problem, nearest};
-use crate::expression::Expression;
+use super::{Deformation, Problem, TimeStatistics, monitors};
 use crate::limits::{Exceeded, NAME};
 
 impl From<Exceeded> for Problem {
@@ -62,7 +62,7 @@ impl Validate for Config {
             }
             pipeline.validate().map_err(located)?;
         }
-        Ok(())
+        monitors::check(self)
     }
 }
 
@@ -96,23 +96,40 @@ impl Validate for Pipeline {
                 );
             }
         }
-        if let Some(when) = &self.when {
-            let names = monitor_names(self);
-            let names: Vec<&str> = names.iter().map(String::as_str).collect();
-            Expression::parse_condition(when, &names).map_err(|error| {
-                let message = format!("column {} of the formula: {}", error.column, error.message);
-                Problem::new(message).suggest(error.suggestion.as_deref()).within("when")
-            })?;
-            if self.then.is_empty() {
+        if let Some(budget) = self.budget
+            && !(budget.percent > 0.0 && budget.percent <= 100.0)
+        {
+            let message = format!(
+                "found {}, expected a number above 0 and at most 100",
+                Number(budget.percent)
+            );
+            return Err(Problem::new(message).within("percent").within("budget"));
+        }
+        match &self.when {
+            Some(_) if self.then.is_empty() => {
                 return Err(Problem::new("found a condition without `then`").within("when"));
             }
+            None if self.lasting.is_some() => {
+                return Err(Problem::new("found `for` without `when`").within("for"));
+            }
+            None if matches!(self.again_after, Some(AgainAfter::Condition(_))) => {
+                return Err(Problem::new("found a condition without `when`").within("again_after"));
+            }
+            _ => {}
         }
         for (index, action) in self.then.iter().enumerate() {
             let located = |problem: Problem| problem.within(action.name()).at(index).within("then");
             match action {
-                Action::Pause {} | Action::Stop {} => Ok(()),
+                Action::Pause {} | Action::Stop {} | Action::Log(_) => Ok(()),
+                _ if self.due == Due::OnEnd && !matches!(action, Action::Csv(_)) => {
+                    let message = "when the run ends there is no mesh any more, and nobody to obey; \
+                                   expected `csv` or `log`";
+                    Err(Problem::new(message))
+                }
                 Action::Stream(stream) => state.stream(stream),
                 Action::Write(write) => state.write(write),
+                Action::Csv(csv) => csv.check(),
+                Action::Set(parameter) => finite(parameter.value).map_err(|it| it.within("value")),
                 Action::Order(order) => state.order(order),
             }
             .map_err(located)?;
@@ -125,30 +142,6 @@ impl Validate for Pipeline {
     }
 }
 
-/// The monitors that a condition may name, in the order in which the runner gives their values.
-pub(crate) fn monitor_names(pipeline: &Pipeline) -> Vec<String> {
-    let mut names = vec!["cycle".to_owned(), "time".to_owned()];
-    for stage in &pipeline.stages {
-        match stage {
-            Stage::Quality {} => names
-                .extend(["min", "mean", "max", "inverted"].map(|name| format!("quality.{name}"))),
-            Stage::Statistics(statistics) => {
-                let field = &statistics.field;
-                names.extend(
-                    ["min", "max", "mean", "l2", "non_finite"]
-                        .map(|name| format!("{field}.{name}")),
-                );
-            }
-            Stage::Integrate(integrate) => {
-                let has_faces = pipeline.stages.iter().any(Stage::takes_faces);
-                names.extend(integrate.monitors(has_faces));
-            }
-            _ => {}
-        }
-    }
-    names
-}
-
 /// The things that the stages of a pipeline have made so far.
 #[derive(Default)]
 struct Made {
@@ -156,8 +149,11 @@ struct Made {
     extract: bool,
     /// The key of the source stage.
     source: Option<&'static str>,
-    /// The names of the fields that were derived.
+    /// The names of the fields that were derived, and how many stages did.
     derived: HashSet<String>,
+    deriving: usize,
+    /// The names of fields that were added later.
+    added: HashSet<String>,
     quality: bool,
     measured: HashSet<String>,
     settings: HashSet<&'static str>,
@@ -176,6 +172,12 @@ impl Made {
             } else {
                 "a pipeline with `\"on\": \"order\"` has only the stages `deform`, `guard` and `schedule`"
             }));
+        }
+        if !monitors::needs_no_mesh(stage, due) {
+            return Err(Problem::new(
+                "a pipeline with `\"on\": \"end\"` has only the stages `difference`, `csv` and `log`: \
+                 there is no mesh any more",
+            ));
         }
         if is_setting && !self.settings.insert(stage.name()) {
             return Err(Problem::new("found twice, expected at most once"));
@@ -213,16 +215,28 @@ impl Made {
             Stage::Quality {} if std::mem::replace(&mut self.quality, true) => {
                 Err(Problem::new("found twice, expected at most once"))
             }
-            Stage::Statistics(statistics) if !self.measured.insert(statistics.field.clone()) => {
-                Err(Problem::new("this field is measured twice").within("field"))
+            Stage::Statistics(stage) => {
+                stage.check().and_then(|()| self.measures(stage.name(), stage.name.is_some()))
             }
-            Stage::Statistics(statistics)
-                if ["quality", "cycle", "time"].contains(&statistics.field.as_str()) =>
-            {
-                Err(Problem::new("a field of this name cannot be told from other monitors")
-                    .within("field"))
+            Stage::Integrate(stage) => {
+                stage.check(self.is_on_surface()).and_then(|()| self.reduces(&stage.name))
             }
-            Stage::Integrate(integrate) => self.integrate(integrate),
+            Stage::Histogram(stage) => {
+                stage.check(self.is_on_surface()).and_then(|()| self.reduces(&stage.name))
+            }
+            Stage::Force(stage) => {
+                stage.check(self.is_on_surface()).and_then(|()| self.reduces(&stage.name))
+            }
+            Stage::WallShearStress(stage) => {
+                stage.check(self.is_on_surface()).and_then(|()| self.adds(stage.name()))
+            }
+            Stage::Difference(stage) => check_monitor(&stage.name),
+            Stage::TimeStatistics(stage) => {
+                stage.check().and_then(|()| self.time_statistics(stage))
+            }
+            Stage::Spectrum(stage) => stage.check().and_then(|()| self.measures(&stage.name, true)),
+            Stage::Csv(csv) => csv.check(),
+            Stage::Set(parameter) => finite(parameter.value).map_err(|it| it.within("value")),
             Stage::Stream(stream) => self.stream(stream),
             Stage::Write(write) => self.write(write),
             Stage::Order(order) => self.order(order),
@@ -237,7 +251,7 @@ impl Made {
         if self.extract {
             return Err(Problem::new("a pipeline has one source stage"));
         }
-        if self.stages > self.derived.len() + 1 {
+        if self.stages > self.deriving + 1 {
             let message = "a source stage must come first; only stages that derive fields may \
                            stand before it";
             return Err(Problem::new(message));
@@ -248,29 +262,64 @@ impl Made {
 
     /// A stage that derives a field.
     fn derives(&mut self, stage: &Stage) -> Result<(), Problem> {
-        if self.stages > self.derived.len() + 1 {
+        if self.stages > self.deriving + 1 {
             let message = "a stage that derives a field must come before all others";
             return Err(Problem::new(message));
         }
         let name = stage.derived_name().unwrap_or_default();
         check_name(name).map_err(|problem| problem.within("name"))?;
-        if !self.derived.insert(name.to_owned()) {
+        self.deriving += 1;
+        if self.added.contains(name) || !self.derived.insert(name.to_owned()) {
             let message = format!("two stages derive a field `{name}`");
             return Err(Problem::new(message).within("name"));
         }
         Ok(())
     }
 
-    fn integrate(&mut self, integrate: &Integrate) -> Result<(), Problem> {
-        integrate.check(self.source == Some("surface"))?;
+    fn is_on_surface(&self) -> bool {
+        self.source == Some("surface")
+    }
+
+    /// A stage whose monitors begin with this name.
+    fn measures(&mut self, name: &str, is_given: bool) -> Result<(), Problem> {
+        if self.measured.insert(name.to_owned()) {
+            return Ok(());
+        }
+        let message = match is_given {
+            true => format!("another stage has monitors named `{name}`"),
+            false => "this field is measured twice, expected a `name` beside it".into(),
+        };
+        Err(Problem::new(message).within(if is_given { "name" } else { "field" }))
+    }
+
+    /// A stage that reduces the extract to monitors that begin with this name.
+    fn reduces(&mut self, name: &str) -> Result<(), Problem> {
         if self.source == Some("probe") {
             return Err(Problem::new("the points of a `probe` have no size to integrate over"));
         }
-        if !self.measured.insert(integrate.name.clone()) {
-            let message = format!("another stage has monitors named `{}`", integrate.name);
+        self.measures(name, true)
+    }
+
+    /// A stage that adds a field of this name.
+    fn adds(&mut self, name: &str) -> Result<(), Problem> {
+        if self.derived.contains(name) || !self.added.insert(name.to_owned()) {
+            let message = format!("two stages derive a field `{name}`");
             return Err(Problem::new(message).within("name"));
         }
         Ok(())
+    }
+
+    fn time_statistics(&mut self, stage: &TimeStatistics) -> Result<(), Problem> {
+        if stage.field.is_none() {
+            return self.measures(&stage.name, true);
+        }
+        if self.stages > self.deriving + 1 {
+            let message = "the statistics of a field must come before all stages but those that \
+                           derive fields";
+            return Err(Problem::new(message));
+        }
+        self.deriving += 1;
+        stage.fields().try_for_each(|(name, _)| self.adds(&name))
     }
 
     fn stream(&self, stream: &StreamStage) -> Result<(), Problem> {
@@ -380,76 +429,6 @@ fn check_deformation(stage: &Deformation) -> Result<(), Problem> {
             Err(Problem::new(message).at(index).within("free"))
         }
         None => Ok(()),
-    }
-}
-
-fn check_file(pattern: &str) -> Result<(), Problem> {
-    let extensions = ["vtu", "vtp", "vtk", "vtpd", "pvtu", "pvtp"];
-    let extension = pattern.rsplit_once('.').map_or("", |(_, extension)| extension);
-    if !extensions.contains(&extension) {
-        let message = format!(
-            "found the file `{pattern}`, expected one that ends in `.vtu`, `.vtp`, `.vtk`, `.vtpd`, `.pvtu` or `.pvtp`"
-        );
-        return Err(Problem::new(message)
-            .suggest(nearest(extension, extensions).filter(|_| !extension.is_empty())));
-    }
-    file_pattern(pattern, 0, 0.0).map(|_| ())
-}
-
-/// The file that a pattern stands for at a step: `{cycle}` becomes the cycle with six digits or
-/// more, `{cycle:4}` with four or more, `{time}` the time, `{time:3}` the time with three digits
-/// after its point.
-///
-/// ```
-/// use tombolo_pipelines::language::file_pattern;
-///
-/// let file = file_pattern("{cycle}-{cycle:2}-{time}-{time:3}.vtu", 7, 0.5).map_err(|problem| problem.to_string())?;
-/// assert_eq!(file, "000007-07-0.5-0.500.vtu");
-/// # Ok::<(), String>(())
-/// ```
-///
-/// # Errors
-/// A [`Problem`] for braces that hold anything else, with the nearest known name.
-pub fn file_pattern(pattern: &str, cycle: u64, time: f64) -> Result<String, Problem> {
-    let mut file = String::with_capacity(pattern.len() + 16);
-    let mut rest = pattern;
-    while let Some((before, after)) = rest.split_once('{') {
-        file.push_str(before);
-        let Some((inside, after)) = after.split_once('}') else {
-            return Err(Problem::new("found '{' without its '}'"));
-        };
-        let (name, digits) =
-            inside.split_once(':').map_or((inside, None), |(name, digits)| (name, Some(digits)));
-        let digits = digits.map(|digits| file_digits(inside, digits)).transpose()?;
-        match name {
-            "cycle" => file.push_str(&format!("{cycle:0width$}", width = digits.unwrap_or(6))),
-            "time" => match digits {
-                Some(digits) => file.push_str(&format!("{time:.digits$}")),
-                None => file.push_str(&time.to_string()),
-            },
-            _ => {
-                let message = format!(
-                    "found `{{{name}}}` in a file's name, expected `{{cycle}}` or `{{time}}`"
-                );
-                return Err(Problem::new(message).suggest(nearest(name, ["cycle", "time"])));
-            }
-        }
-        rest = after;
-    }
-    if rest.contains('}') {
-        return Err(Problem::new("found '}' without its '{'"));
-    }
-    file.push_str(rest);
-    Ok(file)
-}
-
-/// How many digits a number in a file's name has.
-fn file_digits(inside: &str, digits: &str) -> Result<usize, Problem> {
-    match digits.parse() {
-        Ok(digits @ 0..=20) => Ok(digits),
-        _ => Err(Problem::new(format!(
-            "found `{{{inside}}}` in a file's name, expected a number of digits from 0 to 20 behind the colon"
-        ))),
     }
 }
 

@@ -1,37 +1,13 @@
 //! Integrals of fields over an extract or the whole mesh.
 
-use std::sync::Arc;
+use tombolo_deform::communicator::Reduction;
+use tombolo_deform::mesh::{Cells, Vector};
+use tombolo_deform::vector::{dot, scale};
 
-use tombolo_deform::communicator::{Communicator, Reduction, agree};
-use tombolo_deform::mesh::{ArrayView, Cells, Values, Vector};
-use tombolo_deform::names::nearest;
-use tombolo_deform::vector::{dot, length, scale};
-
+use super::region::{CHUNK, Chosen, Region, Wanted};
 use super::weights::Weights;
-use crate::extract::{
-    Association, Channel, Extract, ExtractFeatures, Extracted, Field, FieldView, Source,
-    check_length, is_absent, merged, unknown_field,
-};
-use crate::language::{Integrate, Slice, Stage};
-
-/// What is integrated over.
-#[derive(Clone, Copy)]
-pub(crate) struct Region<'a> {
-    /// The channel, with the fields that were derived; its points are known to the source where
-    /// there is no source stage.
-    pub(crate) channel: &'a Channel<'a>,
-    pub(crate) source: &'a Source,
-    /// The source stage; without one the region is the whole mesh.
-    pub(crate) stage: Option<&'a Stage>,
-    /// What the stage has taken; `None` where it has failed, which has been told.
-    pub(crate) extracted: Option<&'a Extracted>,
-    /// Fields of the extract that no later stage is to see.
-    pub(crate) unselected: &'a [Field],
-    pub(crate) communicator: &'a dyn Communicator,
-}
-
-/// How many cells are added up before their sum is: the sums lose less to rounding.
-const CHUNK: usize = 4096;
+use crate::extract::{Association, FieldView, is_absent};
+use crate::language::{Integrate, Stage};
 
 /// The values of the monitors of a stage: its own, then those of its field and of its vector. They
 /// are NaN where any rank has failed. Collective.
@@ -40,31 +16,28 @@ const CHUNK: usize = 4096;
 /// In the second part: what is missing on this rank, or does not fit.
 pub(crate) fn integrate(stage: &Integrate, region: &Region) -> (Vec<f64>, Option<String>) {
     let has_faces = region.stage.is_some_and(Stage::takes_faces);
-    let surface = region.surface(stage);
-    let terms = match &surface {
-        Ok(surface) => region.terms(stage, surface.as_deref()),
-        Err(message) => Err(message.clone()),
-    };
-    let communicator = region.communicator;
-    let is_known = agree(communicator, terms.as_ref().map(|_| ())).is_ok();
-    let dimension = communicator.most(terms.as_ref().map_or(0, |terms| terms.cells.dimension()));
+    let wanted: Vec<Wanted> = [(&stage.field, &[1][..]), (&stage.vector, &[2, 3])]
+        .into_iter()
+        .filter_map(|(name, components)| Some(Wanted { name: name.as_deref()?, components }))
+        .collect();
+    let surface = region.surface(&wanted);
+    let part = region.part(&surface, &wanted, &stage.features);
+    let Chosen { dimension, is_known } = region.agreed(&part);
     let across = region.across().filter(|_| dimension == 1);
-    let mut error = terms.as_ref().err().cloned();
+    let mut error = part.as_ref().err().cloned();
     let mut sums = Sums::default();
-    if let Ok(terms) = &terms {
-        let counts = |cell: usize| {
-            let is_own = |cell| region.source.counts(Association::Element, cell);
-            terms.cells.cell_type(cell).dimension() == dimension
-                && (region.stage.is_some() || is_own(cell))
-                && terms.features.is_none_or(|known| known.contains(&stage.features, cell))
-        };
-        sums = terms.sums(&counts, across);
+    if let Ok(part) = &part {
+        let mut fields = part.fields.iter().copied();
+        let mut next = |name: &Option<String>| name.as_ref().and_then(|_| fields.next()).flatten();
+        let (field, vector) = (next(&stage.field), next(&stage.vector));
+        let terms = Terms { cells: part.cells, points: part.points, field, vector };
+        sums = terms.sums(&|cell| region.counts(part, cell, dimension), across);
         if has_faces && stage.vector.is_some() && dimension == 1 && across.is_none() {
             error = Some("lines have no normal, expected faces or a slice by one plane".into());
             sums.0[FLOW] = f64::NAN;
         }
     }
-    communicator.reduce(Reduction::Sum, &mut sums.0);
+    region.communicator.reduce(Reduction::Sum, &mut sums.0);
     if !is_known {
         sums.0 = [f64::NAN; COUNT];
     }
@@ -104,24 +77,12 @@ impl Sums {
     }
 }
 
-/// The surface features that cells belong to.
-#[derive(Clone, Copy)]
-struct Chosen<'a>(&'a ExtractFeatures);
-
-impl Chosen<'_> {
-    fn contains(&self, names: &[String], cell: usize) -> bool {
-        let feature = self.0.of_cells[cell] as usize;
-        self.0.names.get(feature).is_some_and(|name| names.contains(name))
-    }
-}
-
 /// What a rank integrates.
 struct Terms<'a> {
     cells: &'a Cells,
     points: &'a [Vector],
     field: Option<FieldView<'a>>,
     vector: Option<FieldView<'a>>,
-    features: Option<Chosen<'a>>,
 }
 
 impl Terms<'_> {
@@ -176,135 +137,4 @@ impl Terms<'_> {
             }
         }
     }
-}
-
-impl<'a> Region<'a> {
-    /// The surface of the whole mesh, with the fields that are integrated, where it lies in parts
-    /// on several ranks: on rank 0, where its features and its outside are known. Collective.
-    fn surface(&self, stage: &Integrate) -> Result<Option<Arc<Extract>>, String> {
-        let Some(whole) = self.source.whole_mesh().filter(|_| self.is_surface()) else {
-            return Ok(None);
-        };
-        let lean = self.extracted.map(|extracted| {
-            let all = extracted.extract.fields.iter().chain(self.unselected);
-            let names = [&stage.field, &stage.vector];
-            let is_needed = |field: &&Field| names.contains(&&Some(field.name.clone()));
-            let fields = all.filter(is_needed).cloned().collect();
-            let extract = Extract { fields, ..Extract::clone(&extracted.extract) };
-            Extracted { extract: Arc::new(extract), ..extracted.clone() }
-        });
-        // Where a rank has no surface, it has said why.
-        merged(self.communicator, whole, lean.as_ref()).map_err(|_| String::new())
-    }
-
-    fn is_surface(&self) -> bool {
-        matches!(self.stage, Some(Stage::Surface {}))
-    }
-
-    /// The direction across a slice by one plane.
-    fn across(&self) -> Option<Vector> {
-        match self.stage {
-            Some(Stage::Slice(Slice::Plane(plane))) => {
-                Some(scale(plane.normal, 1.0 / length(plane.normal)))
-            }
-            _ => None,
-        }
-    }
-
-    /// What this rank integrates; an error without a text has been told already.
-    fn terms<'b>(
-        &'b self,
-        stage: &Integrate,
-        surface: Option<&'b Extract>,
-    ) -> Result<Terms<'b>, String> {
-        let is_merged = self.is_surface() && self.source.whole_mesh().is_some();
-        let extract = match (self.stage, surface, self.extracted) {
-            (None, ..) => None,
-            (_, Some(surface), _) => Some(surface),
-            (_, _, Some(extracted)) => Some(&*extracted.extract),
-            (_, _, None) => return Err(String::new()),
-        };
-        // Rank 0 looks at all of the surface.
-        let is_elsewhere = is_merged && surface.is_none();
-        let is_bare = self.communicator.size() > 1 && self.channel.mesh.points.is_empty();
-        let has_fields = surface.is_some() || !(is_elsewhere || is_bare);
-        let find = |name: &Option<String>, components: &[usize]| match name {
-            Some(name) if has_fields => self.field(name, components, extract).map(Some),
-            _ => Ok(None),
-        };
-        let (field, vector) = (find(&stage.field, &[1])?, find(&stage.vector, &[2, 3])?);
-        let mut features = None;
-        if let Some(known) = extract.filter(|_| !stage.features.is_empty() && !is_elsewhere) {
-            let known = known.features.as_deref().ok_or("the surface has no features")?;
-            if let Some(name) = stage.features.iter().find(|&name| !known.names.contains(name)) {
-                return Err(unknown_feature(name, &known.names));
-            }
-            features = Some(Chosen(known));
-        }
-        let (cells, points) = match extract {
-            Some(extract) => (&*extract.cells, &extract.points[..]),
-            None => (&**self.source.cells(), self.source.points()),
-        };
-        Ok(Terms { cells, points, field, vector, features })
-    }
-
-    /// A field of the extract, or of the mesh where there is none.
-    fn field<'b>(
-        &'b self,
-        name: &str,
-        components: &[usize],
-        extract: Option<&'b Extract>,
-    ) -> Result<FieldView<'b>, String> {
-        let known = self.channel.fields.iter().map(|field| field.name);
-        let of_mesh = self.channel.fields.iter().find(|view| view.name == name).copied();
-        let view = match extract {
-            None => of_mesh.ok_or_else(|| unknown_field(name, known))?,
-            Some(extract) => {
-                let mut all = extract.fields.iter().chain(self.unselected);
-                let Some(field) = all.find(|field| field.name == name) else {
-                    return Err(match of_mesh {
-                        Some(_) => format!("field `{name}` could not be taken from all of it"),
-                        None => unknown_field(name, known),
-                    });
-                };
-                view_of(field)?
-            }
-        };
-        let found = view.values.components();
-        if view.association == Association::Mesh || !components.contains(&found) {
-            let expected = if components == [1] { "a scalar" } else { "a vector of 2 or 3" };
-            let association = view.association;
-            return Err(format!(
-                "field `{name}` is one of {association} values of {found} components, expected \
-                 {expected} of vertices or elements"
-            ));
-        }
-        if extract.is_none() {
-            check_length(self.channel, &view).map_err(|error| error.to_string())?;
-            let is_wrong = |&entity: &usize| {
-                let mut values = (0..found).map(|component| view.values.get(entity, component));
-                self.source.shows(view.association, entity)
-                    && values.any(|value| !value.is_finite() && !is_absent(value))
-            };
-            if let Some(entity) = (0..view.values.len()).find(is_wrong) {
-                return Err(format!(
-                    "field `{name}` is not finite at {} {entity}",
-                    view.association
-                ));
-            }
-        }
-        Ok(view)
-    }
-}
-
-fn view_of(field: &Field) -> Result<FieldView<'_>, String> {
-    let values = ArrayView::interleaved(Values::F64(&field.values), field.components);
-    let values = values.map_err(|error| error.to_string())?;
-    Ok(FieldView { name: &field.name, association: field.association, values })
-}
-
-fn unknown_feature(name: &str, known: &[String]) -> String {
-    let hint = nearest(name, known.iter().map(String::as_str))
-        .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-    format!("the surface has no feature `{name}`; its features are {}{hint}", known.join(", "))
 }

@@ -1,11 +1,20 @@
 //! When pipelines run.
 
-use tombolo_deform::schedule::Every;
-
-use crate::language::Due;
+use crate::language::{Cadence, Due};
 
 /// How much of an interval a step may come too early: time steps add up with rounding.
-const SLACK: f64 = 1e-9;
+pub(super) const SLACK: f64 = 1e-9;
+
+/// A step, and what all ranks know alike of the world outside.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Now {
+    pub(super) cycle: u64,
+    pub(super) time: f64,
+    /// Seconds on the clock of rank 0 since the run began.
+    pub(super) seconds: f64,
+    /// How many viewers have come so far.
+    pub(super) viewers: u64,
+}
 
 /// When a pipeline runs, and when it last did.
 #[derive(Debug, Clone, Copy)]
@@ -13,34 +22,52 @@ pub(super) struct Clock {
     due: Due,
     last_cycle: Option<u64>,
     last_interval: Option<f64>,
+    viewers: u64,
 }
 
 impl Clock {
     pub(super) fn new(due: Due) -> Self {
-        Self { due, last_cycle: None, last_interval: None }
+        Self { due, last_cycle: None, last_interval: None, viewers: 0 }
     }
 
-    pub(super) fn is_due(&self, cycle: u64, time: f64) -> bool {
-        if self.last_cycle == Some(cycle) {
+    #[inline]
+    pub(super) fn is_due(&self, now: &Now) -> bool {
+        if self.last_cycle == Some(now.cycle) {
             return false;
         }
         match self.due {
-            Due::Every(Every::Steps(steps)) => cycle % steps == 0,
-            Due::Every(Every::Time(length)) => {
-                let interval = (time / length.get() + SLACK).floor();
+            Due::Every(Cadence::Steps(steps)) => now.cycle % steps == 0,
+            Due::Every(cadence) => {
+                let interval = interval(cadence, now);
                 self.last_interval.is_none_or(|last| interval > last)
             }
-            Due::At(at) => self.last_cycle.is_none() && at.has_come(cycle, time),
-            Due::OnOrder => false,
+            Due::At(at) => self.last_cycle.is_none() && at.has_come(now.cycle, now.time),
+            Due::OnViewer => now.viewers > self.viewers,
+            Due::OnOrder | Due::OnEnd => false,
         }
     }
 
+    /// Whether it waits for what is not in the step itself.
+    pub(super) fn listens(&self) -> bool {
+        matches!(self.due, Due::OnViewer | Due::Every(Cadence::Seconds(_)))
+    }
+
     /// Notes that the pipeline runs at this step.
-    pub(super) fn take(&mut self, cycle: u64, time: f64) {
-        self.last_cycle = Some(cycle);
-        if let Due::Every(Every::Time(length)) = self.due {
-            self.last_interval = Some((time / length.get() + SLACK).floor());
+    pub(super) fn take(&mut self, now: &Now) {
+        self.last_cycle = Some(now.cycle);
+        self.viewers = now.viewers;
+        if let Due::Every(cadence) = self.due {
+            self.last_interval = Some(interval(cadence, now));
         }
+    }
+}
+
+/// In which of the intervals of a cadence a step lies.
+fn interval(cadence: Cadence, now: &Now) -> f64 {
+    match cadence {
+        Cadence::Steps(_) => 0.0,
+        Cadence::Time(length) => (now.time / length.get() + SLACK).floor(),
+        Cadence::Seconds(length) => (now.seconds / length.get()).floor(),
     }
 }
 
@@ -55,8 +82,11 @@ mod tests {
         let mut time = 0.0;
         let mut taken = Vec::new();
         for cycle in 0..steps {
-            if clock.is_due(cycle, time) {
-                clock.take(cycle, time);
+            // Each step takes 0.3 seconds, and viewers come before the fifth and the sixth.
+            let seconds = 0.3 * cycle as f64;
+            let now = Now { cycle, time, seconds, viewers: cycle.clamp(3, 5) - 3 };
+            if clock.is_due(&now) {
+                clock.take(&now);
                 taken.push(cycle);
             }
             time += time_step;
@@ -66,13 +96,17 @@ mod tests {
 
     #[test]
     fn clocks_strike_when_they_should() {
-        assert_eq!(cycles(Due::Every(Every::Steps(5.try_into().unwrap())), 0.1, 12), [0, 5, 10]);
+        assert_eq!(cycles(Due::Every(Cadence::Steps(5.try_into().unwrap())), 0.1, 12), [0, 5, 10]);
         // 0.1 is no binary fraction: ten of them add up to a little less than 1.
-        let every_second = Due::Every(Every::Time(Interval::new(1.0).unwrap()));
+        let every_second = Due::Every(Cadence::Time(Interval::new(1.0).unwrap()));
         assert_eq!(cycles(every_second, 0.1, 31), [0, 10, 20, 30]);
         assert_eq!(cycles(every_second, 1.7, 5), [0, 1, 2, 3, 4]);
         assert_eq!(cycles(Due::At(At::Cycle(3)), 0.1, 10), [3]);
         assert_eq!(cycles(Due::At(At::Time(0.3)), 0.1, 10), [3]);
+        let every_second = Due::Every(Cadence::Seconds(Interval::new(1.0).unwrap()));
+        assert_eq!(cycles(every_second, 0.1, 15), [0, 4, 7, 10, 14]);
+        assert_eq!(cycles(Due::OnViewer, 0.1, 10), [4, 5]);
         assert_eq!(cycles(Due::OnOrder, 0.1, 10), [0; 0]);
+        assert_eq!(cycles(Due::OnEnd, 0.1, 10), [0; 0]);
     }
 }

@@ -1,20 +1,28 @@
 //! Pipelines at work: which are due, and what comes of them.
 
+mod cost;
 mod due;
+mod history;
 mod output;
 mod pipeline;
+mod trigger;
 
 use std::collections::HashMap;
 use std::sync::Arc;
+use std::time::Instant;
 
 use tombolo_deform::surface::Surface;
 
 use crate::extract::{Channel, Snapshot, Source};
-use crate::language::{Config, Due, Problem, Stage, Validate};
+use crate::language::{Config, Due, Problem, Stage, Validate, monitors};
+use due::Now;
+use history::Board;
 use pipeline::Prepared;
 use tombolo_deform::communicator::{Communicator, Solo, agree};
 
-pub use output::{Encoding, Frame, MonitorValues, Output, View, ViewKind};
+pub use cost::Cost;
+pub use history::{History, Measured};
+pub use output::{Encoding, Frame, MonitorValues, Output, Table, View, ViewKind};
 
 /// Runs the pipelines of a configuration.
 ///
@@ -45,6 +53,10 @@ pub struct Runner {
     pipelines: Vec<Prepared>,
     sources: HashMap<String, Source>,
     communicator: Arc<dyn Communicator>,
+    board: Board,
+    /// What all ranks were told of the world outside.
+    outside: Now,
+    clock: Box<dyn Fn() -> f64 + Send + Sync>,
 }
 
 impl Runner {
@@ -65,9 +77,67 @@ impl Runner {
         communicator: Arc<dyn Communicator>,
     ) -> Result<Self, Problem> {
         config.validate()?;
-        let pipelines = config.pipelines.iter().filter(|pipeline| pipeline.due != Due::OnOrder);
-        let pipelines: Result<Vec<_>, _> = pipelines.map(Prepared::new).collect();
-        Ok(Self { pipelines: pipelines?, sources: HashMap::new(), communicator })
+        let all = &config.pipelines;
+        let places = (0..all.len()).filter(|&place| all[place].due != Due::OnOrder);
+        let prepared = |place: usize| {
+            let located = |problem: Problem| problem.at(place).within("pipelines");
+            Prepared::new(all, place).map_err(located)
+        };
+        let pipelines: Result<Vec<_>, _> = places.map(prepared).collect();
+        let history = |pipeline| History::new(monitors(pipeline).split_off(2));
+        let histories = all.iter().map(history).collect();
+        let begun = Instant::now();
+        Ok(Self {
+            pipelines: pipelines?,
+            sources: HashMap::new(),
+            communicator,
+            board: Board { histories, parameters: Vec::new() },
+            outside: Now::default(),
+            clock: Box::new(move || begun.elapsed().as_secs_f64()),
+        })
+    }
+
+    /// Measures what pipelines cost by another clock: seconds that rise.
+    #[must_use]
+    pub fn with_clock(self, clock: impl Fn() -> f64 + Send + Sync + 'static) -> Self {
+        Self { clock: Box::new(clock), ..self }
+    }
+
+    /// Tells what goes on outside: how many seconds have gone by since the run began, and how many
+    /// viewers have come so far. Pipelines that wait for either are due from then on; all ranks are
+    /// told the same.
+    pub fn tell(&mut self, seconds: f64, viewers: u64) {
+        (self.outside.seconds, self.outside.viewers) = (seconds, viewers);
+    }
+
+    /// Whether any pipeline waits for what [`tell`](Self::tell) tells.
+    #[must_use]
+    pub fn listens(&self) -> bool {
+        self.pipelines.iter().any(|prepared| prepared.due.listens())
+    }
+
+    /// Tells the values of the solver's parameters, which conditions may name.
+    pub fn set_parameters<'a>(&mut self, parameters: impl IntoIterator<Item = (&'a str, f64)>) {
+        let parameters = parameters.into_iter().map(|(name, value)| (name.to_owned(), value));
+        self.board.parameters = parameters.collect();
+    }
+
+    /// The monitors of a pipeline and what they have measured; `None` where there is no pipeline of
+    /// this name.
+    #[must_use]
+    pub fn history(&self, pipeline: &str) -> Option<&History> {
+        let prepared = self.pipelines.iter().find(|prepared| prepared.pipeline.name == pipeline);
+        prepared.and_then(|prepared| self.board.histories.get(prepared.place))
+    }
+
+    /// What each pipeline has cost so far, by name.
+    pub fn costs(&self) -> impl Iterator<Item = (&str, Cost)> {
+        self.pipelines.iter().map(|prepared| {
+            let history = self.board.histories.get(prepared.place).map_or(0, History::bytes);
+            let memory = prepared.cost.memory + history as u64;
+            let every = prepared.thinning.every();
+            (&*prepared.name, Cost { memory, every, ..prepared.cost })
+        })
     }
 
     /// The views that the pipelines stream.
@@ -91,7 +161,8 @@ impl Runner {
     #[must_use]
     #[inline]
     pub fn is_due(&self, cycle: u64, time: f64) -> bool {
-        self.pipelines.iter().any(|prepared| prepared.is_chosen && prepared.due.is_due(cycle, time))
+        let now = Now { cycle, time, ..self.outside };
+        self.pipelines.iter().any(|prepared| prepared.is_chosen && prepared.due.is_due(&now))
     }
 
     /// Whether any pipeline that is due at this step looks at the channel of this name; `is_first`
@@ -99,10 +170,9 @@ impl Runner {
     #[must_use]
     pub fn reads(&self, cycle: u64, time: f64, channel: &str, is_first: bool) -> bool {
         let reads = |name: Option<&str>| name.map_or(is_first, |name| name == channel);
-        let due = self
-            .pipelines
-            .iter()
-            .filter(|prepared| prepared.is_chosen && prepared.due.is_due(cycle, time));
+        let now = Now { cycle, time, ..self.outside };
+        let is_due = |prepared: &&Prepared| prepared.is_chosen && prepared.due.is_due(&now);
+        let due = self.pipelines.iter().filter(is_due);
         due.map(|prepared| prepared.pipeline.channel.as_deref()).any(reads)
     }
 
@@ -120,19 +190,55 @@ impl Runner {
     /// the solver. An error that lasts is told once, and again after it has been gone.
     pub fn run(&mut self, snapshot: &Snapshot) -> Vec<Output> {
         let mut outputs = Vec::new();
+        let now = Now { cycle: snapshot.cycle, time: snapshot.time, ..self.outside };
         for prepared in &mut self.pipelines {
-            if !prepared.is_chosen || !prepared.due.is_due(snapshot.cycle, snapshot.time) {
+            if !prepared.is_chosen || !prepared.due.is_due(&now) {
                 continue;
             }
-            prepared.due.take(snapshot.cycle, snapshot.time);
+            prepared.due.take(&now);
+            if !prepared.thinning.admits() {
+                continue;
+            }
+            let begun = (self.clock)();
             let name = prepared.pipeline.channel.as_deref();
-            match source(&mut self.sources, snapshot.channels, name, &self.communicator) {
-                Ok((channel, source)) => {
-                    prepared.run(snapshot, channel, source, &self.communicator, &mut outputs);
-                }
-                Err(message) => {
-                    prepared.report(snapshot.cycle, vec![("channel".into(), message)], &mut outputs)
-                }
+            let measured =
+                match source(&mut self.sources, snapshot.channels, name, &self.communicator) {
+                    Ok((channel, source)) => prepared.run(
+                        snapshot,
+                        channel,
+                        source,
+                        &self.communicator,
+                        &self.board,
+                        &mut outputs,
+                    ),
+                    Err(message) => {
+                        let errors = vec![("channel".into(), message)];
+                        prepared.report(snapshot.cycle, errors, &mut outputs);
+                        vec![f64::NAN; prepared.monitors().len()]
+                    }
+                };
+            if let Some(history) = self.board.histories.get_mut(prepared.place)
+                && !measured.is_empty()
+            {
+                history.push(Measured { cycle: now.cycle, time: now.time, values: measured });
+            }
+            let ended = (self.clock)();
+            let message = prepared.ran(begun, ended, &*self.communicator);
+            if let Some(message) = message.filter(|_| self.communicator.rank() == 0) {
+                let pipeline = Arc::clone(&prepared.name);
+                outputs.push(Output::Error { pipeline, cycle: now.cycle, message });
+            }
+        }
+        outputs
+    }
+
+    /// Runs the pipelines that wait for the end of the run, of which this is the last step. On all
+    /// ranks alike.
+    pub fn finish(&mut self, cycle: u64, time: f64) -> Vec<Output> {
+        let mut outputs = Vec::new();
+        for prepared in &mut self.pipelines {
+            if prepared.is_chosen && prepared.pipeline.due == Due::OnEnd {
+                prepared.end(cycle, time, &*self.communicator, &self.board, &mut outputs);
             }
         }
         outputs

@@ -1,11 +1,12 @@
 //! The outputs of pipelines.
 
+use std::num::NonZeroU32;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
 use crate::extract::Extract;
-use crate::language::{Command, ErrorBound, StreamStage};
+use crate::language::{Command, ErrorBound, Existing, LogLevel, StreamStage};
 
 /// How exactly an extract is sent.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,6 +61,17 @@ pub struct MonitorValues {
     pub values: Vec<(String, f64)>,
 }
 
+/// A table of monitors that is written as the run goes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Table {
+    /// The file. A relative one lies in the run's output directory.
+    pub file: String,
+    /// The titles of the columns behind `cycle` and `time`, with units.
+    pub titles: Vec<String>,
+    /// What becomes of a file that is there already.
+    pub existing: Existing,
+}
+
 /// A thing that a pipeline wants done.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
@@ -78,6 +90,30 @@ pub enum Output {
         time: f64,
         /// The extract to write.
         extract: Arc<Extract>,
+        /// How many files of the pipeline stay; `None`: all.
+        keep: Option<NonZeroU32>,
+    },
+    /// Add a row to a table. On rank 0.
+    Row {
+        /// The pipeline.
+        pipeline: Arc<str>,
+        /// The table.
+        table: Arc<Table>,
+        /// The step.
+        cycle: u64,
+        /// The simulated time.
+        time: f64,
+        /// The values of the columns; NaN where nothing could be measured.
+        values: Vec<f64>,
+    },
+    /// Write a line to the log. On rank 0.
+    Log {
+        /// The pipeline.
+        pipeline: Arc<str>,
+        /// How important it is.
+        level: LogLevel,
+        /// The line.
+        message: String,
     },
     /// Tell viewers and reports.
     Monitor(MonitorValues),
@@ -85,10 +121,10 @@ pub enum Output {
     Command {
         /// The pipeline.
         pipeline: Arc<str>,
-        /// A pause, a stop, or an order of a new shape.
+        /// A pause, a stop, a value of a parameter, or an order of a new shape.
         command: Command,
     },
-    /// Something could not be done; tell viewers and the log.
+    /// Something could not be done, or is done in another way; tell viewers and the log.
     Error {
         /// The pipeline.
         pipeline: Arc<str>,

@@ -43,6 +43,24 @@ impl Series {
         Ok(Self { path: path.to_path_buf(), length: HEAD.len() as u64 })
     }
 
+    /// A series of these files, with their times, in place of what was there.
+    ///
+    /// # Errors
+    /// As [`create`](Self::create).
+    pub fn of<'a>(
+        path: &Path,
+        files: impl Iterator<Item = (f64, &'a Path)>,
+    ) -> Result<Self, FileError> {
+        let directory = path.parent().unwrap_or(Path::new(""));
+        let mut text = HEAD.to_owned();
+        files.for_each(|(time, file)| text.push_str(&entry(directory, time, file)));
+        write_atomically(path, |new| {
+            new.write_all(text.as_bytes())?;
+            new.write_all(TAIL.as_bytes())
+        })?;
+        Ok(Self { path: path.to_path_buf(), length: text.len() as u64 })
+    }
+
     /// The path of the series.
     #[must_use]
     pub fn path(&self) -> &Path {
@@ -56,9 +74,7 @@ impl Series {
     /// [`FileError`] where the series cannot be read back or written.
     pub fn push(&mut self, time: f64, file: &Path) -> Result<(), FileError> {
         let directory = self.path.parent().unwrap_or(Path::new(""));
-        let shown = file.strip_prefix(directory).unwrap_or(file).to_string_lossy();
-        let shown = quick_xml::escape::escape(shown.as_ref());
-        let entry = format!("<DataSet timestep=\"{time}\" part=\"0\" file=\"{shown}\"/>\n");
+        let entry = entry(directory, time, file);
         let old = File::open(&self.path).map_err(|error| Flaw::from(error).in_file(&self.path))?;
         write_atomically(&self.path, |new| {
             let copied = std::io::copy(&mut old.take(self.length), new)?;
@@ -71,4 +87,11 @@ impl Series {
         self.length += entry.len() as u64;
         Ok(())
     }
+}
+
+/// The line of a file.
+fn entry(directory: &Path, time: f64, file: &Path) -> String {
+    let shown = file.strip_prefix(directory).unwrap_or(file).to_string_lossy();
+    let shown = quick_xml::escape::escape(shown.as_ref());
+    format!("<DataSet timestep=\"{time}\" part=\"0\" file=\"{shown}\"/>\n")
 }

@@ -5,11 +5,12 @@ use tombolo_deform::{
     mesh::ArrayView,
 };
 
+use super::prepare::{Names, State, gradient_of};
 use super::{Prepared, Progress, QUALITY_FIELD};
 use crate::derive::with_derived;
 use crate::extract::{Channel, FieldView, Input, check_length, statistics, unknown_field};
-use crate::language::Integrate;
-use crate::reduce::{Region, integrate};
+use crate::language::{Stage, monitors_of};
+use crate::reduce::{Region, force, histogram, integrate};
 
 impl Prepared {
     /// Measures the cells.
@@ -86,8 +87,8 @@ impl Prepared {
         }
     }
 
-    /// Integrates over what the source stage has taken, or over the whole mesh.
-    pub(super) fn integrate(&self, stage: &Integrate, progress: &mut Progress) {
+    /// Reduces fields over what the source stage has taken, or over the whole mesh.
+    pub(super) fn reduce(&self, stage: &Stage, progress: &mut Progress) {
         let fields = with_derived(progress.channel, &progress.derived);
         let channel = Channel { fields: &fields, ..*progress.channel };
         let (cycle, communicator) = (progress.snapshot.cycle, progress.communicator);
@@ -101,8 +102,9 @@ impl Prepared {
             }
             is_known
         };
+        let has_faces = source_stage.is_some_and(Stage::takes_faces);
         if !is_known {
-            let monitors = stage.monitors(false).len();
+            let monitors = monitors_of(stage, has_faces).len();
             return progress.values.extend(vec![f64::NAN; monitors]);
         }
         let region = Region {
@@ -113,11 +115,54 @@ impl Prepared {
             unselected: &progress.unselected,
             communicator,
         };
-        let (values, error) = integrate(stage, &region);
+        let (name, (values, error)) = match stage {
+            Stage::Integrate(stage) => (&stage.name, integrate(stage, &region)),
+            Stage::Histogram(stage) => (&stage.name, histogram(stage, &region)),
+            Stage::Force(stage) => {
+                let gradient = gradient_of(stage.velocity.as_deref().unwrap_or_default());
+                (&stage.name, force(stage, &gradient, &region))
+            }
+            _ => return,
+        };
         progress.values.extend(values);
         if let Some(message) = error {
-            let key = format!("integrate {}", stage.name);
-            progress.errors.push((key, format!("integrate `{}`: {message}", stage.name)));
+            let stage = stage.name();
+            let key = format!("{stage} {name}");
+            progress.errors.push((key, format!("{stage} `{name}`: {message}")));
+        }
+    }
+
+    /// Measures what comes of other monitors.
+    pub(super) fn of_monitors(
+        stage: &Stage,
+        names: &Names,
+        state: &mut State,
+        progress: &mut Progress,
+    ) {
+        let time = progress.snapshot.time;
+        match (stage, names, state) {
+            (Stage::Difference(_), Names::Difference(of, minus), _) => {
+                let difference = progress.value(of) - progress.value(minus);
+                progress.values.push(difference);
+            }
+            (Stage::TimeStatistics(stage), Names::One(slot), State::OverTime(over_time)) => {
+                over_time.add(time, progress.value(slot));
+                progress.values.extend(over_time.values(&stage.measures));
+            }
+            (Stage::Spectrum(stage), Names::One(slot), State::Samples(samples)) => {
+                samples.add(time, progress.value(slot));
+                let (values, is_uneven) = samples.values();
+                progress.values.extend(values);
+                if is_uneven && progress.communicator.rank() == 0 {
+                    let message = format!(
+                        "spectrum `{}`: the time steps vary; the values are interpolated at even \
+                         times",
+                        stage.name
+                    );
+                    progress.errors.push((format!("uneven {}", stage.name), message));
+                }
+            }
+            _ => {}
         }
     }
 }

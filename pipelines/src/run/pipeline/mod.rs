@@ -1,25 +1,28 @@
 //! One pipeline and its stages.
 
+mod end;
 mod measure;
+mod prepare;
+mod sinks;
 
 use std::collections::HashSet;
 use std::sync::Arc;
 
+use tombolo_deform::communicator::Communicator;
 use tombolo_deform::edit::Edit;
 
+use super::cost::{Cost, Thinning};
 use super::due::Clock;
-use super::output::{Frame, MonitorValues, Output};
-use crate::derive::{Basis, derive, with_derived};
-use crate::expression::Expression;
+use super::history::Board;
+use super::output::{MonitorValues, Output};
+use super::trigger::Trigger;
+use crate::derive::{Basis, derive, follow, wall_shear_stress, with_derived};
 use crate::extract::{
-    Channel, Extract, ExtractError, Extracted, Field, Input, Kept, Snapshot, Source, is_absent,
-    merged, skin, unknown_field,
+    Channel, Extract, ExtractError, Extracted, Field, Input, Kept, Snapshot, Source, merged,
+    unknown_field,
 };
-use crate::language::{
-    Action, Change, Command, Order, OrderStage, Pipeline, Problem, Stage, StreamStage, Write,
-    file_pattern, monitor_names,
-};
-use tombolo_deform::communicator::Communicator;
+use crate::language::{Action, Command, Monitor, Pipeline, Slot, Stage, WallShearStress};
+use prepare::{Names, State, gradient_of};
 
 /// The name of the element field that a `quality` stage adds.
 const QUALITY_FIELD: &str = "scaled_jacobian";
@@ -27,16 +30,28 @@ const QUALITY_FIELD: &str = "scaled_jacobian";
 /// A pipeline that is ready to run.
 pub(super) struct Prepared {
     pub(super) pipeline: Pipeline,
+    /// Its place in the configuration.
+    pub(super) place: usize,
     pub(super) due: Clock,
+    pub(super) thinning: Thinning,
+    pub(super) cost: Cost,
     /// Whether it runs when it is due.
     pub(super) is_chosen: bool,
-    name: Arc<str>,
+    pub(super) name: Arc<str>,
+    /// The stages, and those that derive what they need.
+    stages: Vec<Stage>,
+    /// What each stage names, and what it keeps.
+    names: Vec<Names>,
+    states: Vec<State>,
+    names_of_actions: Vec<Names>,
     /// The fields to keep, where a `select` stage says so.
     selected: Option<HashSet<String>>,
-    /// The fields to integrate over the extract.
-    integrated: HashSet<String>,
-    condition: Option<Expression>,
-    monitors: Vec<String>,
+    /// The fields that are reduced over the extract.
+    reduced: HashSet<String>,
+    /// The fields that nobody sees but the stages that need them.
+    hidden: HashSet<String>,
+    trigger: Trigger,
+    monitors: Vec<Monitor>,
     /// The errors of the last run, so that it is told once and not at every step.
     reported: HashSet<String>,
     /// What the source stage keeps as long as the mesh does not move.
@@ -58,13 +73,49 @@ struct Progress<'a> {
     extracted: Option<Extracted>,
     /// Fields of the extract that are integrated, but not selected.
     unselected: Vec<Field>,
+    /// The values of the monitors so far, the cycle and the time in front.
     values: Vec<f64>,
+    board: &'a Board,
     edits: Vec<Edit>,
     errors: Vec<Keyed>,
+    cost: Cost,
     outputs: &'a mut Vec<Output>,
 }
 
+/// What monitors and parameters are at a step.
+struct Seen<'a> {
+    cycle: u64,
+    time: f64,
+    /// The values of the pipeline's own monitors, the cycle and the time in front.
+    values: &'a [f64],
+    board: &'a Board,
+    /// Whether this is rank 0.
+    is_first: bool,
+}
+
+impl Seen<'_> {
+    fn value(&self, slot: &Slot) -> f64 {
+        self.board.value(slot, self.values)
+    }
+}
+
 impl Progress<'_> {
+    /// What the monitors are so far.
+    fn seen(&self) -> Seen<'_> {
+        Seen {
+            cycle: self.snapshot.cycle,
+            time: self.snapshot.time,
+            values: &self.values,
+            board: self.board,
+            is_first: self.communicator.rank() == 0,
+        }
+    }
+
+    /// The value of a name as it is now.
+    fn value(&self, slot: &Slot) -> f64 {
+        self.board.value(slot, &self.values)
+    }
+
     /// Whether this rank has nothing of a mesh of which others have parts.
     fn is_bare(&self) -> bool {
         self.communicator.size() > 1 && self.channel.mesh.points.is_empty()
@@ -72,49 +123,6 @@ impl Progress<'_> {
 }
 
 impl Prepared {
-    pub(super) fn new(pipeline: &Pipeline) -> Result<Self, Problem> {
-        let monitors = monitor_names(pipeline);
-        let names: Vec<&str> = monitors.iter().map(String::as_str).collect();
-        let condition = match &pipeline.when {
-            Some(when) => Some(
-                Expression::parse_condition(when, &names)
-                    .map_err(|error| Problem::new(error.to_string()).within("when"))?,
-            ),
-            None => None,
-        };
-        let mut selected: Option<HashSet<String>> = None;
-        for stage in &pipeline.stages {
-            if let Stage::Select(select) = stage {
-                let fields: HashSet<String> = select.fields.iter().cloned().collect();
-                selected = Some(match selected {
-                    Some(before) => before.intersection(&fields).cloned().collect(),
-                    None => fields,
-                });
-            }
-        }
-        let integrated = pipeline.stages.iter().filter_map(|stage| match stage {
-            Stage::Integrate(integrate) => Some([&integrate.field, &integrate.vector]),
-            _ => None,
-        });
-        Ok(Self {
-            integrated: integrated.flatten().flatten().cloned().collect(),
-            due: Clock::new(pipeline.due),
-            is_chosen: true,
-            name: pipeline.name.as_str().into(),
-            selected,
-            condition,
-            monitors,
-            reported: HashSet::new(),
-            kept: Kept::default(),
-            pipeline: pipeline.clone(),
-        })
-    }
-
-    pub(super) fn streams(&self) -> bool {
-        self.pipeline.stages.iter().any(|stage| matches!(stage, Stage::Stream(_)))
-            || self.pipeline.then.iter().any(|action| matches!(action, Action::Stream(_)))
-    }
-
     /// Tells the errors that were not there in the last run.
     pub(super) fn report(&mut self, cycle: u64, errors: Vec<Keyed>, outputs: &mut Vec<Output>) {
         let mut keys = HashSet::new();
@@ -127,14 +135,17 @@ impl Prepared {
         self.reported = keys;
     }
 
+    /// Runs the stages, and the actions where the condition holds. Returns the values of the
+    /// monitors. Collective.
     pub(super) fn run(
         &mut self,
         snapshot: &Snapshot,
         channel: &Channel,
         source: &mut Source,
         communicator: &dyn Communicator,
+        board: &Board,
         outputs: &mut Vec<Output>,
-    ) {
+    ) -> Vec<f64> {
         #[expect(clippy::cast_precision_loss, reason = "cycles below 2^53")]
         let values = vec![snapshot.cycle as f64, snapshot.time];
         let mut progress = Progress {
@@ -147,47 +158,68 @@ impl Prepared {
             extracted: None,
             unselected: Vec::new(),
             values,
+            board,
             edits: Vec::new(),
             errors: Vec::new(),
+            cost: self.cost,
             outputs,
         };
         self.check_selection(&mut progress);
-        for stage in &self.pipeline.stages {
-            self.stage(stage, &mut progress);
+        let mut states = std::mem::take(&mut self.states);
+        for (index, state) in states.iter_mut().enumerate() {
+            self.stage(index, state, &mut progress);
         }
-        if self.monitors.len() > 2 {
-            let values = self
-                .monitors
-                .iter()
-                .cloned()
-                .zip(progress.values.iter().copied())
-                .skip(2)
-                .collect();
+        self.states = states;
+        let measured = progress.values[2..].to_vec();
+        if !measured.is_empty() {
+            let names = self.monitors.iter().map(|monitor| monitor.name.clone());
             progress.outputs.push(Output::Monitor(MonitorValues {
                 pipeline: Arc::clone(&self.name),
                 cycle: snapshot.cycle,
                 time: snapshot.time,
-                values,
+                values: names.zip(measured.iter().copied()).collect(),
             }));
         }
-        if self.condition.as_ref().is_none_or(|condition| condition.holds(&progress.values)) {
-            for action in &self.pipeline.then {
-                match action {
-                    Action::Pause {} => self.command(Command::Pause {}, &mut progress),
-                    Action::Stop {} => self.command(Command::Stop {}, &mut progress),
-                    Action::Stream(stream) => self.stream(stream, &mut progress),
-                    Action::Write(write) => self.write(write, &mut progress),
-                    Action::Order(order) => self.order(order, &mut progress),
-                }
+        let fires = {
+            let value = |slot: &Slot| progress.value(slot);
+            self.trigger.fires((snapshot.cycle, snapshot.time), value)
+        };
+        if fires {
+            for (action, names) in self.pipeline.then.iter().zip(&self.names_of_actions) {
+                self.act(action, names, &mut progress);
             }
         }
         self.kept = std::mem::take(&mut progress.kept);
+        self.cost = progress.cost;
+        let states: usize = self.states.iter().map(State::bytes).sum();
+        self.cost.memory = (self.kept.bytes() + states) as u64;
         let errors = errors_of_all(communicator, std::mem::take(&mut progress.errors));
         self.report(snapshot.cycle, errors, outputs);
+        measured
+    }
+
+    fn act(&self, action: &Action, names: &Names, progress: &mut Progress) {
+        match action {
+            Action::Pause {} => self.command(Command::Pause {}, progress),
+            Action::Stop {} => self.command(Command::Stop {}, progress),
+            Action::Set(parameter) => self.command(Command::Parameter(parameter.clone()), progress),
+            Action::Stream(stream) => self.stream(stream, progress),
+            Action::Write(write) => self.write(write, progress),
+            Action::Csv(_) => {
+                let row = self.row(names, &progress.seen());
+                progress.outputs.extend(row);
+            }
+            Action::Log(log) => {
+                let line = self.log(log, names, &progress.seen());
+                progress.outputs.extend(line);
+            }
+            Action::Order(order) => self.order(order, progress),
+        }
     }
 
     fn wants(&self, field: &str) -> bool {
-        self.selected.as_ref().is_none_or(|selected| selected.contains(field))
+        !self.hidden.contains(field)
+            && self.selected.as_ref().is_none_or(|selected| selected.contains(field))
     }
 
     /// Names selected fields that the channel does not have.
@@ -196,8 +228,10 @@ impl Prepared {
         if progress.is_bare() {
             return;
         }
-        let derived = || self.pipeline.stages.iter().filter_map(Stage::derived_name);
-        let known = || progress.channel.fields.iter().map(|field| field.name).chain(derived());
+        let added: Vec<String> =
+            self.pipeline.stages.iter().flat_map(Stage::added_fields).collect();
+        let of_channel = || progress.channel.fields.iter().map(|field| field.name);
+        let known = || of_channel().chain(added.iter().map(String::as_str));
         let mut missing: Vec<&String> = selected
             .iter()
             .filter(|name| *name != QUALITY_FIELD && known().all(|known| known != *name))
@@ -209,7 +243,8 @@ impl Prepared {
         }
     }
 
-    fn stage(&self, stage: &Stage, progress: &mut Progress) {
+    fn stage(&self, index: usize, state: &mut State, progress: &mut Progress) {
+        let (stage, names) = (&self.stages[index], &self.names[index]);
         match stage {
             Stage::Surface {}
             | Stage::Slice(_)
@@ -225,9 +260,27 @@ impl Prepared {
             | Stage::Expression(_) => Self::derive(stage, progress),
             Stage::Quality {} => self.quality(progress),
             Stage::Statistics(stage) => Self::statistics(&stage.field, progress),
-            Stage::Integrate(stage) => self.integrate(stage, progress),
+            Stage::Integrate(_) | Stage::Histogram(_) | Stage::Force(_) => {
+                self.reduce(stage, progress);
+            }
+            Stage::WallShearStress(stress) => self.wall_shear_stress(stress, progress),
+            Stage::TimeStatistics(statistics) if statistics.field.is_some() => {
+                Self::follow(stage, state, progress);
+            }
+            Stage::Difference(_) | Stage::TimeStatistics(_) | Stage::Spectrum(_) => {
+                Self::of_monitors(stage, names, state, progress);
+            }
             Stage::Stream(stream) => self.stream(stream, progress),
             Stage::Write(write) => self.write(write, progress),
+            Stage::Csv(_) => {
+                let row = self.row(names, &progress.seen());
+                progress.outputs.extend(row);
+            }
+            Stage::Log(log) => {
+                let line = self.log(log, names, &progress.seen());
+                progress.outputs.extend(line);
+            }
+            Stage::Set(parameter) => self.command(Command::Parameter(parameter.clone()), progress),
             Stage::Translate(_)
             | Stage::Rotate(_)
             | Stage::ScaleDirection(_)
@@ -251,7 +304,7 @@ impl Prepared {
         let input = Input {
             channel: &channel,
             cycle: progress.snapshot.cycle,
-            wanted: &|field: &str| self.wants(field) || self.integrated.contains(field),
+            wanted: &|field: &str| self.wants(field) || self.reduced.contains(field),
             communicator: progress.communicator,
         };
         let (source, kept) = (&mut *progress.source, &mut progress.kept);
@@ -268,6 +321,56 @@ impl Prepared {
 
     /// Derives a field, which the stages after find among those of the channel.
     fn derive(stage: &Stage, progress: &mut Progress) {
+        let derived = Self::on_basis(progress, |basis| derive(stage, basis));
+        match derived {
+            Ok(field) => progress.derived.extend(field.flatten()),
+            Err(message) => {
+                let key = format!("derived {}", stage.derived_name().unwrap_or_default());
+                progress.errors.push((key, format!("{}: {message}", stage.name())));
+            }
+        }
+    }
+
+    /// Follows a field over time; its statistics are found among the fields of the channel.
+    fn follow(stage: &Stage, state: &mut State, progress: &mut Progress) {
+        let (Stage::TimeStatistics(statistics), State::Running(running)) = (stage, state) else {
+            return;
+        };
+        match Self::on_basis(progress, |basis| follow(statistics, basis, running)) {
+            Ok(fields) => progress.derived.extend(fields.into_iter().flatten()),
+            Err(message) => {
+                let key = format!("over time {}", statistics.name);
+                progress.errors.push((key, format!("time_statistics: {message}")));
+            }
+        }
+    }
+
+    /// Derives the shear of the flow on the faces of the surface, as a field of the extract.
+    fn wall_shear_stress(&self, stage: &WallShearStress, progress: &mut Progress) {
+        let gradient = gradient_of(&stage.velocity);
+        let derived = Self::on_basis(progress, |basis| match basis.source.walls() {
+            Some(walls) => wall_shear_stress(stage, &gradient, basis, &walls),
+            None => Ok(None),
+        });
+        match (derived, progress.extracted.as_mut()) {
+            (Ok(Some(Some(field))), Some(extracted)) => match self.wants(stage.name()) {
+                true => Arc::make_mut(&mut extracted.extract).fields.push(field),
+                false => progress.unselected.push(field),
+            },
+            (Err(message), _) => {
+                let message = format!("wall_shear_stress: {message}");
+                progress.errors.push((format!("derived {}", stage.name()), message));
+            }
+            _ => {}
+        }
+    }
+
+    /// Works something out from the fields of the mesh, where all ranks know where it lies; `None`
+    /// where one does not. Collective.
+    fn on_basis<T>(
+        progress: &mut Progress,
+        work: impl FnOnce(&Basis) -> Result<T, String>,
+    ) -> Result<Option<T>, String> {
         let fields = with_derived(progress.channel, &progress.derived);
         let channel = Channel { fields: &fields, ..*progress.channel };
         let Snapshot { cycle, time, .. } = *progress.snapshot;
@@ -276,18 +379,10 @@ impl Prepared {
         // What is wrong on one rank is wrong for all.
         let found = progress.source.update(&input).map_err(|error| error.to_string());
         let is_found = !communicator.any(found.is_err());
-        let derived = found.and_then(|()| {
-            let source = &*progress.source;
-            let basis = Basis { channel: &channel, source, cycle, time, communicator };
-            if is_found { derive(stage, &basis) } else { Ok(None) }
-        });
-        match derived {
-            Ok(field) => progress.derived.extend(field),
-            Err(message) => {
-                let key = format!("derived {}", stage.derived_name().unwrap_or_default());
-                progress.errors.push((key, format!("{}: {message}", stage.name())));
-            }
-        }
+        found?;
+        let source = &*progress.source;
+        let basis = Basis { channel: &channel, source, cycle, time, communicator };
+        if is_found { work(&basis).map(Some) } else { Ok(None) }
     }
 
     fn keep(&self, taken: Result<Extracted, ExtractError>, stage: &str, progress: &mut Progress) {
@@ -310,8 +405,8 @@ impl Prepared {
                         &progress.source.scaled_jacobians(progress.channel),
                     );
                 }
-                let is_aside = |name: &str| self.integrated.contains(name) && !self.wants(name);
-                if self.integrated.iter().any(|field| is_aside(field)) {
+                let is_aside = |name: &str| self.reduced.contains(name) && !self.wants(name);
+                if self.reduced.iter().any(|field| is_aside(field)) {
                     let fields = &mut Arc::make_mut(&mut extracted.extract).fields;
                     progress.unselected =
                         fields.extract_if(.., |field| is_aside(&field.name)).collect();
@@ -347,55 +442,6 @@ impl Prepared {
         };
         // Where the extract could not be taken, its error has been reported already.
         merged(progress.communicator, whole, progress.extracted.as_ref()).ok().flatten()
-    }
-
-    fn stream(&self, stage: &StreamStage, progress: &mut Progress) {
-        let Some(mut extract) = self.finished(progress) else { return };
-        match skin(&extract) {
-            Ok(Some(outside)) => extract = outside.into(),
-            Ok(None) => {}
-            Err(error) => progress.errors.push(("skin".into(), error.to_string())),
-        }
-        let lacks = |field: &Field| field.values.iter().any(|&value| is_absent(value));
-        if extract.fields.iter().any(lacks) {
-            for field in Arc::make_mut(&mut extract).fields.extract_if(.., |field| lacks(field)) {
-                let message = format!(
-                    "field `{}` is not on all of the mesh; it is not sent to viewers",
-                    field.name
-                );
-                progress.errors.push((format!("absent {}", field.name), message));
-            }
-        }
-        progress.outputs.push(Output::Frame(Frame {
-            pipeline: Arc::clone(&self.name),
-            cycle: progress.snapshot.cycle,
-            time: progress.snapshot.time,
-            extract,
-            encoding: (*stage).into(),
-        }));
-    }
-
-    fn write(&self, stage: &Write, progress: &mut Progress) {
-        let Some(extract) = self.finished(progress) else { return };
-        let Snapshot { cycle, time, .. } = *progress.snapshot;
-        match file_pattern(&stage.file, cycle, time) {
-            Ok(path) => {
-                let pipeline = Arc::clone(&self.name);
-                progress.outputs.push(Output::Write { pipeline, path, cycle, time, extract });
-            }
-            Err(problem) => progress.errors.push(("write".into(), problem.to_string())),
-        }
-    }
-
-    fn order(&self, stage: &OrderStage, progress: &mut Progress) {
-        let edits = std::mem::take(&mut progress.edits);
-        let OrderStage { schedule, deform, guard } = stage.clone();
-        let order = Order { change: Change::Edits(edits), schedule, deform, guard };
-        self.command(Command::Order(order), progress);
-    }
-
-    fn command(&self, command: Command, progress: &mut Progress) {
-        progress.outputs.push(Output::Command { pipeline: Arc::clone(&self.name), command });
     }
 }
 

@@ -1,0 +1,121 @@
+//! Tables of monitors: CSV files that grow by a row at a time.
+
+use std::fmt::Write as _;
+use std::fs::{File, OpenOptions, create_dir_all};
+use std::io::{BufRead as _, BufReader, Seek as _, SeekFrom, Write as _};
+use std::path::Path;
+
+use tombolo_pipelines::{language::Existing, run::Table};
+
+/// A table that is open.
+pub(crate) struct OpenTable {
+    file: File,
+}
+
+/// Bytes of a first line that are looked at.
+const FIRST_LINE: u64 = 1 << 22;
+
+impl OpenTable {
+    /// Opens or begins the file.
+    ///
+    /// # Errors
+    /// Why it cannot be written, or what other columns it has.
+    pub(crate) fn open(path: &Path, table: &Table) -> Result<Self, String> {
+        let told = |error: std::io::Error| format!("{}: {error}", path.display());
+        if let Some(folder) = path.parent() {
+            create_dir_all(folder).map_err(told)?;
+        }
+        let head = head(&table.titles);
+        if table.existing == Existing::Continue && path.exists() {
+            let mut file = OpenOptions::new().read(true).append(true).open(path).map_err(told)?;
+            let mut found = String::new();
+            let mut lines = BufReader::new(std::io::Read::take(&file, FIRST_LINE));
+            lines.read_line(&mut found).map_err(told)?;
+            if !found.is_empty() {
+                if found.trim_end_matches(['\r', '\n']) != head {
+                    return Err(format!(
+                        "{}: the table that is there has other columns: found `{}`, expected \
+                         `{head}`",
+                        path.display(),
+                        found.trim_end()
+                    ));
+                }
+                // A row that a run did not come to finish is closed.
+                let end = file.seek(SeekFrom::End(-1)).map_err(told)?;
+                let mut last = [0];
+                std::io::Read::read_exact(&mut file, &mut last).map_err(told)?;
+                if end > 0 && last != [b'\n'] {
+                    file.write_all(b"\n").map_err(told)?;
+                }
+                return Ok(Self { file });
+            }
+        }
+        let mut file = File::create(path).map_err(told)?;
+        file.write_all(format!("{head}\n").as_bytes()).map_err(told)?;
+        Ok(Self { file })
+    }
+
+    /// Adds a row, which is in the file when this returns.
+    ///
+    /// # Errors
+    /// Why it cannot be written.
+    pub(crate) fn push(&mut self, cycle: u64, time: f64, values: &[f64]) -> Result<(), String> {
+        let mut row = format!("{cycle},{time}");
+        for value in values {
+            let _ = match value.is_nan() {
+                true => write!(row, ",nan"),
+                false => write!(row, ",{value}"),
+            };
+        }
+        row.push('\n');
+        // In one piece, so that who reads meanwhile sees whole rows.
+        let written = self.file.write_all(row.as_bytes()).and_then(|()| self.file.flush());
+        written.map_err(|error| error.to_string())
+    }
+}
+
+/// The first line.
+fn head(titles: &[String]) -> String {
+    let quoted = |title: &String| match title.contains([',', '"', '\n', '\r']) {
+        true => format!("\"{}\"", title.replace('"', "\"\"")),
+        false => title.clone(),
+    };
+    let titles = titles.iter().map(quoted);
+    ["cycle".to_owned(), "time".to_owned()].into_iter().chain(titles).collect::<Vec<_>>().join(",")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::{read_to_string, write};
+
+    use super::*;
+
+    fn table(existing: Existing) -> Table {
+        let titles = vec!["drop [Pa]".into(), "a, b".into()];
+        Table { file: "a.csv".into(), titles, existing }
+    }
+
+    #[test]
+    fn rows_are_added_and_what_was_there_is_replaced_or_continued() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new/a.csv");
+        let push = |existing, cycle: u64| {
+            let mut open = OpenTable::open(&path, &table(existing))?;
+            open.push(cycle, 0.1, &[1.5, f64::NAN])
+        };
+        push(Existing::Continue, 1).unwrap();
+        push(Existing::Continue, 2).unwrap();
+        let head = "cycle,time,drop [Pa],\"a, b\"\n";
+        assert_eq!(read_to_string(&path).unwrap(), format!("{head}1,0.1,1.5,nan\n2,0.1,1.5,nan\n"));
+        push(Existing::Replace, 3).unwrap();
+        assert_eq!(read_to_string(&path).unwrap(), format!("{head}3,0.1,1.5,nan\n"));
+        // A run that was killed in the middle of a row.
+        write(&path, format!("{head}3,0.1,1.")).unwrap();
+        push(Existing::Continue, 4).unwrap();
+        assert_eq!(read_to_string(&path).unwrap(), format!("{head}3,0.1,1.\n4,0.1,1.5,nan\n"));
+        write(&path, "cycle,time,lift\n1,2,3\n").unwrap();
+        let error = push(Existing::Continue, 5).unwrap_err();
+        assert!(error.contains("found `cycle,time,lift`"), "{error}");
+        assert_eq!(read_to_string(&path).unwrap(), "cycle,time,lift\n1,2,3\n", "left as it was");
+    }
+}

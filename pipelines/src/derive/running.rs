@@ -1,0 +1,165 @@
+//! Fields over time: their means, least and largest values while the solver runs.
+
+use std::collections::VecDeque;
+
+use tombolo_deform::mesh::NumberType;
+
+use super::Basis;
+use crate::extract::{ABSENT, Association, Field, MeshKey, is_absent};
+use crate::language::{Measure, TimeStatistics};
+
+/// How many blocks a window is made of: it moves on by one of them.
+const BLOCKS: f64 = 4.0;
+
+/// A field over a window of time, or since the first measurement.
+#[derive(Debug, Default)]
+pub(crate) struct Running {
+    of: Option<(MeshKey, Association, usize)>,
+    last: Option<(f64, Vec<f64>)>,
+    /// The oldest first; the last is still growing.
+    blocks: VecDeque<Block>,
+}
+
+/// A length of time, and what the field did in it: what no measure asks for is empty.
+#[derive(Debug, Default)]
+struct Block {
+    length: f64,
+    integral: Vec<f64>,
+    squares: Vec<f64>,
+    least: Vec<f64>,
+    largest: Vec<f64>,
+}
+
+impl Block {
+    fn new(measures: &[Measure], values: &[f64]) -> Self {
+        let has = |measure: Measure| measures.contains(&measure);
+        let zeros = |is_there: bool| vec![0.0; if is_there { values.len() } else { 0 }];
+        let copy = |is_there: bool| if is_there { values.to_vec() } else { Vec::new() };
+        Self {
+            length: 0.0,
+            integral: zeros(has(Measure::Mean)),
+            squares: zeros(has(Measure::Rms)),
+            least: copy(has(Measure::Min)),
+            largest: copy(has(Measure::Max)),
+        }
+    }
+
+    /// Adds a length of time in which the field changes evenly.
+    fn add(&mut self, length: f64, from: &[f64], to: &[f64]) {
+        self.length += length;
+        let ends = || from.iter().zip(to);
+        for (sum, (a, b)) in self.integral.iter_mut().zip(ends()) {
+            *sum += length * (a + b) / 2.0;
+        }
+        for (sum, (a, b)) in self.squares.iter_mut().zip(ends()) {
+            *sum += length * (a * a + a * b + b * b) / 3.0;
+        }
+        // Written so that a NaN stays.
+        self.least.iter_mut().zip(to).filter(|(a, b)| !(**a <= **b)).for_each(|(a, b)| *a = *b);
+        self.largest.iter_mut().zip(to).filter(|(a, b)| !(**a >= **b)).for_each(|(a, b)| *a = *b);
+    }
+
+    fn bytes(&self) -> usize {
+        let all = [&self.integral, &self.squares, &self.least, &self.largest];
+        all.iter().map(|part| part.capacity() * size_of::<f64>()).sum()
+    }
+}
+
+impl Running {
+    /// Takes a measurement in.
+    fn add(&mut self, stage: &TimeStatistics, time: f64, values: Vec<f64>) {
+        let Some((before, old)) = self.last.take().filter(|(before, _)| *before <= time) else {
+            self.blocks = VecDeque::from([Block::new(&stage.measures, &values)]);
+            self.last = Some((time, values));
+            return;
+        };
+        if let Some(window) = stage.window {
+            let window = window.get();
+            if self.blocks.back().is_some_and(|block| block.length >= window / BLOCKS) {
+                self.blocks.push_back(Block::new(&stage.measures, &old));
+            }
+            let length = |blocks: &VecDeque<Block>| -> f64 {
+                blocks.iter().skip(1).map(|block| block.length).sum()
+            };
+            while self.blocks.len() > 1 && length(&self.blocks) + time - before >= window {
+                self.blocks.pop_front();
+            }
+        }
+        if let Some(block) = self.blocks.back_mut() {
+            block.add(time - before, &old, &values);
+        }
+        self.last = Some((time, values));
+    }
+
+    fn measure(&self, measure: Measure) -> Vec<f64> {
+        let Some((_, last)) = &self.last else { return Vec::new() };
+        let length: f64 = self.blocks.iter().map(|block| block.length).sum();
+        let sum = |entity: usize, of: fn(&Block) -> &[f64]| -> f64 {
+            self.blocks.iter().map(|block| of(block)[entity]).sum::<f64>() / length
+        };
+        let first = |of: fn(&Block) -> &[f64], entity: usize, pick: fn(f64, f64) -> f64| {
+            let all = self.blocks.iter().map(|block| of(block)[entity]);
+            all.reduce(|a, b| if a.is_nan() || b.is_nan() { f64::NAN } else { pick(a, b) })
+        };
+        let value = |entity: usize| match measure {
+            Measure::Mean if length > 0.0 => sum(entity, |block| &block.integral),
+            Measure::Rms if length > 0.0 => sum(entity, |block| &block.squares).sqrt(),
+            Measure::Mean => last[entity],
+            Measure::Rms => last[entity].abs(),
+            Measure::Min => first(|block| &block.least, entity, f64::min).unwrap_or(ABSENT),
+            Measure::Max => first(|block| &block.largest, entity, f64::max).unwrap_or(ABSENT),
+        };
+        let finite = |value: f64| if value.is_finite() { value } else { ABSENT };
+        (0..last.len()).map(value).map(finite).collect()
+    }
+
+    /// Bytes of memory.
+    pub(crate) fn bytes(&self) -> usize {
+        let last = self.last.as_ref().map_or(0, |(_, values)| values.capacity());
+        last * size_of::<f64>() + self.blocks.iter().map(Block::bytes).sum::<usize>()
+    }
+}
+
+/// The statistics over time of a field as it is now, and was when this was called before; none where
+/// another rank says why there are none. They begin anew where the cells of any rank are others, or
+/// the field is of another kind. Collective.
+///
+/// # Errors
+/// What is missing or does not fit.
+pub(crate) fn follow(
+    stage: &TimeStatistics,
+    basis: &Basis,
+    running: &mut Running,
+) -> Result<Vec<Field>, String> {
+    let Some(field) = &stage.field else { return Ok(Vec::new()) };
+    let known = |name: &str| basis.channel.fields.iter().any(|field| field.name == name);
+    let operand = match stage.fields().find(|(name, _)| known(name)) {
+        Some((name, _)) => Err(format!("the channel has a field `{name}` already")),
+        None => basis.operand(field),
+    };
+    let kind = operand.as_ref().map(|operand| operand.as_ref().map(super::Operand::kind));
+    let kind = basis.agreed(kind.map_err(Clone::clone))?;
+    let Some((association, components)) = kind else { return Ok(Vec::new()) };
+    let of = Some((MeshKey::of(&basis.channel.mesh), association, components));
+    if basis.communicator.any(running.of != of) {
+        *running = Running { of, ..Running::default() };
+    }
+    let values = match operand {
+        Ok(Some(operand)) => {
+            let tuple =
+                |entity: usize| (0..components).map(move |part| operand.value(entity, part));
+            let nan = |value: f64| if is_absent(value) { f64::NAN } else { value };
+            (0..operand.view.values.len()).flat_map(tuple).map(nan).collect()
+        }
+        _ => Vec::new(),
+    };
+    running.add(stage, basis.time, values);
+    let field = |(name, measure)| Field {
+        name,
+        association,
+        components,
+        number: NumberType::F64,
+        values: running.measure(measure),
+    };
+    Ok(stage.fields().map(field).collect())
+}

@@ -1,0 +1,417 @@
+//! The monitors of pipelines: their names and units, and what of them a pipeline may name.
+
+use super::config::{Action, Config, Stage};
+use super::pipeline::{AgainAfter, Due, Pipeline};
+use super::{Csv, Log, Problem, nearest};
+use crate::expression::Expression;
+
+/// A number that a pipeline measures.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Monitor {
+    /// Its name, which no other monitor of the pipeline has: `quality.min`.
+    pub name: String,
+    /// Its unit, where one is given.
+    pub unit: Option<String>,
+}
+
+impl Monitor {
+    /// The name with the unit in brackets behind it, where there is one.
+    #[must_use]
+    pub fn titled(&self) -> String {
+        match &self.unit {
+            Some(unit) => format!("{} [{unit}]", self.name),
+            None => self.name.clone(),
+        }
+    }
+}
+
+/// What the names of vectors' components end in.
+const XYZ: [&str; 3] = ["x", "y", "z"];
+
+/// The monitors of a pipeline, in the order in which the runner gives their values; the first two
+/// are `cycle` and `time`.
+#[must_use]
+pub fn monitors(pipeline: &Pipeline) -> Vec<Monitor> {
+    let mut all = vec![Monitor { name: "cycle".into(), unit: None }];
+    all.push(Monitor { name: "time".into(), unit: None });
+    let has_faces = pipeline.stages.iter().any(Stage::takes_faces);
+    pipeline.stages.iter().for_each(|stage| all.extend(monitors_of(stage, has_faces)));
+    all
+}
+
+/// The monitors of one stage; `has_faces` says whether the extract is one of faces, through which a
+/// vector field has a flux.
+pub(crate) fn monitors_of(stage: &Stage, has_faces: bool) -> Vec<Monitor> {
+    let mut all = Vec::new();
+    let mut add = |prefix: &str, suffix: &str, unit: Option<&String>| {
+        let name = if suffix.is_empty() { prefix.into() } else { format!("{prefix}.{suffix}") };
+        all.push(Monitor { name, unit: unit.cloned() });
+    };
+    match stage {
+        Stage::Quality {} => {
+            ["min", "mean", "max", "inverted"].iter().for_each(|name| add("quality", name, None));
+        }
+        Stage::Statistics(stage) => {
+            let unit = stage.unit.as_ref();
+            ["min", "max", "mean", "l2"].iter().for_each(|name| add(stage.name(), name, unit));
+            add(stage.name(), "non_finite", None);
+        }
+        Stage::Integrate(stage) => {
+            let (name, mean) = (&stage.name, stage.unit.as_ref());
+            let unit = |suffix: &str| stage.units.get(suffix);
+            add(name, "size", unit("size"));
+            if stage.field.is_some() {
+                add(name, "integral", unit("integral"));
+                add(name, "mean", mean.or(unit("mean")));
+            }
+            if stage.vector.is_some() {
+                XYZ.iter().for_each(|xyz| add(name, &format!("integral.{xyz}"), unit("integral")));
+                XYZ.iter().for_each(|xyz| add(name, &format!("mean.{xyz}"), mean.or(unit("mean"))));
+                if has_faces {
+                    add(name, "flow_rate", unit("flow_rate"));
+                }
+            }
+        }
+        Stage::Histogram(stage) => {
+            ["lower", "upper"].iter().for_each(|name| add(&stage.name, name, stage.unit.as_ref()));
+            ["below", "above"].iter().for_each(|name| add(&stage.name, name, None));
+            (0..stage.bins).for_each(|bin| add(&stage.name, &format!("bins.{bin}"), None));
+        }
+        Stage::Force(stage) => {
+            let (name, force) = (&stage.name, stage.unit.as_ref());
+            let unit = |suffix: &str| stage.units.get(suffix);
+            XYZ.iter().for_each(|xyz| add(name, xyz, force));
+            XYZ.iter().for_each(|xyz| add(name, &format!("moment.{xyz}"), unit("moment")));
+            add(name, "size", unit("size"));
+            if stage.pressure.is_some() {
+                XYZ.iter().for_each(|xyz| add(name, &format!("pressure.{xyz}"), force));
+                add(name, "mean_pressure", unit("mean_pressure"));
+            }
+            if stage.velocity.is_some() {
+                XYZ.iter().for_each(|xyz| add(name, &format!("viscous.{xyz}"), force));
+            }
+        }
+        Stage::Difference(stage) => add(&stage.name, "", stage.unit.as_ref()),
+        Stage::TimeStatistics(stage) if stage.monitor.is_some() => {
+            let unit = stage.unit.as_ref();
+            stage.measures.iter().for_each(|measure| add(&stage.name, measure.name(), unit));
+            add(&stage.name, "time", None);
+        }
+        Stage::Spectrum(stage) => {
+            ["frequency", "resolution"].iter().for_each(|name| add(&stage.name, name, None));
+            add(&stage.name, "amplitude", stage.unit.as_ref());
+            (0..=stage.samples / 2).for_each(|k| add(&stage.name, &format!("power.{k}"), None));
+        }
+        _ => {}
+    }
+    all
+}
+
+/// Where the value of a name is found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Slot {
+    /// Among the values of the pipeline itself.
+    Own(usize),
+    /// Among those of another pipeline, by its place in the configuration.
+    Other { pipeline: usize, monitor: usize },
+    /// Among the solver's parameters.
+    Parameter(String),
+}
+
+/// What a parameter's name begins with.
+const PARAMETER: &str = "parameter.";
+
+/// The names that a pipeline may use.
+pub(crate) struct Scope {
+    own: Vec<Monitor>,
+    /// Those of other pipelines, by their places.
+    others: Vec<(usize, String, Vec<Monitor>)>,
+}
+
+impl Scope {
+    pub(crate) fn of(pipelines: &[Pipeline], index: usize) -> Self {
+        let others = pipelines.iter().enumerate().filter(|(other, _)| *other != index);
+        let other =
+            |(place, other): (usize, &Pipeline)| (place, other.name.clone(), monitors(other));
+        Self { own: monitors(&pipelines[index]), others: others.map(other).collect() }
+    }
+
+    /// The pipeline's own monitors.
+    pub(crate) fn own(&self) -> &[Monitor] {
+        &self.own
+    }
+
+    /// The monitors of other pipelines but `cycle` and `time`, with their places and with the names
+    /// by which any of them may be called.
+    fn of_others(&self) -> impl Iterator<Item = (Slot, &str, &Monitor)> {
+        self.others.iter().flat_map(|(pipeline, name, monitors)| {
+            monitors.iter().enumerate().skip(2).map(move |(monitor, of)| {
+                (Slot::Other { pipeline: *pipeline, monitor }, name.as_str(), of)
+            })
+        })
+    }
+
+    /// Where the value of a name is found: among the own monitors, or those of another pipeline.
+    ///
+    /// # Errors
+    /// A [`Problem`] with the nearest name, or with the full names where several pipelines have it.
+    pub(crate) fn find(&self, name: &str) -> Result<Slot, Problem> {
+        if let Some(parameter) = name.strip_prefix(PARAMETER) {
+            return Ok(Slot::Parameter(parameter.to_owned()));
+        }
+        if let Some(own) = self.own.iter().position(|monitor| monitor.name == name) {
+            return Ok(Slot::Own(own));
+        }
+        let qualified = |pipeline: &str, monitor: &Monitor| format!("{pipeline}/{}", monitor.name);
+        let is_meant = |pipeline: &str, monitor: &Monitor| {
+            monitor.name == name
+                || name.strip_prefix(pipeline).and_then(|rest| rest.strip_prefix('/'))
+                    == Some(&monitor.name)
+        };
+        let mut found = self.of_others().filter(|(_, pipeline, it)| is_meant(pipeline, it));
+        match (found.next(), found.next()) {
+            (Some((slot, ..)), None) => Ok(slot),
+            (Some((_, a, first)), Some((_, b, second))) => Err(Problem::new(format!(
+                "found `{name}`, which several pipelines have, expected `{}` or `{}`",
+                qualified(a, first),
+                qualified(b, second)
+            ))),
+            (None, _) => {
+                let mut known: Vec<String> =
+                    self.own.iter().map(|monitor| monitor.name.clone()).collect();
+                let others = self.of_others();
+                known.extend(others.flat_map(|(_, pipeline, monitor)| {
+                    [monitor.name.clone(), qualified(pipeline, monitor)]
+                }));
+                let near = nearest(name, known.iter().map(String::as_str));
+                Err(Problem::new(format!(
+                    "found the unknown name `{name:.60}`, expected a monitor"
+                ))
+                .suggest(near))
+            }
+        }
+    }
+
+    /// The monitor at a place, with the name by which it was called.
+    pub(crate) fn monitor(&self, name: &str, slot: &Slot) -> Monitor {
+        let monitor = match slot {
+            Slot::Own(index) => self.own.get(*index),
+            Slot::Other { pipeline, monitor } => {
+                let other = self.others.iter().find(|(place, ..)| place == pipeline);
+                other.and_then(|(_, _, monitors)| monitors.get(*monitor))
+            }
+            Slot::Parameter(_) => None,
+        };
+        Monitor { name: name.to_owned(), unit: monitor.and_then(|monitor| monitor.unit.clone()) }
+    }
+}
+
+/// A condition over monitors and parameters.
+#[derive(Debug, Clone)]
+pub(crate) struct Condition {
+    expression: Expression,
+    slots: Vec<Slot>,
+}
+
+impl Condition {
+    /// # Errors
+    /// A [`Problem`] at the first token that is wrong.
+    pub(crate) fn parse(text: &str, scope: &Scope) -> Result<Self, Problem> {
+        let (expression, names) = Expression::parse_open_condition(text).map_err(|error| {
+            let message = format!("column {} of the formula: {}", error.column, error.message);
+            Problem::new(message).suggest(error.suggestion.as_deref())
+        })?;
+        let mut slots = Vec::new();
+        for name in &names {
+            let slot = scope.find(name).map_err(|problem| {
+                // Where it stands a parser knows that knows all the others.
+                let others: Vec<&str> =
+                    names.iter().map(String::as_str).filter(|it| it != name).collect();
+                let column = Expression::parse_condition(text, &others)
+                    .err()
+                    .map_or(1, |error| error.column);
+                problem.after(&format!("column {column} of the formula: "))
+            });
+            slots.push(slot?);
+        }
+        Ok(Self { expression, slots })
+    }
+
+    /// Whether it holds; a comparison with NaN does not.
+    pub(crate) fn holds(&self, value: impl Fn(&Slot) -> f64) -> bool {
+        let values: Vec<f64> = self.slots.iter().map(value).collect();
+        self.expression.holds(&values)
+    }
+}
+
+/// The monitors of a table, and where each is found.
+pub(crate) fn columns(csv: &Csv, scope: &Scope) -> Result<Vec<(Monitor, Slot)>, Problem> {
+    if csv.monitors.is_empty() {
+        let own = scope.own().iter().enumerate().skip(2);
+        return Ok(own.map(|(index, it)| (it.clone(), Slot::Own(index))).collect());
+    }
+    let column = |(index, name): (usize, &String)| {
+        let slot = scope.find(name).map_err(|it| it.at(index).within("monitors"))?;
+        Ok((scope.monitor(name, &slot), slot))
+    };
+    csv.monitors.iter().enumerate().map(column).collect()
+}
+
+/// A line of text with numbers: text, then what stands behind it.
+pub(crate) type Line = Vec<(String, Option<Slot>)>;
+
+/// The parts of a line in the log.
+pub(crate) fn line(log: &Log, scope: &Scope) -> Result<Line, Problem> {
+    if log.message.is_some() {
+        let part = |(text, name): (&str, Option<&str>)| {
+            let slot = name.map(|name| scope.find(name)).transpose();
+            Ok((text.to_owned(), slot.map_err(|problem| problem.within("message"))?))
+        };
+        return log.parts()?.into_iter().map(part).collect();
+    }
+    let own = scope.own().iter().enumerate();
+    Ok(own
+        .map(|(index, monitor)| {
+            let before = if index == 0 { "" } else { ", " };
+            (format!("{before}{} ", monitor.titled()), Some(Slot::Own(index)))
+        })
+        .collect())
+}
+
+/// Checks of all pipelines what they say of each other's monitors.
+pub(super) fn check(config: &Config) -> Result<(), Problem> {
+    let mut files = Vec::new();
+    for (index, pipeline) in config.pipelines.iter().enumerate() {
+        let located = |problem: Problem| problem.at(index).within("pipelines");
+        let scope = Scope::of(&config.pipelines, index);
+        check_pipeline(pipeline, &scope).map_err(located)?;
+        for table in tables(pipeline) {
+            if files.contains(&(&table.file, index)) {
+                continue;
+            }
+            if files.iter().any(|(file, _)| *file == &table.file) {
+                let message = format!("another pipeline writes the file `{}`", table.file);
+                return Err(located(Problem::new(message)));
+            }
+            files.push((&table.file, index));
+        }
+    }
+    Ok(())
+}
+
+/// Checks of a configuration that the parameters it names are among those that a solver has.
+///
+/// # Errors
+/// A [`Problem`] of the first that is not, with the nearest name.
+pub fn check_parameters(config: &Config, known: &[&str]) -> Result<(), Problem> {
+    let check = |name: &str| {
+        if known.contains(&name) {
+            return Ok(());
+        }
+        let all = if known.is_empty() { "none".into() } else { known.join(", ") };
+        let message = format!("the solver has no parameter `{name}`; it has {all}");
+        Err(Problem::new(message).suggest(nearest(name, known.iter().copied())))
+    };
+    let check_slot = |slot: &Slot| match slot {
+        Slot::Parameter(name) => check(name),
+        _ => Ok(()),
+    };
+    for (index, pipeline) in config.pipelines.iter().enumerate() {
+        let located = |problem: Problem| problem.at(index).within("pipelines");
+        let scope = Scope::of(&config.pipelines, index);
+        let condition =
+            |text: &String| Condition::parse(text, &scope)?.slots.iter().try_for_each(check_slot);
+        let again = match &pipeline.again_after {
+            Some(AgainAfter::Condition(text)) => Some(text),
+            _ => None,
+        };
+        for (key, text) in [("when", pipeline.when.as_ref()), ("again_after", again)] {
+            text.map_or(Ok(()), condition).map_err(|it| located(it.within(key)))?;
+        }
+        for table in tables(pipeline) {
+            let columns = columns(table, &scope).map_err(located)?;
+            columns.iter().try_for_each(|(_, slot)| check_slot(slot)).map_err(located)?;
+        }
+        let set = pipeline.stages.iter().filter_map(|stage| match stage {
+            Stage::Set(parameter) => Some(&parameter.name),
+            _ => None,
+        });
+        let by_action = pipeline.then.iter().filter_map(|action| match action {
+            Action::Set(parameter) => Some(&parameter.name),
+            _ => None,
+        });
+        for name in set.chain(by_action) {
+            check(name).map_err(|problem| located(problem.within("set")))?;
+        }
+    }
+    Ok(())
+}
+
+fn tables(pipeline: &Pipeline) -> impl Iterator<Item = &Csv> {
+    let of_stages = pipeline.stages.iter().filter_map(|stage| match stage {
+        Stage::Csv(csv) => Some(csv),
+        _ => None,
+    });
+    of_stages.chain(pipeline.then.iter().filter_map(|action| match action {
+        Action::Csv(csv) => Some(csv),
+        _ => None,
+    }))
+}
+
+fn check_pipeline(pipeline: &Pipeline, scope: &Scope) -> Result<(), Problem> {
+    let has_faces = pipeline.stages.iter().any(Stage::takes_faces);
+    // How many values there are before a stage.
+    let mut before = 2;
+    for (index, stage) in pipeline.stages.iter().enumerate() {
+        let located = |problem: Problem| problem.within(stage.name()).at(index).within("stages");
+        let earlier = |name: &str, key: &str| {
+            let slot = scope.find(name).map_err(|it| it.within(key))?;
+            if matches!(slot, Slot::Own(own) if own >= before) {
+                let message = format!("found `{name}`, which no stage before has measured");
+                return Err(Problem::new(message).within(key));
+            }
+            Ok(())
+        };
+        let found = match stage {
+            Stage::Difference(difference) => {
+                earlier(&difference.of, "of").and_then(|()| earlier(&difference.minus, "minus"))
+            }
+            Stage::TimeStatistics(statistics) => {
+                statistics.monitor.as_ref().map_or(Ok(()), |name| earlier(name, "monitor"))
+            }
+            Stage::Spectrum(spectrum) => earlier(&spectrum.monitor, "monitor"),
+            Stage::Csv(csv) => columns(csv, scope).map(drop),
+            Stage::Log(log) => line(log, scope).map(drop),
+            _ => Ok(()),
+        };
+        found.map_err(located)?;
+        for monitor in monitors_of(stage, has_faces) {
+            if scope.own()[..before].contains(&monitor) {
+                let message = format!("another stage has a monitor named `{}`", monitor.name);
+                return Err(located(Problem::new(message).within("name")));
+            }
+            before += 1;
+        }
+    }
+    for (index, action) in pipeline.then.iter().enumerate() {
+        let found = match action {
+            Action::Csv(csv) => columns(csv, scope).map(drop),
+            Action::Log(log) => line(log, scope).map(drop),
+            _ => Ok(()),
+        };
+        found.map_err(|problem| problem.within(action.name()).at(index).within("then"))?;
+    }
+    if let Some(when) = &pipeline.when {
+        Condition::parse(when, scope).map_err(|problem| problem.within("when"))?;
+    }
+    if let Some(AgainAfter::Condition(text)) = &pipeline.again_after {
+        Condition::parse(text, scope)
+            .map_err(|problem| problem.within("condition").within("again_after"))?;
+    }
+    Ok(())
+}
+
+/// Whether a stage works on monitors alone, so that it may stand where there is no mesh.
+pub(super) fn needs_no_mesh(stage: &Stage, due: Due) -> bool {
+    due != Due::OnEnd || matches!(stage, Stage::Difference(_) | Stage::Csv(_) | Stage::Log(_))
+}

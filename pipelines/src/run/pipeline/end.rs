@@ -1,0 +1,80 @@
+//! The end of a run, and of each run of a pipeline.
+
+use std::sync::Arc;
+
+use tombolo_deform::communicator::{Communicator, Reduction};
+
+use super::super::history::Board;
+use super::super::output::{MonitorValues, Output};
+use super::prepare::Names;
+use super::{Prepared, Seen};
+use crate::language::{Action, Stage};
+
+impl Prepared {
+    /// Does what a pipeline does at the end of the run, where there are monitors and no mesh.
+    pub(crate) fn end(
+        &mut self,
+        cycle: u64,
+        time: f64,
+        communicator: &dyn Communicator,
+        board: &Board,
+        outputs: &mut Vec<Output>,
+    ) {
+        #[expect(clippy::cast_precision_loss, reason = "cycles below 2^53")]
+        let mut values = vec![cycle as f64, time];
+        let is_first = communicator.rank() == 0;
+        for (stage, names) in self.stages.iter().zip(&self.names) {
+            let seen = Seen { cycle, time, values: &values, board, is_first };
+            match (stage, names) {
+                (Stage::Difference(_), Names::Difference(of, minus)) => {
+                    let difference = seen.value(of) - seen.value(minus);
+                    values.push(difference);
+                }
+                (Stage::Csv(_), _) => outputs.extend(self.row(names, &seen)),
+                (Stage::Log(log), _) => outputs.extend(self.log(log, names, &seen)),
+                _ => {}
+            }
+        }
+        if values.len() > 2 {
+            let names = self.monitors.iter().map(|monitor| monitor.name.clone());
+            outputs.push(Output::Monitor(MonitorValues {
+                pipeline: Arc::clone(&self.name),
+                cycle,
+                time,
+                values: names.zip(values[2..].iter().copied()).collect(),
+            }));
+        }
+        let seen = Seen { cycle, time, values: &values, board, is_first };
+        if !self.trigger.fires((cycle, time), |slot| seen.value(slot)) {
+            return;
+        }
+        for (action, names) in self.pipeline.then.iter().zip(&self.names_of_actions) {
+            match action {
+                Action::Csv(_) => outputs.extend(self.row(names, &seen)),
+                Action::Log(log) => outputs.extend(self.log(log, names, &seen)),
+                // There is nobody any more to obey.
+                _ => {}
+            }
+        }
+    }
+
+    /// Notes what a run has cost, by seconds of the clock; where the cadence changes for that, what
+    /// there is to say. Rank 0 decides for all. Collective where the pipeline has a budget.
+    pub(crate) fn ran(
+        &mut self,
+        begun: f64,
+        ended: f64,
+        communicator: &dyn Communicator,
+    ) -> Option<String> {
+        let seconds = (ended - begun).max(0.0);
+        self.cost.runs += 1;
+        self.cost.seconds += seconds;
+        self.cost.last_seconds = seconds;
+        if !self.thinning.is_limited() {
+            return None;
+        }
+        let mut told = if communicator.rank() == 0 { [seconds, ended] } else { [0.0; 2] };
+        communicator.reduce(Reduction::Maximum, &mut told);
+        self.thinning.ran(told[0], told[1])
+    }
+}

@@ -1,0 +1,180 @@
+//! What is known of a pipeline before its first run.
+
+use std::collections::HashSet;
+use std::sync::Arc;
+
+use super::super::cost::{Cost, Thinning};
+use super::super::due::Clock;
+use super::super::output::Table;
+use super::super::trigger::Trigger;
+use super::Prepared;
+use crate::derive::Running;
+use crate::extract::Kept;
+use crate::language::{
+    Action, Csv, Derived, Line, Monitor, Pipeline, Problem, Scope, Slot, Stage, Viscosity, columns,
+    line, monitors,
+};
+use crate::reduce::{OverTime, Samples};
+
+/// The names that a stage uses, looked up.
+#[derive(Debug)]
+pub(super) enum Names {
+    None,
+    One(Slot),
+    Difference(Slot, Slot),
+    Table(Arc<Table>, Vec<Slot>),
+    Line(Line),
+}
+
+/// What a stage keeps from run to run.
+#[derive(Debug)]
+pub(super) enum State {
+    None,
+    OverTime(OverTime),
+    Samples(Samples),
+    Running(Running),
+}
+
+impl State {
+    /// Bytes of memory.
+    pub(super) fn bytes(&self) -> usize {
+        match self {
+            State::None => 0,
+            State::OverTime(over_time) => over_time.bytes(),
+            State::Samples(samples) => samples.bytes(),
+            State::Running(running) => running.bytes(),
+        }
+    }
+}
+
+/// The name of the field of a velocity's gradient that a stage derives for itself.
+pub(super) fn gradient_of(velocity: &str) -> String {
+    format!("gradient of {velocity}")
+}
+
+impl Prepared {
+    /// Prepares the pipeline at a place in a configuration that means something.
+    pub(crate) fn new(pipelines: &[Pipeline], place: usize) -> Result<Self, Problem> {
+        let pipeline = &pipelines[place];
+        let scope = Scope::of(pipelines, place);
+        let mut selected: Option<HashSet<String>> = None;
+        for stage in &pipeline.stages {
+            if let Stage::Select(select) = stage {
+                let fields: HashSet<String> = select.fields.iter().cloned().collect();
+                selected = Some(match selected {
+                    Some(before) => before.intersection(&fields).cloned().collect(),
+                    None => fields,
+                });
+            }
+        }
+        let (stages, hidden) = with_gradients(&pipeline.stages);
+        let names = stages.iter().map(|stage| names_of(stage, &scope));
+        let of_actions = pipeline.then.iter().map(|action| match action {
+            Action::Csv(csv) => table(csv, &scope),
+            Action::Log(log) => line(log, &scope).map(Names::Line),
+            _ => Ok(Names::None),
+        });
+        let reduced = stages.iter().flat_map(reduced_fields).map(str::to_owned);
+        Ok(Self {
+            place,
+            reduced: reduced.chain(hidden.iter().cloned()).collect(),
+            hidden,
+            due: Clock::new(pipeline.due),
+            thinning: Thinning::new(pipeline.budget),
+            cost: Cost::default(),
+            is_chosen: true,
+            name: pipeline.name.as_str().into(),
+            selected,
+            trigger: Trigger::new(pipeline, &scope)?,
+            names: names.collect::<Result<_, _>>()?,
+            names_of_actions: of_actions.collect::<Result<_, _>>()?,
+            states: stages.iter().map(state_of).collect(),
+            stages,
+            monitors: monitors(pipeline).split_off(2),
+            reported: HashSet::new(),
+            kept: Kept::default(),
+            pipeline: pipeline.clone(),
+        })
+    }
+
+    /// The monitors, without `cycle` and `time`.
+    pub(crate) fn monitors(&self) -> &[Monitor] {
+        &self.monitors
+    }
+
+    pub(crate) fn streams(&self) -> bool {
+        self.pipeline.stages.iter().any(|stage| matches!(stage, Stage::Stream(_)))
+            || self.pipeline.then.iter().any(|action| matches!(action, Action::Stream(_)))
+    }
+}
+
+/// The stages, with those in front of the source stage that derive the gradients of velocities that
+/// later ones need, and the names of these fields.
+fn with_gradients(stages: &[Stage]) -> (Vec<Stage>, HashSet<String>) {
+    let (mut gradients, mut hidden) = (Vec::new(), HashSet::new());
+    for stage in stages {
+        let velocity = match stage {
+            Stage::Force(force) => force.velocity.as_ref(),
+            Stage::WallShearStress(stress) => Some(&stress.velocity),
+            _ => None,
+        };
+        let Some(velocity) = velocity else { continue };
+        let name = gradient_of(velocity);
+        if hidden.insert(name.clone()) {
+            gradients.push(Stage::Gradient(Derived { field: velocity.clone(), name: Some(name) }));
+        }
+    }
+    let source = stages.iter().position(Stage::is_source).unwrap_or(stages.len());
+    let (before, after) = stages.split_at(source);
+    let all = before.iter().cloned().chain(gradients).chain(after.iter().cloned()).collect();
+    (all, hidden)
+}
+
+/// The fields that a stage reduces, which the extract must have whatever is selected.
+fn reduced_fields(stage: &Stage) -> Vec<&str> {
+    match stage {
+        Stage::Integrate(it) => {
+            it.field.as_deref().into_iter().chain(it.vector.as_deref()).collect()
+        }
+        Stage::Histogram(it) => vec![&it.field],
+        Stage::Force(it) => {
+            let viscosity = it.viscosity.as_ref().and_then(Viscosity::field);
+            it.pressure.as_deref().into_iter().chain(viscosity).collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+fn names_of(stage: &Stage, scope: &Scope) -> Result<Names, Problem> {
+    Ok(match stage {
+        Stage::Difference(stage) => {
+            Names::Difference(scope.find(&stage.of)?, scope.find(&stage.minus)?)
+        }
+        Stage::TimeStatistics(stage) => match &stage.monitor {
+            Some(monitor) => Names::One(scope.find(monitor)?),
+            None => Names::None,
+        },
+        Stage::Spectrum(stage) => Names::One(scope.find(&stage.monitor)?),
+        Stage::Csv(csv) => table(csv, scope)?,
+        Stage::Log(log) => Names::Line(line(log, scope)?),
+        _ => Names::None,
+    })
+}
+
+fn table(csv: &Csv, scope: &Scope) -> Result<Names, Problem> {
+    let (monitors, slots): (Vec<Monitor>, Vec<Slot>) = columns(csv, scope)?.into_iter().unzip();
+    let titles = monitors.iter().map(Monitor::titled).collect();
+    let table = Table { file: csv.file.clone(), titles, existing: csv.existing };
+    Ok(Names::Table(Arc::new(table), slots))
+}
+
+fn state_of(stage: &Stage) -> State {
+    match stage {
+        Stage::TimeStatistics(stage) if stage.field.is_some() => State::Running(Running::default()),
+        Stage::TimeStatistics(stage) => {
+            State::OverTime(OverTime::new(stage.window.map(|window| window.get())))
+        }
+        Stage::Spectrum(stage) => State::Samples(Samples::new(stage.samples as usize)),
+        _ => State::None,
+    }
+}
