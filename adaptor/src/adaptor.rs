@@ -7,6 +7,7 @@ mod steered;
 mod tagged;
 #[cfg(test)]
 mod tests;
+mod timing;
 
 use std::{
     net::SocketAddr,
@@ -19,6 +20,7 @@ use commands::Intake;
 use contract::Lent;
 use serde_json::Value;
 use steered::SteeredMesh;
+use timing::Timing;
 use tombolo_deform::{
     communicator::{Alarm, Communicator, Reduction, agree},
     linear::Solvers,
@@ -33,7 +35,7 @@ use crate::{
     error::{ExecuteError, FinalizeError, InitializeError},
     journal::Journal,
     meeting,
-    report::{Durations, Report},
+    report::Report,
     settings::Settings,
     stages::Pipelines,
     steering::{Defaults, Forecaster, Log, Parameters, Queue, Source, Steering, Timed},
@@ -86,35 +88,6 @@ struct Told {
     fields: Value,
     features: Value,
     surface: Value,
-}
-
-/// Where the time went.
-struct Timing {
-    begun: Instant,
-    cycles: u64,
-    left: Option<Instant>,
-    steps: Durations,
-    execute: Durations,
-    reference: Durations,
-    pipelines: Durations,
-    steering: Durations,
-    paused: Durations,
-}
-
-impl Default for Timing {
-    fn default() -> Self {
-        Self {
-            begun: Instant::now(),
-            cycles: 0,
-            left: None,
-            steps: Durations::default(),
-            execute: Durations::default(),
-            reference: Durations::default(),
-            pipelines: Durations::default(),
-            steering: Durations::default(),
-            paused: Durations::default(),
-        }
-    }
 }
 
 impl Settings {
@@ -393,21 +366,11 @@ impl Adaptor {
         let faults = self.pipelines.finish();
         // Rank 0 writes: what was asked for is there before any rank goes on.
         self.communicator.reduce(Reduction::Maximum, &mut [0.0]);
-        let parts = [
-            ("execute", &self.timing.execute),
-            ("reference", &self.timing.reference),
-            ("pipelines", &self.timing.pipelines),
-            ("steering", &self.timing.steering),
-            ("paused", &self.timing.paused),
-        ];
         let report = Report {
             cycles: self.timing.cycles,
             orders: self.log.reports(),
             step_seconds: self.timing.steps.spread(),
-            adaptor_seconds: parts
-                .into_iter()
-                .map(|(name, durations)| (name, durations.spread()))
-                .collect(),
+            adaptor_seconds: self.timing.parts(),
             stream: self.hub.as_ref().map(|hub| hub.counts()).unwrap_or_default(),
             pipelines: self.pipelines.reports(),
         };

@@ -12,7 +12,7 @@ use tombolo_deform::surface::Surface;
 use tombolo_pipelines::{
     encode::Encoder,
     extract::{Channel, Snapshot},
-    language::{Action, Command, Config, LogLevel, Stage},
+    language::{Action, Command, Config, LogLevel, Monitor, Stage},
     run::{Cost, Frame, History, MonitorValues, Output, Runner},
 };
 
@@ -32,6 +32,7 @@ pub(crate) struct Pipelines {
     /// The name of each view, and what its last frame taught the encoder of its topology.
     views: Vec<(String, Arc<Mutex<Encoder>>)>,
     description: Value,
+    monitors: Value,
     can_order: bool,
     drags_skeleton: bool,
     listens: bool,
@@ -61,9 +62,11 @@ impl Pipelines {
             pipeline.stages.iter().any(|stage| matches!(stage, Stage::Order(_)))
                 || pipeline.then.iter().any(|action| matches!(action, Action::Order(_)))
         });
+        let monitors = monitors(&runner, config);
         Ok(Self {
             runner,
             description: json!(views),
+            monitors,
             views: views.into_iter().map(|view| (view.name, Arc::default())).collect(),
             can_order,
             drags_skeleton: (config.pipelines.iter().flat_map(|pipeline| &pipeline.stages))
@@ -77,6 +80,11 @@ impl Pipelines {
     /// The description of the views in `hello`.
     pub(crate) fn views(&self) -> &Value {
         &self.description
+    }
+
+    /// The description of the monitors in `hello`.
+    pub(crate) fn monitors(&self) -> &Value {
+        &self.monitors
     }
 
     /// Whether a pipeline can give an order of a new shape.
@@ -233,6 +241,16 @@ impl Pipelines {
     pub(crate) fn finish(&mut self) -> Vec<String> {
         self.writer.finish()
     }
+}
+
+/// The monitors of all pipelines with their units.
+fn monitors(runner: &Runner, config: &Config) -> Value {
+    let of_pipeline = |name: &str| {
+        let monitors = runner.history(name).map(History::monitors).unwrap_or_default();
+        let described = |monitor: &Monitor| json!({"pipeline": name, "name": monitor.name, "unit": monitor.unit});
+        monitors.iter().map(described).collect::<Vec<_>>()
+    };
+    config.pipelines.iter().flat_map(|pipeline| of_pipeline(&pipeline.name)).collect()
 }
 
 /// The message about the values of monitors; what could not be measured is null.

@@ -19,6 +19,7 @@ impl Adaptor {
         let description = json!({
             "protocol": 1,
             "views": self.pipelines.views(),
+            "monitors": self.pipelines.monitors(),
             "channel": self.told.channel,
             "features": list(&self.told.features),
             "surface": self.told.surface,

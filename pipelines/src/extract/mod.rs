@@ -22,6 +22,7 @@ mod skin;
 mod source;
 mod statistics;
 mod take;
+mod walls;
 
 pub use check::{ChannelError, check_field_length, check_names};
 pub use error::ExtractError;
@@ -30,9 +31,9 @@ pub(crate) use gather::check_length;
 pub(crate) use merge::merged;
 pub use pattern::{Input, Kept};
 pub(crate) use skin::skin;
-pub(crate) use source::Walls;
 pub use source::{Extracted, MeshKey, Source};
 pub use statistics::{FieldStatistics, statistics};
+pub(crate) use walls::Walls;
 
 use std::sync::Arc;
 

@@ -101,12 +101,12 @@ pub struct Source {
     cells: Arc<Cells>,
     /// As they are measured, once they are.
     right_handed: OnceLock<Arc<Cells>>,
-    boundary: Option<Boundary>,
+    pub(super) boundary: Option<Boundary>,
     /// Where the vertices were when something was last cut.
     pub(super) positions: Positions,
     /// The knowledge that sets own cells apart from others: on several ranks, and where there are
     /// ghosts.
-    whole: Option<Box<Whole>>,
+    pub(super) whole: Option<Box<Whole>>,
     /// Whether other ranks have parts too.
     is_part: bool,
 }
@@ -131,22 +131,6 @@ pub(crate) struct Whole {
     pub(crate) surface: Option<Boundary>,
     /// Why there is none.
     no_surface: Option<SurfaceError>,
-}
-
-/// Faces of the surface, with the cell behind each.
-pub(crate) struct Walls<'a> {
-    pub(crate) faces: &'a Cells,
-    /// The vertex of the mesh that each number in the faces means, where it is not that itself.
-    vertices: Option<&'a [u32]>,
-    pub(crate) owners: &'a [u32],
-}
-
-impl Walls<'_> {
-    /// The mesh's vertices of a face.
-    pub(crate) fn face(&self, face: usize) -> impl Iterator<Item = u32> + '_ {
-        let numbers = self.faces.vertices(face).iter();
-        numbers.map(|&number| self.vertices.map_or(number, |all| all[number as usize]))
-    }
 }
 
 /// The identity of lent cells, told without a look at a value: where they lie in memory, how many
@@ -176,7 +160,7 @@ impl MeshKey {
 pub(crate) struct Boundary {
     pub(crate) cells: Arc<Cells>,
     pub(crate) vertices: Arc<[u32]>,
-    owners: Arc<[u32]>,
+    pub(super) owners: Arc<[u32]>,
     pub(crate) features: Arc<ExtractFeatures>,
 }
 
@@ -419,21 +403,6 @@ impl Source {
             }
         };
         Ok(self.boundary.insert(boundary))
-    }
-
-    /// The faces of the surface that this rank has, in the order of its extract; `None` before there
-    /// is one.
-    pub(crate) fn walls(&self) -> Option<Walls<'_>> {
-        if let Some(whole) = &self.whole {
-            let boundary = &whole.boundary;
-            let (faces, owners) = (boundary.faces(), boundary.face_cells());
-            return Some(Walls { faces, vertices: None, owners });
-        }
-        self.boundary.as_ref().map(|boundary| Walls {
-            faces: &boundary.cells,
-            vertices: Some(&boundary.vertices),
-            owners: &boundary.owners,
-        })
     }
 
     /// The boundary of the mesh at its present coordinates, with the fields whose names are

@@ -19,7 +19,7 @@
 //! );
 //! ```
 
-mod config;
+mod configuration;
 mod derived;
 mod error;
 mod extracts;
@@ -34,14 +34,12 @@ mod reductions;
 mod relative_files;
 mod scan;
 mod sinks;
+mod stage;
 mod timed;
 mod tree;
 mod validate;
 
-pub use config::{
-    Action, Config, ErrorBound, OrderStage, Select, Stage, Steering, StreamServer, StreamStage,
-    Write,
-};
+pub use configuration::{Config, Steering, StreamServer};
 pub(crate) use derived::GIVEN;
 pub use derived::{Derived, Formula};
 pub use error::{LanguageError, Problem};
@@ -62,6 +60,7 @@ pub use reductions::{
 };
 pub use relative_files::resolve_files;
 pub use sinks::{Csv, Existing, Log, LogLevel};
+pub use stage::{Action, ErrorBound, OrderStage, Select, Stage, StreamStage, Write};
 pub use timed::{JournalEntry, OrderStatus, TimedCommand, parse_orders};
 pub use tombolo_deform::names::nearest;
 pub use tombolo_deform::shape::Deformation;

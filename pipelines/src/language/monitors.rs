@@ -1,7 +1,8 @@
 //! The monitors of pipelines: their names and units, and what of them a pipeline may name.
 
-use super::config::{Action, Config, Stage};
+use super::configuration::Config;
 use super::pipeline::{AgainAfter, Due, Pipeline};
+use super::stage::{Action, Stage};
 use super::{Csv, Log, Problem, nearest};
 use crate::expression::Expression;
 

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tombolo_deform::schedule::{Every, Interval};
 
-use super::config::{Action, Stage};
+use super::stage::{Action, Stage};
 
 /// Stages that run one after the other at some steps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -8,7 +8,7 @@ use tombolo_deform::quality::Guard;
 use tombolo_deform::schedule::Schedule;
 use tombolo_deform::shape::check_stack;
 
-use super::config::{Action, Config, ErrorBound, OrderStage, Stage, StreamStage, Write};
+use super::configuration::Config;
 use super::derived::check_name;
 use super::error::finite;
 use super::file_pattern::check_file;
@@ -16,6 +16,7 @@ use super::order::{Change, Command, Order, Question};
 use super::parse::Validate;
 use super::pipeline::{AgainAfter, At, Due, Pipeline};
 use super::reductions::check_monitor;
+use super::stage::{Action, ErrorBound, OrderStage, Stage, StreamStage, Write};
 use super::timed::TimedCommand;
 use super::{Deformation, Problem, TimeStatistics, monitors};
 use crate::limits::{Exceeded, NAME};

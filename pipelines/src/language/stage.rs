@@ -1,12 +1,10 @@
-//! A configuration: the views to stream, the monitors to watch, and how orders become mesh motion.
+//! The stages of a pipeline, and the actions of one whose condition holds.
 
-use std::net::SocketAddr;
 use std::num::NonZeroU32;
 
 use super::{
     Clip, Contour, Csv, Deformation, Derived, Difference, Force, Formula, Histogram, Integrate,
-    Log, Parameter, Pipeline, Probe, Slice, Spectrum, Statistics, Threshold, TimeStatistics,
-    WallShearStress,
+    Log, Parameter, Probe, Slice, Spectrum, Statistics, Threshold, TimeStatistics, WallShearStress,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -15,74 +13,6 @@ use tombolo_deform::edit::{
 };
 use tombolo_deform::quality::Guard;
 use tombolo_deform::schedule::Schedule;
-
-/// A whole configuration file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Config {
-    /// The version of this language: 1.
-    #[schemars(range(min = 1, max = 1))]
-    pub version: u32,
-    /// What the file is for, in words for people.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub description: Option<String>,
-    /// The server that viewers connect to; left out, there is none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub stream: Option<StreamServer>,
-    /// The file that every command and its outcome is written to, one JSON object a line. It can be
-    /// given as a file of orders to another run.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub journal: Option<String>,
-    /// How orders from viewers are carried out.
-    #[serde(default)]
-    pub steering: Steering,
-    /// The pipelines, each with the steps at which it runs.
-    #[serde(default)]
-    pub pipelines: Vec<Pipeline>,
-}
-
-/// The server that viewers connect to.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct StreamServer {
-    /// The address and port to listen on. Port 0 takes any free one. Anything but a loopback
-    /// address is open to the network.
-    #[schemars(with = "String")]
-    pub listen: SocketAddr,
-    /// The token that viewers must show: 16 to 128 letters, digits, `-` or `_`. Left out, a new one
-    /// is made for each run.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub token: Option<String>,
-}
-
-impl Default for StreamServer {
-    fn default() -> Self {
-        Self { listen: SocketAddr::from(([127, 0, 0, 1], 7070)), token: None }
-    }
-}
-
-/// How orders from viewers are carried out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Steering {
-    /// Whether the solver keeps stepping while a new shape is computed. The motion then starts at
-    /// the first step after it is ready, so that the cycle depends on the machine's speed;
-    /// otherwise the solver waits and the cycle is that of the order.
-    pub background: bool,
-    /// Whether the solver waits before its first step until a viewer has connected. Needs `stream`.
-    pub wait_for_viewer: bool,
-    /// On several ranks: at every how many calls of `execute` the ranks come together to hear what
-    /// was asked for and whether one of them has an error, by one reduction of six numbers. In
-    /// between a call returns at once, and what falls due waits for the next such call. While the
-    /// mesh moves they come together at every call.
-    pub poll_steps: NonZeroU32,
-}
-
-impl Default for Steering {
-    fn default() -> Self {
-        Self { background: true, wait_for_viewer: false, poll_steps: NonZeroU32::MIN }
-    }
-}
 
 /// One stage of a pipeline.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
