@@ -43,7 +43,10 @@ fn a_step_with_nothing_due_allocates_nothing() {
     let orders = r#"[{"at": {"cycle": 1000000000}, "order": {"stack": []}}]"#;
     let config = r#"{"version": 1, "pipelines": [
         {"name": "health", "at": {"cycle": 1000000000}, "stages": [{"quality": {}}]},
-        {"name": "more", "every": {"time": 1e9}, "stages": [{"quality": {}}]}]}"#;
+        {"name": "more", "every": {"time": 1e9}, "stages": [{"quality": {}}]},
+        {"name": "slow", "every": {"seconds": 1e9}, "stages": [{"quality": {}}]},
+        {"name": "hello", "on": "viewer", "stages": [{"quality": {}}]},
+        {"name": "end", "on": "end", "stages": [{"log": {}}]}]}"#;
     let mut adaptor = Adaptor::initialize(Settings {
         config: parse(config, "overhead.json").unwrap(),
         orders: parse_orders(orders, "orders.json").unwrap(),
