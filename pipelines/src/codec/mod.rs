@@ -18,15 +18,19 @@
 
 mod bits;
 mod bytes;
+mod cells;
 mod connectivity;
 mod error;
 mod exact;
 mod field;
+mod grid;
 mod hierarchy;
+mod known;
 mod kriging;
 mod mask;
 mod motion;
 mod plane;
+mod prediction;
 mod rans;
 mod temporal;
 mod topology;

@@ -3,7 +3,7 @@
 use super::CodecError;
 use super::bytes::Input;
 use super::hierarchy::Stencil;
-use super::plane::{Node, predict, sums};
+use super::prediction::{Coefficients, Node, predict, sums};
 
 /// The number of points that share a way of prediction.
 pub(super) const BLOCK: usize = 256;
@@ -18,11 +18,6 @@ const FIXED: [Coefficients; 3] = [[0.0, 1.0, 0.0, 0.0], [0.0; 4], [1.0, 0.0, 0.0
 const FITTED: u8 = 3;
 /// Fitted coefficients are whole multiples of the inverse of this.
 const PARTS: f32 = 32.0;
-
-/// What four differences count for: of the neighbours' prediction to that of the last frame; of the
-/// neighbours' prediction to the last value; of the last value to the one before; of the
-/// neighbours' prediction of the last frame to that of the one before.
-pub(super) type Coefficients = [f32; 4];
 
 /// The way of each block.
 pub(super) struct Modes {

@@ -3,17 +3,16 @@
 use std::sync::OnceLock;
 
 use super::CodecError;
-use super::bits::{Bits, Model, Number, Reader, Writer};
+use super::bits::{Reader, Writer};
 use super::bytes::{Input, put_count};
-use super::connectivity::{Across, Guide, Third, walk};
+use super::cells::{MOST_STEPS, Unknown, Walked, code};
 use super::hierarchy::Hierarchy;
+use super::known::Known;
 
 /// The most points, triangles and lines together that a byte of a message stands for.
 const PER_BYTE: usize = 1024;
 /// The most points, triangles and lines together.
 const MOST: usize = 1 << 27;
-/// Positions are below it, in steps of their grid.
-const MOST_STEPS: f64 = 268_435_456.0;
 
 /// The cells and the reference positions of a mesh of triangles and lines, as they are decoded.
 /// Points have the numbers of their places in the hierarchy.
@@ -80,12 +79,12 @@ impl Topology {
         message.extend(step.to_le_bytes());
         message.extend(offset.iter().flat_map(|offset| offset.to_le_bytes()));
         let mut bits = Writer::new();
-        let mut from = From::new(&places, triangles, features, lines);
-        let coded = code(&mut bits, &mut from, count, triangles.len(), lines.len())?;
+        let mut source = Known::new(&places, triangles, features, lines);
+        let coded = code(&mut bits, &mut source, count, triangles.len(), lines.len())?;
         message.extend(bits.finish());
         message.resize(message.len().max(total.div_ceil(PER_BYTE)), 0);
 
-        let From { old_points, old_triangles, .. } = from;
+        let Known { old_points, old_triangles, .. } = source;
         let topology = Self::new(coded, step, offset, features.is_some());
         let order = topology.points.order();
         let points = order.iter().map(|&point| old_points[point as usize]).collect();
@@ -108,8 +107,8 @@ impl Topology {
         if !step.is_finite() || offset.iter().any(|offset| !offset.is_finite()) {
             return Err(CodecError::Positions);
         }
-        let mut into = Into { has_features };
-        let coded = code(&mut Reader::new(input.0), &mut into, points, triangles, lines)?;
+        let mut source = Unknown { has_features };
+        let coded = code(&mut Reader::new(input.0), &mut source, points, triangles, lines)?;
         Ok(Self::new(coded, step, offset, has_features))
     }
 
@@ -246,353 +245,4 @@ fn shared(triangles: &[[u32; 3]], lines: &[[u32; 2]]) -> Vec<[u32; 2]> {
     sides.sort_unstable();
     let next_to = sides.windows(2).filter(|pair| pair[0].0 == pair[1].0);
     next_to.map(|pair| [pair[0].1, pair[1].1]).collect()
-}
-
-/// What a walk finds, points numbered in the order of the walk.
-struct Walked {
-    places: Vec<[i32; 3]>,
-    triangles: Vec<[u32; 3]>,
-    features: Vec<u32>,
-    lines: Vec<[u32; 2]>,
-    models: Models,
-    most_triangles: usize,
-}
-
-struct Models {
-    /// For points opposite a triangle, and for others.
-    axes: [[Number; 3]; 2],
-    is_same_feature: Model,
-    feature: Number,
-    goes_on: Model,
-    is_new: Model,
-    end: Number,
-}
-
-/// Knows the mesh (the encoder), or knows nothing (the decoder).
-trait Source {
-    fn seed(&mut self, fresh: u32) -> Option<[u32; 3]>;
-    fn behind(&mut self, gate: [u32; 2]) -> Third;
-    /// The place of a point that was met.
-    fn place(&mut self, point: u32) -> [i32; 3];
-    /// Takes note of the triangle that was last asked for, and says its feature.
-    fn feature(&mut self) -> Option<u32>;
-    /// The ends of a line.
-    fn line(&mut self, line: usize, fresh: u32) -> [u32; 2];
-    /// Any point that was not met.
-    fn rest(&mut self, fresh: u32);
-}
-
-/// The guide of a walk that codes positions and features.
-struct Coding<'a, S> {
-    source: &'a mut S,
-    walked: Walked,
-}
-
-impl<S: Source> Coding<'_, S> {
-    fn place<B: Bits>(
-        &mut self,
-        bits: &mut B,
-        point: u32,
-        across: Option<Across>,
-    ) -> Result<(), CodecError> {
-        let place = self.source.place(point);
-        let places = &mut self.walked.places;
-        let near = across.map_or([0; 3], |Across { ends: [x, y], opposite }| {
-            let at = |point: u32| places[point as usize].map(i64::from);
-            let (x, y, opposite) = (at(x), at(y), at(opposite));
-            std::array::from_fn(|axis| x[axis] + y[axis] - opposite[axis])
-        });
-        let is_opposite = across.is_some_and(|across| across.opposite != across.ends[0]);
-        let models = &mut self.walked.models.axes[usize::from(is_opposite)];
-        let mut coded = [0; 3];
-        for axis in 0..3 {
-            let difference = i64::from(place[axis]) - near[axis];
-            let difference = bits.signed(&mut models[axis], difference)?;
-            let steps = near[axis].wrapping_add(difference);
-            let steps = i32::try_from(steps).ok();
-            let steps = steps.filter(|steps| f64::from(*steps).abs() <= MOST_STEPS);
-            coded[axis] = steps.ok_or(CodecError::Positions)?;
-        }
-        places.push(coded);
-        Ok(())
-    }
-}
-
-impl<B: Bits, S: Source> Guide<B> for Coding<'_, S> {
-    fn seed(&mut self, fresh: u32) -> Option<[u32; 3]> {
-        self.source.seed(fresh)
-    }
-
-    fn behind(&mut self, gate: [u32; 2]) -> Third {
-        self.source.behind(gate)
-    }
-
-    fn point(
-        &mut self,
-        bits: &mut B,
-        point: u32,
-        across: Option<Across>,
-    ) -> Result<(), CodecError> {
-        self.place(bits, point, across)
-    }
-
-    fn triangle(
-        &mut self,
-        bits: &mut B,
-        triangle: [u32; 3],
-        beside: Option<u32>,
-    ) -> Result<(), CodecError> {
-        let feature = self.source.feature();
-        let walked = &mut self.walked;
-        if walked.triangles.len() >= walked.most_triangles {
-            return Err(CodecError::Damaged("more triangles than the message states"));
-        }
-        walked.triangles.push(triangle);
-        let Some(feature) = feature else { return Ok(()) };
-        let beside = beside.map(|beside| walked.features[beside as usize]);
-        let models = &mut walked.models;
-        if let Some(beside) = beside
-            && bits.bit(&mut models.is_same_feature, feature == beside)?
-        {
-            walked.features.push(beside);
-            return Ok(());
-        }
-        let feature = bits.number(&mut models.feature, u64::from(feature))?;
-        let wrong = CodecError::Damaged("the number of a feature is too large");
-        walked.features.push(u32::try_from(feature).map_err(|_| wrong)?);
-        Ok(())
-    }
-}
-
-/// Codes triangles, lines, and the points that belong to none.
-fn code<B: Bits, S: Source>(
-    bits: &mut B,
-    source: &mut S,
-    points: usize,
-    triangles: usize,
-    lines: usize,
-) -> Result<Walked, CodecError> {
-    let models = Models {
-        axes: [const { [Number::NEW; 3] }; 2],
-        is_same_feature: Model::NEW,
-        feature: Number::NEW,
-        goes_on: Model::NEW,
-        is_new: Model::NEW,
-        end: Number::NEW,
-    };
-    let walked = Walked {
-        places: Vec::new(),
-        triangles: Vec::new(),
-        features: Vec::new(),
-        lines: Vec::new(),
-        models,
-        most_triangles: triangles,
-    };
-    let mut coding = Coding { source, walked };
-    let mut fresh = walk(bits, &mut coding, points)?;
-    if coding.walked.triangles.len() != triangles {
-        return Err(CodecError::Damaged("fewer triangles than the message states"));
-    }
-    let beside = |fresh: u32, point: Option<u32>| {
-        let point = point.or(fresh.checked_sub(1));
-        point.map(|point| Across { ends: [point; 2], opposite: point })
-    };
-    for line in 0..lines {
-        let wanted = coding.source.line(line, fresh);
-        let last = coding.walked.lines.last().map(|line| line[1]);
-        let mut ends = [0; 2];
-        for end in 0..2 {
-            if let (0, Some(last)) = (end, last)
-                && bits.bit(&mut coding.walked.models.goes_on, wanted[0] == last)?
-            {
-                ends[0] = last;
-                continue;
-            }
-            if bits.bit(&mut coding.walked.models.is_new, wanted[end] == fresh)? {
-                if fresh as usize >= points {
-                    return Err(CodecError::Damaged("more points than the message states"));
-                }
-                let near = beside(fresh, (end == 1).then_some(ends[0]));
-                coding.place(bits, fresh, near)?;
-                ends[end] = fresh;
-                fresh += 1;
-            } else {
-                let back = u64::from(fresh.wrapping_sub(1).wrapping_sub(wanted[end]));
-                let back = bits.number(&mut coding.walked.models.end, back)?;
-                let newer = u32::try_from(back).ok().and_then(|back| back.checked_add(1));
-                let known = newer.and_then(|newer| fresh.checked_sub(newer));
-                let wrong = CodecError::Damaged("a line names a point that is not known yet");
-                ends[end] = known.ok_or(wrong)?;
-            }
-        }
-        coding.walked.lines.push(ends);
-    }
-    coding.source.rest(fresh);
-    while (fresh as usize) < points {
-        coding.place(bits, fresh, beside(fresh, None))?;
-        fresh += 1;
-    }
-    Ok(coding.walked)
-}
-
-/// The decoder's source.
-struct Into {
-    has_features: bool,
-}
-
-impl Source for Into {
-    fn seed(&mut self, _: u32) -> Option<[u32; 3]> {
-        None
-    }
-
-    fn behind(&mut self, _: [u32; 2]) -> Third {
-        Third::Nothing
-    }
-
-    fn place(&mut self, _: u32) -> [i32; 3] {
-        [0; 3]
-    }
-
-    fn feature(&mut self) -> Option<u32> {
-        self.has_features.then_some(0)
-    }
-
-    fn line(&mut self, _: usize, _: u32) -> [u32; 2] {
-        [0; 2]
-    }
-
-    fn rest(&mut self, _: u32) {}
-}
-
-/// The encoder's source.
-struct From<'a> {
-    places: &'a [[i32; 3]],
-    triangles: &'a [[u32; 3]],
-    features: Option<&'a [u32]>,
-    lines: &'a [[u32; 2]],
-    /// The directed sides of the triangles: where the list of each point begins, and in it where a
-    /// side leads and the number of its triangle, rising.
-    starts: Vec<u32>,
-    sides: Vec<(u32, u32)>,
-    is_done: Vec<bool>,
-    next_seed: usize,
-    asked: u32,
-    new_points: Vec<u32>,
-    old_points: Vec<u32>,
-    old_triangles: Vec<u32>,
-}
-
-const UNMET: u32 = u32::MAX;
-
-impl<'a> From<'a> {
-    fn new(
-        places: &'a [[i32; 3]],
-        triangles: &'a [[u32; 3]],
-        features: Option<&'a [u32]>,
-        lines: &'a [[u32; 2]],
-    ) -> Self {
-        let mut starts = vec![0u32; places.len() + 1];
-        for &point in triangles.as_flattened() {
-            starts[point as usize + 1] += 1;
-        }
-        for point in 0..places.len() {
-            starts[point + 1] += starts[point];
-        }
-        let mut next = starts.clone();
-        let mut sides = vec![(0, 0); 3 * triangles.len()];
-        for (&[a, b, c], triangle) in triangles.iter().zip(0u32..) {
-            for (from, to) in [(a, b), (b, c), (c, a)] {
-                sides[next[from as usize] as usize] = (to, triangle);
-                next[from as usize] += 1;
-            }
-        }
-        for point in 0..places.len() {
-            sides[starts[point] as usize..starts[point + 1] as usize].sort_unstable();
-        }
-        Self {
-            places,
-            triangles,
-            features,
-            lines,
-            starts,
-            sides,
-            is_done: vec![false; triangles.len()],
-            next_seed: 0,
-            asked: 0,
-            new_points: vec![UNMET; places.len()],
-            old_points: Vec::with_capacity(places.len()),
-            old_triangles: Vec::with_capacity(triangles.len()),
-        }
-    }
-
-    /// The number of a point, a new one if it has none.
-    #[expect(clippy::cast_possible_truncation, reason = "points are numbered with 32 bits")]
-    fn number(&mut self, point: u32) -> u32 {
-        let number = &mut self.new_points[point as usize];
-        if *number == UNMET {
-            *number = self.old_points.len() as u32;
-            self.old_points.push(point);
-        }
-        *number
-    }
-}
-
-impl Source for From<'_> {
-    fn seed(&mut self, _: u32) -> Option<[u32; 3]> {
-        while *self.is_done.get(self.next_seed)? {
-            self.next_seed += 1;
-        }
-        #[expect(clippy::cast_possible_truncation, reason = "triangles have 32 bits")]
-        {
-            self.asked = self.next_seed as u32;
-        }
-        Some(self.triangles[self.next_seed].map(|point| self.number(point)))
-    }
-
-    fn behind(&mut self, [from, to]: [u32; 2]) -> Third {
-        let [from, to] = [from, to].map(|point| self.old_points[point as usize]);
-        let list = self.starts[from as usize] as usize..self.starts[from as usize + 1] as usize;
-        let list = &self.sides[list];
-        let first = list.partition_point(|side| side.0 < to);
-        let mut along = list[first..].iter().take_while(|side| side.0 == to);
-        let Some(&(_, triangle)) = along.find(|side| !self.is_done[side.1 as usize]) else {
-            return Third::Nothing;
-        };
-        self.asked = triangle;
-        let [a, b, c] = self.triangles[triangle as usize];
-        let third = if (a, b) == (from, to) {
-            c
-        } else if (b, c) == (from, to) {
-            a
-        } else {
-            b
-        };
-        match self.new_points[third as usize] {
-            UNMET => {
-                self.number(third);
-                Third::New
-            }
-            known => Third::Known(known),
-        }
-    }
-
-    fn place(&mut self, point: u32) -> [i32; 3] {
-        self.places[self.old_points[point as usize] as usize]
-    }
-
-    fn feature(&mut self) -> Option<u32> {
-        self.is_done[self.asked as usize] = true;
-        self.old_triangles.push(self.asked);
-        self.features.map(|features| features[self.asked as usize])
-    }
-
-    fn line(&mut self, line: usize, _: u32) -> [u32; 2] {
-        self.lines[line].map(|point| self.number(point))
-    }
-
-    fn rest(&mut self, _: u32) {
-        for point in (0u32..).take(self.places.len()) {
-            self.number(point);
-        }
-    }
 }
