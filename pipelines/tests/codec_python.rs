@@ -7,8 +7,11 @@ use std::process::Command;
 
 use tombolo_pipelines::codec::{Bound, Field, Topology};
 
+/// Points, triangles and lines.
+type Parts = (Vec<[f64; 3]>, Vec<[u32; 3]>, Vec<[u32; 2]>);
+
 /// A Möbius band of triangles, a patch with a hole beside it, a polyline and loose points.
-fn mesh() -> (Vec<[f64; 3]>, Vec<[u32; 3]>, Vec<[u32; 2]>) {
+fn mesh() -> Parts {
     let (around, across) = (90u32, 9u32);
     let mut points = Vec::new();
     for i in 0..around {

@@ -33,11 +33,8 @@ impl Model {
     fn learn(&mut self, bit: bool) {
         let rate = RATES[usize::from(self.seen)];
         let no = u32::from(self.no);
-        let no = if bit { no - (no * rate >> 16) } else { no + ((65536 - no) * rate >> 16) };
-        #[expect(clippy::cast_possible_truncation, reason = "below 65536")]
-        {
-            self.no = no.clamp(LEAST, 65536 - LEAST) as u16;
-        }
+        let no = if bit { no - ((no * rate) >> 16) } else { no + (((65536 - no) * rate) >> 16) };
+        self.no = no.clamp(LEAST, 65536 - LEAST) as u16;
         self.seen = (self.seen + 1).min(RATES.len() as u8 - 1);
     }
 }

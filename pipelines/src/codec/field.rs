@@ -252,8 +252,8 @@ impl Field {
                 let value = values[tuple as usize * components + component];
                 let coded = offset + f64::from(node[0]) * unit;
                 let is_masked = mask.is_some_and(|mask| mask[place]);
-                // Not `>`: a NaN must not pass.
-                if !is_masked && !((coded - value).abs() <= bound) {
+                let off = (coded - value).abs();
+                if !is_masked && (off.is_nan() || off > bound) {
                     exceptions.push((place * components + component, value));
                 }
             }

@@ -55,7 +55,6 @@ impl Grid {
         let Some(mask) = &self.mask else { return };
         for (component, plane) in self.planes.iter_mut().enumerate() {
             let value = (mask.tuple[component] - self.offsets[component]) * per_unit;
-            #[expect(clippy::cast_possible_truncation, reason = "the nearest will do")]
             let value = if value.abs() <= 2.0 * MOST_STEPS { value.round_ties_even() } else { 0.0 };
             for (node, _) in plane.nodes.iter_mut().zip(&mask.points).filter(|(_, set)| **set) {
                 node[0] = value as f32;

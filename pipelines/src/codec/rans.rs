@@ -241,7 +241,7 @@ pub(super) fn encode(numbers: &[(u8, u32)], lanes: u32, out: &mut Vec<u8>) {
             words.push(*state as u16);
             *state >>= 16;
         }
-        *state = (*state / frequency << BITS) + *state % frequency + start;
+        *state = ((*state / frequency) << BITS) + *state % frequency + start;
     }
     for state in &states[..=mask] {
         out.extend(state.to_le_bytes());

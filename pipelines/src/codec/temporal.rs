@@ -143,6 +143,7 @@ fn logarithm(number: f32) -> f32 {
 }
 
 /// The coefficients with the least squares of what is left.
+#[expect(clippy::needless_range_loop, reason = "the indices of a matrix")]
 fn fit(nodes: &[Node], stencils: &[Stencil], is_masked: impl Fn(usize) -> bool) -> [i8; 4] {
     let (mut matrix, mut right) = ([[0.0f64; 4]; 4], [0.0f64; 4]);
     // Some thousand points say as much as all.
@@ -162,8 +163,8 @@ fn fit(nodes: &[Node], stencils: &[Stencil], is_masked: impl Fn(usize) -> bool) 
         }
     }
     let trace: f64 = (0..4).map(|index| matrix[index][index]).sum();
-    for row in 0..4 {
-        matrix[row][row] += 1e-9 * trace + 1e-300;
+    for (index, row) in matrix.iter_mut().enumerate() {
+        row[index] += 1e-9 * trace + 1e-300;
     }
     for pivot in 0..4 {
         for row in pivot + 1..4 {

@@ -208,7 +208,7 @@ fn grid(points: &[[f64; 3]], bound: f64) -> Option<Grid> {
     let step = 2.0 * bound * (1.0 - 1e-9);
     let extent = (0..3).map(|axis| largest[axis] - offset[axis]).fold(0.0, f64::max);
     let step = if extent == 0.0 { 1.0 } else { step };
-    if !bound.is_finite() || !step.is_normal() || !(extent / step < MOST_STEPS) {
+    if !bound.is_finite() || !step.is_normal() || extent.is_nan() || extent / step >= MOST_STEPS {
         return None;
     }
     let mut places = Vec::with_capacity(points.len());
@@ -216,8 +216,8 @@ fn grid(points: &[[f64; 3]], bound: f64) -> Option<Grid> {
         let mut place = [0; 3];
         for axis in 0..3 {
             let steps = ((point[axis] - offset[axis]) / step).round_ties_even();
-            // Not `>`: a NaN must not pass.
-            if !((offset[axis] + step * steps - point[axis]).abs() <= bound) {
+            let off = (offset[axis] + step * steps - point[axis]).abs();
+            if off.is_nan() || off > bound {
                 return None;
             }
             #[expect(clippy::cast_possible_truncation, reason = "checked above")]
