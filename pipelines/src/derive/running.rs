@@ -54,9 +54,8 @@ impl Block {
         for (sum, (a, b)) in self.squares.iter_mut().zip(ends()) {
             *sum += length * (a * a + a * b + b * b) / 3.0;
         }
-        // Written so that a NaN stays.
-        self.least.iter_mut().zip(to).filter(|(a, b)| !(**a <= **b)).for_each(|(a, b)| *a = *b);
-        self.largest.iter_mut().zip(to).filter(|(a, b)| !(**a >= **b)).for_each(|(a, b)| *a = *b);
+        self.least.iter_mut().zip(to).for_each(|(least, value)| *least = lesser(*least, *value));
+        self.largest.iter_mut().zip(to).for_each(|(most, value)| *most = greater(*most, *value));
     }
 
     fn bytes(&self) -> usize {
@@ -97,17 +96,16 @@ impl Running {
         let sum = |entity: usize, of: fn(&Block) -> &[f64]| -> f64 {
             self.blocks.iter().map(|block| of(block)[entity]).sum::<f64>() / length
         };
-        let first = |of: fn(&Block) -> &[f64], entity: usize, pick: fn(f64, f64) -> f64| {
-            let all = self.blocks.iter().map(|block| of(block)[entity]);
-            all.reduce(|a, b| if a.is_nan() || b.is_nan() { f64::NAN } else { pick(a, b) })
+        let of_all = |of: fn(&Block) -> &[f64], entity: usize, pick: fn(f64, f64) -> f64| {
+            self.blocks.iter().map(|block| of(block)[entity]).reduce(pick).unwrap_or(ABSENT)
         };
         let value = |entity: usize| match measure {
             Measure::Mean if length > 0.0 => sum(entity, |block| &block.integral),
             Measure::Rms if length > 0.0 => sum(entity, |block| &block.squares).sqrt(),
             Measure::Mean => last[entity],
             Measure::Rms => last[entity].abs(),
-            Measure::Min => first(|block| &block.least, entity, f64::min).unwrap_or(ABSENT),
-            Measure::Max => first(|block| &block.largest, entity, f64::max).unwrap_or(ABSENT),
+            Measure::Min => of_all(|block| &block.least, entity, lesser),
+            Measure::Max => of_all(|block| &block.largest, entity, greater),
         };
         let finite = |value: f64| if value.is_finite() { value } else { ABSENT };
         (0..last.len()).map(value).map(finite).collect()
@@ -118,6 +116,16 @@ impl Running {
         let last = self.last.as_ref().map_or(0, |(_, values)| values.capacity());
         last * size_of::<f64>() + self.blocks.iter().map(Block::bytes).sum::<usize>()
     }
+}
+
+/// The less of two numbers; NaN where one is.
+fn lesser(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a <= b { a } else { b }
+}
+
+/// The greater of two numbers; NaN where one is.
+fn greater(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a >= b { a } else { b }
 }
 
 /// The statistics over time of a field as it is now, and was when this was called before; none where
