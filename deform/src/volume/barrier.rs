@@ -209,11 +209,8 @@ impl Barrier {
         )
     }
 
-    /// A better place of a vertex, or its own where all its qualities are above `good`.
-    pub(super) fn improved(&self, point: Vector, star: &Star, good: f64) -> Vector {
-        if star.is_above(point, good) {
-            return point;
-        }
+    /// A better place of a vertex, or its own where none is found.
+    pub(super) fn improved(&self, point: Vector, star: &Star) -> Vector {
         let (gradient, hessian) = self.derivatives(point, star);
         let Some(direction) = newton(&gradient, &hessian) else { return point };
         let energy = |length: f64| self.energy(add(point, scale(direction, length)), star);

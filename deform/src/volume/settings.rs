@@ -23,9 +23,10 @@ pub struct Deform {
     /// The relative residual at which the iterative solve stops. Above 0, at most 0.1.
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 0.1))]
     pub tolerance: f64,
-    /// How often the vertices inside are gone through after the solve: each moves to where its
-    /// worst cells are more like those of the reference. Vertices whose cells have all kept 95 % of
-    /// their scaled Jacobian stay. 0 leaves the shape as it was solved for. 0 to 100.
+    /// How often the vertices inside are gone through after the solve, at most: each moves to
+    /// where its worst cells are more like those of the reference. Vertices whose cells have all
+    /// kept 95 % of their scaled Jacobian stay, and all do where moving them would gain nothing. 0
+    /// leaves the shape as it was solved for. 0 to 100.
     #[schemars(range(min = 0, max = 100))]
     pub improve: u32,
 }

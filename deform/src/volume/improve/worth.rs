@@ -1,0 +1,75 @@
+//! What sweeps have gained.
+
+use super::{Improver, Interface};
+use crate::communicator::{Communicator, Reduction};
+use crate::mesh::Vector;
+use crate::parallel;
+
+/// How many corners are looked at at a time.
+const CHUNK: usize = 4096;
+
+/// From this least quality on, it is the mean that counts.
+pub(super) const ENOUGH: f64 = 0.8;
+
+/// What a sweep must add to the quality of each worn cell, in the mean.
+const GAIN: f64 = 1e-3;
+
+/// What it must add to the mean or to the least where that is not enough yet.
+const REST: f64 = 1e-6;
+
+/// The quality of what can be moved, on all ranks.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Qualities {
+    /// The least; NaN or negative infinity where one is NaN.
+    pub(super) least: f64,
+    sum: f64,
+    /// How many are worn.
+    worn: f64,
+}
+
+impl Qualities {
+    const NONE: Self = Self { least: f64::INFINITY, sum: 0.0, worn: 0.0 };
+
+    /// With those of `other`, whose NaN counts.
+    fn with(self, other: Self) -> Self {
+        let is_less = other.least < self.least || other.least.is_nan();
+        Self {
+            least: if is_less { other.least } else { self.least },
+            sum: self.sum + other.sum,
+            worn: self.worn + other.worn,
+        }
+    }
+
+    /// Whether these are so much better than those `before` a sweep, or a part of one, that the
+    /// sweep was worth it.
+    pub(super) fn are_worth_more(&self, before: &Self, part: f64) -> bool {
+        let gain = (self.sum - before.sum) / before.worn.max(1.0);
+        let rise = self.least - before.least;
+        gain >= part * GAIN || before.least < ENOUGH && gain.max(rise) >= REST
+    }
+}
+
+impl Improver {
+    /// The quality of what can be moved. Collective.
+    pub(super) fn qualities(&self, points: &[Vector]) -> Qualities {
+        let of_simplex = |&simplex: &u32| {
+            let least = self.simplices[simplex as usize].least(points);
+            Qualities { least, sum: least, worn: f64::from(u8::from(least < self.good)) }
+        };
+        let mut found = parallel::map_chunks(self.movable.len(), CHUNK, |range| {
+            self.movable[range].iter().map(of_simplex).fold(Qualities::NONE, Qualities::with)
+        })
+        .into_iter()
+        .fold(Qualities::NONE, Qualities::with);
+        if let Some(Interface { held, .. }) = &self.interface {
+            let ranks = held.halo().communicator();
+            // The reduction passes over NaN.
+            let least = if found.least.is_nan() { f64::NEG_INFINITY } else { found.least };
+            let (mut least, mut sums) = ([least], [found.sum, found.worn]);
+            ranks.reduce(Reduction::Minimum, &mut least);
+            ranks.reduce(Reduction::Sum, &mut sums);
+            found = Qualities { least: least[0], sum: sums[0], worn: sums[1] };
+        }
+        found
+    }
+}
