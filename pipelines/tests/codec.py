@@ -257,24 +257,30 @@ class Field:
             self.offsets, self.nodes, self.frames = message.doubles(c), np.zeros((c, n, 4), F), 0
             self.tables, self.mask = [list(FIRST_TABLES) for _ in range(c)], None
         self.exponent, self.frames = exponent, self.frames + 1
-        if flags & 16: self.tuple, self.mask = message.doubles(c), self.masked(message.block())
+        if flags & 16:
+            self.of, self.tuples = np.zeros(n, int), []
+            for number in range(1, message.take("B") + 1):
+                self.tuples.append(message.doubles(c))
+                self.masked(message.block(), number)
+            self.mask = self.of > 0
         elif not flags & 8: self.mask = None
         if self.mask is not None:
-            steps_of = (self.tuple - self.offsets) * 2.0 ** -exponent
-            self.nodes[:, self.mask, 0] = np.where(abs(steps_of) <= 1 << 23, np.rint(steps_of), 0)[:, None]
+            for number, tuple_ in enumerate(self.tuples, 1):
+                steps_of = (tuple_ - self.offsets) * 2.0 ** -exponent
+                self.nodes[:, self.of == number, 0] = np.where(abs(steps_of) <= 1 << 23, np.rint(steps_of), 0)[:, None]
             self.nodes[:, self.mask, 3] = 0
         for i in range(c): self.plane(message, i, F(steps))
         values = (self.offsets + self.nodes[:, :, 0].T.astype(float) * 2.0 ** exponent)
-        if self.mask is not None: values[self.mask] = self.tuple
+        if self.mask is not None: values[self.mask] = np.array(self.tuples)[self.of[self.mask] - 1]
         values, place = values.ravel(), -1
         for _ in range(message.count() if flags & 32 else 0):
             place += message.count() + 1
             values[place] = message.take("d")
         return values
-    def masked(self, data):
-        bits, models, mask = Bits(data), [model() for _ in range(5)], np.zeros(len(self.stencils), bool)
-        for p, s in enumerate(self.stencils): mask[p] = bits.bit(models[int(mask[s[:4]].sum())])
-        return mask
+    def masked(self, data, number):
+        bits, models = Bits(data), [model() for _ in range(5)]
+        for p, s in enumerate(self.stencils):
+            if not self.of[p] and bits.bit(models[int((self.of[s[:4]] == number).sum())]): self.of[p] = number
     def bits(self, data, flags, last):
         bits, models, double, lengths = Bits(data), [number() for _ in range(9)], flags & 3 == 3, []
         values, (real, whole, width) = np.zeros(len(self.stencils)), ("<d", "<q", 64) if double else ("<f", "<i", 32)

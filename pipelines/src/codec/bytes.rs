@@ -43,6 +43,11 @@ impl<'bytes> Input<'bytes> {
         self.array().map(f64::from_le_bytes)
     }
 
+    pub(super) fn doubles(&mut self, count: usize) -> Result<Vec<f64>, CodecError> {
+        let bytes = self.take(count.saturating_mul(8))?;
+        Ok(bytes.as_chunks().0.iter().map(|&bytes| f64::from_le_bytes(bytes)).collect())
+    }
+
     /// A whole number below 2³⁵.
     pub(super) fn count(&mut self) -> Result<usize, CodecError> {
         let mut value = 0u64;

@@ -3,9 +3,9 @@
 use super::CodecError;
 use super::bytes::{Input, put_block, put_count};
 use super::exact::{self, Precision};
-use super::grid::{Grid, MOST_STEPS, Mask, two_to};
+use super::grid::{Grid, MOST_STEPS, two_to};
 use super::hierarchy::Hierarchy;
-use super::mask;
+use super::mask::Mask;
 use super::plane::Around;
 use super::temporal::{Modes, SPACE};
 
@@ -199,25 +199,16 @@ impl Field {
         if !follows {
             message.extend(grid.offsets.iter().flat_map(|offset| offset.to_le_bytes()));
         }
-        let mask = mask::find(values, components, order);
-        grid.mask = match (mask, grid.mask.take()) {
-            (None, _) => None,
-            (Some(points), last) => {
-                let place = points.iter().position(|&is_set| is_set).unwrap_or(0);
-                let tuple = &values[order[place] as usize * components..][..components];
-                let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
-                let last = last
-                    .filter(|last| last.points == points && last.tuple.iter().zip(tuple).all(same));
-                if last.is_some() {
-                    message[start] |= SAME_MASK;
-                } else {
-                    message[start] |= NEW_MASK;
-                    message.extend(tuple.iter().flat_map(|value| value.to_le_bytes()));
-                    put_block(message, &mask::encode(stencils, &points)?);
-                }
-                Some(Mask { points, tuple: tuple.to_vec() })
+        let mask = Mask::find(values, components, order);
+        if let Some(mask) = &mask {
+            if grid.mask.as_ref().is_some_and(|last| last.is_as(mask)) {
+                message[start] |= SAME_MASK;
+            } else {
+                message[start] |= NEW_MASK;
+                mask.write(stencils, message)?;
             }
-        };
+        }
+        grid.mask = mask;
         grid.set_masked();
         let (unit, per_unit) = (grid.unit(), two_to(-i32::from(grid.exponent)));
         let mask = grid.mask.as_ref().map(|mask| &mask.points[..]);
@@ -333,7 +324,7 @@ impl Field {
         let follows = flags & FOLLOWS != 0;
         match flags & 3 {
             CONSTANT => {
-                let tuple = doubles(self.components, input)?;
+                let tuple = input.doubles(self.components)?;
                 Ok(tuple.repeat(hierarchy.len()))
             }
             GRID => self.read_grid(known, flags, hierarchy, input),
@@ -372,7 +363,7 @@ impl Field {
             return Err(CodecError::Damaged("a grid is too fine or too coarse"));
         }
         let mut grid = if flags & FOLLOWS == 0 {
-            let offsets = doubles(self.components, input)?;
+            let offsets = input.doubles(self.components)?;
             Grid::new(exponent, steps, offsets, hierarchy.len())
         } else {
             let Known::Grid(mut grid) = known else { return Err(NOT_KNOWN) };
@@ -383,9 +374,7 @@ impl Field {
             grid
         };
         if flags & NEW_MASK != 0 {
-            let tuple = doubles(self.components, input)?;
-            let points = mask::decode(stencils, input.block()?)?;
-            grid.mask = Some(Mask { points, tuple });
+            grid.mask = Some(Mask::read(self.components, stencils, input)?);
         } else if flags & SAME_MASK == 0 {
             grid.mask = None;
         } else if grid.mask.is_none() {
@@ -410,11 +399,6 @@ impl Field {
 }
 
 const NOT_KNOWN: CodecError = CodecError::Damaged("the frame goes on from one that is not known");
-
-fn doubles(count: usize, input: &mut Input<'_>) -> Result<Vec<f64>, CodecError> {
-    let bytes = input.take(count.saturating_mul(8))?;
-    Ok(bytes.as_chunks().0.iter().map(|&bytes| f64::from_le_bytes(bytes)).collect())
-}
 
 /// Values by their place, the lowest first: each as how many lie between it and the one before.
 fn put_exceptions(mut exceptions: Vec<(usize, f64)>, message: &mut Vec<u8>) {

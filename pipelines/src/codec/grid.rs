@@ -1,5 +1,6 @@
 //! A field in whole steps of a grid: what both sides know of it.
 
+use super::mask::Mask;
 use super::plane::Plane;
 
 /// No value is further than this from its offset, in grid steps.
@@ -15,13 +16,6 @@ pub(super) struct Grid {
     pub(super) planes: Vec<Plane>,
     pub(super) mask: Option<Mask>,
     pub(super) frames: u32,
-}
-
-/// The points that have one and the same tuple.
-#[derive(Debug, Clone)]
-pub(super) struct Mask {
-    pub(super) points: Vec<bool>,
-    pub(super) tuple: Vec<f64>,
 }
 
 impl Grid {
@@ -52,12 +46,12 @@ impl Grid {
     /// Gives points with a mask the value that is next to theirs in the grid.
     pub(super) fn set_masked(&mut self) {
         let per_unit = two_to(-i32::from(self.exponent));
-        let Some(mask) = &self.mask else { return };
-        for (component, plane) in self.planes.iter_mut().enumerate() {
-            let value = (mask.tuple[component] - self.offsets[component]) * per_unit;
-            let value = if value.abs() <= 2.0 * MOST_STEPS { value.round_ties_even() } else { 0.0 };
-            for (node, _) in plane.nodes.iter_mut().zip(&mask.points).filter(|(_, set)| **set) {
-                node[0] = value as f32;
+        for (place, tuple) in self.mask.iter().flat_map(Mask::tuples) {
+            for (component, plane) in self.planes.iter_mut().enumerate() {
+                let value = (tuple[component] - self.offsets[component]) * per_unit;
+                let is_near = value.abs() <= 2.0 * MOST_STEPS;
+                let node = &mut plane.nodes[place];
+                node[0] = if is_near { value.round_ties_even() as f32 } else { 0.0 };
                 node[3] = 0.0;
             }
         }
@@ -74,11 +68,8 @@ impl Grid {
                 *value = offset + f64::from(node[0]) * unit;
             }
         }
-        if let Some(mask) = &self.mask {
-            let tuples = values.chunks_exact_mut(components);
-            for (tuple, _) in tuples.zip(&mask.points).filter(|(_, is_set)| **is_set) {
-                tuple.copy_from_slice(&mask.tuple);
-            }
+        for (place, tuple) in self.mask.iter().flat_map(Mask::tuples) {
+            values[place * components..][..components].copy_from_slice(tuple);
         }
         values
     }

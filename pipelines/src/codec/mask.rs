@@ -1,49 +1,128 @@
-//! Which points have one and the same value, and which have not.
+//! Which points share one and the same tuple with many others: walls, an inlet, a hole.
 
 use super::CodecError;
 use super::bits::{Bits, Model, Reader, Writer};
+use super::bytes::{Input, put_block};
 use super::hierarchy::Stencil;
 
 /// How many neighbours a point's context counts.
 const COUNTED: usize = 4;
+/// The most tuples.
+const MOST: usize = 4;
+/// Fewer points are not worth a tuple of their own, but for the first.
+const LEAST: usize = 32;
 
-fn code<B: Bits>(bits: &mut B, stencils: &[Stencil], mask: &mut [bool]) -> Result<(), CodecError> {
+/// The points that have one of a few tuples.
+#[derive(Debug, Clone)]
+pub(super) struct Mask {
+    /// The points that have one.
+    pub(super) points: Vec<bool>,
+    /// Which: 1 is the first, 0 is none.
+    of: Vec<u8>,
+    tuples: Vec<Vec<f64>>,
+}
+
+/// Codes which points have a tuple, of those that have none yet.
+fn code<B: Bits>(
+    bits: &mut B,
+    stencils: &[Stencil],
+    of: &mut [u8],
+    tuple: u8,
+) -> Result<(), CodecError> {
     let mut models = [Model::NEW; COUNTED + 1];
     for (point, stencil) in stencils.iter().enumerate() {
-        let is_set = |&place: &u32| (place as usize) < point && mask[place as usize];
+        if (1..tuple).contains(&of[point]) {
+            continue;
+        }
+        let is_set = |&place: &u32| (place as usize) < point && of[place as usize] == tuple;
         let context = stencil.places[..COUNTED].iter().filter(|place| is_set(place)).count();
-        mask[point] = bits.bit(&mut models[context], mask[point])?;
+        if bits.bit(&mut models[context], of[point] == tuple)? {
+            of[point] = tuple;
+        }
     }
     Ok(())
 }
 
-pub(super) fn encode(stencils: &[Stencil], mask: &[bool]) -> Result<Vec<u8>, CodecError> {
-    let mut bits = Writer::new();
-    code(&mut bits, stencils, &mut mask.to_vec())?;
-    Ok(bits.finish())
+fn same(a: &[f64], b: &[f64]) -> bool {
+    a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits())
 }
 
-pub(super) fn decode(stencils: &[Stencil], bytes: &[u8]) -> Result<Vec<bool>, CodecError> {
-    let mut mask = vec![false; stencils.len()];
-    code(&mut Reader::new(bytes), stencils, &mut mask)?;
-    Ok(mask)
-}
-
-/// The tuple that most of a sample share, and the points that have it, where they are enough to be
-/// worth a mask. `order` says which tuple stands at each place.
-pub(super) fn find(values: &[f64], components: usize, order: &[u32]) -> Option<Vec<bool>> {
-    const SAMPLES: usize = 64;
-    let tuple = |place: usize| &values[order[place] as usize * components..][..components];
-    let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
-    let count = order.len();
-    let stride = count.div_ceil(SAMPLES).max(1);
-    let sample: Vec<&[f64]> = (0..count).step_by(stride).map(tuple).collect();
-    let shares = |candidate: &[f64]| sample.iter().filter(|other| same(candidate, other)).count();
-    let (share, best) = sample.iter().map(|tuple| (shares(tuple), *tuple)).max_by_key(|of| of.0)?;
-    if share * 16 < sample.len() || share < 2 {
-        return None;
+impl Mask {
+    /// The tuples that many points share, where they are enough to be worth it. `order` says which
+    /// tuple stands at each place.
+    pub(super) fn find(values: &[f64], components: usize, order: &[u32]) -> Option<Self> {
+        const SAMPLES: usize = 64;
+        let tuple = |place: usize| &values[order[place] as usize * components..][..components];
+        let mut mask = Self { points: vec![], of: vec![0; order.len()], tuples: vec![] };
+        let mut number = 0;
+        while mask.tuples.len() < MOST {
+            let left: Vec<usize> = (0..order.len()).filter(|&place| mask.of[place] == 0).collect();
+            let stride = left.len().div_ceil(SAMPLES).max(1);
+            let sample: Vec<&[f64]> = left.iter().step_by(stride).map(|&at| tuple(at)).collect();
+            let shares = |of: &[f64]| sample.iter().filter(|other| same(of, other)).count();
+            let found = sample.iter().map(|tuple| (shares(tuple), *tuple)).max_by_key(|of| of.0);
+            let Some((share, best)) = found else { break };
+            if share * 16 < sample.len() || share < 2 {
+                break;
+            }
+            let set: Vec<usize> =
+                left.iter().copied().filter(|&at| same(tuple(at), best)).collect();
+            if set.len() * 16 < left.len() || (number > 0 && set.len() < LEAST) {
+                break;
+            }
+            number += 1;
+            set.into_iter().for_each(|place| mask.of[place] = number);
+            mask.tuples.push(best.to_vec());
+        }
+        mask.points = mask.of.iter().map(|&of| of != 0).collect();
+        (number > 0).then_some(mask)
     }
-    let mask: Vec<bool> = (0..count).map(|place| same(tuple(place), best)).collect();
-    let set = mask.iter().filter(|&&is_set| is_set).count();
-    (set * 16 >= count).then_some(mask)
+
+    pub(super) fn is_as(&self, other: &Self) -> bool {
+        let tuples = || self.tuples.iter().zip(&other.tuples).all(|(a, b)| same(a, b));
+        self.of == other.of && self.tuples.len() == other.tuples.len() && tuples()
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "there are at most four")]
+    pub(super) fn write(
+        &self,
+        stencils: &[Stencil],
+        message: &mut Vec<u8>,
+    ) -> Result<(), CodecError> {
+        message.push(self.tuples.len() as u8);
+        for (tuple, number) in self.tuples.iter().zip(1..) {
+            message.extend(tuple.iter().flat_map(|value| value.to_le_bytes()));
+            let mut bits = Writer::new();
+            code(&mut bits, stencils, &mut self.of.clone(), number)?;
+            put_block(message, &bits.finish());
+        }
+        Ok(())
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "there are at most four")]
+    pub(super) fn read(
+        components: usize,
+        stencils: &[Stencil],
+        input: &mut Input<'_>,
+    ) -> Result<Self, CodecError> {
+        let count = usize::from(input.byte()?);
+        if count > MOST {
+            return Err(CodecError::Damaged("more tuples than there may be"));
+        }
+        let (mut of, mut tuples) = (vec![0; stencils.len()], Vec::new());
+        for number in 1..=count as u8 {
+            tuples.push(input.doubles(components)?);
+            code(&mut Reader::new(input.block()?), stencils, &mut of, number)?;
+        }
+        Ok(Self { points: of.iter().map(|&of| of != 0).collect(), of, tuples })
+    }
+
+    /// The places that have a tuple, with it.
+    pub(super) fn tuples(&self) -> impl Iterator<Item = (usize, &[f64])> {
+        let tuple = |(place, &of): (usize, &u8)| {
+            let index = usize::from(of).checked_sub(1)?;
+            Some((place, &self.tuples[index][..]))
+        };
+        self.of.iter().enumerate().filter_map(tuple)
+    }
 }
