@@ -72,7 +72,7 @@ fn flow(
     let mut runner = Runner::new(&config).map_err(|problem| format!("{problem:?}"))?;
     let mut cases: Vec<Case> = Vec::new();
     for step in 0..first + 6 * every {
-        if step >= first && (step - first) % every == 0 {
+        if step >= first && (step - first).is_multiple_of(every) {
             let (velocity, pressure) = (solver.velocity(), solver.pressure());
             let fields = [
                 FieldView::vertex("velocity", &velocity),
@@ -142,7 +142,7 @@ fn made_up(name: &str, waves: u32) -> Case {
             let length = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
             // E(k) ~ k^(-5/3), over waves that are k^(1/4) apart.
             let amplitude = number.powf(-5.0 / 6.0 + 0.125);
-            (direction.map(|x| x * number / length), 6.283 * next(), amplitude)
+            (direction.map(|x| x * number / length), std::f64::consts::TAU * next(), amplitude)
         })
         .collect();
     let frame = |time: f64| {

@@ -254,13 +254,15 @@ class Field:
             self.nodes[:, :, 2] = self.nodes[:, :, 0 if self.frames == 1 else 1] * F(2.0 ** (self.exponent - exponent))
             self.nodes[:, :, 1] = self.nodes[:, :, 0] * F(2.0 ** (self.exponent - exponent))
         else:
-            self.offsets, self.nodes, self.frames = message.doubles(c), np.zeros((c, n, 4), F), 0
+            self.offsets = np.frombuffer(message.bytes(4 * c), "<f4").astype(float)
+            self.nodes, self.frames = np.zeros((c, n, 4), F), 0
             self.tables, self.mask = [list(FIRST_TABLES) for _ in range(c)], None
         self.exponent, self.frames = exponent, self.frames + 1
         if flags & 16:
             self.of, self.tuples = np.zeros(n, int), []
-            for number in range(1, message.take("B") + 1):
-                self.tuples.append(message.doubles(c))
+            byte = message.take("B")
+            for number in range(1, (byte & 7) + 1):
+                self.tuples.append(np.zeros(c) if byte >> 2 + number & 1 else message.doubles(c))
                 self.masked(message.block(), number)
             self.mask = self.of > 0
         elif not flags & 8: self.mask = None

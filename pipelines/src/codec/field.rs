@@ -141,7 +141,11 @@ impl Field {
                 _ => None,
             };
             let middle = if least <= largest { least / 2.0 + largest / 2.0 } else { 0.0 };
-            let offset = known.unwrap_or(middle);
+            #[expect(clippy::cast_possible_truncation, reason = "near the middle is enough")]
+            let offset = known.unwrap_or(f64::from(middle as f32));
+            if !offset.is_finite() {
+                return None;
+            }
             span = span.max((least - offset).abs().min(f64::MAX));
             span = span.max((largest - offset).abs().min(f64::MAX));
             offsets.push(offset);
@@ -197,7 +201,8 @@ impl Field {
         message.extend(grid.exponent.to_le_bytes());
         message.push(grid.steps);
         if !follows {
-            message.extend(grid.offsets.iter().flat_map(|offset| offset.to_le_bytes()));
+            #[expect(clippy::cast_possible_truncation, reason = "they are rounded already")]
+            message.extend(grid.offsets.iter().flat_map(|offset| (*offset as f32).to_le_bytes()));
         }
         let mask = Mask::find(values, components, order);
         if let Some(mask) = &mask {
@@ -363,7 +368,8 @@ impl Field {
             return Err(CodecError::Damaged("a grid is too fine or too coarse"));
         }
         let mut grid = if flags & FOLLOWS == 0 {
-            let offsets = input.doubles(self.components)?;
+            let offsets = (0..self.components).map(|_| input.array().map(f32::from_le_bytes));
+            let offsets = offsets.map(|offset| offset.map(f64::from)).collect::<Result<_, _>>()?;
             Grid::new(exponent, steps, offsets, hierarchy.len())
         } else {
             let Known::Grid(mut grid) = known else { return Err(NOT_KNOWN) };

@@ -89,9 +89,15 @@ impl Mask {
         stencils: &[Stencil],
         message: &mut Vec<u8>,
     ) -> Result<(), CodecError> {
-        message.push(self.tuples.len() as u8);
+        let is_zero = |tuple: &[f64]| tuple.iter().all(|value| value.to_bits() == 0);
+        // How many there are, and which of them are all zero.
+        let zeros =
+            self.tuples.iter().rev().fold(0, |bits, tuple| bits << 1 | u8::from(is_zero(tuple)));
+        message.push(self.tuples.len() as u8 | zeros << 3);
         for (tuple, number) in self.tuples.iter().zip(1..) {
-            message.extend(tuple.iter().flat_map(|value| value.to_le_bytes()));
+            if !is_zero(tuple) {
+                message.extend(tuple.iter().flat_map(|value| value.to_le_bytes()));
+            }
             let mut bits = Writer::new();
             code(&mut bits, stencils, &mut self.of.clone(), number)?;
             put_block(message, &bits.finish());
@@ -105,13 +111,15 @@ impl Mask {
         stencils: &[Stencil],
         input: &mut Input<'_>,
     ) -> Result<Self, CodecError> {
-        let count = usize::from(input.byte()?);
+        let byte = input.byte()?;
+        let count = usize::from(byte & 7);
         if count > MOST {
             return Err(CodecError::Damaged("more tuples than there may be"));
         }
         let (mut of, mut tuples) = (vec![0; stencils.len()], Vec::new());
         for number in 1..=count as u8 {
-            tuples.push(input.doubles(components)?);
+            let is_zero = byte >> (2 + number) & 1 == 1;
+            tuples.push(if is_zero { vec![0.0; components] } else { input.doubles(components)? });
             code(&mut Reader::new(input.block()?), stencils, &mut of, number)?;
         }
         Ok(Self { points: of.iter().map(|&of| of != 0).collect(), of, tuples })
