@@ -379,6 +379,38 @@ fn other_cells_begin_the_statistics_of_a_field_anew() {
 }
 
 #[test]
+fn a_value_that_is_missing_is_missing_until_the_window_has_left_it() {
+    let pipelines = r#"{"version": 1, "pipelines": [{"name": "a", "stages": [
+        {"time_statistics": {"name": "p", "field": "p", "window": 1}}, {"write": {"file": "a.vtu"}}]}]}"#;
+    let mut runner = Runner::new(&parse(pipelines, "test.json").unwrap()).unwrap();
+    let mesh = box_of_tets([1, 1, 1], [0.0; 3], UPPER);
+    let mut is_there = Vec::new();
+    for cycle in 0..16 {
+        let mut values = vec![2.0; mesh.points().len()];
+        if cycle == 4 {
+            values[0] = f64::NAN;
+        }
+        let fields = [FieldView::vertex("p", &values)];
+        let channels = [Channel::new("fluid", (&mesh).into(), &fields)];
+        let time = 0.25 * cycle as f64;
+        for output in runner.run(&Snapshot { cycle, time, channels: &channels }) {
+            let Output::Write { extract, .. } = output else { continue };
+            let of = |name: &str| {
+                let field = extract.fields.iter().find(|field| field.name == format!("p_{name}"));
+                field.unwrap().values.clone()
+            };
+            let all = ["mean", "rms", "min", "max"].map(of);
+            assert!(all.iter().all(|values| values[1] == 2.0));
+            assert!(all.iter().all(|values| values[0].is_nan() == all[0][0].is_nan()), "{cycle}");
+            is_there.push(!all[0][0].is_nan());
+        }
+    }
+    assert!(is_there[..4].iter().all(|&is_there| is_there));
+    assert!(is_there[4..8].iter().all(|&is_there| !is_there));
+    assert!(is_there[12..].iter().all(|&is_there| is_there), "{is_there:?}");
+}
+
+#[test]
 fn a_spectrum_finds_the_frequency_of_a_flow() {
     // Vortices that shed five times in a unit of time.
     let times: &'static [f64] = Vec::leak((0..140).map(|step| f64::from(step) * 0.02).collect());

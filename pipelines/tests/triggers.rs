@@ -266,6 +266,10 @@ fn what_means_nothing_is_refused_with_its_place() {
             "expected a number or the name of a field",
         ),
         (
+            r#"{"name": "a", "stages": [{"integrate": {"name": "f", "units": {"flowrate": "m3/s"}}}]}"#.into(),
+            "integrate.units: found `flowrate`, expected one of `size`, `integral`, `mean`, `flow_rate`; did you mean `flow_rate`?",
+        ),
+        (
             r#"{"name": "a", "stages": [{"time_statistics": {"name": "t"}}]}"#.into(),
             "expected exactly one of `monitor` and `field`",
         ),

@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 use tombolo_deform::mesh::Vector;
 use tombolo_deform::schedule::Interval;
 
-use super::Problem;
 use super::derived::check_name;
 use super::error::finite;
 use super::extracts::check_point;
+use super::{Problem, nearest};
 use crate::limits::{BINS, HISTORY};
 
 /// A field to measure: monitors `<name>.min`, `.max`, `.mean`, `.l2` (of the magnitude, for a
@@ -196,7 +196,8 @@ pub struct Difference {
 /// value. Exactly one of `monitor` and `field` is given.
 ///
 /// Each time the pipeline runs is one measurement; between two of them a value is taken to change
-/// evenly, so that time steps may vary. A NaN is passed over.
+/// evenly, so that time steps may vary. A NaN of a monitor is passed over; where a field has one,
+/// there is no value until the window has left it.
 ///
 /// Of a monitor they are the monitors `<name>.mean`, `.rms`, `.min`, `.max` and `.time`, the time
 /// that they cover. Of a field they are the fields `<name>_mean`, `<name>_rms`, `<name>_min` and
@@ -307,6 +308,7 @@ impl Statistics {
 impl Integrate {
     pub(super) fn check(&self, is_after_surface: bool) -> Result<(), Problem> {
         check_monitor(&self.name)?;
+        check_units(&self.units, &["size", "integral", "mean", "flow_rate"])?;
         check_features(&self.features, is_after_surface)
     }
 }
@@ -341,6 +343,7 @@ impl Force {
             ));
         }
         check_features(&self.features, true)?;
+        check_units(&self.units, &["moment", "size", "mean_pressure"])?;
         let numbers = [("reference_pressure", self.reference_pressure), ("density", self.density)];
         for (key, number) in numbers {
             finite(number).map_err(|problem| problem.within(key))?;
@@ -443,6 +446,19 @@ pub(super) fn check_monitor(name: &str) -> Result<(), Problem> {
         false => Ok(()),
     });
     check.map_err(|problem| problem.within("name"))
+}
+
+/// Checks that units are those of monitors.
+fn check_units(units: &BTreeMap<String, String>, known: &[&str]) -> Result<(), Problem> {
+    match units.keys().find(|key| !known.contains(&key.as_str())) {
+        None => Ok(()),
+        Some(key) => {
+            let known = known.iter().copied();
+            let all = known.clone().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+            let message = format!("found `{key}`, expected one of {all}");
+            Err(Problem::new(message).suggest(nearest(key, known)).within("units"))
+        }
+    }
 }
 
 fn check_features(features: &[String], is_after_surface: bool) -> Result<(), Problem> {
