@@ -1,4 +1,5 @@
 use super::*;
+use crate::mesh::Mesh;
 use crate::quality::{normalized_scaled_jacobians, quality};
 use crate::shapes;
 
