@@ -187,6 +187,11 @@ impl Pipelines {
                     let content = Content::Extract(extract, keep);
                     self.writer.write(Job { pipeline, path, time, content });
                 }
+                Output::Picture { pipeline, path, cycle, time, picture } => {
+                    let path = self.output.join(path);
+                    let content = Content::Picture(picture, cycle);
+                    self.writer.write(Job { pipeline, path, time, content });
+                }
                 Output::Row { pipeline, table, cycle, time, values } => {
                     let path = self.output.join(&table.file);
                     let content = Content::Row(table, cycle, values);

@@ -13,7 +13,8 @@ use std::{
 
 use tombolo_pipelines::{
     extract::Extract,
-    files::{self, Series},
+    files::{self, Database, Series},
+    render::Picture,
     run::Table,
 };
 
@@ -37,6 +38,8 @@ pub(crate) struct Job {
 pub(crate) enum Content {
     /// A file of its own; of the pipeline only so many stay.
     Extract(Arc<Extract>, Option<NonZeroU32>),
+    /// A picture of a step.
+    Picture(Arc<Picture>, u64),
     /// A row of a table.
     Row(Arc<Table>, u64, Vec<f64>),
 }
@@ -106,6 +109,8 @@ fn note(faults: &Mutex<Vec<String>>, fault: String) {
 struct Written {
     /// Of each pipeline.
     files: HashMap<Arc<str>, Files>,
+    /// Databases of pictures, by path.
+    databases: HashMap<PathBuf, Database>,
     /// By path; `None` where a table cannot be written, which has been told.
     tables: HashMap<PathBuf, Option<OpenTable>>,
 }
@@ -123,6 +128,7 @@ fn work(jobs: &Receiver<Job>, faults: &Mutex<Vec<String>>) {
     while let Ok(job) = jobs.recv() {
         let outcome = match &job.content {
             Content::Extract(extract, keep) => written.extract(&job, extract, *keep),
+            Content::Picture(picture, cycle) => written.draw(&job, picture, *cycle),
             Content::Row(table, cycle, values) => written.row(&job, table, *cycle, values),
         };
         if let Err(fault) = outcome {
@@ -204,5 +210,20 @@ impl Written {
             *open = None;
             format!("{}: {fault}", job.path.display())
         })
+    }
+
+    /// Writes a picture to its file, or adds it to its database, which the first of a run begins.
+    fn draw(&mut self, job: &Job, picture: &Picture, cycle: u64) -> Result<(), String> {
+        if job.path.extension().is_none_or(|extension| extension != "cdb") {
+            return files::write_picture(&job.path, &picture.image).map_err(told);
+        }
+        if !self.databases.contains_key(&job.path) {
+            let database = Database::create(&job.path).map_err(told)?;
+            self.databases.insert(job.path.clone(), database);
+        }
+        match self.databases.get_mut(&job.path) {
+            Some(database) => database.push(cycle, job.time, picture).map_err(told),
+            None => Ok(()),
+        }
     }
 }

@@ -94,6 +94,18 @@ pub const WAITING_BYTES: Limit = limit(
 pub const CUTS: Limit = limit("surfaces", 256, "the planes of a slice, or the values of a contour");
 /// Points of a probe.
 pub const PROBES: Limit = limit("points", 1 << 20, "a probe");
+/// Streamlines that begin at once.
+pub const SEEDS: Limit = limit("seeds", 1 << 16, "the places that streamlines begin at");
+/// Steps of a streamline.
+pub const STEPS: Limit = limit("steps", 1 << 17, "a streamline in one direction");
+/// Glyphs of a stage.
+pub const GLYPHS: Limit = limit("glyphs", 1 << 17, "a stage that draws glyphs");
+/// Pixels along one side of a picture.
+pub const PICTURE: Limit = limit("pixels", 1 << 13, "the width or height of a picture");
+/// Cameras of a stage that draws.
+pub const CAMERAS: Limit = limit("cameras", 1024, "a stage that draws pictures");
+/// Pixels that a stage draws.
+pub const PIXELS: Limit = limit("pixels", 1 << 26, "all pictures that a stage draws at a step");
 
 /// Bins of a histogram.
 pub const BINS: Limit = limit("bins", 1024, "a histogram");
@@ -111,7 +123,7 @@ pub const HISTORY_NUMBERS: Limit = limit(
 );
 
 /// All of them.
-pub const ALL: [Limit; 18] = [
+pub const ALL: [Limit; 24] = [
     DOCUMENT,
     VALUES,
     DEPTH,
@@ -130,4 +142,10 @@ pub const ALL: [Limit; 18] = [
     BINS,
     HISTORY,
     HISTORY_NUMBERS,
+    SEEDS,
+    STEPS,
+    GLYPHS,
+    PICTURE,
+    CAMERAS,
+    PIXELS,
 ];

@@ -16,6 +16,7 @@ pub mod files;
 mod interpolation;
 pub mod language;
 mod reduce;
+pub mod render;
 pub mod run;
 
 pub use tombolo_deform::limits;

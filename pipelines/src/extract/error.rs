@@ -54,6 +54,20 @@ pub enum ExtractError {
         /// Its association.
         association: Association,
     },
+    /// A field that is no vector.
+    #[error("field `{field}` has {components} components, expected a vector of 2 or 3")]
+    NoVector {
+        /// The field.
+        field: String,
+        /// How many components it has.
+        components: usize,
+    },
+    /// There is no place to begin at.
+    #[error("{0}")]
+    Seeds(String),
+    /// Another rank has failed, and tells why.
+    #[error("another rank could not take it")]
+    Elsewhere,
     /// Points of a probe lie in no cell.
     #[error(
         "{outside} of {points} points lie in no cell and are left out, first {}",

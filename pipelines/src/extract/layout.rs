@@ -1,15 +1,22 @@
-//! How the points of a probe hang together.
+//! How the points of a probe or of streamlines hang together.
+
+use std::sync::Arc;
 
 use tombolo_deform::mesh::{CellType, Cells, MeshError, Vector};
 
 use super::ExtractError;
 
-/// How the points of a probe hang together, and how many of them lie outside of the mesh.
+/// How the points of a probe or of streamlines hang together, and how many of those that were asked
+/// for lie outside of the mesh.
 #[derive(Debug, Clone)]
 pub(crate) struct Layout {
     /// How many points there are along each axis; `None` for loose points.
     pub(super) counts: Option<[usize; 3]>,
+    /// Of streamlines, where each begins among the points, and where the last ends.
+    pub(super) lines: Option<Arc<[usize]>>,
     pub(crate) points: usize,
+    /// How many points were asked for: those of a probe, or the seeds of streamlines.
+    pub(super) asked: usize,
     pub(super) outside: usize,
     /// The first point outside, on the rank that tells of it.
     pub(super) told: Option<Vector>,
@@ -24,6 +31,13 @@ impl Layout {
             let points: Vec<u32> = points.iter().map(|&point| numbers[point]).collect();
             if points.contains(&u32::MAX) { Ok(()) } else { cells.push(cell_type, &points) }
         };
+        if let Some(lines) = &self.lines {
+            for ends in lines.windows(2) {
+                (ends[0] + 1..ends[1])
+                    .try_for_each(|point| push(CellType::Line, &[point - 1, point]))?;
+            }
+            return Ok(cells);
+        }
         let Some(counts) = self.counts else {
             (0..self.points).try_for_each(|point| push(CellType::Vertex, &[point]))?;
             return Ok(cells);
@@ -53,7 +67,7 @@ impl Layout {
 
     /// What is told of points outside of the mesh.
     pub(super) fn error(&self) -> Option<ExtractError> {
-        let Self { outside, points, .. } = *self;
+        let Self { outside, asked: points, .. } = *self;
         self.told.map(|first| ExtractError::OutsidePoints { outside, points, first })
     }
 }

@@ -37,7 +37,9 @@ pub(crate) fn merged(
     let result = match &piece.origin {
         Origin::Whole => return Ok(Some(Arc::clone(&piece.extract))),
         Origin::Boundary => on_boundary(communicator, whole, piece),
-        Origin::Vertices | Origin::Between(_) => anywhere(communicator, whole, piece),
+        Origin::Vertices | Origin::Between(_) | Origin::Loose => {
+            anywhere(communicator, whole, piece)
+        }
         Origin::Probe(layout, indices) => probed(communicator, layout, indices, piece),
     };
     Ok(agree(communicator, result)?)
@@ -173,26 +175,28 @@ fn probed(
     })))
 }
 
+/// What all ranks call a point of an extract, and whether other ranks may have it too; `None` for a
+/// point that none has.
+pub(super) fn name(whole: &Whole, piece: &Extracted, index: usize) -> Option<(Support, bool)> {
+    let numbers = whole.shared.numbers();
+    let support = match &piece.origin {
+        Origin::Between(supports) => supports[index],
+        Origin::Loose => return None,
+        _ => Support::new(&[piece.extract.vertices.as_ref()?[index]], 0),
+    };
+    let is_shared = support.vertices().all(|vertex| whole.is_shared[vertex as usize]);
+    let vertices: Vec<u32> = support.vertices().map(|vertex| numbers[vertex as usize]).collect();
+    Some((Support::new(&vertices, support.layer), is_shared))
+}
+
 /// A rank's piece as it is sent.
 fn described(whole: &Whole, piece: &Extracted) -> Vec<u8> {
     let extract = &piece.extract;
-    let numbers = whole.shared.numbers();
-    let number = |vertex: u32| numbers[vertex as usize];
     // Points between vertices that other ranks have too are shared; of a vertex extract all are
     // named, for their own sake.
-    let name = |index: usize| match &piece.origin {
-        Origin::Between(supports) => {
-            let support = supports[index];
-            support.vertices().all(|vertex| whole.is_shared[vertex as usize]).then(|| {
-                let vertices: Vec<u32> = support.vertices().map(number).collect();
-                (Support::new(&vertices, support.layer), true)
-            })
-        }
-        _ => extract.vertices.as_ref().map(|vertices| {
-            let vertex = vertices[index];
-            (Support::new(&[number(vertex)], 0), whole.is_shared[vertex as usize])
-        }),
-    };
+    let is_between = matches!(piece.origin, Origin::Between(_));
+    let name =
+        |index: usize| name(whole, piece, index).filter(|(_, is_shared)| *is_shared || !is_between);
     let named = (0..extract.points.len()).filter_map(|index| Some((index, name(index)?)));
     let named: Vec<(usize, (Support, bool))> = named.collect();
     let mut message =

@@ -3,34 +3,42 @@
 //!
 //! [`Source`] keeps what does not change while a channel's cells stay the same;
 //! [`Source::surface`], [`Source::slice`], [`Source::contour`], [`Source::threshold`],
-//! [`Source::clip`], [`Source::probe`] and [`Source::whole`] then make an [`Extract`] of the channel
+//! [`Source::clip`], [`Source::probe`], [`Source::streamlines`], [`Source::glyphs`] and [`Source::whole`] then make an [`Extract`] of the channel
 //! as it is now. The parts of an extract that depend on the mesh alone stay in a [`Kept`].
 
 mod check;
 mod clip;
 mod cut;
+mod decimate;
 mod decompose;
 mod error;
 mod function;
 mod gather;
+mod glyphs;
 mod layout;
 mod merge;
 mod pattern;
 mod positions;
 mod probe;
+mod seeds;
+mod shown;
 mod skin;
 mod source;
 mod statistics;
+mod streamlines;
 mod take;
 mod walls;
 
 pub use check::{ChannelError, check_field_length, check_names};
+pub(crate) use decimate::Decimation;
 pub use error::ExtractError;
 pub(crate) use error::unknown_field;
 pub(crate) use gather::check_length;
 pub(crate) use merge::merged;
 pub use pattern::{Input, Kept};
+pub(crate) use shown::{Shown, shown};
 pub(crate) use skin::skin;
+pub(crate) use source::Support;
 pub use source::{Extracted, MeshKey, Source};
 pub use statistics::{FieldStatistics, statistics};
 pub(crate) use walls::Walls;

@@ -22,7 +22,7 @@ use crate::language::{Probe, ProbeAt, ProbeGrid, ProbeLine, ProbeMethod};
 const SLACK: f64 = 1e-9;
 
 /// The points of a probe.
-fn points(at: &ProbeAt) -> (Vec<Vector>, Option<[usize; 3]>) {
+pub(super) fn points(at: &ProbeAt) -> (Vec<Vector>, Option<[usize; 3]>) {
     let between = |from: Vector, to: Vector, fraction: f64| -> Vector {
         std::array::from_fn(|axis| from[axis] * (1.0 - fraction) + to[axis] * fraction)
     };
@@ -61,13 +61,7 @@ pub(super) fn pattern(
     let communicator = input.communicator;
     let (points, counts) = points(&probe.at);
     let finder = fault.map(|()| Finder::new(source, probe.method));
-    let numbers = input.channel.mesh.global_cells;
-    let numbers = numbers.filter(|numbers| numbers.len() == source.cells().len());
-    let is_numbered = !communicator.any(numbers.is_none() && !source.cells().is_empty());
-    let key = |cell: u32| match numbers.filter(|_| is_numbered) {
-        Some(numbers) => numbers.get(cell as usize),
-        None => (communicator.rank() as u64) << 32 | u64::from(cell),
-    };
+    let key = keys(source, input);
     let mut found: Vec<Option<Found>> = match &finder {
         Ok(finder) => points.iter().map(|point| finder.find(*point, &key)).collect(),
         Err(_) => vec![None; points.len()],
@@ -82,7 +76,9 @@ pub(super) fn pattern(
     let first_outside = (0..points.len()).find(is_outside).map(|index| points[index]);
     let layout = Layout {
         counts,
+        lines: None,
         points: points.len(),
+        asked: points.len(),
         outside: (0..points.len()).filter(is_outside).count(),
         told: first_outside.filter(|_| communicator.rank() == 0),
     };
@@ -114,14 +110,28 @@ pub(super) fn pattern(
     })
 }
 
-/// The cell that a point lies in, and the vertices that its values come from, with their weights.
-#[derive(Clone)]
-struct Found {
-    cell: u32,
-    row: Vec<(u32, f64)>,
+/// The numbers by which all ranks know a rank's cells: those of the whole mesh, or where there are
+/// none those of the ranks in turn. Collective.
+pub(super) fn keys<'a>(source: &Source, input: &Input<'a>) -> impl Fn(u32) -> u64 + use<'a> {
+    let communicator = input.communicator;
+    let numbers = input.channel.mesh.global_cells;
+    let numbers = numbers.filter(|numbers| numbers.len() == source.cells().len());
+    let is_numbered = !communicator.any(numbers.is_none() && !source.cells().is_empty());
+    move |cell: u32| match numbers.filter(|_| is_numbered) {
+        Some(numbers) => numbers.get(cell as usize),
+        None => (communicator.rank() as u64) << 32 | u64::from(cell),
+    }
 }
 
-struct Finder<'a> {
+/// The cell that a point lies in, and the vertices that its values come from, with their weights.
+#[derive(Clone)]
+pub(super) struct Found {
+    pub(super) cell: u32,
+    pub(super) row: Vec<(u32, f64)>,
+}
+
+/// The own cells of a rank, and which of them a point lies in.
+pub(super) struct Finder<'a> {
     source: &'a Source,
     method: ProbeMethod,
     /// The own cells.
@@ -131,7 +141,7 @@ struct Finder<'a> {
 }
 
 impl<'a> Finder<'a> {
-    fn new(source: &'a Source, method: ProbeMethod) -> Self {
+    pub(super) fn new(source: &'a Source, method: ProbeMethod) -> Self {
         let (cells, points) = (source.cells(), &source.positions.points);
         #[expect(clippy::cast_possible_truncation, reason = "cells are numbered with 32 bits")]
         let own: Vec<u32> = (0..cells.len())
@@ -150,8 +160,15 @@ impl<'a> Finder<'a> {
         Self { source, method, cells: own, tree: BoxTree::new(&boxes), slack }
     }
 
+    /// The diagonal of the box around a cell.
+    pub(super) fn size(&self, cell: u32) -> f64 {
+        let vertices = self.source.cells().vertices(cell as usize);
+        let at = |&vertex: &u32| self.source.positions.points[vertex as usize];
+        Bounds::around(vertices.iter().map(at)).diagonal()
+    }
+
     /// Of the cells that a point lies in, that of the lowest key.
-    fn find(&self, point: Vector, key: &dyn Fn(u32) -> u64) -> Option<Found> {
+    pub(super) fn find(&self, point: Vector, key: &dyn Fn(u32) -> u64) -> Option<Found> {
         let mut candidates = Vec::new();
         self.tree.around(point, self.slack, |index| candidates.push(self.cells[index as usize]));
         candidates.sort_unstable_by_key(|&cell| key(cell));

@@ -14,47 +14,100 @@ use super::{Association, Extract, ExtractFeatures, Field};
 /// # Errors
 /// None for an extract whose cells are sound.
 pub(crate) fn skin(extract: &Extract) -> Result<Option<Extract>, MeshError> {
-    let cells = &extract.cells;
-    if cells.dimension() < 3 {
+    if extract.cells.dimension() < 3 {
         return Ok(None);
     }
-    let mut faces = Vec::new();
-    let mut corners = Vec::new();
-    for cell in 0..cells.len() {
-        if cells.cell_type(cell).dimension() == 3 {
-            cells.for_each_face(cell, |face| {
-                let start = corners.len();
-                corners.extend(face);
-                faces.push(Face { key: key(face), cell, start, end: corners.len() });
-            });
-        }
-    }
-    faces.sort_by_key(|face| (face.key, face.cell));
-    let mut outer: Vec<&Face> = faces
-        .chunk_by(|a, b| a.key == b.key)
-        .filter_map(|same| if let [one] = same { Some(one) } else { None })
-        .collect();
-    remove_split(&mut outer, &corners);
-    outer.sort_by_key(|face| (face.cell, face.start));
+    Ok(Some(Outside::of(&extract.cells, None).taken(extract)?.0))
+}
 
-    let mut taken = Cells::new();
-    let mut owners = Vec::new();
-    let mut outer = outer.into_iter().peekable();
-    for (cell, (cell_type, vertices)) in cells.iter().enumerate() {
-        if cell_type.dimension() < 3 {
-            taken.push(cell_type, vertices)?;
-            owners.push(cell);
+/// The faces of volume cells that no other cell has.
+pub(super) struct Outside {
+    faces: Vec<Face>,
+    corners: Vec<u32>,
+    /// For each cell whether it is passed over; `None` where none is.
+    hidden: Option<Vec<bool>>,
+}
+
+impl Outside {
+    /// The outside of the cells that are not hidden.
+    pub(super) fn of(cells: &Cells, hidden: Option<Vec<bool>>) -> Self {
+        let mut faces = Faces::default();
+        for cell in 0..cells.len() {
+            let is_hidden = hidden.as_ref().is_some_and(|hidden| hidden[cell]);
+            if cells.cell_type(cell).dimension() == 3 && !is_hidden {
+                cells.for_each_face(cell, |face| faces.push(cell, face));
+            }
         }
-        while let Some(face) = outer.next_if(|face| face.cell == cell) {
-            let face = &corners[face.start..face.end];
-            taken.push(face_type(face), face)?;
-            owners.push(cell);
-        }
+        Self { hidden, ..faces.outside() }
     }
-    Ok(Some(with_cells(extract, &taken, &owners)))
+
+    /// The corners of each face, by a number that [`retain`](Self::retain) knows it by.
+    pub(super) fn faces(&self) -> impl Iterator<Item = &[u32]> {
+        self.faces.iter().map(|face| &self.corners[face.start..face.end])
+    }
+
+    /// Keeps only those of the faces for which `is_kept` holds, by their numbers.
+    pub(super) fn retain(&mut self, is_kept: impl Fn(usize) -> bool) {
+        let mut numbers = 0..;
+        self.faces.retain(|_| numbers.next().is_some_and(&is_kept));
+    }
+
+    /// The cells that the faces belong to.
+    pub(super) fn owners(&self) -> impl Iterator<Item = usize> {
+        self.faces.iter().map(|face| face.cell)
+    }
+
+    /// The faces, and cells of lower dimension, as an extract; and which of the points they have.
+    pub(super) fn taken(&self, extract: &Extract) -> Result<(Extract, Vec<usize>), MeshError> {
+        let mut taken = Cells::new();
+        let mut owners = Vec::new();
+        let mut outer = self.faces.iter().peekable();
+        for (cell, (cell_type, vertices)) in extract.cells.iter().enumerate() {
+            let is_hidden = self.hidden.as_ref().is_some_and(|hidden| hidden[cell]);
+            if cell_type.dimension() < 3 && !is_hidden {
+                taken.push(cell_type, vertices)?;
+                owners.push(cell);
+            }
+            while let Some(face) = outer.next_if(|face| face.cell == cell) {
+                let face = &self.corners[face.start..face.end];
+                taken.push(face_type(face), face)?;
+                owners.push(cell);
+            }
+        }
+        Ok(with_cells(extract, &taken, &owners))
+    }
+}
+
+/// Faces of cells, of which some may be the same.
+#[derive(Default)]
+pub(super) struct Faces {
+    faces: Vec<Face>,
+    corners: Vec<u32>,
+}
+
+impl Faces {
+    /// Adds a face of a cell.
+    pub(super) fn push(&mut self, cell: usize, face: &[u32]) {
+        let start = self.corners.len();
+        self.corners.extend(face);
+        self.faces.push(Face { key: key(face), cell, start, end: self.corners.len() });
+    }
+
+    /// Those that are there once.
+    pub(super) fn outside(self) -> Outside {
+        let Self { mut faces, corners } = self;
+        faces.sort_by_key(|face| (face.key, face.cell));
+        let single = faces.chunk_by(|a, b| a.key == b.key);
+        let mut faces: Vec<Face> =
+            single.filter_map(|same| if let [one] = same { Some(*one) } else { None }).collect();
+        remove_split(&mut faces, &corners);
+        faces.sort_by_key(|face| (face.cell, face.start));
+        Outside { faces, corners, hidden: None }
+    }
 }
 
 /// A face of a cell.
+#[derive(Clone, Copy)]
 struct Face {
     /// Its four lowest corners; of a triangle three and `u32::MAX`.
     key: [u32; 4],
@@ -79,7 +132,7 @@ fn face_type(face: &[u32]) -> CellType {
 }
 
 /// Takes out quadrilaterals, with the two triangles that fill each of them.
-fn remove_split(outer: &mut Vec<&Face>, corners: &[u32]) {
+fn remove_split(outer: &mut Vec<Face>, corners: &[u32]) {
     let triangles: HashSet<[u32; 4]> =
         outer.iter().map(|face| face.key).filter(|key| key[3] == u32::MAX).collect();
     let mut inner = HashSet::new();
@@ -95,8 +148,8 @@ fn remove_split(outer: &mut Vec<&Face>, corners: &[u32]) {
     outer.retain(|face| !inner.contains(&face.key));
 }
 
-/// An extract of other cells, with the points that they have.
-fn with_cells(extract: &Extract, cells: &Cells, owners: &[usize]) -> Extract {
+/// An extract of other cells, with the points that they have, and which those are.
+fn with_cells(extract: &Extract, cells: &Cells, owners: &[usize]) -> (Extract, Vec<usize>) {
     let mut numbers = vec![u32::MAX; extract.points.len()];
     let mut points: Vec<usize> = Vec::new();
     for &point in cells.connectivity() {
@@ -125,7 +178,7 @@ fn with_cells(extract: &Extract, cells: &Cells, owners: &[usize]) -> Extract {
         let of_cells = owners.iter().map(|&cell| features.of_cells[cell]).collect();
         ExtractFeatures { names: features.names.clone(), of_cells }.into()
     });
-    Extract {
+    let taken = Extract {
         vertices: extract
             .vertices
             .as_ref()
@@ -134,5 +187,6 @@ fn with_cells(extract: &Extract, cells: &Cells, owners: &[usize]) -> Extract {
         features,
         fields: extract.fields.iter().map(field).collect(),
         points: points.iter().map(|&point| extract.points[point]).collect(),
-    }
+    };
+    (taken, points)
 }

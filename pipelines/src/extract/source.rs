@@ -41,6 +41,8 @@ pub(crate) enum Origin {
     Vertices,
     /// Between vertices.
     Between(Arc<[Support]>),
+    /// Points that no other rank has, as of glyphs.
+    Loose,
     /// The points of a probe, by their numbers there.
     Probe(Layout, Arc<[u32]>),
 }

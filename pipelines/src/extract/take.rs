@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tombolo_deform::mesh::{Vector, ghosts};
+use tombolo_deform::mesh::{NumberType, Vector, ghosts};
 
 use super::clip::Clipper;
 use super::cut::cut;
@@ -11,8 +11,13 @@ use super::gather::check_length;
 use super::pattern::{Base, Input, Kept, Pattern};
 use super::probe;
 use super::source::{Extracted, Origin, Source};
-use super::{Association, ExtractError, FieldView, is_absent, unknown_field};
-use crate::language::{Clip, ClipBy, Contour, Probe, Quantifier, Slice, Threshold};
+use super::{
+    Association, ExtractError, Field, FieldView, glyphs, is_absent, seeds, streamlines,
+    unknown_field,
+};
+use crate::language::{
+    Clip, ClipBy, Contour, Glyphs, GlyphsAt, Probe, Quantifier, Slice, Streamlines, Threshold,
+};
 
 impl Source {
     /// The cut of the mesh with planes, a cylinder or a sphere: polygons that turn
@@ -150,6 +155,85 @@ impl Source {
         kept: &mut Kept,
     ) -> Result<Extracted, ExtractError> {
         self.kept(input, kept, |source, fault| probe::pattern(source, input, stage, fault))
+    }
+
+    /// Lines along a vector field, as the field is now. Seeds that lie in no cell are left out, and
+    /// named in [`Extracted::errors`]. The field `integration_time` is the time from the seed,
+    /// below 0 against the flow. Collective.
+    ///
+    /// # Errors
+    /// As [`contour`](Self::contour); [`ExtractError::NoVector`], [`ExtractError::Seeds`].
+    pub fn streamlines(
+        &mut self,
+        input: &Input,
+        stage: &Streamlines,
+    ) -> Result<Extracted, ExtractError> {
+        let communicator = input.communicator;
+        let found = self.update(input).and_then(|()| self.vectors(input, &stage.field));
+        let all_have = !communicator.any(found.is_err());
+        let vectors = found?;
+        if !all_have {
+            return Err(ExtractError::Elsewhere);
+        }
+        let seeds = seeds::of(self, input, &stage.seeds)?;
+        let (pattern, times) = streamlines::pattern(self, input, &vectors, &seeds, stage)?;
+        let mut extracted = pattern.fill(input);
+        let extract = Arc::make_mut(&mut extracted.extract);
+        extract.fields.retain(|field| field.name != streamlines::TIME);
+        extract.fields.push(Field {
+            name: streamlines::TIME.to_owned(),
+            association: Association::Vertex,
+            components: 1,
+            number: NumberType::F64,
+            values: times,
+        });
+        Ok(extracted)
+    }
+
+    /// Arrows or spheres that show a field, as triangles whose points have the values of the place
+    /// that the glyph stands at. Places that lie in no cell are left out. Collective.
+    ///
+    /// # Errors
+    /// As [`streamlines`](Self::streamlines).
+    pub fn glyphs(&mut self, input: &Input, stage: &Glyphs) -> Result<Extracted, ExtractError> {
+        let communicator = input.communicator;
+        let found = self.update(input).and_then(|()| match &stage.field {
+            Some(name) => self.vectors(input, name).map(Some),
+            None => Ok(None),
+        });
+        let all_have = !communicator.any(found.is_err());
+        let vectors = found?;
+        if !all_have {
+            return Err(ExtractError::Elsewhere);
+        }
+        let seeds = match &stage.at {
+            GlyphsAt::Points(seeds) => seeds::of(self, input, seeds)?,
+            _ => Vec::new(),
+        };
+        let pattern = glyphs::pattern(self, communicator, vectors.as_deref(), &seeds, stage)?;
+        Ok(pattern.fill(input))
+    }
+
+    /// The vector that a vertex field has at each vertex.
+    fn vectors(&self, input: &Input, name: &str) -> Result<Vec<Vector>, ExtractError> {
+        let Some(view) = self.field(input, name)? else { return Ok(Vec::new()) };
+        let (field, association) = (name.to_owned(), view.association);
+        let components = view.values.components();
+        if association != Association::Vertex {
+            return Err(ExtractError::NotOfVertices { field, association });
+        }
+        if !matches!(components, 2 | 3) {
+            return Err(ExtractError::NoVector { field, components });
+        }
+        self.deciding(input, view)?;
+        let vector = |vertex: usize| {
+            [0, 1, 2].map(
+                |axis| {
+                    if axis < components { view.values.get(vertex, axis) } else { 0.0 }
+                },
+            )
+        };
+        Ok((0..view.values.len()).map(vector).collect())
     }
 
     /// Takes note of where the vertices are now.

@@ -8,6 +8,8 @@
 //! | VTK `.vtk` (legacy) | text and binary, file versions 1 to 5 | binary, by vtkio (feature `vtkio`) |
 //! | ParaView `.pvd` | | [`Series`] |
 //!
+//! Pictures are written as PNG: [`write_picture`], [`Database`].
+//!
 //! Displacements of a surface are read from and written to plain text and VTK:
 //! [`read_displacement`], [`write_displacement`].
 //!
@@ -39,6 +41,7 @@ mod error;
 mod gmsh;
 #[cfg(feature = "vtkio")]
 mod model;
+mod pictures;
 mod scanner;
 #[cfg(test)]
 mod tests;
@@ -56,6 +59,7 @@ pub use displacement::{
 pub use error::{FileError, Position, Problem};
 #[cfg(feature = "vtkio")]
 pub use model::{extract_from_vtkio, extract_to_vtkio, mesh_from_vtkio, mesh_to_vtkio};
+pub use pictures::{Database, write_picture};
 pub use vtk::{Compression, Series};
 
 use crate::extract::{Extract, Field};

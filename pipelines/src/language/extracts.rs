@@ -339,7 +339,7 @@ pub(super) fn check_point(point: Vector, key: &str) -> Result<(), Problem> {
     Ok(())
 }
 
-fn check_direction(direction: Vector, key: &str) -> Result<(), Problem> {
+pub(super) fn check_direction(direction: Vector, key: &str) -> Result<(), Problem> {
     let length = direction.iter().fold(0.0_f64, |sum, x| sum.hypot(*x));
     if length.is_normal() {
         return Ok(());

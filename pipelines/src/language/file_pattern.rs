@@ -1,4 +1,4 @@
-//! The names of files that pipelines write at each step.
+//! Names of files that say which step they are of.
 
 use super::{Problem, nearest};
 
@@ -71,4 +71,18 @@ fn file_digits(inside: &str, digits: &str) -> Result<usize, Problem> {
             "found `{{{inside}}}` in a file's name, expected a number of digits from 0 to 20 behind the colon"
         ))),
     }
+}
+
+/// The text that a pattern stands for in a picture: as [`file_pattern`], with `{camera}` for the
+/// camera's name.
+///
+/// # Errors
+/// As [`file_pattern`].
+pub(crate) fn picture_pattern(
+    pattern: &str,
+    cycle: u64,
+    time: f64,
+    camera: &str,
+) -> Result<String, Problem> {
+    file_pattern(&pattern.replace("{camera}", camera), cycle, time)
 }

@@ -19,11 +19,13 @@
 //! );
 //! ```
 
+mod cameras;
 mod configuration;
 mod derived;
 mod error;
 mod extracts;
 mod file_pattern;
+mod glyphs;
 mod message;
 mod monitors;
 mod order;
@@ -32,13 +34,16 @@ mod pipeline;
 mod probe;
 mod reductions;
 mod relative_files;
+mod render;
 mod scan;
 mod sinks;
 mod stage;
+mod streamlines;
 mod timed;
 mod tree;
 mod validate;
 
+pub use cameras::{Camera, Orbit, Place};
 pub use configuration::{Config, Steering, StreamServer};
 pub(crate) use derived::GIVEN;
 pub use derived::{Derived, Formula};
@@ -47,6 +52,8 @@ pub use extracts::{
     Clip, ClipBy, ClipField, Contour, Cylinder, Plane, Quantifier, Slice, Threshold,
 };
 pub use file_pattern::file_pattern;
+pub(crate) use file_pattern::picture_pattern;
+pub use glyphs::{GlyphShape, Glyphs, GlyphsAt};
 pub use message::{Message, parse_message};
 pub(crate) use monitors::{Condition, Line, Scope, Slot, columns, line, monitors_of};
 pub use monitors::{Monitor, check_parameters, monitors};
@@ -55,12 +62,14 @@ pub use parse::{ReadError, Validate, parse_json, parse_valid, read_text, text};
 pub use pipeline::{AgainAfter, At, Budget, Cadence, Due, Pipeline};
 pub use probe::{Probe, ProbeAt, ProbeGrid, ProbeLine, ProbeMethod};
 pub use reductions::{
-    Difference, Force, Histogram, Integrate, Measure, Spectrum, Statistics, TimeStatistics,
-    Viscosity, WallShearStress, Weight,
+    Decimate, Difference, Force, Histogram, Integrate, Measure, Spectrum, Statistics,
+    TimeStatistics, Viscosity, WallShearStress, Weight,
 };
 pub use relative_files::resolve_files;
+pub use render::{Color, ColorMap, Component, Render, Shading};
 pub use sinks::{Csv, Existing, Log, LogLevel};
 pub use stage::{Action, ErrorBound, OrderStage, Select, Stage, StreamStage, Write};
+pub use streamlines::{Direction, SeedFeatures, SeedPlane, Seeds, Streamlines};
 pub use timed::{JournalEntry, OrderStatus, TimedCommand, parse_orders};
 pub use tombolo_deform::names::nearest;
 pub use tombolo_deform::shape::Deformation;

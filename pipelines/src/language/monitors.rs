@@ -73,6 +73,9 @@ pub(crate) fn monitors_of(stage: &Stage, has_faces: bool) -> Vec<Monitor> {
                 }
             }
         }
+        Stage::Decimate(_) => {
+            ["error", "triangles"].iter().for_each(|name| add("decimate", name, None));
+        }
         Stage::Histogram(stage) => {
             ["lower", "upper"].iter().for_each(|name| add(&stage.name, name, stage.unit.as_ref()));
             ["below", "above"].iter().for_each(|name| add(&stage.name, name, None));

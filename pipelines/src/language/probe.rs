@@ -132,7 +132,7 @@ impl Probe {
 }
 
 impl ProbeLine {
-    fn check(&self) -> Result<(), Problem> {
+    pub(super) fn check(&self) -> Result<(), Problem> {
         check_point(self.from, "from")?;
         check_point(self.to, "to")?;
         if self.count < 2 {
@@ -144,7 +144,7 @@ impl ProbeLine {
 }
 
 impl ProbeGrid {
-    fn check(&self) -> Result<(), Problem> {
+    pub(super) fn check(&self) -> Result<(), Problem> {
         check_box(self.lower, self.upper, true)?;
         if let Some(axis) = self.counts.iter().position(|&count| count == 0) {
             let message = "found 0, expected at least 1 point";

@@ -294,7 +294,8 @@ impl Statistics {
 
     pub(super) fn check(&self) -> Result<(), Problem> {
         let Some(name) = &self.name else {
-            if ["quality", "cycle", "time", "parameter"].contains(&self.field.as_str()) {
+            if ["quality", "decimate", "cycle", "time", "parameter"].contains(&self.field.as_str())
+            {
                 let message = "a field of this name cannot be told from other monitors, expected a \
                                `name` beside it";
                 return Err(Problem::new(message).within("field"));
@@ -473,4 +474,42 @@ fn check_features(features: &[String], is_after_surface: bool) -> Result<(), Pro
         }
     }
     Ok(())
+}
+
+/// Fewer triangles for viewers and files that come after it: of a surface, or of the outside of
+/// volumes.
+///
+/// Vertices are taken out one by one, the one that bends the surface least first. Those that are
+/// left, and their fields, are exact. Borders and those between features stay where they are. What
+/// `render` draws and `integrate` adds up is not touched.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Decimate {
+    /// The part of the triangles that is left, above 0 and at most 1.
+    #[serde(default = "tenth")]
+    pub fraction: f64,
+    /// By how much a face that is gone may lie beside what is left, in units of the mesh; left out,
+    /// there is no bound but the fraction.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error: Option<f64>,
+}
+
+fn tenth() -> f64 {
+    0.1
+}
+
+impl Decimate {
+    pub(super) fn check(&self) -> Result<(), Problem> {
+        if !(self.fraction > 0.0 && self.fraction <= 1.0) {
+            let message = format!("found {}, expected a number above 0, at most 1", self.fraction);
+            return Err(Problem::new(message).within("fraction"));
+        }
+        match self.error {
+            Some(error) if !(error > 0.0 && error.is_finite()) => {
+                let message = format!("found {error}, expected a number above 0");
+                Err(Problem::new(message).within("error"))
+            }
+            _ => Ok(()),
+        }
+    }
 }

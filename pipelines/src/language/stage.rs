@@ -3,8 +3,9 @@
 use std::num::NonZeroU32;
 
 use super::{
-    Clip, Contour, Csv, Deformation, Derived, Difference, Force, Formula, Histogram, Integrate,
-    Log, Parameter, Probe, Slice, Spectrum, Statistics, Threshold, TimeStatistics, WallShearStress,
+    Clip, Contour, Csv, Decimate, Deformation, Derived, Difference, Force, Formula, Glyphs,
+    Histogram, Integrate, Log, Parameter, Probe, Render, Slice, Spectrum, Statistics, Streamlines,
+    Threshold, TimeStatistics, WallShearStress,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -32,6 +33,10 @@ pub enum Stage {
     Clip(Clip),
     /// Takes the fields at points, on a line or on a grid. A source stage.
     Probe(Probe),
+    /// Takes lines along a vector field. A source stage.
+    Streamlines(Streamlines),
+    /// Takes arrows or spheres that show a field, as triangles. A source stage.
+    Glyphs(Glyphs),
     /// Derives the gradient of a field: of each component its derivatives along x, y and z. At a
     /// vertex it is the mean over the cells around; an element field is first brought to the
     /// vertices as the mean over the cells around each.
@@ -72,6 +77,10 @@ pub enum Stage {
     TimeStatistics(TimeStatistics),
     /// Finds the frequencies in a monitor.
     Spectrum(Spectrum),
+    /// Leaves fewer triangles for what is streamed and written after it: monitors
+    /// `decimate.error`, the largest distance of a point from what is left, and
+    /// `decimate.triangles`.
+    Decimate(Decimate),
     /// Sends the extract to the viewers as the view of this pipeline; of volume cells their outside.
     Stream(StreamStage),
     /// Writes the extract, or the whole mesh where no stage has extracted anything, to a file.
@@ -80,6 +89,9 @@ pub enum Stage {
     Csv(Csv),
     /// Says monitors in the log, a line each time.
     Log(Log),
+    /// Draws pictures of the extract, or of the outside of the whole mesh where no stage has taken
+    /// one.
+    Render(Box<Render>),
     /// An edit of the shape, for `order`.
     Translate(Translate),
     /// An edit of the shape, for `order`.
@@ -121,6 +133,8 @@ impl Stage {
             Stage::Threshold(_) => "threshold",
             Stage::Clip(_) => "clip",
             Stage::Probe(_) => "probe",
+            Stage::Streamlines(_) => "streamlines",
+            Stage::Glyphs(_) => "glyphs",
             Stage::Gradient(_) => "gradient",
             Stage::Vorticity(_) => "vorticity",
             Stage::Divergence(_) => "divergence",
@@ -137,10 +151,12 @@ impl Stage {
             Stage::Difference(_) => "difference",
             Stage::TimeStatistics(_) => "time_statistics",
             Stage::Spectrum(_) => "spectrum",
+            Stage::Decimate(_) => "decimate",
             Stage::Stream(_) => "stream",
             Stage::Write(_) => "write",
             Stage::Csv(_) => "csv",
             Stage::Log(_) => "log",
+            Stage::Render(_) => "render",
             Stage::Translate(_) => "translate",
             Stage::Rotate(_) => "rotate",
             Stage::ScaleDirection(_) => "scale_direction",
@@ -169,6 +185,8 @@ impl Stage {
                 | Stage::Threshold(_)
                 | Stage::Clip(_)
                 | Stage::Probe(_)
+                | Stage::Streamlines(_)
+                | Stage::Glyphs(_)
         )
     }
 
@@ -238,6 +256,9 @@ pub enum Action {
     Log(Log),
     /// Gives a parameter of the solver a new value.
     Set(Parameter),
+    /// Draws pictures of the extract, or of the outside of the whole mesh where no stage has taken
+    /// one.
+    Render(Box<Render>),
     /// Orders the edits of the stages.
     Order(OrderStage),
 }
@@ -254,6 +275,7 @@ impl Action {
             Action::Csv(_) => "csv",
             Action::Log(_) => "log",
             Action::Set(_) => "set",
+            Action::Render(_) => "render",
             Action::Order(_) => "order",
         }
     }

@@ -131,6 +131,7 @@ impl Validate for Pipeline {
                 Action::Write(write) => state.write(write),
                 Action::Csv(csv) => csv.check(),
                 Action::Set(parameter) => finite(parameter.value).map_err(|it| it.within("value")),
+                Action::Render(render) => render.check(),
                 Action::Order(order) => state.order(order),
             }
             .map_err(located)?;
@@ -156,6 +157,7 @@ struct Made {
     /// The names of fields that were added later.
     added: HashSet<String>,
     quality: bool,
+    decimates: bool,
     measured: HashSet<String>,
     settings: HashSet<&'static str>,
     /// The last edit that no order has taken up yet.
@@ -198,6 +200,8 @@ impl Made {
             Stage::Threshold(threshold) => self.source().and_then(|()| threshold.check()),
             Stage::Clip(clip) => self.source().and_then(|()| clip.check()),
             Stage::Probe(probe) => self.source().and_then(|()| probe.check()),
+            Stage::Streamlines(lines) => self.source().and_then(|()| lines.check()),
+            Stage::Glyphs(glyphs) => self.source().and_then(|()| glyphs.check()),
             Stage::Gradient(_)
             | Stage::Vorticity(_)
             | Stage::Divergence(_)
@@ -238,8 +242,13 @@ impl Made {
             Stage::Spectrum(stage) => stage.check().and_then(|()| self.measures(&stage.name, true)),
             Stage::Csv(csv) => csv.check(),
             Stage::Set(parameter) => finite(parameter.value).map_err(|it| it.within("value")),
+            Stage::Decimate(_) if std::mem::replace(&mut self.decimates, true) => {
+                Err(Problem::new("found twice, expected at most once"))
+            }
+            Stage::Decimate(decimate) => decimate.check(),
             Stage::Stream(stream) => self.stream(stream),
             Stage::Write(write) => self.write(write),
+            Stage::Render(render) => render.check(),
             Stage::Order(order) => self.order(order),
             Stage::Deform(deform) => check_deformation(deform),
             Stage::Guard(guard) => check_guard(guard),
@@ -295,8 +304,9 @@ impl Made {
 
     /// A stage that reduces the extract to monitors that begin with this name.
     fn reduces(&mut self, name: &str) -> Result<(), Problem> {
-        if self.source == Some("probe") {
-            return Err(Problem::new("the points of a `probe` have no size to integrate over"));
+        if let Some(source @ ("probe" | "streamlines" | "glyphs")) = self.source {
+            let message = format!("what `{source}` takes has no size to integrate over");
+            return Err(Problem::new(message));
         }
         self.measures(name, true)
     }

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::extract::Extract;
 use crate::language::{Command, ErrorBound, Existing, LogLevel, StreamStage};
+use crate::render::Picture;
 
 /// How exactly an extract is sent.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,6 +115,20 @@ pub enum Output {
         level: LogLevel,
         /// The line.
         message: String,
+    },
+    /// Write this picture to a file.
+    Picture {
+        /// The pipeline.
+        pipeline: Arc<str>,
+        /// The file, its pattern filled in: a `.png`, or a `.cdb`, the database that the picture is
+        /// added to. A relative one lies in the run's output directory.
+        path: String,
+        /// The step.
+        cycle: u64,
+        /// The simulated time.
+        time: f64,
+        /// The picture to write.
+        picture: Arc<Picture>,
     },
     /// Tell viewers and reports.
     Monitor(MonitorValues),

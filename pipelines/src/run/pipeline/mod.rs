@@ -1,5 +1,7 @@
 //! One pipeline and its stages.
 
+mod decimate;
+mod draw;
 mod end;
 mod measure;
 mod prepare;
@@ -18,8 +20,8 @@ use super::output::{MonitorValues, Output};
 use super::trigger::Trigger;
 use crate::derive::{Basis, derive, follow, wall_shear_stress, with_derived};
 use crate::extract::{
-    Channel, Extract, ExtractError, Extracted, Field, Input, Kept, Snapshot, Source, merged,
-    unknown_field,
+    Channel, Decimation, Extract, ExtractError, Extracted, Field, Input, Kept, Snapshot, Source,
+    merged, unknown_field,
 };
 use crate::language::{Action, Command, Monitor, Pipeline, Slot, Stage, WallShearStress};
 use prepare::{Names, State, gradient_of};
@@ -46,8 +48,8 @@ pub(super) struct Prepared {
     names_of_actions: Vec<Names>,
     /// The fields to keep, where a `select` stage says so.
     selected: Option<HashSet<String>>,
-    /// The fields that are reduced over the extract.
-    reduced: HashSet<String>,
+    /// The fields that are reduced over the extract or colour it.
+    used: HashSet<String>,
     /// The fields that nobody sees but the stages that need them.
     hidden: HashSet<String>,
     trigger: Trigger,
@@ -56,6 +58,8 @@ pub(super) struct Prepared {
     reported: HashSet<String>,
     /// What the source stage keeps as long as the mesh does not move.
     kept: Kept,
+    /// The same of a stage that leaves fewer triangles.
+    decimation: Option<Arc<Decimation>>,
 }
 
 /// An error and what it is known by from run to run.
@@ -70,8 +74,12 @@ struct Progress<'a> {
     /// The fields that stages have derived.
     derived: Vec<Field>,
     kept: Kept,
+    decimation: Option<Arc<Decimation>>,
     extracted: Option<Extracted>,
-    /// Fields of the extract that are integrated, but not selected.
+    /// What is handed out in place of the extract, on rank 0.
+    decimated: Option<Arc<Extract>>,
+    is_decimated: bool,
+    /// Fields of the extract that are used, but not selected.
     unselected: Vec<Field>,
     /// The values of the monitors so far, the cycle and the time in front.
     values: Vec<f64>,
@@ -155,7 +163,10 @@ impl Prepared {
             communicator,
             derived: Vec::new(),
             kept: std::mem::take(&mut self.kept),
+            decimation: self.decimation.take(),
             extracted: None,
+            decimated: None,
+            is_decimated: false,
             unselected: Vec::new(),
             values,
             board,
@@ -190,6 +201,7 @@ impl Prepared {
             }
         }
         self.kept = std::mem::take(&mut progress.kept);
+        self.decimation = progress.decimation.take();
         self.cost = progress.cost;
         let states: usize = self.states.iter().map(State::bytes).sum();
         self.cost.memory = (self.kept.bytes() + states) as u64;
@@ -205,6 +217,7 @@ impl Prepared {
             Action::Set(parameter) => self.command(Command::Parameter(parameter.clone()), progress),
             Action::Stream(stream) => self.stream(stream, progress),
             Action::Write(write) => self.write(write, progress),
+            Action::Render(render) => self.render(render, progress),
             Action::Csv(_) => {
                 let row = self.row(names, &progress.seen());
                 progress.outputs.extend(row);
@@ -251,7 +264,9 @@ impl Prepared {
             | Stage::Contour(_)
             | Stage::Threshold(_)
             | Stage::Clip(_)
-            | Stage::Probe(_) => self.source(stage, progress),
+            | Stage::Probe(_)
+            | Stage::Streamlines(_)
+            | Stage::Glyphs(_) => self.source(stage, progress),
             Stage::Gradient(_)
             | Stage::Vorticity(_)
             | Stage::Divergence(_)
@@ -270,8 +285,10 @@ impl Prepared {
             Stage::Difference(_) | Stage::TimeStatistics(_) | Stage::Spectrum(_) => {
                 Self::of_monitors(stage, names, state, progress);
             }
+            Stage::Decimate(stage) => self.decimate(stage, progress),
             Stage::Stream(stream) => self.stream(stream, progress),
             Stage::Write(write) => self.write(write, progress),
+            Stage::Render(render) => self.render(render, progress),
             Stage::Csv(_) => {
                 let row = self.row(names, &progress.seen());
                 progress.outputs.extend(row);
@@ -304,7 +321,7 @@ impl Prepared {
         let input = Input {
             channel: &channel,
             cycle: progress.snapshot.cycle,
-            wanted: &|field: &str| self.wants(field) || self.reduced.contains(field),
+            wanted: &|field: &str| self.wants(field) || self.used.contains(field),
             communicator: progress.communicator,
         };
         let (source, kept) = (&mut *progress.source, &mut progress.kept);
@@ -314,6 +331,8 @@ impl Prepared {
             Stage::Threshold(threshold) => source.threshold(&input, threshold),
             Stage::Clip(clip) => source.clip(&input, clip, kept),
             Stage::Probe(probe) => source.probe(&input, probe, kept),
+            Stage::Streamlines(lines) => source.streamlines(&input, lines),
+            Stage::Glyphs(glyphs) => source.glyphs(&input, glyphs),
             _ => source.surface(&channel, input.cycle, input.wanted),
         };
         self.keep(taken, stage.name(), progress);
@@ -405,8 +424,8 @@ impl Prepared {
                         &progress.source.scaled_jacobians(progress.channel),
                     );
                 }
-                let is_aside = |name: &str| self.reduced.contains(name) && !self.wants(name);
-                if self.reduced.iter().any(|field| is_aside(field)) {
+                let is_aside = |name: &str| self.used.contains(name) && !self.wants(name);
+                if self.used.iter().any(|field| is_aside(field)) {
                     let fields = &mut Arc::make_mut(&mut extracted.extract).fields;
                     progress.unselected =
                         fields.extract_if(.., |field| is_aside(&field.name)).collect();
@@ -426,9 +445,8 @@ impl Prepared {
         }
     }
 
-    /// The extract to hand out; the whole mesh where no stage has taken one. Of several ranks rank
-    /// 0 alone has one.
-    fn finished(&self, progress: &mut Progress) -> Option<Arc<Extract>> {
+    /// Takes the whole mesh where no stage takes an extract.
+    fn take_whole(&self, progress: &mut Progress) {
         let has_source = self.pipeline.stages.iter().any(Stage::is_source);
         if progress.extracted.is_none() && !has_source {
             let fields = with_derived(progress.channel, &progress.derived);
@@ -437,6 +455,15 @@ impl Prepared {
             let taken = progress.source.whole(&channel, progress.snapshot.cycle, &wanted);
             self.keep(taken, "mesh", progress);
         }
+    }
+
+    /// The extract to hand out; the whole mesh where no stage has taken one. Of several ranks rank
+    /// 0 alone has one.
+    fn finished(&self, progress: &mut Progress) -> Option<Arc<Extract>> {
+        if progress.is_decimated {
+            return progress.decimated.clone();
+        }
+        self.take_whole(progress);
         let Some(whole) = progress.source.whole_mesh() else {
             return progress.extracted.as_ref().map(|extracted| Arc::clone(&extracted.extract));
         };

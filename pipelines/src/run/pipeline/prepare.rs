@@ -74,10 +74,14 @@ impl Prepared {
             Action::Log(log) => line(log, &scope).map(Names::Line),
             _ => Ok(Names::None),
         });
-        let reduced = stages.iter().flat_map(reduced_fields).map(str::to_owned);
+        let coloured = pipeline.then.iter().filter_map(|action| match action {
+            Action::Render(render) => render.field.as_deref(),
+            _ => None,
+        });
+        let used = stages.iter().flat_map(used_fields).chain(coloured).map(str::to_owned);
         Ok(Self {
             place,
-            reduced: reduced.chain(hidden.iter().cloned()).collect(),
+            used: used.chain(hidden.iter().cloned()).collect(),
             hidden,
             due: Clock::new(pipeline.due),
             thinning: Thinning::new(pipeline.budget),
@@ -93,6 +97,7 @@ impl Prepared {
             monitors: monitors(pipeline).split_off(2),
             reported: HashSet::new(),
             kept: Kept::default(),
+            decimation: None,
             pipeline: pipeline.clone(),
         })
     }
@@ -130,13 +135,14 @@ fn with_gradients(stages: &[Stage]) -> (Vec<Stage>, HashSet<String>) {
     (all, hidden)
 }
 
-/// The fields that a stage reduces, which the extract must have whatever is selected.
-fn reduced_fields(stage: &Stage) -> Vec<&str> {
+/// The fields that a stage reduces or colours by, which the extract must have whatever is selected.
+fn used_fields(stage: &Stage) -> Vec<&str> {
     match stage {
         Stage::Integrate(it) => {
             it.field.as_deref().into_iter().chain(it.vector.as_deref()).collect()
         }
         Stage::Histogram(it) => vec![&it.field],
+        Stage::Render(it) => it.field.as_deref().into_iter().collect(),
         Stage::Force(it) => {
             let viscosity = it.viscosity.as_ref().and_then(Viscosity::field);
             it.pressure.as_deref().into_iter().chain(viscosity).collect()

@@ -1,0 +1,294 @@
+//! Arrows and spheres that show a field.
+
+use std::sync::Arc;
+
+use tombolo_deform::bounds::Bounds;
+use tombolo_deform::communicator::{Communicator, Reduction};
+use tombolo_deform::mesh::{CellType, Cells, Vector};
+use tombolo_deform::number::real;
+use tombolo_deform::vector::{cross, dot, length, scale, subtract};
+
+use super::gather::Rows;
+use super::pattern::{Base, Pattern};
+use super::probe::{Finder, Found};
+use super::source::{Origin, Source};
+use super::{Association, ExtractError};
+use crate::language::{GlyphShape, Glyphs, GlyphsAt, ProbeMethod};
+use crate::limits::GLYPHS;
+
+/// The sides of an arrow.
+const SIDES: usize = 10;
+/// Points around an arrow, as in VTK's: along it and away from its axis.
+const ARROW: [[f64; 2]; 4] = [[0.0, 0.03], [0.65, 0.03], [0.65, 0.1], [1.0, 0.0]];
+/// The rings of a sphere between its poles.
+const RINGS: usize = 7;
+
+/// The glyphs of this rank but for their fields. Collective.
+///
+/// # Errors
+/// [`ExtractError::Seeds`] where there would be more than the limit; the same on all ranks.
+pub(super) fn pattern(
+    source: &Source,
+    communicator: &dyn Communicator,
+    vectors: Option<&[Vector]>,
+    seeds: &[Vector],
+    stage: &Glyphs,
+) -> Result<Pattern, ExtractError> {
+    let bounds = bounds(source, communicator);
+    let places = match &stage.at {
+        GlyphsAt::Spread(count) => spread(source, communicator, &bounds, *count),
+        GlyphsAt::Every(every) => {
+            at_vertices(source, |number| (number as usize).is_multiple_of(*every))
+        }
+        GlyphsAt::Points(_) => at_points(source, communicator, seeds),
+    };
+    GLYPHS
+        .check(communicator.total(places.len()))
+        .map_err(|exceeded| ExtractError::Seeds(exceeded.to_string()))?;
+    let vector = |found: &Found| {
+        let mut sum = [0.0; 3];
+        for &(vertex, weight) in &found.row {
+            let vector = vectors.map_or([1.0, 0.0, 0.0], |all| all[vertex as usize]);
+            (0..3).for_each(|axis| sum[axis] += weight * vector[axis]);
+        }
+        sum
+    };
+    let along: Vec<Vector> = places.iter().map(|(_, found)| vector(found)).collect();
+    let own = along.iter().map(|vector| length(*vector)).filter(|size| size.is_finite());
+    let mut largest = [own.fold(0.0, f64::max)];
+    communicator.reduce(Reduction::Maximum, &mut largest);
+    let size = stage.size.unwrap_or(0.05 * bounds.diagonal());
+    let body = match stage.shape {
+        GlyphShape::Arrow => arrow(),
+        GlyphShape::Sphere => sphere(),
+    };
+    let mut rows = Rows::default();
+    let (mut points, mut owners) = (Vec::new(), Vec::new());
+    let mut cells = Cells::new();
+    for ((place, found), along) in places.into_iter().zip(along) {
+        let magnitude = length(along);
+        // What has no direction has no arrow.
+        if magnitude.is_nan() || magnitude == 0.0 && stage.shape == GlyphShape::Arrow {
+            continue;
+        }
+        let is_scaled = stage.scaled && vectors.is_some() && largest[0] > 0.0;
+        let size = if is_scaled { size * magnitude / largest[0] } else { size };
+        let frame = frame(along);
+        #[expect(clippy::cast_possible_truncation, reason = "a limited number of glyphs")]
+        let first = points.len() as u32;
+        for point in &body.points {
+            points.push([0, 1, 2].map(|axis| {
+                let offset: f64 = (0..3).map(|part| frame[part][axis] * point[part]).sum();
+                place[axis] + size * offset
+            }));
+            rows.push(found.row.iter().copied());
+        }
+        for triangle in &body.triangles {
+            cells.push(CellType::Triangle, &triangle.map(|corner| first + corner))?;
+            owners.push(found.cell);
+        }
+    }
+    Ok(Pattern {
+        points,
+        base: Base::Rows(rows),
+        cells: Arc::new(cells),
+        owners: owners.into(),
+        origin: Origin::Loose,
+    })
+}
+
+fn bounds(source: &Source, communicator: &dyn Communicator) -> Bounds {
+    let [lower, upper] = Bounds::around(source.positions.points.iter().copied()).corners();
+    let mut extremes = [-lower[0], -lower[1], -lower[2], upper[0], upper[1], upper[2]];
+    communicator.reduce(Reduction::Maximum, &mut extremes);
+    let [a, b, c, d, e, f] = extremes;
+    Bounds { lower: [-a, -b, -c], upper: [d, e, f] }
+}
+
+/// A place and the vertices that its values come from.
+type Place = (Vector, Found);
+
+/// The vertices of own cells whose numbers in the whole mesh are wanted.
+fn at_vertices(source: &Source, is_wanted: impl Fn(u32) -> bool) -> Vec<Place> {
+    let points = &source.positions.points;
+    let numbers = source.whole_mesh().map(|whole| whole.shared.numbers());
+    let mut places = Vec::new();
+    let mut is_known = vec![false; points.len()];
+    #[expect(clippy::cast_possible_truncation, reason = "cells are numbered with 32 bits")]
+    for cell in (0..source.cells().len()).filter(|&cell| source.counts(Association::Element, cell))
+    {
+        for &vertex in source.cells().vertices(cell) {
+            let at = vertex as usize;
+            let number = numbers.map_or(vertex, |numbers| numbers[at]);
+            let is_new = !std::mem::replace(&mut is_known[at], true);
+            if is_new && source.counts(Association::Vertex, at) && is_wanted(number) {
+                let row = vec![(vertex, 1.0)];
+                places.push((number, (points[at], Found { cell: cell as u32, row })));
+            }
+        }
+    }
+    places.sort_by_key(|(number, _)| *number);
+    places.into_iter().map(|(_, place)| place).collect()
+}
+
+/// Of all ranks' vertices the nearest to the middle of each of about `count` boxes.
+fn spread(
+    source: &Source,
+    communicator: &dyn Communicator,
+    bounds: &Bounds,
+    count: usize,
+) -> Vec<Place> {
+    let extent = bounds.extent();
+    // Cubes as large as leave about so many boxes; along a side without length there is one.
+    let boxes = |side: f64| extent.map(|length| ((length / side).ceil() as usize).max(1));
+    let all = |side: f64| boxes(side).iter().fold(1_usize, |all, &some| all.saturating_mul(some));
+    let (mut least, mut most) = (0.0, bounds.diagonal().max(f64::MIN_POSITIVE));
+    for _ in 0..60 {
+        let middle = 0.5 * (least + most);
+        if middle > 0.0 && all(middle) <= count { most = middle } else { least = middle }
+    }
+    let counts = boxes(most);
+    let mut own: Vec<Option<Place>> = Vec::new();
+    own.resize_with(counts.iter().product(), || None);
+    let mut nearest = vec![u64::MAX; own.len()];
+    for place in at_vertices(source, |_| true) {
+        let mut index = 0;
+        let mut square = 0.0;
+        for axis in (0..3).rev() {
+            let side = extent[axis] / real(counts[axis]);
+            let from = place.0[axis] - bounds.lower[axis];
+            let at = if side > 0.0 { (from / side).floor() as usize } else { 0 };
+            let at = at.min(counts[axis] - 1);
+            index = index * counts[axis] + at;
+            let aside = from - (real(at) + 0.5) * side;
+            square += aside * aside;
+        }
+        // Numbers above 0 are in the order of their bits.
+        let bits = square.to_bits();
+        if bits < nearest[index] {
+            (nearest[index], own[index]) = (bits, Some(place));
+        }
+    }
+    let mut least = nearest.clone();
+    communicator.reduce_integers(Reduction::Minimum, &mut least);
+    let rank = communicator.rank() as u64;
+    let mut ranks: Vec<u64> = (0..own.len())
+        .map(|index| if nearest[index] == least[index] { rank } else { u64::MAX })
+        .collect();
+    communicator.reduce_integers(Reduction::Minimum, &mut ranks);
+    own.into_iter()
+        .zip(ranks)
+        .filter(|(_, first)| *first == rank)
+        .filter_map(|(it, _)| it)
+        .collect()
+}
+
+/// Of these points those that the lowest rank finds in its cells.
+fn at_points(source: &Source, communicator: &dyn Communicator, seeds: &[Vector]) -> Vec<Place> {
+    let finder = Finder::new(source, ProbeMethod::Interpolated);
+    let rank = communicator.rank() as u64;
+    let found: Vec<Option<Found>> =
+        seeds.iter().map(|&seed| finder.find(seed, &u64::from)).collect();
+    let mut ranks: Vec<u64> =
+        found.iter().map(|found| if found.is_some() { rank } else { u64::MAX }).collect();
+    communicator.reduce_integers(Reduction::Minimum, &mut ranks);
+    let own = seeds.iter().zip(found).zip(ranks).filter(|(_, first)| *first == rank);
+    own.filter_map(|((&seed, found), _)| Some((seed, found?))).collect()
+}
+
+/// Directions along a vector and two across it, of length 1.
+fn frame(along: Vector) -> [Vector; 3] {
+    let size = length(along);
+    let first = if size > 0.0 { scale(along, 1.0 / size) } else { [1.0, 0.0, 0.0] };
+    let sizes = first.map(f64::abs);
+    let shortest =
+        (0..3).fold(0, |least, axis| if sizes[axis] < sizes[least] { axis } else { least });
+    let mut aside = [0.0; 3];
+    aside[shortest] = 1.0;
+    let aside = subtract(aside, scale(first, dot(aside, first)));
+    let second = scale(aside, 1.0 / length(aside));
+    [first, second, cross(first, second)]
+}
+
+/// A body along the first axis, of length 1.
+struct Body {
+    points: Vec<Vector>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Body {
+    /// The surface that a profile makes as it turns about the axis; its first and last points lie
+    /// on the axis. Seen from outside triangles turn counter-clockwise.
+    fn turned(profile: &[[f64; 2]], sides: usize) -> Self {
+        let mut body = Self { points: Vec::new(), triangles: Vec::new() };
+        let mut rings: Vec<Vec<u32>> = Vec::new();
+        for &[along, away] in profile {
+            #[expect(clippy::cast_possible_truncation, reason = "a small body")]
+            let first = body.points.len() as u32;
+            let count = if away == 0.0 { 1 } else { sides };
+            for side in 0..count {
+                let angle = std::f64::consts::TAU * real(side) / real(sides);
+                body.points.push([along, away * angle.cos(), away * angle.sin()]);
+            }
+            #[expect(clippy::cast_possible_truncation, reason = "a small body")]
+            rings.push(
+                (0..sides as u32).map(|side| first + if count > 1 { side } else { 0 }).collect(),
+            );
+        }
+        for pair in rings.windows(2) {
+            for side in 0..sides {
+                let next = (side + 1) % sides;
+                let [a, b, c, d] = [pair[0][side], pair[0][next], pair[1][next], pair[1][side]];
+                if a != b {
+                    body.triangles.push([a, b, c]);
+                }
+                if c != d {
+                    body.triangles.push([a, c, d]);
+                }
+            }
+        }
+        body
+    }
+}
+
+fn arrow() -> Body {
+    let mut profile = vec![[0.0, 0.0]];
+    profile.extend(ARROW);
+    Body::turned(&profile, SIDES)
+}
+
+/// A sphere of diameter 1.
+fn sphere() -> Body {
+    let mut profile = vec![[-0.5, 0.0]];
+    for ring in 1..=RINGS {
+        let angle = std::f64::consts::PI * real(ring) / real(RINGS + 1);
+        profile.push([-0.5 * angle.cos(), 0.5 * angle.sin()]);
+    }
+    profile.push([0.5, 0.0]);
+    Body::turned(&profile, 2 * RINGS)
+}
+
+#[cfg(test)]
+mod tests {
+    use tombolo_deform::vector::determinant;
+
+    use super::*;
+
+    #[test]
+    fn bodies_are_closed_and_turned_outwards() {
+        for (body, volume) in [(arrow(), 0.0052), (sphere(), 0.478)] {
+            let at = |corner: u32| body.points[corner as usize];
+            let sum: f64 = body
+                .triangles
+                .iter()
+                .map(|&[a, b, c]| determinant(at(a), at(b), at(c)) / 6.0)
+                .sum();
+            assert!((sum - volume).abs() < 0.1 * volume, "{sum}");
+            let mut edges: Vec<(u32, u32)> = Vec::new();
+            for &[a, b, c] in &body.triangles {
+                edges.extend([(a, b), (b, c), (c, a)]);
+            }
+            assert!(edges.iter().all(|&(a, b)| edges.contains(&(b, a))));
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! Pictures as PNG files, and Cinema databases of them.
+
+use std::fs::File;
+use std::io::{Read as _, Write as _};
+use std::path::{Path, PathBuf};
+
+use super::error::{FileError, Flaw};
+use super::write_atomically;
+use crate::render::{Image, Picture};
+
+/// Writes a picture to a PNG file of 8 bits a channel.
+///
+/// # Errors
+/// [`FileError`] where the file cannot be written.
+pub fn write_picture(path: impl AsRef<Path>, image: &Image) -> Result<(), FileError> {
+    let path = path.as_ref();
+    let bytes = encode(image).map_err(|error| Flaw::from(error).in_file(path))?;
+    write_atomically(path, |file| file.write_all(&bytes))
+}
+
+/// The picture as the bytes of a PNG file.
+fn encode(image: &Image) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, image.width, image.height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    let mut writer = encoder.write_header().map_err(std::io::Error::other)?;
+    writer.write_image_data(&image.pixels).map_err(std::io::Error::other)?;
+    writer.finish().map_err(std::io::Error::other)?;
+    Ok(bytes)
+}
+
+const TABLE: &str = "data.csv";
+const HEAD: &str = "time,cycle,camera,azimuth,elevation,FILE\n";
+
+/// A Cinema database (specification D): a folder that ends in `.cdb` with pictures and the table
+/// `data.csv`, which says what each of them shows.
+///
+/// Whenever a run is killed, the table is whole, and names only pictures that are there.
+///
+/// ```no_run
+/// # use std::path::Path;
+/// # use tombolo_pipelines::{files::{Database, FileError}, render::Picture};
+/// # fn add(picture: &Picture) -> Result<(), FileError> {
+/// let mut database = Database::create(Path::new("out/nozzle.cdb"))?;
+/// database.push(10, 0.01, picture)?;
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct Database {
+    folder: PathBuf,
+    /// Bytes of the table.
+    length: u64,
+}
+
+impl Database {
+    /// A database without pictures. The table of one that was there is replaced.
+    ///
+    /// # Errors
+    /// [`FileError`] where the table cannot be written.
+    pub fn create(folder: &Path) -> Result<Self, FileError> {
+        write_atomically(&folder.join(TABLE), |file| file.write_all(HEAD.as_bytes()))?;
+        Ok(Self { folder: folder.to_path_buf(), length: HEAD.len() as u64 })
+    }
+
+    /// Writes a picture and adds its row to the table. Of a camera that stands at a point the
+    /// angles are left empty.
+    ///
+    /// # Errors
+    /// [`FileError`] where either cannot be written.
+    pub fn push(&mut self, cycle: u64, time: f64, picture: &Picture) -> Result<(), FileError> {
+        let Picture { camera, angles, image, .. } = picture;
+        let name = format!("{cycle:06}-{camera}.png");
+        write_picture(self.folder.join(&name), image)?;
+        let [azimuth, elevation] =
+            angles.map_or([String::new(), String::new()], |them| them.map(|it| it.to_string()));
+        let row = format!("{time},{cycle},{camera},{azimuth},{elevation},{name}\n");
+        let table = self.folder.join(TABLE);
+        let old = File::open(&table).map_err(|error| Flaw::from(error).in_file(&table))?;
+        write_atomically(&table, |new| {
+            let copied = std::io::copy(&mut old.take(self.length), new)?;
+            if copied < self.length {
+                return Err(std::io::Error::other("the table was cut short by another program"));
+            }
+            new.write_all(row.as_bytes())
+        })?;
+        self.length += row.len() as u64;
+        Ok(())
+    }
+}

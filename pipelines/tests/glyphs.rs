@@ -1,0 +1,110 @@
+//! Arrows and spheres: how many, how large, which way, and over the parts of a mesh.
+
+use std::sync::Arc;
+
+use tombolo_deform::communicator::{Communicator, Solo, threads};
+use tombolo_deform::distributed::Part;
+use tombolo_deform::mesh::{Mesh, Vector};
+use tombolo_deform::shapes::box_of_mixed_cells;
+use tombolo_pipelines::extract::{Channel, Extract, FieldView, Snapshot};
+use tombolo_pipelines::language::parse;
+use tombolo_pipelines::run::{Output, Runner};
+
+fn glyphs(stage: &str, part: &Part, communicator: Arc<dyn Communicator>) -> Option<Arc<Extract>> {
+    let u: Vec<Vector> = part.points.iter().map(|&[x, ..]| [0.0, 1.0 + x, 0.0]).collect();
+    let fields = [FieldView::vertex("u", &u)];
+    let channels = [Channel::new("fluid", part.view(), &fields)];
+    let text = format!(
+        r#"{{"version": 1, "pipelines": [{{"name": "a", "stages": [{{"glyphs": {stage}}}, {{"write": {{"file": "a.vtu"}}}}]}}]}}"#
+    );
+    let config = parse(&text, "test.json").unwrap_or_else(|error| panic!("{error}"));
+    let mut runner = Runner::with_communicator(&config, communicator).unwrap();
+    let outputs = runner.run(&Snapshot { cycle: 0, time: 0.0, channels: &channels });
+    outputs.into_iter().find_map(|output| match output {
+        Output::Write { extract, .. } => Some(extract),
+        other => panic!("{other:?}"),
+    })
+}
+
+fn mesh() -> Mesh {
+    box_of_mixed_cells([6, 4, 4], [0.0; 3], [2.0, 1.0, 1.0])
+}
+
+fn alone(stage: &str) -> Arc<Extract> {
+    let mesh = mesh();
+    let part = Part::cut(&mesh, &vec![0; mesh.cells().len()], 0, false).unwrap();
+    glyphs(stage, &part, Arc::new(Solo)).unwrap()
+}
+
+/// The triangles of an arrow or a sphere that stands at one point.
+fn triangles(shape: &str) -> usize {
+    let stage = format!(r#"{{"shape": "{shape}", "field": "u", "points": [[1, 0.5, 0.5]]}}"#);
+    alone(&stage).cells.len()
+}
+
+#[test]
+fn an_arrow_points_along_its_field_and_is_as_long_as_it_says() {
+    let stage = r#"{"field": "u", "points": [[0.5, 0.2, 0.5], [1.5, 0.2, 0.5]], "size": 0.4}"#;
+    let extract = alone(stage);
+    let values = &extract.fields[0].values;
+    for (at, speed, length) in [(0.5, 1.5, 0.24), (1.5, 2.5, 0.4)] {
+        let ends = extract
+            .points
+            .iter()
+            .zip(values.chunks(3))
+            .filter(|(point, _)| (point[0] - at).abs() < 0.1);
+        let mut bounds = [f64::INFINITY, f64::NEG_INFINITY];
+        for (point, value) in ends {
+            bounds = [bounds[0].min(point[1]), bounds[1].max(point[1])];
+            assert!((value[1] - speed).abs() < 1e-12 && value[0] == 0.0);
+        }
+        assert!((bounds[0] - 0.2).abs() < 1e-12 && (bounds[1] - 0.2 - length).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn there_are_as_many_as_were_asked_for() {
+    let arrow = triangles("arrow");
+    let sphere = triangles("sphere");
+    let vertices = mesh().points().len();
+    assert_eq!(alone(r#"{"field": "u", "every": 1}"#).cells.len(), vertices * arrow);
+    let tenth = vertices.div_ceil(10);
+    assert_eq!(alone(r#"{"field": "u", "every": 10}"#).cells.len(), tenth * arrow);
+    let spread =
+        alone(r#"{"shape": "sphere", "field": "u", "count": 40, "scaled": false, "size": 0.01}"#);
+    let count = spread.cells.len() / sphere;
+    assert!((16..=40).contains(&count), "{count}");
+    // They stand on both sides of each middle.
+    for axis in 0..3 {
+        let middle = if axis == 0 { 1.0 } else { 0.5 };
+        let below = spread.points.iter().filter(|point| point[axis] < middle).count();
+        let part = below as f64 / spread.points.len() as f64;
+        assert!((0.25..0.75).contains(&part), "{axis}: {part}");
+    }
+}
+
+#[test]
+fn ranks_make_those_that_one_process_makes() {
+    let mesh = mesh();
+    let count = mesh.cells().len();
+    let of_cells: Vec<usize> = (0..count).map(|cell| cell * 7 / count % 3).collect();
+    for stage in [
+        r#"{"field": "u", "every": 3}"#,
+        r#"{"field": "u", "count": 50}"#,
+        r#"{"shape": "sphere", "grid": {"lower": [0, 0, 0], "upper": [2, 1, 1], "counts": [5, 4, 3]}}"#,
+    ] {
+        let whole = alone(stage);
+        let by_ranks = threads::run(3, |ranks| {
+            let part = Part::cut(&mesh, &of_cells, ranks.rank(), true).unwrap();
+            glyphs(stage, &part, Arc::new(ranks))
+        });
+        let extract = by_ranks[0].as_ref().unwrap();
+        let sorted = |extract: &Extract| {
+            let round = |point: &Vector| point.map(|x| (x * 1e9).round() as i64);
+            let mut points: Vec<[i64; 3]> = extract.points.iter().map(round).collect();
+            points.sort_unstable();
+            (points, extract.cells.len())
+        };
+        assert!(sorted(extract) == sorted(&whole), "{stage}");
+    }
+}
