@@ -9,12 +9,11 @@ use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap, HashMap};
 use std::sync::Arc;
 
-use tombolo_deform::bounds::Bounds;
+use tombolo_deform::bounds::{Bounds, BoxTree};
 use tombolo_deform::mesh::{CellType, Cells, MeshError, Vector};
 use tombolo_deform::number::real;
 use tombolo_deform::vector::{cross, dot, length, scale, subtract};
 
-use super::tree::Tree;
 use super::{Association, Extract, ExtractFeatures, Field};
 use crate::language::Decimate;
 
@@ -390,7 +389,7 @@ fn largest_distance(gone: &[u32], points: &[Vector], triangles: &[[Vector; 3]]) 
     if triangles.is_empty() || diagonal <= 0.0 {
         return 0.0;
     }
-    let tree = Tree::new(boxes);
+    let tree = BoxTree::new(&boxes);
     let mut largest = 0.0_f64;
     for &point in gone {
         let point = points[point as usize];
@@ -398,7 +397,7 @@ fn largest_distance(gone: &[u32], points: &[Vector], triangles: &[[Vector; 3]]) 
         let mut reach = largest.max(1e-6 * diagonal);
         loop {
             let mut nearest = f64::INFINITY;
-            tree.at(point, reach, |index| {
+            tree.around(point, reach, |index| {
                 nearest = nearest.min(distance(point, triangles[index as usize]));
             });
             if nearest <= reach || reach > 2.0 * diagonal {
