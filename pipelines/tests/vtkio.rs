@@ -110,11 +110,14 @@ fn meshes_go_to_the_model_and_back() {
     assert_eq!(again, extract);
 }
 
+/// Makes a piece one that holds no mesh.
+type Change = fn(&mut UnstructuredGridPiece);
+
 /// What is no mesh is refused by name, whatever the model says.
 #[test]
 fn models_that_hold_no_mesh_are_refused() {
     let model = mesh_to_vtkio(&mesh(), &[]).unwrap();
-    let changed = |change: &dyn Fn(&mut UnstructuredGridPiece)| {
+    let changed = |change: Change| {
         let mut model = model.clone();
         if let DataSet::UnstructuredGrid { pieces, .. } = &mut model.data
             && let [Piece::Inline(piece)] = pieces.as_mut_slice()
@@ -123,13 +126,13 @@ fn models_that_hold_no_mesh_are_refused() {
         }
         (mesh_from_vtkio(&model).unwrap_err().to_string(), extract_from_vtkio(&model).is_err())
     };
-    let cases: [(&str, &dyn Fn(&mut UnstructuredGridPiece)); 6] = [
-        ("point coordinates", &|piece| piece.points = vec![0.0_f64; 4].into()),
-        ("vertex", &|piece| piece.points = vec![0.0_f64; 6].into()),
-        ("cells with vertices", &|piece| piece.cells.types.truncate(2)),
-        ("polyhedron", &|piece| piece.cells.types[0] = vtkio::model::CellType::Polyhedron),
-        ("quadratic", &|piece| piece.cells.types[0] = vtkio::model::CellType::QuadraticTetra),
-        ("values of array 'p'", &|piece| {
+    let cases: [(&str, Change); 6] = [
+        ("point coordinates", |piece| piece.points = vec![0.0_f64; 4].into()),
+        ("vertex", |piece| piece.points = vec![0.0_f64; 6].into()),
+        ("cells with vertices", |piece| piece.cells.types.truncate(2)),
+        ("polyhedron", |piece| piece.cells.types[0] = vtkio::model::CellType::Polyhedron),
+        ("quadratic", |piece| piece.cells.types[0] = vtkio::model::CellType::QuadraticTetra),
+        ("values of array 'p'", |piece| {
             piece.data.point = vec![vtkio::model::Attribute::generic("p", 1).with_data(vec![1.0])];
         }),
     ];
