@@ -20,10 +20,10 @@ fn glyphs(stage: &str, part: &Part, communicator: Arc<dyn Communicator>) -> Opti
     let config = parse(&text, "test.json").unwrap_or_else(|error| panic!("{error}"));
     let mut runner = Runner::with_communicator(&config, communicator).unwrap();
     let outputs = runner.run(&Snapshot { cycle: 0, time: 0.0, channels: &channels });
-    outputs.into_iter().find_map(|output| match output {
+    match outputs.into_iter().next()? {
         Output::Write { extract, .. } => Some(extract),
         other => panic!("{other:?}"),
-    })
+    }
 }
 
 fn mesh() -> Mesh {
