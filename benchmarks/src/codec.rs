@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use tombolo::deform::mesh::{CellType, Cells, NumberType};
 use tombolo::pipelines::codec::{Bound, Coded, Field, Topology};
-use tombolo::pipelines::encode::{Encoder, encode};
+use tombolo::pipelines::encode::{Decoded, decode, encode};
 use tombolo::pipelines::extract::{Association, Extract, Field as Values};
 use tombolo::pipelines::language::ErrorBound;
 use tombolo::pipelines::run::{Encoding, Frame};
@@ -236,18 +236,20 @@ fn protocol(
         values: values.to_vec(),
     }]);
     let without = encode(&frame(Vec::new()))?.data.len();
-    let mut encoder = Encoder::new();
-    let bytes = encoder.encode(&with)?.data.len() - without;
-    let bits = 8.0 * bytes as f64 / values.len() as f64;
+    let data = encode(&with)?.data;
+    let Decoded::Data(decoded) = decode(&data)? else { return Err("a frame holds data".into()) };
+    let decoded = &decoded.fields.first().ok_or("a frame holds its field")?.values;
+    let pairs = decoded.iter().zip(values);
+    let off = pairs.map(|(value, sent)| (value - sent).abs()).fold(0.0, f64::max);
     Ok(Row {
         name: name.into(),
         bound: part,
         method: "protocol".into(),
         is_temporal: false,
-        bits,
+        bits: 8.0 * (data.len() - without) as f64 / values.len() as f64,
         speed: 0.0,
         decoding: 0.0,
-        error: 1.0,
+        error: off / (part * widest(values, components)),
     })
 }
 
