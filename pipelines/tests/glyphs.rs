@@ -20,10 +20,11 @@ fn glyphs(stage: &str, part: &Part, communicator: Arc<dyn Communicator>) -> Opti
     let config = parse(&text, "test.json").unwrap_or_else(|error| panic!("{error}"));
     let mut runner = Runner::with_communicator(&config, communicator).unwrap();
     let outputs = runner.run(&Snapshot { cycle: 0, time: 0.0, channels: &channels });
-    match outputs.into_iter().next()? {
-        Output::Write { extract, .. } => Some(extract),
+    let taken = outputs.into_iter().map(|output| match output {
+        Output::Write { extract, .. } => extract,
         other => panic!("{other:?}"),
-    }
+    });
+    taken.last()
 }
 
 fn mesh() -> Mesh {
