@@ -206,25 +206,6 @@ fn one_and_three_ranks_draw_the_same_bits() {
     }
 }
 
-#[test]
-fn ghosts_are_not_drawn() {
-    let scenes = SCENES.replace("RENDER", r#""width": 300, "height": 200, "samples": 1"#);
-    let mesh = box_of_tets([5, 4, 4], [0.0; 3], [2.0, 1.0, 1.0]);
-    let of_cells: Vec<usize> =
-        (0..mesh.cells().len()).map(|cell| cell * 2 / mesh.cells().len()).collect();
-    let [with, without] = [true, false].map(|ghosts| {
-        let part = Part::cut(&mesh, &of_cells, 0, ghosts).unwrap();
-        made(&scenes, &part, Arc::new(Solo)).pictures
-    });
-    for name in
-        ["surface.png", "edges-0.png", "plane.png", "threshold.png", "clip.png", "whole.png"]
-    {
-        assert!(with[name].image == without[name].image, "{name}");
-        let blank = with[name].image.pixels.chunks(3).filter(|pixel| **pixel == [255; 3]).count();
-        assert!(blank < 55_000, "{name}: {blank}");
-    }
-}
-
 /// The mesh with its vertices moved, so that few things lie where they are expected.
 fn bent(mesh: &Mesh) -> Mesh {
     let bend = |&[x, y, z]: &Vector| [x + 0.1 * y * z, y + 0.07 * x * x, z + 0.05 * (x - y)];
