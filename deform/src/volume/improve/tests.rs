@@ -78,21 +78,20 @@ fn good_and_broken_meshes_stay_as_they_are() {
     }
 }
 
-/// Sheared evenly, all cells have lost as much as they must.
+/// Where the shear has worn all cells alike, what lifts some costs others as much.
 #[test]
 fn what_gains_nothing_stays_as_it_was_solved() {
-    for mesh in meshes() {
-        let boundary = boundary(&mesh);
-        let sheared: Vec<Vector> =
-            mesh.points().iter().map(|&[x, y, z]| [x + 0.1 * z, y, z]).collect();
-        let (least, _) = spread(&mesh, &sheared);
-        assert!(least > ENOUGH && least < GOOD, "{least}");
-        let mut points = sheared.clone();
-        assert!(!Improver::new(&mesh, &boundary).improve(&mut points, 10));
-        assert_eq!(points, sheared);
-        assert!(Improver::new(&mesh, &boundary).lifting_to(GOOD).improve(&mut points, 10));
-        assert_ne!(points, sheared);
-    }
+    let mesh = shapes::box_of_tets([9, 9, 9], [0.0; 3], [1.0; 3]);
+    let boundary = boundary(&mesh);
+    let sheared: Vec<Vector> =
+        mesh.points().iter().map(|&[x, y, z]| [x + 0.08 * z * z, y, z]).collect();
+    let (least, _) = spread(&mesh, &sheared);
+    assert!(least > ENOUGH && least < GOOD, "{least}");
+    let mut points = sheared.clone();
+    assert!(!Improver::new(&mesh, &boundary).improve(&mut points, 10));
+    assert_eq!(points, sheared);
+    assert!(Improver::new(&mesh, &boundary).lifting_to(GOOD).improve(&mut points, 10));
+    assert_ne!(points, sheared);
 }
 
 /// Whatever has been gained for good, further sweeps would change by rounding alone.
