@@ -341,7 +341,7 @@ fn a_stage_that_means_nothing_is_refused() {
         ),
         (
             r#"{"probe": {"points": [[0, 0, 0]]}}, {"integrate": {"name": "a"}}"#,
-            "have no size to integrate over",
+            "what `probe` takes has no size to integrate over",
         ),
     ] {
         let text =

@@ -137,8 +137,9 @@ fn unknown_extension(found: &str, expected: &'static str) -> Flaw {
 /// cells stand in VTK's order of kinds: vertices, lines, polygons, strips.
 ///
 /// # Errors
-/// [`FileError`] for another extension, for volume cells in a `.vtp`, for fields whose length is
-/// not that of the mesh, and where the file cannot be written.
+/// [`FileError`] for another extension, for volume cells in a `.vtp`, for prisms of five or six
+/// sides in a `.vtk`, for fields whose length is not that of the mesh, and where the file cannot be
+/// written.
 pub fn write(path: impl AsRef<Path>, extract: &Extract) -> Result<(), FileError> {
     write_compressed(path, extract, Compression::None)
 }

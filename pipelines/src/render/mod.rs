@@ -1,9 +1,9 @@
 //! Pictures of extracts, drawn without a graphics card or a display.
 //!
 //! Each rank draws the faces, lines and points that it has, and of what several have drawn at a
-//! place the nearest stays ([`raster`]). A picture is the same to the last bit on every machine and
-//! on any number of ranks: what is drawn is rounded first ([`lattice`]), and only operations are
-//! used whose rounding is fixed ([`angle`]).
+//! place the nearest stays (`raster`). A picture is the same to the last bit on every machine and
+//! on any number of ranks: what is drawn is rounded first (`lattice`), and only operations are
+//! used whose rounding is fixed (`angle`).
 
 mod angle;
 mod annotate;

@@ -13,8 +13,8 @@ static SOUND: LazyLock<Vec<(&str, Vec<u8>)>> = LazyLock::new(|| {
     let mut files: Vec<(&str, Vec<u8>)> =
         super::gmsh_files::all_forms().into_iter().map(|(_, bytes)| ("a.msh", bytes)).collect();
     for compression in [Compression::None, Compression::Zlib] {
-        let volume = one_of_each(3);
         for (name, format) in [("a.vtu", Format::Unstructured), ("a.vtk", Format::Legacy)] {
+            let volume = one_of_each_for(name, 3);
             let bytes = vtk::from_mesh(&volume, &fields(&volume), format, compression).unwrap();
             files.push((name, bytes));
         }

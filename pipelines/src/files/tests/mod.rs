@@ -16,10 +16,24 @@ use crate::extract::{Association, Extract, ExtractFeatures, Field};
 /// One cell of each type of a dimension, none sharing a vertex, at coordinates that no short
 /// decimal gives exactly.
 fn one_of_each(dimension: usize) -> Mesh {
+    one_of_some(dimension, |_| true)
+}
+
+/// One cell of each type of a dimension that legacy files can be written with: vtkio has no type
+/// for prisms of five and six sides.
+fn one_of_each_for(file: &str, dimension: usize) -> Mesh {
+    one_of_some(dimension, |cell_type| {
+        let is_prism = matches!(cell_type, CellType::PentagonalPrism | CellType::HexagonalPrism);
+        !file.ends_with(".vtk") || !is_prism
+    })
+}
+
+fn one_of_some(dimension: usize, is_chosen: impl Fn(CellType) -> bool) -> Mesh {
     let mut points: Vec<Vector> = Vec::new();
     let mut cells = Cells::new();
-    for cell_type in
-        CellType::ALL.into_iter().filter(|cell_type| cell_type.dimension() == dimension)
+    for cell_type in CellType::ALL
+        .into_iter()
+        .filter(|&cell_type| cell_type.dimension() == dimension && is_chosen(cell_type))
     {
         let first = points.len() as u32;
         let count = cell_type.vertex_count().unwrap_or(5) as u32;
