@@ -29,6 +29,7 @@ class Errors:
 
 def read(path):
     reader = {
+        ".vtk": vtk.vtkUnstructuredGridReader,
         ".vtp": vtk.vtkXMLPolyDataReader,
         ".pvtp": vtk.vtkXMLPPolyDataReader,
         ".pvtu": vtk.vtkXMLPUnstructuredGridReader,

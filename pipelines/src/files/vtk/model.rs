@@ -56,8 +56,8 @@ impl Grid<'_> {
         // vtkio's grids have no field data; the format has them behind the line of the grid's kind.
         file.data = vtk::DataSet::Field { name: "FieldData".into(), data_array: of_mesh };
         let fields = legacy_bytes(file)?;
-        let (head, grid) = bytes.split_at(end_of_line(&bytes, 4));
-        Ok([head, &fields[end_of_line(&fields, 3)..], b"\n", grid].concat())
+        let (head, grid) = bytes.split_at(end_of_line(&bytes, b"DATASET"));
+        Ok([head, &fields[start_of(&fields, b"FIELD")..], b"\n", grid].concat())
     }
 
     fn field_data(&self) -> Result<Vec<vtk::FieldArray>, Problem> {
@@ -80,10 +80,16 @@ fn legacy_bytes(file: vtk::Vtk) -> Result<Vec<u8>, Problem> {
     Ok(bytes)
 }
 
-/// The number of bytes of the first lines, their ends included.
-fn end_of_line(bytes: &[u8], lines: usize) -> usize {
-    let ends = bytes.iter().enumerate().filter(|(_, byte)| **byte == b'\n');
-    ends.map(|(end, _)| end + 1).nth(lines - 1).unwrap_or(bytes.len())
+/// Where a word of the file's head first stands; its end where there is none.
+fn start_of(bytes: &[u8], word: &[u8]) -> usize {
+    bytes.windows(word.len()).position(|window| window == word).unwrap_or(bytes.len())
+}
+
+/// Where the line behind that with the word begins.
+fn end_of_line(bytes: &[u8], word: &[u8]) -> usize {
+    let start = start_of(bytes, word);
+    let rest = bytes[start..].iter().position(|&byte| byte == b'\n');
+    rest.map_or(bytes.len(), |end| start + end + 1)
 }
 
 fn as_one_field(attributes: Vec<vtk::Attribute>) -> Vec<vtk::Attribute> {
