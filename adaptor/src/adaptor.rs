@@ -276,8 +276,8 @@ impl Adaptor {
                 let is_calm = self.is_calm(moment, called);
                 let moved = !is_calm && self.act(step, moment, called, channels)?;
                 if self.pipelines.listens() {
-                    // What is due by the clock is so from the next step on: then it is known before
-                    // the step begins, on all ranks.
+                    // All ranks must know before a step begins whether a pipeline is due. The clock
+                    // therefore counts from the next step on.
                     self.pipelines.tell(outside);
                 }
                 moved

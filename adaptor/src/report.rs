@@ -27,16 +27,16 @@ pub struct Report {
     pub adaptor_seconds: BTreeMap<&'static str, Spread>,
     /// The frames and bytes that were streamed.
     pub stream: StreamCounts,
-    /// What each pipeline has cost and measured.
+    /// The cost and the monitors of each pipeline.
     pub pipelines: Vec<PipelineReport>,
 }
 
-/// What a pipeline has cost and measured.
+/// The cost of a pipeline and its monitors, over the whole run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PipelineReport {
     /// Its name.
     pub name: String,
-    /// How often it ran.
+    /// The number of its runs.
     pub runs: u64,
     /// Seconds inside its stages, on this rank.
     pub seconds: f64,
@@ -44,24 +44,25 @@ pub struct PipelineReport {
     pub bytes: u64,
     /// Bytes that it kept from run to run.
     pub memory: u64,
-    /// It ran at each so manieth of its times in the end: 1, or more where it exceeded its budget.
+    /// The pipeline ran at one in so many of its due times when the run ended: 1, or more where
+    /// it exceeded its budget.
     pub every: u32,
     /// Its monitors.
     pub monitors: Vec<MonitorReport>,
 }
 
-/// What a monitor has measured.
+/// The last, least and largest value of a monitor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MonitorReport {
     /// Its name.
     pub name: String,
     /// Its unit, where one is given.
     pub unit: Option<String>,
-    /// The value that was measured last; `None` where there is none, or it is not finite.
+    /// The last value; `None` where nothing was measured, or the value is not finite.
     pub last: Option<f64>,
-    /// The least of those that are kept.
+    /// The least of the values that the history keeps.
     pub min: Option<f64>,
-    /// The largest of those that are kept.
+    /// The largest of the values that the history keeps.
     pub max: Option<f64>,
 }
 

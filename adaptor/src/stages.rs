@@ -134,7 +134,7 @@ impl Pipelines {
         self.runner.tell(outside.seconds, outside.viewers);
     }
 
-    /// What the pipelines have cost and measured.
+    /// The cost and the monitors of each pipeline.
     pub(crate) fn reports(&self) -> Vec<PipelineReport> {
         let report = |(name, cost): (&str, Cost)| {
             let history = self.runner.history(name);

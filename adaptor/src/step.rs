@@ -19,7 +19,7 @@ impl Step {
     }
 }
 
-/// What goes on outside the solver, as rank 0 knows it.
+/// The clock and the viewers of a run, as rank 0 knows them.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Outside {
     /// Seconds since the run began.

@@ -2,10 +2,10 @@
 
 use crate::language::Budget;
 
-/// What a pipeline has cost so far.
+/// The cost of a pipeline so far.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Cost {
-    /// How often it ran.
+    /// The number of its runs.
     pub runs: u64,
     /// Seconds inside its stages, on this rank; what other threads encode and write is not in it.
     pub seconds: f64,
@@ -16,7 +16,7 @@ pub struct Cost {
     /// Bytes that it keeps from run to run: cuts of a mesh that stands still, histories, windows of
     /// time.
     pub memory: u64,
-    /// It runs at each so manieth of its times: 1, or more where it has a budget and exceeds it.
+    /// The pipeline runs at one in so many of its due times: 1, or more where it exceeds its budget.
     pub every: u32,
 }
 
