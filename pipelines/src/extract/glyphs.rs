@@ -105,11 +105,11 @@ fn bounds(source: &Source, communicator: &dyn Communicator) -> Bounds {
     Bounds { lower: [-a, -b, -c], upper: [d, e, f] }
 }
 
-/// A place and the vertices that its values come from.
-type Place = (Vector, Found);
+/// A point and the vertices that its values come from.
+type Sampled = (Vector, Found);
 
 /// The vertices of own cells whose numbers in the whole mesh are wanted.
-fn at_vertices(source: &Source, is_wanted: impl Fn(u32) -> bool) -> Vec<Place> {
+fn at_vertices(source: &Source, is_wanted: impl Fn(u32) -> bool) -> Vec<Sampled> {
     let points = &source.positions.points;
     let numbers = source.whole_mesh().map(|whole| whole.shared.numbers());
     let mut places = Vec::new();
@@ -137,7 +137,7 @@ fn spread(
     communicator: &dyn Communicator,
     bounds: &Bounds,
     count: usize,
-) -> Vec<Place> {
+) -> Vec<Sampled> {
     let extent = bounds.extent();
     // Cubes as large as leave about so many boxes; along a side without length there is one.
     let boxes = |side: f64| extent.map(|length| ((length / side).ceil() as usize).max(1));
@@ -148,7 +148,7 @@ fn spread(
         if middle > 0.0 && all(middle) <= count { most = middle } else { least = middle }
     }
     let counts = boxes(most);
-    let mut own: Vec<Option<Place>> = Vec::new();
+    let mut own: Vec<Option<Sampled>> = Vec::new();
     own.resize_with(counts.iter().product(), || None);
     let mut nearest = vec![u64::MAX; own.len()];
     for place in at_vertices(source, |_| true) {
@@ -184,7 +184,7 @@ fn spread(
 }
 
 /// Of these points those that the lowest rank finds in its cells.
-fn at_points(source: &Source, communicator: &dyn Communicator, seeds: &[Vector]) -> Vec<Place> {
+fn at_points(source: &Source, communicator: &dyn Communicator, seeds: &[Vector]) -> Vec<Sampled> {
     let finder = Finder::new(source, ProbeMethod::Interpolated);
     let rank = communicator.rank() as u64;
     let found: Vec<Option<Found>> =

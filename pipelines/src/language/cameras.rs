@@ -17,7 +17,7 @@ pub struct Camera {
     /// Its name; without one, its number from 0.
     pub name: Option<String>,
     /// Where it stands.
-    pub place: Place,
+    pub viewpoint: Viewpoint,
     /// The direction that is up in the picture.
     pub up: Vector,
     /// Whether it sees along parallel rays.
@@ -30,7 +30,7 @@ pub struct Camera {
 
 /// Where a camera stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Place {
+pub enum Viewpoint {
     /// At a point.
     At {
         /// The point.
@@ -102,8 +102,8 @@ impl Camera {
     /// One that sees all of an extract from a direction, z being up.
     #[must_use]
     pub fn around(azimuth: f64, elevation: f64) -> Self {
-        let place = Place::Around { azimuth, elevation, bounds: None };
-        Self { name: None, place, up: upwards(), parallel: false, angle: angle(), zoom: one() }
+        let viewpoint = Viewpoint::Around { azimuth, elevation, bounds: None };
+        Self { name: None, viewpoint, up: upwards(), parallel: false, angle: angle(), zoom: one() }
     }
 }
 
@@ -112,31 +112,32 @@ impl TryFrom<CameraKeys> for Camera {
 
     fn try_from(keys: CameraKeys) -> Result<Self, String> {
         let CameraKeys { name, up, parallel, angle, zoom, elevation, bounds, .. } = keys;
-        let place = match (keys.position, keys.focal_point, keys.azimuth) {
+        let viewpoint = match (keys.position, keys.focal_point, keys.azimuth) {
             (Some(position), Some(focal_point), None) => {
                 if elevation.is_some() || bounds.is_some() {
                     return Err("found `elevation` or `bounds`, which go with `azimuth`".into());
                 }
-                Place::At { position, focal_point }
+                Viewpoint::At { position, focal_point }
             }
             (Some(_), None, None) => return Err("the key `focal_point` is missing".into()),
             (None, Some(_), None) => return Err("the key `position` is missing".into()),
             (None, None, Some(azimuth)) => {
-                Place::Around { azimuth, elevation: elevation.unwrap_or(0.0), bounds }
+                Viewpoint::Around { azimuth, elevation: elevation.unwrap_or(0.0), bounds }
             }
             (None, None, None) => {
                 return Err(
-                    "found no place, expected `position` with `focal_point`, or `azimuth`".into()
+                    "found no viewpoint, expected `position` with `focal_point`, or `azimuth`"
+                        .into(),
                 );
             }
             _ => return Err("found `azimuth` and `position` or `focal_point`".into()),
         };
-        Ok(Self { name, place, up, parallel, angle, zoom })
+        Ok(Self { name, viewpoint, up, parallel, angle, zoom })
     }
 }
 
 impl From<Camera> for CameraKeys {
-    fn from(Camera { name, place, up, parallel, angle, zoom }: Camera) -> Self {
+    fn from(Camera { name, viewpoint, up, parallel, angle, zoom }: Camera) -> Self {
         let keys = Self {
             name,
             position: None,
@@ -149,11 +150,11 @@ impl From<Camera> for CameraKeys {
             angle,
             zoom,
         };
-        match place {
-            Place::At { position, focal_point } => {
+        match viewpoint {
+            Viewpoint::At { position, focal_point } => {
                 Self { position: Some(position), focal_point: Some(focal_point), ..keys }
             }
-            Place::Around { azimuth, elevation, bounds } => {
+            Viewpoint::Around { azimuth, elevation, bounds } => {
                 Self { azimuth: Some(azimuth), elevation: Some(elevation), bounds, ..keys }
             }
         }
@@ -191,8 +192,8 @@ impl Camera {
             return Err(Problem::new(message).within("name"));
         }
         check_direction(self.up, "up")?;
-        match self.place {
-            Place::At { position, focal_point } => {
+        match self.viewpoint {
+            Viewpoint::At { position, focal_point } => {
                 check_point(position, "position")?;
                 check_point(focal_point, "focal_point")?;
                 if position == focal_point {
@@ -200,7 +201,7 @@ impl Camera {
                     return Err(Problem::new(message).within("focal_point"));
                 }
             }
-            Place::Around { azimuth, elevation, bounds } => {
+            Viewpoint::Around { azimuth, elevation, bounds } => {
                 finite(azimuth).map_err(|problem| problem.within("azimuth"))?;
                 check_between(elevation, [-90.0, 90.0], "elevation")?;
                 if let Some(BoxRegion { lower, upper }) = bounds {

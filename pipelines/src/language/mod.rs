@@ -43,7 +43,7 @@ mod timed;
 mod tree;
 mod validate;
 
-pub use cameras::{Camera, Orbit, Place};
+pub use cameras::{Camera, Orbit, Viewpoint};
 pub use configuration::{Config, Steering, StreamServer};
 pub(crate) use derived::GIVEN;
 pub use derived::{Derived, Formula};

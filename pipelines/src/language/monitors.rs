@@ -116,7 +116,7 @@ pub(crate) fn monitors_of(stage: &Stage, has_faces: bool) -> Vec<Monitor> {
 pub(crate) enum Slot {
     /// Among the values of the pipeline itself.
     Own(usize),
-    /// Among those of another pipeline, by its place in the configuration.
+    /// Among those of another pipeline, by its index in the configuration.
     Other { pipeline: usize, monitor: usize },
     /// Among the solver's parameters.
     Parameter(String),
@@ -128,7 +128,7 @@ const PARAMETER: &str = "parameter.";
 /// The names that a pipeline may use.
 pub(crate) struct Scope {
     own: Vec<Monitor>,
-    /// Those of other pipelines, by their places.
+    /// Those of other pipelines, by their indices.
     others: Vec<(usize, String, Vec<Monitor>)>,
 }
 
@@ -136,7 +136,7 @@ impl Scope {
     pub(crate) fn of(pipelines: &[Pipeline], index: usize) -> Self {
         let others = pipelines.iter().enumerate().filter(|(other, _)| *other != index);
         let other =
-            |(place, other): (usize, &Pipeline)| (place, other.name.clone(), monitors(other));
+            |(index, other): (usize, &Pipeline)| (index, other.name.clone(), monitors(other));
         Self { own: monitors(&pipelines[index]), others: others.map(other).collect() }
     }
 
@@ -145,7 +145,7 @@ impl Scope {
         &self.own
     }
 
-    /// The monitors of other pipelines but `cycle` and `time`, with their places and with the names
+    /// The monitors of other pipelines but `cycle` and `time`, with their indices and with the names
     /// by which any of them may be called.
     fn of_others(&self) -> impl Iterator<Item = (Slot, &str, &Monitor)> {
         self.others.iter().flat_map(|(pipeline, name, monitors)| {
@@ -196,12 +196,12 @@ impl Scope {
         }
     }
 
-    /// The monitor at a place, with the name by which it was called.
+    /// The monitor at an index, with the name by which it was called.
     pub(crate) fn monitor(&self, name: &str, slot: &Slot) -> Monitor {
         let monitor = match slot {
             Slot::Own(index) => self.own.get(*index),
             Slot::Other { pipeline, monitor } => {
-                let other = self.others.iter().find(|(place, ..)| place == pipeline);
+                let other = self.others.iter().find(|(index, ..)| index == pipeline);
                 other.and_then(|(_, _, monitors)| monitors.get(*monitor))
             }
             Slot::Parameter(_) => None,

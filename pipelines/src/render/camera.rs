@@ -6,7 +6,7 @@ use tombolo_deform::mesh::Vector;
 use tombolo_deform::vector::{cross, dot, length, scale, subtract};
 
 use super::angle::sine_and_cosine;
-use crate::language::{Camera, Place};
+use crate::language::{Camera, Viewpoint};
 
 /// The part of a picture that a fitted scene fills, in pixels from the top left.
 #[derive(Debug, Clone, Copy)]
@@ -68,8 +68,8 @@ impl View {
             near: 0.0,
             far: 1.0,
         };
-        match camera.place {
-            Place::At { position, focal_point } => {
+        match camera.viewpoint {
+            Viewpoint::At { position, focal_point } => {
                 view.eye = position;
                 let per_pixel = if camera.parallel {
                     length(subtract(focal_point, position)) * tangent
@@ -78,7 +78,7 @@ impl View {
                 };
                 view.scale = camera.zoom * size[1] / 2.0 / per_pixel;
             }
-            Place::Around { bounds: fixed, .. } => {
+            Viewpoint::Around { bounds: fixed, .. } => {
                 let of_box = |it: BoxRegion| Bounds { lower: it.lower, upper: it.upper };
                 view.fit(&fixed.map_or(*bounds, of_box), viewport, tangent, size[1]);
                 view.scale *= camera.zoom;
@@ -184,14 +184,14 @@ fn directions(camera: &Camera) -> (Vector, Vector) {
     let sum = |parts: [(Vector, f64); 3]| -> Vector {
         std::array::from_fn(|axis| parts.iter().map(|(part, by)| part[axis] * by).sum())
     };
-    match camera.place {
-        Place::At { position, focal_point } => {
+    match camera.viewpoint {
+        Viewpoint::At { position, focal_point } => {
             let away = normalized(subtract(focal_point, position));
             // Along the direction up there is none in the picture: any will do.
             let is_lost = length(cross(away, upwards)) < 1e-9;
             (away, if is_lost { ahead } else { upwards })
         }
-        Place::Around { azimuth, elevation, .. } => {
+        Viewpoint::Around { azimuth, elevation, .. } => {
             let (sine, cosine) = sine_and_cosine(azimuth);
             let (height, horizontal) = sine_and_cosine(elevation);
             let away = sum([

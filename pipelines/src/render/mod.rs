@@ -23,7 +23,7 @@ use tombolo_deform::mesh::Vector;
 use tombolo_deform::vector::dot;
 
 use crate::extract::{Field, Shown};
-use crate::language::{Camera, Color, Component, Place, Render, Shading, picture_pattern};
+use crate::language::{Camera, Color, Component, Render, Shading, Viewpoint, picture_pattern};
 use annotate::Annotation;
 use camera::View;
 use colour::Palette;
@@ -176,9 +176,9 @@ impl Drawing<'_> {
         }
         let mut image = image?;
         annotation.draw(&mut image, &view);
-        let angles = match camera.place {
-            Place::Around { azimuth, elevation, .. } => Some([azimuth, elevation]),
-            Place::At { .. } => None,
+        let angles = match camera.viewpoint {
+            Viewpoint::Around { azimuth, elevation, .. } => Some([azimuth, elevation]),
+            Viewpoint::At { .. } => None,
         };
         Some(Picture { camera: name, angles, range: self.range, image })
     }
@@ -186,16 +186,16 @@ impl Drawing<'_> {
     /// The camera with its points from the origin of the lattice.
     fn placed(&self, camera: &Camera) -> Camera {
         let mut camera = camera.clone();
-        match &mut camera.place {
-            Place::At { position, focal_point } => {
+        match &mut camera.viewpoint {
+            Viewpoint::At { position, focal_point } => {
                 *position = self.lattice.relative(*position);
                 *focal_point = self.lattice.relative(*focal_point);
             }
-            Place::Around { bounds: Some(bounds), .. } => {
+            Viewpoint::Around { bounds: Some(bounds), .. } => {
                 bounds.lower = self.lattice.relative(bounds.lower);
                 bounds.upper = self.lattice.relative(bounds.upper);
             }
-            Place::Around { bounds: None, .. } => {}
+            Viewpoint::Around { bounds: None, .. } => {}
         }
         camera
     }

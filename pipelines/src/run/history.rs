@@ -73,7 +73,7 @@ impl History {
 /// The values that pipelines may name.
 #[derive(Debug, Default)]
 pub(super) struct Board {
-    /// By the places of the pipelines in the configuration.
+    /// By the indices of the pipelines in the configuration.
     pub(super) histories: Vec<History>,
     pub(super) parameters: Vec<(String, f64)>,
 }

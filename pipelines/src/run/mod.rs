@@ -78,12 +78,12 @@ impl Runner {
     ) -> Result<Self, Problem> {
         config.validate()?;
         let all = &config.pipelines;
-        let places = (0..all.len()).filter(|&place| all[place].due != Due::OnOrder);
-        let prepared = |place: usize| {
-            let located = |problem: Problem| problem.at(place).within("pipelines");
-            Prepared::new(all, place).map_err(located)
+        let indices = (0..all.len()).filter(|&index| all[index].due != Due::OnOrder);
+        let prepared = |index: usize| {
+            let located = |problem: Problem| problem.at(index).within("pipelines");
+            Prepared::new(all, index).map_err(located)
         };
-        let pipelines: Result<Vec<_>, _> = places.map(prepared).collect();
+        let pipelines: Result<Vec<_>, _> = indices.map(prepared).collect();
         let history = |pipeline| History::new(monitors(pipeline).split_off(2));
         let histories = all.iter().map(history).collect();
         let begun = Instant::now();
@@ -127,13 +127,13 @@ impl Runner {
     #[must_use]
     pub fn history(&self, pipeline: &str) -> Option<&History> {
         let prepared = self.pipelines.iter().find(|prepared| prepared.pipeline.name == pipeline);
-        prepared.and_then(|prepared| self.board.histories.get(prepared.place))
+        prepared.and_then(|prepared| self.board.histories.get(prepared.index))
     }
 
     /// What each pipeline has cost so far, by name.
     pub fn costs(&self) -> impl Iterator<Item = (&str, Cost)> {
         self.pipelines.iter().map(|prepared| {
-            let history = self.board.histories.get(prepared.place).map_or(0, History::bytes);
+            let history = self.board.histories.get(prepared.index).map_or(0, History::bytes);
             let memory = prepared.cost.memory + history as u64;
             let every = prepared.thinning.every();
             (&*prepared.name, Cost { memory, every, ..prepared.cost })
@@ -217,7 +217,7 @@ impl Runner {
                         vec![f64::NAN; prepared.monitors().len()]
                     }
                 };
-            if let Some(history) = self.board.histories.get_mut(prepared.place)
+            if let Some(history) = self.board.histories.get_mut(prepared.index)
                 && !measured.is_empty()
             {
                 history.push(Measured { cycle: now.cycle, time: now.time, values: measured });

@@ -32,8 +32,8 @@ const QUALITY_FIELD: &str = "scaled_jacobian";
 /// A pipeline that is ready to run.
 pub(super) struct Prepared {
     pub(super) pipeline: Pipeline,
-    /// Its place in the configuration.
-    pub(super) place: usize,
+    /// Its index in the configuration.
+    pub(super) index: usize,
     pub(super) due: Clock,
     pub(super) thinning: Thinning,
     pub(super) cost: Cost,
@@ -76,7 +76,7 @@ struct Progress<'a> {
     kept: Kept,
     decimation: Option<Arc<Decimation>>,
     extracted: Option<Extracted>,
-    /// What is handed out in place of the extract, on rank 0.
+    /// What is handed out instead of the extract, on rank 0.
     decimated: Option<Arc<Extract>>,
     is_decimated: bool,
     /// Fields of the extract that are used, but not selected.

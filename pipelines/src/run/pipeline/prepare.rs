@@ -53,10 +53,10 @@ pub(super) fn gradient_of(velocity: &str) -> String {
 }
 
 impl Prepared {
-    /// Prepares the pipeline at a place in a configuration that means something.
-    pub(crate) fn new(pipelines: &[Pipeline], place: usize) -> Result<Self, Problem> {
-        let pipeline = &pipelines[place];
-        let scope = Scope::of(pipelines, place);
+    /// Prepares the pipeline at an index of a valid configuration.
+    pub(crate) fn new(pipelines: &[Pipeline], index: usize) -> Result<Self, Problem> {
+        let pipeline = &pipelines[index];
+        let scope = Scope::of(pipelines, index);
         let mut selected: Option<HashSet<String>> = None;
         for stage in &pipeline.stages {
             if let Stage::Select(select) = stage {
@@ -80,7 +80,7 @@ impl Prepared {
         });
         let used = stages.iter().flat_map(used_fields).chain(coloured).map(str::to_owned);
         Ok(Self {
-            place,
+            index,
             used: used.chain(hidden.iter().cloned()).collect(),
             hidden,
             due: Clock::new(pipeline.due),
