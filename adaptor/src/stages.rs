@@ -5,7 +5,6 @@ use std::{
     sync::{Arc, Mutex},
 };
 
-use axum::body::Bytes;
 use serde_json::{Map, Value, json};
 use tombolo_deform::communicator::Communicator;
 use tombolo_deform::surface::Surface;
@@ -22,14 +21,14 @@ use crate::{
     report::PipelineReport,
     steering::Parameter,
     step::{Moment, Outside},
-    stream::{Frame as EncodedFrame, Hub},
+    stream::Hub,
     writer::{Content, Job, Writer},
 };
 
 /// The pipelines of a run.
 pub(crate) struct Pipelines {
     runner: Runner,
-    /// The name of each view, and what its last frame taught the encoder of its topology.
+    /// The name of each view, and the encoder of its frames.
     views: Vec<(String, Arc<Mutex<Encoder>>)>,
     description: Value,
     monitors: Value,
@@ -229,17 +228,9 @@ impl Pipelines {
             return;
         };
         let encoder = Arc::clone(&self.views[view].1);
-        let encode = move || {
-            let mut encoder = lock(&encoder);
-            let encoded = encoder.encode(&frame).map_err(|error| error.to_string())?;
-            Ok(EncodedFrame {
-                topology_id: encoded.topology_id,
-                topology: Bytes::from_owner(encoded.topology),
-                data: encoded.data.into(),
-                raw_bytes: encoded.raw_bytes as u64,
-            })
-        };
-        hub.frame(view, Box::new(encode));
+        let encode =
+            move |key: bool| lock(&encoder).encode(&frame, key).map_err(|error| error.to_string());
+        hub.frame(view, Arc::new(encode));
     }
 
     /// Waits for files that are still being written; what was wrong with any of the run.

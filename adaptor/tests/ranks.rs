@@ -16,7 +16,7 @@ use tombolo::{
         shapes::{BOX_FEATURES, box_of_tets},
     },
     pipelines::{
-        encode::{Decoded, decode},
+        encode::Decoder,
         extract::{Channel, FieldView},
         language::parse_orders,
     },
@@ -79,11 +79,9 @@ fn what_viewers_ask_for_happens_at_the_same_cycle() {
                         let viewer = first.as_mut().expect("connected");
                         viewer.hello();
                         let _ = viewer.look_for("nothing", Duration::from_millis(500), |_| false);
-                        let whole = viewer.frames.iter().filter_map(|frame| match decode(frame) {
-                            Ok(Decoded::Topology(topology)) => Some(topology),
-                            _ => None,
-                        });
-                        assert!(whole.count() > 0, "no frame came");
+                        let mut decoder = Decoder::new();
+                        let all = viewer.frames.iter().all(|frame| decoder.decode(frame).is_ok());
+                        assert!(all && !viewer.frames.is_empty(), "no frame came");
                         viewer.send(
                             &json!({"id": "more", "parameter": {"name": "inflow", "value": 2.0}}),
                         );

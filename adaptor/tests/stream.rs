@@ -15,7 +15,7 @@ use tokio_tungstenite::tungstenite::{Error, Message};
 use tombolo::{
     Adaptor, InitializeError, OrderStatus, Parameter, Settings,
     pipelines::{
-        encode::{Decoded, decode},
+        encode::{Decoder, decode_surface},
         language::{self, parse_orders},
         limits::{DOCUMENT, EDITS, SHAPES},
     },
@@ -49,6 +49,76 @@ fn status_of(error: &Error) -> Option<u16> {
         Error::Http(response) => Some(response.status().as_u16()),
         _ => None,
     }
+}
+
+/// Frames that come within a second, while the solver steps.
+fn frames_within_a_second(solver: &mut Solver, viewer: &mut Viewer) -> usize {
+    let (before, begun) = (viewer.frames.len(), Instant::now());
+    while begun.elapsed() < Duration::from_secs(1) {
+        solver.step();
+        let _ = viewer.look_for("nothing", Duration::from_millis(5), |_| false);
+    }
+    viewer.frames.len() - before
+}
+
+#[test]
+fn a_viewer_that_counts_its_frames_is_sent_no_more_than_it_takes() {
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    assert!(frames_within_a_second(&mut solver, &mut viewer) > 2, "nothing holds them back");
+    let acknowledge = |viewer: &mut Viewer| {
+        let count = viewer.frames.len() as u64;
+        viewer.send_message(Message::binary(count.to_le_bytes().to_vec()));
+    };
+    acknowledge(&mut viewer);
+    let _ = frames_within_a_second(&mut solver, &mut viewer);
+    assert_eq!(frames_within_a_second(&mut solver, &mut viewer), 0, "two are on their way");
+    let (held, cycle) = (viewer.frames.len(), solver.cycle);
+    acknowledge(&mut viewer);
+    let _ = frames_within_a_second(&mut solver, &mut viewer);
+    acknowledge(&mut viewer);
+    while viewer.frames.len() < held + 3 {
+        let _ = frames_within_a_second(&mut solver, &mut viewer);
+    }
+    // What it missed it missed: everything that came can be read, and the last of it is new.
+    let mut decoder = Decoder::new();
+    let cycles: Vec<u64> =
+        viewer.frames.iter().map(|frame| decoder.decode(frame).expect("a frame").cycle).collect();
+    assert!(cycles.is_sorted(), "{cycles:?}");
+    assert!(cycles[held + 2] >= cycle, "{cycles:?}, held back at {held} and cycle {cycle}");
+    // A number that says nothing new, or too much, is an error.
+    for count in [0, 1 << 40] {
+        viewer.send_message(Message::binary(u64::to_le_bytes(count).to_vec()));
+        let error = solver.step_until_told(&mut viewer, "error", |_| true);
+        let message = error["message"].as_str().unwrap_or_default();
+        assert!(message.contains("the number of frames decoded"), "{error}");
+    }
+    solver.finish();
+}
+
+#[test]
+fn a_late_viewer_needs_one_message() {
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    let mut early = Viewer::connect(&solver.adaptor);
+    early.hello();
+    let _ = frames_within_a_second(&mut solver, &mut early);
+    // No step is made for it: it is sent what is there.
+    let mut late = Viewer::connect(&solver.adaptor);
+    late.hello();
+    let begun = Instant::now();
+    while late.frames.is_empty() && begun.elapsed() < PATIENCE {
+        let _ = late.look_for("nothing", Duration::from_millis(20), |_| false);
+    }
+    let mut decoder = Decoder::new();
+    let first = decoder.decode(&late.frames[0]).expect("the first message is enough");
+    assert_eq!((first.cycle, first.cells.is_some()), (solver.cycle - 1, true));
+    let _ = frames_within_a_second(&mut solver, &mut late);
+    let _ = early.look_for("nothing", Duration::from_millis(100), |_| false);
+    assert!(late.frames[1..].iter().all(|frame| decoder.decode(frame).is_ok()));
+    let mut decoder = Decoder::new();
+    assert!(early.frames.iter().all(|frame| decoder.decode(frame).is_ok()));
+    solver.finish();
 }
 
 #[test]
@@ -109,14 +179,12 @@ fn a_viewer_sees_the_run_and_changes_its_shape() {
     );
 
     assert!(viewer.frames.len() >= 2);
-    let Ok(Decoded::Topology(topology)) = decode(&viewer.frames[0]) else {
-        panic!("the topology comes first")
-    };
-    assert_eq!(topology.view, "boundary");
+    let mut decoder = Decoder::new();
     let mut squeezed = 0;
-    for frame in &viewer.frames[1..] {
-        let Ok(Decoded::Data(data)) = decode(frame) else { panic!("the topology comes once") };
-        assert_eq!(data.points.len(), topology.points);
+    for (index, frame) in viewer.frames.iter().enumerate() {
+        let data = decoder.decode(frame).expect("every frame can be read");
+        assert_eq!((data.view.as_str(), data.points.len()), ("boundary", 98));
+        assert_eq!(data.cells.is_some(), index == 0, "the topology comes first, and once");
         let height = data.points.iter().map(|point| point[2]).fold(0.0, f64::max);
         squeezed += usize::from((height - 0.7).abs() < 1e-4);
         assert!((height - 0.7).abs() < 1e-4 || (height - 1.0).abs() < 1e-4, "{height}");
@@ -258,9 +326,7 @@ fn the_reference_surface_is_there_for_those_with_the_token_bit_for_bit() {
         let answer = answer(&solver.adaptor, request.as_bytes());
         let body = answer.windows(4).position(|four| four == b"\r\n\r\n").expect("a body") + 4;
         assert!(answer.starts_with(b"HTTP/1.1 200"));
-        let Decoded::Surface(surface) = decode(&answer[body..]).expect("a frame") else {
-            panic!("another frame")
-        };
+        let surface = decode_surface(&answer[body..]).expect("a surface");
         let points: Vec<_> = surface
             .vertices()
             .iter()

@@ -1,20 +1,14 @@
-//! `codec`: bits a value and MB/s of the codec, beside SZ3, zfp, zstd, and the frames of the
-//! protocol, on frames of flow and on made-up fields.
+//! `codec`: bits a value and MB/s of the codec that frames are sent with, beside SZ3, zfp and zstd,
+//! on frames of flow and on made-up fields.
 
 use std::error::Error;
 use std::fs;
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 use serde_json::json;
-use tombolo::deform::mesh::{CellType, Cells, NumberType};
 use tombolo::pipelines::codec::{Bound, Coded, Field, Topology};
-use tombolo::pipelines::encode::{Decoded, decode, encode};
-use tombolo::pipelines::extract::{Association, Extract, Field as Values};
-use tombolo::pipelines::language::ErrorBound;
-use tombolo::pipelines::run::{Encoding, Frame};
 use tombolo_tests::project;
 
 use crate::codec_cases::{Case, all};
@@ -103,7 +97,6 @@ pub fn run() -> Result<Report<Row>, Box<dyn Error>> {
                 if frames.len() > FIRST {
                     rows.push(series(&field, &coded, *components, frames, bound)?);
                 }
-                rows.push(protocol(&field, &case, *components, &frames[0], bound)?);
             }
         }
     }
@@ -202,54 +195,6 @@ fn series(
         speed: 8e-6 * values / encoding,
         decoding: 8e-6 * values / decoding,
         error,
-    })
-}
-
-/// The same frame as the protocol sends it.
-fn protocol(
-    name: &str,
-    case: &Case,
-    components: usize,
-    values: &[f64],
-    part: f64,
-) -> Result<Row, Box<dyn Error>> {
-    let cells = Cells::uniform(CellType::Triangle, case.triangles.as_flattened().to_vec())?;
-    let cells = Arc::new(cells);
-    let frame = |fields| Frame {
-        pipeline: "view".into(),
-        cycle: 0,
-        time: 0.0,
-        extract: Arc::new(Extract {
-            points: case.points.clone(),
-            vertices: None,
-            cells: Arc::clone(&cells),
-            features: None,
-            fields,
-        }),
-        encoding: Encoding { fields: ErrorBound::Relative(part), ..Encoding::default() },
-    };
-    let with = frame(vec![Values {
-        name: "value".into(),
-        association: Association::Vertex,
-        components,
-        number: NumberType::F64,
-        values: values.to_vec(),
-    }]);
-    let without = encode(&frame(Vec::new()))?.data.len();
-    let data = encode(&with)?.data;
-    let Decoded::Data(decoded) = decode(&data)? else { return Err("a frame holds data".into()) };
-    let decoded = &decoded.fields.first().ok_or("a frame holds its field")?.values;
-    let pairs = decoded.iter().zip(values);
-    let off = pairs.map(|(value, sent)| (value - sent).abs()).fold(0.0, f64::max);
-    Ok(Row {
-        name: name.into(),
-        bound: part,
-        method: "protocol".into(),
-        is_temporal: false,
-        bits: 8.0 * (data.len() - without) as f64 / values.len() as f64,
-        speed: 0.0,
-        decoding: 0.0,
-        error: off / (part * widest(values, components)),
     })
 }
 

@@ -248,7 +248,7 @@ fn moving(stages: &[Value], channel: &Channel) -> Result<f64, Box<dyn Error>> {
     })
 }
 
-/// Encodes the frame of a view; seconds and bytes before.
+/// Encodes the frame of a view as a key frame; seconds and bytes before.
 fn encoding(view: &[Value], channels: &[Channel]) -> Result<(f64, usize), Box<dyn Error>> {
     let outputs = once(&mut runner(view)?, 1, channels)?;
     let frame = outputs
@@ -258,7 +258,7 @@ fn encoding(view: &[Value], channels: &[Channel]) -> Result<(f64, usize), Box<dy
     let mut raw = 0;
     let mut encoder = Encoder::new();
     let seconds = median(|| {
-        raw = encoder.encode(&frame)?.raw_bytes;
+        raw = encoder.encode(&frame, true)?.raw_bytes;
         Ok::<(), Box<dyn Error>>(())
     })?;
     Ok((seconds, raw))

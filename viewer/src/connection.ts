@@ -106,6 +106,20 @@ export class Connection {
     return true;
   }
 
+  /** Tells how many frames of this connection have been decoded, so that the server sends the next. */
+  acknowledge(frames: number): void {
+    if (this.socket?.readyState === 1) this.socket.send(BigUint64Array.of(BigInt(frames)));
+  }
+
+  /** Gives the connection up and opens another. */
+  renew(reason: string): void {
+    const socket = this.socket;
+    if (!socket) return;
+    this.socket = null;
+    socket.close();
+    this.again("reconnecting", reason, backOff(this.attempt++, this.surroundings.random()));
+  }
+
   private change(state: ConnectionState, explanation: string): void {
     this.state = state;
     this.listener.state(state, explanation);

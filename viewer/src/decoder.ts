@@ -1,8 +1,7 @@
 /**
- * The queue in front of the decoder: the newest data of a view replaces data of the same view that still waits, so that
- * decoding keeps up with any stream. A topology is never left out, and never overtaken.
+ * The queue in front of the decoder. Frames are decoded in the order in which they came, since each goes on from the one before
+ * it; the server is told how many were, and sends no more than two of a view ahead.
  */
-import { peekFrame } from "./protocol";
 import type { Frame } from "./protocol";
 import type { DecodeAnswer } from "./decode.worker";
 
@@ -12,61 +11,54 @@ export interface DecodeWorker {
   postMessage(message: ArrayBuffer, transfer: Transferable[]): void;
 }
 
-interface Waiting { view: string; kind: "topology" | "data"; bytes: ArrayBuffer }
+export interface DecoderEvents {
+  frame(frame: Frame): void;
+  /** So many frames of this connection have been decoded. */
+  decoded(count: number): void;
+  /** A frame cannot be read, nor any after it: only a new connection helps. */
+  lost(reason: string): void;
+}
 
 export class Decoder {
-  private waiting: Waiting[] = [];
+  private waiting: ArrayBuffer[] = [];
   private busy = false;
   private generation = 0;
   private sent = 0;
-  /** Frames left out because a newer one of the same view was there already. */
-  dropped = 0;
+  private count = 0;
 
-  constructor(
-    private readonly worker: DecodeWorker,
-    private readonly onFrame: (frame: Frame) => void,
-    private readonly onError: (message: string) => void,
-  ) {
+  constructor(private readonly worker: DecodeWorker, private readonly events: DecoderEvents) {
     worker.onmessage = (event) => this.answer(event.data);
   }
 
-  push(bytes: ArrayBuffer): void {
-    let peek: { kind: "topology" | "data"; view: string };
-    try {
-      peek = peekFrame(new Uint8Array(bytes));
-    } catch (error) {
-      this.onError(error instanceof Error ? error.message : String(error));
-      return;
-    }
-    if (peek.kind === "data") {
-      const before = this.waiting.length;
-      this.waiting = this.waiting.filter((item) => item.kind === "topology" || item.view !== peek.view);
-      this.dropped += before - this.waiting.length;
-    }
-    this.waiting.push({ ...peek, bytes });
+  push(message: ArrayBuffer): void {
+    this.waiting.push(message);
     this.next();
   }
 
   /** Forgets everything that waits: the connection it came from is gone. */
   clear(): void {
     this.waiting = [];
+    this.count = 0;
     this.generation++;
   }
 
   private next(): void {
     if (this.busy) return;
-    const item = this.waiting.shift();
-    if (!item) return;
+    const message = this.waiting.shift();
+    if (!message) return;
     this.busy = true;
     this.sent = this.generation;
-    this.worker.postMessage(item.bytes, [item.bytes]);
+    this.worker.postMessage(message, [message]);
   }
 
   private answer(answer: DecodeAnswer): void {
     this.busy = false;
     if (this.sent === this.generation) {
-      if ("frame" in answer) this.onFrame(answer.frame);
-      else this.onError(answer.error);
+      if ("error" in answer) this.events.lost(answer.error);
+      else {
+        for (const frame of answer.frames) this.events.frame(frame);
+        this.events.decoded(++this.count);
+      }
     }
     this.next();
   }

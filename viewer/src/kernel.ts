@@ -4,7 +4,7 @@
  * Whatever goes wrong is a `KernelError`. Where the module itself fails, its memory is given up, a new instance takes its place,
  * and the surfaces that were open are opened again when they are next used.
  */
-import type { Json } from "./protocol";
+import type { Association, DataFrame, Frame, Json, TopologyFrame } from "./protocol";
 
 export type FailureKind = "handle" | "input" | "json" | "frame" | "surface" | "edit" | "skeleton" | "memory" | "trap";
 
@@ -41,8 +41,11 @@ export interface ShapeFaults { text: string; triangles: Uint32Array }
 /** Curves through a surface: places of the nodes, the nodes of each curve, and the node that carries each vertex. */
 export interface SkeletonDescription { nodes: Float64Array; curves: Uint32Array[]; nodeOfVertex: Uint32Array }
 
-/** A frame as the module reads it: its header, and the arrays behind it. */
-export interface DecodedFrame { header: { [key: string]: Json }; arrays: (Uint32Array | Float32Array)[] }
+/** What the module says of a frame; its arrays come behind it. */
+interface FrameHeader {
+  view: string; topology: string; cycle: number; time: number; points: number; cells: boolean; features: boolean;
+  fields: { name: string; association: Association; components: number }[];
+}
 
 interface Exports {
   memory: WebAssembly.Memory;
@@ -66,6 +69,13 @@ interface Exports {
 const encoder = new TextEncoder();
 const decoder = new TextDecoder();
 
+/** Compiles the module while it is still arriving. Workers are sent what this gives. */
+export async function compileKernel(): Promise<WebAssembly.Module> {
+  const response = await fetch(new URL("../wasm/pkg/kernel.wasm", import.meta.url));
+  if (!response.ok) throw new KernelError("trap", `the geometry kernel did not arrive: ${response.status} ${response.statusText}`);
+  return WebAssembly.compileStreaming(response);
+}
+
 export class Kernel {
   private exports: Exports;
   /** How many instances there have been: a surface of an earlier one must be opened again. */
@@ -73,13 +83,6 @@ export class Kernel {
 
   constructor(private readonly module: WebAssembly.Module) {
     this.exports = this.instantiate();
-  }
-
-  /** Compiles the module; in a browser while it is still arriving. */
-  static async load(source: Response | BufferSource): Promise<Kernel> {
-    const streamed = typeof Response !== "undefined" && source instanceof Response;
-    if (streamed && !source.ok) throw new KernelError("trap", `the geometry kernel did not arrive: ${source.status} ${source.statusText}`);
-    return new Kernel(await (streamed ? WebAssembly.compileStreaming(source) : WebAssembly.compile(source as BufferSource)));
   }
 
   /** Has the module make a small edit of its own, so that the engine has compiled it well before the first that somebody waits for. */
@@ -104,12 +107,20 @@ export class Kernel {
     return new KernelSurface(this, () => this.call(bytes, open, () => undefined));
   }
 
-  decodeFrame(frame: Uint8Array): DecodedFrame {
-    return this.call([frame], (exports) => exports.decode_frame(), () => {
-      const header = JSON.parse(this.text(0)) as DecodedFrame["header"];
-      const arrays = Array.from({ length: this.exports.arrays() - 1 }, (_, i) =>
-        header.kind === "data" ? new Float32Array(this.bytes(i + 1)) : new Uint32Array(this.bytes(i + 1)));
-      return { header, arrays };
+  /** Decodes the next frame of a view: its topology, where it brings one, and its values. What is known of the view is kept in the module. */
+  decodeFrame(message: Uint8Array): Frame[] {
+    return this.call([message], (exports) => exports.decode_frame(), () => {
+      const { view, topology, cycle, time, points, fields, cells, features } = JSON.parse(this.text(0)) as FrameHeader;
+      const data: DataFrame = {
+        kind: "data", view, topology, cycle, time, points: new Float32Array(this.bytes(1)),
+        fields: fields.map((field, index) => ({ ...field, values: new Float32Array(this.bytes(2 + index)) })),
+      };
+      if (!cells) return [data];
+      const numbers = (index: number): Uint32Array => new Uint32Array(this.bytes(2 + fields.length + index));
+      const frame: TopologyFrame = {
+        kind: "topology", view, topology, points, triangles: numbers(0), lines: numbers(1), triangleFeatures: features ? numbers(2) : null,
+      };
+      return [frame, data];
     }).answer;
   }
 

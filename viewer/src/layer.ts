@@ -30,6 +30,13 @@ function cells(points: Uint32Array, size: number): Uint32Array {
   return result;
 }
 
+function linesFirst(values: Float32Array, triangles: number): Float32Array {
+  const result = new Float32Array(values.length);
+  result.set(values.subarray(triangles));
+  result.set(values.subarray(0, triangles), values.length - triangles);
+  return result;
+}
+
 export class Piece {
   readonly data = vtkPolyData.newInstance();
   readonly mapper = vtkMapper.newInstance();
@@ -139,12 +146,11 @@ export class Layer {
     const topology = this.topology;
     if (!topology || topology.topology !== frame.topology) return null;
     const fresh = this.frame === null;
-    if (fresh && !frame.points) return `view ${this.name}: the first frame has no points`;
-    if (frame.points && frame.points.length !== topology.points * 3) {
+    if (frame.points.length !== topology.points * 3) {
       return `view ${this.name}: ${frame.points.length / 3} points, its topology has ${topology.points}`;
     }
     const triangles = topology.triangles.length / 3;
-    const elements = triangles > 0 ? triangles : topology.lines.length / 2;
+    const elements = triangles + topology.lines.length / 2;
     for (const field of frame.fields) {
       const expected = field.association === "vertex" ? topology.points : elements;
       if (field.values.length !== expected * field.components) {
@@ -152,11 +158,9 @@ export class Layer {
       }
     }
     this.frame = frame;
-    if (frame.points) {
-      this.coordinates = frame.points as Float32Array<ArrayBuffer>;
-      this.points.setData(frame.points, 3);
-      this.points.modified();
-    }
+    this.coordinates = frame.points as Float32Array<ArrayBuffer>;
+    this.points.setData(frame.points, 3);
+    this.points.modified();
     if (fresh) this.setCells(topology);
     for (const piece of this.pieces()) piece.data.modified();
     return null;
@@ -178,9 +182,12 @@ export class Layer {
       mapper.setScalarVisibility(false);
       return null;
     }
-    const values = scalars(field, colouring.component);
-    const array = vtkDataArray.newInstance({ name: field.name, numberOfComponents: 1, values });
     const vertex = field.association === "vertex";
+    let values = scalars(field, colouring.component);
+    // vtk.js numbers the lines of a view before its triangles.
+    const triangles = vertex ? 0 : this.topology!.triangles.length / 3;
+    if (triangles > 0 && triangles < values.length) values = linesFirst(values, triangles);
+    const array = vtkDataArray.newInstance({ name: field.name, numberOfComponents: 1, values });
     data.getPointData().setScalars(vertex ? array : (null as never));
     data.getCellData().setScalars(vertex ? (null as never) : array);
     if (vertex) mapper.setScalarModeToUsePointData();

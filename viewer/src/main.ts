@@ -7,6 +7,7 @@ import type { DecodeWorker } from "./decoder";
 import { part, write } from "./dom";
 import { Forecasts } from "./forecast";
 import { EditForm } from "./form";
+import { compileKernel } from "./kernel";
 import { showLayers } from "./layers";
 import { publish } from "./inspection";
 import { Orders } from "./orders";
@@ -36,6 +37,8 @@ let noticed = 0;
 const errors: string[] = [];
 const session = Array.from(crypto.getRandomValues(new Uint8Array(4)), (byte) => byte.toString(16).padStart(2, "0")).join("");
 
+/** The kernel decodes the frames and computes the previews: it is fetched once, at once. */
+const kernel = compileKernel();
 const selection = new Selection();
 const scalarBar = new ScalarBar();
 const triad = new Triad();
@@ -56,7 +59,7 @@ const orders = new Orders(part("orders"), (text) => write(part("announcer"), tex
 const bar = new StatusBar();
 watchPointer(part("scene"), scene, selection);
 const addresses = streamAddress(window.location.href);
-const preview = new PreviewPanel(scene, addresses.surface, () => {
+const preview = new PreviewPanel(scene, addresses.surface, kernel, () => {
   const { edits } = form.read();
   return Array.isArray(edits) ? edits : [];
 });
@@ -89,7 +92,12 @@ function composed(): void {
 }
 
 const worker = new Worker(new URL("./decode.worker.ts", import.meta.url), { type: "module" });
-const decoder = new Decoder(worker as unknown as DecodeWorker, takeFrame, report);
+kernel.then((module) => worker.postMessage({ module }), (error: unknown) => report(String(error)));
+const decoder = new Decoder(worker as unknown as DecodeWorker, {
+  frame: takeFrame,
+  decoded: (count) => connection.acknowledge(count),
+  lost: (reason) => connection.renew(`A frame could not be read: ${reason}.`),
+});
 
 const connection = new Connection(addresses, {
   state: (state, explanation) => {
@@ -289,7 +297,6 @@ publish({
   get role() { return hello?.role ?? null; },
   get cycle() { return cycle; },
   get frames() { return frames; },
-  get dropped() { return decoder.dropped; },
   get views() {
     return Object.fromEntries([...scene.layers].map(([name, layer]) => [name, {
       bounds: scene.viewBounds(name), points: layer.topology?.points ?? 0,

@@ -21,7 +21,10 @@ export class PreviewPanel {
   private bones = false;
 
   /** `edits` reads the form; it throws an `InputError` as long as something is missing there. */
-  constructor(private readonly scene: Scene, private readonly address: string, private readonly edits: () => Json[]) {}
+  constructor(
+    private readonly scene: Scene, private readonly address: string, private readonly module: Promise<WebAssembly.Module>,
+    private readonly edits: () => Json[],
+  ) {}
 
   /** What the server says: the surface from which shapes are measured, and the edits that the shape has now. */
   set(surface: SurfaceInformation | null, stack: Json[]): void {
@@ -79,6 +82,7 @@ export class PreviewPanel {
   private started(): Preview {
     if (this.preview) return this.preview;
     const worker = new Worker(new URL("./preview.worker.ts", import.meta.url), { type: "module" });
+    this.module.then((module) => worker.postMessage({ module }), (error: unknown) => this.fail(String(error)));
     this.preview = new Preview(worker as unknown as PreviewWorker, () => fetchSurface(this.address), {
       surface: (surface) => this.scene.setPreviewSurface(surface),
       shape: (shape) => this.take(shape),

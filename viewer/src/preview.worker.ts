@@ -5,6 +5,9 @@ import type { Json } from "./protocol";
 import { segmentsOf } from "./skeleton";
 import type { Bones } from "./skeleton";
 
+/** The module, once. */
+type PreviewModule = { module: WebAssembly.Module };
+
 export type PreviewRequest =
   /** A reference surface, as the server sends it. */
   | { id: string; surface: ArrayBuffer }
@@ -25,15 +28,12 @@ export type PreviewAnswer =
   | { id: string; kind: FailureKind; error: string };
 
 const worker = self as unknown as {
-  onmessage: ((event: MessageEvent<PreviewRequest>) => void) | null;
+  onmessage: ((event: MessageEvent<PreviewModule | PreviewRequest>) => void) | null;
   postMessage(answer: PreviewAnswer, transfer: Transferable[]): void;
 };
 
-const kernel = fetch(new URL("../wasm/pkg/kernel.wasm", import.meta.url)).then(async (response) => {
-  const loaded = await Kernel.load(response);
-  loaded.rehearse();
-  return loaded;
-});
+let loaded: (kernel: Kernel) => void;
+const kernel = new Promise<Kernel>((resolve) => { loaded = resolve; });
 let surface: KernelSurface | null = null;
 let reference: Float64Array = new Float64Array(0);
 /** The displacement that the shape has now, and the stack that it is of. */
@@ -92,6 +92,12 @@ function bonesOf({ nodes, curves, nodeOfVertex }: SkeletonDescription, displacem
 // One after the other: an answer is there before the next question is looked at.
 let last = Promise.resolve();
 worker.onmessage = ({ data }) => {
+  if ("module" in data) {
+    const instance = new Kernel(data.module);
+    instance.rehearse();
+    loaded(instance);
+    return;
+  }
   last = last.then(() => answer(data)).catch((error: unknown) => {
     const kind = error instanceof KernelError ? error.kind : "trap";
     const which = "number" in data ? { number: data.number } : "check" in data ? { number: data.check }

@@ -1,65 +1,52 @@
 import { describe, expect, it } from "vitest";
 import { Decoder } from "../src/decoder";
 import type { DecodeWorker } from "../src/decoder";
-import { decodeFrame } from "../src/protocol";
-import type { Frame } from "../src/protocol";
-import { dataFrame, topologyFrame } from "./frames.mjs";
+import type { DataFrame, Frame } from "../src/protocol";
+
+const frame = (cycle: number): DataFrame => ({ kind: "data", view: "a", topology: "t", cycle, time: 0, points: new Float32Array(0), fields: [] });
 
 function setUp() {
   const waiting: ArrayBuffer[] = [];
-  const worker: DecodeWorker = { onmessage: null, postMessage: (bytes) => waiting.push(bytes) };
-  const frames: Frame[] = [];
-  const errors: string[] = [];
-  const decoder = new Decoder(worker, (frame) => frames.push(frame), (message) => errors.push(message));
+  const worker: DecodeWorker = { onmessage: null, postMessage: (message) => waiting.push(message) };
+  const frames: Frame[] = [], counts: number[] = [], lost: string[] = [];
+  const decoder = new Decoder(worker, { frame: (read) => frames.push(read), decoded: (count) => counts.push(count), lost: (reason) => lost.push(reason) });
+  /** Answers with a frame whose cycle is the first byte of the message. */
   const work = (): void => {
-    const bytes = waiting.shift()!;
-    let data: { frame: Frame } | { error: string };
-    try {
-      data = { frame: decodeFrame(new Uint8Array(bytes)) };
-    } catch (error) {
-      data = { error: String(error) };
-    }
-    worker.onmessage?.({ data } as MessageEvent);
+    const cycle = new Uint8Array(waiting.shift()!)[0]!;
+    worker.onmessage?.({ data: cycle === 255 ? { error: "broken" } : { frames: [frame(cycle)] } } as MessageEvent);
   };
-  return { decoder, frames, errors, waiting, work };
+  return { decoder, frames, counts, lost, waiting, work };
 }
-const buffer = (bytes: Uint8Array): ArrayBuffer => bytes.slice().buffer;
-const data = (view: string, cycle: number): ArrayBuffer => buffer(dataFrame(view, "t", cycle, 0, [{ name: "points", components: 3, values: [0, 0, 0, 1, 1, 1] }]));
-const topology = (view: string): ArrayBuffer => buffer(topologyFrame(view, "t", 2, [0, 1, 1]));
+const message = (cycle: number): ArrayBuffer => Uint8Array.of(cycle).buffer;
+const cycles = (frames: Frame[]): number[] => frames.flatMap((read) => (read.kind === "data" ? [read.cycle] : []));
 
 describe("the queue in front of the decoder", () => {
-  it("keeps only the newest data of each view, never skips a topology, and keeps their order", () => {
-    const { decoder, frames, waiting, work } = setUp();
-    decoder.push(topology("a"));
-    for (let cycle = 1; cycle <= 5; cycle++) {
-      decoder.push(data("a", cycle));
-      decoder.push(data("b", cycle));
-    }
-    decoder.push(topology("a"));
-    decoder.push(data("a", 6));
+  it("keeps every frame and their order, one at a time, and counts them", () => {
+    const { decoder, frames, counts, waiting, work } = setUp();
+    for (let cycle = 1; cycle <= 5; cycle++) decoder.push(message(cycle));
+    expect(waiting).toHaveLength(1);
     while (waiting.length) work();
-    expect(frames.map((frame) => (frame.kind === "data" ? `${frame.view}${frame.cycle}` : `T${frame.view}`))).toEqual(["Ta", "b5", "Ta", "a6"]);
-    expect(decoder.dropped).toBe(9);
+    expect(cycles(frames)).toEqual([1, 2, 3, 4, 5]);
+    expect(counts).toEqual([1, 2, 3, 4, 5]);
   });
 
-  it("reports a broken frame and goes on", () => {
-    const { decoder, frames, errors, waiting, work } = setUp();
-    decoder.push(new ArrayBuffer(5));
-    const broken = new Uint8Array(data("a", 1));
-    decoder.push(buffer(broken.subarray(0, broken.length - 4)));
-    decoder.push(data("b", 2));
+  it("says that a frame cannot be read, and does not count it", () => {
+    const { decoder, counts, lost, waiting, work } = setUp();
+    decoder.push(message(255));
+    decoder.push(message(2));
     while (waiting.length) work();
-    expect(errors).toHaveLength(2);
-    expect(frames).toHaveLength(1);
+    expect(lost).toEqual(["broken"]);
+    expect(counts).toEqual([1]);
   });
 
-  it("forgets what an ended connection left behind", () => {
-    const { decoder, frames, waiting, work } = setUp();
-    decoder.push(data("a", 1));
-    decoder.push(data("b", 1));
+  it("forgets what an ended connection left behind, and counts from the start", () => {
+    const { decoder, frames, counts, waiting, work } = setUp();
+    decoder.push(message(1));
+    decoder.push(message(2));
     decoder.clear();
-    decoder.push(data("c", 2));
+    decoder.push(message(3));
     while (waiting.length) work();
-    expect(frames.map((frame) => frame.view)).toEqual(["c"]);
+    expect(cycles(frames)).toEqual([3]);
+    expect(counts).toEqual([1]);
   });
 });

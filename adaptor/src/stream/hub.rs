@@ -1,9 +1,9 @@
 //! What the solver's side has to say to the viewers, the newest of each kind, and who the viewers
 //! are.
 //!
-//! Every call returns at once. What is kept is bounded: one newest frame of each view (as an
-//! extract until somebody looks), the same again for each viewer that has not read it yet, and
-//! short queues of texts.
+//! Every call returns at once. What is kept is bounded: the newest extract of each view, one that
+//! waits to be encoded, a few frames for each viewer that has not read them yet, and short queues of
+//! texts.
 
 use std::{
     collections::{BTreeMap, VecDeque},
@@ -17,6 +17,7 @@ use std::{
 use axum::body::Bytes;
 use serde_json::{Map, Value, json};
 use tokio::sync::Notify;
+use tombolo_pipelines::encode::Encoded;
 use tombolo_pipelines::run::Cost;
 
 use super::{ReferenceSurface, StreamCounts};
@@ -28,21 +29,78 @@ pub(super) const WHEEL_KEPT: Duration = Duration::from_secs(3);
 const TEXTS: usize = 1024;
 /// How often it is looked for a viewer that is waited for.
 const LOOK_AGAIN: Duration = Duration::from_millis(20);
+/// Frames of a view that may wait for a viewer, and that may be on their way to it.
+const FRAMES: usize = 2;
+/// Frames that are remembered of a viewer that has not acknowledged any.
+const UNACKNOWLEDGED: usize = 64;
 /// Monitor values that may wait for a viewer; older ones make way.
 const MONITORS: usize = 256;
 
 /// One encoded frame of a view, shared by all viewers.
 #[derive(Debug)]
-pub(crate) struct Frame {
-    pub(crate) topology_id: u64,
-    pub(crate) topology: Bytes,
-    pub(crate) data: Bytes,
-    /// Bytes that the arrays of `data` fill uncompressed.
-    pub(crate) raw_bytes: u64,
+pub(super) struct Frame {
+    encoded: Encoded,
+    /// The frame's message.
+    pub(super) message: Bytes,
 }
 
-/// Encodes a frame on the encoder's thread; the message says why it could not be done.
-pub(crate) type Encode = Box<dyn FnOnce() -> Result<Frame, String> + Send>;
+impl Frame {
+    fn new(mut encoded: Encoded) -> Self {
+        // Key frames are asked for with their topology too, which is put in front of them.
+        let is_key = encoded.is_key();
+        let message =
+            if is_key { encoded.message.clone() } else { std::mem::take(&mut encoded.message) };
+        Self { message: message.into(), encoded }
+    }
+
+    /// Which topology the frame belongs to.
+    pub(super) fn topology_id(&self) -> u64 {
+        self.encoded.topology_id
+    }
+
+    /// The message of a key frame with its topology.
+    pub(super) fn with_topology(&self) -> Bytes {
+        self.encoded.with_topology().into()
+    }
+}
+
+/// Encodes a frame on the encoder's thread, as a key frame or as the next of its chain; the message
+/// says why it could not be done.
+pub(crate) type Encode = Arc<dyn Fn(bool) -> Result<Encoded, String> + Send + Sync>;
+
+/// The frames of one view that a viewer has yet to read: a part of the view's chain.
+#[derive(Default)]
+struct Unread {
+    frames: VecDeque<Arc<Frame>>,
+    /// How many were sent and are not acknowledged.
+    in_flight: usize,
+    /// Frames of the chain were left out: the viewer can go on with a key frame only.
+    is_behind: bool,
+    /// The encoder was asked for a key frame.
+    has_asked: bool,
+}
+
+impl Unread {
+    /// Takes the next frame of the view; returns how many the viewer will miss for it.
+    fn put(&mut self, frame: &Arc<Frame>) -> usize {
+        let missed = if frame.encoded.is_key() {
+            let missed = self.frames.len();
+            *self = Self { in_flight: self.in_flight, ..Self::default() };
+            missed
+        } else if self.is_behind {
+            return 1;
+        } else if self.frames.len() >= FRAMES {
+            self.is_behind = true;
+            let missed = self.frames.len() + 1;
+            self.frames.clear();
+            return missed;
+        } else {
+            0
+        };
+        self.frames.push_back(Arc::clone(frame));
+        missed
+    }
+}
 
 /// The messages that a viewer has yet to read.
 #[derive(Default)]
@@ -51,8 +109,66 @@ struct Outbox {
     monitors: VecDeque<Arc<str>>,
     status: Option<Arc<str>>,
     hello: bool,
-    frames: BTreeMap<usize, Arc<Frame>>,
+    views: BTreeMap<usize, Unread>,
+    /// The view that was served last: they take turns.
+    last_view: usize,
+    /// The view of each frame that was sent and not acknowledged, the oldest first; from the first
+    /// acknowledgement on.
+    in_flight: VecDeque<usize>,
+    /// How many frames were acknowledged; `None` for a viewer that does not.
+    acknowledged: Option<u64>,
+    sent: u64,
     overflowed: bool,
+}
+
+impl Outbox {
+    /// The next frame, or a view whose next key frame is to be asked for.
+    fn frame(&mut self) -> Option<Message> {
+        let waits = |unread: &Unread| {
+            unread.in_flight < FRAMES
+                && (!unread.frames.is_empty() || unread.is_behind && !unread.has_asked)
+        };
+        let after =
+            self.views.range(self.last_view + 1..).chain(self.views.range(..=self.last_view));
+        let view = after.filter(|(_, unread)| waits(unread)).map(|(&view, _)| view).next()?;
+        let unread = self.views.get_mut(&view)?;
+        let Some(frame) = unread.frames.pop_front() else {
+            unread.has_asked = true;
+            return Some(Message::Behind(view));
+        };
+        self.last_view = view;
+        self.sent += 1;
+        self.in_flight.push_back(view);
+        if self.acknowledged.is_some() {
+            unread.in_flight += 1;
+        } else if self.in_flight.len() > UNACKNOWLEDGED {
+            self.in_flight.pop_front();
+        }
+        Some(Message::Frame(view, frame))
+    }
+
+    /// The viewer has decoded so many frames in all.
+    fn acknowledge(&mut self, count: u64) -> bool {
+        let before = self.acknowledged.unwrap_or(0);
+        if count <= before || count > self.sent {
+            return false;
+        }
+        if self.acknowledged.is_none() {
+            self.in_flight.iter().for_each(|view| {
+                if let Some(unread) = self.views.get_mut(view) {
+                    unread.in_flight += 1;
+                }
+            });
+        }
+        self.acknowledged = Some(count);
+        while self.in_flight.len() as u64 > self.sent - count {
+            let view = self.in_flight.pop_front();
+            if let Some(unread) = view.and_then(|view| self.views.get_mut(&view)) {
+                unread.in_flight = unread.in_flight.saturating_sub(1);
+            }
+        }
+        true
+    }
 }
 
 /// One viewer.
@@ -67,6 +183,8 @@ pub(super) enum Message {
     Text(Arc<str>),
     Hello,
     Frame(usize, Arc<Frame>),
+    /// The viewer is ready for a view of which it missed frames.
+    Behind(usize),
 }
 
 impl Client {
@@ -89,7 +207,16 @@ impl Client {
         if let Some(text) = outbox.monitors.pop_front() {
             return Ok(Some(Message::Text(text)));
         }
-        Ok(outbox.frames.pop_first().map(|(view, frame)| Message::Frame(view, frame)))
+        Ok(outbox.frame())
+    }
+
+    /// Takes note that the viewer has decoded so many frames in all; from then on it is sent new
+    /// ones only as it gets on with them. `false` where the number is more than were sent, or no more
+    /// than before.
+    pub(super) fn acknowledge(&self, frames: u64) -> bool {
+        let done = lock(&self.outbox).acknowledge(frames);
+        self.wake.notify_one();
+        done
     }
 
     fn put(&self, change: impl FnOnce(&mut Outbox)) {
@@ -137,8 +264,12 @@ struct Counters {
 
 #[derive(Default)]
 struct View {
+    /// What is newer than the last frame.
     waiting: Option<Encode>,
-    frame: Option<Arc<Frame>>,
+    /// What the last frame was made of.
+    newest: Option<Encode>,
+    /// Somebody cannot go on without a key frame.
+    key_wanted: bool,
 }
 
 /// The viewers, and the newest message of each kind for them.
@@ -289,14 +420,14 @@ impl Hub {
     pub(super) fn encode_until_closed(&self) {
         loop {
             let mut state = lock(&self.state);
-            let (view, encode) = loop {
+            let (view, encode, key) = loop {
                 if state.closed {
                     return;
                 }
                 let watched = !state.clients.is_empty();
-                let waiting = state.views.iter_mut().enumerate().find_map(|(index, view)| {
-                    if watched { view.waiting.take().map(|encode| (index, encode)) } else { None }
-                });
+                let mut views = state.views.iter_mut().enumerate();
+                let waiting =
+                    if watched { views.find_map(|(index, view)| view.due(index)) } else { None };
                 match waiting {
                     Some(found) => break found,
                     None => state = wait(&self.work, state),
@@ -304,10 +435,10 @@ impl Hub {
             };
             drop(state);
             // A frame that cannot be encoded must not take the others with it.
-            let encoded = std::panic::catch_unwind(std::panic::AssertUnwindSafe(encode))
+            let encoded = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| encode(key)))
                 .unwrap_or_else(|_| Err("the encoder failed".into()));
             match encoded {
-                Ok(frame) => self.publish(view, Arc::new(frame)),
+                Ok(encoded) => self.publish(view, &Arc::new(Frame::new(encoded))),
                 Err(reason) => self.tell(
                     &json!({"error": {"message": format!("a frame was not encoded: {reason}")}}),
                 ),
@@ -315,18 +446,26 @@ impl Hub {
         }
     }
 
-    fn publish(&self, view: usize, frame: Arc<Frame>) {
-        let mut state = lock(&self.state);
-        for client in state.clients.values() {
+    fn publish(&self, view: usize, frame: &Arc<Frame>) {
+        for client in lock(&self.state).clients.values() {
             client.put(|outbox| {
-                if outbox.frames.insert(view, Arc::clone(&frame)).is_some() {
-                    self.counters.dropped.fetch_add(1, Ordering::Relaxed);
-                }
+                let missed = outbox.views.entry(view).or_default().put(frame);
+                self.counters.dropped.fetch_add(missed as u64, Ordering::Relaxed);
             });
         }
-        if let Some(view) = state.views.get_mut(view) {
-            view.frame = Some(frame);
+    }
+}
+
+impl View {
+    /// What is to be encoded, and whether as a key frame.
+    fn due(&mut self, index: usize) -> Option<(usize, Encode, bool)> {
+        if let Some(waiting) = self.waiting.take() {
+            self.newest = Some(waiting);
+        } else if !self.key_wanted {
+            return None;
         }
+        let key = std::mem::take(&mut self.key_wanted);
+        self.newest.clone().map(|encode| (index, encode, key))
     }
 }
 
@@ -354,10 +493,8 @@ impl Hub {
         {
             let mut outbox = lock(&client.outbox);
             outbox.hello = true;
-            for (index, view) in state.views.iter().enumerate() {
-                if let Some(frame) = &view.frame {
-                    outbox.frames.insert(index, Arc::clone(frame));
-                }
+            for index in 0..state.views.len() {
+                outbox.views.insert(index, Unread { is_behind: true, ..Unread::default() });
             }
         }
         state.clients.insert(client.id, Arc::clone(&client));
@@ -366,6 +503,14 @@ impl Hub {
         drop(state);
         self.work.notify_one();
         Some(client)
+    }
+
+    /// Has the encoder make a key frame of a view, of its newest extract.
+    pub(super) fn want_key(&self, view: usize) {
+        if let Some(view) = lock(&self.state).views.get_mut(view) {
+            view.key_wanted = true;
+        }
+        self.work.notify_one();
     }
 
     pub(super) fn leave(&self, client: u64) {
@@ -465,7 +610,7 @@ impl Hub {
     pub(super) fn sent(&self, bytes: usize, frame: &Frame) {
         self.counters.frames.fetch_add(1, Ordering::Relaxed);
         self.counters.bytes.fetch_add(bytes as u64, Ordering::Relaxed);
-        self.counters.raw_bytes.fetch_add(frame.raw_bytes, Ordering::Relaxed);
+        self.counters.raw_bytes.fetch_add(frame.encoded.raw_bytes as u64, Ordering::Relaxed);
     }
 }
 

@@ -45,7 +45,7 @@ use tombolo_pipelines::{
     limits::DOCUMENT,
 };
 
-pub(crate) use hub::{Frame, Hub};
+pub(crate) use hub::Hub;
 pub(crate) use surface::ReferenceSurface;
 pub use token::Token;
 

@@ -67,20 +67,20 @@ async fn write(
                 if topologies.len() <= view {
                     topologies.resize(view + 1, None);
                 }
-                let mut bytes = frame.data.len();
-                let mut written = Ok(());
-                if topologies[view] != Some(frame.topology_id) {
-                    bytes += frame.topology.len();
-                    written = sink.send(Wire::Binary(frame.topology.clone())).await;
-                    topologies[view] = Some(frame.topology_id);
-                }
-                if written.is_ok() {
-                    written = sink.send(Wire::Binary(frame.data.clone())).await;
-                }
+                // One that goes on from another follows a frame of the same topology.
+                let topology = Some(frame.topology_id());
+                let is_known = std::mem::replace(&mut topologies[view], topology) == topology;
+                let message = if is_known { frame.message.clone() } else { frame.with_topology() };
+                let bytes = message.len();
+                let written = sink.send(Wire::Binary(message)).await;
                 if written.is_ok() {
                     hub.sent(bytes, &frame);
                 }
                 written
+            }
+            Ok(Some(Message::Behind(view))) => {
+                hub.want_key(view);
+                Ok(())
             }
             Ok(None) => {
                 tokio::select! {
@@ -113,13 +113,20 @@ async fn read(
         let answer = match message {
             Wire::Close(_) => return,
             Wire::Ping(_) | Wire::Pong(_) => continue,
+            // Not counted: there is no more of it than there are frames.
+            Wire::Binary(bytes) if acknowledged(&bytes, client) => continue,
             message if !allowance.take(bytes(&message)) => {
                 // Waiting here leaves the rest in the viewer's own socket.
                 tokio::time::sleep(Duration::from_secs(1)).await;
                 Err((None, format!("more than {RATE} messages a second; this one was not read")))
             }
             Wire::Text(text) => receive(&text, client, hub, commands),
-            Wire::Binary(_) => Err((None, "a binary message; commands are JSON text".into())),
+            Wire::Binary(_) => Err((
+                None,
+                "a binary message that is not the number of frames decoded, 8 bytes, more than \
+                 before and no more than were sent; commands are JSON text"
+                    .into(),
+            )),
         };
         if let Err((id, message)) = answer {
             let error = json!({"error": {"message": message, "id": id}});
@@ -151,6 +158,12 @@ fn receive(
         Err(error) => Err(error.to_string()),
     };
     answered.map_err(|reason| (id, reason))
+}
+
+/// Whether this is the number of frames that the viewer has decoded.
+fn acknowledged(bytes: &[u8], client: &Client) -> bool {
+    let count = bytes.try_into().map(u64::from_le_bytes);
+    count.is_ok_and(|count| client.acknowledge(count))
 }
 
 fn bytes(message: &Wire) -> usize {

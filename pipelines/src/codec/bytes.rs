@@ -4,7 +4,7 @@ use super::CodecError;
 
 /// A whole number in as few bytes as it needs, seven bits in each, the lowest first.
 #[expect(clippy::cast_possible_truncation, reason = "seven bits at a time")]
-pub(super) fn put_count(out: &mut Vec<u8>, mut value: usize) {
+pub(crate) fn put_count(out: &mut Vec<u8>, mut value: usize) {
     while value >= 0x80 {
         out.push(value as u8 | 0x80);
         value >>= 7;
@@ -13,43 +13,43 @@ pub(super) fn put_count(out: &mut Vec<u8>, mut value: usize) {
 }
 
 /// A list of bytes, its length first.
-pub(super) fn put_block(out: &mut Vec<u8>, bytes: &[u8]) {
+pub(crate) fn put_block(out: &mut Vec<u8>, bytes: &[u8]) {
     put_count(out, bytes.len());
     out.extend(bytes);
 }
 
 /// The next bytes of a message.
 #[derive(Debug, Clone)]
-pub(super) struct Input<'bytes>(pub(super) &'bytes [u8]);
+pub(crate) struct Input<'bytes>(pub(crate) &'bytes [u8]);
 
 impl<'bytes> Input<'bytes> {
-    pub(super) fn take(&mut self, count: usize) -> Result<&'bytes [u8], CodecError> {
+    pub(crate) fn take(&mut self, count: usize) -> Result<&'bytes [u8], CodecError> {
         let (taken, rest) = self.0.split_at_checked(count).ok_or(CodecError::Truncated)?;
         self.0 = rest;
         Ok(taken)
     }
 
-    pub(super) fn array<const N: usize>(&mut self) -> Result<[u8; N], CodecError> {
+    pub(crate) fn array<const N: usize>(&mut self) -> Result<[u8; N], CodecError> {
         let (taken, rest) = self.0.split_first_chunk().ok_or(CodecError::Truncated)?;
         self.0 = rest;
         Ok(*taken)
     }
 
-    pub(super) fn byte(&mut self) -> Result<u8, CodecError> {
+    pub(crate) fn byte(&mut self) -> Result<u8, CodecError> {
         self.array().map(|[byte]| byte)
     }
 
-    pub(super) fn double(&mut self) -> Result<f64, CodecError> {
+    pub(crate) fn double(&mut self) -> Result<f64, CodecError> {
         self.array().map(f64::from_le_bytes)
     }
 
-    pub(super) fn doubles(&mut self, count: usize) -> Result<Vec<f64>, CodecError> {
+    pub(crate) fn doubles(&mut self, count: usize) -> Result<Vec<f64>, CodecError> {
         let bytes = self.take(count.saturating_mul(8))?;
         Ok(bytes.as_chunks().0.iter().map(|&bytes| f64::from_le_bytes(bytes)).collect())
     }
 
     /// A whole number below 2³⁵.
-    pub(super) fn count(&mut self) -> Result<usize, CodecError> {
+    pub(crate) fn count(&mut self) -> Result<usize, CodecError> {
         let mut value = 0u64;
         for shift in (0..35).step_by(7) {
             let byte = self.byte()?;
@@ -62,7 +62,7 @@ impl<'bytes> Input<'bytes> {
         Err(CodecError::Damaged("a count is too large"))
     }
 
-    pub(super) fn block(&mut self) -> Result<&'bytes [u8], CodecError> {
+    pub(crate) fn block(&mut self) -> Result<&'bytes [u8], CodecError> {
         let length = self.count()?;
         self.take(length)
     }

@@ -17,7 +17,7 @@
 //! `docs/codec.md` says it all again for whoever writes another decoder.
 
 mod bits;
-mod bytes;
+pub(crate) mod bytes;
 mod cells;
 mod connectivity;
 mod error;

@@ -103,7 +103,7 @@ fn check(bytes: Vec<u8>, expected: usize) -> Result<Vec<u8>, String> {
         return Ok(bytes);
     }
     let found = if bytes.len() > expected { "more".to_owned() } else { bytes.len().to_string() };
-    Err(format!("{found} bytes where the header says {expected}"))
+    Err(format!("{found} bytes where the message says {expected}"))
 }
 
 #[cfg(test)]

@@ -1,18 +1,16 @@
-//! Frames for viewers: an extract as few bytes, each number within a stated error, and back.
+//! Frames for viewers: an extract in few bytes, each number within a stated error, and back.
 //!
-//! A frame is `TMBL`, version 1, kind (1 topology, 2 data, 3 reference surface), two zero bytes,
-//! the length of a JSON header (32 bits, little endian), the header, and one blob for each of its
-//! arrays, each a zstd frame of its own. A value is `offset + quantum * integer`; the integers
-//! stand component after component, each as the zigzag of its difference to the one before (with
-//! wrap-around in the array's type). Arrays of type `f32` and `f64` hold the values themselves.
+//! A view is a chain of frames. The first of a chain, a key frame, can be read by whoever has the
+//! view's topology, or has it sent along; each later one goes on from the frame before it. Cells,
+//! positions and fields are coded by [`codec`](crate::codec); `docs/protocol.md` says how a frame is
+//! laid out.
 //!
-//! Without the feature `compression` the blobs are zstd frames that hold their bytes as they are;
-//! compressed ones are read with the feature `decompression`, which is written in Rust alone.
+//! The surface that shapes are measured from is sent bit for bit, by [`encode_surface`].
 //!
 //! ```
 //! use std::sync::Arc;
 //! use tombolo_deform::mesh::{CellType, Cells};
-//! use tombolo_pipelines::encode::{Decoded, decode, encode};
+//! use tombolo_pipelines::encode::{Decoder, Encoder};
 //! use tombolo_pipelines::extract::Extract;
 //! use tombolo_pipelines::run::{Encoding, Frame};
 //!
@@ -24,21 +22,22 @@
 //!     fields: vec![],
 //! };
 //! let frame = Frame { pipeline: "surface".into(), cycle: 7, time: 0.7, extract: extract.into(), encoding: Encoding::default() };
-//! let encoded = encode(&frame)?;
-//! let Decoded::Data(data) = decode(&encoded.data)? else { panic!() };
-//! assert_eq!((data.cycle, data.points.len()), (7, 3));
+//! let encoded = Encoder::new().encode(&frame, false)?;
+//! let decoded = Decoder::new().decode(&encoded.with_topology())?;
+//! assert_eq!((decoded.cycle, decoded.points.len()), (7, 3));
+//! assert!(decoded.cells.is_some());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod arrays;
 mod blob;
-mod decode;
+mod decoder;
+mod elements;
 mod encoder;
-mod quantize;
+mod error;
+mod layout;
 mod surface;
-mod wire;
 
-pub use arrays::DecodeError;
-pub use decode::{DataFrame, Decoded, TopologyFrame, decode};
-pub use encoder::{EncodeError, Encoded, Encoder, encode};
-pub use surface::encode_surface;
+pub use decoder::{DecodedCells, DecodedFrame, Decoder};
+pub use encoder::{Encoded, Encoder};
+pub use error::{DecodeError, EncodeError};
+pub use surface::{decode_surface, encode_surface};

@@ -1,14 +1,18 @@
-//! A reference surface as a frame: every bit of it, so that edits of the copy give what edits of
+//! A reference surface as a message: every bit of it, so that edits of the copy give what edits of
 //! the original give.
 
 use tombolo_deform::mesh::{CellType, Cells};
 use tombolo_deform::surface::Surface;
 
-use super::arrays::{DecodeError, error, unpacked, values};
-use super::encoder::{EncodeError, Message, TOPOLOGY_LEVEL};
-use super::wire::{SURFACE, SurfaceHeader, integers};
-use crate::extract::Association;
-use crate::language::ErrorBound;
+use super::blob::{MOST_BYTES, compress, decompress};
+use super::error::{DecodeError, EncodeError, error};
+use super::layout::{Kind, name, open, preamble, put_name};
+use crate::codec::bytes::{Input, put_block, put_count};
+
+/// zstd's level: a surface is sent once.
+const LEVEL: i32 = 3;
+/// The most features of a surface.
+const MOST_FEATURES: usize = 1 << 16;
 
 /// Encodes a surface without loss: points in double precision, mesh vertex numbers, faces and
 /// features. About 32 bytes a vertex.
@@ -18,10 +22,10 @@ use crate::language::ErrorBound;
 ///
 /// ```
 /// use tombolo_deform::{shapes, features::FeatureSettings, surface::Surface};
-/// use tombolo_pipelines::encode::{Decoded, decode, encode_surface};
+/// use tombolo_pipelines::encode::{decode_surface, encode_surface};
 ///
 /// let surface = Surface::extract(&shapes::box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]), &FeatureSettings::default())?;
-/// let Decoded::Surface(copy) = decode(&encode_surface(&surface)?)? else { panic!() };
+/// let copy = decode_surface(&encode_surface(&surface)?)?;
 /// assert_eq!((copy.points(), copy.vertices(), copy.faces()), (surface.points(), surface.vertices(), surface.faces()));
 /// assert_eq!(copy.features(), surface.features());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -30,48 +34,97 @@ pub fn encode_surface(surface: &Surface) -> Result<Vec<u8>, EncodeError> {
     let (faces, features) = (surface.faces(), surface.features());
     #[expect(clippy::cast_possible_truncation, reason = "a face has fewer vertices than the mesh")]
     let sizes: Vec<u32> = faces.iter().map(|(_, corners)| corners.len() as u32).collect();
-    let mut message = Message::new(TOPOLOGY_LEVEL);
+    let mut message = preamble(Kind::Surface).to_vec();
+    put_count(&mut message, features.names().len());
+    features.names().iter().for_each(|name| put_name(&mut message, name));
     let points = surface.points().as_flattened();
-    message.values("points", Association::Vertex, points, 3, ErrorBound::Lossless, 0.0)?;
-    message.integers("vertices", surface.vertices(), 1)?;
-    message.integers("face_sizes", &sizes, 1)?;
-    message.integers("face_points", faces.connectivity(), 1)?;
-    message.integers("face_features", features.face_features(), 1)?;
-    message.finish(SURFACE, |arrays| {
-        serde_json::to_vec(&SurfaceHeader { features: features.names().to_vec(), arrays })
-    })
+    let axis = |axis: usize| points.iter().skip(axis).step_by(3);
+    let coordinates: Vec<u8> =
+        (0..3).flat_map(axis).flat_map(|coordinate| coordinate.to_le_bytes()).collect();
+    put_count(&mut message, surface.points().len());
+    put_block(&mut message, &compress(&coordinates, LEVEL)?);
+    for numbers in [surface.vertices(), &sizes, faces.connectivity(), features.face_features()] {
+        put_count(&mut message, numbers.len());
+        put_block(&mut message, &compress(&differences(numbers), LEVEL)?);
+    }
+    Ok(message)
 }
 
-pub(super) fn decode(header: SurfaceHeader, blobs: &[u8]) -> Result<Surface, DecodeError> {
-    let mut points = Vec::new();
-    let [mut vertices, mut sizes, mut corners, mut features] = [const { Vec::new() }; 4];
-    for (array, bytes) in unpacked(header.arrays, blobs)? {
-        let part = format!("array `{:.60}`", array.name);
-        let (target, components) = match array.name.as_str() {
-            "points" => (None, 3),
-            "vertices" => (Some(&mut vertices), 1),
-            "face_sizes" => (Some(&mut sizes), 1),
-            "face_points" => (Some(&mut corners), 1),
-            "face_features" => (Some(&mut features), 1),
-            _ => continue,
-        };
-        if array.components != components {
-            return Err(error(
-                part,
-                format!("{} components, expected {components}", array.components),
-            ));
-        }
-        match target {
-            Some(target) => {
-                *target = integers(&bytes, array.kind, array.filter)
-                    .ok_or_else(|| error(part, "expected integers"))?;
-            }
-            None => points = values(&array, &bytes)?.as_chunks().0.to_vec(),
-        }
+/// Decodes a surface. Any bytes are answered with a surface or an error, and no more memory is
+/// taken than the arrays need that the message says it holds, at most 1 GiB.
+///
+/// # Errors
+/// [`DecodeError`].
+pub fn decode_surface(message: &[u8]) -> Result<Surface, DecodeError> {
+    let (kind, mut input) = open(message)?;
+    if kind != Kind::Surface {
+        return Err(error("preamble", "the message holds a frame, expected a surface"));
     }
-    let faces = faces(&sizes, &corners).map_err(|message| error("array `face_sizes`", message))?;
-    Surface::from_faces(points, vertices, faces, header.features, features)
+    let count = input.count().map_err(|failure| error("features", failure.to_string()))?;
+    if count > MOST_FEATURES {
+        return Err(error("features", format!("{count}, expected at most {MOST_FEATURES}")));
+    }
+    let mut names = Vec::new();
+    for _ in 0..count {
+        names.push(name(&mut input, "features")?);
+    }
+    let mut room = MOST_BYTES;
+    let mut bytes = |part: &str, size: usize| array(&mut input, part, size, &mut room);
+    let coordinates = bytes("points", 24)?;
+    let points = coordinates.len() / 24;
+    let coordinate = |index: usize| {
+        let (axis, point) = (index % 3, index / 3);
+        let start = (axis * points + point) * 8;
+        coordinates[start..].first_chunk().map_or(0.0, |bytes| f64::from_le_bytes(*bytes))
+    };
+    let coordinates: Vec<f64> = (0..3 * points).map(coordinate).collect();
+    let mut numbers = |part: &str| bytes(part, 4).map(|bytes| sums(&bytes));
+    let (vertices, sizes) = (numbers("vertices")?, numbers("face sizes")?);
+    let (corners, features) = (numbers("face points")?, numbers("face features")?);
+    if !input.0.is_empty() {
+        return Err(error("arrays", format!("{} bytes after the last one", input.0.len())));
+    }
+    let faces = faces(&sizes, &corners).map_err(|message| error("face sizes", message))?;
+    Surface::from_faces(coordinates.as_chunks().0.to_vec(), vertices, faces, names, features)
         .map_err(|failure| error("arrays", failure.to_string()))
+}
+
+/// An array's bytes, of so many for each entry.
+fn array(
+    input: &mut Input<'_>,
+    part: &str,
+    size: usize,
+    room: &mut usize,
+) -> Result<Vec<u8>, DecodeError> {
+    let wrong = |message: String| error(part, message);
+    let count = input.count().map_err(|failure| wrong(failure.to_string()))?;
+    let blob = input.block().map_err(|failure| wrong(failure.to_string()))?;
+    let bytes = count.checked_mul(size).filter(|bytes| bytes <= room);
+    let bytes = bytes.ok_or_else(|| wrong(format!("more than {MOST_BYTES} bytes in all")))?;
+    *room -= bytes;
+    decompress(blob, bytes).map_err(wrong)
+}
+
+/// Each number as the zigzag of its difference to the one before.
+fn differences(numbers: &[u32]) -> Vec<u8> {
+    let mut previous = 0u32;
+    let difference = |&number: &u32| {
+        let difference =
+            number.wrapping_sub(std::mem::replace(&mut previous, number)).cast_signed();
+        (difference << 1 ^ difference >> 31).to_le_bytes()
+    };
+    numbers.iter().flat_map(difference).collect()
+}
+
+/// The numbers behind [`differences`].
+fn sums(bytes: &[u8]) -> Vec<u32> {
+    let mut number = 0u32;
+    let sum = |&bytes: &[u8; 4]| {
+        let zigzag = u32::from_le_bytes(bytes);
+        number = number.wrapping_add(zigzag >> 1 ^ (zigzag & 1).wrapping_neg());
+        number
+    };
+    bytes.as_chunks().0.iter().map(sum).collect()
 }
 
 /// Faces from the number of points of each, and all their points.
@@ -79,7 +132,7 @@ fn faces(sizes: &[u32], mut corners: &[u32]) -> Result<Cells, String> {
     let mut faces = Cells::new();
     for &size in sizes {
         let (face, rest) =
-            corners.split_at_checked(size as usize).ok_or("more points than `face_points` has")?;
+            corners.split_at_checked(size as usize).ok_or("more points than the faces have")?;
         corners = rest;
         let cell_type = match size {
             3 => CellType::Triangle,
@@ -91,7 +144,7 @@ fn faces(sizes: &[u32], mut corners: &[u32]) -> Result<Cells, String> {
     if corners.is_empty() {
         Ok(faces)
     } else {
-        Err(format!("fewer points than `face_points`, by {}", corners.len()))
+        Err(format!("fewer points than the faces have, by {}", corners.len()))
     }
 }
 
@@ -100,7 +153,6 @@ mod tests {
     use tombolo_deform::mesh::{FeatureSource, Mesh};
     use tombolo_deform::{features::FeatureSettings, shapes};
 
-    use super::super::{Decoded, decode};
     use super::*;
 
     /// Triangles, a quadrilateral and a pentagon; a vertex of the mesh that is not on the surface.
@@ -126,9 +178,7 @@ mod tests {
     fn every_bit_comes_back() {
         let box_ = shapes::box_of_tets([5, 4, 3], [0.0; 3], [1.0, 0.3, 0.7]);
         for surface in [mixed(), Surface::extract(&box_, &FeatureSettings::default()).unwrap()] {
-            let Decoded::Surface(copy) = decode(&encode_surface(&surface).unwrap()).unwrap() else {
-                panic!()
-            };
+            let copy = decode_surface(&encode_surface(&surface).unwrap()).unwrap();
             let bits = |surface: &Surface| -> Vec<u64> {
                 surface.points().as_flattened().iter().map(|value| value.to_bits()).collect()
             };
@@ -145,16 +195,15 @@ mod tests {
     #[test]
     fn damaged_surfaces_are_errors() {
         let bytes = encode_surface(&mixed()).unwrap();
-        let sound = decode(&bytes).unwrap();
         for length in 0..bytes.len() {
-            assert!(decode(&bytes[..length]).is_err(), "cut to {length} bytes");
+            assert!(decode_surface(&bytes[..length]).is_err(), "cut to {length} bytes");
         }
         for byte in 0..bytes.len() {
             for bit in 0..8 {
                 let mut damaged = bytes.clone();
                 damaged[byte] ^= 1 << bit;
                 // Whatever it says: no panic, and nothing that is no surface.
-                if let Ok(Decoded::Surface(surface)) = decode(&damaged) {
+                if let Ok(surface) = decode_surface(&damaged) {
                     assert!(
                         surface
                             .triangles()
@@ -165,7 +214,6 @@ mod tests {
                 }
             }
         }
-        assert!(matches!(sound, Decoded::Surface(_)));
         let wrong = |sizes: &[u32], corners: &[u32]| faces(sizes, corners).unwrap_err();
         assert!(wrong(&[3, 4], &[0, 1, 2, 0]).contains("more points"));
         assert!(wrong(&[3], &[0, 1, 2, 3]).contains("fewer points"));

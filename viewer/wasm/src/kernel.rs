@@ -8,7 +8,8 @@ use tombolo_deform::edit::{Edit, EditError, Editor};
 use tombolo_deform::mesh::{CellType, Cells, Vector};
 use tombolo_deform::skeleton::SkeletonError;
 use tombolo_deform::surface::{Surface, SurfaceError};
-use tombolo_pipelines::encode::{DecodeError, Decoded, decode};
+use tombolo_pipelines::encode::{DecodeError, DecodedFrame, Decoder, decode_surface};
+use tombolo_pipelines::extract::Field;
 
 use crate::Array;
 
@@ -19,6 +20,7 @@ pub struct Kernel {
     answer: Vec<Array>,
     surfaces: BTreeMap<u32, Open>,
     opened: u32,
+    decoder: Decoder,
 }
 
 /// A surface that is open.
@@ -48,14 +50,6 @@ pub enum Failure {
     /// A frame that cannot be read (`frame`).
     #[error(transparent)]
     Frame(#[from] DecodeError),
-    /// A frame of another kind than was asked for (`frame`).
-    #[error("the frame holds {found}, expected {expected}")]
-    Kind {
-        /// The kind that it holds.
-        found: &'static str,
-        /// The kind that was asked for.
-        expected: &'static str,
-    },
     /// Arrays that make no surface, or one that cannot be edited (`surface`).
     #[error(transparent)]
     Surface(#[from] SurfaceError),
@@ -75,7 +69,7 @@ impl Failure {
             Failure::Handle(_) => "handle",
             Failure::Input { .. } => "input",
             Failure::Json(_) => "json",
-            Failure::Frame(_) | Failure::Kind { .. } => "frame",
+            Failure::Frame(_) => "frame",
             Failure::Surface(_) => "surface",
             Failure::Edit(_) => "edit",
             Failure::Skeleton(_) => "skeleton",
@@ -87,7 +81,13 @@ impl Kernel {
     /// A kernel with no surface open.
     #[must_use]
     pub const fn new() -> Self {
-        Self { input: Vec::new(), answer: Vec::new(), surfaces: BTreeMap::new(), opened: 0 }
+        Self {
+            input: Vec::new(),
+            answer: Vec::new(),
+            surfaces: BTreeMap::new(),
+            opened: 0,
+            decoder: Decoder::new(),
+        }
     }
 
     /// Room for the next input; `None` where there is not so much memory.
@@ -106,10 +106,7 @@ impl Kernel {
 
     /// Opens the surface of a frame: [`open_surface`](crate::open_surface).
     pub fn open_surface(&mut self) -> u32 {
-        self.open(|input| match decode(input)? {
-            Decoded::Surface(surface) => Ok(*surface),
-            other => Err(Failure::Kind { found: contents(&other), expected: "a surface" }),
-        })
+        self.open(|input| Ok(decode_surface(input)?))
     }
 
     /// Opens the surface of arrays: [`create_surface`](crate::create_surface).
@@ -227,36 +224,8 @@ impl Kernel {
     /// Answers with the header and the arrays of a frame: [`decode_frame`](crate::decode_frame).
     pub fn decode_frame(&mut self) -> bool {
         let input = std::mem::take(&mut self.input);
-        let answer = decode(&input).map_err(Failure::from).and_then(|decoded| match decoded {
-            Decoded::Topology(frame) => {
-                let names = ["triangles", "lines", "triangle_features"];
-                let names = &names[..2 + usize::from(frame.triangle_features.is_some())];
-                let header = json!({
-                    "kind": "topology", "view": frame.view, "topology": frame.topology, "points": frame.points,
-                    "arrays": names,
-                });
-                let lines = frame.lines.into_flattened();
-                let mut arrays = vec![Array::Text(header.to_string()), Array::Triangles(frame.triangles), Array::Numbers(lines)];
-                arrays.extend(frame.triangle_features.map(Array::Numbers));
-                Ok(arrays)
-            }
-            Decoded::Data(frame) => {
-                let fields: Vec<_> = frame
-                    .fields
-                    .iter()
-                    .map(|field| json!({"name": field.name, "association": field.association, "components": field.components}))
-                    .collect();
-                let header = json!({
-                    "kind": "data", "view": frame.view, "topology": frame.topology, "cycle": frame.cycle, "time": frame.time,
-                    "fields": fields,
-                });
-                let mut arrays = vec![Array::Text(header.to_string()), singles(frame.points.as_flattened())];
-                arrays.extend(frame.fields.iter().map(|field| singles(&field.values)));
-                Ok(arrays)
-            }
-            other => Err(Failure::Kind { found: contents(&other), expected: "a topology or data" }),
-        });
-        self.settle(answer)
+        let frame = self.decoder.decode(&input).map_err(Failure::from);
+        self.settle(frame.map(arrays))
     }
 
     fn surface(&mut self, surface: u32) -> Result<&mut Open, Failure> {
@@ -272,12 +241,24 @@ impl Kernel {
     }
 }
 
-fn contents(decoded: &Decoded) -> &'static str {
-    match decoded {
-        Decoded::Topology(_) => "a topology",
-        Decoded::Data(_) => "data",
-        Decoded::Surface(_) => "a surface",
+/// The header of a frame, its points and fields, and its cells where it brought them.
+fn arrays(frame: DecodedFrame) -> Vec<Array> {
+    let field = |field: &Field| json!({"name": field.name, "association": field.association, "components": field.components});
+    let cells = frame.cells.as_ref();
+    let header = json!({
+        "view": frame.view, "topology": format!("{:016x}", frame.topology),
+        "cycle": frame.cycle, "time": frame.time, "points": frame.points.len(),
+        "fields": frame.fields.iter().map(field).collect::<Vec<_>>(),
+        "cells": cells.is_some(), "features": cells.is_some_and(|cells| cells.triangle_features.is_some()),
+    });
+    let mut arrays = vec![Array::Text(header.to_string()), singles(frame.points.as_flattened())];
+    arrays.extend(frame.fields.iter().map(|field| singles(&field.values)));
+    if let Some(cells) = frame.cells {
+        arrays.push(Array::Triangles(cells.triangles));
+        arrays.push(Array::Numbers(cells.lines.into_flattened()));
+        arrays.extend(cells.triangle_features.map(Array::Numbers));
     }
+    arrays
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "this is what is drawn")]

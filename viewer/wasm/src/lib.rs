@@ -8,14 +8,14 @@
 //!
 //! | export | input | returns | arrays |
 //! |---|---|---|---|
-//! | [`open_surface`] | a frame of kind 3 | a surface, from 1 | |
+//! | [`open_surface`] | a surface's message | a surface, from 1 | |
 //! | [`create_surface`] | see there | a surface, from 1 | |
 //! | [`close_surface`] | | | |
 //! | [`describe_surface`] | | 1 | points `f64`, triangles `u32`, the feature of each triangle `u32`, mesh vertices `u32`, names of features (JSON) |
 //! | [`displacement`] | a stack of edits (JSON) | 1 | the displacement of each vertex `f64` |
 //! | [`check`] | | 1 | what is wrong with the shape of the last displacement (a line, empty where it is sound), the first triangles at fault `u32` |
 //! | [`skeleton`] | | 1 | nodes `f64`, the number of nodes of each curve `u32`, their nodes `u32`, the node of each vertex `u32` |
-//! | [`decode_frame`] | a frame of kind 1 or 2 | 1 | its header (JSON), then the arrays that it names |
+//! | [`decode_frame`] | the next frame of a view | 1 | its header (JSON), points `f32`, each field `f32`; where it brought cells: triangles `u32`, lines `u32`, the feature of each triangle `u32` |
 //! | [`rehearse`] | | | |
 //!
 //! Nothing here panics on any input. Should the kernel do so all the same, the module traps: its
@@ -53,7 +53,7 @@ pub extern "C" fn input(bytes: usize) -> *mut u8 {
     lock(&KERNEL).input(bytes).map_or(std::ptr::null_mut(), <[u8]>::as_mut_ptr)
 }
 
-/// Opens the surface of a frame of kind 3. Returns its number, 0 where there is none.
+/// Opens the surface of a message. Returns its number, 0 where there is none.
 #[unsafe(no_mangle)]
 pub extern "C" fn open_surface() -> u32 {
     lock(&KERNEL).open_surface()
@@ -99,8 +99,8 @@ pub extern "C" fn skeleton(surface: u32) -> u32 {
     lock(&KERNEL).skeleton(surface).into()
 }
 
-/// The header and the arrays of a frame: integers as they were before they were packed, all other
-/// values as they are drawn, in single precision; tuple after tuple.
+/// The header and the arrays of the next frame of a view, in single precision, as they are drawn;
+/// tuple after tuple. What is known of a view is kept for its frames to come.
 #[unsafe(no_mangle)]
 pub extern "C" fn decode_frame() -> u32 {
     lock(&KERNEL).decode_frame().into()

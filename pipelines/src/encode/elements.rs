@@ -1,0 +1,63 @@
+//! The triangles and lines of an extract's cells.
+
+use tombolo_deform::mesh::CellType;
+
+use super::error::EncodeError;
+use crate::extract::Extract;
+
+/// What a viewer draws of an extract.
+#[derive(Debug, Default)]
+pub(super) struct Elements {
+    pub(super) triangles: Vec<[u32; 3]>,
+    pub(super) lines: Vec<[u32; 2]>,
+    /// The cell that each triangle is part of.
+    pub(super) triangle_cells: Vec<u32>,
+    /// The cell that each line is part of.
+    pub(super) line_cells: Vec<u32>,
+}
+
+impl Elements {
+    pub(super) fn of(extract: &Extract) -> Result<Self, EncodeError> {
+        let mut elements = Self::default();
+        let Self { triangles, lines, triangle_cells, line_cells } = &mut elements;
+        for (cell, (cell_type, points)) in extract.cells.iter().enumerate() {
+            match (cell_type, points) {
+                (CellType::Vertex | CellType::PolyVertex, _) => {}
+                (CellType::Line | CellType::PolyLine, _) => {
+                    lines.extend(points.windows(2).map(|line| [line[0], line[1]]))
+                }
+                (CellType::Pixel, &[a, b, c, d]) => triangles.extend([[a, b, d], [a, d, c]]),
+                (CellType::TriangleStrip, _) => {
+                    for (index, strip) in points.windows(3).enumerate() {
+                        let odd = index % 2 == 1;
+                        triangles.push(if odd {
+                            [strip[1], strip[0], strip[2]]
+                        } else {
+                            [strip[0], strip[1], strip[2]]
+                        });
+                    }
+                }
+                (
+                    CellType::Triangle | CellType::Quad | CellType::Polygon,
+                    &[first, ref rest @ ..],
+                ) => {
+                    triangles.extend(rest.windows(2).map(|edge| [first, edge[0], edge[1]]));
+                }
+                _ => return Err(EncodeError::VolumeCell { cell, cell_type }),
+            }
+            #[expect(clippy::cast_possible_truncation, reason = "cells are numbered with 32 bits")]
+            let cell = cell as u32;
+            triangle_cells.resize(triangles.len(), cell);
+            line_cells.resize(lines.len(), cell);
+        }
+        Ok(elements)
+    }
+
+    /// The feature of each triangle, where the extract knows features.
+    pub(super) fn features(&self, extract: &Extract) -> Option<Vec<u32>> {
+        extract.features.as_ref().map(|features| {
+            let feature = |&cell: &u32| features.of_cells.get(cell as usize).copied().unwrap_or(0);
+            self.triangle_cells.iter().map(feature).collect()
+        })
+    }
+}
