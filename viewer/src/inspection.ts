@@ -31,8 +31,6 @@ export interface Inspection {
   readonly cycle: number | null;
   /** Data frames taken since the page was opened. */
   readonly frames: number;
-  /** Frames left out because a newer one of the same view was there. */
-  readonly dropped: number;
   readonly views: Readonly<Record<string, ViewInspection>>;
   /** Orders by the time they became known, with their state and reason. */
   readonly orders: readonly OrderRecord[];
