@@ -13,6 +13,7 @@ use std::hash::{BuildHasherDefault, Hasher};
 use tombolo_deform::mesh::{CellType, Cells, MeshError, Vector};
 use tombolo_deform::vector::{add, cross, dot, subtract};
 
+use super::blocks::Blocks;
 use super::function::Samples;
 use super::gather::Crossing;
 
@@ -35,8 +36,10 @@ pub(super) struct Cut {
 ///
 /// There are `layers` functions, one after the other; `sample` gives the values of one. Cells for
 /// which `counts` does not hold are passed over, and those with a vertex at which it is NaN.
+/// `blocks` are those of the cells.
 pub(super) fn cut(
     cells: &Cells,
+    blocks: &Blocks,
     points: &[Vector],
     layers: usize,
     sample: &dyn Fn(usize) -> Samples,
@@ -57,15 +60,17 @@ pub(super) fn cut(
             directions: Vec::new(),
             cut,
         };
-        for cell in 0..cells.len() {
-            let vertices = cells.vertices(cell);
-            let (mut some, mut all) = (0, BEHIND | AHEAD | NOWHERE);
-            for &vertex in vertices {
-                some |= sides[vertex as usize];
-                all &= sides[vertex as usize];
+        let sides_of = |vertices: &[u32]| {
+            vertices.iter().fold(0, |sides_of, &vertex| sides_of | sides[vertex as usize])
+        };
+        for (block, vertices) in blocks.iter() {
+            if sides_of(vertices) & (BEHIND | AHEAD) != BEHIND | AHEAD {
+                continue;
             }
-            if some == BEHIND | AHEAD && all == 0 && counts(cell) {
-                cutter.cell(cells, cell)?;
+            for cell in block {
+                if sides_of(cells.vertices(cell)) == BEHIND | AHEAD && counts(cell) {
+                    cutter.cell(cells, cell)?;
+                }
             }
         }
         cut = cutter.cut;
@@ -144,6 +149,9 @@ impl Cutter<'_> {
         let vertices = cells.vertices(cell);
         self.segments.clear();
         self.directions.clear();
+        if let (CellType::Tetra, &[a, b, c, d]) = (cell_type, vertices) {
+            return self.tetrahedron([a, b, c, d], cell);
+        }
         match cell_type.dimension() {
             3 => {
                 cells.for_each_face(cell, |face| self.face(face));
@@ -166,6 +174,40 @@ impl Cutter<'_> {
             }
             _ => Ok(()),
         }
+    }
+
+    /// The polygon of a tetrahedron: around the corner that lies alone on its side, or between the
+    /// edges that two and two make.
+    fn tetrahedron(&mut self, vertices: [u32; 4], cell: usize) -> Result<(), MeshError> {
+        let (mut ahead, mut behind) = ([0; 4], [0; 4]);
+        let (mut ahead_count, mut behind_count) = (0, 0);
+        for vertex in vertices {
+            if self.sides[vertex as usize] == AHEAD {
+                ahead[ahead_count] = vertex;
+                ahead_count += 1;
+            } else {
+                behind[behind_count] = vertex;
+                behind_count += 1;
+            }
+        }
+        let [a, b, c, _] = ahead;
+        let [d, e, f, _] = behind;
+        let (ring, count) = match ahead_count {
+            1 => ([[d, a], [e, a], [f, a], [f, a]], 3),
+            2 => ([[d, a], [d, b], [e, b], [e, a]], 4),
+            _ => ([[d, a], [d, b], [d, c], [d, c]], 3),
+        };
+        let mut polygon = std::mem::take(&mut self.polygon);
+        polygon.clear();
+        let mut direction = [0.0; 3];
+        for edge in &ring[..count] {
+            polygon.push(self.crossing(*edge));
+            let [behind, ahead] = edge.map(|vertex| self.coordinates[vertex as usize]);
+            direction = add(direction, subtract(ahead, behind));
+        }
+        let done = self.push_polygon(&mut polygon, direction, cell);
+        self.polygon = polygon;
+        done
     }
 
     /// The segments of one face: one for each run of its corners ahead.
@@ -240,37 +282,51 @@ impl Cutter<'_> {
                 };
                 end = segments.swap_remove(next).1;
             }
-            self.polygon.dedup();
-            if self.polygon.len() < 3 {
-                continue;
-            }
             let mut polygon = std::mem::take(&mut self.polygon);
-            if self.turns_backwards(&polygon) {
-                polygon.reverse();
-            }
-            let cell_type = match polygon.len() {
-                3 => CellType::Triangle,
-                4 => CellType::Quad,
-                _ => CellType::Polygon,
-            };
-            self.push(cell_type, &polygon, cell)?;
+            let own = self.directions.iter().filter(|(point, _)| polygon.contains(point));
+            let direction = own.fold([0.0; 3], |sum, (_, direction)| add(sum, *direction));
+            self.push_polygon(&mut polygon, direction, cell)?;
             self.polygon = polygon;
         }
         self.segments = segments;
         Ok(())
     }
 
-    fn turns_backwards(&self, polygon: &[u32]) -> bool {
+    /// Adds a polygon, turned so that it is counter-clockwise seen from where the direction points.
+    /// Points that follow on themselves are left out, and what is left without an area.
+    fn push_polygon(
+        &mut self,
+        polygon: &mut Vec<u32>,
+        direction: Vector,
+        cell: usize,
+    ) -> Result<(), MeshError> {
+        polygon.dedup();
+        if polygon.len() > 1 && polygon.first() == polygon.last() {
+            polygon.pop();
+        }
+        if polygon.len() < 3 {
+            return Ok(());
+        }
+        if self.turn(polygon, direction) < 0.0 {
+            polygon.reverse();
+        }
+        let cell_type = match polygon.len() {
+            3 => CellType::Triangle,
+            4 => CellType::Quad,
+            _ => CellType::Polygon,
+        };
+        self.push(cell_type, polygon, cell)
+    }
+
+    /// Twice the area of a polygon as it is seen from where the direction points, times its length.
+    fn turn(&self, polygon: &[u32], direction: Vector) -> f64 {
         let at = |index: usize| self.cut.points[polygon[index] as usize];
         let origin = at(0);
-        let own = self.directions.iter().filter(|(point, _)| polygon.contains(point));
-        let direction = own.fold([0.0; 3], |sum, (_, direction)| add(sum, *direction));
-        let mut turn = 0.0;
-        for index in 1..polygon.len() - 1 {
+        let triangle = |index: usize| {
             let [u, v] = [at(index), at(index + 1)].map(|corner| subtract(corner, origin));
-            turn += dot(cross(u, v), direction);
-        }
-        turn < 0.0
+            dot(cross(u, v), direction)
+        };
+        (1..polygon.len() - 1).map(triangle).sum()
     }
 
     fn push(&mut self, cell_type: CellType, points: &[u32], cell: usize) -> Result<(), MeshError> {

@@ -8,6 +8,7 @@ use tombolo_deform::mesh::{Cells, Mesh, MeshView, NumberType, Vector, ghosts};
 use tombolo_deform::quality::{Quality, quality, scaled_jacobians};
 use tombolo_deform::surface::{Surface, SurfaceError};
 
+use super::blocks::Blocks;
 use super::gather::{self, Owners, Points};
 use super::layout::Layout;
 use super::positions::Positions;
@@ -104,6 +105,8 @@ pub struct Source {
     /// As they are measured, once they are.
     right_handed: OnceLock<Arc<Cells>>,
     pub(super) boundary: Option<Boundary>,
+    /// The blocks of the cells, once something was cut.
+    blocks: OnceLock<Blocks>,
     /// Where the vertices were when something was last cut.
     pub(super) positions: Positions,
     /// The knowledge that sets own cells apart from others: on several ranks, and where there are
@@ -351,6 +354,7 @@ impl Source {
             cells: Arc::new(cells),
             right_handed,
             boundary: None,
+            blocks: OnceLock::new(),
             positions: Positions::default(),
             whole,
             is_part,
@@ -380,6 +384,11 @@ impl Source {
     #[must_use]
     pub fn is_of(&self, channel: &Channel) -> bool {
         self.key == MeshKey::of(&channel.mesh)
+    }
+
+    /// The blocks of the cells.
+    pub(super) fn blocks(&self) -> &Blocks {
+        self.blocks.get_or_init(|| Blocks::new(&self.cells, self.key.points))
     }
 
     /// The cells, as the solver has them.

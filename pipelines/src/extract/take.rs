@@ -287,7 +287,8 @@ impl Source {
     ) -> Result<Pattern, ExtractError> {
         let counts = |cell: usize| self.counts(Association::Element, cell);
         let sample = |index: usize| settled(sample(index), slacks[index]);
-        Ok(cut(self.cells(), &self.positions.points, slacks.len(), &sample, &counts)?.into())
+        let points = &self.positions.points;
+        Ok(cut(self.cells(), self.blocks(), points, slacks.len(), &sample, &counts)?.into())
     }
 
     fn clipped(

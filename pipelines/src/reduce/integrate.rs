@@ -1,11 +1,11 @@
 //! Integrals of fields over an extract or the whole mesh.
 
 use tombolo_deform::communicator::Reduction;
-use tombolo_deform::mesh::{Cells, Vector};
+use tombolo_deform::mesh::{CellType, Cells, Vector};
 use tombolo_deform::vector::{dot, scale};
 
 use super::region::{CHUNK, Chosen, Region, Wanted};
-use super::weights::Weights;
+use super::weights::{Weights, volume};
 use crate::extract::{Association, FieldView, is_absent};
 use crate::language::{Integrate, Stage};
 
@@ -29,7 +29,8 @@ pub(crate) fn integrate(stage: &Integrate, region: &Region) -> (Vec<f64>, Option
     if let Ok(part) = &part {
         let mut fields = part.fields.iter().copied();
         let mut next = |name: &Option<String>| name.as_ref().and_then(|_| fields.next()).flatten();
-        let (field, vector) = (next(&stage.field), next(&stage.vector));
+        let mut taken = |name: &Option<String>| next(name).map(|view| Taken::new(&view));
+        let (field, vector) = (taken(&stage.field), taken(&stage.vector));
         let terms = Terms { cells: part.cells, points: part.points, field, vector };
         sums = terms.sums(&|cell| region.counts(part, cell, dimension), across);
         if has_faces && stage.vector.is_some() && dimension == 1 && across.is_none() {
@@ -81,8 +82,33 @@ impl Sums {
 struct Terms<'a> {
     cells: &'a Cells,
     points: &'a [Vector],
-    field: Option<FieldView<'a>>,
-    vector: Option<FieldView<'a>>,
+    field: Option<Taken>,
+    vector: Option<Taken>,
+}
+
+/// The values of a field as vectors. What a scalar or a plane vector lacks is 0.
+struct Taken {
+    is_of_cells: bool,
+    values: Vec<Vector>,
+}
+
+impl Taken {
+    fn new(view: &FieldView) -> Self {
+        let values = &view.values;
+        let component = |entity: usize, axis: usize| match axis < values.components() {
+            true => values.get(entity, axis),
+            false => 0.0,
+        };
+        let value = |entity: usize| std::array::from_fn(|axis| component(entity, axis));
+        Self {
+            is_of_cells: view.association == Association::Element,
+            values: (0..values.len()).map(value).collect(),
+        }
+    }
+
+    fn is_absent(&self, entity: usize) -> bool {
+        is_absent(self.values[entity][0])
+    }
 }
 
 impl Terms<'_> {
@@ -93,6 +119,11 @@ impl Terms<'_> {
             let mut part = Sums::default();
             let chunk = start..self.cells.len().min(start + CHUNK);
             for cell in chunk.filter(|&cell| counts(cell)) {
+                let vertices = self.cells.vertices(cell);
+                if let (CellType::Tetra, &[a, b, c, d]) = (self.cells.cell_type(cell), vertices) {
+                    self.add_tetrahedron(cell, [a, b, c, d], &mut part.0);
+                    continue;
+                }
                 weights.find(self.cells, cell, self.points);
                 self.add(cell, &weights, across, &mut part.0);
             }
@@ -101,35 +132,49 @@ impl Terms<'_> {
         sums
     }
 
+    /// Adds what a tetrahedron has, as [`add`](Self::add) does, without a list of its parts.
+    fn add_tetrahedron(&self, cell: usize, vertices: [u32; 4], sums: &mut [f64; COUNT]) {
+        let size = volume(vertices.map(|vertex| self.points[vertex as usize]));
+        sums[SIZE] += size;
+        let entities = vertices.map(|vertex| vertex as usize);
+        for (first, taken) in [(FIELD, &self.field), (VECTOR, &self.vector)] {
+            let Some(taken) = taken else { continue };
+            let whole = [cell];
+            let entities = if taken.is_of_cells { &whole[..] } else { &entities };
+            if entities.iter().any(|&entity| taken.is_absent(entity)) {
+                continue;
+            }
+            sums[first] += size;
+            let part = if taken.is_of_cells { size } else { size / 4.0 };
+            for &entity in entities {
+                let value = taken.values[entity];
+                let axes = if first == FIELD { 1 } else { 3 };
+                for axis in 0..axes {
+                    sums[first + 1 + axis] += part * value[axis];
+                }
+            }
+        }
+    }
+
     /// Adds what one cell has.
     fn add(&self, cell: usize, weights: &Weights, across: Option<Vector>, sums: &mut [f64; COUNT]) {
         sums[SIZE] += weights.size;
         // The entities whose values count, with their parts of the size and of the vector area.
-        let whole = [(0, weights.size, weights.area)];
-        for (first, view) in [(FIELD, &self.field), (VECTOR, &self.vector)] {
-            let Some(FieldView { association, values, .. }) = view else { continue };
-            let parts = match association {
-                Association::Element => &whole[..],
-                _ => &weights.parts,
-            };
-            let entity = |part: u32| match association {
-                Association::Element => cell,
-                _ => part as usize,
-            };
-            if parts.iter().any(|part| is_absent(values.get(entity(part.0), 0))) {
+        #[expect(clippy::cast_possible_truncation, reason = "cells are numbered with 32 bits")]
+        let whole = [(cell as u32, weights.size, weights.area)];
+        for (first, taken) in [(FIELD, &self.field), (VECTOR, &self.vector)] {
+            let Some(taken) = taken else { continue };
+            let parts = if taken.is_of_cells { &whole[..] } else { &weights.parts };
+            if parts.iter().any(|part| taken.is_absent(part.0 as usize)) {
                 continue;
             }
             sums[first] += weights.size;
-            for &(part, size, area) in parts {
+            for &(entity, size, area) in parts {
+                let value = taken.values[entity as usize];
                 if first == FIELD {
-                    sums[FIELD + 1] += size * values.get(entity(part), 0);
+                    sums[FIELD + 1] += size * value[0];
                     continue;
                 }
-                let component = |axis: usize| match axis < values.components() {
-                    true => values.get(entity(part), axis),
-                    false => 0.0,
-                };
-                let value = [0, 1, 2].map(component);
                 for axis in 0..3 {
                     sums[VECTOR + 1 + axis] += size * value[axis];
                 }

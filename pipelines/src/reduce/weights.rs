@@ -20,6 +20,12 @@ pub(super) struct Weights {
     ring: Vec<u32>,
 }
 
+/// The volume of a tetrahedron, whichever way its corners turn.
+pub(super) fn volume([a, b, c, d]: [Vector; 4]) -> f64 {
+    let [u, v, w] = [b, c, d].map(|corner| subtract(corner, a));
+    dot(cross(u, v), w).abs() / 6.0
+}
+
 impl Weights {
     /// Finds the weights of a cell of dimension 1, 2 or 3; those of others are 0.
     pub(super) fn find(&mut self, cells: &Cells, cell: usize, points: &[Vector]) {
@@ -36,8 +42,7 @@ impl Weights {
                 }
             }
             (CellType::Tetra, &[a, b, c, d]) => {
-                let [u, v, w] = [b, c, d].map(|vertex| subtract(at(vertex), at(a)));
-                let size = dot(cross(u, v), w).abs() / 6.0;
+                let size = volume([a, b, c, d].map(at));
                 self.parts.extend(vertices.iter().map(|&vertex| (vertex, size / 4.0, [0.0; 3])));
             }
             (cell_type, _) => match cell_type.dimension() {
