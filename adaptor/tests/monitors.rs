@@ -146,3 +146,36 @@ fn the_clock_of_rank_0_counts_for_all_ranks() {
     });
     assert!(cycles[1] == cycles[0] && cycles[2] == cycles[0], "{cycles:?}");
 }
+
+#[test]
+fn pictures_are_written_beside_the_solver() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = r#"{"version": 1, "pipelines": [
+        {"name": "front", "every": {"steps": 2}, "stages": [{"surface": {}},
+            {"render": {"file": "pictures/front-{cycle}.png", "field": "speed", "width": 60, "height": 40}}]},
+        {"name": "around", "every": {"steps": 3}, "stages": [{"slice": {"origin": [0, 0, 0.3], "normal": [0, 0, 1]}},
+            {"render": {"file": "around.cdb", "width": 30, "height": 20, "orbit": {"azimuths": 3, "elevations": [20]}}}]}]}"#;
+    let mut solver = Solver::new(Settings {
+        config: config(text),
+        output: folder.path().into(),
+        ..Settings::default()
+    });
+    solver.steps(5);
+    solver.finish();
+    let size = |path: &str| {
+        let bytes = std::fs::read(folder.path().join(path)).unwrap_or_else(|_| panic!("{path}"));
+        assert_eq!(&bytes[..8], b"\x89PNG\r\n\x1a\n", "{path}");
+        [16, 20].map(|at| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()))
+    };
+    for cycle in [0, 2, 4] {
+        assert_eq!(size(&format!("pictures/front-{cycle:06}.png")), [60, 40]);
+    }
+    let table = read_to_string(folder.path().join("around.cdb/data.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows[0].last(), Some(&"FILE"));
+    assert_eq!(
+        rows.iter().map(|row| row[1]).collect::<Vec<_>>(),
+        ["cycle", "0", "0", "0", "3", "3", "3"]
+    );
+    assert!(rows[1..].iter().all(|row| size(&format!("around.cdb/{}", row[5])) == [30, 20]));
+}

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use serde_json::Value;
 use tombolo_deform::communicator::{Communicator, Solo, threads};
 use tombolo_deform::distributed::Part;
-use tombolo_deform::mesh::{Mesh, Vector};
+use tombolo_deform::mesh::{Mesh, Vector, ghosts};
 use tombolo_deform::shapes::{box_of_mixed_cells, box_of_tets};
 use tombolo_pipelines::extract::{Channel, Extract, FieldView, Snapshot};
 use tombolo_pipelines::files::{self, Database};
@@ -303,4 +303,32 @@ fn a_database_says_what_its_pictures_show() {
          0.25,7,180+30,180,30,000007-180+30.png\n0.5,8,front,,,000008-front.png\n"
     );
     assert!(path.join("000007-180+30.png").is_file());
+}
+
+/// A copy of a cell that another part has is not drawn, and neither is the face towards it, which
+/// lies inside the whole mesh; a hidden cell leaves a hole.
+#[test]
+fn ghosts_are_not_drawn() {
+    let stages = r#"{"surface": {}}, {"render": {"file": "a.png", "field": "x", "range": [0, 5], "width": 120, "height": 90,
+        "axes": false, "cameras": [{"position": [-9, -7, 8], "focal_point": [2, 1.5, 1.5], "up": [0, 0, 1]}]}}"#;
+    let mesh = box_of_tets([5, 3, 3], [0.0; 3], [5.0, 3.0, 3.0]);
+    let is_last = |cell: usize| {
+        let vertices = mesh.cells().vertices(cell);
+        vertices.iter().all(|&vertex| mesh.points()[vertex as usize][0] > 3.9)
+    };
+    let drawn = |bits: u8| {
+        let ghosts = (0..mesh.cells().len()).map(|cell| if is_last(cell) { bits } else { 0 });
+        let part = Part { ghosts: Some(ghosts.collect()), ..whole(&mesh) };
+        let made =
+            made(&format!(r#"{{"name": "a", "stages": [{stages}]}}"#), &part, Arc::new(Solo));
+        assert!(made.errors.is_empty(), "{:?}", made.errors);
+        Arc::clone(&made.pictures["a.png"])
+    };
+    let shorter = picture(&box_of_tets([4, 3, 3], [0.0; 3], [4.0, 3.0, 3.0]), stages);
+    let all = picture(&mesh, stages);
+    assert_ne!(all.image, shorter.image);
+    assert_eq!(drawn(0).image, all.image);
+    // From this side the open end is not seen: what is left looks as the shorter box.
+    assert_eq!(drawn(ghosts::DUPLICATE).image, shorter.image);
+    assert_eq!(drawn(ghosts::HIDDEN).image, shorter.image);
 }
