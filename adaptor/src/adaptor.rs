@@ -27,7 +27,7 @@ use tombolo_deform::{
 };
 use tombolo_pipelines::{
     extract::Channel,
-    language::{self, Config, Due, ReadError, Validate},
+    language::{self, Config, Due, Problems, ReadError, Validate},
     run::History,
 };
 
@@ -115,8 +115,7 @@ impl Adaptor {
     /// ```
     ///
     /// # Errors
-    /// [`ReadError`], which names the file, and the line and column of the first token that is
-    /// wrong.
+    /// [`ReadError`], which names the file, and the line and column of everything that is wrong.
     pub fn from_file(file: impl AsRef<Path>) -> Result<Settings, ReadError> {
         Settings::from_file(file)
     }
@@ -163,8 +162,8 @@ impl Adaptor {
     fn set_up(settings: Settings) -> Result<Self, InitializeError> {
         let Settings { config, communicator, solvers, parameters, orders, output } = settings;
         // A configuration built in Rust is held to the same rules as one read from a file.
-        config.validate().map_err(InitializeError::Configuration)?;
-        orders.validate().map_err(InitializeError::Orders)?;
+        Problems::none(config.problems()).map_err(InitializeError::Configuration)?;
+        Problems::none(orders.problems()).map_err(InitializeError::Orders)?;
         let parameters = Parameters::new(parameters)?;
         let known: Vec<&str> = parameters.all().iter().map(|known| &*known.name).collect();
         language::check_parameters(&config, &known).map_err(InitializeError::Configuration)?;

@@ -1,7 +1,7 @@
 //! Why a call of the adaptor failed.
 
 use tombolo_deform::{communicator::RankError, number::Number};
-use tombolo_pipelines::{extract::ChannelError, language::Problem};
+use tombolo_pipelines::{extract::ChannelError, language::Problems};
 
 use crate::{journal::JournalError, report::Report, steering::ParameterError, stream::StreamError};
 
@@ -20,10 +20,10 @@ pub enum InitializeError {
     Parameter(#[from] ParameterError),
     /// The configuration makes no sense.
     #[error("the configuration: {0}")]
-    Configuration(Problem),
+    Configuration(Problems),
     /// One of the commands given beforehand makes no sense.
     #[error("the orders given beforehand: {0}")]
-    Orders(Problem),
+    Orders(Problems),
     /// Something is wrong on one rank, or the ranks were given different configurations. All ranks
     /// have this error.
     #[error(transparent)]

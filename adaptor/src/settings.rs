@@ -19,7 +19,7 @@ use crate::steering::Parameter;
 #[derive(Clone)]
 pub struct Settings {
     /// The configuration: what to watch, stream and write, and how orders become mesh motion; read
-    /// it with [`language::parse`](tombolo_pipelines::language::parse).
+    /// it with [`language::check`](tombolo_pipelines::language::check).
     pub config: Config,
     /// The processes that the mesh is distributed over.
     pub communicator: Arc<dyn Communicator>,
@@ -28,7 +28,7 @@ pub struct Settings {
     /// The numbers of the solver that can be steered.
     pub parameters: Vec<Parameter>,
     /// Commands known beforehand; read a file of them, or a journal, with
-    /// [`language::parse_orders`](tombolo_pipelines::language::parse_orders). They take effect at
+    /// [`language::check_orders`](tombolo_pipelines::language::check_orders). They take effect at
     /// their cycle exactly: the solver waits for their plans.
     pub orders: Vec<TimedCommand>,
     /// The directory of the files that pipelines write and of the journal, where their names are
@@ -41,12 +41,11 @@ impl Settings {
     /// [`Adaptor::from_file`](crate::Adaptor::from_file).
     ///
     /// # Errors
-    /// [`ReadError`], which names the file, and the line and column of the first token that is
-    /// wrong.
+    /// [`ReadError`], which names the file, and the line and column of everything that is wrong.
     pub fn from_file(file: impl AsRef<Path>) -> Result<Self, ReadError> {
         let file = file.as_ref();
         let text = language::read_text(file, DOCUMENT)?;
-        let config = language::parse(&text, &file.display().to_string())?;
+        let config = language::check(&text, &file.display().to_string())?;
         Ok(Self { config, ..Self::default() })
     }
 
@@ -66,12 +65,11 @@ impl Settings {
     /// Adds the commands that are in a file, such as a journal.
     ///
     /// # Errors
-    /// [`ReadError`], which names the file, and the line and column of the first token that is
-    /// wrong.
+    /// [`ReadError`], which names the file, and the line and column of everything that is wrong.
     pub fn orders_from_file(mut self, file: impl AsRef<Path>) -> Result<Self, ReadError> {
         let file = file.as_ref();
         let text = language::read_text(file, WAITING_BYTES)?;
-        self.orders.extend(language::parse_orders(&text, &file.display().to_string())?);
+        self.orders.extend(language::check_orders(&text, &file.display().to_string())?);
         Ok(self)
     }
 

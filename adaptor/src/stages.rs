@@ -55,7 +55,7 @@ impl Pipelines {
         output: &Path,
     ) -> Result<Self, InitializeError> {
         let runner = Runner::with_communicator(config, communicator)
-            .map_err(InitializeError::Configuration)?;
+            .map_err(|problem| InitializeError::Configuration(problem.into()))?;
         let (views, listens) = (runner.views(), runner.listens());
         let can_order = config.pipelines.iter().any(|pipeline| {
             pipeline.stages.iter().any(|stage| matches!(stage, Stage::Order(_)))

@@ -135,7 +135,7 @@ fn default_config(channels: &[String]) -> Result<Config, RunError> {
     };
     let pipelines: Vec<_> = channels.iter().map(view).collect();
     let config = json!({"version": 1, "stream": {}, "pipelines": pipelines});
-    Ok(language::parse(&config.to_string(), "the default configuration")?)
+    Ok(language::check(&config.to_string(), "the default configuration")?)
 }
 
 /// The configurations of all files as one, and what the node itself asks for; and which pipelines
@@ -143,7 +143,7 @@ fn default_config(channels: &[String]) -> Result<Config, RunError> {
 /// says.
 fn merged(found: &mut Found, of_user: Option<&str>) -> Result<(Config, Groups), RunError> {
     let own = json!({"version": 1, "pipelines": found.pipelines});
-    let mut config = language::parse(&own.to_string(), "catalyst/pipelines")?;
+    let mut config = language::check(&own.to_string(), "catalyst/pipelines")?;
     let mut groups: Groups = found.others.iter().map(|name| (name.clone(), Vec::new())).collect();
     let mut of_solver: Vec<String> =
         config.pipelines.iter().map(|pipeline| pipeline.name.clone()).collect();

@@ -122,8 +122,12 @@ pub const HISTORY_NUMBERS: Limit = limit(
     "the history of a pipeline's monitors: where they are many, fewer measurements are kept",
 );
 
+/// Errors that are told at once.
+pub const ERRORS: Limit =
+    limit("errors", 100, "what is told of one text; of more errors only their number");
+
 /// All of them.
-pub const ALL: [Limit; 24] = [
+pub const ALL: [Limit; 25] = [
     DOCUMENT,
     VALUES,
     DEPTH,
@@ -148,4 +152,5 @@ pub const ALL: [Limit; 24] = [
     PICTURE,
     CAMERAS,
     PIXELS,
+    ERRORS,
 ];

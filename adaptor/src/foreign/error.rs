@@ -2,7 +2,7 @@
 
 use tombolo_deform::mesh::MeshError;
 use tombolo_pipelines::extract::ChannelError;
-use tombolo_pipelines::language::{LanguageError, ReadError};
+use tombolo_pipelines::language::{LanguageErrors, ReadError};
 
 use crate::{ExecuteError, FinalizeError, InitializeError};
 
@@ -78,9 +78,9 @@ pub enum RunError {
     Finalize(#[from] FinalizeError),
 }
 
-impl From<LanguageError> for RunError {
-    fn from(error: LanguageError) -> Self {
-        Self::Configuration(error.to_string())
+impl From<LanguageErrors> for RunError {
+    fn from(errors: LanguageErrors) -> Self {
+        Self::Configuration(errors.to_string())
     }
 }
 

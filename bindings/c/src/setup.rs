@@ -44,7 +44,7 @@ export! {
     fn tombolo_configure(run: *mut Handle, json: Text) {
         let json = json.get("json")?;
         set(run, |settings| {
-            settings.config = language::parse(&json, "configuration")?;
+            settings.config = language::check(&json, "configuration")?;
             Ok(())
         })
     }
@@ -52,7 +52,7 @@ export! {
     fn tombolo_orders(run: *mut Handle, json: Text) {
         let json = json.get("json")?;
         set(run, |settings| {
-            settings.orders = language::parse_orders(&json, "orders")?;
+            settings.orders = language::check_orders(&json, "orders")?;
             Ok(())
         })
     }

@@ -176,6 +176,23 @@ impl Editor {
         Ok(displacement)
     }
 
+    /// What keeps edits from being made on this surface, the first thing of each edit; nothing is
+    /// evaluated. Edits that drag the skeleton have it extracted.
+    pub fn check(&mut self, edits: &[Edit]) -> Vec<EditError> {
+        let mut errors = Vec::new();
+        for (index, edit) in edits.iter().enumerate() {
+            let mut found = Handle::find(&self.surface, edit, index).map(drop);
+            if let (Ok(()), Edit::Skeleton(drag)) = (&found, edit)
+                && !drag.muted
+            {
+                let nodes = self.skeletons.nodes(drag).map(drop);
+                found = nodes.map_err(|source| EditError::skeleton(index, source));
+            }
+            errors.extend(found.err());
+        }
+        errors
+    }
+
     /// [`Editor::displacement`] into memory that is there already. After an error it holds nothing
     /// of meaning.
     ///

@@ -1,12 +1,14 @@
 //! Errors that point at their token.
 
+use std::ops::Range;
+
 use serde_path_to_error::Segment;
 
 use super::nearest;
 use super::scan::{Node, Value};
 
 /// An error in a JSON text, with its position.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, thiserror::Error)]
 #[error("{file}:{line}:{column}: {}{message}{}", prefix(path), hint(suggestion.as_deref()))]
 pub struct LanguageError {
     /// The file, as the caller named it.
@@ -28,13 +30,16 @@ fn prefix(path: &str) -> String {
     if path.is_empty() { String::new() } else { format!("{path}: ") }
 }
 
+/// What stands before the name that was likely meant.
+const MEANT: &str = "; did you mean `";
+
 fn hint(suggestion: Option<&str>) -> String {
-    suggestion.map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
+    suggestion.map_or_else(String::new, |name| format!("{MEANT}{name}`?"))
 }
 
 /// One step of the path to a value.
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum Step {
+pub(super) enum Step {
     Key(String),
     Index(usize),
 }
@@ -47,12 +52,32 @@ pub struct Problem {
     path: Vec<Step>,
     message: String,
     suggestion: Option<String>,
+    /// The name of the monitor that nothing measures.
+    unmeasured: Option<String>,
+    /// Whether its message names the value that it is a problem of.
+    names_its_value: bool,
 }
 
 impl Problem {
     /// A problem of the value at hand.
     pub fn new(message: impl Into<String>) -> Self {
-        Self { path: Vec::new(), message: message.into(), suggestion: None }
+        Self {
+            path: Vec::new(),
+            message: message.into(),
+            suggestion: None,
+            unmeasured: None,
+            names_its_value: false,
+        }
+    }
+
+    /// Says that the problem is that nothing measures a monitor of this name.
+    pub(super) fn of_unmeasured(self, name: &str) -> Self {
+        Self { unmeasured: Some(name.to_owned()), ..self }
+    }
+
+    /// The name of the monitor, where the problem is that nothing measures it.
+    pub(super) fn unmeasured(&self) -> Option<&str> {
+        self.unmeasured.as_deref()
     }
 
     /// Adds the name that was likely meant.
@@ -90,6 +115,13 @@ impl Problem {
         self
     }
 
+    /// Whether both are problems of one stage or action of a configuration.
+    pub(super) fn is_beside(&self, other: &Self) -> bool {
+        // A list of pipelines, which of them, a list of stages, which of them.
+        let part = |problem: &Self| problem.path.iter().rev().take(4).cloned().collect::<Vec<_>>();
+        part(self).len() == 4 && part(self) == part(other)
+    }
+
     /// Puts words before its message.
     pub(super) fn after(mut self, words: &str) -> Self {
         self.message.insert_str(0, words);
@@ -97,9 +129,43 @@ impl Problem {
     }
 
     pub(super) fn locate(self, root: &Node, text: &str, file: &str) -> LanguageError {
-        let steps: Vec<Step> = self.path.into_iter().rev().collect();
-        let (node, _) = walk(root, &steps);
-        error(text, file, node.span.start, show(&steps), self.message, self.suggestion)
+        let Fault { steps, place, message, suggestion, .. } = self.found_in(root);
+        error(text, file, place.start, show(&steps), message, suggestion)
+    }
+
+    /// The problem at the deepest node on its way.
+    pub(super) fn found_in(self, root: &Node) -> Fault {
+        let mut steps: Vec<Step> = self.path.into_iter().rev().collect();
+        let Walk { mut node, mut taken, .. } = walk(root, &steps);
+        if self.names_its_value
+            && let Some(value) = named(node, &self.message)
+        {
+            let below = path_to(node, &value.span);
+            steps.splice(taken.., below);
+            (node, taken) = (value, steps.len());
+        }
+        let place = node.span.clone();
+        let (message, suggestion) = (self.message, self.suggestion);
+        Fault { steps, taken, place, message, suggestion, kind: FaultKind::Other }
+    }
+
+    /// The index of the pipeline of a configuration that it is a problem of.
+    pub(super) fn pipeline(&self) -> Option<usize> {
+        match self.path.iter().rev().take(2).collect::<Vec<_>>()[..] {
+            [Step::Key(_), Step::Index(index)] => Some(*index),
+            _ => None,
+        }
+    }
+
+    /// A problem in the words of a run, with the name that was likely meant where they say one. It
+    /// is one of the first value that these words name, wherever that stands below.
+    pub(crate) fn told(text: &str) -> Self {
+        let told = text.strip_suffix("`?").and_then(|text| text.rsplit_once(MEANT));
+        let problem = match told {
+            Some((message, name)) => Self::new(message).suggest(Some(name)),
+            None => Self::new(text),
+        };
+        Self { names_its_value: true, ..problem }
     }
 }
 
@@ -121,25 +187,58 @@ pub(super) fn finite(value: f64) -> Result<(), Problem> {
     }
 }
 
-/// The deepest node on a path, and where the key of the last step stands.
-fn walk<'a>(root: &'a Node, steps: &[Step]) -> (&'a Node, Option<usize>) {
-    let (mut node, mut key) = (root, None);
-    for step in steps {
-        match step {
-            Step::Key(name) => {
-                let Some(member) = node.member(name) else { return (node, None) };
-                (node, key) = (&member.node, Some(member.key_span.start));
-            }
-            Step::Index(index) => {
-                let Some(item) = node.item(*index) else { return (node, None) };
-                (node, key) = (item, None);
-            }
-        }
-    }
-    (node, key)
+/// The end of a path in a tree.
+struct Walk<'a> {
+    /// The deepest node on it.
+    node: &'a Node,
+    /// The key of that node, where the whole path is there and ends at a key.
+    key: Option<&'a Range<usize>>,
+    /// How many steps lead to the node.
+    taken: usize,
 }
 
-fn show(steps: &[Step]) -> String {
+fn walk<'a>(root: &'a Node, steps: &[Step]) -> Walk<'a> {
+    let (mut node, mut key) = (root, None);
+    for (taken, step) in steps.iter().enumerate() {
+        let next = match step {
+            Step::Key(name) => {
+                node.member(name).map(|member| (&member.node, Some(&member.key_span)))
+            }
+            Step::Index(index) => node.item(*index).map(|item| (item, None)),
+        };
+        let Some(next) = next else { return Walk { node, key: None, taken } };
+        (node, key) = next;
+    }
+    Walk { node, key, taken: steps.len() }
+}
+
+/// The path to the node, or to the key, that fills a place of the text.
+pub(super) fn path_to(root: &Node, place: &Range<usize>) -> Vec<Step> {
+    let holds = |node: &Node| node.span.start <= place.start && place.end <= node.span.end;
+    let (mut node, mut steps) = (root, Vec::new());
+    while node.span != *place {
+        let next = match &node.value {
+            Value::Array(items) => {
+                items.iter().position(holds).map(|index| (Step::Index(index), Some(&items[index])))
+            }
+            Value::Object(members) => members.iter().find_map(|member| {
+                let key = || Step::Key(member.key.clone());
+                match holds(&member.node) {
+                    true => Some((key(), Some(&member.node))),
+                    false => (member.key_span == *place).then(|| (key(), None)),
+                }
+            }),
+            _ => None,
+        };
+        let Some((step, below)) = next else { break };
+        steps.push(step);
+        let Some(below) = below else { break };
+        node = below;
+    }
+    steps
+}
+
+pub(super) fn show(steps: &[Step]) -> String {
     let mut path = String::new();
     for step in steps {
         match step {
@@ -175,6 +274,30 @@ pub(super) fn error(
     }
 }
 
+/// A thing that is wrong in a tree.
+pub(super) struct Fault {
+    /// The path to it.
+    pub(super) steps: Vec<Step>,
+    /// How many of the steps lead to the node that it was found at.
+    pub(super) taken: usize,
+    /// The place of that node, or of the key at fault, in the text.
+    pub(super) place: Range<usize>,
+    pub(super) message: String,
+    pub(super) suggestion: Option<String>,
+    pub(super) kind: FaultKind,
+}
+
+/// What can be done about a fault.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum FaultKind {
+    /// A key that is not known: the last step.
+    Key,
+    /// A name that is not known: a text, or the only key of an object.
+    Name,
+    /// Anything else.
+    Other,
+}
+
 /// Translates an error of serde, which names Rust's types, into one that names what stands in the
 /// text.
 pub(super) fn from_serde(
@@ -183,6 +306,16 @@ pub(super) fn from_serde(
     text: &str,
     file: &str,
 ) -> LanguageError {
+    let Fault { steps, place, message, suggestion, .. } = fault(failure, root, text);
+    error(text, file, place.start, show(&steps), message, suggestion)
+}
+
+/// What is wrong by an error of serde, in the words of what stands in the text.
+pub(super) fn fault(
+    failure: &serde_path_to_error::Error<serde_json::Error>,
+    root: &Node,
+    text: &str,
+) -> Fault {
     let mut steps: Vec<Step> = Vec::new();
     for segment in failure.path().iter() {
         match segment {
@@ -193,7 +326,7 @@ pub(super) fn from_serde(
         }
     }
     let message = failure.inner().to_string();
-    let (node, key) = walk(root, &steps);
+    let Walk { node, key, taken } = walk(root, &steps);
 
     if let Some(rest) =
         message.strip_prefix("unknown field ").or_else(|| message.strip_prefix("unknown variant "))
@@ -211,19 +344,22 @@ pub(super) fn from_serde(
                 format!("{} or `{last}`", first.join(", "))
             }
         };
-        let mut at = key.unwrap_or(node.span.start);
-        if !is_field {
-            at = node.span.start;
-            if let Value::Object(members) = &node.value
-                && let Some(member) = members.first()
-            {
-                at = member.key_span.start;
-                steps.push(Step::Key(member.key.clone()));
-            }
+        let mut place = key.filter(|_| is_field).unwrap_or(&node.span).clone();
+        let mut taken = taken;
+        if !is_field
+            && let Value::Object(members) = &node.value
+            && let Some(member) = members.first()
+        {
+            place = member.key_span.clone();
+            steps.push(Step::Key(member.key.clone()));
+            taken = steps.len();
         }
-        let what = if is_field { "key" } else { "name" };
+        let (what, kind) = match is_field {
+            true => ("key", FaultKind::Key),
+            false => ("name", FaultKind::Name),
+        };
         let message = format!("found the unknown {what} `{name}`, expected {expected}");
-        return error(text, file, at, show(&steps), message, suggestion);
+        return Fault { steps, taken, place, message, suggestion, kind };
     }
 
     let message = if let Some(rest) = message.strip_prefix("missing field ") {
@@ -241,7 +377,8 @@ pub(super) fn from_serde(
     } else {
         message
     };
-    error(text, file, node.span.start, show(&steps), message, None)
+    let place = node.span.clone();
+    Fault { steps, taken, place, message, suggestion: None, kind: FaultKind::Other }
 }
 
 fn split_expected(rest: &str) -> Option<(&str, &str)> {
@@ -251,6 +388,26 @@ fn split_expected(rest: &str) -> Option<(&str, &str)> {
 /// The names between backticks.
 fn backticked(text: &str) -> Vec<&str> {
     text.split('`').skip(1).step_by(2).collect()
+}
+
+/// The first text below a node that a message names, or else one that has the name in it.
+fn named<'a>(node: &'a Node, message: &str) -> Option<&'a Node> {
+    fn find<'a>(node: &'a Node, is_meant: &dyn Fn(&str) -> bool) -> Option<&'a Node> {
+        match &node.value {
+            Value::String(text) => is_meant(text).then_some(node),
+            Value::Array(items) => items.iter().find_map(|item| find(item, is_meant)),
+            Value::Object(members) => {
+                members.iter().find_map(|member| find(&member.node, is_meant))
+            }
+            _ => None,
+        }
+    }
+    let names = backticked(message);
+    let find_by = |is_meant: &dyn Fn(&str, &str) -> bool| {
+        names.iter().find_map(|name| find(node, &|text: &str| is_meant(text, name)))
+    };
+    find_by(&|text, name| text == name)
+        .or_else(|| find_by(&|text, name| name.len() > 1 && text.contains(name)))
 }
 
 /// A value as it stands in the text, shortened.

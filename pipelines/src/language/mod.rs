@@ -3,7 +3,9 @@
 //!
 //! Every type is declared once; from it come the parser, the JSON Schema ([`config_schema`],
 //! [`order_schema`]) and the reference pages. [`parse`] reads a configuration, [`parse_orders`] a
-//! file of orders or a journal, [`parse_json`] any other type with the same errors.
+//! file of orders or a journal, [`parse_json`] any other type with the same errors. [`check`] and
+//! [`check_orders`] read the same and tell every error at once; [`check_content`] finds out which
+//! of both a text is.
 //!
 //! ```
 //! let failure = tombolo_pipelines::language::parse(
@@ -20,12 +22,15 @@
 //! ```
 
 mod cameras;
+mod check;
 mod configuration;
 mod derived;
 mod error;
+mod errors;
 mod extracts;
 mod file_pattern;
 mod glyphs;
+mod mend;
 mod message;
 mod monitors;
 mod order;
@@ -41,13 +46,16 @@ mod stage;
 mod streamlines;
 mod timed;
 mod tree;
+mod unread;
 mod validate;
 
 pub use cameras::{Camera, Orbit, Viewpoint};
+pub use check::{Content, Trial, check, check_content, check_orders};
 pub use configuration::{Config, Steering, StreamServer};
 pub(crate) use derived::GIVEN;
 pub use derived::{Derived, Formula};
 pub use error::{LanguageError, Problem};
+pub use errors::{LanguageErrors, Problems};
 pub use extracts::{
     Clip, ClipBy, ClipField, Contour, Cylinder, Plane, Quantifier, Slice, Threshold,
 };
@@ -71,6 +79,7 @@ pub use sinks::{Csv, Existing, Log, LogLevel};
 pub use stage::{Action, ErrorBound, OrderStage, Select, Stage, StreamStage, Write};
 pub use streamlines::{Direction, SeedFeatures, SeedPlane, Seeds, Streamlines};
 pub use timed::{JournalEntry, OrderStatus, TimedCommand, parse_orders};
+pub(crate) use tombolo_deform::names::near;
 pub use tombolo_deform::names::nearest;
 pub use tombolo_deform::shape::Deformation;
 
@@ -79,7 +88,7 @@ pub use tombolo_deform::shape::Deformation;
 /// Files that edits name lie beside `file` where they are relative.
 ///
 /// # Errors
-/// A [`LanguageError`] at the first token that is wrong.
+/// A [`LanguageError`] at the first token that is wrong; [`check`] tells all that are.
 pub fn parse(text: &str, file: &str) -> Result<Config, LanguageError> {
     let mut config = parse_valid(text, file)?;
     relative_files::resolve_config_files(&mut config, file);

@@ -3,7 +3,8 @@
 use super::configuration::Config;
 use super::pipeline::{AgainAfter, Due, Pipeline};
 use super::stage::{Action, Stage};
-use super::{Csv, Log, Problem, nearest};
+use super::unread::Found;
+use super::{Csv, Log, Parameter, Problem, Problems, nearest};
 use crate::expression::Expression;
 
 /// A number that a pipeline measures.
@@ -191,7 +192,8 @@ impl Scope {
                 Err(Problem::new(format!(
                     "found the unknown name `{name:.60}`, expected a monitor"
                 ))
-                .suggest(near))
+                .suggest(near)
+                .of_unmeasured(name))
             }
         }
     }
@@ -221,24 +223,32 @@ impl Condition {
     /// # Errors
     /// A [`Problem`] at the first token that is wrong.
     pub(crate) fn parse(text: &str, scope: &Scope) -> Result<Self, Problem> {
+        Self::find(text, scope).map_err(|mut problems| problems.swap_remove(0))
+    }
+
+    /// # Errors
+    /// One [`Problem`] where the text is no condition, or one for each name that is not known.
+    fn find(text: &str, scope: &Scope) -> Result<Self, Vec<Problem>> {
         let (expression, names) = Expression::parse_open_condition(text).map_err(|error| {
             let message = format!("column {} of the formula: {}", error.column, error.message);
-            Problem::new(message).suggest(error.suggestion.as_deref())
+            vec![Problem::new(message).suggest(error.suggestion.as_deref())]
         })?;
-        let mut slots = Vec::new();
+        let (mut slots, mut problems) = (Vec::new(), Vec::new());
         for name in &names {
-            let slot = scope.find(name).map_err(|problem| {
-                // Where it stands a parser knows that knows all the others.
-                let others: Vec<&str> =
-                    names.iter().map(String::as_str).filter(|it| it != name).collect();
-                let column = Expression::parse_condition(text, &others)
-                    .err()
-                    .map_or(1, |error| error.column);
-                problem.after(&format!("column {column} of the formula: "))
-            });
-            slots.push(slot?);
+            match scope.find(name) {
+                Ok(slot) => slots.push(slot),
+                Err(problem) => {
+                    // Where it stands a parser knows that knows all the others.
+                    let others: Vec<&str> =
+                        names.iter().map(String::as_str).filter(|it| it != name).collect();
+                    let column = Expression::parse_condition(text, &others)
+                        .err()
+                        .map_or(1, |error| error.column);
+                    problems.push(problem.after(&format!("column {column} of the formula: ")));
+                }
+            }
         }
-        Ok(Self { expression, slots })
+        if problems.is_empty() { Ok(Self { expression, slots }) } else { Err(problems) }
     }
 
     /// Whether it holds; a comparison with NaN does not.
@@ -283,72 +293,112 @@ pub(crate) fn line(log: &Log, scope: &Scope) -> Result<Line, Problem> {
 }
 
 /// Checks of all pipelines what they say of each other's monitors.
-pub(super) fn check(config: &Config) -> Result<(), Problem> {
+pub(super) fn check(config: &Config, found: &mut Found) {
     let mut files = Vec::new();
     for (index, pipeline) in config.pipelines.iter().enumerate() {
         let located = |problem: Problem| problem.at(index).within("pipelines");
         let scope = Scope::of(&config.pipelines, index);
-        check_pipeline(pipeline, &scope).map_err(located)?;
+        let (problems, twice) = check_pipeline(pipeline, &scope);
+        found.extend(problems.into_problems(), located);
+        twice.into_iter().for_each(|problem| found.push_alone(located(problem)));
         for table in tables(pipeline) {
             if files.contains(&(&table.file, index)) {
                 continue;
             }
             if files.iter().any(|(file, _)| *file == &table.file) {
                 let message = format!("another pipeline writes the file `{}`", table.file);
-                return Err(located(Problem::new(message)));
+                found.push(located(Problem::new(message)));
             }
             files.push((&table.file, index));
         }
     }
-    Ok(())
 }
 
 /// Checks of a configuration that the parameters it names are among those that a solver has.
 ///
 /// # Errors
-/// A [`Problem`] of the first that is not, with the nearest name.
-pub fn check_parameters(config: &Config, known: &[&str]) -> Result<(), Problem> {
-    let check = |name: &str| {
-        if known.contains(&name) {
-            return Ok(());
-        }
-        let all = if known.is_empty() { "none".into() } else { known.join(", ") };
-        let message = format!("the solver has no parameter `{name}`; it has {all}");
-        Err(Problem::new(message).suggest(nearest(name, known.iter().copied())))
-    };
-    let check_slot = |slot: &Slot| match slot {
-        Slot::Parameter(name) => check(name),
-        _ => Ok(()),
-    };
+/// A [`Problem`] for each condition, stage and action that names another, with the nearest name.
+pub fn check_parameters(config: &Config, known: &[&str]) -> Result<(), Problems> {
+    let parameters = Parameters { known };
+    let mut found = Found::default();
     for (index, pipeline) in config.pipelines.iter().enumerate() {
         let located = |problem: Problem| problem.at(index).within("pipelines");
         let scope = Scope::of(&config.pipelines, index);
-        let condition =
-            |text: &String| Condition::parse(text, &scope)?.slots.iter().try_for_each(check_slot);
         let again = match &pipeline.again_after {
             Some(AgainAfter::Condition(text)) => Some(text),
             _ => None,
         };
         for (key, text) in [("when", pipeline.when.as_ref()), ("again_after", again)] {
-            text.map_or(Ok(()), condition).map_err(|it| located(it.within(key)))?;
+            let checked = text.map_or(Ok(()), |text| parameters.check_condition(text, &scope));
+            found.note(checked, |problem| located(problem.within(key)));
         }
-        for table in tables(pipeline) {
-            let columns = columns(table, &scope).map_err(located)?;
-            columns.iter().try_for_each(|(_, slot)| check_slot(slot)).map_err(located)?;
+        for (index, stage) in pipeline.stages.iter().enumerate() {
+            let checked = match stage {
+                Stage::Set(parameter) => parameters.check_set(parameter),
+                Stage::Csv(csv) => parameters.check_table(csv, &scope),
+                Stage::Log(log) => parameters.check_line(log, &scope),
+                _ => Ok(()),
+            };
+            found.note(checked, |it| located(it.within(stage.name()).at(index).within("stages")));
         }
-        let set = pipeline.stages.iter().filter_map(|stage| match stage {
-            Stage::Set(parameter) => Some(&parameter.name),
-            _ => None,
-        });
-        let by_action = pipeline.then.iter().filter_map(|action| match action {
-            Action::Set(parameter) => Some(&parameter.name),
-            _ => None,
-        });
-        for name in set.chain(by_action) {
-            check(name).map_err(|problem| located(problem.within("set")))?;
+        for (index, action) in pipeline.then.iter().enumerate() {
+            let checked = match action {
+                Action::Set(parameter) => parameters.check_set(parameter),
+                Action::Csv(csv) => parameters.check_table(csv, &scope),
+                Action::Log(log) => parameters.check_line(log, &scope),
+                _ => Ok(()),
+            };
+            found.note(checked, |it| located(it.within(action.name()).at(index).within("then")));
         }
     }
-    Ok(())
+    Problems::none(found.into_problems())
+}
+
+/// The parameters that a solver has.
+struct Parameters<'a> {
+    known: &'a [&'a str],
+}
+
+impl Parameters<'_> {
+    fn check(&self, name: &str) -> Result<(), Problem> {
+        if self.known.contains(&name) {
+            return Ok(());
+        }
+        let all = if self.known.is_empty() { "none".into() } else { self.known.join(", ") };
+        let message = format!("the solver has no parameter `{name}`; it has {all}");
+        Err(Problem::new(message).suggest(nearest(name, self.known.iter().copied())))
+    }
+
+    fn check_slot(&self, slot: &Slot) -> Result<(), Problem> {
+        match slot {
+            Slot::Parameter(name) => self.check(name),
+            _ => Ok(()),
+        }
+    }
+
+    fn check_condition(&self, text: &str, scope: &Scope) -> Result<(), Problem> {
+        let condition = Condition::parse(text, scope)?;
+        condition.slots.iter().try_for_each(|slot| self.check_slot(slot))
+    }
+
+    fn check_set(&self, parameter: &Parameter) -> Result<(), Problem> {
+        self.check(&parameter.name).map_err(|problem| problem.within("name"))
+    }
+
+    fn check_table(&self, csv: &Csv, scope: &Scope) -> Result<(), Problem> {
+        let columns = columns(csv, scope)?;
+        columns.iter().enumerate().try_for_each(|(index, (_, slot))| {
+            self.check_slot(slot).map_err(|problem| problem.at(index).within("monitors"))
+        })
+    }
+
+    fn check_line(&self, log: &Log, scope: &Scope) -> Result<(), Problem> {
+        let slots = line(log, scope)?.into_iter().filter_map(|(_, slot)| slot);
+        slots
+            .map(|slot| self.check_slot(&slot))
+            .collect::<Result<(), _>>()
+            .map_err(|problem| problem.within("message"))
+    }
 }
 
 fn tables(pipeline: &Pipeline) -> impl Iterator<Item = &Csv> {
@@ -362,7 +412,9 @@ fn tables(pipeline: &Pipeline) -> impl Iterator<Item = &Csv> {
     }))
 }
 
-fn check_pipeline(pipeline: &Pipeline, scope: &Scope) -> Result<(), Problem> {
+/// What is wrong with the names that a pipeline uses, and with those that it gives twice.
+fn check_pipeline(pipeline: &Pipeline, scope: &Scope) -> (Found, Vec<Problem>) {
+    let (mut found, mut all_twice) = (Found::default(), Vec::new());
     let has_faces = pipeline.stages.iter().any(Stage::takes_faces);
     // How many values there are before a stage.
     let mut before = 2;
@@ -376,43 +428,51 @@ fn check_pipeline(pipeline: &Pipeline, scope: &Scope) -> Result<(), Problem> {
             }
             Ok(())
         };
-        let found = match stage {
+        match stage {
             Stage::Difference(difference) => {
-                earlier(&difference.of, "of").and_then(|()| earlier(&difference.minus, "minus"))
+                found.note(earlier(&difference.of, "of"), located);
+                found.note(earlier(&difference.minus, "minus"), located);
             }
             Stage::TimeStatistics(statistics) => {
-                statistics.monitor.as_ref().map_or(Ok(()), |name| earlier(name, "monitor"))
+                let monitor = statistics.monitor.as_ref();
+                found.note(monitor.map_or(Ok(()), |name| earlier(name, "monitor")), located);
             }
-            Stage::Spectrum(spectrum) => earlier(&spectrum.monitor, "monitor"),
-            Stage::Csv(csv) => columns(csv, scope).map(drop),
-            Stage::Log(log) => line(log, scope).map(drop),
-            _ => Ok(()),
-        };
-        found.map_err(located)?;
+            Stage::Spectrum(spectrum) => {
+                found.note(earlier(&spectrum.monitor, "monitor"), located);
+            }
+            Stage::Csv(csv) => found.note(columns(csv, scope).map(drop), located),
+            Stage::Log(log) => found.note(line(log, scope).map(drop), located),
+            _ => {}
+        }
+        let mut twice = None;
         for monitor in monitors_of(stage, has_faces) {
             if scope.own()[..before].contains(&monitor) {
-                let message = format!("another stage has a monitor named `{}`", monitor.name);
-                return Err(located(Problem::new(message).within("name")));
+                twice.get_or_insert(monitor.name);
             }
             before += 1;
         }
+        if let Some(name) = twice {
+            let message = format!("another stage has a monitor named `{name}`");
+            all_twice.push(located(Problem::new(message).within("name")));
+        }
     }
     for (index, action) in pipeline.then.iter().enumerate() {
-        let found = match action {
+        let checked = match action {
             Action::Csv(csv) => columns(csv, scope).map(drop),
             Action::Log(log) => line(log, scope).map(drop),
             _ => Ok(()),
         };
-        found.map_err(|problem| problem.within(action.name()).at(index).within("then"))?;
+        found.note(checked, |it| it.within(action.name()).at(index).within("then"));
     }
     if let Some(when) = &pipeline.when {
-        Condition::parse(when, scope).map_err(|problem| problem.within("when"))?;
+        let problems = Condition::find(when, scope).err().unwrap_or_default();
+        found.extend(problems, |problem| problem.within("when"));
     }
     if let Some(AgainAfter::Condition(text)) = &pipeline.again_after {
-        Condition::parse(text, scope)
-            .map_err(|problem| problem.within("condition").within("again_after"))?;
+        let problems = Condition::find(text, scope).err().unwrap_or_default();
+        found.extend(problems, |problem| problem.within("condition").within("again_after"));
     }
-    Ok(())
+    (found, all_twice)
 }
 
 /// Whether a stage works on monitors alone, so that it may stand where there is no mesh.

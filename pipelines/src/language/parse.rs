@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
+use super::LanguageErrors;
 use super::error::{LanguageError, Problem, error, from_serde};
 use super::scan::{Node, scan};
 use crate::limits::{DOCUMENT, Limit};
@@ -17,6 +18,11 @@ pub trait Validate {
     /// # Errors
     /// A [`Problem`] with the way to it.
     fn validate(&self) -> Result<(), Problem>;
+
+    /// Finds everything that means nothing; unless it is told otherwise, the first thing alone.
+    fn problems(&self) -> Vec<Problem> {
+        self.validate().err().into_iter().collect()
+    }
 }
 
 /// Bytes as text, which must be UTF-8.
@@ -44,9 +50,15 @@ pub enum ReadError {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// It is no text, or too long.
+    /// It is no text, or too long, or does not say what it should: all errors that it has.
     #[error(transparent)]
-    Text(#[from] LanguageError),
+    Text(#[from] LanguageErrors),
+}
+
+impl From<LanguageError> for ReadError {
+    fn from(error: LanguageError) -> Self {
+        ReadError::Text(error.into())
+    }
 }
 
 /// Reads the text of a file of at most so many bytes: [`DOCUMENT`], or of orders
@@ -115,8 +127,8 @@ pub fn parse_valid<T: DeserializeOwned + Validate>(
 /// A JSON text that was read, and is still to be taken for something.
 pub(super) struct Document<'a> {
     pub(super) root: Node,
-    text: &'a str,
-    file: &'a str,
+    pub(super) text: &'a str,
+    pub(super) file: &'a str,
 }
 
 impl<'a> Document<'a> {

@@ -15,14 +15,14 @@ use crate::limits::{DEPTH, Exceeded, TEXT, VALUES};
 const FEW: usize = 16;
 
 /// A value and where it stands, in bytes.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Node {
     pub(super) span: Range<usize>,
     pub(super) value: Value,
 }
 
 /// A value of JSON.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) enum Value {
     Null,
     Boolean(bool),
@@ -33,7 +33,7 @@ pub(super) enum Value {
 }
 
 /// A member of an object.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Member {
     pub(super) key: String,
     pub(super) key_span: Range<usize>,
@@ -46,6 +46,14 @@ impl Node {
         match &self.value {
             Value::Object(members) => members.iter().find(|member| member.key == key),
             _ => None,
+        }
+    }
+
+    /// The members of an object; none of anything else.
+    pub(super) fn members(&self) -> &[Member] {
+        match &self.value {
+            Value::Object(members) => members,
+            _ => &[],
         }
     }
 

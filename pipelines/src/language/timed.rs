@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::order::{Command, Order, Parameter};
-use super::parse::{Document, Validate, check_length, parse_valid};
+use super::parse::{Document, Validate, check_length};
 use super::relative_files::resolve_files;
 use super::{At, LanguageError, Problem};
 use crate::limits::{Exceeded, WAITING, WAITING_BYTES};
@@ -232,11 +232,23 @@ impl Validate for Vec<TimedCommand> {
             .enumerate()
             .try_for_each(|(index, timed)| timed.validate().map_err(|problem| problem.at(index)))
     }
+
+    fn problems(&self) -> Vec<Problem> {
+        let too_many = WAITING.check(self.len()).err().map(Problem::from);
+        let of_item = |(index, timed): (usize, &TimedCommand)| {
+            timed.problems().into_iter().map(move |problem| problem.at(index))
+        };
+        too_many.into_iter().chain(self.iter().enumerate().flat_map(of_item)).collect()
+    }
 }
 
 impl Validate for JournalEntry {
     fn validate(&self) -> Result<(), Problem> {
         self.command.as_ref().map_or(Ok(()), Validate::validate)
+    }
+
+    fn problems(&self) -> Vec<Problem> {
+        self.command.as_ref().map_or_else(Vec::new, Validate::problems)
     }
 }
 
@@ -250,7 +262,8 @@ impl Validate for JournalEntry {
 /// Files that edits name lie beside `file` where they are relative.
 ///
 /// # Errors
-/// A [`LanguageError`] at the first token that is wrong.
+/// A [`LanguageError`] at the first token that is wrong;
+/// [`check_orders`](super::check_orders) tells all that are.
 ///
 /// # Example
 /// ```
@@ -275,19 +288,55 @@ pub fn parse_orders(text: &str, file: &str) -> Result<Vec<TimedCommand>, Languag
 }
 
 fn parse_commands(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageError> {
-    let start = text.trim_start_matches(['\u{feff}', ' ', '\t', '\r', '\n']);
-    if start.is_empty() {
-        return Ok(Vec::new());
+    match OrdersText::read(text, file)? {
+        OrdersText::Nothing => Ok(Vec::new()),
+        OrdersText::List(document) => document.valid(),
+        OrdersText::One(document) => document.valid::<TimedCommand>().map(|timed| vec![timed]),
+        OrdersText::Lines => parse_lines(text, file),
     }
-    if start.starts_with('[') {
-        return parse_valid(text, file);
-    }
-    match Document::read(text, file) {
-        Ok(document) if !is_of_journal(&document) => {
-            document.valid::<TimedCommand>().map(|timed| vec![timed])
+}
+
+/// A text of orders, by its outer form.
+pub(super) enum OrdersText<'a> {
+    /// There is none.
+    Nothing,
+    /// A JSON array.
+    List(Document<'a>),
+    /// One command.
+    One(Document<'a>),
+    /// A command or an entry of a journal in each line.
+    Lines,
+}
+
+impl<'a> OrdersText<'a> {
+    pub(super) fn read(text: &'a str, file: &'a str) -> Result<Self, LanguageError> {
+        let start = text.trim_start_matches(['\u{feff}', ' ', '\t', '\r', '\n']);
+        if start.is_empty() {
+            return Ok(OrdersText::Nothing);
         }
-        _ => parse_lines(text, file),
+        match Document::read(text, file) {
+            Ok(document) if start.starts_with('[') => Ok(OrdersText::List(document)),
+            Ok(document) if !is_of_journal(&document) => Ok(OrdersText::One(document)),
+            Ok(_) => Ok(OrdersText::Lines),
+            Err(error) if start.starts_with('[') => Err(error),
+            // Of what is written over several lines, neither of the first two is a whole value.
+            Err(_) if lines(text).take(2).any(|(_, line)| Document::read(line, file).is_ok()) => {
+                Ok(OrdersText::Lines)
+            }
+            Err(error) => Err(error),
+        }
     }
+}
+
+/// The lines that are not empty, each with its number from 0.
+pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let is_empty = |line: &str| line.trim_start_matches('\u{feff}').trim().is_empty();
+    text.lines().enumerate().filter(move |(_, line)| !is_empty(line))
+}
+
+/// Whether a line that cannot be read is the last, which a killed run has left half-written.
+pub(super) fn is_torn(text: &str, number: usize) -> bool {
+    number > 0 && !text.ends_with('\n') && number + 1 == text.lines().count()
 }
 
 fn is_of_journal(line: &Document<'_>) -> bool {
@@ -298,16 +347,11 @@ fn parse_lines(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageErro
     let mut commands: Vec<TimedCommand> = Vec::new();
     let mut indices = HashMap::new();
     let mut rejected = HashSet::new();
-    let ends_whole = text.ends_with('\n');
-    let count = text.lines().count();
-    for (number, content) in text.lines().enumerate() {
-        if content.trim_start_matches('\u{feff}').trim().is_empty() {
-            continue;
-        }
+    for (number, content) in lines(text) {
         let moved =
             |failure: LanguageError| LanguageError { line: failure.line + number, ..failure };
         let line = match Document::read(content, file) {
-            Err(_) if number + 1 == count && number > 0 && !ends_whole => break,
+            Err(_) if is_torn(text, number) => break,
             line => line.map_err(moved)?,
         };
         let too_many = |exceeded: Exceeded| moved(line.locate(exceeded.into()));

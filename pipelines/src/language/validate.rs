@@ -18,6 +18,7 @@ use super::pipeline::{AgainAfter, At, Due, Pipeline};
 use super::reductions::check_monitor;
 use super::stage::{Action, ErrorBound, OrderStage, Stage, StreamStage, Write};
 use super::timed::TimedCommand;
+use super::unread::{Found, Unread};
 use super::{Deformation, Problem, TimeStatistics, monitors};
 use crate::limits::{Exceeded, NAME};
 
@@ -29,9 +30,41 @@ impl From<Exceeded> for Problem {
 
 impl Validate for Config {
     fn validate(&self) -> Result<(), Problem> {
+        self.problems_beside(&Unread::default()).first()
+    }
+
+    fn problems(&self) -> Vec<Problem> {
+        self.problems_beside(&Unread::default()).into_problems()
+    }
+}
+
+impl Config {
+    /// What means nothing, beside what could not be read.
+    pub(super) fn problems_beside(&self, unread: &Unread) -> Found {
+        let mut found = Found::default();
+        self.check_settings(unread, &mut found);
+        let mut names = HashSet::new();
+        let mut on_order = None;
+        for (index, pipeline) in self.pipelines.iter().enumerate() {
+            let located = |problem: Problem| problem.at(index).within("pipelines");
+            if !names.insert(&pipeline.name) {
+                let message = format!("two pipelines are named `{}`", pipeline.name);
+                found.push(located(Problem::new(message).within("name")));
+            }
+            if pipeline.due == Due::OnOrder && on_order.replace(index).is_some() {
+                let message = "two pipelines run on orders, expected at most one";
+                found.push(located(Problem::new(message).within("on")));
+            }
+            found.extend(pipeline.problems(unread.is_whole(index)), located);
+        }
+        monitors::check(self, &mut found);
+        found
+    }
+
+    fn check_settings(&self, unread: &Unread, found: &mut Found) {
         if self.version != 1 {
             let message = format!("found version {}, expected 1", self.version);
-            return Err(Problem::new(message).within("version"));
+            found.push(Problem::new(message).within("version"));
         }
         if let Some(stream) = &self.stream
             && let Some(token) = &stream.token
@@ -39,63 +72,41 @@ impl Validate for Config {
             let known = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
             if !(16..=128).contains(&token.len()) || !token.chars().all(known) {
                 let message = "expected a token of 16 to 128 letters, digits, '-' or '_'";
-                return Err(Problem::new(message).within("token").within("stream"));
+                found.push(Problem::new(message).within("token").within("stream"));
             }
         }
-        if self.steering.wait_for_viewer && self.stream.is_none() {
+        let no_stream = self.stream.is_none() && !unread.of_configuration;
+        if self.steering.wait_for_viewer && no_stream {
             let message = "there is no `stream`, so that no viewer could connect";
-            return Err(Problem::new(message).within("wait_for_viewer").within("steering"));
+            found.push(Problem::new(message).within("wait_for_viewer").within("steering"));
         }
         if self.journal.as_deref() == Some("") {
-            return Err(Problem::new("expected the name of a file").within("journal"));
+            found.push(Problem::new("expected the name of a file").within("journal"));
         }
-        let mut names = HashSet::new();
-        let mut on_order = None;
-        for (index, pipeline) in self.pipelines.iter().enumerate() {
-            let located = |problem: Problem| problem.at(index).within("pipelines");
-            if !names.insert(&pipeline.name) {
-                let message = format!("two pipelines are named `{}`", pipeline.name);
-                return Err(located(Problem::new(message).within("name")));
-            }
-            if pipeline.due == Due::OnOrder && on_order.replace(index).is_some() {
-                let message = "two pipelines run on orders, expected at most one";
-                return Err(located(Problem::new(message).within("on")));
-            }
-            pipeline.validate().map_err(located)?;
-        }
-        monitors::check(self)
     }
 }
 
-impl Validate for Pipeline {
-    fn validate(&self) -> Result<(), Problem> {
+impl Pipeline {
+    /// What means nothing in a pipeline by itself; `is_whole` says whether all of it could be read.
+    fn problems(&self, is_whole: bool) -> Vec<Problem> {
+        let mut found = Found::default();
         if self.name.trim().is_empty()
             || self.name.chars().any(char::is_control)
             || NAME.check(self.name.chars().count()).is_err()
         {
             let message = format!("expected a name of 1 to {} visible characters", NAME.most);
-            return Err(Problem::new(message).within("name"));
+            found.push(Problem::new(message).within("name"));
         }
         if let Due::At(At::Time(time)) = self.due {
-            finite(time).map_err(|problem| problem.within("time").within("at"))?;
+            found.note(finite(time), |problem| problem.within("time").within("at"));
         }
-        let mut state = Made::default();
+        let mut state = Made { is_whole, ..Made::default() };
         for (index, stage) in self.stages.iter().enumerate() {
-            state
-                .check(stage, self.due)
-                .map_err(|problem| problem.within(stage.name()).at(index).within("stages"))?;
+            let located = |problem: Problem| problem.within(stage.name()).at(index);
+            found.note(state.check(stage, self.due), |it| located(it).within("stages"));
         }
-        if self.due == Due::OnOrder {
-            if self.when.is_some() {
-                return Err(
-                    Problem::new("a pipeline that runs on orders has no condition").within("when")
-                );
-            }
-            if !self.then.is_empty() {
-                return Err(
-                    Problem::new("a pipeline that runs on orders has no `then`").within("then")
-                );
-            }
+        if is_whole {
+            self.check_condition(&mut found);
         }
         if let Some(budget) = self.budget
             && !(budget.percent > 0.0 && budget.percent <= 100.0)
@@ -104,49 +115,54 @@ impl Validate for Pipeline {
                 "found {}, expected a number above 0 and at most 100",
                 Number(budget.percent)
             );
-            return Err(Problem::new(message).within("percent").within("budget"));
+            found.push(Problem::new(message).within("percent").within("budget"));
+        }
+        for (index, action) in self.then.iter().enumerate() {
+            let located = |problem: Problem| problem.within(action.name()).at(index);
+            found.note(state.act(action, self.due), |it| located(it).within("then"));
+        }
+        if let Some((index, name)) = state.unordered.filter(|_| is_whole) {
+            let message = "found an edit that nothing orders, expected an `order` stage after it";
+            found.push(Problem::new(message).within(name).at(index).within("stages"));
+        }
+        found.into_problems()
+    }
+
+    /// Checks that a condition has what belongs to it.
+    fn check_condition(&self, found: &mut Found) {
+        if self.due == Due::OnOrder {
+            if self.when.is_some() {
+                let message = "a pipeline that runs on orders has no condition";
+                found.push(Problem::new(message).within("when"));
+            }
+            if !self.then.is_empty() {
+                let message = "a pipeline that runs on orders has no `then`";
+                found.push(Problem::new(message).within("then"));
+            }
         }
         match &self.when {
             Some(_) if self.then.is_empty() => {
-                return Err(Problem::new("found a condition without `then`").within("when"));
+                found.push(Problem::new("found a condition without `then`").within("when"));
             }
-            None if self.lasting.is_some() => {
-                return Err(Problem::new("found `for` without `when`").within("for"));
-            }
-            None if matches!(self.again_after, Some(AgainAfter::Condition(_))) => {
-                return Err(Problem::new("found a condition without `when`").within("again_after"));
+            None => {
+                if self.lasting.is_some() {
+                    found.push(Problem::new("found `for` without `when`").within("for"));
+                }
+                if matches!(self.again_after, Some(AgainAfter::Condition(_))) {
+                    let message = "found a condition without `when`";
+                    found.push(Problem::new(message).within("again_after"));
+                }
             }
             _ => {}
         }
-        for (index, action) in self.then.iter().enumerate() {
-            let located = |problem: Problem| problem.within(action.name()).at(index).within("then");
-            match action {
-                Action::Pause {} | Action::Stop {} | Action::Log(_) => Ok(()),
-                _ if self.due == Due::OnEnd && !matches!(action, Action::Csv(_)) => {
-                    let message = "when the run ends there is no mesh any more, and nobody to obey; \
-                                   expected `csv` or `log`";
-                    Err(Problem::new(message))
-                }
-                Action::Stream(stream) => state.stream(stream),
-                Action::Write(write) => state.write(write),
-                Action::Csv(csv) => csv.check(),
-                Action::Set(parameter) => finite(parameter.value).map_err(|it| it.within("value")),
-                Action::Render(render) => render.check(),
-                Action::Order(order) => state.order(order),
-            }
-            .map_err(located)?;
-        }
-        if let Some((index, name)) = state.unordered {
-            let message = "found an edit that nothing orders, expected an `order` stage after it";
-            return Err(Problem::new(message).within(name).at(index).within("stages"));
-        }
-        Ok(())
     }
 }
 
 /// The things that the stages of a pipeline have made so far.
 #[derive(Default)]
 struct Made {
+    /// Whether all stages are there: what one lacks for want of another is told only then.
+    is_whole: bool,
     stages: usize,
     extract: bool,
     /// The key of the source stage.
@@ -170,25 +186,24 @@ impl Made {
         self.stages += 1;
         let is_setting = matches!(stage, Stage::Deform(_) | Stage::Guard(_) | Stage::Schedule(_));
         if is_setting != (due == Due::OnOrder) {
-            return Err(Problem::new(if is_setting {
+            self.of_whole(if is_setting {
                 "this stage belongs to a pipeline with `\"on\": \"order\"`"
             } else {
                 "a pipeline with `\"on\": \"order\"` has only the stages `deform`, `guard` and `schedule`"
-            }));
+            })?;
         }
         if !monitors::needs_no_mesh(stage, due) {
-            return Err(Problem::new(
+            self.of_whole(
                 "a pipeline with `\"on\": \"end\"` has only the stages `difference`, `csv` and `log`: \
                  there is no mesh any more",
-            ));
+            )?;
         }
         if is_setting && !self.settings.insert(stage.name()) {
             return Err(Problem::new("found twice, expected at most once"));
         }
         if let Some(edit) = stage.edit() {
-            check_edit(&edit)?;
             self.unordered = Some((index, stage.name()));
-            return Ok(());
+            return check_edit(&edit);
         }
         if stage.is_source() {
             self.source.get_or_insert(stage.name());
@@ -224,16 +239,16 @@ impl Made {
                 stage.check().and_then(|()| self.measures(stage.name(), stage.name.is_some()))
             }
             Stage::Integrate(stage) => {
-                stage.check(self.is_on_surface()).and_then(|()| self.reduces(&stage.name))
+                stage.check(self.may_be_on_surface()).and_then(|()| self.reduces(&stage.name))
             }
             Stage::Histogram(stage) => {
-                stage.check(self.is_on_surface()).and_then(|()| self.reduces(&stage.name))
+                stage.check(self.may_be_on_surface()).and_then(|()| self.reduces(&stage.name))
             }
             Stage::Force(stage) => {
-                stage.check(self.is_on_surface()).and_then(|()| self.reduces(&stage.name))
+                stage.check(self.may_be_on_surface()).and_then(|()| self.reduces(&stage.name))
             }
             Stage::WallShearStress(stage) => {
-                stage.check(self.is_on_surface()).and_then(|()| self.adds(stage.name()))
+                stage.check(self.may_be_on_surface()).and_then(|()| self.adds(stage.name()))
             }
             Stage::Difference(stage) => check_monitor(&stage.name),
             Stage::TimeStatistics(stage) => {
@@ -257,8 +272,31 @@ impl Made {
         }
     }
 
+    /// Checks an action.
+    fn act(&mut self, action: &Action, due: Due) -> Result<(), Problem> {
+        match action {
+            Action::Pause {} | Action::Stop {} | Action::Log(_) => Ok(()),
+            _ if due == Due::OnEnd && !matches!(action, Action::Csv(_)) => {
+                let message = "when the run ends there is no mesh any more, and nobody to obey; \
+                               expected `csv` or `log`";
+                self.of_whole(message)
+            }
+            Action::Stream(stream) => self.stream(stream),
+            Action::Write(write) => self.write(write),
+            Action::Csv(csv) => csv.check(),
+            Action::Set(parameter) => finite(parameter.value).map_err(|it| it.within("value")),
+            Action::Render(render) => render.check(),
+            Action::Order(order) => self.order(order),
+        }
+    }
+
+    /// A problem that is one only where all stages are there.
+    fn of_whole(&self, message: &str) -> Result<(), Problem> {
+        if self.is_whole { Err(Problem::new(message)) } else { Ok(()) }
+    }
+
     fn source(&mut self) -> Result<(), Problem> {
-        if self.extract {
+        if std::mem::replace(&mut self.extract, true) {
             return Err(Problem::new("a pipeline has one source stage"));
         }
         if self.stages > self.deriving + 1 {
@@ -266,7 +304,6 @@ impl Made {
                            stand before it";
             return Err(Problem::new(message));
         }
-        self.extract = true;
         Ok(())
     }
 
@@ -276,9 +313,9 @@ impl Made {
             let message = "a stage that derives a field must come before all others";
             return Err(Problem::new(message));
         }
+        self.deriving += 1;
         let name = stage.derived_name().unwrap_or_default();
         check_name(name).map_err(|problem| problem.within("name"))?;
-        self.deriving += 1;
         if self.added.contains(name) || !self.derived.insert(name.to_owned()) {
             let message = format!("two stages derive a field `{name}`");
             return Err(Problem::new(message).within("name"));
@@ -286,8 +323,8 @@ impl Made {
         Ok(())
     }
 
-    fn is_on_surface(&self) -> bool {
-        self.source == Some("surface")
+    fn may_be_on_surface(&self) -> bool {
+        self.source == Some("surface") || (self.source.is_none() && !self.is_whole)
     }
 
     /// A stage whose monitors begin with this name.
@@ -335,9 +372,7 @@ impl Made {
 
     fn stream(&self, stream: &StreamStage) -> Result<(), Problem> {
         if !self.extract {
-            return Err(Problem::new(
-                "nothing to stream, expected a source stage such as `surface` first",
-            ));
+            self.of_whole("nothing to stream, expected a source stage such as `surface` first")?;
         }
         check_bound(stream.error).map_err(|problem| problem.within("error"))?;
         match stream.positions {
@@ -348,7 +383,7 @@ impl Made {
 
     fn write(&self, write: &Write) -> Result<(), Problem> {
         let surface_only = write.file.to_ascii_lowercase().ends_with(".vtp") && !self.extract;
-        if surface_only {
+        if surface_only && self.is_whole {
             let message = "a `.vtp` file holds surfaces, expected a source stage such as `surface` first, or a `.vtu` file";
             return Err(Problem::new(message).within("file"));
         }
@@ -357,9 +392,9 @@ impl Made {
 
     fn order(&mut self, order: &OrderStage) -> Result<(), Problem> {
         if self.unordered.take().is_none() {
-            return Err(Problem::new("nothing to order, expected an edit stage before it"));
+            self.of_whole("nothing to order, expected an edit stage before it")?;
         }
-        check_settings(order.deform.as_ref(), order.guard.as_ref(), order.schedule.as_ref())
+        check_settings(order.deform.as_ref(), order.guard.as_ref(), order.schedule.as_ref()).first()
     }
 }
 
@@ -404,19 +439,22 @@ fn check_settings(
     deform: Option<&Deformation>,
     guard: Option<&Guard>,
     schedule: Option<&Schedule>,
-) -> Result<(), Problem> {
-    deform.map_or(Ok(()), check_deformation).map_err(|problem| problem.within("deform"))?;
-    guard.map_or(Ok(()), check_guard).map_err(|problem| problem.within("guard"))?;
-    schedule.map_or(Ok(()), check_schedule).map_err(|problem| problem.within("schedule"))
+) -> Found {
+    let mut found = Found::default();
+    found.note(deform.map_or(Ok(()), check_deformation), |problem| problem.within("deform"));
+    found.note(guard.map_or(Ok(()), check_guard), |problem| problem.within("guard"));
+    found.note(schedule.map_or(Ok(()), check_schedule), |problem| problem.within("schedule"));
+    found
 }
 
-/// Checks edits one by one, and what all of them come to.
-fn check_edits(edits: &[Edit]) -> Result<(), Problem> {
-    check_stack(edits)?;
-    let located = |index: usize, edit: &Edit| {
-        check_edit(edit).map_err(|problem| problem.within(edit.name()).at(index))
-    };
-    edits.iter().enumerate().try_for_each(|(index, edit)| located(index, edit))
+/// Checks what all edits come to, and each of them.
+fn check_edits(edits: &[Edit]) -> Found {
+    let mut found = Found::default();
+    found.note(check_stack(edits).map_err(Problem::from), |problem| problem);
+    for (index, edit) in edits.iter().enumerate() {
+        found.note(check_edit(edit), |problem| problem.within(edit.name()).at(index));
+    }
+    found
 }
 
 /// Checks of a deformation what can be checked without a mesh.
@@ -445,22 +483,40 @@ fn check_deformation(stage: &Deformation) -> Result<(), Problem> {
 
 impl Validate for Vec<Edit> {
     fn validate(&self) -> Result<(), Problem> {
-        check_edits(self)
+        check_edits(self).first()
+    }
+
+    fn problems(&self) -> Vec<Problem> {
+        check_edits(self).into_problems()
+    }
+}
+
+impl Order {
+    fn found(&self) -> Found {
+        let mut found = Found::default();
+        let (key, edits) = match &self.change {
+            Change::Edits(edits) => ("edits", edits.as_slice()),
+            Change::Stack(edits) => ("stack", edits.as_slice()),
+            Change::Undo(_) => ("undo", &[][..]),
+        };
+        if key == "edits" && edits.is_empty() {
+            found.push(Problem::new("expected at least one edit").within("edits"));
+        }
+        found.extend(check_edits(edits).into_problems(), |problem| problem.within(key));
+        let settings =
+            check_settings(self.deform.as_ref(), self.guard.as_ref(), self.schedule.as_ref());
+        found.extend(settings.into_problems(), |problem| problem);
+        found
     }
 }
 
 impl Validate for Order {
     fn validate(&self) -> Result<(), Problem> {
-        let (key, edits) = match &self.change {
-            Change::Edits(edits) if edits.is_empty() => {
-                return Err(Problem::new("expected at least one edit").within("edits"));
-            }
-            Change::Edits(edits) => ("edits", edits.as_slice()),
-            Change::Stack(edits) => ("stack", edits.as_slice()),
-            Change::Undo(_) => ("undo", &[][..]),
-        };
-        check_edits(edits).map_err(|problem| problem.within(key))?;
-        check_settings(self.deform.as_ref(), self.guard.as_ref(), self.schedule.as_ref())
+        self.found().first()
+    }
+
+    fn problems(&self) -> Vec<Problem> {
+        self.found().into_problems()
     }
 }
 
@@ -473,6 +529,15 @@ impl Validate for Command {
             Command::Pause {} | Command::Resume {} | Command::Stop {} => Ok(()),
         }
     }
+
+    fn problems(&self) -> Vec<Problem> {
+        match self {
+            Command::Order(order) => {
+                order.problems().into_iter().map(|problem| problem.within("order")).collect()
+            }
+            _ => self.validate().err().into_iter().collect(),
+        }
+    }
 }
 
 impl Validate for Question {
@@ -482,11 +547,23 @@ impl Validate for Question {
     }
 }
 
+impl TimedCommand {
+    fn check_time(&self) -> Result<(), Problem> {
+        match self.at {
+            Some(At::Time(time)) => {
+                finite(time).map_err(|problem| problem.within("time").within("at"))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 impl Validate for TimedCommand {
     fn validate(&self) -> Result<(), Problem> {
-        if let Some(At::Time(time)) = self.at {
-            finite(time).map_err(|problem| problem.within("time").within("at"))?;
-        }
-        self.command.validate()
+        self.check_time().and_then(|()| self.command.validate())
+    }
+
+    fn problems(&self) -> Vec<Problem> {
+        self.check_time().err().into_iter().chain(self.command.problems()).collect()
     }
 }

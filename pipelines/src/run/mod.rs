@@ -5,6 +5,7 @@ mod due;
 mod history;
 mod output;
 mod pipeline;
+mod rehearsal;
 mod trigger;
 
 use std::collections::HashMap;
@@ -23,6 +24,7 @@ use tombolo_deform::communicator::{Communicator, Solo, agree};
 pub use cost::Cost;
 pub use history::{History, Measured};
 pub use output::{Encoding, Frame, MonitorValues, Output, Table, View, ViewKind};
+pub use rehearsal::Rehearsal;
 
 /// Runs the pipelines of a configuration.
 ///

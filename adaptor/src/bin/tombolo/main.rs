@@ -1,5 +1,6 @@
 //! The program `tombolo`: see `tombolo --help`.
 
+mod check;
 mod edit;
 mod features;
 mod mesh;
@@ -27,11 +28,10 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Task {
-    /// Check a configuration; what is wrong goes to the error output with its line and column
-    Check {
-        /// The configuration
-        file: PathBuf,
-    },
+    /// Check a configuration or a file of orders: every error goes to the error output with its
+    /// file, line and column
+    #[command(after_help = check::EXIT_CODES)]
+    Check(check::Options),
     /// Print the JSON Schema of configurations
     Schema,
     /// Look at a mesh
@@ -62,6 +62,8 @@ enum MeshTask {
 enum Failure {
     /// Something is wrong with what was given: exit code 1.
     Wrong(String),
+    /// The same, and it was told: exit code 1.
+    Told,
     /// The shape that was asked for is refused: exit code 2.
     Refused(String),
 }
@@ -78,7 +80,7 @@ fn main() -> ExitCode {
         Err(asked) => return answer(&asked),
     };
     let done = match arguments.task {
-        Task::Check { file } => check(&file),
+        Task::Check(options) => check::check(&options),
         Task::Schema => json(&language::config_schema()),
         Task::Mesh(MeshTask::Info { file, json }) => mesh::info(&file, json),
         Task::Features(options) => features::features(&options),
@@ -91,6 +93,7 @@ fn main() -> ExitCode {
             eprintln!("tombolo: {message}");
             ExitCode::from(1)
         }
+        Err(Failure::Told) => ExitCode::from(1),
         Err(Failure::Refused(message)) => {
             eprintln!("tombolo: refused: {message}");
             ExitCode::from(2)
@@ -103,11 +106,6 @@ fn main() -> ExitCode {
 fn answer(asked: &clap::Error) -> ExitCode {
     let printed = asked.print().is_ok();
     if printed && asked.exit_code() == 0 { ExitCode::SUCCESS } else { ExitCode::from(1) }
-}
-
-fn check(file: &Path) -> Result<(), Failure> {
-    let config = language::parse(&read(file)?, &file.to_string_lossy())?;
-    say(format_args!("{}: {} pipeline(s), all well", file.display(), config.pipelines.len()))
 }
 
 /// The text of a file; an error names the file.

@@ -5,6 +5,7 @@ mod draw;
 mod end;
 mod measure;
 mod prepare;
+mod rehearse;
 mod sinks;
 
 use std::collections::HashSet;
@@ -143,20 +144,19 @@ impl Prepared {
         self.reported = keys;
     }
 
-    /// Runs the stages, and the actions where the condition holds. Returns the values of the
-    /// monitors. Collective.
-    pub(super) fn run(
+    /// What a run begins with.
+    fn begin<'a>(
         &mut self,
-        snapshot: &Snapshot,
-        channel: &Channel,
-        source: &mut Source,
-        communicator: &dyn Communicator,
-        board: &Board,
-        outputs: &mut Vec<Output>,
-    ) -> Vec<f64> {
+        snapshot: &'a Snapshot<'a>,
+        channel: &'a Channel<'a>,
+        source: &'a mut Source,
+        communicator: &'a dyn Communicator,
+        board: &'a Board,
+        outputs: &'a mut Vec<Output>,
+    ) -> Progress<'a> {
         #[expect(clippy::cast_precision_loss, reason = "cycles below 2^53")]
         let values = vec![snapshot.cycle as f64, snapshot.time];
-        let mut progress = Progress {
+        Progress {
             snapshot,
             channel,
             source,
@@ -174,7 +174,21 @@ impl Prepared {
             errors: Vec::new(),
             cost: self.cost,
             outputs,
-        };
+        }
+    }
+
+    /// Runs the stages, and the actions where the condition holds. Returns the values of the
+    /// monitors. Collective.
+    pub(super) fn run(
+        &mut self,
+        snapshot: &Snapshot,
+        channel: &Channel,
+        source: &mut Source,
+        communicator: &dyn Communicator,
+        board: &Board,
+        outputs: &mut Vec<Output>,
+    ) -> Vec<f64> {
+        let mut progress = self.begin(snapshot, channel, source, communicator, board, outputs);
         self.check_selection(&mut progress);
         let mut states = std::mem::take(&mut self.states);
         for (index, state) in states.iter_mut().enumerate() {
