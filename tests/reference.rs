@@ -20,6 +20,10 @@ Generated from the types of the program; do not edit. `tombolo schema` prints th
 A stage, an edit or a command is an object with exactly one key, its name: `{\"surface\": {}}`. A key that is not listed is an error, and so
 is one that stands twice. Every number must be finite.
 
+`tombolo check FILE` tells every error of a configuration or a file of orders at once, each with its line, column and path, what was
+expected and the nearest name; with `--mesh MESH` also the fields, features and regions that the mesh does not have. A run that does not
+start for such errors tells them all as well.
+
 ";
 
 #[test]

@@ -301,3 +301,97 @@ fn what_means_nothing_is_refused_with_its_place() {
     assert!(check_parameters(&config, &["valve", "valvo"]).is_ok());
     assert!(check_parameters(&config, &["valvo"]).is_err());
 }
+
+/// A formula has the value that a parameter has at its step, on all ranks.
+#[test]
+fn a_formula_follows_a_parameter() {
+    let pipelines = r#"
+        {"name": "f", "stages": [
+           {"expression": {"name": "force", "components": ["p * parameter.inflow^2", "{parameter.two words} + 0 * p"]}},
+           {"expression": {"name": "constant", "formula": "parameter.inflow"}},
+           {"statistics": {"field": "force"}}, {"statistics": {"field": "constant"}}]}"#;
+    for ranks in 1..=4 {
+        let made = threads::run(ranks, |ranks| {
+            let ranks: Arc<dyn Communicator> = Arc::new(ranks);
+            let rank = ranks.rank();
+            let mut runner = Runner::with_communicator(&config(pipelines), ranks).unwrap();
+            let mut found = Vec::new();
+            for (cycle, inflow) in [(0, 2.0), (1, 3.0), (2, -1.0)] {
+                runner.set_parameters([("inflow", inflow), ("two words", 0.0)]);
+                for output in step_of(rank, &mut runner, cycle, 5.0) {
+                    match output {
+                        Output::Monitor(values) => {
+                            let of = |wanted: &str| {
+                                values.values.iter().find(|(name, _)| name == wanted).unwrap().1
+                            };
+                            found.push([of("force.max"), of("constant.min"), of("constant.max")]);
+                        }
+                        other => panic!("{other:?}"),
+                    }
+                }
+            }
+            found
+        });
+        for found in made {
+            assert_eq!(found, [[20.0, 2.0, 2.0], [45.0, 3.0, 3.0], [5.0, -1.0, -1.0]]);
+        }
+    }
+}
+
+#[test]
+fn a_parameter_is_neither_unknown_nor_a_field() {
+    let told = |formula: &str, parameters: &[(&'static str, f64)], field: &str| {
+        let stage = format!(r#"{{"expression": {{"name": "e", "formula": "{formula}"}}}}"#);
+        let mut runner = runner(&format!(r#"{{"name": "a", "stages": [{stage}]}}"#));
+        runner.set_parameters(parameters.iter().copied());
+        let mesh = box_of_tets([1, 1, 1], [0.0; 3], [1.0; 3]);
+        let values = vec![[1.0, 2.0, 3.0]; mesh.points().len()];
+        let fields = [FieldView::vertex(field, &values)];
+        let channel = Channel::new("fluid", MeshView::from(&mesh), &fields);
+        words(&runner.run(&Snapshot { cycle: 0, time: 0.0, channels: &[channel] })).join("\n")
+    };
+    let inflow = [("inflow", 1.0), ("valve", 2.0)];
+    assert_eq!(told("parameter.inflow + u.x", &inflow, "u"), "");
+    assert_eq!(
+        told("parameter.inflw", &inflow, "u"),
+        "expression: the solver has no parameter `inflw`; it has inflow, valve; did you mean \
+         `parameter.inflow`?"
+    );
+    assert_eq!(
+        told("parameter.x", &[], "parameter"),
+        "expression: the solver has no parameter `x`; it has none"
+    );
+    assert_eq!(
+        told("inflow", &inflow, "u"),
+        "expression: the channel has no field `inflow`; the parameter of that name is \
+         `parameter.inflow`; did you mean `parameter.inflow`?"
+    );
+    for field in ["parameter", "parameter.x"] {
+        assert_eq!(
+            told("parameter.x", &[("x", 1.0)], field),
+            format!(
+                "expression: `parameter.x` is a parameter of the solver, and of the field \
+                 `{field}` too; expected a field of another name"
+            )
+        );
+    }
+    // At the start the adaptor knows what there is.
+    let config = config(
+        r#"{"name": "a", "stages": [
+            {"expression": {"name": "e", "components": ["x", "parameter.inflw"]}},
+            {"log": {"message": "{parameter.valv}"}}], "when": "parameter.inlfow > 0", "then": [{"stop": {}}]}"#,
+    );
+    let problems = check_parameters(&config, &["inflow", "valve"]).unwrap_err();
+    let problems: Vec<String> = problems.iter().map(ToString::to_string).collect();
+    assert_eq!(
+        problems,
+        [
+            "pipelines[0].when: the solver has no parameter `inlfow`; it has inflow, valve; did you mean `inflow`?",
+            "pipelines[0].stages[0].expression.components[1]: the solver has no parameter `inflw`; it has inflow, valve; did you mean `inflow`?",
+            "pipelines[0].stages[1].log.message: the solver has no parameter `valv`; it has inflow, valve; did you mean `valve`?",
+        ]
+    );
+    let text = r#"{"version": 1, "pipelines": [{"name": "a", "stages": [{"magnitude": {"field": "u", "name": "parameter.u"}}]}]}"#;
+    let error = parse(text, "test.json").unwrap_err().to_string();
+    assert!(error.contains("found `parameter.u`, which has a meaning of its own"), "{error}");
+}

@@ -6,7 +6,7 @@ use tombolo_deform::vector::mean;
 use super::{Basis, Operand};
 use crate::expression::Expression;
 use crate::extract::{ABSENT, Association, FieldView, unknown_field};
-use crate::language::{Formula, GIVEN};
+use crate::language::{Formula, GIVEN, PARAMETER, nearest};
 
 /// Where the value of a name comes from.
 enum Name<'a> {
@@ -14,6 +14,8 @@ enum Name<'a> {
     Coordinate(usize),
     Time,
     Cycle,
+    /// A parameter of the solver, by its value now.
+    Parameter(f64),
     /// A component of a field; `None` on a rank that has nothing of the mesh.
     Field(Option<Operand<'a>>, usize),
 }
@@ -93,6 +95,7 @@ impl<'a> Program<'a> {
                     Name::Coordinate(axis) => at[*axis],
                     Name::Time => basis.time,
                     Name::Cycle => cycle,
+                    Name::Parameter(value) => *value,
                     Name::Field(operand, component) => {
                         operand.as_ref().map_or(ABSENT, |operand| operand.value(entity, *component))
                     }
@@ -111,13 +114,35 @@ fn find<'a>(name: &str, basis: &Basis<'a>) -> Result<Name<'a>, String> {
         Some(axis) => return Ok(Name::Coordinate(axis)),
         None => {}
     }
+    let known = || basis.channel.fields.iter().map(|field| field.name);
+    if let Some(parameter) = name.strip_prefix(PARAMETER) {
+        let found = basis.parameters.iter().find(|(known, _)| known == parameter);
+        let whole = PARAMETER.trim_end_matches('.');
+        let field = known().find(|known| *known == name || *known == whole);
+        match (found, field) {
+            (Some(_), Some(field)) => {
+                return Err(format!(
+                    "`{name}` is a parameter of the solver, and of the field `{field}` too; \
+                     expected a field of another name"
+                ));
+            }
+            (Some((_, value)), None) => return Ok(Name::Parameter(*value)),
+            (None, _) => return Err(unknown_parameter(parameter, basis.parameters)),
+        }
+    }
     if basis.is_bare() {
         return Ok(Name::Field(None, 0));
     }
-    let known = || basis.channel.fields.iter().map(|field| field.name);
     let (field, component) = match name.rsplit_once('.') {
         _ if known().any(|known| known == name) => (name, None),
         Some((field, component)) if known().any(|known| known == field) => (field, Some(component)),
+        // A parameter without what stands before its name.
+        _ if basis.parameters.iter().any(|(known, _)| known == name) => {
+            return Err(format!(
+                "the channel has no field `{name}`; the parameter of that name is \
+                 `{PARAMETER}{name}`; did you mean `{PARAMETER}{name}`?"
+            ));
+        }
         _ => return Err(unknown_field(name, known())),
     };
     let Some(operand) = basis.operand(field)? else { return Ok(Name::Field(None, 0)) };
@@ -143,4 +168,14 @@ fn find<'a>(name: &str, basis: &Basis<'a>) -> Result<Name<'a>, String> {
             Err(format!("field `{field}` has {components} components, none of which is `{name}`"))
         }
     }
+}
+
+/// A text that says that the solver has no such parameter, which it has, and the nearest.
+fn unknown_parameter(name: &str, known: &[(String, f64)]) -> String {
+    let known = || known.iter().map(|(known, _)| known.as_str());
+    let hint = nearest(name, known())
+        .map_or(String::new(), |near| format!("; did you mean `{PARAMETER}{near}`?"));
+    let all =
+        if known().count() == 0 { "none".into() } else { known().collect::<Vec<_>>().join(", ") };
+    format!("the solver has no parameter `{name}`; it has {all}{hint}")
 }

@@ -24,6 +24,8 @@ pub(crate) struct Basis<'a> {
     pub(crate) source: &'a Source,
     pub(crate) cycle: u64,
     pub(crate) time: f64,
+    /// The solver's parameters as they are now.
+    pub(crate) parameters: &'a [(String, f64)],
     pub(crate) communicator: &'a dyn Communicator,
 }
 

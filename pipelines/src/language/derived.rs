@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Problem;
+use super::{PARAMETER, Problem};
 use crate::expression::Expression;
 use crate::limits::NAME;
 
@@ -20,8 +20,9 @@ pub struct Derived {
 
 /// A field that formulas give. They may name scalar fields, components of others (`velocity.x`,
 /// `stress.0`), the coordinates `x`, `y` and `z` (of a cell those of its centre, the mean of its
-/// vertices), `time` and `cycle`. The fields must all be of vertices or all of elements; without
-/// any, the new field is of vertices.
+/// vertices), `time`, `cycle` and the parameters of the solver (`parameter.inflow`) as they are at
+/// the step. The fields must all be of vertices or all of elements; without any, the new field is of
+/// vertices.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "FormulaKeys", into = "FormulaKeys")]
 pub struct Formula {
@@ -77,7 +78,7 @@ pub(super) fn check_name(name: &str) -> Result<(), Problem> {
         let message = format!("expected a name of 1 to {} visible characters", NAME.most);
         return Err(Problem::new(message));
     }
-    if GIVEN.contains(&name) || name == "quality" {
+    if GIVEN.contains(&name) || name == "quality" || name.starts_with(PARAMETER) {
         return Err(Problem::new(format!("found `{name}`, which has a meaning of its own")));
     }
     Ok(())
@@ -93,13 +94,29 @@ impl Formula {
         for (index, text) in self.components.iter().enumerate() {
             Expression::parse_open(text).map_err(|error| {
                 let message = format!("column {} of the formula: {}", error.column, error.message);
-                let problem = Problem::new(message).suggest(error.suggestion.as_deref());
-                match count {
-                    1 => problem.within("formula"),
-                    _ => problem.at(index).within("components"),
-                }
+                self.at(index, Problem::new(message).suggest(error.suggestion.as_deref()))
             })?;
         }
         Ok(())
+    }
+
+    /// Puts a problem at the formula of a component.
+    pub(super) fn at(&self, component: usize, problem: Problem) -> Problem {
+        match self.components.len() {
+            1 => problem.within("formula"),
+            _ => problem.at(component).within("components"),
+        }
+    }
+
+    /// The parameters that the formulas name, each with the component whose formula does.
+    pub(crate) fn parameters(&self) -> impl Iterator<Item = (usize, String)> + '_ {
+        self.components.iter().enumerate().flat_map(|(component, text)| {
+            let names =
+                Expression::parse_open(text).map_or_else(|_| Vec::new(), |(_, names)| names);
+            let parameter = move |name: String| {
+                name.strip_prefix(PARAMETER).map(|name| (component, name.to_owned()))
+            };
+            names.into_iter().filter_map(parameter)
+        })
     }
 }

@@ -63,7 +63,7 @@ pub use file_pattern::file_pattern;
 pub(crate) use file_pattern::picture_pattern;
 pub use glyphs::{GlyphShape, Glyphs, GlyphsAt};
 pub use message::{Message, parse_message};
-pub(crate) use monitors::{Condition, Line, Scope, Slot, columns, line, monitors_of};
+pub(crate) use monitors::{Condition, Line, PARAMETER, Scope, Slot, columns, line, monitors_of};
 pub use monitors::{Monitor, check_parameters, monitors};
 pub use order::{Change, Command, Order, Parameter, Question};
 pub use parse::{ReadError, Validate, parse_json, parse_valid, read_text, text};

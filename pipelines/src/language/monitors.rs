@@ -4,7 +4,7 @@ use super::configuration::Config;
 use super::pipeline::{AgainAfter, Due, Pipeline};
 use super::stage::{Action, Stage};
 use super::unread::Found;
-use super::{Csv, Log, Parameter, Problem, Problems, nearest};
+use super::{Csv, Formula, Log, Parameter, Problem, Problems, nearest};
 use crate::expression::Expression;
 
 /// A number that a pipeline measures.
@@ -124,7 +124,7 @@ pub(crate) enum Slot {
 }
 
 /// What a parameter's name begins with.
-const PARAMETER: &str = "parameter.";
+pub(crate) const PARAMETER: &str = "parameter.";
 
 /// The names that a pipeline may use.
 pub(crate) struct Scope {
@@ -337,6 +337,7 @@ pub fn check_parameters(config: &Config, known: &[&str]) -> Result<(), Problems>
                 Stage::Set(parameter) => parameters.check_set(parameter),
                 Stage::Csv(csv) => parameters.check_table(csv, &scope),
                 Stage::Log(log) => parameters.check_line(log, &scope),
+                Stage::Expression(formula) => parameters.check_formula(formula),
                 _ => Ok(()),
             };
             found.note(checked, |it| located(it.within(stage.name()).at(index).within("stages")));
@@ -390,6 +391,12 @@ impl Parameters<'_> {
         columns.iter().enumerate().try_for_each(|(index, (_, slot))| {
             self.check_slot(slot).map_err(|problem| problem.at(index).within("monitors"))
         })
+    }
+
+    fn check_formula(&self, formula: &Formula) -> Result<(), Problem> {
+        formula
+            .parameters()
+            .try_for_each(|(index, name)| self.check(&name).map_err(|it| formula.at(index, it)))
     }
 
     fn check_line(&self, log: &Log, scope: &Scope) -> Result<(), Problem> {

@@ -414,7 +414,8 @@ impl Prepared {
         let is_found = !communicator.any(found.is_err());
         found?;
         let source = &*progress.source;
-        let basis = Basis { channel: &channel, source, cycle, time, communicator };
+        let parameters = &progress.board.parameters[..];
+        let basis = Basis { channel: &channel, source, cycle, time, parameters, communicator };
         if is_found { work(&basis).map(Some) } else { Ok(None) }
     }
 
