@@ -8,10 +8,13 @@ use std::{
 use serde_json::Value;
 use tombolo::{
     deform::{
-        mesh::{CellType, Cells, FeatureSource, Mesh},
+        mesh::{CellType, Cells, FeatureSource, Mesh, NumberType},
         shapes::{self, box_of_tets},
     },
-    pipelines::files::{Compression, read_mesh, write_mesh},
+    pipelines::{
+        extract::{Association, Field},
+        files::{Compression, read_mesh, write_mesh},
+    },
 };
 
 fn tombolo(directory: &Path, arguments: &[&str]) -> Output {
@@ -57,6 +60,117 @@ fn check_points_at_what_is_wrong() {
     let missing = tombolo(directory.path(), &["check", "missing.json"]);
     assert!(missing.status.code() == Some(1) && error_text(&missing).contains("missing.json"));
     assert!(json(&tombolo(directory.path(), &["schema"]))["properties"]["pipelines"].is_object());
+}
+
+#[test]
+fn check_tells_every_error_and_those_on_a_mesh() {
+    let directory = tempfile::tempdir().unwrap();
+    let mesh = box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
+    let pressure = Field {
+        name: "pressure".into(),
+        association: Association::Vertex,
+        components: 1,
+        number: NumberType::F64,
+        values: vec![0.0; mesh.points().len()],
+    };
+    write_mesh(directory.path().join("box.vtu"), &mesh, &[pressure], Compression::None).unwrap();
+    let views = r#"{"version": 1, "pipelines": [
+  {"name": "a", "stages": [{"surface": {"all": true}}, {"statistics": {"field": "presure"}}]},
+  {"name": "b", "stages": [{"vorticity": {"field": "velocity"}}, {"statistics": {"field": "vorticity"}}],
+   "when": "vorticity.mx > 1", "then": [{"stop": {}}]},
+  {"name": "c", "channel": "solid", "stages": [{"statistics": {"field": "heat"}}]}
+]}"#;
+    std::fs::write(directory.path().join("views.json"), views).unwrap();
+    let check = |more: &[&str]| {
+        let output = tombolo(directory.path(), &[&["check", "views.json"], more].concat());
+        assert_eq!(output.status.code(), Some(1));
+        output
+    };
+    let lines = |output: &Output| -> Vec<String> {
+        error_text(output).lines().map(str::to_owned).collect()
+    };
+    let all = "views.json:2:41: pipelines[0].stages[0].surface.all: found the unknown key `all`, expected no key at all";
+    let presure = "views.json:2:81: pipelines[0].stages[1].statistics.field: the channel has no field `presure`; its fields are pressure; did you mean `pressure`?";
+    let when = "views.json:4:12: pipelines[1].when: column 1 of the formula: found the unknown name `vorticity.mx`, expected a monitor; did you mean `vorticity.max`?";
+    let heat = "views.json:5:73: pipelines[2].stages[0].statistics.field: the channel has no field `heat`; its fields are pressure";
+    assert_eq!(lines(&check(&[])), [all, when, "tombolo: 2 error(s)"]);
+    assert_eq!(
+        lines(&check(&["--mesh", "box.vtu"])),
+        [all, presure, when, heat, "tombolo: 4 error(s)"]
+    );
+    let solid = check(&["--mesh", "box.vtu", "--channel", "solid", "--field", "heat:1:element"]);
+    assert_eq!(lines(&solid), [all, when, "tombolo: 2 error(s)"]);
+
+    let errors = json(&check(&["--mesh", "box.vtu", "--json"]));
+    assert_eq!(errors.as_array().map(Vec::len), Some(4));
+    assert_eq!(
+        errors[1],
+        serde_json::json!({
+            "file": "views.json", "line": 2, "column": 81,
+            "path": "pipelines[0].stages[1].statistics.field",
+            "message": "the channel has no field `presure`; its fields are pressure",
+            "suggestion": "pressure"
+        })
+    );
+
+    // What `edit` takes, a list of commands and a journal.
+    for (text, code, expected) in [
+        (
+            r#"[{"translate": {"features": ["x-mox"], "by": [0, 0, 1]}}]"#,
+            1,
+            "did you mean `x-max`?",
+        ),
+        (r#"[{"translate": {"features": ["x-max"], "by": [0, 0, 1]}}]"#, 0, "1 edit(s), all well"),
+        (r#"{"undo": 1}"#, 0, "an order of 0 edit(s), all well"),
+        (r#"[{"order": {"undo": 0}}, {"puase": {}}]"#, 1, "tombolo: 2 error(s)"),
+        ("{\"pause\": {}}\n{\"stop\": {}}\n", 0, "2 command(s), all well"),
+    ] {
+        std::fs::write(directory.path().join("orders.json"), text).unwrap();
+        let output = tombolo(directory.path(), &["check", "orders.json", "--mesh", "box.vtu"]);
+        assert_eq!(output.status.code(), Some(code), "{text}");
+        let said = error_text(&output) + &String::from_utf8_lossy(&output.stdout);
+        assert!(said.contains(expected), "{text}: {said}");
+    }
+    let well = tombolo(directory.path(), &["check", "orders.json", "--json"]);
+    assert_eq!((well.status.code(), json(&well)), (Some(0), serde_json::json!([])));
+    let wrong = check(&["--mesh", "box.vtu", "--field", "velocity:12"]);
+    assert!(error_text(&wrong).contains("1 to 9 components"), "{}", error_text(&wrong));
+}
+
+/// A run that does not start says all that is wrong, not the first thing alone.
+#[test]
+fn a_run_that_does_not_start_tells_every_error() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("views.json");
+    let start = |text: &str| {
+        std::fs::write(&file, text).unwrap();
+        let settings = tombolo::Adaptor::from_file(&file).map_err(|error| error.to_string())?;
+        settings.parameter("inflow", 1.0, 0.0..=2.0).start().map(drop).map_err(|it| it.to_string())
+    };
+    let text =
+        start("{\"version\": 2,\n \"pipelines\": [{\"name\": \"\", \"stages\": []}]}").unwrap_err();
+    let name = file.display();
+    assert_eq!(
+        text,
+        format!(
+            "{name}:1:13: version: found version 2, expected 1\n\
+             {name}:2:25: pipelines[0].name: expected a name of 1 to 200 visible characters"
+        )
+    );
+    let text = start(
+        r#"{"version": 1, "pipelines": [{"name": "a", "when": "parameter.inflw > 0", "stages": [
+            {"expression": {"name": "e", "formula": "2 * parameter.outflow"}},
+            {"expression": {"name": "f", "formula": "2 * parameter.inflow"}}], "then": [{"stop": {}}]}]}"#,
+    );
+    assert_eq!(
+        text.unwrap_err(),
+        "the configuration: pipelines[0].when: the solver has no parameter `inflw`; it has inflow; did you mean `inflow`?\n\
+         pipelines[0].stages[0].expression.formula: the solver has no parameter `outflow`; it has inflow; did you mean `inflow`?"
+    );
+    let orders = directory.path().join("orders.json");
+    std::fs::write(&orders, r#"[{"order": {"undo": 0}}, {"puase": {}}]"#).unwrap();
+    let failure = tombolo::Settings::default().orders_from_file(&orders).err().unwrap();
+    assert_eq!(failure.to_string().lines().count(), 2, "{failure}");
 }
 
 #[test]

@@ -406,8 +406,14 @@ fn named<'a>(node: &'a Node, message: &str) -> Option<&'a Node> {
     let find_by = |is_meant: &dyn Fn(&str, &str) -> bool| {
         names.iter().find_map(|name| find(node, &|text: &str| is_meant(text, name)))
     };
-    find_by(&|text, name| text == name)
-        .or_else(|| find_by(&|text, name| name.len() > 1 && text.contains(name)))
+    // In a formula a name stands by itself, or before that of its component.
+    let is_in = |text: &str, name: &str| {
+        let is_part = |c: char| c.is_alphanumeric() || c == '_';
+        let follows = |at: usize| text[at + name.len()..].starts_with(is_part);
+        let leads = |at: usize| text[..at].ends_with(|c: char| is_part(c) || c == '.');
+        !name.is_empty() && text.match_indices(name).any(|(at, _)| !follows(at) && !leads(at))
+    };
+    find_by(&|text, name| text == name).or_else(|| find_by(&is_in))
 }
 
 /// A value as it stands in the text, shortened.

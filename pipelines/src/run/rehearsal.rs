@@ -12,7 +12,7 @@ use super::history::{Board, History};
 use super::pipeline::Prepared;
 use crate::extract::{Channel, Snapshot, Source};
 use crate::files::read_displacement;
-use crate::language::{Action, Config, Due, Problem, Stage, Trial, monitors};
+use crate::language::{Action, Config, Due, Formula, Problem, Stage, Trial, monitors};
 
 /// A mesh on which pipelines and orders are tried, as a run would show it at its first step.
 ///
@@ -80,7 +80,12 @@ impl<'a> Rehearsal<'a> {
             let monitors = monitors(pipeline).split_off(2);
             History::new(monitors)
         });
-        let board = Board { histories: histories.collect(), parameters: Vec::new() };
+        let formulas = config.pipelines[index].stages.iter().filter_map(|stage| match stage {
+            Stage::Expression(formula) => Some(formula),
+            _ => None,
+        });
+        let parameters = formulas.flat_map(Formula::parameters).map(|(_, name)| (name, 1.0));
+        let board = Board { histories: histories.collect(), parameters: parameters.collect() };
         let communicator: Arc<dyn tombolo_deform::communicator::Communicator> = Arc::new(Solo);
         let channels = [self.channel];
         let snapshot = Snapshot { cycle: 0, time: 0.0, channels: &channels };
@@ -151,7 +156,8 @@ impl Trial for Rehearsal<'_> {
 
 impl Rehearsal<'_> {
     fn deformation_of(&mut self, deformation: Option<&Deformation>) -> Vec<Problem> {
-        deformation.map_or_else(Vec::new, |deformation| self.deformation(deformation))
+        let problems = deformation.map(|deformation| self.deformation(deformation));
+        problems.into_iter().flatten().map(|problem| problem.within("deform")).collect()
     }
 
     /// What keeps an edit from being made, within the edit.
@@ -183,7 +189,16 @@ fn of_edit(edit: &Edit, error: &EditError) -> Problem {
     }
     let text = error.to_string();
     let prefix = format!("edit 0 ({}): ", edit.name());
-    Problem::new(text.strip_prefix(&prefix).unwrap_or(&text))
+    let text = text.strip_prefix(&prefix).unwrap_or(&text);
+    // Most begin with the way to what is wrong: `region.box`, `vertices[3]`.
+    let is_way = |way: &str| {
+        way.starts_with(|c: char| c.is_ascii_lowercase())
+            && way.chars().all(|c| c.is_ascii_alphanumeric() || "_.[]".contains(c))
+    };
+    match text.split_once(": ").filter(|(way, _)| is_way(way)) {
+        Some((way, message)) => Problem::new(message).within_path(way),
+        None => Problem::new(text),
+    }
 }
 
 fn unknown_feature(unknown: &UnknownFeature) -> Problem {
