@@ -28,7 +28,7 @@ use crate::limits::ERRORS;
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LanguageErrors {
-    first: LanguageError,
+    first: Box<LanguageError>,
     others: Vec<LanguageError>,
     more: usize,
 }
@@ -37,14 +37,14 @@ impl LanguageErrors {
     /// The errors that are told, and how many more there are; `None` where there are none.
     pub(super) fn new(told: Vec<LanguageError>, more: usize) -> Option<Self> {
         let mut told = told.into_iter();
-        let first = told.next()?;
+        let first = Box::new(told.next()?);
         Some(Self { first, others: told.collect(), more })
     }
 
     /// Adds errors that stand behind these.
     pub(super) fn append(&mut self, other: Self) {
         self.more += other.more;
-        for error in std::iter::once(other.first).chain(other.others) {
+        for error in std::iter::once(*other.first).chain(other.others) {
             if 1 + self.others.len() < ERRORS.most {
                 self.others.push(error);
             } else {
@@ -69,12 +69,12 @@ impl LanguageErrors {
     /// The first error alone.
     #[must_use]
     pub fn into_first(self) -> LanguageError {
-        self.first
+        *self.first
     }
 
     /// The errors that are told, in the order of the text.
     pub fn iter(&self) -> impl Iterator<Item = &LanguageError> {
-        std::iter::once(&self.first).chain(&self.others)
+        std::iter::once(&*self.first).chain(&self.others)
     }
 
     /// How many errors there are.
@@ -92,7 +92,7 @@ impl LanguageErrors {
 
 impl From<LanguageError> for LanguageErrors {
     fn from(first: LanguageError) -> Self {
-        Self { first, others: Vec::new(), more: 0 }
+        Self { first: Box::new(first), others: Vec::new(), more: 0 }
     }
 }
 
@@ -109,7 +109,7 @@ impl std::error::Error for LanguageErrors {}
 /// Shown, each has a line of its own, up to as many as [`ERRORS`] says.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Problems {
-    first: Problem,
+    first: Box<Problem>,
     others: Vec<Problem>,
 }
 
@@ -122,19 +122,19 @@ impl Problems {
         let mut problems = problems.into_iter();
         match problems.next() {
             None => Ok(()),
-            Some(first) => Err(Self { first, others: problems.collect() }),
+            Some(first) => Err(Self { first: first.into(), others: problems.collect() }),
         }
     }
 
     /// The problems in their order.
     pub fn iter(&self) -> impl Iterator<Item = &Problem> {
-        std::iter::once(&self.first).chain(&self.others)
+        std::iter::once(&*self.first).chain(&self.others)
     }
 }
 
 impl From<Problem> for Problems {
     fn from(first: Problem) -> Self {
-        Self { first, others: Vec::new() }
+        Self { first: first.into(), others: Vec::new() }
     }
 }
 

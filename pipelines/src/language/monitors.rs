@@ -400,10 +400,9 @@ impl Parameters<'_> {
     }
 
     fn check_line(&self, log: &Log, scope: &Scope) -> Result<(), Problem> {
-        let slots = line(log, scope)?.into_iter().filter_map(|(_, slot)| slot);
+        let mut slots = line(log, scope)?.into_iter().filter_map(|(_, slot)| slot);
         slots
-            .map(|slot| self.check_slot(&slot))
-            .collect::<Result<(), _>>()
+            .try_for_each(|slot| self.check_slot(&slot))
             .map_err(|problem| problem.within("message"))
     }
 }
