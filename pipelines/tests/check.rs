@@ -4,9 +4,10 @@ use std::fs;
 use std::path::Path;
 
 use proptest::prelude::*;
+use tombolo_deform::edit::Edit;
 use tombolo_pipelines::language::{
-    Config, Content, LanguageError, LanguageErrors, check, check_content, check_orders, parse,
-    parse_orders, parse_valid,
+    Config, Content, Deformation, LanguageError, LanguageErrors, Problem, Trial, check,
+    check_content, check_orders, parse, parse_orders, parse_valid,
 };
 
 const DESIGN: &str = include_str!("design.json");
@@ -398,6 +399,23 @@ fn slipped(text: &str, slips: &[(prop::sample::Index, Slip)]) -> String {
     serde_json::to_string_pretty(&value).expect("JSON")
 }
 
+/// A trial that finds nothing.
+struct Nothing;
+
+impl Trial for Nothing {
+    fn configuration(&mut self, _: &Config, _: &dyn Fn(usize) -> bool) -> Vec<Problem> {
+        Vec::new()
+    }
+
+    fn edits(&mut self, _: &[Edit]) -> Vec<Problem> {
+        Vec::new()
+    }
+
+    fn deformation(&mut self, _: &Deformation) -> Vec<Problem> {
+        Vec::new()
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 600, failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -410,6 +428,8 @@ proptest! {
     ) {
         let sources = sources();
         let text = slipped(&sources[source.index(sources.len())], &slips);
+        // What is read in pieces for a trial is what is read at once.
+        prop_assert_eq!(check_content(&text, "a", Some(&mut Nothing)), check_content(&text, "a", None));
         match (parse_valid::<Config>(&text, "a"), check(&text, "a")) {
             (Ok(_), found) => prop_assert_eq!(found, parse(&text, "a").map_err(LanguageErrors::from)),
             (Err(first), Ok(_)) => prop_assert!(false, "{}\n{}", first, text),
@@ -427,7 +447,7 @@ proptest! {
                 prop_assert!(has(&errors, &first), "{}\nnot among\n{}\n{}", first, errors, text);
             }
         }
-        let _ = check_content(&text, "a", None);
+        prop_assert_eq!(check_content(&text, "a", Some(&mut Nothing)), check_content(&text, "a", None));
     }
 
     /// One slip is one error, or none: what follows from it is not told.

@@ -11,7 +11,7 @@ use super::order::{Change, Command, Order};
 use super::parse::{Document, Validate};
 use super::relative_files::{resolve_config_files, resolve_files};
 use super::scan::{Member, Node, Value};
-use super::timed::{JournalEntry, OrderStatus, OrdersText, TimedCommand, is_torn, lines};
+use super::timed::{JournalEntry, OrderStatus, OrdersText, TimedCommand, lines, torn_line};
 use super::unread::Unread;
 use super::{
     Action, Config, Deformation, LanguageErrors, Pipeline, Problem, Stage, monitors_of, near,
@@ -306,9 +306,10 @@ fn errors_in_lines(text: &str, file: &str, trial: &mut Tried<'_>) -> Option<Lang
         Some(_) => rejected(text, file),
         None => HashSet::new(),
     };
+    let torn = torn_line(text);
     for (number, content) in lines(text) {
         let errors = match Document::read(content, file) {
-            Err(_) if is_torn(text, number) => None,
+            Err(_) if torn == Some(number) => None,
             Err(error) => Some(error.into()),
             Ok(line) if is_like_journal(&line) => errors_in(&line, |mender, tree| {
                 let set = |entry: &mut JournalEntry, order| entry.command = Some(order);

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{PARAMETER, Problem};
+use super::Problem;
 use crate::expression::Expression;
 use crate::limits::NAME;
 
@@ -70,6 +70,9 @@ impl From<Formula> for FormulaKeys {
 
 /// The names that formulas give to what is no field.
 pub(crate) const GIVEN: [&str; 5] = ["x", "y", "z", "time", "cycle"];
+
+/// What the name of a parameter begins with, in formulas and conditions.
+pub(crate) const PARAMETER: &str = "parameter.";
 
 /// Checks of a new field's name what can be checked without a mesh.
 pub(super) fn check_name(name: &str) -> Result<(), Problem> {

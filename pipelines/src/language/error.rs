@@ -38,7 +38,7 @@ fn hint(suggestion: Option<&str>) -> String {
 }
 
 /// One step of the path to a value.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) enum Step {
     Key(String),
     Index(usize),
@@ -115,11 +115,11 @@ impl Problem {
         self
     }
 
-    /// Whether both are problems of one stage or action of a configuration.
-    pub(super) fn is_beside(&self, other: &Self) -> bool {
+    /// The way to the stage or action of a configuration that it is a problem of.
+    pub(super) fn part(&self) -> Option<Vec<Step>> {
         // A list of pipelines, which of them, a list of stages, which of them.
-        let part = |problem: &Self| problem.path.iter().rev().take(4).cloned().collect::<Vec<_>>();
-        part(self).len() == 4 && part(self) == part(other)
+        let way: Vec<Step> = self.path.iter().rev().take(4).cloned().collect();
+        (way.len() == 4).then_some(way)
     }
 
     /// Puts words before its message.
@@ -159,6 +159,7 @@ impl Problem {
 
     /// A problem in the words of a run, with the name that was likely meant where they say one. It
     /// is one of the first value that these words name, wherever that stands below.
+    #[cfg(feature = "files")]
     pub(crate) fn told(text: &str) -> Self {
         let told = text.strip_suffix("`?").and_then(|text| text.rsplit_once(MEANT));
         let problem = match told {

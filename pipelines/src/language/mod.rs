@@ -52,8 +52,8 @@ mod validate;
 pub use cameras::{Camera, Orbit, Viewpoint};
 pub use check::{Content, Trial, check, check_content, check_orders};
 pub use configuration::{Config, Steering, StreamServer};
-pub(crate) use derived::GIVEN;
 pub use derived::{Derived, Formula};
+pub(crate) use derived::{GIVEN, PARAMETER};
 pub use error::{LanguageError, Problem};
 pub use errors::{LanguageErrors, Problems};
 pub use extracts::{
@@ -63,7 +63,7 @@ pub use file_pattern::file_pattern;
 pub(crate) use file_pattern::picture_pattern;
 pub use glyphs::{GlyphShape, Glyphs, GlyphsAt};
 pub use message::{Message, parse_message};
-pub(crate) use monitors::{Condition, Line, PARAMETER, Scope, Slot, columns, line, monitors_of};
+pub(crate) use monitors::{Condition, Line, Scope, Slot, columns, line, monitors_of};
 pub use monitors::{Monitor, check_parameters, monitors};
 pub use order::{Change, Command, Order, Parameter, Question};
 pub use parse::{ReadError, Validate, parse_json, parse_valid, read_text, text};

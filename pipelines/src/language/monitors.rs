@@ -1,14 +1,17 @@
 //! The monitors of pipelines: their names and units, and what of them a pipeline may name.
 
+use std::collections::HashSet;
+
 use super::configuration::Config;
+use super::derived::{Formula, PARAMETER};
 use super::pipeline::{AgainAfter, Due, Pipeline};
 use super::stage::{Action, Stage};
 use super::unread::Found;
-use super::{Csv, Formula, Log, Parameter, Problem, Problems, nearest};
+use super::{Csv, Log, Parameter, Problem, Problems, nearest};
 use crate::expression::Expression;
 
 /// A number that a pipeline measures.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Monitor {
     /// Its name, which no other monitor of the pipeline has: `quality.min`.
     pub name: String,
@@ -122,9 +125,6 @@ pub(crate) enum Slot {
     /// Among the solver's parameters.
     Parameter(String),
 }
-
-/// What a parameter's name begins with.
-pub(crate) const PARAMETER: &str = "parameter.";
 
 /// The names that a pipeline may use.
 pub(crate) struct Scope {
@@ -295,12 +295,15 @@ pub(crate) fn line(log: &Log, scope: &Scope) -> Result<Line, Problem> {
 /// Checks of all pipelines what they say of each other's monitors.
 pub(super) fn check(config: &Config, found: &mut Found) {
     let mut files = Vec::new();
+    let faulty = found.parts();
     for (index, pipeline) in config.pipelines.iter().enumerate() {
         let located = |problem: Problem| problem.at(index).within("pipelines");
         let scope = Scope::of(&config.pipelines, index);
         let (problems, twice) = check_pipeline(pipeline, &scope);
         found.extend(problems.into_problems(), located);
-        twice.into_iter().for_each(|problem| found.push_alone(located(problem)));
+        // A stage with another fault is told of that.
+        let is_new = |problem: &Problem| problem.part().is_none_or(|part| !faulty.contains(&part));
+        twice.into_iter().map(located).filter(is_new).for_each(|problem| found.push(problem));
         for table in tables(pipeline) {
             if files.contains(&(&table.file, index)) {
                 continue;
@@ -422,8 +425,9 @@ fn tables(pipeline: &Pipeline) -> impl Iterator<Item = &Csv> {
 fn check_pipeline(pipeline: &Pipeline, scope: &Scope) -> (Found, Vec<Problem>) {
     let (mut found, mut all_twice) = (Found::default(), Vec::new());
     let has_faces = pipeline.stages.iter().any(Stage::takes_faces);
-    // How many values there are before a stage.
+    // How many values there are before a stage, and their monitors.
     let mut before = 2;
+    let mut known: HashSet<Monitor> = scope.own().iter().take(before).cloned().collect();
     for (index, stage) in pipeline.stages.iter().enumerate() {
         let located = |problem: Problem| problem.within(stage.name()).at(index).within("stages");
         let earlier = |name: &str, key: &str| {
@@ -452,10 +456,10 @@ fn check_pipeline(pipeline: &Pipeline, scope: &Scope) -> (Found, Vec<Problem>) {
         }
         let mut twice = None;
         for monitor in monitors_of(stage, has_faces) {
-            if scope.own()[..before].contains(&monitor) {
-                twice.get_or_insert(monitor.name);
-            }
             before += 1;
+            if let Some(known) = known.replace(monitor) {
+                twice.get_or_insert(known.name);
+            }
         }
         if let Some(name) = twice {
             let message = format!("another stage has a monitor named `{name}`");

@@ -334,9 +334,9 @@ pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     text.lines().enumerate().filter(move |(_, line)| !is_empty(line))
 }
 
-/// Whether a line that cannot be read is the last, which a killed run has left half-written.
-pub(super) fn is_torn(text: &str, number: usize) -> bool {
-    number > 0 && !text.ends_with('\n') && number + 1 == text.lines().count()
+/// The number of the line that a killed run may have left half-written: the last.
+pub(super) fn torn_line(text: &str) -> Option<usize> {
+    text.lines().count().checked_sub(1).filter(|&last| last > 0 && !text.ends_with('\n'))
 }
 
 fn is_of_journal(line: &Document<'_>) -> bool {
@@ -351,7 +351,7 @@ fn parse_lines(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageErro
         let moved =
             |failure: LanguageError| LanguageError { line: failure.line + number, ..failure };
         let line = match Document::read(content, file) {
-            Err(_) if is_torn(text, number) => break,
+            Err(_) if torn_line(text) == Some(number) => break,
             line => line.map_err(moved)?,
         };
         let too_many = |exceeded: Exceeded| moved(line.locate(exceeded.into()));

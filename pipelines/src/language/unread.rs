@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 
 use super::Problem;
+use super::error::Step;
 
 /// The parts of a configuration that could not be read: what would be wrong for the lack of them
 /// alone is not told.
@@ -62,11 +63,9 @@ impl Found {
         self.problems.push(problem);
     }
 
-    /// Notes a problem of a stage that has no other.
-    pub(super) fn push_alone(&mut self, problem: Problem) {
-        if !self.problems.iter().any(|other| other.is_beside(&problem)) {
-            self.problems.push(problem);
-        }
+    /// The stages and actions that have problems.
+    pub(super) fn parts(&self) -> HashSet<Vec<Step>> {
+        self.problems.iter().filter_map(Problem::part).collect()
     }
 
     pub(super) fn into_problems(self) -> Vec<Problem> {

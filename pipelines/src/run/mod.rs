@@ -5,6 +5,7 @@ mod due;
 mod history;
 mod output;
 mod pipeline;
+#[cfg(feature = "files")]
 mod rehearsal;
 mod trigger;
 
@@ -24,6 +25,7 @@ use tombolo_deform::communicator::{Communicator, Solo, agree};
 pub use cost::Cost;
 pub use history::{History, Measured};
 pub use output::{Encoding, Frame, MonitorValues, Output, Table, View, ViewKind};
+#[cfg(feature = "files")]
 pub use rehearsal::Rehearsal;
 
 /// Runs the pipelines of a configuration.

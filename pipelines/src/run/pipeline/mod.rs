@@ -5,6 +5,7 @@ mod draw;
 mod end;
 mod measure;
 mod prepare;
+#[cfg(feature = "files")]
 mod rehearse;
 mod sinks;
 
