@@ -36,6 +36,22 @@ pub struct Pipeline {
     pub then: Vec<Action>,
 }
 
+impl Pipeline {
+    /// Whether it streams a view.
+    #[must_use]
+    pub fn streams(&self) -> bool {
+        self.stages.iter().any(|stage| matches!(stage, Stage::Stream(_)))
+            || self.then.iter().any(|action| matches!(action, Action::Stream(_)))
+    }
+
+    /// Whether it gives orders of a new shape.
+    #[must_use]
+    pub fn can_order(&self) -> bool {
+        self.stages.iter().any(|stage| matches!(stage, Stage::Order(_)))
+            || self.then.iter().any(|action| matches!(action, Action::Order(_)))
+    }
+}
+
 /// When a pipeline runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Due {

@@ -7,6 +7,7 @@ mod output;
 mod pipeline;
 #[cfg(feature = "files")]
 mod rehearsal;
+mod replace;
 mod trigger;
 
 use std::collections::HashMap;
@@ -16,7 +17,7 @@ use std::time::Instant;
 use tombolo_deform::surface::Surface;
 
 use crate::extract::{Channel, Snapshot, Source};
-use crate::language::{Config, Due, Problem, Stage, Validate, monitors};
+use crate::language::{Config, Due, Pipeline, Problem, Stage, Validate, monitors};
 use due::Now;
 use history::Board;
 use pipeline::Prepared;
@@ -27,6 +28,7 @@ pub use history::{History, Measured};
 pub use output::{Encoding, Frame, MonitorValues, Output, Table, View, ViewKind};
 #[cfg(feature = "files")]
 pub use rehearsal::Rehearsal;
+pub use replace::{ReplaceError, Replacement};
 
 /// Runs the pipelines of a configuration.
 ///
@@ -55,6 +57,8 @@ pub use rehearsal::Rehearsal;
 /// ```
 pub struct Runner {
     pipelines: Vec<Prepared>,
+    /// The pipelines of the configuration, also those that wait for orders.
+    all: Vec<Pipeline>,
     sources: HashMap<String, Source>,
     communicator: Arc<dyn Communicator>,
     board: Board,
@@ -80,19 +84,11 @@ impl Runner {
         config: &Config,
         communicator: Arc<dyn Communicator>,
     ) -> Result<Self, Problem> {
-        config.validate()?;
-        let all = &config.pipelines;
-        let indices = (0..all.len()).filter(|&index| all[index].due != Due::OnOrder);
-        let prepared = |index: usize| {
-            let located = |problem: Problem| problem.at(index).within("pipelines");
-            Prepared::new(all, index).map_err(located)
-        };
-        let pipelines: Result<Vec<_>, _> = indices.map(prepared).collect();
-        let history = |pipeline| History::new(monitors(pipeline).split_off(2));
-        let histories = all.iter().map(history).collect();
+        let (pipelines, histories) = prepared(config)?;
         let begun = Instant::now();
         Ok(Self {
-            pipelines: pipelines?,
+            pipelines,
+            all: config.pipelines.clone(),
             sources: HashMap::new(),
             communicator,
             board: Board { histories, parameters: Vec::new() },
@@ -262,6 +258,20 @@ impl Runner {
         source.set_surface(surface);
         Ok(())
     }
+}
+
+/// The pipelines of a configuration that run at steps or at the end, and empty histories of all.
+fn prepared(config: &Config) -> Result<(Vec<Prepared>, Vec<History>), Problem> {
+    config.validate()?;
+    let all = &config.pipelines;
+    let indices = (0..all.len()).filter(|&index| all[index].due != Due::OnOrder);
+    let prepared = |index: usize| {
+        let located = |problem: Problem| problem.at(index).within("pipelines");
+        Prepared::new(all, index).map_err(located)
+    };
+    let pipelines: Result<Vec<_>, _> = indices.map(prepared).collect();
+    let history = |pipeline| History::new(monitors(pipeline).split_off(2));
+    Ok((pipelines?, all.iter().map(history).collect()))
 }
 
 /// The channel of this name and what is known of its cells, taken anew where they have changed.

@@ -52,6 +52,11 @@ impl Trigger {
         })
     }
 
+    /// Takes over what the same condition has come to.
+    pub(super) fn go_on_from(&mut self, before: &Self) {
+        (self.since, self.fired, self.is_armed) = (before.since, before.fired, before.is_armed);
+    }
+
     /// Whether the actions are taken now.
     pub(super) fn fires(&mut self, now: Moment, value: impl Fn(&Slot) -> f64) -> bool {
         let holds = self.condition.as_ref().is_none_or(|condition| condition.holds(&value));

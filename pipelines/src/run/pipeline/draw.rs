@@ -50,6 +50,9 @@ impl Prepared {
                 return;
             }
         };
+        if progress.is_trial {
+            return;
+        }
         match render(stage, &Subject { shown: &shown, field, cycle, time }, communicator) {
             Ok(pictures) => {
                 for picture in pictures {

@@ -8,6 +8,7 @@ mod prepare;
 #[cfg(feature = "files")]
 mod rehearse;
 mod sinks;
+mod trial;
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -89,6 +90,8 @@ struct Progress<'a> {
     edits: Vec<Edit>,
     errors: Vec<Keyed>,
     cost: Cost,
+    /// Whether it is only tried whether the pipeline can run.
+    is_trial: bool,
     outputs: &'a mut Vec<Output>,
 }
 
@@ -174,6 +177,7 @@ impl Prepared {
             edits: Vec::new(),
             errors: Vec::new(),
             cost: self.cost,
+            is_trial: false,
             outputs,
         }
     }
@@ -190,12 +194,7 @@ impl Prepared {
         outputs: &mut Vec<Output>,
     ) -> Vec<f64> {
         let mut progress = self.begin(snapshot, channel, source, communicator, board, outputs);
-        self.check_selection(&mut progress);
-        let mut states = std::mem::take(&mut self.states);
-        for (index, state) in states.iter_mut().enumerate() {
-            self.stage(index, state, &mut progress);
-        }
-        self.states = states;
+        self.run_stages(&mut progress);
         let measured = progress.values[2..].to_vec();
         if !measured.is_empty() {
             let names = self.monitors.iter().map(|monitor| monitor.name.clone());
@@ -223,6 +222,15 @@ impl Prepared {
         let errors = errors_of_all(communicator, std::mem::take(&mut progress.errors));
         self.report(snapshot.cycle, errors, outputs);
         measured
+    }
+
+    fn run_stages(&mut self, progress: &mut Progress) {
+        self.check_selection(progress);
+        let mut states = std::mem::take(&mut self.states);
+        for (index, state) in states.iter_mut().enumerate() {
+            self.stage(index, state, progress);
+        }
+        self.states = states;
     }
 
     fn act(&self, action: &Action, names: &Names, progress: &mut Progress) {
@@ -273,6 +281,9 @@ impl Prepared {
 
     fn stage(&self, index: usize, state: &mut State, progress: &mut Progress) {
         let (stage, names) = (&self.stages[index], &self.names[index]);
+        if progress.is_trial && !trial::is_tried(stage) {
+            return;
+        }
         match stage {
             Stage::Surface {}
             | Stage::Slice(_)

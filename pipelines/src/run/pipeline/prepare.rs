@@ -102,14 +102,34 @@ impl Prepared {
         })
     }
 
+    /// Takes over what the same pipeline has come to, whose place among the others may have changed.
+    pub(crate) fn go_on_from(&mut self, before: Self) {
+        self.due = before.due;
+        self.thinning = before.thinning;
+        self.cost = before.cost;
+        self.is_chosen = before.is_chosen;
+        self.trigger.go_on_from(&before.trigger);
+        self.states = before.states;
+        self.reported = before.reported;
+        self.kept = before.kept;
+        self.decimation = before.decimation;
+    }
+
+    /// The tables that it writes.
+    pub(crate) fn tables(&self) -> impl Iterator<Item = &Table> {
+        self.names.iter().chain(&self.names_of_actions).filter_map(|names| match names {
+            Names::Table(table, _) => Some(&**table),
+            _ => None,
+        })
+    }
+
     /// The monitors, without `cycle` and `time`.
     pub(crate) fn monitors(&self) -> &[Monitor] {
         &self.monitors
     }
 
     pub(crate) fn streams(&self) -> bool {
-        self.pipeline.stages.iter().any(|stage| matches!(stage, Stage::Stream(_)))
-            || self.pipeline.then.iter().any(|action| matches!(action, Action::Stream(_)))
+        self.pipeline.streams()
     }
 }
 
