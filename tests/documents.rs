@@ -57,7 +57,8 @@ fn accept(block: &str, name: &str) -> Result<(), LanguageError> {
     if value.get("version").is_some() {
         return parse(block, name).map(drop);
     }
-    if first.get("order").is_none() && value.is_array() {
+    let is_command = ["order", "pipelines"].iter().any(|key| first.get(key).is_some());
+    if !is_command && value.is_array() {
         return parse_json::<Vec<Edit>>(block, name).map(drop);
     }
     parse_orders(block, name).map(drop)

@@ -1,5 +1,6 @@
 //! The three calls.
 
+mod changing;
 mod commands;
 mod contract;
 mod description;
@@ -12,7 +13,10 @@ mod timing;
 use std::{
     net::SocketAddr,
     path::Path,
-    sync::{Arc, OnceLock},
+    sync::{
+        Arc, OnceLock,
+        atomic::{AtomicBool, Ordering},
+    },
     time::Instant,
 };
 
@@ -27,11 +31,12 @@ use tombolo_deform::{
 };
 use tombolo_pipelines::{
     extract::Channel,
-    language::{self, Config, Due, Problems, ReadError, Validate},
+    language::{self, Config, Problems, ReadError, Validate},
     run::History,
 };
 
 use crate::{
+    changes::Changes,
     error::{ExecuteError, FinalizeError, InitializeError},
     journal::Journal,
     meeting,
@@ -40,14 +45,15 @@ use crate::{
     stages::Pipelines,
     steering::{Defaults, Forecaster, Log, Parameters, Queue, Source, Steering, Timed},
     step::{Moment, Outside, Step},
-    stream::{Hub, Server},
+    stream::{Clock, Hub, Server},
+    watch::Watch,
 };
 
 /// Links a solver to its viewers and to the orders that change its shape.
 ///
 /// See the [crate's page](crate) for a whole solver.
 pub struct Adaptor {
-    config: Config,
+    config: Arc<Config>,
     communicator: Arc<dyn Communicator>,
     solvers: Arc<dyn Solvers>,
     parameters: Parameters,
@@ -57,6 +63,17 @@ pub struct Adaptor {
     queue: Arc<Queue>,
     log: Arc<Log>,
     hub: Option<Arc<Hub>>,
+    clock: Arc<Clock>,
+    /// The changes of pipelines that were taken in.
+    changes: Arc<Changes>,
+    /// Those that all ranks were told of, and that were not made yet.
+    told_changes: Vec<changing::Told>,
+    /// How many changes of pipelines were made.
+    changed: u64,
+    /// Whether the solver was told that the step to come does not look at its mesh and fields.
+    is_spared: AtomicBool,
+    /// Looks at the configuration's file.
+    watch: Option<Watch>,
     /// Answers viewers, once there is a mesh.
     forecaster: Arc<OnceLock<Forecaster>>,
     server: Option<Server>,
@@ -160,7 +177,7 @@ impl Adaptor {
     }
 
     fn set_up(settings: Settings) -> Result<Self, InitializeError> {
-        let Settings { config, communicator, solvers, parameters, orders, output } = settings;
+        let Settings { config, communicator, solvers, parameters, orders, output, file } = settings;
         // A configuration built in Rust is held to the same rules as one read from a file.
         Problems::none(config.problems()).map_err(InitializeError::Configuration)?;
         Problems::none(orders.problems()).map_err(InitializeError::Orders)?;
@@ -175,6 +192,16 @@ impl Adaptor {
         let queue = Arc::new(Queue::default());
         let hub = config.stream.as_ref().filter(|_| first).map(|_| Arc::new(Hub::default()));
         let log = Arc::new(Log::new(journal, hub.clone()));
+        let clock = hub.as_ref().map(|hub| Arc::clone(&hub.clock)).unwrap_or_default();
+        let config = Arc::new(config);
+        let known: Vec<String> = known.into_iter().map(str::to_owned).collect();
+        let changes = Arc::new(Changes::new(
+            Arc::clone(&config),
+            known.clone(),
+            Arc::clone(&queue),
+            Arc::clone(&log),
+            Arc::clone(&clock),
+        ));
         let forecaster = Arc::default();
         let server = match (&config.stream, &hub) {
             (Some(stream), Some(hub)) => {
@@ -183,9 +210,21 @@ impl Adaptor {
                     log: Arc::clone(&log),
                     hub: Arc::clone(hub),
                     forecaster: Arc::clone(&forecaster),
+                    changes: Arc::clone(&changes),
                     is_in_parts: communicator.size() > 1,
                 };
                 Some(Server::start(stream, Arc::clone(hub), Arc::new(intake))?)
+            }
+            _ => None,
+        };
+        let watch = match file {
+            Some(file) if config.watch && first => Some(
+                Watch::start(&file, known, Arc::clone(&changes), hub.clone())
+                    .map_err(|source| InitializeError::Watch { file, source })?,
+            ),
+            None if config.watch => {
+                let message = "the configuration did not come from a file that could be watched";
+                return Err(InitializeError::Configuration(Problem::new(message).within("watch")));
             }
             _ => None,
         };
@@ -200,6 +239,12 @@ impl Adaptor {
             queue,
             log,
             hub,
+            clock,
+            changes,
+            told_changes: Vec::new(),
+            changed: 0,
+            is_spared: AtomicBool::new(false),
+            watch,
             forecaster,
             server,
             mesh: SteeredMesh::Unknown,
@@ -211,6 +256,7 @@ impl Adaptor {
             meetings: Meetings::default(),
             timing: Timing::default(),
         };
+        adaptor.offer_pipelines();
         adaptor.describe();
         adaptor.tell_conditions();
         Ok(adaptor)
@@ -265,9 +311,7 @@ impl Adaptor {
         }
         self.timing.cycles += 1;
         let moment = step.moment();
-        if let Some(hub) = &self.hub {
-            hub.clock.set(moment.cycle, moment.time);
-        }
+        self.clock.set(moment.cycle, moment.time);
         let fault = self.check(step, moment, channels).err();
         self.moment = moment;
         let moved = match self.meet(moment, fault, entered)? {
@@ -283,6 +327,7 @@ impl Adaptor {
             }
             None => false,
         };
+        *self.is_spared.get_mut() = false;
         let left = Instant::now();
         self.timing.execute.add(left - entered);
         self.timing.left = Some(left);
@@ -311,11 +356,15 @@ impl Adaptor {
         let by_orders = match &self.mesh {
             SteeredMesh::Unknown => true,
             SteeredMesh::Unsteered | SteeredMesh::Refused(_) => false,
-            SteeredMesh::Steered(steerer, _) => {
-                is_called || steerer.looks_at_mesh() || self.timed.is_due(moment)
-            }
+            SteeredMesh::Steered(steerer, _) => steerer.looks_at_mesh(),
         };
-        by_orders || self.pipelines.is_due(moment)
+        let looks = by_orders
+            || is_called
+            || !self.told_changes.is_empty()
+            || self.timed.is_due(moment)
+            || self.pipelines.is_due(moment);
+        self.is_spared.store(!looks, Ordering::Relaxed);
+        looks
     }
 
     /// Runs only the chosen pipelines from now on; at first all run. A pipeline that was left out
@@ -329,8 +378,7 @@ impl Adaptor {
     /// is shown.
     #[must_use]
     pub fn steered_channel(&self) -> Option<&str> {
-        let pipeline = self.config.pipelines.iter().find(|pipeline| pipeline.due == Due::OnOrder);
-        pipeline.and_then(|pipeline| pipeline.channel.as_deref())
+        self.config.steered_channel()
     }
 
     /// The orders so far and what became of each, in the order in which they came in; of more than
@@ -361,6 +409,7 @@ impl Adaptor {
         self.mesh = SteeredMesh::Unknown;
         let asked = self.pipelines.end(self.moment, self.hub.as_ref());
         asked.faults.iter().for_each(|fault| self.complain(fault));
+        self.watch = None;
         self.server = None;
         let faults = self.pipelines.finish();
         // Rank 0 writes: what was asked for is there before any rank goes on.
@@ -409,6 +458,7 @@ impl Adaptor {
         // All ranks know alike of a motion under way; what only the step's own numbers could tell
         // is left for the next meeting.
         let under_way = self.paused
+            || !self.told_changes.is_empty()
             || matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if !steerer.is_at_rest());
         if !due && !under_way {
             self.meetings.fault = fault;
@@ -428,6 +478,7 @@ impl Adaptor {
         at_rest
             && !self.paused
             && !called
+            && self.told_changes.is_empty()
             && !self.timed.is_due(moment)
             && !self.pipelines.is_due(moment)
     }

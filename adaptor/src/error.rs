@@ -21,6 +21,14 @@ pub enum InitializeError {
     /// The configuration makes no sense.
     #[error("the configuration: {0}")]
     Configuration(Problems),
+    /// The file of the configuration cannot be watched.
+    #[error("watch: {}: {source}", file.display())]
+    Watch {
+        /// The file.
+        file: std::path::PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
     /// One of the commands given beforehand makes no sense.
     #[error("the orders given beforehand: {0}")]
     Orders(Problems),

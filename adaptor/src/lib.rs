@@ -44,6 +44,7 @@
 #![warn(missing_docs)]
 
 mod adaptor;
+mod changes;
 mod error;
 pub mod foreign;
 mod journal;
@@ -61,6 +62,7 @@ pub mod steering;
 mod step;
 pub mod stream;
 mod table;
+mod watch;
 mod writer;
 
 pub use adaptor::Adaptor;

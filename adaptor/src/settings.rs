@@ -34,6 +34,9 @@ pub struct Settings {
     /// The directory of the files that pipelines write and of the journal, where their names are
     /// relative.
     pub output: PathBuf,
+    /// The file that the configuration was read from, where it was: with `"watch": true` the
+    /// adaptor looks at it again while the run goes on.
+    pub file: Option<PathBuf>,
 }
 
 impl Settings {
@@ -46,7 +49,7 @@ impl Settings {
         let file = file.as_ref();
         let text = language::read_text(file, DOCUMENT)?;
         let config = language::check(&text, &file.display().to_string())?;
-        Ok(Self { config, ..Self::default() })
+        Ok(Self { config, file: Some(file.into()), ..Self::default() })
     }
 
     /// Lets a number of the solver be steered, from its value now to any in a range.
@@ -89,6 +92,7 @@ impl Default for Settings {
             stream: None,
             journal: None,
             steering: Default::default(),
+            watch: false,
             pipelines: Vec::new(),
         };
         Self {
@@ -98,6 +102,7 @@ impl Default for Settings {
             parameters: Vec::new(),
             orders: Vec::new(),
             output: PathBuf::from("."),
+            file: None,
         }
     }
 }

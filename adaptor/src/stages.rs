@@ -1,6 +1,7 @@
 //! Runs the pipelines that are due and hands on what they make.
 
 use std::{
+    collections::BTreeMap,
     path::{Path, PathBuf},
     sync::{Arc, Mutex},
 };
@@ -11,8 +12,8 @@ use tombolo_deform::surface::Surface;
 use tombolo_pipelines::{
     encode::Encoder,
     extract::{Channel, Snapshot},
-    language::{Action, Command, Config, LogLevel, Monitor, Stage},
-    run::{Cost, Frame, History, MonitorValues, Output, Runner},
+    language::{Command, Config, LogLevel, Monitor, Pipeline, Stage},
+    run::{Cost, Frame, History, MonitorValues, Output, Replacement, Runner},
 };
 
 use crate::{
@@ -28,8 +29,11 @@ use crate::{
 /// The pipelines of a run.
 pub(crate) struct Pipelines {
     runner: Runner,
-    /// The name of each view, and the encoder of its frames.
-    views: Vec<(String, Arc<Mutex<Encoder>>)>,
+    views: Vec<LiveView>,
+    /// How many views there have been.
+    numbers: usize,
+    /// The titles of the tables that the run writes or has written, by file.
+    tables: BTreeMap<String, Vec<String>>,
     description: Value,
     monitors: Value,
     can_order: bool,
@@ -38,6 +42,18 @@ pub(crate) struct Pipelines {
     output: PathBuf,
     writer: Writer,
 }
+
+/// A view that viewers see.
+struct LiveView {
+    name: String,
+    /// Its number among all that there have been.
+    number: usize,
+    /// What its last frame taught the encoder of its topology.
+    encoder: Arc<Mutex<Encoder>>,
+}
+
+/// Tables that a run may begin, of which each stays open.
+const TABLES: usize = 256;
 
 /// The requests of pipelines besides what was sent and written.
 #[derive(Default)]
@@ -48,6 +64,14 @@ pub(crate) struct Asked {
     pub(crate) faults: Vec<String>,
 }
 
+/// The names of the pipelines that a change has changed.
+#[derive(Debug, serde::Serialize)]
+pub(crate) struct Changed {
+    pub(crate) added: Vec<String>,
+    pub(crate) replaced: Vec<String>,
+    pub(crate) removed: Vec<String>,
+}
+
 impl Pipelines {
     pub(crate) fn new(
         config: &Config,
@@ -56,24 +80,108 @@ impl Pipelines {
     ) -> Result<Self, InitializeError> {
         let runner = Runner::with_communicator(config, communicator)
             .map_err(|problem| InitializeError::Configuration(problem.into()))?;
-        let (views, listens) = (runner.views(), runner.listens());
-        let can_order = config.pipelines.iter().any(|pipeline| {
-            pipeline.stages.iter().any(|stage| matches!(stage, Stage::Order(_)))
-                || pipeline.then.iter().any(|action| matches!(action, Action::Order(_)))
-        });
-        let monitors = monitors(&runner, config);
-        Ok(Self {
+        let mut pipelines = Self {
             runner,
-            description: json!(views),
-            monitors,
-            views: views.into_iter().map(|view| (view.name, Arc::default())).collect(),
-            can_order,
-            drags_skeleton: (config.pipelines.iter().flat_map(|pipeline| &pipeline.stages))
-                .any(|stage| matches!(stage, Stage::Skeleton(_))),
-            listens,
+            views: Vec::new(),
+            numbers: 0,
+            tables: BTreeMap::new(),
+            description: Value::Null,
+            monitors: Value::Null,
+            can_order: false,
+            drags_skeleton: false,
+            listens: false,
             output: output.into(),
             writer: Writer::default(),
-        })
+        };
+        pipelines.describe(config);
+        Ok(pipelines)
+    }
+
+    /// Brings what is told of the pipelines up to date.
+    fn describe(&mut self, config: &Config) {
+        let views = self.runner.views();
+        self.description = json!(views);
+        self.monitors = monitors(&self.runner, config);
+        let mut before = std::mem::take(&mut self.views);
+        for view in views {
+            let known = before.iter().position(|known| known.name == view.name);
+            let view = known.map(|known| before.swap_remove(known)).unwrap_or_else(|| {
+                self.numbers += 1;
+                LiveView { name: view.name, number: self.numbers - 1, encoder: Arc::default() }
+            });
+            self.views.push(view);
+        }
+        for table in self.runner.tables() {
+            self.tables.insert(table.file.clone(), table.titles.clone());
+        }
+        self.can_order = config.pipelines.iter().any(Pipeline::can_order);
+        self.drags_skeleton = (config.pipelines.iter().flat_map(|pipeline| &pipeline.stages))
+            .any(|stage| matches!(stage, Stage::Skeleton(_)));
+        self.listens = self.runner.listens();
+    }
+
+    /// Lets the pipelines of another configuration take over, where they are found fit for the mesh
+    /// at hand. Collective.
+    ///
+    /// # Errors
+    /// Why they are not, the same on all ranks; then those before go on.
+    pub(crate) fn replace(
+        &mut self,
+        config: &Config,
+        moment: Moment,
+        channels: &[Channel<'_>],
+        parameters: &[Parameter],
+        hub: Option<&Arc<Hub>>,
+    ) -> Result<Changed, String> {
+        let Moment { cycle, time } = moment;
+        let values = parameters.iter().map(|parameter| (&*parameter.name, parameter.value));
+        self.runner.set_parameters(values);
+        let prepared = self.runner.prepare(config, &Snapshot { cycle, time, channels });
+        let mut next = prepared.map_err(|error| error.to_string())?;
+        self.check_tables(&next)?;
+        let changed = Changed {
+            added: next.added().to_vec(),
+            replaced: next.replaced().to_vec(),
+            removed: next.removed().to_vec(),
+        };
+        let (kept, gone) = std::mem::take(&mut self.views)
+            .into_iter()
+            .partition::<Vec<_>, _>(|view| next.keeps(&view.name));
+        self.views = kept;
+        let frames = next.take_frames();
+        self.runner.replace(next, channels);
+        self.describe(config);
+        if let Some(hub) = hub {
+            gone.iter().for_each(|view| hub.forget(view.number));
+            frames.into_iter().for_each(|frame| self.send(frame, hub));
+            hub.costs(self.runner.costs());
+        }
+        Ok(changed)
+    }
+
+    /// Refuses tables with other columns than the run has begun them with: rows that were written
+    /// are not to be lost.
+    fn check_tables(&self, next: &Replacement) -> Result<(), String> {
+        let mut new = 0;
+        for table in next.tables() {
+            match self.tables.get(&table.file) {
+                Some(titles) if *titles != table.titles => {
+                    return Err(format!(
+                        "the table `{}` of this run has other columns: found {}, expected {}; \
+                         another file can have these",
+                        table.file,
+                        table.titles.join(", "),
+                        titles.join(", ")
+                    ));
+                }
+                Some(_) => {}
+                None => new += 1,
+            }
+        }
+        if new > 0 && self.tables.len() + new > TABLES {
+            return Err(format!("a run that has begun {TABLES} tables begins no more"));
+        }
+        Ok(())
     }
 
     /// The description of the views in `hello`.
@@ -224,13 +332,13 @@ impl Pipelines {
 
     /// Hands a frame to the encoder's thread.
     fn send(&self, frame: Frame, hub: &Hub) {
-        let Some(view) = self.views.iter().position(|(name, _)| **name == *frame.pipeline) else {
+        let Some(view) = self.views.iter().find(|view| *view.name == *frame.pipeline) else {
             return;
         };
-        let encoder = Arc::clone(&self.views[view].1);
+        let encoder = Arc::clone(&view.encoder);
         let encode =
             move |key: bool| lock(&encoder).encode(&frame, key).map_err(|error| error.to_string());
-        hub.frame(view, Arc::new(encode));
+        hub.frame(view.number, Arc::new(encode));
     }
 
     /// Waits for files that are still being written; what was wrong with any of the run.

@@ -155,9 +155,12 @@ impl Written {
         };
         if let Some(keep) = keep {
             let files = self.files.entry(Arc::clone(&job.pipeline));
-            let Files::Kept(kept) = files.or_insert_with(|| Files::Kept(VecDeque::new())) else {
-                return Ok(());
-            };
+            let files = files.or_insert_with(|| Files::Kept(VecDeque::new()));
+            if !matches!(files, Files::Kept(_)) {
+                // The pipeline was replaced: what it wrote before all stays.
+                *files = Files::Kept(VecDeque::new());
+            }
+            let Files::Kept(kept) = files else { return Ok(()) };
             if kept.back().is_some_and(|(path, _)| *path == job.path) {
                 kept.pop_back();
             }
@@ -186,7 +189,13 @@ impl Written {
                 self.files.insert(Arc::clone(&job.pipeline), Files::Many(series));
             }
             Some(Files::Many(series)) => series.push(job.time, &job.path).map_err(told)?,
-            Some(Files::Kept(_)) => {}
+            Some(Files::Kept(kept)) => {
+                // The pipeline was replaced: from now on all stay.
+                let kept = kept.iter().map(|(path, time)| (*time, &**path));
+                let mut all = Series::of(&series(), kept).map_err(told)?;
+                all.push(job.time, &job.path).map_err(told)?;
+                self.files.insert(Arc::clone(&job.pipeline), Files::Many(all));
+            }
         }
         Ok(())
     }

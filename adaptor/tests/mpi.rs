@@ -9,6 +9,7 @@ use std::{
 };
 
 use tombolo::{
+    Channel, FieldView, Settings, Step,
     communicator::{Alarm, Communicator, Counted, Reduction, threads},
     deform::{
         distributed::{Part, PartBoundary, domain},
@@ -20,6 +21,10 @@ use tombolo::{
     },
     mpi::{Mpi, MpiError, rsmpi},
     petsc::{Petsc, Preconditioning},
+    pipelines::{
+        language::{parse, parse_json, parse_orders},
+        run::History,
+    },
 };
 
 unsafe extern "C" {
@@ -164,6 +169,7 @@ fn as_rank() {
     let none = unsafe { Mpi::from_raw(rsmpi::ffi::RSMPI_COMM_NULL) };
     assert_eq!(none.err(), Some(MpiError::Null));
     partitioned(Mpi::new(&universe.world()).unwrap());
+    changed_pipelines(Arc::new(Mpi::new(&universe.world()).unwrap()));
 }
 
 /// Every call, against what threads make of it.
@@ -308,4 +314,57 @@ fn partitioned(ranks: Mpi) {
     }
     assert_eq!(ranks.rank() == 0, boundary.surface().is_some());
     assert!(ranks.size() == 1 || counted.traffic().bytes_sent > 0);
+}
+
+/// All ranks add, replace and refuse pipelines at the same cycles, whether a file, the program or
+/// rank 0 alone asks for it.
+fn changed_pipelines(ranks: Arc<dyn Communicator>) {
+    let mesh = box_of_tets([6, 5, 4], [0.0; 3], [1.0; 3]);
+    let (rank, size) = (ranks.rank(), ranks.size());
+    let of_cells: Vec<usize> =
+        (0..mesh.cells().len()).map(|cell| cell * size / mesh.cells().len()).collect();
+    let part = Part::cut(&mesh, &of_cells, rank, true).unwrap();
+    let heights: Vec<f64> = part.points.iter().map(|point| point[2]).collect();
+    let of = |field: &str| {
+        format!(
+            r#"{{"name": "{field}", "stages": [{{"slice": {{"origin": [0.3, 0, 0], "normal": [1, 0, 0]}}}},
+                {{"statistics": {{"field": "{field}"}}}}, {{"integrate": {{"name": "cut"}}}}]}}"#
+        )
+    };
+    let orders = format!(
+        r#"[{{"at": {{"cycle": 2}}, "pipelines": {{"set": [{}]}}}},
+            {{"at": {{"cycle": 3}}, "pipelines": {{"set": [{}]}}}}]"#,
+        of("height"),
+        of("hieght"),
+    );
+    let settings = Settings {
+        config: parse(r#"{"version": 1}"#, "test.json").unwrap(),
+        orders: parse_orders(&orders, "orders.json").unwrap(),
+        ..Settings::default()
+    };
+    let mut adaptor = settings.on(Arc::clone(&ranks)).start().unwrap();
+    for cycle in 0..10 {
+        if cycle == 5 {
+            let text = r#"{"set": [{"name": "health", "stages": [{"quality": {}}]}]}"#;
+            adaptor.change_pipelines(parse_json(text, "change").unwrap()).unwrap();
+        }
+        if cycle == 7 && rank == 0 {
+            let text = r#"{"remove": ["height"]}"#;
+            adaptor.change_pipelines(parse_json(text, "change").unwrap()).unwrap();
+        }
+        let step = Step { cycle, time: 0.1 * cycle as f64, time_step: 0.1 };
+        let fields = [FieldView::vertex("height", &heights)];
+        adaptor.execute(&step, &[Channel::new("fluid", part.view(), &fields)]).unwrap();
+        assert_eq!(adaptor.history("height").is_some(), (2..7).contains(&cycle), "cycle {cycle}");
+        assert_eq!(adaptor.history("health").is_some(), cycle >= 5, "cycle {cycle}");
+        assert!(adaptor.history("hieght").is_none());
+        if let Some(last) = adaptor.history("height").and_then(History::last) {
+            let history = adaptor.history("height").unwrap();
+            let area = history.monitors().iter().position(|it| it.name == "cut.size");
+            assert_eq!(last.cycle, cycle);
+            assert!((last.values[area.unwrap()] - 1.0).abs() < 1e-12, "{last:?}");
+        }
+    }
+    assert_eq!(adaptor.history("health").unwrap().count(), 4);
+    assert_eq!(adaptor.finalize().unwrap().pipelines.len(), 1);
 }

@@ -33,6 +33,8 @@ pub(crate) struct Configuration {
     pub(crate) parameters: Vec<Parameter>,
     pub(crate) orders: Vec<TimedCommand>,
     pub(crate) output: PathBuf,
+    /// The file that is watched.
+    pub(crate) file: Option<PathBuf>,
     /// The Fortran handle of the communicator.
     pub(crate) communicator: Option<i32>,
     /// Requests that are not carried out, for the log.
@@ -89,7 +91,7 @@ impl Configuration {
             orders = tombolo::Settings::default().orders_from_file(&file)?.orders;
         }
         let is_default = found.files.is_empty() && of_user.is_none();
-        let (config, groups) = merged(&mut found, of_user.as_deref())?;
+        let (config, groups, file) = merged(&mut found, of_user.as_deref())?;
         Ok(Self {
             config,
             is_default,
@@ -97,6 +99,7 @@ impl Configuration {
             parameters,
             orders,
             output: variable(OUTPUT).map_or_else(|| PathBuf::from("."), PathBuf::from),
+            file,
             communicator,
             notes: found.notes,
         })
@@ -138,10 +141,13 @@ fn default_config(channels: &[String]) -> Result<Config, RunError> {
     Ok(language::check(&config.to_string(), "the default configuration")?)
 }
 
-/// The configurations of all files as one, and what the node itself asks for; and which pipelines
-/// each name in the node stands for. The user's file has no such name: no solver chooses what it
-/// says.
-fn merged(found: &mut Found, of_user: Option<&str>) -> Result<(Config, Groups), RunError> {
+/// The configurations of all files as one, and what the node itself asks for; which pipelines each
+/// name in the node stands for; and the file that is watched. The user's file has no such name: no
+/// solver chooses what it says.
+fn merged(
+    found: &mut Found,
+    of_user: Option<&str>,
+) -> Result<(Config, Groups, Option<PathBuf>), RunError> {
     let own = json!({"version": 1, "pipelines": found.pipelines});
     let mut config = language::check(&own.to_string(), "catalyst/pipelines")?;
     let mut groups: Groups = found.others.iter().map(|name| (name.clone(), Vec::new())).collect();
@@ -163,6 +169,7 @@ fn merged(found: &mut Found, of_user: Option<&str>) -> Result<(Config, Groups), 
     config.pipelines = pipelines;
     config.stream = settings.stream.map(|(stream, _)| stream);
     config.journal = settings.journal.map(|(journal, _)| journal);
+    config.watch = settings.watch.is_some();
     config.steering = settings.steering.map(|(steering, _)| steering).unwrap_or_default();
     // Where there is nothing to choose from, the names are those of another implementation's
     // scripts.
@@ -175,7 +182,7 @@ fn merged(found: &mut Found, of_user: Option<&str>) -> Result<(Config, Groups), 
             groups.push((name.clone(), vec![name]));
         }
     }
-    Ok((config, groups))
+    Ok((config, groups, settings.watch.map(PathBuf::from)))
 }
 
 /// Settings that a run has once, each with the file that says it: the first that does.
@@ -184,6 +191,8 @@ struct Settings {
     stream: Option<(StreamServer, String)>,
     journal: Option<(String, String)>,
     steering: Option<(Steering, String)>,
+    /// The file that is watched.
+    watch: Option<String>,
 }
 
 impl Settings {
@@ -212,6 +221,14 @@ impl Settings {
         first(&mut self.stream, config.stream, "stream", file, notes);
         first(&mut self.journal, config.journal, "journal", file, notes);
         first(&mut self.steering, steering, "steering", file, notes);
+        if config.watch {
+            match &self.watch {
+                None => self.watch = Some(file.to_owned()),
+                Some(before) => {
+                    notes.push(format!("'watch' of {file} is passed over: {before} is watched"));
+                }
+            }
+        }
         Ok(config.pipelines)
     }
 }
@@ -403,18 +420,21 @@ mod tests {
         let two = file(
             "two.json",
             &format!(
-                r#"{{"version": 1, "journal": "b.jsonl", "stream": {{"listen": "127.0.0.1:0"}}, "steering": {{"background": false}}, {}}}"#,
+                r#"{{"version": 1, "watch": true, "journal": "b.jsonl", "stream": {{"listen": "127.0.0.1:0"}}, "steering": {{"background": false}}, {}}}"#,
                 pipeline("two")
             ),
         );
         let three = file(
             "three.json",
-            &format!(r#"{{"version": 1, "steering": {{"poll_steps": 4}}, {}}}"#, pipeline("three")),
+            &format!(
+                r#"{{"version": 1, "watch": true, "steering": {{"poll_steps": 4}}, {}}}"#,
+                pipeline("three")
+            ),
         );
         let files = [("a", &one), ("b", &two)].map(|(name, file)| (name.to_owned(), file.clone()));
         let io = json!({"name": "io", "channel": "grid", "every": {"steps": 1}, "stages": [{"write": {"file": "a.vtu"}}]});
         let mut found = Found { files: files.to_vec(), pipelines: vec![io], ..Found::default() };
-        let (config, groups) = merged(&mut found, Some(&three)).expect("a configuration");
+        let (config, groups, watched) = merged(&mut found, Some(&three)).expect("a configuration");
         let names: Vec<&str> =
             config.pipelines.iter().map(|pipeline| pipeline.name.as_str()).collect();
         assert_eq!(names, ["one", "two", "three", "io"]);
@@ -428,9 +448,11 @@ mod tests {
             found.notes,
             [
                 format!("'journal' of {two} is passed over: that of {one} holds"),
-                format!("'steering' of {three} is passed over: that of {two} holds")
+                format!("'steering' of {three} is passed over: that of {two} holds"),
+                format!("'watch' of {three} is passed over: {two} is watched"),
             ]
         );
+        assert!(config.watch && watched.is_some_and(|file| file.ends_with("two.json")));
         // No solver chooses among what the user asks for.
         let known: Vec<&str> = groups.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(known, ["a", "b", "io", "one", "two"]);

@@ -39,8 +39,17 @@ impl Session {
         // SAFETY: Catalyst's blueprint says that `catalyst/mpi_comm` is the handle of a live
         // communicator.
         let communicator = unsafe { ranks::communicator(handle) }?;
-        let Configuration { config, is_default, groups, parameters, orders, output, notes, .. } =
-            ranks::agree(&*communicator, configuration)?;
+        let Configuration {
+            config,
+            is_default,
+            groups,
+            parameters,
+            orders,
+            output,
+            file,
+            notes,
+            ..
+        } = ranks::agree(&*communicator, configuration)?;
         let settings = Settings {
             config,
             communicator: Arc::clone(&communicator),
@@ -48,6 +57,7 @@ impl Session {
             parameters,
             orders,
             output,
+            file,
         };
         let stage = if is_default {
             let asked = Asked::of(&settings.parameters);

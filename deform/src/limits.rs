@@ -60,6 +60,13 @@ pub const DEPTH: Limit = limit("levels of nesting", 64, "lists and objects withi
 pub const TEXT: Limit = limit("bytes", 1 << 16, "a text or key in a JSON document");
 /// Characters of a name.
 pub const NAME: Limit = limit("characters", 200, "the name of a pipeline or an edit");
+/// Pipelines of a run.
+pub const PIPELINES: Limit = limit("pipelines", 1024, "a configuration, also as changes leave it");
+/// Views of a run.
+pub const VIEWS: Limit = limit("pipelines that stream", 256, "a configuration: its live views");
+/// Changes of pipelines that wait.
+pub const CHANGES: Limit =
+    limit("changes of pipelines", 64, "those that the solver has not come to yet");
 /// Characters of a formula.
 pub const FORMULA: Limit = limit("characters", 10_000, "a formula or condition");
 /// How deep a formula may be nested.
@@ -127,12 +134,15 @@ pub const ERRORS: Limit =
     limit("errors", 100, "what is told of one text; of more errors only their number");
 
 /// All of them.
-pub const ALL: [Limit; 25] = [
+pub const ALL: [Limit; 28] = [
     DOCUMENT,
     VALUES,
     DEPTH,
     TEXT,
     NAME,
+    PIPELINES,
+    VIEWS,
+    CHANGES,
     FORMULA,
     FORMULA_DEPTH,
     EDITS,

@@ -129,6 +129,8 @@ function takeMessage(message: ServerMessage): void {
     case "order": return orders.update(message.body);
     case "forecast": return forecasts.answer(message.body, status?.quality ?? null);
     case "monitor": return monitors.update(message.body);
+    // The hello that comes with it says what there is now.
+    case "pipelines": return;
     case "error": {
       const { id, message: text } = message.body;
       if (!(id && (orders.refused(id, text) || forecasts.refused(id, text)))) showProblem(text);

@@ -83,6 +83,16 @@ export interface ForecastAnswer {
 }
 
 export interface Monitor { pipeline: string; cycle: number; values: Record<string, number> }
+/** What became of a change of the pipelines. */
+export interface PipelineChange {
+  id: string;
+  status: "accepted" | "applied";
+  cycle?: number;
+  added?: string[];
+  replaced?: string[];
+  removed?: string[];
+}
+
 export interface ServerError { message: string; id?: string | null }
 
 export type ServerMessage =
@@ -91,11 +101,12 @@ export type ServerMessage =
   | { kind: "order"; body: OrderStatus }
   | { kind: "forecast"; body: ForecastAnswer }
   | { kind: "monitor"; body: Monitor }
+  | { kind: "pipelines"; body: PipelineChange }
   | { kind: "error"; body: ServerError };
 
 export type ClientMessage = { id?: string } & (
   | { order: Json } | { forecast: Json } | { pause: object } | { resume: object } | { stop: object }
-  | { parameter: { name: string; value: number } } | { drive: object }
+  | { parameter: { name: string; value: number } } | { pipelines: Json } | { drive: object }
 );
 
 /** Raised for a message that does not follow the protocol; the text says where it departs from it. */
@@ -151,7 +162,7 @@ export function parseServerMessage(text: string): ServerMessage {
     throw new ProtocolError("a text message that is not JSON");
   }
   if (!isObject(parsed)) throw new ProtocolError("a text message that is not a JSON object");
-  for (const kind of ["hello", "status", "order", "forecast", "monitor", "error"] as const) {
+  for (const kind of ["hello", "status", "order", "forecast", "monitor", "pipelines", "error"] as const) {
     const body: unknown = parsed[kind];
     if (body === undefined) continue;
     if (!isObject(body)) throw new ProtocolError(`the message "${kind}" is not an object`);

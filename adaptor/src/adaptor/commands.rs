@@ -7,11 +7,12 @@ use tombolo_deform::communicator::Reduction;
 use tombolo_pipelines::{
     extract::Channel,
     files::{UnreadFile, read_displacements},
-    language::{Command, Message, Order, Question},
+    language::{Command, Message, Order, Problem, Question, locate},
 };
 
 use super::{Adaptor, SteeredMesh};
 use crate::{
+    changes::{Changes, make_absolute},
     meeting,
     steering::{Asked, Forecaster, Log, Queue, Received, Source},
     step::Moment,
@@ -48,6 +49,9 @@ impl Adaptor {
         // The journal gets what a file holds and not its name, so that it replays whatever becomes
         // of the file.
         let read = self.read_files(&mut command);
+        if let Command::Pipelines(change) = &mut command {
+            make_absolute(change);
+        }
         match self.log.accept(id, source, &command, moment) {
             Ok(id) => match read {
                 Ok(()) => return Some((id, command)),
@@ -88,16 +92,19 @@ impl Adaptor {
         }
     }
 
-    /// Carries out what viewers have asked for meanwhile, as far as it can be now.
+    /// Carries out what viewers and others have asked for meanwhile, as far as it can be now.
     pub(super) fn serve(&mut self, moment: Moment, channels: &[Channel<'_>]) {
         let received: Vec<Received> = self.queue.take().into();
-        let clients: Vec<u64> = received.iter().map(|received| received.client).collect();
-        let own = received.into_iter().map(|received| (received.id, received.command)).collect();
+        let (sources, own): (Vec<Source>, _) = received
+            .into_iter()
+            .map(|received| (received.source, (received.id, received.command)))
+            .unzip();
         for (index, (id, command)) in self.told_to_all(own).into_iter().enumerate() {
             // Only rank 0 has viewers to answer.
-            let client = clients.get(index).copied().unwrap_or_default();
-            self.obey(id, &Source::Viewer(client), command, moment);
+            let source = sources.get(index).cloned().unwrap_or(Source::Viewer(0));
+            self.obey(id, &source, command, moment);
         }
+        self.make_changes(moment, channels);
         self.make_ready();
         let named = self.steered_channel().map(str::to_owned);
         if let (SteeredMesh::Steered(steerer, _), Ok(channel)) =
@@ -185,7 +192,19 @@ impl Adaptor {
             Command::Parameter(change) => {
                 self.parameters.set(&change.name, change.value).map_err(|error| error.to_string())
             }
+            Command::Pipelines(change) => return self.keep_change(id, source.clone(), change),
         };
+        self.settle(&id, source, moment, outcome);
+    }
+
+    /// Notes what became of a command that is no order, and tells who gave it what was wrong.
+    pub(super) fn settle(
+        &self,
+        id: &str,
+        source: &Source,
+        moment: Moment,
+        outcome: Result<(), String>,
+    ) {
         if let Err(reason) = &outcome {
             match (source, &self.hub) {
                 (Source::Viewer(client), Some(hub)) => {
@@ -194,7 +213,7 @@ impl Adaptor {
                 _ => self.complain(&format!("command '{id}': {reason}")),
             }
         }
-        self.log.settle(&id, moment, outcome);
+        self.log.settle(id, moment, outcome);
         self.describe();
         self.tell_conditions();
     }
@@ -206,6 +225,7 @@ pub(super) struct Intake {
     pub(super) log: Arc<Log>,
     pub(super) hub: Arc<Hub>,
     pub(super) forecaster: Arc<OnceLock<Forecaster>>,
+    pub(super) changes: Arc<Changes>,
     /// Whether the mesh is on several ranks.
     pub(super) is_in_parts: bool,
 }
@@ -247,9 +267,17 @@ impl CommandSink for Intake {
         client: u64,
         id: Option<String>,
         message: Message,
-        bytes: usize,
+        text: &str,
     ) -> Result<(), String> {
         let command = match message {
+            Message::Command(Command::Pipelines(change)) => {
+                let source = Source::Viewer(client);
+                let taken = change.check_files();
+                let taken = taken.and_then(|()| self.changes.take(id, source, change, text.len()));
+                let located =
+                    |problem: Problem| locate(problem.within("pipelines"), text, "message");
+                return taken.map(drop).map_err(|problem| located(problem).to_string());
+            }
             Message::Question(Question::Forecast(order)) => {
                 return self.forecast(client, id, order);
             }
@@ -258,14 +286,16 @@ impl CommandSink for Intake {
             Message::Drive => return Ok(()),
         };
         check_files(&command)?;
+        let bytes = text.len();
         self.queue.check_room(bytes).map_err(|exceeded| {
             format!(
                 "{exceeded}; the solver has not come to those before this one yet, try again later"
             )
         })?;
         let (cycle, time) = self.hub.clock.get();
-        let id = self.log.accept(id, &Source::Viewer(client), &command, Moment { cycle, time })?;
-        self.queue.push(Received { client, id, command, bytes });
+        let source = Source::Viewer(client);
+        let id = self.log.accept(id, &source, &command, Moment { cycle, time })?;
+        self.queue.push(Received { source, id, command, bytes });
         Ok(())
     }
 

@@ -20,6 +20,7 @@ impl Adaptor {
             "protocol": 1,
             "views": self.pipelines.views(),
             "monitors": self.pipelines.monitors(),
+            "pipelines": {"changes": self.changed},
             "channel": self.told.channel,
             "features": list(&self.told.features),
             "surface": self.told.surface,

@@ -13,9 +13,11 @@ use super::{
 };
 use crate::lock::lock;
 
-/// The shape that the mesh has now, as those see it who are not the solver's thread.
+/// The shape that the mesh has now and the settings of orders, as those see them who are not the
+/// solver's thread.
 #[derive(Debug, Clone)]
 pub(super) struct Present {
+    pub(super) defaults: Defaults,
     pub(super) stack: EditStack,
     pub(super) here: CurrentShape,
     /// The motion that the solver itself has added to it, as far as it was looked at.
@@ -25,7 +27,6 @@ pub(super) struct Present {
 /// Asks the worker without going through the solver's thread, so that an answer does not wait for
 /// the end of a step.
 pub(crate) struct Forecaster {
-    pub(super) defaults: Defaults,
     pub(super) present: Arc<Mutex<Present>>,
     pub(super) jobs: Arc<Jobs>,
 }
@@ -39,8 +40,8 @@ impl Forecaster {
         order: &Order,
         answer: impl FnOnce(Forecast) + Send + 'static,
     ) {
-        let Present { stack, here, own } = lock(&self.present).clone();
-        match self.defaults.request(&stack, here, order) {
+        let Present { defaults, stack, here, own } = lock(&self.present).clone();
+        match defaults.request(&stack, here, order) {
             Ok((_, request)) => {
                 self.jobs.forecast(asker, PlanRequest { request, own }, Box::new(answer))
             }

@@ -26,10 +26,14 @@ const TOLD_WHOLE: usize = 16 << 10;
 pub(crate) enum Source {
     /// The viewer of this number.
     Viewer(u64),
-    /// The file of orders.
+    /// A file of orders.
     File,
     /// The pipeline of this name.
     Pipeline(String),
+    /// The file of the configuration, which has changed.
+    Configuration,
+    /// The program that the adaptor is linked into.
+    Program,
 }
 
 /// The commands that were given, as far as they are kept.
@@ -102,12 +106,17 @@ impl Log {
         let command = (!matches!(source, Source::Pipeline(_))).then(|| command.clone());
         let reason = match source {
             Source::Pipeline(name) => Some(format!("from pipeline '{name}'")),
+            Source::Configuration => Some("from the file of the configuration".into()),
             _ => None,
         };
+        let changes_pipelines = matches!(command, Some(Command::Pipelines(_)));
         if command.is_some() {
             self.journal(&id, JournalStatus::Accepted, moment, command, reason, [None; 2]);
         }
         self.tell(&id);
+        if let Some(hub) = self.hub.as_ref().filter(|_| changes_pipelines) {
+            hub.tell(&json!({"pipelines": {"id": id, "status": JournalStatus::Accepted}}));
+        }
         Ok(id)
     }
 

@@ -13,12 +13,13 @@ use tombolo_pipelines::{
     limits::{Exceeded, WAITING, WAITING_BYTES},
 };
 
+use super::Source;
 use crate::lock::{lock, wait};
 
 /// A command that was read, found valid and written to the journal.
 #[derive(Debug)]
 pub(crate) struct Received {
-    pub(crate) client: u64,
+    pub(crate) source: Source,
     pub(crate) id: String,
     pub(crate) command: Command,
     /// How many bytes it came in.

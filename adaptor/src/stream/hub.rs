@@ -277,7 +277,10 @@ struct View {
 struct HubState {
     description: Map<String, Value>,
     conditions: Map<String, Value>,
-    views: Vec<View>,
+    /// By their numbers, which no later view gets again.
+    views: BTreeMap<usize, View>,
+    /// The pipelines as JSON.
+    pipelines: Arc<str>,
     surface: Option<Arc<ReferenceSurface>>,
     clients: BTreeMap<u64, Arc<Client>>,
     next_client: u64,
@@ -296,7 +299,7 @@ struct HubState {
 pub(crate) struct Hub {
     state: Mutex<HubState>,
     work: Condvar,
-    pub(crate) clock: Clock,
+    pub(crate) clock: Arc<Clock>,
     counters: Counters,
     arrivals: AtomicU64,
 }
@@ -385,16 +388,27 @@ impl Hub {
     /// dropped.
     pub(crate) fn frame(&self, view: usize, encode: Encode) {
         let mut state = lock(&self.state);
-        if state.views.len() <= view {
-            state.views.resize_with(view + 1, View::default);
-        }
         let watched = !state.clients.is_empty();
-        if state.views[view].waiting.replace(encode).is_some() && watched {
+        if state.views.entry(view).or_default().waiting.replace(encode).is_some() && watched {
             self.counters.dropped.fetch_add(1, Ordering::Relaxed);
         }
         if watched {
             self.work.notify_one();
         }
+    }
+
+    /// Lets go of a view that is not streamed any more; its number is not given again.
+    pub(crate) fn forget(&self, view: usize) {
+        let mut state = lock(&self.state);
+        state.views.remove(&view);
+        for client in state.clients.values() {
+            lock(&client.outbox).views.remove(&view);
+        }
+    }
+
+    /// Offers the pipelines as JSON.
+    pub(crate) fn offer_pipelines(&self, pipelines: String) {
+        lock(&self.state).pipelines = pipelines.into();
     }
 
     pub(crate) fn counts(&self) -> StreamCounts {
@@ -425,9 +439,8 @@ impl Hub {
                     return;
                 }
                 let watched = !state.clients.is_empty();
-                let mut views = state.views.iter_mut().enumerate();
-                let waiting =
-                    if watched { views.find_map(|(index, view)| view.due(index)) } else { None };
+                let mut views = state.views.iter_mut().filter(|_| watched);
+                let waiting = views.find_map(|(&number, view)| view.due(number));
                 match waiting {
                     Some(found) => break found,
                     None => state = wait(&self.work, state),
@@ -447,7 +460,12 @@ impl Hub {
     }
 
     fn publish(&self, view: usize, frame: &Arc<Frame>) {
-        for client in lock(&self.state).clients.values() {
+        let state = lock(&self.state);
+        if !state.views.contains_key(&view) {
+            // It was let go of while it was encoded.
+            return;
+        }
+        for client in state.clients.values() {
             client.put(|outbox| {
                 let missed = outbox.views.entry(view).or_default().put(frame);
                 self.counters.dropped.fetch_add(missed as u64, Ordering::Relaxed);
@@ -493,8 +511,8 @@ impl Hub {
         {
             let mut outbox = lock(&client.outbox);
             outbox.hello = true;
-            for index in 0..state.views.len() {
-                outbox.views.insert(index, Unread { is_behind: true, ..Unread::default() });
+            for &number in state.views.keys() {
+                outbox.views.insert(number, Unread { is_behind: true, ..Unread::default() });
             }
         }
         state.clients.insert(client.id, Arc::clone(&client));
@@ -525,6 +543,14 @@ impl Hub {
 
     pub(super) fn surface(&self) -> Option<Arc<ReferenceSurface>> {
         lock(&self.state).surface.clone()
+    }
+
+    pub(super) fn pipelines(&self) -> Arc<str> {
+        Arc::clone(&lock(&self.state).pipelines)
+    }
+
+    pub(super) fn has_view(&self, view: usize) -> bool {
+        lock(&self.state).views.contains_key(&view)
     }
 
     pub(super) fn is_driver(&self, client: u64) -> bool {

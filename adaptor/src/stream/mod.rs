@@ -1,7 +1,8 @@
 //! The server that viewers connect to, on a thread of its own.
 //!
-//! It serves the viewer's files at `/`, one WebSocket at `/ws?token=...` and the reference surface
-//! at `/surface?token=...` (the protocol is in `docs/protocol.md`). Nothing that a client does
+//! It serves the viewer's files at `/`, one WebSocket at `/ws?token=...`, the reference surface at
+//! `/surface?token=...`, the pipelines at `/pipelines?token=...` and the schema of one at
+//! `/schema?token=...` (the protocol is in `docs/protocol.md`). Nothing that a client does
 //! reaches the solver but commands that were read and found valid.
 //!
 //! What it guarantees: it listens on the loopback address unless told otherwise; nothing of the run
@@ -41,11 +42,11 @@ use axum::{
 use serde::{Deserialize, Serialize};
 use tokio::sync::oneshot;
 use tombolo_pipelines::{
-    language::{Message, StreamServer},
+    language::{Message, StreamServer, pipeline_schema},
     limits::DOCUMENT,
 };
 
-pub(crate) use hub::Hub;
+pub(crate) use hub::{Clock, Hub};
 pub(crate) use surface::ReferenceSurface;
 pub use token::Token;
 
@@ -64,7 +65,7 @@ const STATUS_PERIOD: Duration = Duration::from_millis(100);
 
 /// Takes the commands of viewers, already known to come from the one that drives.
 pub(crate) trait CommandSink: Send + Sync {
-    /// Takes one message, which had so many bytes.
+    /// Takes one message, which was read from this text.
     ///
     /// # Errors
     /// A text for the viewer that says what is wrong; then nothing was taken.
@@ -73,7 +74,7 @@ pub(crate) trait CommandSink: Send + Sync {
         client: u64,
         id: Option<String>,
         message: Message,
-        bytes: usize,
+        text: &str,
     ) -> Result<(), String>;
 
     /// Hears that a viewer has connected which may steer.
@@ -211,6 +212,8 @@ async fn serve(socket: TcpListener, shared: Shared, stopped: oneshot::Receiver<(
     let router = Router::new()
         .route("/ws", get(upgrade))
         .route("/surface", get(reference_surface))
+        .route("/pipelines", get(pipelines))
+        .route("/schema", get(schema))
         .fallback(file)
         .layer(middleware::from_fn_with_state(shared.clone(), guard))
         .with_state(shared)
@@ -336,6 +339,27 @@ async fn reference_surface(
         Ok(Err(reason)) => failed(format!("the surface was not encoded: {reason}\n")),
         Err(_) => failed("the encoder failed\n".into()),
     }
+}
+
+const JSON: [(HeaderName, &str); 1] = [(header::CONTENT_TYPE, "application/json")];
+
+/// The pipelines as they are now, as JSON.
+async fn pipelines(
+    State(shared): State<Shared>,
+    Query(credentials): Query<Credentials>,
+) -> Response {
+    if !credentials.token.is_some_and(|token| shared.token.matches(&token)) {
+        return (StatusCode::UNAUTHORIZED, UNAUTHORIZED).into_response();
+    }
+    (JSON, shared.hub.pipelines().to_string()).into_response()
+}
+
+/// The JSON Schema of a pipeline.
+async fn schema(State(shared): State<Shared>, Query(credentials): Query<Credentials>) -> Response {
+    if !credentials.token.is_some_and(|token| shared.token.matches(&token)) {
+        return (StatusCode::UNAUTHORIZED, UNAUTHORIZED).into_response();
+    }
+    (JSON, pipeline_schema().to_string()).into_response()
 }
 
 async fn file(State(shared): State<Shared>, uri: Uri, request: Request) -> Response {

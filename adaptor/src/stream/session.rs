@@ -1,6 +1,7 @@
 //! One viewer's WebSocket, from the upgrade to its end.
 
 use std::{
+    collections::HashMap,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -55,21 +56,20 @@ async fn write(
     hub: &Hub,
     commands: &dyn CommandSink,
 ) {
-    let mut topologies: Vec<Option<u64>> = Vec::new();
+    // By view, the topology that was sent last.
+    let mut topologies: HashMap<usize, u64> = HashMap::new();
     let mut ping = tokio::time::interval(PING_PERIOD);
     loop {
         let written = match client.next() {
             Ok(Some(Message::Hello)) => {
+                topologies.retain(|&view, _| hub.has_view(view));
                 sink.send(Wire::text(&*hub.hello(client.id, commands.orders()))).await
             }
             Ok(Some(Message::Text(text))) => sink.send(Wire::text(&*text)).await,
             Ok(Some(Message::Frame(view, frame))) => {
-                if topologies.len() <= view {
-                    topologies.resize(view + 1, None);
-                }
                 // One that goes on from another follows a frame of the same topology.
-                let topology = Some(frame.topology_id());
-                let is_known = std::mem::replace(&mut topologies[view], topology) == topology;
+                let topology = frame.topology_id();
+                let is_known = topologies.insert(view, topology) == Some(topology);
                 let message = if is_known { frame.message.clone() } else { frame.with_topology() };
                 let bytes = message.len();
                 let written = sink.send(Wire::Binary(message)).await;
@@ -135,8 +135,8 @@ async fn read(
     }
 }
 
-/// Takes one message: `{"id"?, "order" | "pause" | "resume" | "stop" | "parameter" | "forecast" |
-/// "drive": ...}`.
+/// Takes one message: `{"id"?, "order" | "pause" | "resume" | "stop" | "parameter" | "pipelines" |
+/// "forecast" | "drive": ...}`.
 fn receive(
     text: &str,
     client: &Client,
@@ -154,7 +154,7 @@ fn receive(
     let answered = match message {
         Ok(Said::Drive) => hub.drive(client.id),
         _ if !drives => Err(watches.into()),
-        Ok(message) => commands.receive(client.id, id.clone(), message, text.len()),
+        Ok(message) => commands.receive(client.id, id.clone(), message, text),
         Err(error) => Err(error.to_string()),
     };
     answered.map_err(|reason| (id, reason))

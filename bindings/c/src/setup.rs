@@ -45,6 +45,7 @@ export! {
         let json = json.get("json")?;
         set(run, |settings| {
             settings.config = language::check(&json, "configuration")?;
+            settings.file = None;
             Ok(())
         })
     }

@@ -195,6 +195,7 @@ impl Run {
             parameters: declared,
             orders,
             output: options.out.clone().unwrap_or_else(|| PathBuf::from(".")),
+            file: options.pipelines.clone().or(case.pipelines.clone()),
         })?;
         let points = share.mesh.points().to_vec();
         // With viewers a run goes on until somebody stops it, unless it was told when to end.

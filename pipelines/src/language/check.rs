@@ -9,7 +9,7 @@ use tombolo_deform::edit::Edit;
 use super::mend::{Mender, Piece, Taken, rescue, take, take_list};
 use super::order::{Change, Command, Order};
 use super::parse::{Document, Validate};
-use super::relative_files::{resolve_config_files, resolve_files};
+use super::relative_files::{resolve_files, resolve_pipeline_files};
 use super::scan::{Member, Node, Value};
 use super::timed::{JournalEntry, OrderStatus, OrdersText, TimedCommand, lines, torn_line};
 use super::unread::Unread;
@@ -63,7 +63,7 @@ fn check_configuration(
 ) -> Result<Config, LanguageErrors> {
     let read: Result<Config, _> = document.valid();
     let config = read.map(|mut config| {
-        resolve_config_files(&mut config, document.file);
+        resolve_pipeline_files(&mut config.pipelines, document.file);
         config
     });
     if let (Ok(_), None) = (&config, &trial) {
@@ -376,7 +376,7 @@ fn configuration(mender: &mut Mender<'_>, tree: &mut Node, trial: &mut Tried<'_>
     config.pipelines = read;
     let problems = config.problems_beside(&unread).into_problems();
     if let Some(trial) = trial {
-        resolve_config_files(&mut config, mender.file());
+        resolve_pipeline_files(&mut config.pipelines, mender.file());
         let faulty: HashSet<usize> = problems.iter().filter_map(Problem::pipeline).collect();
         let is_sound = |index: usize| unread.is_whole(index) && !faulty.contains(&index);
         for problem in trial.configuration(&config, &is_sound) {

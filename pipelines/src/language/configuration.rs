@@ -6,7 +6,7 @@ use std::num::NonZeroU32;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::pipeline::Pipeline;
+use super::pipeline::{Due, Pipeline};
 
 /// A whole configuration file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -28,9 +28,23 @@ pub struct Config {
     /// How orders from viewers are carried out.
     #[serde(default)]
     pub steering: Steering,
+    /// Whether the file is looked at again while the run goes on, about once a second: pipelines
+    /// that are changed in it are changed in the run. Everything else needs a restart.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub watch: bool,
     /// The pipelines, each with the steps at which it runs.
     #[serde(default)]
     pub pipelines: Vec<Pipeline>,
+}
+
+impl Config {
+    /// The name of the channel whose mesh orders change, where a pipeline that runs on orders
+    /// names one.
+    #[must_use]
+    pub fn steered_channel(&self) -> Option<&str> {
+        let pipeline = self.pipelines.iter().find(|pipeline| pipeline.due == Due::OnOrder);
+        pipeline.and_then(|pipeline| pipeline.channel.as_deref())
+    }
 }
 
 /// The server that viewers connect to.

@@ -128,6 +128,22 @@ impl Problem {
         self
     }
 
+    /// Takes `pipelines` off the way to it, and the index behind it, which it tells.
+    pub(super) fn of_pipeline(mut self) -> (Option<usize>, Self) {
+        let is_pipelines = |step: &mut Step| *step == Step::Key("pipelines".into());
+        if self.path.pop_if(is_pipelines).is_none() {
+            return (None, self);
+        }
+        let index = match self.path.last() {
+            Some(Step::Index(index)) => Some(*index),
+            _ => None,
+        };
+        if index.is_some() {
+            self.path.pop();
+        }
+        (index, self)
+    }
+
     pub(super) fn locate(self, root: &Node, text: &str, file: &str) -> LanguageError {
         let Fault { steps, place, message, suggestion, .. } = self.found_in(root);
         error(text, file, place.start, show(&steps), message, suggestion)

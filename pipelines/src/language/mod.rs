@@ -2,10 +2,10 @@
 //! token.
 //!
 //! Every type is declared once; from it come the parser, the JSON Schema ([`config_schema`],
-//! [`order_schema`]) and the reference pages. [`parse`] reads a configuration, [`parse_orders`] a
-//! file of orders or a journal, [`parse_json`] any other type with the same errors. [`check`] and
-//! [`check_orders`] read the same and tell every error at once; [`check_content`] finds out which
-//! of both a text is.
+//! [`order_schema`], [`pipeline_schema`]) and the reference pages. [`parse`] reads a configuration,
+//! [`parse_orders`] a file of orders or a journal, [`parse_json`] any other type with the same
+//! errors. [`check`] and [`check_orders`] read the same and tell every error at once;
+//! [`check_content`] finds out which of both a text is.
 //!
 //! ```
 //! let failure = tombolo_pipelines::language::parse(
@@ -36,6 +36,7 @@ mod monitors;
 mod order;
 mod parse;
 mod pipeline;
+mod pipeline_change;
 mod probe;
 mod reductions;
 mod relative_files;
@@ -66,8 +67,9 @@ pub use message::{Message, parse_message};
 pub(crate) use monitors::{Condition, Line, Scope, Slot, columns, line, monitors_of};
 pub use monitors::{Monitor, check_parameters, monitors};
 pub use order::{Change, Command, Order, Parameter, Question};
-pub use parse::{ReadError, Validate, parse_json, parse_valid, read_text, text};
+pub use parse::{ReadError, Validate, locate, parse_json, parse_valid, read_text, text};
 pub use pipeline::{AgainAfter, At, Budget, Cadence, Due, Pipeline};
+pub use pipeline_change::PipelineChange;
 pub use probe::{Probe, ProbeAt, ProbeGrid, ProbeLine, ProbeMethod};
 pub use reductions::{
     Decimate, Difference, Force, Histogram, Integrate, Measure, Spectrum, Statistics,
@@ -90,8 +92,8 @@ pub use tombolo_deform::shape::Deformation;
 /// # Errors
 /// A [`LanguageError`] at the first token that is wrong; [`check`] tells all that are.
 pub fn parse(text: &str, file: &str) -> Result<Config, LanguageError> {
-    let mut config = parse_valid(text, file)?;
-    relative_files::resolve_config_files(&mut config, file);
+    let mut config: Config = parse_valid(text, file)?;
+    relative_files::resolve_pipeline_files(&mut config.pipelines, file);
     Ok(config)
 }
 
@@ -105,4 +107,10 @@ pub fn config_schema() -> serde_json::Value {
 #[must_use]
 pub fn order_schema() -> serde_json::Value {
     schemars::schema_for!(Order).to_value()
+}
+
+/// The JSON Schema (draft 2020-12) of a pipeline.
+#[must_use]
+pub fn pipeline_schema() -> serde_json::Value {
+    schemars::schema_for!(Pipeline).to_value()
 }

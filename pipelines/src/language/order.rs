@@ -8,7 +8,7 @@ use tombolo_deform::edit::Edit;
 use tombolo_deform::quality::Guard;
 use tombolo_deform::schedule::Schedule;
 
-use super::Deformation;
+use super::{Deformation, PipelineChange};
 
 /// An order of a new shape: exactly one of `edits`, `stack` and `undo`, and settings for this order
 /// alone.
@@ -144,10 +144,12 @@ pub enum Command {
     Stop {},
     /// A parameter that the solver has declared gets a new value.
     Parameter(Parameter),
+    /// Pipelines are added, replaced or removed.
+    Pipelines(PipelineChange),
 }
 
 impl Command {
-    /// The first edit that names a file, and the file.
+    /// The first edit of an order that names a file, and the file.
     #[must_use]
     pub fn file(&self) -> Option<(usize, &str)> {
         let Command::Order(order) = self else { return None };

@@ -124,6 +124,15 @@ pub fn parse_valid<T: DeserializeOwned + Validate>(
     Document::read(text, file)?.valid()
 }
 
+/// A problem that was found after reading, at its token in the text that was read.
+#[must_use]
+pub fn locate(problem: Problem, text: &str, file: &str) -> LanguageError {
+    match Document::read(text, file) {
+        Ok(document) => document.locate(problem),
+        Err(error) => error,
+    }
+}
+
 /// A JSON text that was read, and is still to be taken for something.
 pub(super) struct Document<'a> {
     pub(super) root: Node,

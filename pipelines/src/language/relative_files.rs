@@ -4,7 +4,7 @@ use std::path::Path;
 
 use tombolo_deform::edit::{Displacement, Edit};
 
-use super::{Config, Stage};
+use super::{Pipeline, Stage};
 
 /// Resolves the files that edits name against the folder of `file`, the JSON file that the edits
 /// stand in, where they are relative.
@@ -29,8 +29,8 @@ pub fn resolve_files(edits: &mut [Edit], file: &str) {
     }
 }
 
-pub(super) fn resolve_config_files(config: &mut Config, file: &str) {
-    for stage in config.pipelines.iter_mut().flat_map(|pipeline| &mut pipeline.stages) {
+pub(super) fn resolve_pipeline_files(pipelines: &mut [Pipeline], file: &str) {
+    for stage in pipelines.iter_mut().flat_map(|pipeline| &mut pipeline.stages) {
         if let Stage::Displacement(import) = stage {
             resolve(import, file);
         }

@@ -6,13 +6,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::order::{Command, Order, Parameter};
-use super::parse::{Document, Validate, check_length};
-use super::relative_files::resolve_files;
-use super::{At, LanguageError, Problem};
+use super::parse::{Document, Validate, check_length, parse_valid};
+use super::relative_files::{resolve_files, resolve_pipeline_files};
+use super::{At, LanguageError, PipelineChange, Problem};
 use crate::limits::{Exceeded, WAITING, WAITING_BYTES};
 
-/// A command and when it is carried out: exactly one of `order`, `pause`, `resume`, `stop` and
-/// `parameter`.
+/// A command and when it is carried out: exactly one of `order`, `pause`, `resume`, `stop`,
+/// `parameter` and `pipelines`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "TimedFields", into = "TimedFields")]
 pub struct TimedCommand {
@@ -48,6 +48,9 @@ macro_rules! with_command {
             /// A parameter that the solver has declared gets a new value.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             parameter: Option<Parameter>,
+            /// Pipelines are added, replaced or removed.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pipelines: Option<PipelineChange>,
         }
 
         impl $name {
@@ -59,6 +62,7 @@ macro_rules! with_command {
                     self.resume.take().map(|_| Command::Resume {}),
                     self.stop.take().map(|_| Command::Stop {}),
                     self.parameter.take().map(Command::Parameter),
+                    self.pipelines.take().map(Command::Pipelines),
                 ]
                 .into_iter()
                 .flatten()
@@ -76,13 +80,14 @@ macro_rules! with_command {
                     Command::Resume {} => self.resume = Some(Empty {}),
                     Command::Stop {} => self.stop = Some(Empty {}),
                     Command::Parameter(parameter) => self.parameter = Some(parameter),
+                    Command::Pipelines(change) => self.pipelines = Some(change),
                 }
             }
         }
     };
 }
 
-const COMMANDS: &str = "`order`, `pause`, `resume`, `stop` and `parameter`";
+const COMMANDS: &str = "`order`, `pause`, `resume`, `stop`, `parameter` and `pipelines`";
 
 /// No settings.
 #[derive(Clone, Serialize, Deserialize, JsonSchema)]
@@ -280,8 +285,10 @@ pub fn parse_orders(text: &str, file: &str) -> Result<Vec<TimedCommand>, Languag
     check_length(text.len(), file, WAITING_BYTES)?;
     let mut commands = parse_commands(text, file)?;
     for command in &mut commands {
-        if let Command::Order(order) = &mut command.command {
-            resolve_files(order.edits_mut(), file);
+        match &mut command.command {
+            Command::Order(order) => resolve_files(order.edits_mut(), file),
+            Command::Pipelines(change) => resolve_pipeline_files(change.pipelines_mut(), file),
+            _ => {}
         }
     }
     Ok(commands)

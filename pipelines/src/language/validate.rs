@@ -20,7 +20,7 @@ use super::stage::{Action, ErrorBound, OrderStage, Stage, StreamStage, Write};
 use super::timed::TimedCommand;
 use super::unread::{Found, Unread};
 use super::{Deformation, Problem, TimeStatistics, monitors};
-use crate::limits::{Exceeded, NAME};
+use crate::limits::{Exceeded, NAME, PIPELINES, VIEWS};
 
 impl From<Exceeded> for Problem {
     fn from(exceeded: Exceeded) -> Self {
@@ -43,6 +43,10 @@ impl Config {
     pub(super) fn problems_beside(&self, unread: &Unread) -> Found {
         let mut found = Found::default();
         self.check_settings(unread, &mut found);
+        let views = self.pipelines.iter().filter(|pipeline| pipeline.streams()).count();
+        for count in [PIPELINES.check(self.pipelines.len()), VIEWS.check(views)] {
+            found.note(count.map_err(Problem::from), |problem| problem.within("pipelines"));
+        }
         let mut names = HashSet::new();
         let mut on_order = None;
         for (index, pipeline) in self.pipelines.iter().enumerate() {
@@ -526,6 +530,9 @@ impl Validate for Command {
             Command::Order(order) => order.validate().map_err(|problem| problem.within("order")),
             Command::Parameter(parameter) => finite(parameter.value)
                 .map_err(|problem| problem.within("value").within("parameter")),
+            Command::Pipelines(change) => {
+                change.validate().map_err(|problem| problem.within("pipelines"))
+            }
             Command::Pause {} | Command::Resume {} | Command::Stop {} => Ok(()),
         }
     }

@@ -137,8 +137,13 @@ impl Steerer {
         let rounding = Rounding::of(shaper.reference(), domain.communicator());
         let planner = Arc::new(Mutex::new(Planner::new(shaper)));
         let stack = EditStack::default();
-        let present =
-            Arc::new(Mutex::new(Present { stack: stack.clone(), here: here.clone(), own: None }));
+        let present = Present {
+            defaults: defaults.clone(),
+            stack: stack.clone(),
+            here: here.clone(),
+            own: None,
+        };
+        let present = Arc::new(Mutex::new(present));
         Self {
             domain,
             rounding,
@@ -166,6 +171,15 @@ impl Steerer {
         }
     }
 
+    /// Gives orders that begin from now on other settings where they bring none.
+    pub(crate) fn set_defaults(&mut self, defaults: &Defaults) {
+        if self.defaults != *defaults {
+            self.defaults.clone_from(defaults);
+            lock(&self.present).defaults.clone_from(defaults);
+            self.looked_ahead = false;
+        }
+    }
+
     /// The surface of the mesh, where this process has it.
     pub(crate) fn surface(&self) -> Option<Arc<Surface>> {
         lock(&self.planner).shaper().surface().cloned()
@@ -174,11 +188,7 @@ impl Steerer {
     /// A forecaster for other threads; `None` where the worker has ended.
     pub(crate) fn forecaster(&self) -> Option<Forecaster> {
         let jobs = Arc::clone(self.worker.as_ref()?.jobs());
-        Some(Forecaster {
-            defaults: self.defaults.clone(),
-            present: Arc::clone(&self.present),
-            jobs,
-        })
+        Some(Forecaster { present: Arc::clone(&self.present), jobs })
     }
 
     /// The forecast of an order, made at once. Collective.

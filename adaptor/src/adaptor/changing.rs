@@ -1,0 +1,168 @@
+//! Changes of the pipelines, made at a safe point.
+
+use std::sync::Arc;
+
+use serde_json::json;
+use tombolo_deform::communicator::agree;
+use tombolo_pipelines::{
+    extract::Channel,
+    language::{Action, Config, Deformation, Pipeline, PipelineChange, Problem, Stage},
+};
+
+use super::{Adaptor, SteeredMesh};
+use crate::{
+    stages::Changed,
+    steering::{Defaults, Source},
+    step::Moment,
+};
+
+/// A change of the pipelines that all ranks know of.
+pub(super) struct Told {
+    id: String,
+    source: Source,
+    change: PipelineChange,
+}
+
+impl Adaptor {
+    /// Adds, replaces or removes pipelines while the run goes on.
+    ///
+    /// The change is checked against all pipelines at once, and against the mesh and its fields in
+    /// the next call of [`execute`](Adaptor::execute), which makes it, or tells the log and the
+    /// viewers why it is not made; the journal has both. A pipeline that stays the same goes on,
+    /// one that is replaced starts anew.
+    ///
+    /// ```
+    /// use tombolo::{Adaptor, Channel, FieldView, MeshView, Step};
+    /// use tombolo::pipelines::language::parse_json;
+    /// # let mesh = tombolo::deform::shapes::box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
+    /// # let mesh = MeshView::from(&mesh);
+    ///
+    /// let mut adaptor = tombolo::Settings::default().start()?;
+    /// adaptor.change_pipelines(parse_json(
+    ///     r#"{"set": [{"name": "health", "stages": [{"quality": {}}]}]}"#,
+    ///     "pipelines",
+    /// )?)?;
+    /// let step = Step { cycle: 0, time: 0.0, time_step: 0.1 };
+    /// adaptor.execute(&step, &[Channel::new("fluid", mesh, &[])])?;
+    /// assert!(adaptor.history("health").is_some());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// What does not go together, with the way to it; nothing has changed then. To be called on all
+    /// ranks alike: the change of rank 0 counts.
+    pub fn change_pipelines(&mut self, change: PipelineChange) -> Result<(), Problem> {
+        if self.communicator.rank() > 0 {
+            return self.changes.check(&change);
+        }
+        self.changes.take(None, Source::Program, change, 0).map(drop)
+    }
+
+    /// Keeps a change that all ranks were told of for the next safe point.
+    pub(super) fn keep_change(&mut self, id: String, source: Source, change: PipelineChange) {
+        self.told_changes.push(Told { id, source, change });
+    }
+
+    /// Makes the changes that all ranks were told of, where all have lent the whole mesh with its
+    /// fields; otherwise the next call does, for which the solver is asked for them. Collective.
+    pub(super) fn make_changes(&mut self, moment: Moment, channels: &[Channel<'_>]) {
+        if self.told_changes.is_empty() {
+            return;
+        }
+        let was_spared = *self.is_spared.get_mut();
+        if self.communicator.any(was_spared) {
+            return;
+        }
+        for Told { id, source, change } in std::mem::take(&mut self.told_changes) {
+            let made = self.make_change(&change, moment, channels);
+            self.changes.settle(&id, made.is_ok(), &self.config);
+            self.settle(&id, &source, moment, made.as_ref().map(|_| ()).map_err(Clone::clone));
+            if let (Ok(Changed { added, replaced, removed }), Some(hub)) = (&made, &self.hub) {
+                hub.tell(&json!({"pipelines": {
+                    "id": id, "status": "applied", "cycle": moment.cycle,
+                    "added": added, "replaced": replaced, "removed": removed,
+                }}));
+            }
+        }
+    }
+
+    fn make_change(
+        &mut self,
+        change: &PipelineChange,
+        moment: Moment,
+        channels: &[Channel<'_>],
+    ) -> Result<Changed, String> {
+        let config = self.changes.after(change, &self.config).map_err(|it| it.to_string())?;
+        self.check_orders(&config)?;
+        self.check_features_of(change.pipelines())?;
+        let (parameters, hub) = (self.parameters.all(), self.hub.as_ref());
+        let changed = self.pipelines.replace(&config, moment, channels, parameters, hub)?;
+        self.config = Arc::new(config);
+        self.defaults = Defaults::of(&self.config);
+        if let SteeredMesh::Steered(steerer, _) = &mut self.mesh {
+            steerer.set_defaults(&self.defaults);
+            if self.pipelines.can_order() {
+                steerer.make_ready();
+            }
+        }
+        self.changed += 1;
+        self.offer_pipelines();
+        Ok(changed)
+    }
+
+    /// Refuses pipelines that order shapes in a run that has kept no reference mesh.
+    fn check_orders(&self, config: &Config) -> Result<(), String> {
+        let ordering = config.pipelines.iter().find(|pipeline| Pipeline::can_order(pipeline));
+        match (ordering, &self.mesh) {
+            (Some(pipeline), SteeredMesh::Unsteered) => Err(format!(
+                "pipeline `{}` gives orders, but the run began with nobody who could, so that it \
+                 has kept no reference mesh: this needs a restart",
+                pipeline.name
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Refuses pipelines whose edits or settings of orders name features that the mesh does not
+    /// have. Collective.
+    fn check_features_of(&self, pipelines: &[Pipeline]) -> Result<(), String> {
+        let SteeredMesh::Steered(_, surface) = &self.mesh else { return Ok(()) };
+        // Of several ranks rank 0 has the surface.
+        let features = surface.as_ref().map(|surface| surface.features());
+        let check = |pipeline: &Pipeline| {
+            let known = |name: &String| {
+                let found = features.map_or(Ok(0), |features| features.index(name));
+                found.map_err(|error| format!("pipeline `{}`: {error}", pipeline.name))
+            };
+            let settings = |deform: &Deformation| {
+                deform.sliding.iter().chain(&deform.free).try_for_each(|name| known(name).map(drop))
+            };
+            for stage in &pipeline.stages {
+                if let Some(edit) = stage.edit() {
+                    edit.features()
+                        .iter()
+                        .chain(edit.fixed())
+                        .try_for_each(|name| known(name).map(drop))?;
+                }
+                match stage {
+                    Stage::Deform(deform) => settings(deform)?,
+                    Stage::Order(order) => order.deform.iter().try_for_each(settings)?,
+                    _ => {}
+                }
+            }
+            pipeline.then.iter().try_for_each(|action| match action {
+                Action::Order(order) => order.deform.iter().try_for_each(settings),
+                _ => Ok(()),
+            })
+        };
+        let mine = pipelines.iter().try_for_each(check);
+        agree(&*self.communicator, mine).map_err(|error| error.message)
+    }
+
+    /// Offers viewers the pipelines as they are now.
+    pub(super) fn offer_pipelines(&self) {
+        if let Some(hub) = &self.hub {
+            hub.offer_pipelines(json!(self.config.pipelines).to_string());
+        }
+    }
+}
