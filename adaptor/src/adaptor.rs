@@ -31,7 +31,7 @@ use tombolo_deform::{
 };
 use tombolo_pipelines::{
     extract::Channel,
-    language::{self, Config, Problems, ReadError, Validate},
+    language::{self, Config, Problem, Problems, ReadError, Validate},
     run::History,
 };
 
@@ -224,7 +224,9 @@ impl Adaptor {
             ),
             None if config.watch => {
                 let message = "the configuration did not come from a file that could be watched";
-                return Err(InitializeError::Configuration(Problem::new(message).within("watch")));
+                return Err(InitializeError::Configuration(
+                    Problem::new(message).within("watch").into(),
+                ));
             }
             _ => None,
         };

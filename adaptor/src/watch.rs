@@ -13,7 +13,7 @@ use std::{
 use serde_json::{Value, json};
 use tombolo_pipelines::{
     language::{
-        self, Config, LanguageError, Pipeline, PipelineChange, check_parameters, locate, read_text,
+        self, Config, Pipeline, PipelineChange, check_parameters, locate, read_text,
     },
     limits::DOCUMENT,
 };
@@ -154,10 +154,10 @@ impl Watcher {
 fn parse(file: &Path, parameters: &[String]) -> Result<Config, String> {
     let name = file.display().to_string();
     let text = read_text(file, DOCUMENT).map_err(|error| error.to_string())?;
-    let told = |error: LanguageError| error.to_string();
-    let config = language::parse(&text, &name).map_err(told)?;
+    let config = language::check(&text, &name).map_err(|errors| errors.to_string())?;
     let known: Vec<&str> = parameters.iter().map(String::as_str).collect();
-    check_parameters(&config, &known).map_err(|problem| told(locate(problem, &text, &name)))?;
+    check_parameters(&config, &known)
+        .map_err(|problems| locate(problems.into_first(), &text, &name).to_string())?;
     Ok(config)
 }
 

@@ -525,7 +525,7 @@ impl Hub {
 
     /// Has the encoder make a key frame of a view, of its newest extract.
     pub(super) fn want_key(&self, view: usize) {
-        if let Some(view) = lock(&self.state).views.get_mut(view) {
+        if let Some(view) = lock(&self.state).views.get_mut(&view) {
             view.key_wanted = true;
         }
         self.work.notify_one();

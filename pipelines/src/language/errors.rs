@@ -126,6 +126,12 @@ impl Problems {
         }
     }
 
+    /// The first problem alone.
+    #[must_use]
+    pub fn into_first(self) -> Problem {
+        *self.first
+    }
+
     /// The problems in their order.
     pub fn iter(&self) -> impl Iterator<Item = &Problem> {
         std::iter::once(&*self.first).chain(&self.others)

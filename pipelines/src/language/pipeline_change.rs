@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::pipeline::{Due, Pipeline};
 use super::stage::{Action, Stage};
-use super::{Config, Problem, Validate, check_parameters, nearest};
+use super::{Config, Problem, Problems, Validate, check_parameters, nearest};
 use crate::limits::PIPELINES;
 
 /// A change of the pipelines of a run. All of it takes effect at one step, or none of it.
@@ -120,7 +120,9 @@ impl PipelineChange {
                 }
             }
         }
-        let checked = after.validate().and_then(|()| check_parameters(&after, parameters));
+        let checked = after
+            .validate()
+            .and_then(|()| check_parameters(&after, parameters).map_err(Problems::into_first));
         let checked = checked.and_then(|()| check_steered(before, &after));
         checked.map_err(|problem| self.found(problem, &after, &brought))?;
         Ok(after)
@@ -173,7 +175,9 @@ impl Validate for PipelineChange {
             return Err(located(Problem::new(message).at(index)));
         }
         for (index, pipeline) in self.pipelines().iter().enumerate() {
-            pipeline.validate().map_err(|problem| located(problem.at(index)))?;
+            if let Some(problem) = pipeline.problems(true).into_iter().next() {
+                return Err(located(problem.at(index)));
+            }
         }
         Ok(())
     }

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::order::{Command, Order, Parameter};
-use super::parse::{Document, Validate, check_length, parse_valid};
+use super::parse::{Document, Validate, check_length};
 use super::relative_files::{resolve_files, resolve_pipeline_files};
 use super::{At, LanguageError, PipelineChange, Problem};
 use crate::limits::{Exceeded, WAITING, WAITING_BYTES};

@@ -92,7 +92,7 @@ impl Config {
 
 impl Pipeline {
     /// What means nothing in a pipeline by itself; `is_whole` says whether all of it could be read.
-    fn problems(&self, is_whole: bool) -> Vec<Problem> {
+    pub(super) fn problems(&self, is_whole: bool) -> Vec<Problem> {
         let mut found = Found::default();
         if self.name.trim().is_empty()
             || self.name.chars().any(char::is_control)

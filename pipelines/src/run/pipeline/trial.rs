@@ -2,10 +2,9 @@
 
 use tombolo_deform::communicator::Communicator;
 
-use super::{Keyed, Prepared, Progress, errors_of_all};
-use crate::extract::{Channel, Kept, Snapshot, Source};
+use super::{Keyed, Prepared, errors_of_all};
+use crate::extract::{Channel, Snapshot, Source};
 use crate::language::{Action, Stage};
-use crate::run::cost::Cost;
 use crate::run::history::Board;
 use crate::run::output::{Frame, Output};
 
@@ -48,7 +47,8 @@ impl Prepared {
     ) -> Result<Vec<Frame>, String> {
         let board = Board::default();
         let mut outputs = Vec::new();
-        let mut progress = self.begin(snapshot, channel, source, communicator, &board, &mut outputs);
+        let mut progress =
+            self.begin(snapshot, channel, source, communicator, &board, &mut outputs);
         progress.is_trial = true;
         self.run_stages(&mut progress);
         for action in &self.pipeline.then {
