@@ -12,9 +12,7 @@ use std::{
 
 use serde_json::{Value, json};
 use tombolo_pipelines::{
-    language::{
-        self, Config, Pipeline, PipelineChange, check_parameters, locate, read_text,
-    },
+    language::{self, Config, Pipeline, PipelineChange, check_parameters, locate, read_text},
     limits::DOCUMENT,
 };
 

@@ -21,7 +21,7 @@ use tombolo::{
         shapes::box_of_tets,
     },
     pipelines::{
-        encode::{Decoded, decode},
+        encode::DecodedFrame,
         language::{parse_json, parse_orders},
     },
 };
@@ -62,12 +62,10 @@ fn step_until_seen(
 ) {
     let begun = std::time::Instant::now();
     loop {
-        let seen = viewer.frames.drain(..).any(|frame| match decode(&frame) {
-            Ok(Decoded::Data(data)) => {
-                data.view == view && data.points.iter().all(|point| fits(point[0]))
-            }
-            _ => false,
-        });
+        let seen = viewer
+            .decoded()
+            .iter()
+            .any(|frame| frame.view == view && frame.points.iter().all(|point| fits(point[0])));
         if seen {
             return;
         }
@@ -133,9 +131,7 @@ fn a_viewer_adds_replaces_and_removes_a_view() {
     step_until_seen(&mut solver, &mut late, "boundary", |_| true);
     solver.steps(20);
     let _ = late.look_for("nothing", Duration::from_millis(50), |_| false);
-    let is_of_cut =
-        |frame: &Vec<u8>| matches!(decode(frame), Ok(Decoded::Data(data)) if data.view == "cut");
-    assert!(!late.frames.iter().any(is_of_cut));
+    assert!(!late.decoded().iter().any(|frame| frame.view == "cut"));
     let status = solver.step_until_told(&mut late, "status", |status| {
         status["pipelines"].as_array().is_some_and(|all| all.len() == 2)
     });
@@ -281,9 +277,8 @@ fn a_slice_can_be_moved_while_the_solver_waits() {
         viewer.send(&json!({"id": "cut", "pipelines": {"set": [slice(0.3)]}}));
         let told = viewer.wait_for("pipelines", |told| told["status"] == "applied");
         let begun = std::time::Instant::now();
-        while !viewer.frames.iter().any(|frame| {
-            matches!(decode(frame), Ok(Decoded::Data(data)) if data.view == "cut" && data.cycle == told["cycle"])
-        }) {
+        let is_shown = |frame: &DecodedFrame| frame.view == "cut" && frame.cycle == told["cycle"];
+        while !viewer.decoded().iter().any(is_shown) {
             assert!(begun.elapsed() < PATIENCE, "the slice was not shown");
             let _ = viewer.look_for("nothing", Duration::from_millis(5), |_| false);
         }

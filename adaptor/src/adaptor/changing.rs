@@ -106,7 +106,9 @@ impl Adaptor {
             }
         }
         self.changed += 1;
-        self.offer_pipelines();
+        if let Some(hub) = &self.hub {
+            hub.offer_pipelines(&self.config.pipelines);
+        }
         Ok(changed)
     }
 
@@ -157,12 +159,5 @@ impl Adaptor {
         };
         let mine = pipelines.iter().try_for_each(check);
         agree(&*self.communicator, mine).map_err(|error| error.message)
-    }
-
-    /// Offers viewers the pipelines as they are now.
-    pub(super) fn offer_pipelines(&self) {
-        if let Some(hub) = &self.hub {
-            hub.offer_pipelines(json!(self.config.pipelines).to_string());
-        }
     }
 }

@@ -17,8 +17,7 @@ use std::{
 use axum::body::Bytes;
 use serde_json::{Map, Value, json};
 use tokio::sync::Notify;
-use tombolo_pipelines::encode::Encoded;
-use tombolo_pipelines::run::Cost;
+use tombolo_pipelines::{encode::Encoded, language::Pipeline, run::Cost};
 
 use super::{ReferenceSurface, StreamCounts};
 use crate::lock::{lock, wait};
@@ -407,8 +406,8 @@ impl Hub {
     }
 
     /// Offers the pipelines as JSON.
-    pub(crate) fn offer_pipelines(&self, pipelines: String) {
-        lock(&self.state).pipelines = pipelines.into();
+    pub(crate) fn offer_pipelines(&self, pipelines: &[Pipeline]) {
+        lock(&self.state).pipelines = json!(pipelines).to_string().into();
     }
 
     pub(crate) fn counts(&self) -> StreamCounts {

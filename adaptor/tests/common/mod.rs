@@ -13,6 +13,7 @@ use tombolo::{
         shapes::box_of_tets,
     },
     pipelines::{
+        encode::{DecodedFrame, Decoder},
         extract::{Channel, FieldView},
         language::{self, Config},
     },
@@ -151,6 +152,7 @@ pub struct Viewer {
     /// Texts that nobody has looked for yet.
     pub seen: Vec<Value>,
     pub frames: Vec<Vec<u8>>,
+    decoder: Decoder,
 }
 
 pub fn socket_url(adaptor: &Adaptor) -> String {
@@ -168,7 +170,8 @@ impl Viewer {
             tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
         let (socket, _) =
             runtime.block_on(tokio_tungstenite::connect_async(url)).map_err(Box::new)?;
-        Ok(Self { runtime, socket, seen: Vec::new(), frames: Vec::new() })
+        let decoder = Decoder::new();
+        Ok(Self { runtime, socket, seen: Vec::new(), frames: Vec::new(), decoder })
     }
 
     pub fn send(&mut self, message: &Value) {
@@ -195,6 +198,12 @@ impl Viewer {
             Ok(Some(Ok(message))) => Some(message),
             _ => None,
         }
+    }
+
+    /// Decodes the frames that came since the last call, and takes them away.
+    pub fn decoded(&mut self) -> Vec<DecodedFrame> {
+        let decoder = &mut self.decoder;
+        self.frames.drain(..).map(|frame| decoder.decode(&frame).expect("a frame")).collect()
     }
 
     /// A text message under `key` that fits, from those seen or the next ones.
