@@ -91,18 +91,20 @@ fn check_tells_every_error_and_those_on_a_mesh() {
     };
     let all = "views.json:2:41: pipelines[0].stages[0].surface.all: found the unknown key `all`, expected no key at all";
     let presure = "views.json:2:81: pipelines[0].stages[1].statistics.field: the channel has no field `presure`; its fields are pressure; did you mean `pressure`?";
+    // The field that it would derive is not told of.
+    let velocity = "views.json:3:52: pipelines[1].stages[0].vorticity.field: the channel has no field `velocity`; its fields are pressure";
     let when = "views.json:4:12: pipelines[1].when: column 1 of the formula: found the unknown name `vorticity.mx`, expected a monitor; did you mean `vorticity.max`?";
     let heat = "views.json:5:73: pipelines[2].stages[0].statistics.field: the channel has no field `heat`; its fields are pressure";
     assert_eq!(lines(&check(&[])), [all, when, "tombolo: 2 error(s)"]);
     assert_eq!(
         lines(&check(&["--mesh", "box.vtu"])),
-        [all, presure, when, heat, "tombolo: 4 error(s)"]
+        [all, presure, velocity, when, heat, "tombolo: 5 error(s)"]
     );
     let solid = check(&["--mesh", "box.vtu", "--channel", "solid", "--field", "heat:1:element"]);
     assert_eq!(lines(&solid), [all, when, "tombolo: 2 error(s)"]);
 
     let errors = json(&check(&["--mesh", "box.vtu", "--json"]));
-    assert_eq!(errors.as_array().map(Vec::len), Some(4));
+    assert_eq!(errors.as_array().map(Vec::len), Some(5));
     assert_eq!(
         errors[1],
         serde_json::json!({
@@ -137,6 +139,36 @@ fn check_tells_every_error_and_those_on_a_mesh() {
     assert!(error_text(&wrong).contains("1 to 9 components"), "{}", error_text(&wrong));
 }
 
+/// The tutorial shows what the program says of the tutorial's file with three slips.
+#[test]
+fn the_tutorial_shows_what_check_says() {
+    let page = include_str!("../../docs/tutorial.md");
+    let (_, section) = page.split_once("## 7. Say what is streamed").expect("the section");
+    let (_, file) = section.split_once("```json\n").expect("a file");
+    let (file, rest) = file.split_once("```").expect("its end");
+    let (_, shown) =
+        rest.split_once("$ tombolo check views.json --mesh duct.vtu\n").expect("a call");
+    let (shown, _) = shown.split_once("```").expect("its end");
+    let file = file
+        .replace("\"normal\"", "\"nromal\"")
+        .replace("\"pressure\"", "\"pressur\"")
+        .replace("quality.min", "qality.min");
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("views.json"), file).unwrap();
+    let mesh = box_of_tets([2, 2, 2], [-1.0; 3], [1.0; 3]);
+    let field = |name: &str, components: usize| Field {
+        name: name.into(),
+        association: Association::Vertex,
+        components,
+        number: NumberType::F64,
+        values: vec![0.0; components * mesh.points().len()],
+    };
+    let fields = [field("velocity", 3), field("pressure", 1)];
+    write_mesh(directory.path().join("duct.vtu"), &mesh, &fields, Compression::None).unwrap();
+    let output = tombolo(directory.path(), &["check", "views.json", "--mesh", "duct.vtu"]);
+    assert_eq!(error_text(&output), shown);
+}
+
 /// A run that does not start says all that is wrong, not the first thing alone.
 #[test]
 fn a_run_that_does_not_start_tells_every_error() {
@@ -165,7 +197,7 @@ fn a_run_that_does_not_start_tells_every_error() {
     assert_eq!(
         text.unwrap_err(),
         "the configuration: pipelines[0].when: the solver has no parameter `inflw`; it has inflow; did you mean `inflow`?\n\
-         pipelines[0].stages[0].expression.formula: the solver has no parameter `outflow`; it has inflow; did you mean `inflow`?"
+         pipelines[0].stages[0].expression.formula: the solver has no parameter `outflow`; it has inflow"
     );
     let orders = directory.path().join("orders.json");
     std::fs::write(&orders, r#"[{"order": {"undo": 0}}, {"puase": {}}]"#).unwrap();

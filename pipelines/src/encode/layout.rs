@@ -53,7 +53,8 @@ pub(super) fn open(message: &[u8]) -> Result<(Kind, Input<'_>), DecodeError> {
 
 /// Appends a name, cut off where it is too long.
 pub(super) fn put_name(message: &mut Vec<u8>, name: &str) {
-    put_block(message, &name.as_bytes()[..name.floor_char_boundary(LONGEST_NAME)]);
+    let end = (0..=name.len().min(LONGEST_NAME)).rev().find(|&end| name.is_char_boundary(end));
+    put_block(message, &name.as_bytes()[..end.unwrap_or(0)]);
 }
 
 /// Reads a name.

@@ -6,6 +6,7 @@ use serde::de::DeserializeOwned;
 use serde_json::Number;
 use tombolo_deform::edit::Edit;
 
+use super::kind::Kind;
 use super::mend::{Mender, Piece, Taken, rescue, take, take_list};
 use super::order::{Change, Command, Order};
 use super::parse::{Document, Validate};
@@ -21,8 +22,9 @@ use crate::limits::WAITING_BYTES;
 
 /// Something that what was read is tried on, such as a mesh.
 pub trait Trial {
-    /// What is wrong with the pipelines of a configuration. Only those at whose index `is_sound` holds
-    /// mean something by themselves; the others must not be run.
+    /// What is wrong with the pipelines of a configuration. Only of those at whose index `is_sound`
+    /// holds do all stages and actions mean something; the others must not be run. Their conditions
+    /// may be wrong all the same.
     fn configuration(&mut self, config: &Config, is_sound: &dyn Fn(usize) -> bool) -> Vec<Problem>;
 
     /// What is wrong with edits that mean something by themselves.
@@ -231,61 +233,6 @@ pub fn check_content(
     }
 }
 
-/// A kind of text.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Configuration,
-    Orders,
-    /// Edits, or an order of them.
-    Edits,
-}
-
-impl Kind {
-    /// The kind that knows most of the keys.
-    fn of(root: &Node) -> Self {
-        let (objects, kinds) = match &root.value {
-            Value::Array(items) => (
-                &items[..],
-                [(Kind::Orders, keys_of::<TimedCommand>()), (Kind::Edits, keys_of::<Edit>())],
-            ),
-            _ => (
-                std::slice::from_ref(root),
-                [(Kind::Orders, keys_of::<TimedCommand>()), (Kind::Edits, keys_of::<Order>())],
-            ),
-        };
-        let configuration = (Kind::Configuration, keys_of::<Config>());
-        let count = |known: &HashSet<String>| {
-            let keys = objects.iter().flat_map(Node::members).map(|member| &member.key);
-            let is_known = |key: &&String| near(key, known.iter().map(String::as_str)).count() > 0;
-            // A key that is there is worth more than one that is misspelt.
-            keys.clone().filter(is_known).count() + keys.filter(|key| known.contains(*key)).count()
-        };
-        // An array is no configuration; of kinds that know as many keys the first counts.
-        let mut best = (Kind::Configuration, count(&configuration.1));
-        if let Value::Array(_) = root.value {
-            best = (Kind::Orders, 0);
-        }
-        for (kind, known) in &kinds {
-            let known = count(known);
-            if known > best.1 {
-                best = (*kind, known);
-            }
-        }
-        best.0
-    }
-}
-
-/// The keys that an object of a type may have.
-fn keys_of<T: schemars::JsonSchema>() -> HashSet<String> {
-    let schema = schemars::schema_for!(T).to_value();
-    let keys = |schema: &serde_json::Value| -> Vec<String> {
-        let properties = schema.get("properties").and_then(serde_json::Value::as_object);
-        properties.map_or_else(Vec::new, |properties| properties.keys().cloned().collect())
-    };
-    let choices = schema.get("oneOf").and_then(serde_json::Value::as_array);
-    keys(&schema).into_iter().chain(choices.into_iter().flatten().flat_map(keys)).collect()
-}
-
 /// The errors of a document that is read in pieces, which have problems.
 fn errors_in(
     document: &Document<'_>,
@@ -377,7 +324,9 @@ fn configuration(mender: &mut Mender<'_>, tree: &mut Node, trial: &mut Tried<'_>
     let problems = config.problems_beside(&unread).into_problems();
     if let Some(trial) = trial {
         resolve_pipeline_files(&mut config.pipelines, mender.file());
-        let faulty: HashSet<usize> = problems.iter().filter_map(Problem::pipeline).collect();
+        // A condition is not needed for that.
+        let in_part = problems.iter().filter(|problem| problem.part().is_some());
+        let faulty: HashSet<usize> = in_part.filter_map(Problem::pipeline).collect();
         let is_sound = |index: usize| unread.is_whole(index) && !faulty.contains(&index);
         for problem in trial.configuration(&config, &is_sound) {
             mender.note_problem(problem, tree);

@@ -30,6 +30,7 @@ mod errors;
 mod extracts;
 mod file_pattern;
 mod glyphs;
+mod kind;
 mod mend;
 mod message;
 mod monitors;
@@ -49,6 +50,7 @@ mod timed;
 mod tree;
 mod unread;
 mod validate;
+mod validate_orders;
 
 pub use cameras::{Camera, Orbit, Viewpoint};
 pub use check::{Content, Trial, check, check_content, check_orders};

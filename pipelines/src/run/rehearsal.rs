@@ -102,13 +102,14 @@ impl<'a> Rehearsal<'a> {
 impl Trial for Rehearsal<'_> {
     fn configuration(&mut self, config: &Config, is_sound: &dyn Fn(usize) -> bool) -> Vec<Problem> {
         let mut problems = Vec::new();
+        let unconditional = unconditional(config);
         for (index, pipeline) in config.pipelines.iter().enumerate() {
             if !self.reads(pipeline.channel.as_deref()) || !is_sound(index) {
                 continue;
             }
             let mut of_pipeline = match pipeline.due {
                 Due::OnOrder | Due::OnEnd => Vec::new(),
-                _ => self.run(config, index),
+                _ => self.run(&unconditional, index),
             };
             for (index, stage) in pipeline.stages.iter().enumerate() {
                 let found = match (stage, stage.edit()) {
@@ -179,6 +180,15 @@ impl Rehearsal<'_> {
         let errors = self.editor.as_mut().map(|editor| editor.check(std::slice::from_ref(&edit)));
         errors.unwrap_or_default().iter().map(|error| of_edit(&edit, error)).collect()
     }
+}
+
+/// A configuration whose pipelines act whatever their conditions say.
+fn unconditional(config: &Config) -> Config {
+    let mut config = config.clone();
+    for pipeline in &mut config.pipelines {
+        (pipeline.when, pipeline.lasting, pipeline.again_after) = (None, None, None);
+    }
+    config
 }
 
 fn of_edit(edit: &Edit, error: &EditError) -> Problem {
