@@ -8,7 +8,7 @@ use tombolo_deform::edit::Edit;
 use tombolo_deform::quality::Guard;
 use tombolo_deform::schedule::Schedule;
 
-use super::{Deformation, PipelineChange};
+use super::{Deformation, Parameter, PipelineChange};
 
 /// An order of a new shape: exactly one of `edits`, `stack` and `undo`, and settings for this order
 /// alone.
@@ -166,14 +166,4 @@ impl Command {
 pub enum Question {
     /// Asks what an order would come to, were it given now.
     Forecast(Order),
-}
-
-/// A new value of a parameter.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Parameter {
-    /// The parameter's name.
-    pub name: String,
-    /// Its new value.
-    pub value: f64,
 }

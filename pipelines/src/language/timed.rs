@@ -5,7 +5,8 @@ use std::collections::{HashMap, HashSet};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::order::{Command, Order, Parameter};
+use super::order::{Command, Order};
+use super::parameter::Parameter;
 use super::parse::{Document, Validate, check_length};
 use super::relative_files::{resolve_files, resolve_pipeline_files};
 use super::{At, LanguageError, PipelineChange, Problem};
