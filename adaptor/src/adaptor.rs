@@ -44,7 +44,7 @@ use crate::{
     stages::Pipelines,
     steering::{Defaults, Forecaster, Log, Parameters, Queue, Source, Steering, Timed},
     step::{Moment, Outside, Step},
-    stream::{Clock, Hub, Server},
+    stream::{Clock, End, Hub, Server},
     watch::Watch,
 };
 
@@ -175,12 +175,11 @@ impl Adaptor {
         Ok(adaptor)
     }
 
-    /// The link that a viewer opens, with its token; `None` without a server.
+    /// The link that a viewer opens, with its token; `None` without a server. Of a server that listens
+    /// on all addresses it has the machine's name.
     #[must_use]
     pub fn link(&self) -> Option<String> {
-        self.server
-            .as_ref()
-            .map(|server| format!("http://{}/?token={}", server.address(), server.token().as_str()))
+        self.server.as_ref().map(Server::link)
     }
 
     /// The address that viewers connect to; `None` without a server.
@@ -255,6 +254,11 @@ impl Adaptor {
         })
     }
 
+    /// What other threads may keep of the run.
+    pub(crate) fn shared(&self) -> (Arc<Queue>, Arc<Log>, Arc<Clock>) {
+        (Arc::clone(&self.queue), Arc::clone(&self.log), Arc::clone(&self.clock))
+    }
+
     /// Whether `execute` will look at the mesh and the fields of this step.
     ///
     /// A solver that would have to copy them first can ask before it does. Where the answer is no,
@@ -323,6 +327,9 @@ impl Adaptor {
         let asked = self.pipelines.end(self.moment, self.hub.as_ref());
         asked.faults.iter().for_each(|fault| self.complain(fault));
         self.watch = None;
+        if let Some(hub) = &self.hub {
+            hub.ends(if self.stopped { End::Stopped } else { End::Finished });
+        }
         self.server = None;
         let faults = self.pipelines.finish();
         // Rank 0 writes: what was asked for is there before any rank goes on.
@@ -413,7 +420,7 @@ impl Adaptor {
             self.timing.reference.add(begun.elapsed());
             if let Some(hub) = self.hub.as_ref().filter(|_| self.config.steering.wait_for_viewer) {
                 let begun = Instant::now();
-                hub.wait_for_viewer();
+                hub.wait_for_viewer(|| self.queue.has_called());
                 self.timing.paused.add(begun.elapsed());
             }
         }

@@ -60,6 +60,7 @@ mod settings;
 mod stages;
 pub mod steering;
 mod step;
+mod stopper;
 pub mod stream;
 mod table;
 mod watch;
@@ -75,6 +76,7 @@ pub use steering::{
     Steering, SurfaceMotion,
 };
 pub use step::Step;
+pub use stopper::Stopper;
 pub use tombolo_deform as deform;
 pub use tombolo_deform::communicator;
 pub use tombolo_deform::mesh::{ArrayView, MeshView};

@@ -200,7 +200,7 @@ fn what_cannot_take_over_is_refused_and_those_before_go_on() {
         ),
         (
             stages(json!([{"set": {"name": "inflow", "value": 1.0}}])),
-            "pipelines.set[0].set: the solver has no parameter `inflow`",
+            "pipelines.set[0].stages[0].set.name: the solver has no parameter `inflow`",
         ),
         (stages(json!([{"write": {"file": "/tmp/a.vtu"}}])), "below the run's output directory"),
         (

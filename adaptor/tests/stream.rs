@@ -701,3 +701,51 @@ mod any_bytes {
         assert!(solver.is_at_reference() && !solver.stopped);
     }
 }
+
+#[test]
+fn the_end_of_a_run_is_told_and_how_it_came() {
+    let told = |viewer: &mut Viewer, how: &str| {
+        let end = viewer.wait_for("end", |_| true);
+        assert_eq!((&end["how"], &end["cycle"]), (&json!(how), &json!(2)));
+        assert_eq!(viewer.closed(), Some(1000));
+    };
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    solver.steps(3);
+    solver.finish();
+    told(&mut viewer, "finished");
+
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    solver.steps(2);
+    let stopper = solver.adaptor.stopper();
+    std::thread::spawn(move || stopper.stop()).join().expect("no panic");
+    solver.step();
+    assert!(solver.stopped);
+    solver.finish();
+    viewer.wait_for("status", |status| status["stopped"] == true);
+    told(&mut viewer, "stopped");
+
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    solver.steps(3);
+    drop(solver.adaptor);
+    told(&mut viewer, "failed");
+}
+
+#[test]
+fn a_request_names_one_host() {
+    let solver = Solver::with_config(LINK_TO_ALL);
+    for (request, code) in [
+        ("GET / HTTP/1.1\r\nHost: localhost\r\n", "HTTP/1.1 200"),
+        ("GET / HTTP/1.1\r\nHost: localhost\r\nHost: evil.example\r\n", "HTTP/1.1 4"),
+        ("GET http://evil.example/ HTTP/1.1\r\nHost: localhost\r\n", "HTTP/1.1 403"),
+        ("GET http://evil.example/ HTTP/1.1\r\nHost: evil.example\r\n", "HTTP/1.1 403"),
+        ("GET http://localhost/ HTTP/1.1\r\nHost: localhost\r\n", "HTTP/1.1 200"),
+    ] {
+        let request = format!("{request}Connection: close\r\n\r\n");
+        let answer =
+            String::from_utf8_lossy(&answer(&solver.adaptor, request.as_bytes())).into_owned();
+        assert!(answer.starts_with(code), "{request}: {}", answer.lines().next().unwrap_or(""));
+    }
+}

@@ -61,7 +61,7 @@ fn errors_of_all_places_are_told_in_the_order_of_the_file() {
         &told(text),
         r#"
 views.json:2:14: version: found "1", expected a whole number from 0 to 4294967295
-views.json:3:3: steam: found the unknown key `steam`, expected `version`, `description`, `stream`, `journal`, `steering` or `pipelines`; did you mean `stream`?
+views.json:3:3: steam: found the unknown key `steam`, expected `version`, `description`, `stream`, `journal`, `steering`, `watch` or `pipelines`; did you mean `stream`?
 views.json:3:23: steam.listen: invalid socket address syntax
 views.json:5:38: pipelines[0].every.steps: found 0, expected a whole number from 1 to 18446744073709551615
 views.json:6:28: pipelines[0].stages[0].slice.origin: found 2 values, expected an array of 3 values
@@ -170,12 +170,12 @@ orders.json:2:11: [0].at.cycl: found the unknown name `cycl`, expected `cycle` o
 orders.json:2:83: [0].order.edits[0].translate.by: found 2 values, expected an array of 3 values
 orders.json:2:94: [0].order.edits[1].rotat: found the unknown name `rotat`, expected `translate`, `rotate`, `scale_direction`, `scale_normals`, `affine`, `displacement` or `skeleton`; did you mean `rotate`?
 orders.json:2:131: [0].order.edits[1].rotat.axis: expected a direction, whose length is not 0
-orders.json:3:3: [1]: found 2 commands, expected exactly one of `order`, `pause`, `resume`, `stop` and `parameter`
+orders.json:3:3: [1]: found 2 commands, expected exactly one of `order`, `pause`, `resume`, `stop`, `parameter` and `pipelines`
 orders.json:4:56: [2].parameter.value: found "3", expected a number
 orders.json:5:38: [3].order.stack[0].translate.features: there is no handle; expected features, a region, or both
 orders.json:5:92: [3].order.guard.min_scaled_jacobian: found 2, expected a number from 0 to 1
 orders.json:6:22: [4].order.undo: found 0, expected a whole number from 1 to 4294967295
-orders.json:6:27: [5]: found no command, expected one of `order`, `pause`, `resume`, `stop` and `parameter`
+orders.json:6:27: [5]: found no command, expected one of `order`, `pause`, `resume`, `stop`, `parameter` and `pipelines`
 "#,
     );
     // Of lines each is a text of its own; the last may be torn.

@@ -160,6 +160,16 @@ impl Run {
         self.child.try_wait().expect("the system knows its children").is_none()
     }
 
+    /// Sends the program a signal, such as `TERM`.
+    ///
+    /// # Panics
+    /// Where it cannot be sent.
+    pub fn signal(&self, name: &str) {
+        let process = self.child.id().to_string();
+        let sent = Command::new("kill").args(["-s", name, &process]).status();
+        assert!(sent.is_ok_and(|status| status.success()), "{name} was not sent");
+    }
+
     /// Waits for the program's end, at most `limit`.
     ///
     /// # Panics

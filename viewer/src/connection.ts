@@ -5,7 +5,7 @@
 import { parseServerMessage } from "./protocol";
 import type { ClientMessage, ServerMessage } from "./protocol";
 
-export type ConnectionState = "connecting" | "connected" | "reconnecting" | "refused";
+export type ConnectionState = "connecting" | "connected" | "reconnecting" | "refused" | "ended";
 
 /** The part of the browser that a connection needs, so that a test can stand in for it. */
 export interface Surroundings {
@@ -160,7 +160,10 @@ export class Connection {
     socket.onclose = (event: CloseEvent) => {
       if (this.socket !== socket) return;
       this.socket = null;
-      if (!this.closed) void this.lost(opened, event.reason);
+      if (this.closed) return;
+      // The server's farewell: there is nothing to come back to.
+      if (event.code === 1000) this.change("ended", "");
+      else void this.lost(opened, event.reason);
     };
   }
 

@@ -24,7 +24,7 @@ export interface PreviewInspection {
 }
 
 export interface Inspection {
-  /** How the connection stands: connecting, connected, reconnecting or refused. */
+  /** How the connection stands: connecting, connected, reconnecting, refused or ended. */
   readonly connection: ConnectionState;
   readonly role: Role | null;
   /** The cycle of the newest frame; null before the first. */

@@ -131,6 +131,7 @@ function takeMessage(message: ServerMessage): void {
     case "monitor": return monitors.update(message.body);
     // The hello that comes with it says what there is now.
     case "pipelines": return;
+    case "end": return bar.end(message.body);
     case "error": {
       const { id, message: text } = message.body;
       if (!(id && (orders.refused(id, text) || forecasts.refused(id, text)))) showProblem(text);

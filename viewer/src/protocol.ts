@@ -95,6 +95,9 @@ export interface PipelineChange {
 
 export interface ServerError { message: string; id?: string | null }
 
+/** The last word of a run. */
+export interface RunEnd { how: "finished" | "stopped" | "failed"; cycle: number; time: number }
+
 export type ServerMessage =
   | { kind: "hello"; body: Hello }
   | { kind: "status"; body: Status }
@@ -102,6 +105,7 @@ export type ServerMessage =
   | { kind: "forecast"; body: ForecastAnswer }
   | { kind: "monitor"; body: Monitor }
   | { kind: "pipelines"; body: PipelineChange }
+  | { kind: "end"; body: RunEnd }
   | { kind: "error"; body: ServerError };
 
 export type ClientMessage = { id?: string } & (
@@ -162,7 +166,7 @@ export function parseServerMessage(text: string): ServerMessage {
     throw new ProtocolError("a text message that is not JSON");
   }
   if (!isObject(parsed)) throw new ProtocolError("a text message that is not a JSON object");
-  for (const kind of ["hello", "status", "order", "forecast", "monitor", "pipelines", "error"] as const) {
+  for (const kind of ["hello", "status", "order", "forecast", "monitor", "pipelines", "end", "error"] as const) {
     const body: unknown = parsed[kind];
     if (body === undefined) continue;
     if (!isObject(body)) throw new ProtocolError(`the message "${kind}" is not an object`);

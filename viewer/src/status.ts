@@ -2,10 +2,10 @@
 import type { ConnectionState } from "./connection";
 import { part, write } from "./dom";
 import { digits, seconds } from "./number";
-import type { Hello, Status } from "./protocol";
+import type { Hello, RunEnd, Status } from "./protocol";
 
 const CONNECTIONS: Record<ConnectionState, string> = {
-  connecting: "connecting", connected: "connected", reconnecting: "reconnecting", refused: "wrong token",
+  connecting: "connecting", connected: "connected", reconnecting: "reconnecting", refused: "wrong token", ended: "ended",
 };
 /** Without a word from the simulation for this long, or for ten of its steps, the bar says so. */
 const SILENCE = 4000;
@@ -15,6 +15,7 @@ export class StatusBar {
   private still = false;
   private patience = SILENCE;
   private state: ConnectionState = "connecting";
+  private last = "The run has ended.";
 
   constructor() {
     setInterval(() => this.silence(), 1000);
@@ -31,7 +32,7 @@ export class StatusBar {
     banner.hidden = state === "connected" || state === "connecting";
     write(part("banner-text"), state === "refused"
       ? `${explanation} Open the link that the simulation printed when it started.`
-      : `${explanation} Trying again; the run itself goes on.`);
+      : state === "ended" ? this.last : `${explanation} Trying again.`);
     banner.dataset.state = state;
     this.silence();
   }
@@ -61,6 +62,16 @@ export class StatusBar {
     run.dataset.state = status.stopped ? "stopped" : status.paused ? "paused" : "running";
     write(run, status.stopped ? "stopped" : status.paused ? "paused" : "running");
     this.silence();
+  }
+
+  /** The run has said that it ends. */
+  end({ how, cycle }: RunEnd): void {
+    const ways = { finished: "it was finished", stopped: "it was stopped", failed: "its program ended without finishing it" };
+    this.last = `The run ended at cycle ${cycle}: ${ways[how]}. The picture stays as it was.`;
+    this.still = true;
+    const run = part("run");
+    run.dataset.state = "stopped";
+    write(run, how);
   }
 
   /** Something arrived, whatever it was. */

@@ -118,6 +118,8 @@ struct Outbox {
     acknowledged: Option<u64>,
     sent: u64,
     overflowed: bool,
+    /// Nothing comes any more.
+    has_ended: bool,
 }
 
 impl Outbox {
@@ -170,6 +172,28 @@ impl Outbox {
     }
 }
 
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum End {
+    /// The solver came to its end.
+    Finished,
+    /// The solver was asked to stop.
+    Stopped,
+    /// The solver went without a word.
+    #[default]
+    Failed,
+}
+
+impl End {
+    fn name(self) -> &'static str {
+        match self {
+            End::Finished => "finished",
+            End::Stopped => "stopped",
+            End::Failed => "failed",
+        }
+    }
+}
+
 /// One viewer.
 pub(super) struct Client {
     pub(super) id: u64,
@@ -184,6 +208,8 @@ pub(super) enum Message {
     Frame(usize, Arc<Frame>),
     /// The viewer is ready for a view of which it missed frames.
     Behind(usize),
+    /// The run has ended.
+    End,
 }
 
 impl Client {
@@ -206,7 +232,8 @@ impl Client {
         if let Some(text) = outbox.monitors.pop_front() {
             return Ok(Some(Message::Text(text)));
         }
-        Ok(outbox.frame())
+        let ended = outbox.has_ended.then_some(Message::End);
+        Ok(outbox.frame().or(ended))
     }
 
     /// Takes note that the viewer has decoded so many frames in all; from then on it is sent new
@@ -290,6 +317,7 @@ struct HubState {
     costs: Vec<(String, Cost)>,
     last_status: Option<(u64, Instant)>,
     status_dirty: bool,
+    end: End,
     closed: bool,
 }
 
@@ -344,9 +372,9 @@ impl Hub {
         self.arrivals.load(Ordering::Relaxed)
     }
 
-    /// Returns once a viewer is connected.
-    pub(crate) fn wait_for_viewer(&self) {
-        while lock(&self.state).clients.is_empty() {
+    /// Returns once a viewer is connected, or the solver is called for something else.
+    pub(crate) fn wait_for_viewer(&self, is_called: impl Fn() -> bool) {
+        while lock(&self.state).clients.is_empty() && !is_called() {
             std::thread::sleep(LOOK_AGAIN);
         }
     }
@@ -418,6 +446,11 @@ impl Hub {
             bytes: get(&self.counters.bytes),
             raw_bytes: get(&self.counters.raw_bytes),
         }
+    }
+
+    /// Has viewers told, once the run ends, how it did; without a word it has failed.
+    pub(crate) fn ends(&self, how: End) {
+        lock(&self.state).end = how;
     }
 
     /// Ends the encoder's thread.
@@ -520,6 +553,23 @@ impl Hub {
         drop(state);
         self.work.notify_one();
         Some(client)
+    }
+
+    /// Tells viewers the last status, and that and how the run has ended; what they have not read of
+    /// it comes before.
+    pub(super) fn tell_end(&self) {
+        self.status();
+        let (cycle, time) = self.clock.get();
+        let how = lock(&self.state).end.name();
+        self.tell(&json!({"end": {"how": how, "cycle": cycle, "time": time}}));
+        for client in lock(&self.state).clients.values() {
+            client.put(|outbox| outbox.has_ended = true);
+        }
+    }
+
+    /// Whether anybody is connected.
+    pub(super) fn has_viewers(&self) -> bool {
+        !lock(&self.state).clients.is_empty()
     }
 
     /// Has the encoder make a key frame of a view, of its newest extract.

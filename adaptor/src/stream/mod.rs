@@ -46,7 +46,7 @@ use tombolo_pipelines::{
     limits::DOCUMENT,
 };
 
-pub(crate) use hub::{Clock, Hub};
+pub(crate) use hub::{Clock, End, Hub};
 pub(crate) use surface::ReferenceSurface;
 pub use token::Token;
 
@@ -126,6 +126,9 @@ pub enum StreamError {
     Thread(std::io::Error),
 }
 
+/// How long the end of a run waits for viewers to read that it ended.
+const END_TIME: Duration = Duration::from_secs(1);
+
 /// A running server. Dropping it ends its threads.
 pub(crate) struct Server {
     address: SocketAddr,
@@ -159,6 +162,12 @@ impl Server {
         let listen_error = |source| StreamError::Listen { address: wanted, source };
         let address = socket.local_addr().map_err(listen_error)?;
         socket.set_nonblocking(true).map_err(listen_error)?;
+        if !address.ip().is_loopback() {
+            log::warn!(
+                "viewers reach {address} from other machines, and what they send and see can be \
+                 read on the way; an SSH tunnel to a server on 127.0.0.1 keeps it private"
+            );
+        }
         let token = match &settings.token {
             Some(given) => Token::given(given),
             None => Token::random().map_err(StreamError::Token)?,
@@ -189,9 +198,24 @@ impl Server {
         self.address
     }
 
-    pub(crate) fn token(&self) -> &Token {
-        &self.token
+    /// The link that a viewer opens.
+    pub(crate) fn link(&self) -> String {
+        let port = self.address.port();
+        let host = match self.address.ip() {
+            ip if ip.is_unspecified() => machine(),
+            _ => None,
+        };
+        let authority = host.map_or(self.address.to_string(), |name| format!("{name}:{port}"));
+        format!("http://{authority}/?token={}", self.token.as_str())
     }
+}
+
+/// The machine's name in its network, as far as the system tells it.
+fn machine() -> Option<String> {
+    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok()?;
+    let name = name.trim();
+    let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '.';
+    (!name.is_empty() && name.chars().all(is_name)).then(|| name.to_owned())
 }
 
 impl Drop for Server {
@@ -226,11 +250,19 @@ async fn serve(socket: TcpListener, shared: Shared, stopped: oneshot::Receiver<(
             hub.status();
         }
     };
-    // Ending this future drops the runtime, and with it every connection: the viewers see it close.
+    let ended = async {
+        let _ = stopped.await;
+        hub.tell_end();
+        let until = tokio::time::Instant::now() + END_TIME;
+        while hub.has_viewers() && tokio::time::Instant::now() < until {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    };
+    // Ending this future drops the runtime, and with it every connection.
     tokio::select! {
         _ = axum::serve(Listener::new(socket), router) => {}
         () = statuses => {}
-        _ = stopped => {}
+        () = ended => {}
     }
 }
 
@@ -251,7 +283,7 @@ const HEADERS: [(HeaderName, &str); 6] = [
 /// Refuses requests under a foreign name or from a foreign page, and puts the headers on every
 /// answer.
 async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Response {
-    let mut response = match refuse(request.headers(), shared.loopback) {
+    let mut response = match refuse(request.uri(), request.headers(), shared.loopback) {
         Some(reason) => (StatusCode::FORBIDDEN, reason).into_response(),
         None => next.run(request).await,
     };
@@ -261,9 +293,14 @@ async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Re
     response
 }
 
-fn refuse(headers: &HeaderMap, loopback: bool) -> Option<&'static str> {
+fn refuse(uri: &Uri, headers: &HeaderMap, loopback: bool) -> Option<&'static str> {
     let text = |name: HeaderName| headers.get(name).map(|value| value.to_str().unwrap_or(""));
     let host = text(header::HOST).unwrap_or("");
+    if headers.get_all(header::HOST).iter().count() > 1
+        || uri.authority().is_some_and(|authority| authority.as_str() != host)
+    {
+        return Some("this request names more than one host\n");
+    }
     // Any port will do: a tunnel may end on another one.
     let name = host
         .rsplit_once(':')
@@ -401,7 +438,11 @@ mod tests {
             ("[::1]:7070", Some("http://[::1]:7070")),
             ("localhost", Some("https://localhost")),
         ] {
-            assert_eq!(refuse(&headers(host, origin), true), None, "{host} {origin:?}");
+            assert_eq!(
+                refuse(&Uri::from_static("/"), &headers(host, origin), true),
+                None,
+                "{host} {origin:?}"
+            );
         }
         for (host, origin) in [
             ("rebound.example:7070", None),
@@ -411,8 +452,14 @@ mod tests {
             ("127.0.0.1.evil.example:7070", None),
             ("", None),
         ] {
-            assert!(refuse(&headers(host, origin), true).is_some(), "{host} {origin:?}");
+            assert!(
+                refuse(&Uri::from_static("/"), &headers(host, origin), true).is_some(),
+                "{host} {origin:?}"
+            );
         }
-        assert_eq!(refuse(&headers("cluster.example:7070", None), false), None);
+        assert_eq!(
+            refuse(&Uri::from_static("/"), &headers("cluster.example:7070", None), false),
+            None
+        );
     }
 }

@@ -78,6 +78,13 @@ async fn write(
                 }
                 written
             }
+            Ok(Some(Message::End)) => {
+                let reason = "the run has ended";
+                let _ = sink
+                    .send(Wire::Close(Some(CloseFrame { code: 1000, reason: reason.into() })))
+                    .await;
+                return;
+            }
             Ok(Some(Message::Behind(view))) => {
                 hub.want_key(view);
                 Ok(())

@@ -237,6 +237,17 @@ impl Viewer {
         self.wait_for("hello", |_| true)
     }
 
+    /// The code with which the other side has closed the connection; reads until then.
+    pub fn closed(&mut self) -> Option<u16> {
+        loop {
+            match self.read(PATIENCE)? {
+                Message::Close(frame) => return frame.map(|frame| frame.code.into()),
+                Message::Text(text) => self.seen.push(serde_json::from_str(&text).expect("JSON")),
+                _ => {}
+            }
+        }
+    }
+
     /// Reads until the other side has closed the connection.
     pub fn wait_for_end(&mut self) {
         let until = Instant::now() + PATIENCE;

@@ -7,6 +7,9 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Parser;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+use tombolo::Stopper;
 use tombolo::communicator::{Communicator, Solo};
 use tombolo::deform::linear::{BuiltIn, Solvers};
 use tombolo_flow::parts::{Dealing, Ranks};
@@ -74,6 +77,22 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Has the run stop, and say what it came to, when the process is asked to end. Who asks twice is
+/// obeyed at once.
+fn stop_on_signals(stopper: Stopper) -> std::io::Result<()> {
+    let mut signals = Signals::new([SIGINT, SIGTERM])?;
+    std::thread::Builder::new().name("signals".into()).spawn(move || {
+        let mut has_asked = false;
+        for signal in signals.forever() {
+            if std::mem::replace(&mut has_asked, true) {
+                let _ = signal_hook::low_level::emulate_default_handler(signal);
+            }
+            stopper.stop();
+        }
+    })?;
+    Ok(())
 }
 
 /// Whether this process was started by mpirun, together with others or alone.
@@ -153,7 +172,13 @@ fn run(
             without_numbers: arguments.without_numbers,
         },
     };
+    if let Some(file) = arguments.report.as_ref().filter(|_| is_first) {
+        // Before the run: what it comes to is not to be lost for a misspelt folder.
+        let opened = std::fs::OpenOptions::new().create(true).append(true).open(file);
+        opened.map_err(|error| format!("{}: {error}", file.display()))?;
+    }
     let run = Run::solved_by(ranks, solvers, &options)?;
+    stop_on_signals(run.stopper())?;
     if let Some(link) = run.link() {
         let mut output = std::io::stdout();
         writeln!(output, "Open {link}")?;

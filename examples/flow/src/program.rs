@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use tombolo::communicator::{Communicator, RankError, Solo};
 use tombolo::{
-    Adaptor, ExecuteError, FinalizeError, InitializeError, JournalError, Settings, Step,
+    Adaptor, ExecuteError, FinalizeError, InitializeError, JournalError, Settings, Step, Stopper,
 };
 use tombolo_deform::distributed::DistributedError;
 use tombolo_deform::features::FeatureSettings;
@@ -224,15 +224,22 @@ impl Run {
         self.adaptor.link()
     }
 
+    /// Something that asks the run to stop, from another thread.
+    #[must_use]
+    pub fn stopper(&self) -> Stopper {
+        self.adaptor.stopper()
+    }
+
     /// Steps until the end, writes the final state where it is wanted, and says what happened.
     ///
-    /// A flow that diverges ends the run early; the report then says so in `error`.
+    /// A flow that diverges ends the run early; the report then says so in `error`, and where the
+    /// final state cannot be written.
     ///
     /// # Errors
-    /// [`ProgramError`] where a file cannot be written.
+    /// [`ProgramError`] where the adaptor cannot go on.
     pub fn finish(mut self) -> Result<Report, ProgramError> {
         let begun = Instant::now();
-        let error = match self.advance(begun) {
+        let mut error = match self.advance(begun) {
             Ok(()) => None,
             Err(error @ ProgramError::Solver(_)) => Some(error.to_string()),
             Err(error) => return Err(error),
@@ -241,7 +248,8 @@ impl Run {
         self.flow.measure(&self.solver, self.case.time_step);
         if let Some(folder) = &self.out {
             let written = self.write(&folder.join("final.vtu"));
-            agreed(&*self.communicator, written)?;
+            let fault = agreed(&*self.communicator, written).err();
+            error = error.or(fault.map(|fault| fault.to_string()));
         }
         let adaptor = match self.adaptor.finalize() {
             Ok(report) => report,

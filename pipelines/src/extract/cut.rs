@@ -54,7 +54,7 @@ pub(super) fn cut(
             values: &values,
             sides: &sides,
             coordinates: points,
-            numbers: HashMap::default(),
+            known: KnownEdges::new(values.len(), cut.points.len()),
             segments: Vec::new(),
             polygon: Vec::new(),
             directions: Vec::new(),
@@ -128,12 +128,61 @@ impl Hasher for EdgeHasher {
 /// What is known by the numbers of vertices.
 pub(super) type ByVertices<K> = HashMap<K, u32, BuildHasherDefault<EdgeHasher>>;
 
+/// The points of a layer by the edges that they lie on: for each vertex a chain of the points on
+/// edges that begin there.
+struct KnownEdges {
+    /// The number of the layer's first point.
+    first: u32,
+    /// The newest point of each chain.
+    heads: Vec<u32>,
+    /// For each point the end of its edge, and the point before it in the chain.
+    links: Vec<(u32, u32)>,
+}
+
+/// There is no further point in a chain.
+const NONE: u32 = u32::MAX;
+
+impl KnownEdges {
+    fn new(vertices: usize, first: usize) -> Self {
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "a point for each edge of a mesh numbered with 32 bits"
+        )]
+        let first = first as u32;
+        Self { first, heads: vec![NONE; vertices], links: Vec::new() }
+    }
+
+    fn find(&self, [start, end]: [u32; 2]) -> Option<u32> {
+        let mut point = self.heads[start as usize];
+        while point != NONE {
+            let (other, before) = self.links[(point - self.first) as usize];
+            if other == end {
+                return Some(point);
+            }
+            point = before;
+        }
+        None
+    }
+
+    /// Adds the next point; returns its number.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "a point for each edge of a mesh numbered with 32 bits"
+    )]
+    fn add(&mut self, [start, end]: [u32; 2]) -> u32 {
+        let point = self.first + self.links.len() as u32;
+        let before = std::mem::replace(&mut self.heads[start as usize], point);
+        self.links.push((end, before));
+        point
+    }
+}
+
 struct Cutter<'a> {
     layer: u32,
     values: &'a [f64],
     sides: &'a [u8],
     coordinates: &'a [Vector],
-    numbers: ByVertices<u64>,
+    known: KnownEdges,
     /// The cell's segments: from the edge where the face's boundary leaves the side ahead to that
     /// where it enters it.
     segments: Vec<(u32, u32)>,
@@ -247,25 +296,18 @@ impl Cutter<'_> {
             (_, true) => [b, b],
             _ => [a, b],
         };
-        let next = self.cut.points.len();
-        let key = u64::from(edge[0]) << 32 | u64::from(edge[1]);
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "a crossing for each edge of a mesh numbered with 32 bits"
-        )]
-        *self.numbers.entry(key).or_insert_with(|| {
-            let crossing = Crossing {
-                edge,
-                fraction: if edge[0] == edge[1] { 0.0 } else { at_a / (at_a - at_b) },
-            };
-            let [from, to] = edge.map(|vertex| self.coordinates[vertex as usize]);
-            self.cut
-                .points
-                .push(std::array::from_fn(|axis| crossing.between(from[axis], to[axis])));
-            self.cut.crossings.push(crossing);
-            self.cut.layers.push(self.layer);
-            next as u32
-        })
+        if let Some(point) = self.known.find(edge) {
+            return point;
+        }
+        let crossing = Crossing {
+            edge,
+            fraction: if edge[0] == edge[1] { 0.0 } else { at_a / (at_a - at_b) },
+        };
+        let [from, to] = edge.map(|vertex| self.coordinates[vertex as usize]);
+        self.cut.points.push(std::array::from_fn(|axis| crossing.between(from[axis], to[axis])));
+        self.cut.crossings.push(crossing);
+        self.cut.layers.push(self.layer);
+        self.known.add(edge)
     }
 
     /// Chains the segments of a volume cell to polygons that turn counter-clockwise seen from

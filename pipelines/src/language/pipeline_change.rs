@@ -313,7 +313,7 @@ mod tests {
             ),
             (
                 r#"{"set": [{"name": "a", "stages": [{"set": {"name": "valbe", "value": 1}}]}]}"#,
-                "set[0].set: the solver has no parameter `valbe`; it has valve",
+                "set[0].stages[0].set.name: the solver has no parameter `valbe`; it has valve",
             ),
             (
                 r#"{"remove": ["inlte"]}"#,

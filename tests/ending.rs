@@ -1,0 +1,94 @@
+//! How a run ends when it is asked to, and when what it leaves behind cannot be written.
+
+use std::fs;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use tombolo_tests::{PATIENCE, Run, Small, Viewer};
+
+/// A run that goes on until it is stopped; `change` adds to its configuration.
+fn endless(change: impl FnOnce(&mut Value)) -> Small {
+    let small = Small::new();
+    let mut pipelines = json!({
+        "version": 1, "stream": {"listen": "127.0.0.1:0"}, "journal": "journal.jsonl",
+        "pipelines": [{"name": "surface", "every": {"steps": 1}, "stages": [{"surface": {}}, {"stream": {}}]}]
+    });
+    change(&mut pipelines);
+    small.write("pipelines.json", &pipelines);
+    small
+}
+
+/// What a run leaves behind that was asked to end: its report, its journal, and its last state.
+fn ends(small: &Small, signal: &str, prepare: impl FnOnce(&mut Run) -> Option<Viewer>) -> Value {
+    let mut run = Run::flow(&small.arguments(&["--pipelines", "@pipelines.json"]));
+    let viewer = prepare(&mut run);
+    let begun = Instant::now();
+    run.signal(signal);
+    let (status, text) = run.finish(PATIENCE);
+    assert!(status.success(), "{text}");
+    assert!(begun.elapsed() < Duration::from_secs(20), "it took {:?}", begun.elapsed());
+    drop(viewer);
+    assert!(small.bytes("out/final.vtu").len() > 1000);
+    let journal = String::from_utf8(small.bytes("out/journal.jsonl")).expect("UTF-8");
+    assert!(journal.lines().any(|line| line.contains("\"stop\"")), "{journal}");
+    serde_json::from_slice(&small.bytes("report.json")).expect("a report")
+}
+
+#[test]
+fn a_signal_ends_a_run_with_all_that_it_leaves_behind() {
+    let small = endless(|_| ());
+    let report = ends(&small, "TERM", |run| {
+        let mut viewer = Viewer::connect(&run.link()).expect("the run lets in");
+        viewer.wait_for("status", |status| status["cycle"].as_u64().is_some_and(|cycle| cycle > 3));
+        Some(viewer)
+    });
+    assert!(report["cycles"].as_u64().is_some_and(|cycles| cycles > 3), "{report}");
+}
+
+#[test]
+fn a_signal_ends_a_run_that_is_paused() {
+    let small = endless(|pipelines| {
+        let hold = json!({"name": "hold", "at": {"cycle": 2}, "stages": [{"pause": {}}]});
+        pipelines["pipelines"].as_array_mut().expect("a list").push(hold);
+    });
+    let report = ends(&small, "INT", |run| {
+        let mut viewer = Viewer::connect(&run.link()).expect("the run lets in");
+        viewer.wait_for("status", |status| status["paused"] == true);
+        Some(viewer)
+    });
+    assert_eq!(report["cycles"], 2);
+}
+
+#[test]
+fn a_signal_ends_a_run_that_waits_for_a_viewer() {
+    let small = endless(|pipelines| pipelines["steering"] = json!({"wait_for_viewer": true}));
+    let report = ends(&small, "TERM", |run| {
+        run.link();
+        std::thread::sleep(Duration::from_secs(1));
+        None
+    });
+    assert_eq!(report["cycles"], 0);
+}
+
+#[test]
+fn a_report_that_cannot_be_written_is_told_before_the_run() {
+    let small = Small::new();
+    let mut arguments = small.arguments(&["--headless", "--steps", "100000"]);
+    let report = arguments.iter().position(|argument| argument == "--report").expect("a report");
+    arguments[report + 1] = small.path("no/such/folder/report.json").display().to_string();
+    let (status, text) = Run::flow(&arguments).finish(PATIENCE);
+    assert!(!status.success());
+    assert!(text.contains("no/such/folder/report.json"), "{text}");
+}
+
+#[test]
+fn a_last_state_that_cannot_be_written_costs_no_report() {
+    let small = Small::new();
+    fs::create_dir_all(small.path("out/final.vtu")).expect("a folder in its place");
+    let (status, text) =
+        Run::flow(&small.arguments(&["--headless", "--steps", "3"])).finish(PATIENCE);
+    assert!(!status.success(), "{text}");
+    let report: Value = serde_json::from_slice(&small.bytes("report.json")).expect("a report");
+    assert_eq!(report["cycles"], 3);
+    assert!(report["error"].as_str().is_some_and(|error| error.contains("final.vtu")), "{report}");
+}
