@@ -132,7 +132,7 @@ fn a_viewer_sees_the_run_and_changes_its_shape() {
     solver.step();
     let mut viewer = Viewer::connect(&solver.adaptor);
     let hello = viewer.hello();
-    assert_eq!((&hello["protocol"], &hello["role"]), (&json!(1), &json!("driver")));
+    assert_eq!((&hello["protocol"], &hello["role"]), (&json!(2), &json!("driver")));
     assert_eq!(hello["views"], json!([{"name": "boundary", "kind": "surface"}]));
     assert_eq!(
         hello["fields"],

@@ -17,7 +17,7 @@ impl Adaptor {
         let list = |value: &Value| if value.is_null() { json!([]) } else { value.clone() };
         let Defaults { deform, guard, schedule } = &self.defaults;
         let description = json!({
-            "protocol": 1,
+            "protocol": 2,
             "views": self.pipelines.views(),
             "monitors": self.pipelines.monitors(),
             "pipelines": {"changes": self.changed},
