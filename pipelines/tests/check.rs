@@ -194,7 +194,7 @@ orders.json:1:90: order.gard.otherwise: found the unknown name `pray`, expected 
 orders.json:2:20: status: found the unknown name `acepted`, expected `accepted`, `applied`, `rejected`, `not_followed` or `not_confirmed`; did you mean `accepted`?
 orders.json:2:38: cycle: found "4", expected a whole number from 0 to 18446744073709551615
 orders.json:4:13: found the end of the text, expected ',' or '}'
-orders.json:5:11: stauts: found the unknown key `stauts`, expected `id`, `status`, `cycle`, `time`, `reason`, `min_scaled_jacobian`, `fraction`, `order`, `pause`, `resume`, `stop` or `parameter`; did you mean `status`?
+orders.json:5:11: stauts: found the unknown key `stauts`, expected `id`, `status`, `cycle`, `time`, `reason`, `min_scaled_jacobian`, `fraction`, `order`, `pause`, `resume`, `stop`, `parameter` or `pipelines`; did you mean `status`?
 "#,
     );
     // What is written over several lines is one text.

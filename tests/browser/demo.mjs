@@ -91,10 +91,10 @@ page.on("console", (message) => {
   if (pathname === "/favicon.ico" || pathname === "/ws") return;
   if (message.type() === "error" && !/WebSocket|ERR_|status of 401/.test(message.text())) complaints.push(`the page complained: ${message.text()}`);
 });
-/** What the page has sent, and how often it has asked for the reference surface. */
+/** What the page has sent beside forecasts and how far its decoder is, and how often it has asked for the reference surface. */
 const traffic = { messages: 0, surfaces: 0, requests: 0 };
 // Forecasts are questions: they change nothing.
-page.on("websocket", (socket) => socket.on("framesent", ({ payload }) => { traffic.messages += String(payload).includes('"forecast"') ? 0 : 1; }));
+page.on("websocket", (socket) => socket.on("framesent", ({ payload }) => { traffic.messages += typeof payload !== "string" || payload.includes('"forecast"') ? 0 : 1; }));
 page.on("request", (request) => {
   traffic.requests++;
   if (new URL(request.url()).pathname === "/surface") traffic.surfaces++;
