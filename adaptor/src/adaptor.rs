@@ -6,10 +6,13 @@ mod contract;
 mod description;
 mod setup;
 mod steered;
+mod stopper;
 mod tagged;
 #[cfg(test)]
 mod tests;
 mod timing;
+
+pub use stopper::Stopper;
 
 use std::{
     net::SocketAddr,
@@ -254,11 +257,6 @@ impl Adaptor {
         })
     }
 
-    /// What other threads may keep of the run.
-    pub(crate) fn shared(&self) -> (Arc<Queue>, Arc<Log>, Arc<Clock>) {
-        (Arc::clone(&self.queue), Arc::clone(&self.log), Arc::clone(&self.clock))
-    }
-
     /// Whether `execute` will look at the mesh and the fields of this step.
     ///
     /// A solver that would have to copy them first can ask before it does. Where the answer is no,
@@ -420,7 +418,7 @@ impl Adaptor {
             self.timing.reference.add(begun.elapsed());
             if let Some(hub) = self.hub.as_ref().filter(|_| self.config.steering.wait_for_viewer) {
                 let begun = Instant::now();
-                hub.wait_for_viewer(|| self.queue.has_called());
+                hub.wait_for_viewer(|| self.queue.has_stop());
                 self.timing.paused.add(begun.elapsed());
             }
         }

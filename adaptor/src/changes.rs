@@ -66,7 +66,7 @@ impl Changes {
     /// The configuration after a change of `before`.
     ///
     /// # Errors
-    /// What does not go together, with the way to it from the change.
+    /// The first problem of the pipelines as they would be, with the way to it from the change.
     pub(crate) fn after(
         &self,
         change: &PipelineChange,
@@ -79,7 +79,7 @@ impl Changes {
     /// Finds out whether a change goes with the pipelines as they will be then.
     ///
     /// # Errors
-    /// What does not go together, with the way to it from the change.
+    /// The first problem of the pipelines as they would be, with the way to it from the change.
     pub(crate) fn check(&self, change: &PipelineChange) -> Result<(), Problem> {
         let waiting = lock(&self.state).under_way.len();
         CHANGES.check(waiting + 1).map_err(come_back)?;

@@ -60,13 +60,12 @@ mod settings;
 mod stages;
 pub mod steering;
 mod step;
-mod stopper;
 pub mod stream;
 mod table;
 mod watch;
 mod writer;
 
-pub use adaptor::Adaptor;
+pub use adaptor::{Adaptor, Stopper};
 pub use error::{ExecuteError, FinalizeError, InitializeError};
 pub use journal::JournalError;
 pub use report::{MonitorReport, PipelineReport, Report, Spread};
@@ -76,7 +75,6 @@ pub use steering::{
     Steering, SurfaceMotion,
 };
 pub use step::Step;
-pub use stopper::Stopper;
 pub use tombolo_deform as deform;
 pub use tombolo_deform::communicator;
 pub use tombolo_deform::mesh::{ArrayView, MeshView};

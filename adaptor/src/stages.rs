@@ -48,7 +48,7 @@ struct LiveView {
     name: String,
     /// Its number among all that there have been.
     number: usize,
-    /// What its last frame taught the encoder of its topology.
+    /// The encoder of the view's frames.
     encoder: Arc<Mutex<Encoder>>,
 }
 

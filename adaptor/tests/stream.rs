@@ -461,6 +461,10 @@ fn a_solver_may_wait_for_its_first_viewer() {
     let waiting = LINK_TO_ALL
         .replace(r#""pipelines""#, r#""steering": {"wait_for_viewer": true}, "pipelines""#);
     let mut solver = Solver::with_config(&waiting);
+    // Something to do that is no stop does not end the waiting.
+    let health = r#"{"set": [{"name": "health", "stages": [{"quality": {}}]}]}"#;
+    let change = language::parse_json(health, "change").expect("a change");
+    solver.adaptor.change_pipelines(change).expect("it goes with the others");
     let address = socket_url(&solver.adaptor);
     let late = std::thread::spawn(move || {
         std::thread::sleep(Duration::from_millis(300));

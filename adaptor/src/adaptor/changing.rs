@@ -29,7 +29,7 @@ impl Adaptor {
     /// The change is checked against all pipelines at once, and against the mesh and its fields in
     /// the next call of [`execute`](Adaptor::execute), which makes it, or tells the log and the
     /// viewers why it is not made; the journal has both. A pipeline that stays the same goes on,
-    /// one that is replaced starts anew.
+    /// one that is replaced starts anew. It is called on all ranks alike; the change of rank 0 counts.
     ///
     /// ```
     /// use tombolo::{Adaptor, Channel, FieldView, MeshView, Step};
@@ -49,8 +49,8 @@ impl Adaptor {
     /// ```
     ///
     /// # Errors
-    /// What does not go together, with the way to it; nothing has changed then. To be called on all
-    /// ranks alike: the change of rank 0 counts.
+    /// A [`Problem`] with the way to it from the change, where the pipelines would not go together;
+    /// nothing has changed then.
     pub fn change_pipelines(&mut self, change: PipelineChange) -> Result<(), Problem> {
         if self.communicator.rank() > 0 {
             return self.changes.check(&change);

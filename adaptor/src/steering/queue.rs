@@ -99,6 +99,12 @@ impl Queue {
         self.attention.load(Ordering::Acquire)
     }
 
+    /// Whether the run is to stop as soon as what waits is looked at.
+    pub(crate) fn has_stop(&self) -> bool {
+        let is_stop = |received: &Received| matches!(received.command, Command::Stop {});
+        lock(&self.waiting).iter().any(is_stop)
+    }
+
     /// All that waits.
     pub(crate) fn take(&self) -> VecDeque<Received> {
         let mut waiting = lock(&self.waiting);

@@ -372,9 +372,9 @@ impl Hub {
         self.arrivals.load(Ordering::Relaxed)
     }
 
-    /// Returns once a viewer is connected, or the solver is called for something else.
-    pub(crate) fn wait_for_viewer(&self, is_called: impl Fn() -> bool) {
-        while lock(&self.state).clients.is_empty() && !is_called() {
+    /// Returns once a viewer is connected, or the run is to stop.
+    pub(crate) fn wait_for_viewer(&self, is_to_stop: impl Fn() -> bool) {
+        while lock(&self.state).clients.is_empty() && !is_to_stop() {
             std::thread::sleep(LOOK_AGAIN);
         }
     }

@@ -62,7 +62,7 @@ enum MeshTask {
 enum Failure {
     /// Something is wrong with what was given: exit code 1.
     Wrong(String),
-    /// The same, and it was told: exit code 1.
+    /// Something is wrong with what was given, and was said already: exit code 1.
     Told,
     /// The shape that was asked for is refused: exit code 2.
     Refused(String),

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use tombolo_pipelines::language::Command;
 
+use super::Adaptor;
 use crate::{
-    adaptor::Adaptor,
     steering::{Log, Queue, Received, Source},
     step::Moment,
     stream::Clock,
@@ -59,7 +59,10 @@ impl Adaptor {
     /// ```
     #[must_use]
     pub fn stopper(&self) -> Stopper {
-        let (queue, log, clock) = self.shared();
-        Stopper { queue, log, clock }
+        Stopper {
+            queue: Arc::clone(&self.queue),
+            log: Arc::clone(&self.log),
+            clock: Arc::clone(&self.clock),
+        }
     }
 }
