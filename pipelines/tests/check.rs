@@ -1,8 +1,11 @@
 //! Every error of a text at once: which are told, in which words, and which are not.
 
+mod common;
+
 use std::fs;
 use std::path::Path;
 
+use common::{assert_told, mutated};
 use proptest::prelude::*;
 use tombolo_deform::edit::Edit;
 use tombolo_pipelines::language::{
@@ -25,14 +28,6 @@ fn told_of_orders(text: &str) -> String {
         Ok(_) => "nothing".into(),
         Err(errors) => errors.to_string(),
     }
-}
-
-/// Compares with what is expected, whose lines may be indented.
-#[track_caller]
-fn assert_told(found: &str, expected: &str) {
-    let expected: Vec<&str> =
-        expected.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
-    assert_eq!(found.lines().collect::<Vec<_>>(), expected, "\n{found}");
 }
 
 #[test]
@@ -465,19 +460,7 @@ proptest! {
 
     /// Bytes overwritten, removed or doubled: never a panic, and always a place in the text.
     #[test]
-    fn no_mutation_makes_the_check_panic(
-        changes in proptest::collection::vec((any::<prop::sample::Index>(), 0..3u8, r#"[\[\]{}:,"0-9a-e\\. é-]"#), 1..6)
-    ) {
-        let mut characters: Vec<char> = DESIGN.chars().collect();
-        for (place, action, replacement) in changes {
-            let place = place.index(characters.len());
-            match action {
-                0 => characters[place] = replacement.chars().next().unwrap_or(' '),
-                1 => { characters.remove(place); }
-                _ => characters.insert(place, characters[place]),
-            }
-        }
-        let text: String = characters.into_iter().collect();
+    fn no_mutation_makes_the_check_panic(text in mutated(DESIGN)) {
         let plain = parse_valid::<Config>(&text, "fuzz");
         prop_assert_eq!(plain.is_ok(), check(&text, "fuzz").is_ok());
         if let (Err(errors), Err(first)) = (check(&text, "fuzz"), plain) {

@@ -1,5 +1,8 @@
 //! The JSON language as its users meet it: what is read, and where errors point.
 
+mod common;
+
+use common::mutated;
 use proptest::prelude::*;
 use tombolo_pipelines::language::{
     At, Change, Command, Config, Due, Order, Slice, Stage, config_schema, order_schema, parse,
@@ -298,19 +301,7 @@ proptest! {
     /// A valid text with some bytes overwritten, removed or doubled is read or refused at a place
     /// that it has.
     #[test]
-    fn no_mutation_makes_the_parser_panic(
-        changes in proptest::collection::vec((any::<prop::sample::Index>(), 0..3u8, r#"[\[\]{}:,"0-9a-e\\. é-]"#), 1..6)
-    ) {
-        let mut characters: Vec<char> = DESIGN.chars().collect();
-        for (place, action, replacement) in changes {
-            let place = place.index(characters.len());
-            match action {
-                0 => characters[place] = replacement.chars().next().unwrap_or(' '),
-                1 => { characters.remove(place); }
-                _ => characters.insert(place, characters[place]),
-            }
-        }
-        let text: String = characters.into_iter().collect();
+    fn no_mutation_makes_the_parser_panic(text in mutated(DESIGN)) {
         if let Err(error) = parse(&text, "fuzz") {
             prop_assert!(error.line <= text.lines().count() + 1);
             let line = text.split('\n').nth(error.line - 1).unwrap_or_default();

@@ -6,7 +6,7 @@
 //! texts.
 
 use std::{
-    collections::{BTreeMap, VecDeque},
+    collections::BTreeMap,
     sync::{
         Arc, Condvar, Mutex,
         atomic::{AtomicU64, Ordering},
@@ -14,163 +14,23 @@ use std::{
     time::{Duration, Instant},
 };
 
-use axum::body::Bytes;
 use serde_json::{Map, Value, json};
-use tokio::sync::Notify;
 use tombolo_pipelines::{encode::Encoded, language::Pipeline, run::Cost};
 
-use super::{ReferenceSurface, StreamCounts};
+use super::{
+    ReferenceSurface, StreamCounts,
+    outbox::{Client, Frame},
+};
 use crate::lock::{lock, wait};
 
 /// How long the wheel is kept for a driver whose connection was lost.
 pub(super) const WHEEL_KEPT: Duration = Duration::from_secs(3);
-/// Texts that may wait for a viewer; one that leaves more unread is let go.
-const TEXTS: usize = 1024;
 /// How often it is looked for a viewer that is waited for.
 const LOOK_AGAIN: Duration = Duration::from_millis(20);
-/// Frames of a view that may wait for a viewer, and that may be on their way to it.
-const FRAMES: usize = 2;
-/// Frames that are remembered of a viewer that has not acknowledged any.
-const UNACKNOWLEDGED: usize = 64;
-/// Monitor values that may wait for a viewer; older ones make way.
-const MONITORS: usize = 256;
-
-/// One encoded frame of a view, shared by all viewers.
-#[derive(Debug)]
-pub(super) struct Frame {
-    encoded: Encoded,
-    /// The frame's message.
-    pub(super) message: Bytes,
-}
-
-impl Frame {
-    fn new(mut encoded: Encoded) -> Self {
-        // Key frames are asked for with their topology too, which is put in front of them.
-        let is_key = encoded.is_key();
-        let message =
-            if is_key { encoded.message.clone() } else { std::mem::take(&mut encoded.message) };
-        Self { message: message.into(), encoded }
-    }
-
-    /// Which topology the frame belongs to.
-    pub(super) fn topology_id(&self) -> u64 {
-        self.encoded.topology_id
-    }
-
-    /// The message of a key frame with its topology.
-    pub(super) fn with_topology(&self) -> Bytes {
-        self.encoded.with_topology().into()
-    }
-}
 
 /// Encodes a frame on the encoder's thread, as a key frame or as the next of its chain; the message
 /// says why it could not be done.
 pub(crate) type Encode = Arc<dyn Fn(bool) -> Result<Encoded, String> + Send + Sync>;
-
-/// The frames of one view that a viewer has yet to read: a part of the view's chain.
-#[derive(Default)]
-struct Unread {
-    frames: VecDeque<Arc<Frame>>,
-    /// How many were sent and are not acknowledged.
-    in_flight: usize,
-    /// Frames of the chain were left out: the viewer can go on with a key frame only.
-    is_behind: bool,
-    /// The encoder was asked for a key frame.
-    has_asked: bool,
-}
-
-impl Unread {
-    /// Takes the next frame of the view; returns how many the viewer will miss for it.
-    fn put(&mut self, frame: &Arc<Frame>) -> usize {
-        let missed = if frame.encoded.is_key() {
-            let missed = self.frames.len();
-            *self = Self { in_flight: self.in_flight, ..Self::default() };
-            missed
-        } else if self.is_behind {
-            return 1;
-        } else if self.frames.len() >= FRAMES {
-            self.is_behind = true;
-            let missed = self.frames.len() + 1;
-            self.frames.clear();
-            return missed;
-        } else {
-            0
-        };
-        self.frames.push_back(Arc::clone(frame));
-        missed
-    }
-}
-
-/// The messages that a viewer has yet to read.
-#[derive(Default)]
-struct Outbox {
-    texts: VecDeque<Arc<str>>,
-    monitors: VecDeque<Arc<str>>,
-    status: Option<Arc<str>>,
-    hello: bool,
-    views: BTreeMap<usize, Unread>,
-    /// The view that was served last: they take turns.
-    last_view: usize,
-    /// The view of each frame that was sent and not acknowledged, the oldest first; from the first
-    /// acknowledgement on.
-    in_flight: VecDeque<usize>,
-    /// How many frames were acknowledged; `None` for a viewer that does not.
-    acknowledged: Option<u64>,
-    sent: u64,
-    overflowed: bool,
-    /// Nothing comes any more.
-    has_ended: bool,
-}
-
-impl Outbox {
-    /// The next frame, or a view whose next key frame is to be asked for.
-    fn frame(&mut self) -> Option<Message> {
-        let waits = |unread: &Unread| {
-            unread.in_flight < FRAMES
-                && (!unread.frames.is_empty() || unread.is_behind && !unread.has_asked)
-        };
-        let after =
-            self.views.range(self.last_view + 1..).chain(self.views.range(..=self.last_view));
-        let view = after.filter(|(_, unread)| waits(unread)).map(|(&view, _)| view).next()?;
-        let unread = self.views.get_mut(&view)?;
-        let Some(frame) = unread.frames.pop_front() else {
-            unread.has_asked = true;
-            return Some(Message::Behind(view));
-        };
-        self.last_view = view;
-        self.sent += 1;
-        self.in_flight.push_back(view);
-        if self.acknowledged.is_some() {
-            unread.in_flight += 1;
-        } else if self.in_flight.len() > UNACKNOWLEDGED {
-            self.in_flight.pop_front();
-        }
-        Some(Message::Frame(view, frame))
-    }
-
-    /// The viewer has decoded so many frames in all.
-    fn acknowledge(&mut self, count: u64) -> bool {
-        let before = self.acknowledged.unwrap_or(0);
-        if count <= before || count > self.sent {
-            return false;
-        }
-        if self.acknowledged.is_none() {
-            self.in_flight.iter().for_each(|view| {
-                if let Some(unread) = self.views.get_mut(view) {
-                    unread.in_flight += 1;
-                }
-            });
-        }
-        self.acknowledged = Some(count);
-        while self.in_flight.len() as u64 > self.sent - count {
-            let view = self.in_flight.pop_front();
-            if let Some(unread) = view.and_then(|view| self.views.get_mut(&view)) {
-                unread.in_flight = unread.in_flight.saturating_sub(1);
-            }
-        }
-        true
-    }
-}
 
 /// How a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -191,72 +51,6 @@ impl End {
             End::Stopped => "stopped",
             End::Failed => "failed",
         }
-    }
-}
-
-/// One viewer.
-pub(super) struct Client {
-    pub(super) id: u64,
-    pub(super) wake: Notify,
-    outbox: Mutex<Outbox>,
-}
-
-/// A message for a viewer.
-pub(super) enum Message {
-    Text(Arc<str>),
-    Hello,
-    Frame(usize, Arc<Frame>),
-    /// The viewer is ready for a view of which it missed frames.
-    Behind(usize),
-    /// The run has ended.
-    End,
-}
-
-impl Client {
-    /// The next thing to send, the most urgent first; `Err` once the viewer has left too much
-    /// unread.
-    pub(super) fn next(&self) -> Result<Option<Message>, ()> {
-        let mut outbox = lock(&self.outbox);
-        if outbox.overflowed {
-            return Err(());
-        }
-        if std::mem::take(&mut outbox.hello) {
-            return Ok(Some(Message::Hello));
-        }
-        if let Some(text) = outbox.texts.pop_front() {
-            return Ok(Some(Message::Text(text)));
-        }
-        if let Some(text) = outbox.status.take() {
-            return Ok(Some(Message::Text(text)));
-        }
-        if let Some(text) = outbox.monitors.pop_front() {
-            return Ok(Some(Message::Text(text)));
-        }
-        let ended = outbox.has_ended.then_some(Message::End);
-        Ok(outbox.frame().or(ended))
-    }
-
-    /// Takes note that the viewer has decoded so many frames in all; from then on it is sent new
-    /// ones only as it gets on with them. `false` where the number is more than were sent, or no more
-    /// than before.
-    pub(super) fn acknowledge(&self, frames: u64) -> bool {
-        let done = lock(&self.outbox).acknowledge(frames);
-        self.wake.notify_one();
-        done
-    }
-
-    fn put(&self, change: impl FnOnce(&mut Outbox)) {
-        change(&mut lock(&self.outbox));
-        self.wake.notify_one();
-    }
-
-    pub(super) fn text(&self, text: &Arc<str>) {
-        self.put(|outbox| {
-            outbox.overflowed |= outbox.texts.len() >= TEXTS;
-            if !outbox.overflowed {
-                outbox.texts.push_back(Arc::clone(text));
-            }
-        });
     }
 }
 
@@ -402,12 +196,7 @@ impl Hub {
         }
         let text: Arc<str> = message.to_string().into();
         for client in state.clients.values() {
-            client.put(|outbox| {
-                if outbox.monitors.len() >= MONITORS {
-                    outbox.monitors.pop_front();
-                }
-                outbox.monitors.push_back(Arc::clone(&text));
-            });
+            client.monitor(&text);
         }
     }
 
@@ -429,7 +218,7 @@ impl Hub {
         let mut state = lock(&self.state);
         state.views.remove(&view);
         for client in state.clients.values() {
-            lock(&client.outbox).views.remove(&view);
+            client.forget(view);
         }
     }
 
@@ -498,10 +287,8 @@ impl Hub {
             return;
         }
         for client in state.clients.values() {
-            client.put(|outbox| {
-                let missed = outbox.views.entry(view).or_default().put(frame);
-                self.counters.dropped.fetch_add(missed as u64, Ordering::Relaxed);
-            });
+            let missed = client.frame(view, frame) as u64;
+            self.counters.dropped.fetch_add(missed, Ordering::Relaxed);
         }
     }
 }
@@ -529,23 +316,12 @@ impl Hub {
             return None;
         }
         state.next_client += 1;
-        let client = Arc::new(Client {
-            id: state.next_client,
-            wake: Notify::new(),
-            outbox: Mutex::new(Outbox::default()),
-        });
+        let client = Arc::new(Client::new(state.next_client, state.views.keys().copied()));
         let alone = state.clients.is_empty();
         let kept_for_it =
             state.wheel_lost.is_some_and(|(_, driver)| Some(&*name(driver)) == returning);
         if state.driver.is_none() && (alone || kept_for_it || state.wheel_is_free()) {
             state.take_wheel(client.id);
-        }
-        {
-            let mut outbox = lock(&client.outbox);
-            outbox.hello = true;
-            for &number in state.views.keys() {
-                outbox.views.insert(number, Unread { is_behind: true, ..Unread::default() });
-            }
         }
         state.clients.insert(client.id, Arc::clone(&client));
         self.arrivals.fetch_add(1, Ordering::Relaxed);
@@ -563,7 +339,7 @@ impl Hub {
         let how = lock(&self.state).end.name();
         self.tell(&json!({"end": {"how": how, "cycle": cycle, "time": time}}));
         for client in lock(&self.state).clients.values() {
-            client.put(|outbox| outbox.has_ended = true);
+            client.end();
         }
     }
 
@@ -678,14 +454,14 @@ impl Hub {
         status.insert("pipelines".into(), state.costs.iter().map(pipeline).collect());
         let text: Arc<str> = json!({ "status": status }).to_string().into();
         for client in state.clients.values() {
-            client.put(|outbox| outbox.status = Some(Arc::clone(&text)));
+            client.status(&text);
         }
     }
 
     pub(super) fn sent(&self, bytes: usize, frame: &Frame) {
         self.counters.frames.fetch_add(1, Ordering::Relaxed);
         self.counters.bytes.fetch_add(bytes as u64, Ordering::Relaxed);
-        self.counters.raw_bytes.fetch_add(frame.encoded.raw_bytes as u64, Ordering::Relaxed);
+        self.counters.raw_bytes.fetch_add(frame.raw_bytes(), Ordering::Relaxed);
     }
 }
 
@@ -702,7 +478,7 @@ impl HubState {
 
     fn greet(&self) {
         for client in self.clients.values() {
-            client.put(|outbox| outbox.hello = true);
+            client.greet();
         }
     }
 }

@@ -16,6 +16,7 @@
 
 mod connection;
 mod hub;
+mod outbox;
 mod session;
 mod surface;
 mod token;

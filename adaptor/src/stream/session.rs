@@ -19,7 +19,8 @@ use tombolo_pipelines::language::{Message as Said, parse_message};
 
 use super::{
     CommandSink, PING_PERIOD,
-    hub::{Client, Hub, Message},
+    hub::Hub,
+    outbox::{Client, Message},
 };
 
 /// Messages that a viewer may send at once.

@@ -180,7 +180,7 @@ pub enum Content {
 /// ```
 ///
 /// What means something by itself is then tried, where there is a `trial`:
-/// [`Rehearsal`](crate::run::Rehearsal) is one on a mesh.
+/// [`MeshTrial`](crate::run::MeshTrial) is one on a mesh.
 ///
 /// # Errors
 /// All errors of a text of that kind, and those that the trial shows.

@@ -3,10 +3,10 @@
 mod cost;
 mod due;
 mod history;
+#[cfg(feature = "files")]
+mod mesh_trial;
 mod output;
 mod pipeline;
-#[cfg(feature = "files")]
-mod rehearsal;
 mod replace;
 mod trigger;
 
@@ -25,9 +25,9 @@ use tombolo_deform::communicator::{Communicator, Solo, agree};
 
 pub use cost::Cost;
 pub use history::{History, Measured};
-pub use output::{Encoding, Frame, MonitorValues, Output, Table, View, ViewKind};
 #[cfg(feature = "files")]
-pub use rehearsal::Rehearsal;
+pub use mesh_trial::MeshTrial;
+pub use output::{Encoding, Frame, MonitorValues, Output, Table, View, ViewKind};
 pub use replace::{ReplaceError, Replacement};
 
 /// Runs the pipelines of a configuration.

@@ -10,7 +10,7 @@ use tombolo::{
         files::read_mesh,
         language::{Content, LanguageErrors, Trial, check_content, read_text},
         limits::WAITING_BYTES,
-        run::Rehearsal,
+        run::MeshTrial,
     },
 };
 
@@ -92,11 +92,11 @@ pub(crate) fn check(options: &Options) -> Result<(), Failure> {
             let views: Vec<FieldView> = fields.iter().filter_map(view).collect();
             let channel = options.channel.as_deref().unwrap_or("mesh");
             let channel = Channel::new(channel, MeshView::from(&file.mesh), &views);
-            let mut rehearsal = Rehearsal::new(channel, surface);
+            let mut trial = MeshTrial::new(channel, surface);
             if let Some(channel) = &options.channel {
-                rehearsal = rehearsal.of_channel(channel);
+                trial = trial.of_channel(channel);
             }
-            let trial: &mut dyn Trial = &mut rehearsal;
+            let trial: &mut dyn Trial = &mut trial;
             check_content(&text, &name, Some(trial))
         }
     };

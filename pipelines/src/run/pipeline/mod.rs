@@ -1,12 +1,12 @@
 //! One pipeline and its stages.
 
+#[cfg(feature = "files")]
+mod check;
 mod decimate;
 mod draw;
 mod end;
 mod measure;
 mod prepare;
-#[cfg(feature = "files")]
-mod rehearse;
 mod sinks;
 mod trial;
 

@@ -1,16 +1,19 @@
 //! What a mesh lacks that a configuration or an order asks for, all of it at once.
 
+mod common;
+
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
+use common::assert_told;
 use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::mesh::{FeatureSource, Mesh, MeshView};
 use tombolo_deform::shapes::box_of_tets;
 use tombolo_deform::surface::Surface;
 use tombolo_pipelines::extract::{Channel, FieldView};
 use tombolo_pipelines::language::check_content;
-use tombolo_pipelines::run::Rehearsal;
+use tombolo_pipelines::run::MeshTrial;
 
 /// The errors of a text tried on a box with a vertex field `p`, a vertex vector `u` and an element
 /// field `load`, whose features are its sides.
@@ -22,22 +25,14 @@ fn told_of(text: &str, channel: Option<&str>) -> String {
     let load = vec![1.0; mesh.cells().len()];
     let fields =
         [FieldView::vertex("p", &p), FieldView::vertex("u", &u), FieldView::element("load", &load)];
-    let mut rehearsal =
-        Rehearsal::new(Channel::new("mesh", MeshView::from(&mesh), &fields), surface);
+    let mut trial = MeshTrial::new(Channel::new("mesh", MeshView::from(&mesh), &fields), surface);
     if let Some(channel) = channel {
-        rehearsal = rehearsal.of_channel(channel);
+        trial = trial.of_channel(channel);
     }
-    match check_content(text, "a.json", Some(&mut rehearsal)) {
+    match check_content(text, "a.json", Some(&mut trial)) {
         Ok(_) => String::new(),
         Err(errors) => errors.to_string(),
     }
-}
-
-#[track_caller]
-fn assert_told(found: &str, expected: &str) {
-    let expected: Vec<&str> =
-        expected.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
-    assert_eq!(found.lines().collect::<Vec<_>>(), expected, "\n{found}");
 }
 
 #[test]
@@ -169,15 +164,15 @@ fn files_of_the_book_are_well_on_a_mesh() {
         }
         let text = fs::read_to_string(&path).expect("a text");
         let channel = Channel::new("fluid", MeshView::from(&mesh), &fields);
-        let mut rehearsal = Rehearsal::new(channel, Arc::clone(&surface));
+        let mut trial = MeshTrial::new(channel, Arc::clone(&surface));
         let name = path.display().to_string();
-        if let Err(errors) = check_content(&text, &name, Some(&mut rehearsal)) {
+        if let Err(errors) = check_content(&text, &name, Some(&mut trial)) {
             panic!("{errors}");
         }
         // What the mesh lacks is found in each of them.
         let channel = Channel::new("fluid", MeshView::from(&mesh), &[]);
-        let mut rehearsal = Rehearsal::new(channel, Arc::clone(&surface));
-        let errors = check_content(&text, &name, Some(&mut rehearsal)).unwrap_err();
+        let mut trial = MeshTrial::new(channel, Arc::clone(&surface));
+        let errors = check_content(&text, &name, Some(&mut trial)).unwrap_err();
         assert!(
             errors.iter().all(|error| error.message.contains("the channel has no field")),
             "{errors}"

@@ -11,7 +11,7 @@ use crate::language::{Problem, Stage};
 
 impl Prepared {
     /// Runs the stages and all actions on the first channel, and says what is wrong with each.
-    pub(crate) fn rehearse(
+    pub(crate) fn check_all(
         &mut self,
         snapshot: &Snapshot,
         source: &mut Source,

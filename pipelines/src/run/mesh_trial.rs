@@ -27,18 +27,18 @@ use crate::language::{Action, Config, Due, Formula, Problem, Stage, Trial, monit
 /// use tombolo_deform::{features::FeatureSettings, mesh::MeshView, shapes, surface::Surface};
 /// use tombolo_pipelines::extract::{Channel, FieldView};
 /// use tombolo_pipelines::language::check_content;
-/// use tombolo_pipelines::run::Rehearsal;
+/// use tombolo_pipelines::run::MeshTrial;
 ///
 /// let mesh = shapes::box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
 /// let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default())?);
 /// let pressure = vec![0.0; mesh.points().len()];
 /// let fields = [FieldView::vertex("pressure", &pressure)];
-/// let mut rehearsal =
-///     Rehearsal::new(Channel::new("mesh", MeshView::from(&mesh), &fields), surface);
+/// let mut trial =
+///     MeshTrial::new(Channel::new("mesh", MeshView::from(&mesh), &fields), surface);
 /// let errors = check_content(
 ///     r#"{"version": 1, "pipelines": [{"name": "p", "stages": [{"statistics": {"field": "presure"}}]}]}"#,
 ///     "views.json",
-///     Some(&mut rehearsal),
+///     Some(&mut trial),
 /// )
 /// .unwrap_err();
 /// assert_eq!(
@@ -48,7 +48,7 @@ use crate::language::{Action, Config, Due, Formula, Problem, Stage, Trial, monit
 /// );
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub struct Rehearsal<'a> {
+pub struct MeshTrial<'a> {
     channel: Channel<'a>,
     /// The name of the one channel that the mesh is.
     only: Option<String>,
@@ -56,8 +56,8 @@ pub struct Rehearsal<'a> {
     editor: Option<Editor>,
 }
 
-impl<'a> Rehearsal<'a> {
-    /// A rehearsal on the mesh of a channel, with its surface. The mesh stands for every channel.
+impl<'a> MeshTrial<'a> {
+    /// A trial on the mesh of a channel, with its surface. The mesh stands for every channel.
     #[must_use]
     pub fn new(channel: Channel<'a>, surface: Arc<Surface>) -> Self {
         Self { channel, only: None, surface, editor: None }
@@ -92,14 +92,14 @@ impl<'a> Rehearsal<'a> {
         match Source::distributed(&self.channel, &communicator) {
             Ok(mut source) => {
                 source.set_surface(&self.surface);
-                prepared.rehearse(&snapshot, &mut source, &*communicator, &board)
+                prepared.check_all(&snapshot, &mut source, &*communicator, &board)
             }
             Err(error) => vec![Problem::new(error.to_string())],
         }
     }
 }
 
-impl Trial for Rehearsal<'_> {
+impl Trial for MeshTrial<'_> {
     fn configuration(&mut self, config: &Config, is_sound: &dyn Fn(usize) -> bool) -> Vec<Problem> {
         let mut problems = Vec::new();
         let unconditional = unconditional(config);
@@ -155,7 +155,7 @@ impl Trial for Rehearsal<'_> {
     }
 }
 
-impl Rehearsal<'_> {
+impl MeshTrial<'_> {
     fn deformation_of(&mut self, deformation: Option<&Deformation>) -> Vec<Problem> {
         let problems = deformation.map(|deformation| self.deformation(deformation));
         problems.into_iter().flatten().map(|problem| problem.within("deform")).collect()

@@ -1,0 +1,273 @@
+//! The messages that a viewer has yet to read.
+//!
+//! What is kept for a viewer is bounded: a few frames of each view, short queues of texts.
+
+use std::{
+    collections::{BTreeMap, VecDeque},
+    sync::{Arc, Mutex},
+};
+
+use axum::body::Bytes;
+use tokio::sync::Notify;
+use tombolo_pipelines::encode::Encoded;
+
+use crate::lock::lock;
+
+/// Texts that may wait for a viewer; one that leaves more unread is let go.
+const TEXTS: usize = 1024;
+/// Frames of a view that may wait for a viewer, and that may be on their way to it.
+const FRAMES: usize = 2;
+/// Frames that are remembered of a viewer that has not acknowledged any.
+const UNACKNOWLEDGED: usize = 64;
+/// Monitor values that may wait for a viewer; older ones make way.
+const MONITORS: usize = 256;
+
+/// One encoded frame of a view, shared by all viewers.
+#[derive(Debug)]
+pub(super) struct Frame {
+    encoded: Encoded,
+    /// The frame's message.
+    pub(super) message: Bytes,
+}
+
+impl Frame {
+    pub(super) fn new(mut encoded: Encoded) -> Self {
+        // Key frames are asked for with their topology too, which is put in front of them.
+        let is_key = encoded.is_key();
+        let message =
+            if is_key { encoded.message.clone() } else { std::mem::take(&mut encoded.message) };
+        Self { message: message.into(), encoded }
+    }
+
+    /// How many bytes the frame's values are before they are encoded.
+    pub(super) fn raw_bytes(&self) -> u64 {
+        self.encoded.raw_bytes as u64
+    }
+
+    /// Which topology the frame belongs to.
+    pub(super) fn topology_id(&self) -> u64 {
+        self.encoded.topology_id
+    }
+
+    /// The message of a key frame with its topology.
+    pub(super) fn with_topology(&self) -> Bytes {
+        self.encoded.with_topology().into()
+    }
+}
+
+/// The frames of one view that a viewer has yet to read: a part of the view's chain.
+#[derive(Default)]
+struct Unread {
+    frames: VecDeque<Arc<Frame>>,
+    /// How many were sent and are not acknowledged.
+    in_flight: usize,
+    /// Frames of the chain were left out: the viewer can go on with a key frame only.
+    is_behind: bool,
+    /// The encoder was asked for a key frame.
+    has_asked: bool,
+}
+
+impl Unread {
+    /// Takes the next frame of the view; returns how many the viewer will miss for it.
+    fn put(&mut self, frame: &Arc<Frame>) -> usize {
+        let missed = if frame.encoded.is_key() {
+            let missed = self.frames.len();
+            *self = Self { in_flight: self.in_flight, ..Self::default() };
+            missed
+        } else if self.is_behind {
+            return 1;
+        } else if self.frames.len() >= FRAMES {
+            self.is_behind = true;
+            let missed = self.frames.len() + 1;
+            self.frames.clear();
+            return missed;
+        } else {
+            0
+        };
+        self.frames.push_back(Arc::clone(frame));
+        missed
+    }
+}
+
+/// The messages that a viewer has yet to read.
+#[derive(Default)]
+struct Outbox {
+    texts: VecDeque<Arc<str>>,
+    monitors: VecDeque<Arc<str>>,
+    status: Option<Arc<str>>,
+    hello: bool,
+    views: BTreeMap<usize, Unread>,
+    /// The view that was served last: they take turns.
+    last_view: usize,
+    /// The view of each frame that was sent and not acknowledged, the oldest first; from the first
+    /// acknowledgement on.
+    in_flight: VecDeque<usize>,
+    /// How many frames were acknowledged; `None` for a viewer that does not.
+    acknowledged: Option<u64>,
+    sent: u64,
+    overflowed: bool,
+    /// Nothing comes any more.
+    has_ended: bool,
+}
+
+impl Outbox {
+    /// The next frame, or a view whose next key frame is to be asked for.
+    fn frame(&mut self) -> Option<Message> {
+        let waits = |unread: &Unread| {
+            unread.in_flight < FRAMES
+                && (!unread.frames.is_empty() || unread.is_behind && !unread.has_asked)
+        };
+        let after =
+            self.views.range(self.last_view + 1..).chain(self.views.range(..=self.last_view));
+        let view = after.filter(|(_, unread)| waits(unread)).map(|(&view, _)| view).next()?;
+        let unread = self.views.get_mut(&view)?;
+        let Some(frame) = unread.frames.pop_front() else {
+            unread.has_asked = true;
+            return Some(Message::Behind(view));
+        };
+        self.last_view = view;
+        self.sent += 1;
+        self.in_flight.push_back(view);
+        if self.acknowledged.is_some() {
+            unread.in_flight += 1;
+        } else if self.in_flight.len() > UNACKNOWLEDGED {
+            self.in_flight.pop_front();
+        }
+        Some(Message::Frame(view, frame))
+    }
+
+    /// The viewer has decoded so many frames in all.
+    fn acknowledge(&mut self, count: u64) -> bool {
+        let before = self.acknowledged.unwrap_or(0);
+        if count <= before || count > self.sent {
+            return false;
+        }
+        if self.acknowledged.is_none() {
+            self.in_flight.iter().for_each(|view| {
+                if let Some(unread) = self.views.get_mut(view) {
+                    unread.in_flight += 1;
+                }
+            });
+        }
+        self.acknowledged = Some(count);
+        while self.in_flight.len() as u64 > self.sent - count {
+            let view = self.in_flight.pop_front();
+            if let Some(unread) = view.and_then(|view| self.views.get_mut(&view)) {
+                unread.in_flight = unread.in_flight.saturating_sub(1);
+            }
+        }
+        true
+    }
+}
+
+/// One viewer.
+pub(super) struct Client {
+    pub(super) id: u64,
+    pub(super) wake: Notify,
+    outbox: Mutex<Outbox>,
+}
+
+/// A message for a viewer.
+pub(super) enum Message {
+    Text(Arc<str>),
+    Hello,
+    Frame(usize, Arc<Frame>),
+    /// The viewer is ready for a view of which it missed frames.
+    Behind(usize),
+    /// The run has ended.
+    End,
+}
+
+impl Client {
+    /// A viewer that is to be greeted, and needs a key frame of each of these views.
+    pub(super) fn new(id: u64, views: impl Iterator<Item = usize>) -> Self {
+        let behind = || Unread { is_behind: true, ..Unread::default() };
+        let views = views.map(|view| (view, behind())).collect();
+        let outbox = Outbox { hello: true, views, ..Outbox::default() };
+        Self { id, wake: Notify::new(), outbox: Mutex::new(outbox) }
+    }
+
+    /// The next thing to send, the most urgent first; `Err` once the viewer has left too much
+    /// unread.
+    pub(super) fn next(&self) -> Result<Option<Message>, ()> {
+        let mut outbox = lock(&self.outbox);
+        if outbox.overflowed {
+            return Err(());
+        }
+        if std::mem::take(&mut outbox.hello) {
+            return Ok(Some(Message::Hello));
+        }
+        if let Some(text) = outbox.texts.pop_front() {
+            return Ok(Some(Message::Text(text)));
+        }
+        if let Some(text) = outbox.status.take() {
+            return Ok(Some(Message::Text(text)));
+        }
+        if let Some(text) = outbox.monitors.pop_front() {
+            return Ok(Some(Message::Text(text)));
+        }
+        let ended = outbox.has_ended.then_some(Message::End);
+        Ok(outbox.frame().or(ended))
+    }
+
+    /// Takes note that the viewer has decoded so many frames in all; from then on it is sent new
+    /// ones only as it gets on with them. `false` where the number is more than were sent, or no more
+    /// than before.
+    pub(super) fn acknowledge(&self, frames: u64) -> bool {
+        let done = lock(&self.outbox).acknowledge(frames);
+        self.wake.notify_one();
+        done
+    }
+
+    fn put(&self, change: impl FnOnce(&mut Outbox)) {
+        change(&mut lock(&self.outbox));
+        self.wake.notify_one();
+    }
+
+    /// Has `hello` sent, for the first time or again.
+    pub(super) fn greet(&self) {
+        self.put(|outbox| outbox.hello = true);
+    }
+
+    /// Puts a status in the place of the last one.
+    pub(super) fn status(&self, text: &Arc<str>) {
+        self.put(|outbox| outbox.status = Some(Arc::clone(text)));
+    }
+
+    /// Adds values of monitors; where very many are unread, the oldest make way.
+    pub(super) fn monitor(&self, text: &Arc<str>) {
+        self.put(|outbox| {
+            if outbox.monitors.len() >= MONITORS {
+                outbox.monitors.pop_front();
+            }
+            outbox.monitors.push_back(Arc::clone(text));
+        });
+    }
+
+    /// Adds the next frame of a view; returns how many frames the viewer will miss for it.
+    pub(super) fn frame(&self, view: usize, frame: &Arc<Frame>) -> usize {
+        let mut missed = 0;
+        self.put(|outbox| missed = outbox.views.entry(view).or_default().put(frame));
+        missed
+    }
+
+    /// Forgets what is unread of a view.
+    pub(super) fn forget(&self, view: usize) {
+        lock(&self.outbox).views.remove(&view);
+    }
+
+    /// Ends the connection once all else was sent.
+    pub(super) fn end(&self) {
+        self.put(|outbox| outbox.has_ended = true);
+    }
+
+    /// Adds a text, which is never left out; a viewer that leaves very many unread is let go.
+    pub(super) fn text(&self, text: &Arc<str>) {
+        self.put(|outbox| {
+            outbox.overflowed |= outbox.texts.len() >= TEXTS;
+            if !outbox.overflowed {
+                outbox.texts.push_back(Arc::clone(text));
+            }
+        });
+    }
+}
