@@ -67,7 +67,7 @@ impl Encoded {
 /// Encodes the frames of a view, one encoder for each view.
 ///
 /// Whatever depends on the cells alone is kept as long as they stay the same, and the last frame
-/// with it: some 50 bytes for each value of a field.
+/// with it: some 16 bytes for each value of a field, and up to 72 for each coordinate.
 #[derive(Debug, Default)]
 pub struct Encoder {
     topology: Option<KnownTopology>,
