@@ -99,3 +99,47 @@ fn a_journal_plays_back_to_the_same_bits() {
     );
     assert!(last(&again) == last(&live), "the journal gives another flow");
 }
+
+#[test]
+fn a_journal_is_carried_out_again_to_the_bit_where_orders_overlap() {
+    let live = Small::new();
+    let mut held = pipelines(true);
+    let again_held = json!({"name": "again", "at": {"cycle": 9}, "stages": [{"pause": {}}]});
+    held["pipelines"].as_array_mut().expect("a list").push(again_held);
+    live.write("pipelines.json", &held);
+    let mut run = Run::flow(&live.arguments(&["--pipelines", "@pipelines.json", "--steps", "40"]));
+    let mut driver = Viewer::connect(&run.link()).expect("the run lets in");
+    driver.wait_for("hello", |hello| hello["role"] == "driver");
+    let mut order = pinch(0.9);
+    order["schedule"] = json!({"steps": 12, "every": {"steps": 2}});
+    driver.send(&json!({"id": "first", "order": order}));
+    driver.wait_for("order", |order| order["id"] == "first" && order["status"] == "applying");
+    driver.resume();
+    // The second comes while the mesh is on its way to the first, the third is never carried out.
+    driver.wait_for("status", |status| status["cycle"] == 9 && status["paused"] == true);
+    driver.send(&json!({"id": "second", "order": pinch(0.8)}));
+    driver.wait_for("order", |order| order["id"] == "second" && order["status"] == "accepted");
+    driver.send(&json!({"id": "third", "order": pinch(0.95)}));
+    driver.send(&json!({"id": "not", "cancel": {"order": "third"}}));
+    driver.resume();
+    let (status, text) = run.finish(PATIENCE);
+    assert!(status.success(), "{text}");
+
+    let again = Small::new();
+    again.write("pipelines.json", &pipelines(false));
+    std::fs::copy(live.path("out/journal.jsonl"), again.path("run.jsonl")).expect("a journal");
+    let mut arguments =
+        vec!["--pipelines", "@pipelines.json", "--replay", "@run.jsonl", "--headless"];
+    arguments.extend(["--steps", "40"]);
+    let (status, text) = Run::flow(&again.arguments(&arguments)).finish(PATIENCE);
+    assert!(status.success(), "{text}");
+    assert!(last(&again) == last(&live), "the journal gives another flow");
+    let shapes = |of: &Small| -> Vec<String> {
+        let journal = String::from_utf8(of.bytes("out/journal.jsonl")).expect("UTF-8");
+        journal.lines().filter(|line| line.starts_with("{\"shape\"")).map(str::to_owned).collect()
+    };
+    let of_first = |line: &&String| line.contains("\"first\"");
+    let overlapped = shapes(&live).iter().filter(of_first).count();
+    assert!((1..12).contains(&overlapped), "{:?}", shapes(&live));
+    assert_eq!(shapes(&again), shapes(&live));
+}

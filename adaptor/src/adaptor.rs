@@ -34,7 +34,7 @@ use tombolo_deform::{
 };
 use tombolo_pipelines::{
     extract::Channel,
-    language::{Config, ReadError},
+    language::{Command, Config, HandedShape, ReadError},
     run::History,
 };
 
@@ -45,7 +45,7 @@ use crate::{
     report::Report,
     settings::Settings,
     stages::Pipelines,
-    steering::{Defaults, Forecaster, Log, Parameters, Queue, Source, Steering, Timed},
+    steering::{Defaults, Forecaster, Log, Parameters, Queue, Received, Source, Steering, Timed},
     step::{Moment, Outside, Step},
     stream::{Clock, End, Hub, Server},
     watch::Watch,
@@ -62,6 +62,8 @@ pub struct Adaptor {
     defaults: Defaults,
     pipelines: Pipelines,
     timed: Timed,
+    /// The shapes of the journal that is carried out again, until there is a mesh.
+    recorded: Option<Vec<HandedShape>>,
     queue: Arc<Queue>,
     log: Arc<Log>,
     hub: Option<Arc<Hub>>,
@@ -86,6 +88,8 @@ pub struct Adaptor {
     told: Told,
     paused: bool,
     stopped: bool,
+    /// Whether the run is carried out as a journal says.
+    is_replay: bool,
     meetings: Meetings,
     timing: Timing,
 }
@@ -160,7 +164,7 @@ impl Adaptor {
     pub fn initialize(settings: Settings) -> Result<Self, InitializeError> {
         let communicator = Arc::clone(&settings.communicator);
         let _alarm = Alarm::among(&communicator);
-        let own = serde_json::to_vec(&(&settings.config, &settings.orders));
+        let own = serde_json::to_vec(&(&settings.config, &settings.orders, &settings.replay));
         let adaptor = Self::set_up(settings);
         if communicator.size() == 1 {
             return adaptor;
@@ -319,8 +323,18 @@ impl Adaptor {
     pub fn finalize(mut self) -> Result<Report, FinalizeError> {
         let _alarm = Alarm::among(&self.communicator);
         if let SteeredMesh::Steered(steerer, _) = &mut self.mesh {
-            steerer.end();
+            steerer.end(self.moment);
         }
+        for Received { id, command, source, .. } in self.queue.take() {
+            let reason = "the run ended before its turn came";
+            match command {
+                Command::Order(_) => self.log.reject(&id, self.moment, &reason.into()),
+                // It ends, as was asked.
+                Command::Stop {} => self.log.settle(&id, &source, self.moment, Ok(())),
+                _ => self.log.settle(&id, &source, self.moment, Err(reason.into())),
+            }
+        }
+        self.forecaster.get().into_iter().for_each(Forecaster::give_up);
         self.mesh = SteeredMesh::Unknown;
         let asked = self.pipelines.end(self.moment, self.hub.as_ref());
         asked.faults.iter().for_each(|fault| self.complain(fault));
@@ -329,6 +343,7 @@ impl Adaptor {
             hub.ends(if self.stopped { End::Stopped } else { End::Finished });
         }
         self.server = None;
+        self.log.end(self.moment);
         let faults = self.pipelines.finish();
         // Rank 0 writes: what was asked for is there before any rank goes on.
         self.communicator.reduce(Reduction::Maximum, &mut [0.0]);
@@ -339,6 +354,7 @@ impl Adaptor {
             adaptor_seconds: self.timing.parts(),
             stream: self.hub.as_ref().map(|hub| hub.counts()).unwrap_or_default(),
             pipelines: self.pipelines.reports(),
+            journal_lost: self.log.journal_lost(),
         };
         match faults.first() {
             None => Ok(report),
@@ -430,7 +446,9 @@ impl Adaptor {
             for fault in asked.faults {
                 self.complain(&fault);
             }
-            for (pipeline, command) in asked.commands {
+            // A replay has the commands from the journal.
+            let commands = if self.is_replay { Vec::new() } else { asked.commands };
+            for (pipeline, command) in commands {
                 self.accept(None, Source::Pipeline(pipeline), command, moment);
             }
         }

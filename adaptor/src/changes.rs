@@ -110,6 +110,45 @@ impl Changes {
         Ok(id)
     }
 
+    /// Takes a change of a viewer in, from the message `text`, as [`Changes::take`] does; it counts
+    /// once it is on disk.
+    ///
+    /// # Errors
+    /// Why it was not taken, with the way to it from the change.
+    pub(crate) fn take_from(
+        self: &Arc<Self>,
+        client: u64,
+        id: Option<String>,
+        change: PipelineChange,
+        text: &str,
+    ) -> Result<(), Problem> {
+        let bytes = text.len();
+        self.queue.check_room(bytes).map_err(come_back)?;
+        let Some(id) = self.log.name(client, id, text).map_err(Problem::new)? else {
+            return Ok(());
+        };
+        if let Err(problem) = self.check(&change) {
+            self.log.forget(&id);
+            return Err(problem);
+        }
+        let mut change = change;
+        make_absolute(&mut change);
+        let (cycle, time) = self.clock.get();
+        let command = Command::Pipelines(change.clone());
+        lock(&self.state).under_way.push((id.clone(), Arc::new(change)));
+        let changes = Arc::clone(self);
+        let source = Source::Viewer(client);
+        let received = Received { source, id: id.clone(), command: command.clone(), bytes };
+        self.log.accept_from(client, id, &command, Moment { cycle, time }, move |is_taken| {
+            if is_taken {
+                changes.queue.push(received);
+            } else {
+                lock(&changes.state).under_way.retain(|(waiting, _)| *waiting != received.id);
+            }
+        });
+        Ok(())
+    }
+
     /// Notes whether a change was made, and the configuration as it is now.
     pub(crate) fn settle(&self, id: &str, is_made: bool, config: &Arc<Config>) {
         let mut state = lock(&self.state);

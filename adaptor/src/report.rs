@@ -29,6 +29,9 @@ pub struct Report {
     pub stream: StreamCounts,
     /// The cost and the monitors of each pipeline.
     pub pipelines: Vec<PipelineReport>,
+    /// Why the end of the journal could not be written, or that lines of it are missing; `None`
+    /// where all of it is there.
+    pub journal_lost: Option<String>,
 }
 
 /// The cost of a pipeline and its monitors, over the whole run.

@@ -9,7 +9,7 @@ use tombolo_deform::{
     linear::{BuiltIn, Solvers},
 };
 use tombolo_pipelines::{
-    language::{self, Config, ReadError, TimedCommand},
+    language::{self, Config, ReadError, Recording, TimedCommand},
     limits::{DOCUMENT, WAITING_BYTES},
 };
 
@@ -31,6 +31,11 @@ pub struct Settings {
     /// [`language::check_orders`](tombolo_pipelines::language::check_orders). They take effect at
     /// their cycle exactly: the solver waits for their plans.
     pub orders: Vec<TimedCommand>,
+    /// The journal that this run carries out again, in place of `orders`; read it with
+    /// [`language::parse_journal`](tombolo_pipelines::language::parse_journal). A solver that is the
+    /// same, with the same configuration, is handed the same shapes at the same cycles, to the bit.
+    /// What pipelines order meanwhile is passed over, because the journal holds it.
+    pub replay: Option<Recording>,
     /// The directory of the files that pipelines write and of the journal, where their names are
     /// relative.
     pub output: PathBuf,
@@ -76,6 +81,24 @@ impl Settings {
         Ok(self)
     }
 
+    /// Carries out the newest run of a journal again.
+    ///
+    /// # Errors
+    /// [`ReadError`], which names the file, and the line and column of what is wrong.
+    pub fn replay_from_file(self, file: impl AsRef<Path>) -> Result<Self, ReadError> {
+        let file = file.as_ref();
+        let text = language::read_text(file, WAITING_BYTES)?;
+        let recording = language::parse_journal(&text, &file.display().to_string())?;
+        if recording.lost > 0 {
+            log::warn!(
+                "{}: {} lines are missing; the replay is that of what is there",
+                file.display(),
+                recording.lost
+            );
+        }
+        Ok(Self { replay: Some(recording), ..self })
+    }
+
     /// Distributes the run over the processes of a communicator.
     #[must_use]
     pub fn on(self, communicator: Arc<dyn Communicator>) -> Self {
@@ -101,6 +124,7 @@ impl Default for Settings {
             solvers: Arc::new(BuiltIn),
             parameters: Vec::new(),
             orders: Vec::new(),
+            replay: None,
             output: PathBuf::from("."),
             file: None,
         }

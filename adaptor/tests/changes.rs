@@ -11,7 +11,7 @@ use std::{
     time::Duration,
 };
 
-use common::{PATIENCE, Solver, Viewer, config, socket_url, squeeze};
+use common::{PATIENCE, Solver, Viewer, config, socket_url, squeeze, statuses};
 use serde_json::{Value, json};
 use tombolo::{
     Adaptor, Channel, FieldView, Settings, Step,
@@ -367,8 +367,7 @@ fn a_journal_makes_the_same_changes_at_the_same_cycles() {
     solver.finish();
     let table = read_to_string(folder.path().join("speed.csv")).expect("a table");
     let journal = read_to_string(folder.path().join("journal.jsonl")).expect("a journal");
-    let lines: Vec<Value> =
-        journal.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let lines = statuses(&journal);
     let told: Vec<[&str; 2]> = lines
         .iter()
         .map(|line| ["id", "status"].map(|key| line[key].as_str().unwrap_or("")))
@@ -395,8 +394,7 @@ fn a_journal_makes_the_same_changes_at_the_same_cycles() {
     assert_eq!(read_to_string(again.path().join("speed.csv")).expect("a table"), table);
     let second = read_to_string(again.path().join("journal.jsonl")).expect("a journal");
     let of = |journal: &str| -> Vec<Value> {
-        let lines = journal.lines().map(|line| serde_json::from_str(line).expect("JSON"));
-        lines.filter(|line: &Value| line["status"] == "applied").collect()
+        statuses(journal).into_iter().filter(|line| line["status"] == "applied").collect()
     };
     assert_eq!(of(&second), of(&journal));
 }
@@ -424,7 +422,7 @@ fn a_file_of_orders_changes_pipelines_and_a_table_keeps_its_columns() {
         rows.lines().skip(1).map(|row| row.split_once(',').expect("columns").0).collect();
     assert_eq!(cycles, ["3", "4", "7", "8"]);
     let journal = read_to_string(folder.path().join("journal.jsonl")).expect("a journal");
-    let last: Value = serde_json::from_str(journal.lines().last().expect("lines")).expect("JSON");
+    let last = statuses(&journal).pop().expect("lines");
     assert_eq!((&last["id"], &last["status"]), (&json!("d"), &json!("rejected")));
     let reason = last["reason"].as_str().expect("a reason");
     assert!(reason.starts_with("the table `a.csv` of this run has other columns"), "{reason}");
@@ -569,8 +567,8 @@ fn the_file_of_the_configuration_is_looked_at_again() {
     solver.finish();
     assert!(begun.elapsed() < Duration::from_secs(20), "the thread ends");
     let journal = read_to_string(folder.path().join("a.jsonl")).expect("a journal");
-    let from_file =
-        journal.lines().filter(|line| line.contains("from the file of the configuration"));
+    let lines = statuses(&journal);
+    let from_file = lines.iter().filter(|line| line["by"] == "configuration");
     assert_eq!(from_file.count(), 3, "{journal}");
 }
 

@@ -385,6 +385,7 @@ fn journalled(file: &std::path::Path) -> Vec<(String, Value)> {
     let line = |line: &str| serde_json::from_str::<Value>(line).expect("a line of JSON");
     text.lines()
         .map(line)
+        .filter(|line| line.get("status").is_some())
         .map(|line| (line["status"].as_str().expect("a status").to_owned(), line))
         .collect()
 }

@@ -331,7 +331,8 @@ fn a_journal_replays_to_the_same_bits() {
             solver.step();
             shapes.push(bits(&solver.mesh));
         }
-        // The run is killed here: nothing is finalized.
+        // Nothing is finalized.
+        drop(solver);
         let text = std::fs::read_to_string(directory.path().join(name)).unwrap();
         (shapes, text)
     };
@@ -342,11 +343,12 @@ fn a_journal_replays_to_the_same_bits() {
         at(9, json!({"undo": 1}))
     ]);
     let (shapes, journal) = run("first.jsonl", orders(&list));
-    assert_eq!(journal.lines().count(), 8, "{journal}");
+    assert_eq!(common::statuses(&journal).len(), 8, "{journal}");
     let (again, _) = run("second.jsonl", parse_orders(&journal, "first.jsonl").unwrap());
     assert!(shapes == again);
-    let torn = &journal[..journal.len() - 10];
-    assert_eq!(parse_orders(torn, "torn.jsonl").unwrap().len(), 3);
+    // Of the last order nothing is known but that it was accepted.
+    let torn = &journal[..journal.rfind("\"applied\"").unwrap() + 3];
+    assert_eq!(parse_orders(torn, "torn.jsonl").unwrap().len(), 2);
 }
 
 #[test]
@@ -362,7 +364,9 @@ fn a_journal_holds_what_a_displacement_file_held() {
         for _ in 0..6 {
             solver.step();
         }
-        (bits(&solver.mesh), std::fs::read_to_string(directory.path().join(name)).unwrap())
+        let shape = bits(&solver.mesh);
+        drop(solver);
+        (shape, std::fs::read_to_string(directory.path().join(name)).unwrap())
     };
     let list = json!([
         at(1, json!({"edits": [{"displacement": {"file": "lift.txt"}}]})),
@@ -375,8 +379,8 @@ fn a_journal_holds_what_a_displacement_file_held() {
     assert!(shape != still);
     let lines: Vec<&str> = journal.lines().collect();
     assert!(
-        lines[0].contains("\"values\":[[0.0,0.0,0.1],[0.0,0.0,0.0625]]")
-            && !lines[0].contains("lift.txt"),
+        lines[1].contains("\"values\":[[0.0,0.0,0.1],[0.0,0.0,0.0625]]")
+            && !lines[1].contains("lift.txt"),
         "{journal}"
     );
     assert!(

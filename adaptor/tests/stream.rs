@@ -300,7 +300,7 @@ fn what_a_viewer_gets_wrong_is_told_and_changes_nothing() {
         assert!(order["reason"].as_str().unwrap().contains(named), "{order}");
     }
     viewer.send(&json!({"id": "same", "order": {"stack": []}}));
-    viewer.send(&json!({"id": "same", "order": {"stack": []}}));
+    viewer.send(&json!({"id": "same", "order": {"undo": 1}}));
     viewer.wait_for("error", |error| error["id"] == "same");
     solver.steps(3);
     assert!(solver.is_at_reference() && !solver.stopped);
@@ -638,14 +638,16 @@ fn orders_of_viewers_replay_from_the_journal() {
     solver.step_until_told(&mut viewer, "order", |order| {
         order["id"] == "b" && order["status"] == "applied"
     });
+    let (cycles, motions, mesh) = (solver.cycle, solver.motions.clone(), bits(&solver.mesh));
+    solver.finish();
     let journal = std::fs::read_to_string(directory.path().join("run.jsonl")).unwrap();
     let mut replay = Solver::new(Settings {
         orders: parse_orders(&journal, "run.jsonl").unwrap(),
         ..Settings::default()
     });
-    replay.steps(solver.cycle);
-    assert_eq!(replay.motions, solver.motions);
-    assert!(bits(&replay.mesh) == bits(&solver.mesh));
+    replay.steps(cycles);
+    assert_eq!(replay.motions, motions);
+    assert!(bits(&replay.mesh) == mesh);
 }
 
 mod any_bytes {

@@ -55,6 +55,7 @@ impl Session {
             communicator: Arc::clone(&communicator),
             solvers: Arc::new(BuiltIn),
             parameters,
+            replay: None,
             orders,
             output,
             file,

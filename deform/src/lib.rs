@@ -117,6 +117,7 @@
 #![warn(missing_docs)]
 
 pub mod bounds;
+pub mod cancellation;
 pub mod communicator;
 pub mod distributed;
 pub mod edit;

@@ -165,12 +165,12 @@ orders.json:2:11: [0].at.cycl: found the unknown name `cycl`, expected `cycle` o
 orders.json:2:83: [0].order.edits[0].translate.by: found 2 values, expected an array of 3 values
 orders.json:2:94: [0].order.edits[1].rotat: found the unknown name `rotat`, expected `translate`, `rotate`, `scale_direction`, `scale_normals`, `affine`, `displacement` or `skeleton`; did you mean `rotate`?
 orders.json:2:131: [0].order.edits[1].rotat.axis: expected a direction, whose length is not 0
-orders.json:3:3: [1]: found 2 commands, expected exactly one of `order`, `pause`, `resume`, `stop`, `parameter` and `pipelines`
+orders.json:3:3: [1]: found 2 commands, expected exactly one of `order`, `pause`, `resume`, `stop`, `parameter`, `pipelines` and `cancel`
 orders.json:4:56: [2].parameter.value: found "3", expected a number
 orders.json:5:38: [3].order.stack[0].translate.features: there is no handle; expected features, a region, or both
 orders.json:5:92: [3].order.guard.min_scaled_jacobian: found 2, expected a number from 0 to 1
 orders.json:6:22: [4].order.undo: found 0, expected a whole number from 1 to 4294967295
-orders.json:6:27: [5]: found no command, expected one of `order`, `pause`, `resume`, `stop`, `parameter` and `pipelines`
+orders.json:6:27: [5]: found no command, expected one of `order`, `pause`, `resume`, `stop`, `parameter`, `pipelines` and `cancel`
 "#,
     );
     // Of lines each is a text of its own; the last may be torn.
@@ -189,7 +189,7 @@ orders.json:1:90: order.gard.otherwise: found the unknown name `pray`, expected 
 orders.json:2:20: status: found the unknown name `acepted`, expected `accepted`, `applied`, `rejected`, `not_followed` or `not_confirmed`; did you mean `accepted`?
 orders.json:2:38: cycle: found "4", expected a whole number from 0 to 18446744073709551615
 orders.json:4:13: found the end of the text, expected ',' or '}'
-orders.json:5:11: stauts: found the unknown key `stauts`, expected `id`, `status`, `cycle`, `time`, `reason`, `min_scaled_jacobian`, `fraction`, `order`, `pause`, `resume`, `stop`, `parameter` or `pipelines`; did you mean `status`?
+orders.json:5:11: stauts: found the unknown key `stauts`, expected `id`, `status`, `cycle`, `time`, `by`, `reason`, `min_scaled_jacobian`, `fraction`, `order`, `pause`, `resume`, `stop`, `parameter`, `pipelines` or `cancel`; did you mean `status`?
 "#,
     );
     // What is written over several lines is one text.
@@ -218,7 +218,7 @@ fn a_file_is_read_as_what_its_keys_say() {
     assert_eq!(kind("[]"), "0 orders");
     assert_eq!(kind("{\"pause\": {}}\n{\"resume\": {}}\n"), "2 orders");
     assert_eq!(
-        kind(r#"{"id":"a","status":"accepted","cycle":3,"time":0.3,"order":{"undo":1}}"#),
+        kind(r#"{"id":"a","status":"applied","cycle":3,"time":0.3,"order":{"undo":1}}"#),
         "1 orders"
     );
     for (text, expected) in [

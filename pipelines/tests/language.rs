@@ -252,7 +252,8 @@ fn orders_are_read_from_arrays_and_journals() {
     let orders = parse_orders(journal, "journal.jsonl").unwrap();
     let places: Vec<_> =
         orders.iter().map(|timed| (timed.id.as_deref().unwrap(), timed.at.unwrap())).collect();
-    assert_eq!(places, [("a", At::Cycle(7)), ("c", At::Cycle(9))]);
+    // The run ended before the last of them took effect.
+    assert_eq!(places, [("a", At::Cycle(7))]);
 
     let error = parse_orders("{\"pause\": {}}\n{\"puase\": {}}\n", "o.jsonl").unwrap_err();
     assert_eq!((error.line, error.column, error.suggestion.as_deref()), (2, 2, Some("pause")));

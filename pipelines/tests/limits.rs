@@ -46,9 +46,7 @@ fn read_everywhere(order: &str) -> Vec<Result<Order, LanguageError>> {
         parse_valid(order, "edits.json"),
         of_file(format!(r#"[{{"order":{order}}}]"#)),
         of_file(format!(r#"{{"order":{order}}}"#)),
-        of_file(format!(
-            r#"{{"id":"a","status":"accepted","cycle":3,"time":0.3,"order":{order}}}"#
-        )),
+        of_file(format!(r#"{{"id":"a","status":"applied","cycle":3,"time":0.3,"order":{order}}}"#)),
         message,
     ]
 }

@@ -160,6 +160,12 @@ impl Run {
         self.child.try_wait().expect("the system knows its children").is_none()
     }
 
+    /// The number of its process.
+    #[must_use]
+    pub fn process(&self) -> u32 {
+        self.child.id()
+    }
+
     /// Sends the program a signal, such as `TERM`.
     ///
     /// # Panics

@@ -189,6 +189,7 @@ impl Adaptor {
                 self.stopped = true;
                 Ok(())
             }
+            Command::Cancel(cancel) => self.cancel(&cancel.order, source, moment),
             Command::Parameter(change) => {
                 self.parameters.set(&change.name, change.value).map_err(|error| error.to_string())
             }
@@ -197,7 +198,31 @@ impl Adaptor {
         self.settle(&id, source, moment, outcome);
     }
 
-    /// Notes what became of a command that is no order, and tells who gave it what was wrong.
+    /// Takes an order back that has not begun to move the mesh.
+    fn cancel(&mut self, order: &str, source: &Source, moment: Moment) -> Result<(), String> {
+        let by = match source {
+            Source::Viewer(client) => format!(" by {}", Hub::name(*client)),
+            _ => String::new(),
+        };
+        let cancelled = match &mut self.mesh {
+            SteeredMesh::Steered(steerer, _) => steerer.cancel(order),
+            _ => None,
+        };
+        match cancelled {
+            Some(Ok(())) => {
+                self.log.reject(order, moment, &format!("cancelled{by}").into());
+                Ok(())
+            }
+            Some(Err(reason)) => Err(reason),
+            None if self.communicator.rank() > 0 => Ok(()),
+            None if self.log.has_order(order) => {
+                Err(format!("order '{order}' waits no more, so that it cannot be cancelled"))
+            }
+            None => Err(format!("there is no order '{order}'")),
+        }
+    }
+
+    /// Notes what became of a command that is no order, and tells who gave it.
     pub(super) fn settle(
         &self,
         id: &str,
@@ -205,15 +230,10 @@ impl Adaptor {
         moment: Moment,
         outcome: Result<(), String>,
     ) {
-        if let Err(reason) = &outcome {
-            match (source, &self.hub) {
-                (Source::Viewer(client), Some(hub)) => {
-                    hub.tell_client(*client, &json!({"error": {"message": reason, "id": id}}));
-                }
-                _ => self.complain(&format!("command '{id}': {reason}")),
-            }
+        if let (Err(reason), false) = (&outcome, matches!(source, Source::Viewer(_))) {
+            self.complain(&format!("command '{id}': {reason}"));
         }
-        self.log.settle(id, moment, outcome);
+        self.log.settle(id, source, moment, outcome);
         self.describe();
         self.tell_conditions();
     }
@@ -228,6 +248,8 @@ pub(super) struct Intake {
     pub(super) changes: Arc<Changes>,
     /// Whether the mesh is on several ranks.
     pub(super) is_in_parts: bool,
+    /// Whether the run is carried out as a journal says.
+    pub(super) is_replay: bool,
 }
 
 impl Intake {
@@ -270,13 +292,18 @@ impl CommandSink for Intake {
         text: &str,
     ) -> Result<(), String> {
         let command = match message {
+            Message::Command(Command::Order(_) | Command::Parameter(_)) if self.is_replay => {
+                return Err("this run replays a journal: it can be watched, paused and stopped, \
+                            and its shape is that of the journal"
+                    .into());
+            }
             Message::Command(Command::Pipelines(change)) => {
-                let source = Source::Viewer(client);
-                let taken = change.check_files();
-                let taken = taken.and_then(|()| self.changes.take(id, source, change, text.len()));
+                let taken = change
+                    .check_files()
+                    .and_then(|()| self.changes.take_from(client, id, change, text));
                 let located =
                     |problem: Problem| locate(problem.within("pipelines"), text, "message");
-                return taken.map(drop).map_err(|problem| located(problem).to_string());
+                return taken.map_err(|problem| located(problem).to_string());
             }
             Message::Question(Question::Forecast(order)) => {
                 return self.forecast(client, id, order);
@@ -292,11 +319,30 @@ impl CommandSink for Intake {
                 "{exceeded}; the solver has not come to those before this one yet, try again later"
             )
         })?;
+        let Some(id) = self.log.name(client, id, text)? else { return Ok(()) };
         let (cycle, time) = self.hub.clock.get();
-        let source = Source::Viewer(client);
-        let id = self.log.accept(id, &source, &command, Moment { cycle, time })?;
-        self.queue.push(Received { source, id, command, bytes });
+        let moment = Moment { cycle, time };
+        let received = Received {
+            source: Source::Viewer(client),
+            id: id.clone(),
+            command: command.clone(),
+            bytes,
+        };
+        let (queue, forecaster) = (Arc::clone(&self.queue), Arc::clone(&self.forecaster));
+        self.log.accept_from(client, id, &command, moment, move |is_taken| {
+            if is_taken {
+                let stops = matches!(received.command, Command::Stop {});
+                queue.push(received);
+                if stops {
+                    forecaster.get().into_iter().for_each(Forecaster::give_up);
+                }
+            }
+        });
         Ok(())
+    }
+
+    fn look_at_time(&self) {
+        self.log.look_at_time();
     }
 
     fn driven(&self) {

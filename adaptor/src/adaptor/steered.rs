@@ -131,7 +131,7 @@ impl Adaptor {
     /// Takes over a mesh, or this rank's part of one; the inner error says why its shape cannot be
     /// changed. Collective.
     fn take_over(
-        &self,
+        &mut self,
         cycle: u64,
         channel: &Channel<'_>,
     ) -> Result<Result<Steerer, String>, ExecuteError> {
@@ -161,6 +161,9 @@ impl Adaptor {
             let shaper = shaper.with_clock(clock);
             let mut steerer = Steerer::new(shaper, self.defaults.clone(), log, queue, skeleton)
                 .map_err(|error| format!("a thread could not be started: {error}"))?;
+            if let Some(shapes) = self.recorded.take() {
+                steerer.repeat(shapes);
+            }
             // Nobody may ever come to a run that is only watched over.
             if !self.timed.is_empty() || self.pipelines.can_order() {
                 steerer.make_ready();

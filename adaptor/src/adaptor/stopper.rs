@@ -1,12 +1,12 @@
 //! Stops that are asked for outside of `execute`, as by a signal.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use tombolo_pipelines::language::Command;
 
 use super::Adaptor;
 use crate::{
-    steering::{Log, Queue, Received, Source},
+    steering::{Forecaster, Log, Queue, Received, Source},
     step::Moment,
     stream::Clock,
 };
@@ -17,11 +17,13 @@ pub struct Stopper {
     queue: Arc<Queue>,
     log: Arc<Log>,
     clock: Arc<Clock>,
+    forecaster: Arc<OnceLock<Forecaster>>,
 }
 
 impl Stopper {
     /// Asks the run to stop, as a viewer's `stop` does: the next call of `execute` says so to the
-    /// solver on all ranks, and one that is paused, or waits for a viewer, goes on. Returns at once.
+    /// solver on all ranks, and one that is paused, or waits for a viewer, goes on. Shapes that are
+    /// being found are given up. Returns at once.
     ///
     /// It counts on rank 0. It takes locks, so that it must not be called inside of a signal's
     /// handler; a thread that waits for signals may call it.
@@ -31,6 +33,7 @@ impl Stopper {
         // It has no name of its own that could be taken.
         if let Ok(id) = self.log.accept(None, &Source::Program, &command, Moment { cycle, time }) {
             self.queue.push(Received { source: Source::Program, id, command, bytes: 0 });
+            self.forecaster.get().into_iter().for_each(Forecaster::give_up);
         }
     }
 }
@@ -63,6 +66,7 @@ impl Adaptor {
             queue: Arc::clone(&self.queue),
             log: Arc::clone(&self.log),
             clock: Arc::clone(&self.clock),
+            forecaster: Arc::clone(&self.forecaster),
         }
     }
 }

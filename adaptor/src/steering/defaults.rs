@@ -5,7 +5,7 @@ use tombolo_deform::{
     schedule::Schedule,
     shape::{CurrentShape, Request},
 };
-use tombolo_pipelines::language::{Config, Deformation, Due, Order, Stage};
+use tombolo_pipelines::language::{Config, Deformation, Due, Order, RunHeader, Stage};
 
 use super::stack::{EditStack, ShapeSettings, StackError};
 
@@ -58,5 +58,13 @@ impl Defaults {
             guard,
         };
         Ok((after, request))
+    }
+}
+
+impl From<RunHeader> for Defaults {
+    /// Those that the run of a journal began with.
+    fn from(run: RunHeader) -> Self {
+        let RunHeader { deform, guard, schedule, .. } = run;
+        Self { deform, guard, schedule }
     }
 }

@@ -32,6 +32,11 @@ pub(crate) struct Forecaster {
 }
 
 impl Forecaster {
+    /// Gives up all shapes that are being found, and those that will be asked for: the run is to end.
+    pub(crate) fn give_up(&self) {
+        self.jobs.give_up();
+    }
+
     /// Has `answer` called with what `order` would come to, were it given now. What the same
     /// `asker` asked for before and was not told yet is forgotten: its answer never comes.
     pub(crate) fn ask(

@@ -1,25 +1,20 @@
 //! The orders of a run and how far each has come; kept for the viewers, the report and the journal.
 
-use std::{
-    collections::VecDeque,
-    sync::{Arc, Mutex},
-};
+use std::sync::{Arc, Mutex};
 
 use serde_json::{Value, json};
-use tombolo_pipelines::language::{Command, JournalEntry, Order, OrderStatus as JournalStatus};
+use tombolo_pipelines::language::{
+    Command, CommandAuthor, HandedShape, JournalEntry, JournalNote, OrderStatus as JournalStatus,
+    RunEnd,
+};
 
 use super::{
     NotFollowed,
-    order_report::{ORDERS_KEPT, OrderReport, OrderStatus},
+    known::{KnownCommands, Named, told_whole},
+    order_report::{OrderReport, OrderStatus},
     planner::Rejection,
 };
 use crate::{journal::Journal, lock::lock, step::Moment, stream::Hub};
-
-/// Orders that a viewer is told of when it connects.
-const ORDERS_TOLD: usize = 100;
-/// Bytes of JSON up to which an order itself is told too; a longer one holds the numbers of a
-/// displacement.
-const TOLD_WHOLE: usize = 16 << 10;
 
 /// Who gave a command.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,15 +31,16 @@ pub(crate) enum Source {
     Program,
 }
 
-/// The commands that were given, as far as they are kept.
-#[derive(Default)]
-struct KnownCommands {
-    orders: VecDeque<OrderReport>,
-    /// The newest orders as they were given, by their names.
-    given: VecDeque<(String, Value)>,
-    /// Names of the other commands, so that none is given twice.
-    others: VecDeque<String>,
-    counted: u64,
+impl From<&Source> for CommandAuthor {
+    fn from(source: &Source) -> Self {
+        match source {
+            Source::Viewer(client) => CommandAuthor::Viewer(Hub::name(*client)),
+            Source::File => CommandAuthor::File,
+            Source::Pipeline(name) => CommandAuthor::Pipeline(name.clone()),
+            Source::Configuration => CommandAuthor::Configuration,
+            Source::Program => CommandAuthor::Program,
+        }
+    }
 }
 
 /// Shared by the thread that reads from viewers and the solver's.
@@ -59,8 +55,8 @@ impl Log {
         Self { state: Mutex::default(), journal, hub }
     }
 
-    /// Takes a command in: gives it a name unless it has one, writes it to the journal, tells the
-    /// viewers of an order.
+    /// Takes a command in that no viewer sent: gives it a name unless it has one, hands it to the
+    /// journal, tells the viewers of an order. Never waits for the disk.
     ///
     /// # Errors
     /// Where another command has that name already.
@@ -71,61 +67,117 @@ impl Log {
         command: &Command,
         moment: Moment,
     ) -> Result<String, String> {
-        let given = match command {
-            Command::Order(order) => told_whole(order),
-            _ => None,
-        };
-        let id = {
-            let mut state = lock(&self.state);
-            let id = match wanted {
-                Some(id) if state.has(&id) => {
-                    return Err(format!("the id '{id}' was given to another command"));
-                }
-                Some(id) => id,
-                None => state.next_id(),
-            };
-            if matches!(command, Command::Order(_)) {
-                if state.given.len() >= ORDERS_TOLD {
-                    state.given.pop_front();
-                }
-                state.given.extend(given.map(|given| (id.clone(), given)));
-                if state.orders.len() >= ORDERS_KEPT {
-                    state.orders.pop_front();
-                }
-                state.orders.push_back(OrderReport { id: id.clone(), ..OrderReport::default() });
-            } else {
-                if state.others.len() >= ORDERS_KEPT {
-                    state.others.pop_front();
-                }
-                state.others.push_back(id.clone());
-            }
-            id
-        };
-        // A replay's own pipelines give their commands again; those of the journal would double
-        // them.
-        let command = (!matches!(source, Source::Pipeline(_))).then(|| command.clone());
-        let reason = match source {
-            Source::Pipeline(name) => Some(format!("from pipeline '{name}'")),
-            Source::Configuration => Some("from the file of the configuration".into()),
-            _ => None,
-        };
-        let changes_pipelines = matches!(command, Some(Command::Pipelines(_)));
-        if command.is_some() {
-            self.journal(&id, JournalStatus::Accepted, moment, command, reason, [None; 2]);
-        }
-        self.tell(&id);
-        if let Some(hub) = self.hub.as_ref().filter(|_| changes_pipelines) {
-            hub.tell(&json!({"pipelines": {"id": id, "status": JournalStatus::Accepted}}));
-        }
+        let named = lock(&self.state).name(wanted, None)?;
+        let (Named::New(id) | Named::Again(id)) = named;
+        self.journal.write(&accepted(&id, source, command, moment));
+        self.admit(&id, command);
         Ok(id)
     }
 
-    /// Notes that a command that is no order took effect, or why it did not.
-    pub(crate) fn settle(&self, id: &str, moment: Moment, outcome: Result<(), String>) {
-        match outcome {
-            Ok(()) => self.journal(id, JournalStatus::Applied, moment, None, None, [None; 2]),
+    /// Names a command of a viewer that came in the message `text`. The same message may come again
+    /// where a connection was lost: it is answered by what became of the command.
+    ///
+    /// # Errors
+    /// Where another command has that name already.
+    pub(crate) fn name(
+        &self,
+        client: u64,
+        wanted: Option<String>,
+        text: &str,
+    ) -> Result<Option<String>, String> {
+        let named = lock(&self.state).name(wanted, Some(text))?;
+        match named {
+            Named::New(id) => Ok(Some(id)),
+            Named::Again(id) => {
+                let outcome = lock(&self.state).outcome(&id);
+                if let (Some(outcome), Some(hub)) = (outcome, &self.hub) {
+                    hub.tell_client(client, &outcome);
+                }
+                Ok(None)
+            }
+        }
+    }
+
+    /// Lets go of a name that was given to a command which is not taken after all.
+    pub(crate) fn forget(&self, id: &str) {
+        lock(&self.state).forget(id);
+    }
+
+    /// Takes a command of a viewer in, under the name that it was given. `then` is called once it is
+    /// on disk, on another thread, and hears that it is taken; or that it is not, because the
+    /// journal cannot be written, which the viewer is told. What a run must hear in any case
+    /// (pause, resume, stop, cancel) does not wait for the disk.
+    pub(crate) fn accept_from(
+        self: &Arc<Self>,
+        client: u64,
+        id: String,
+        command: &Command,
+        moment: Moment,
+        then: impl FnOnce(bool) + Send + 'static,
+    ) {
+        let entry = accepted(&id, &Source::Viewer(client), command, moment);
+        if is_urgent(command) {
+            self.journal.write(&entry);
+            self.admit(&id, command);
+            return then(true);
+        }
+        let (log, command) = (Arc::clone(self), command.clone());
+        self.journal.ask(&entry, move |outcome| match outcome {
+            Ok(()) => {
+                log.admit(&id, &command);
+                then(true);
+            }
             Err(reason) => {
-                self.journal(id, JournalStatus::Rejected, moment, None, Some(reason), [None; 2])
+                lock(&log.state).forget(&id);
+                then(false);
+                if let Some(hub) = &log.hub {
+                    let message = format!(
+                        "it was not taken, because the journal cannot be written: {reason}; try again once it can"
+                    );
+                    hub.tell_client(client, &json!({"error": {"message": message, "id": id}}));
+                }
+            }
+        });
+    }
+
+    /// Notes and tells a command that is in the journal.
+    fn admit(&self, id: &str, command: &Command) {
+        match command {
+            Command::Order(order) => {
+                let given = told_whole(order);
+                lock(&self.state).add(id, given);
+                self.tell(id);
+            }
+            Command::Pipelines(_) => {
+                if let Some(hub) = &self.hub {
+                    hub.tell(&json!({"pipelines": {"id": id, "status": JournalStatus::Accepted}}));
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Notes that a command that is no order took effect, or why it did not, and tells who gave it.
+    pub(crate) fn settle(
+        &self,
+        id: &str,
+        source: &Source,
+        moment: Moment,
+        outcome: Result<(), String>,
+    ) {
+        let Moment { cycle, time } = moment;
+        let told = match &outcome {
+            Ok(()) => json!({"done": {"id": id, "cycle": cycle, "time": time}}),
+            Err(reason) => json!({"error": {"message": reason, "id": id}}),
+        };
+        if let (Source::Viewer(client), Some(hub)) = (source, &self.hub) {
+            hub.tell_client(*client, &told);
+        }
+        lock(&self.state).settle(id, told);
+        match outcome {
+            Ok(()) => self.journal(id, JournalStatus::Applied, moment, None, [None; 2]),
+            Err(reason) => {
+                self.journal(id, JournalStatus::Rejected, moment, Some(reason), [None; 2])
             }
         }
     }
@@ -134,19 +186,45 @@ impl Log {
     pub(crate) fn update(&self, id: &str, change: impl FnOnce(&mut OrderReport)) {
         {
             let mut state = lock(&self.state);
-            let Some(order) = state.orders.iter_mut().rev().find(|order| order.id == id) else {
-                return;
-            };
+            let Some(order) = state.order_mut(id) else { return };
             change(order);
         }
         self.tell(id);
     }
 
+    /// Whether an order of this name is known.
+    pub(crate) fn has_order(&self, id: &str) -> bool {
+        lock(&self.state).order(id).is_some()
+    }
+
+    /// Notes that the solver was handed a shape.
+    pub(crate) fn handed(&self, id: &str, shape: u32, moment: Moment) {
+        let handed = HandedShape { order: id.into(), shape, cycle: moment.cycle };
+        self.journal.note(&JournalNote::Shape(handed));
+    }
+
+    /// Notes that the run comes to its end, and waits for the disk, for two seconds at most.
+    pub(crate) fn end(&self, moment: Moment) {
+        let Moment { cycle, time } = moment;
+        self.journal.note(&JournalNote::End(RunEnd { cycle, time }));
+        self.journal.close();
+    }
+
+    /// Looks whether the disk takes too long. To be called a few times a second.
+    pub(crate) fn look_at_time(&self) {
+        self.journal.look_at_time();
+    }
+
+    /// Why the journal cannot be written, or that lines of it are missing.
+    pub(crate) fn journal_lost(&self) -> Option<String> {
+        self.journal.lost()
+    }
+
     /// Notes that an order changes nothing, and why.
     pub(crate) fn reject(&self, id: &str, moment: Moment, rejection: &Rejection) {
-        let Rejection { reason, min_scaled_jacobian, fraction, seconds } = rejection;
+        let Rejection { reason, min_scaled_jacobian, fraction, seconds, .. } = rejection;
         let numbers = [*min_scaled_jacobian, *fraction];
-        self.journal(id, JournalStatus::Rejected, moment, None, Some(reason.clone()), numbers);
+        self.journal(id, JournalStatus::Rejected, moment, Some(reason.clone()), numbers);
         self.update(id, |order| {
             order.status = OrderStatus::Rejected;
             order.reason = Some(reason.clone());
@@ -165,14 +243,7 @@ impl Log {
         min_scaled_jacobian: Option<f64>,
         clamped: Option<f64>,
     ) {
-        self.journal(
-            id,
-            JournalStatus::Applied,
-            moment,
-            None,
-            None,
-            [min_scaled_jacobian, clamped],
-        );
+        self.journal(id, JournalStatus::Applied, moment, None, [min_scaled_jacobian, clamped]);
     }
 
     /// Notes how far the mesh was from where it was asked to be, which is not far.
@@ -202,7 +273,7 @@ impl Log {
              vertices are up to {distance:.3e} from there"
         );
         let message = format!("order '{id}': applied, not followed: {reason}");
-        self.journal(id, JournalStatus::NotFollowed, handed_out, None, Some(reason), [None; 2]);
+        self.journal(id, JournalStatus::NotFollowed, handed_out, Some(reason), [None; 2]);
         log::warn!("{message}");
         if let Some(hub) = &self.hub {
             hub.tell(&json!({"error": {"message": message, "id": id}}));
@@ -221,7 +292,7 @@ impl Log {
             handed_out.cycle
         );
         log::info!("order '{id}': applied, not confirmed: {reason}");
-        self.journal(id, JournalStatus::NotConfirmed, handed_out, None, Some(reason), [None; 2]);
+        self.journal(id, JournalStatus::NotConfirmed, handed_out, Some(reason), [None; 2]);
     }
 
     fn journal(
@@ -229,34 +300,27 @@ impl Log {
         id: &str,
         status: JournalStatus,
         moment: Moment,
-        command: Option<Command>,
         reason: Option<String>,
         [min_scaled_jacobian, fraction]: [Option<f64>; 2],
     ) {
         let Moment { cycle, time } = moment;
-        let entry = JournalEntry {
+        self.journal.write(&JournalEntry {
             id: id.into(),
             status,
             cycle,
             time,
-            command,
+            command: None,
+            by: None,
             reason,
             min_scaled_jacobian,
             fraction,
-        };
-        if let Err(error) = self.journal.write(&entry) {
-            // The solver goes on without; it must not go unsaid.
-            log::warn!("{error}; this run has no journal from here on");
-            if let Some(hub) = &self.hub {
-                hub.tell(&json!({"error": {"message": format!("{error}; this run has no journal from here on")}}));
-            }
-        }
+        });
     }
 
     fn tell(&self, id: &str) {
         let Some(hub) = &self.hub else { return };
         let state = lock(&self.state);
-        if let Some(order) = state.orders.iter().rev().find(|order| order.id == id) {
+        if let Some(order) = state.order(id) {
             // The edits of an order are sent once, when it is accepted; a viewer that connects later
             // gets them in its `hello`.
             let told = if order.status == OrderStatus::Accepted {
@@ -270,48 +334,34 @@ impl Log {
 
     /// The newest orders, for a viewer that connects.
     pub(crate) fn told(&self) -> Value {
-        let state = lock(&self.state);
-        let skipped = state.orders.len().saturating_sub(ORDERS_TOLD);
-        state.orders.iter().skip(skipped).map(|order| state.told(order)).collect()
+        lock(&self.state).newest()
     }
 
     pub(crate) fn reports(&self) -> Vec<OrderReport> {
-        lock(&self.state).orders.iter().cloned().collect()
+        lock(&self.state).reports()
     }
 }
 
-/// An order as JSON, unless it is long; of a long one no more is written than it takes to find that
-/// out.
-fn told_whole(order: &Order) -> Option<Value> {
-    let mut bytes = [0; TOLD_WHOLE];
-    let mut rest = &mut bytes[..];
-    serde_json::to_writer(&mut rest, order).ok()?;
-    let written = TOLD_WHOLE - rest.len();
-    serde_json::from_slice(&bytes[..written]).ok()
+/// The line that says that a command was accepted.
+fn accepted(id: &str, source: &Source, command: &Command, moment: Moment) -> JournalEntry {
+    let Moment { cycle, time } = moment;
+    JournalEntry {
+        id: id.into(),
+        status: JournalStatus::Accepted,
+        cycle,
+        time,
+        command: Some(command.clone()),
+        by: Some(source.into()),
+        reason: None,
+        min_scaled_jacobian: None,
+        fraction: None,
+    }
 }
 
-impl KnownCommands {
-    /// An order's report, with what was asked for.
-    fn told(&self, order: &OrderReport) -> Value {
-        let mut told = json!(order);
-        if let Some((_, given)) = self.given.iter().rev().find(|(id, _)| *id == order.id) {
-            told["order"] = given.clone();
-        }
-        told
-    }
-
-    fn has(&self, id: &str) -> bool {
-        self.orders.iter().any(|order| order.id == id)
-            || self.others.iter().any(|other| other == id)
-    }
-
-    fn next_id(&mut self) -> String {
-        loop {
-            self.counted += 1;
-            let id = format!("o{}", self.counted);
-            if !self.has(&id) {
-                return id;
-            }
-        }
-    }
+/// Whether a run must hear a command also where the journal cannot be written.
+fn is_urgent(command: &Command) -> bool {
+    matches!(
+        command,
+        Command::Pause {} | Command::Resume {} | Command::Stop {} | Command::Cancel(_)
+    )
 }

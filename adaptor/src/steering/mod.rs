@@ -9,11 +9,12 @@
 //!
 //! Orders of viewers are planned on a thread of their own while the solver keeps stepping, and a
 //! schedule under way goes on meanwhile. Where the mesh has moved since, the way from its present
-//! shape is judged again before the first shape is handed out, so that what a journal replays is
-//! the same bits: the start of each motion depends only on the cycle at which it began.
+//! shape is judged again before the first shape is handed out, and the mesh rests meanwhile. The
+//! journal notes each shape that is handed out, so that a replay gives the same bits.
 
 mod defaults;
 mod forecaster;
+mod known;
 mod lent;
 mod log;
 mod motion;

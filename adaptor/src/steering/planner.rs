@@ -42,6 +42,8 @@ pub(crate) struct Rejection {
     /// The fraction that would have passed.
     pub(crate) fraction: Option<f64>,
     pub(crate) seconds: ShapeSeconds,
+    /// Whether it was given up, of which nothing follows for the next such order.
+    pub(crate) is_cancelled: bool,
 }
 
 impl<T: ToString> From<T> for Rejection {
@@ -51,6 +53,7 @@ impl<T: ToString> From<T> for Rejection {
             min_scaled_jacobian: None,
             fraction: None,
             seconds: ShapeSeconds::default(),
+            is_cancelled: false,
         }
     }
 }
@@ -60,7 +63,8 @@ impl Rejection {
     fn of(refused: &Refused, reason: String) -> Self {
         let (min_scaled_jacobian, fraction) =
             (refused.min_scaled_jacobian(), refused.feasible_fraction());
-        Self { reason, min_scaled_jacobian, fraction, seconds: ShapeSeconds::default() }
+        let is_cancelled = refused.is_cancelled();
+        Self { min_scaled_jacobian, fraction, is_cancelled, ..Self::from(reason) }
     }
 }
 
@@ -108,6 +112,9 @@ impl Planner {
         });
         let plan =
             plan.map_err(|rejection| Rejection { seconds: self.shaper.spent(), ..rejection });
+        if plan.as_ref().is_err_and(|rejection| rejection.is_cancelled) {
+            return plan;
+        }
         if self.known.len() >= REMEMBERED {
             self.known.pop_front();
         }
@@ -147,7 +154,7 @@ impl Planner {
     pub(crate) fn forecast(&mut self, asked: &PlanRequest) -> Forecast {
         match self.plan(asked) {
             Ok(plan) => self.shaper.forecast_of(&plan),
-            Err(Rejection { reason, min_scaled_jacobian, fraction, seconds }) => {
+            Err(Rejection { reason, min_scaled_jacobian, fraction, seconds, .. }) => {
                 Forecast::rejected(reason, fraction, min_scaled_jacobian, seconds)
             }
         }

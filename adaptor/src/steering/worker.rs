@@ -8,12 +8,14 @@ use std::{
     num::NonZeroUsize,
     sync::{
         Arc, Condvar, Mutex,
-        mpsc::{Receiver, RecvError, Sender, TryRecvError, channel},
+        mpsc::{Receiver, Sender, TryRecvError, channel},
     },
     thread::JoinHandle,
+    time::{Duration, Instant},
 };
 
 use rayon::ThreadPool;
+use tombolo_deform::cancellation::Cancellation;
 use tombolo_deform::quality::{Quality, quality};
 use tombolo_deform::shape::{Forecast, Plan};
 use tombolo_pipelines::language::Deformation;
@@ -29,8 +31,14 @@ use crate::lock::{lock, wait};
 pub(crate) enum Done {
     /// The quality of the reference mesh.
     Prepared(Box<Quality>),
-    Planned(Box<Result<Plan, Rejection>>),
+    /// The plan of this number.
+    Planned(u64, Box<Result<Plan, Rejection>>),
+    /// The thread has ended.
+    Gone,
 }
+
+/// How long the end of a run waits for a thread that is at work.
+const END: Duration = Duration::from_secs(2);
 
 /// Takes the answer to a forecast, on the worker's thread.
 pub(crate) type Answer = Box<dyn FnOnce(Forecast) + Send>;
@@ -45,26 +53,31 @@ struct Question {
 /// The jobs that wait, by how urgent they are.
 #[derive(Default)]
 struct WaitingJobs {
-    plans: VecDeque<PlanRequest>,
+    plans: VecDeque<(u64, PlanRequest)>,
+    /// The number of the plan that is being made.
+    at_plan: Option<u64>,
     /// The newest of each asker.
     forecasts: VecDeque<Question>,
     prepare: Option<Deformation>,
     ahead: Option<PlanRequest>,
+    /// Whatever is asked for is given up.
+    gives_up: bool,
     closed: bool,
 }
 
 enum Job {
-    Plan(PlanRequest),
+    Plan(u64, PlanRequest),
     Forecast(Question),
     Prepare(Deformation),
     Ahead(PlanRequest),
 }
 
-/// A job of the worker.
-#[derive(Default)]
+/// The jobs of the worker.
 pub(crate) struct Jobs {
     state: Mutex<WaitingJobs>,
     changed: Condvar,
+    /// Gives up what the kernel is at.
+    cancellation: Cancellation,
 }
 
 impl Jobs {
@@ -80,7 +93,11 @@ impl Jobs {
             if state.closed {
                 return None;
             }
-            let job = (state.plans.pop_front().map(Job::Plan))
+            state.at_plan = state.plans.front().map(|(number, _)| *number);
+            if !state.gives_up {
+                self.cancellation.renew();
+            }
+            let job = (state.plans.pop_front().map(|(number, asked)| Job::Plan(number, asked)))
                 .or_else(|| state.forecasts.pop_front().map(Job::Forecast))
                 .or_else(|| state.prepare.take().map(Job::Prepare))
                 .or_else(|| state.ahead.take().map(Job::Ahead));
@@ -89,6 +106,23 @@ impl Jobs {
             }
             state = wait(&self.changed, state);
         }
+    }
+
+    /// Gives up the plan of this number; it is answered by a rejection, or not at all.
+    fn cancel(&self, number: u64) {
+        let mut state = lock(&self.state);
+        state.plans.retain(|(waiting, _)| *waiting != number);
+        if state.at_plan == Some(number) {
+            self.cancellation.cancel();
+        }
+    }
+
+    /// Gives up whatever is under way, and what will be asked for from now on.
+    pub(crate) fn give_up(&self) {
+        self.change(|state| {
+            state.gives_up = true;
+            self.cancellation.cancel();
+        });
     }
 
     /// Asks for a forecast, in place of what the same asker wanted to know before and was not told
@@ -101,9 +135,11 @@ impl Jobs {
     }
 }
 
-/// The thread. It ends when this is dropped, after the job at hand.
+/// The thread. It ends when this is dropped; the job at hand is given up.
 pub(crate) struct Worker {
     jobs: Arc<Jobs>,
+    /// How many plans were asked for.
+    plans: u64,
     done: Receiver<Done>,
     threads: Vec<JoinHandle<()>>,
 }
@@ -115,13 +151,15 @@ impl Worker {
         // The core that the solver has not less of is left to it.
         let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
         let pool = pool("tombolo-plan", cores.saturating_sub(1).max(1))?;
-        let jobs = Arc::new(Jobs::default());
+        let cancellation = lock(&planner).shaper().cancellation().clone();
+        let jobs = Jobs { state: Mutex::default(), changed: Condvar::new(), cancellation };
+        let jobs = Arc::new(jobs);
         let work = {
             let jobs = Arc::clone(&jobs);
             move || pool.install(|| work(&jobs, &planner, &tell, &queue))
         };
         let thread = std::thread::Builder::new().name("tombolo-shape".into()).spawn(work)?;
-        Ok(Self { jobs, done, threads: vec![thread] })
+        Ok(Self { jobs, plans: 0, done, threads: vec![thread] })
     }
 
     /// Runs `work` beside everything else, on one more thread.
@@ -147,8 +185,16 @@ impl Worker {
         self.jobs.change(|state| state.ahead = Some(asked));
     }
 
-    pub(crate) fn plan(&self, asked: PlanRequest) {
-        self.jobs.change(|state| state.plans.push_back(asked));
+    /// Has a plan made; tells its number.
+    pub(crate) fn plan(&mut self, asked: PlanRequest) -> u64 {
+        self.plans += 1;
+        self.jobs.change(|state| state.plans.push_back((self.plans, asked)));
+        self.plans
+    }
+
+    /// Gives up the plan of this number, whose answer counts no more.
+    pub(crate) fn cancel(&self, number: u64) {
+        self.jobs.cancel(number);
     }
 
     /// The next finished job, if there is one.
@@ -156,19 +202,30 @@ impl Worker {
         match self.done.try_recv() {
             Ok(done) => Some(done),
             Err(TryRecvError::Empty) => None,
-            Err(TryRecvError::Disconnected) => Some(gone()),
+            Err(TryRecvError::Disconnected) => Some(Done::Gone),
         }
     }
 
     /// Waits for the next finished job.
     pub(crate) fn take(&self) -> Done {
-        self.done.recv().unwrap_or_else(|RecvError| gone())
+        self.done.recv().unwrap_or(Done::Gone)
     }
 }
 
 impl Drop for Worker {
     fn drop(&mut self) {
+        self.jobs.give_up();
         self.jobs.change(|state| state.closed = true);
+        let until = Instant::now() + END;
+        while !self.threads.iter().all(JoinHandle::is_finished) {
+            if Instant::now() >= until {
+                // What it is at cannot be given up, such as the set-up of an operator. It hands
+                // nothing to anybody any more, and ends with the process at the latest.
+                log::warn!("a thread that finds shapes is still at work; it is left behind");
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
         for thread in self.threads.drain(..) {
             let _ = thread.join();
         }
@@ -178,7 +235,7 @@ impl Drop for Worker {
 fn work(jobs: &Jobs, planner: &Mutex<Planner>, tell: &Sender<Done>, queue: &Queue) {
     while let Some(job) = jobs.next() {
         let done = match job {
-            Job::Plan(asked) => Done::Planned(Box::new(lock(planner).plan(&asked))),
+            Job::Plan(number, asked) => Done::Planned(number, Box::new(lock(planner).plan(&asked))),
             Job::Prepare(deform) => Done::Prepared(Box::new(prepare(planner, &deform))),
             Job::Forecast(Question { asked, answer, .. }) => {
                 let forecast = lock(planner).forecast(&asked);
@@ -213,8 +270,4 @@ fn pool(name: &'static str, threads: usize) -> std::io::Result<ThreadPool> {
         .thread_name(move |thread| format!("{name}-{thread}"))
         .build()
         .map_err(std::io::Error::other)
-}
-
-fn gone() -> Done {
-    Done::Planned(Box::new(Err(Rejection::from("the thread that plans shapes has ended"))))
 }

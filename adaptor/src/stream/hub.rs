@@ -109,6 +109,8 @@ struct HubState {
     wheel_lost: Option<(Instant, u64)>,
     /// What each pipeline has cost, by name.
     costs: Vec<(String, Cost)>,
+    /// Why the journal cannot be written.
+    journal_lost: Option<String>,
     last_status: Option<(u64, Instant)>,
     status_dirty: bool,
     end: End,
@@ -127,11 +129,23 @@ pub(crate) struct Hub {
 
 /// The name of a viewer in messages.
 fn name(client: u64) -> String {
-    format!("c{client}")
+    Hub::name(client)
 }
 
 /// Said by the solver's side.
 impl Hub {
+    /// The name of a viewer in messages and in the journal.
+    pub(crate) fn name(client: u64) -> String {
+        format!("c{client}")
+    }
+
+    /// Notes why the journal cannot be written; `None` where it can.
+    pub(crate) fn journal(&self, lost: Option<&str>) {
+        let mut state = lock(&self.state);
+        state.journal_lost = lost.map(str::to_owned);
+        state.status_dirty = true;
+    }
+
     /// Replaces what `hello` tells about the run, and tells it to every viewer again.
     pub(crate) fn describe(&self, description: Map<String, Value>) {
         let mut state = lock(&self.state);
@@ -447,6 +461,7 @@ impl Hub {
         }
         status.insert("viewers".into(), state.clients.len().into());
         status.insert("driver".into(), state.driver.map(name).into());
+        status.insert("journal_lost".into(), state.journal_lost.clone().into());
         let pipeline = |(name, cost): &(String, Cost)| {
             json!({"name": name, "runs": cost.runs, "seconds": cost.seconds, "bytes": cost.bytes,
                    "memory": cost.memory, "every": cost.every})

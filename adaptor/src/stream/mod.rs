@@ -81,6 +81,9 @@ pub(crate) trait CommandSink: Send + Sync {
     /// Hears that a viewer has connected which may steer.
     fn driven(&self);
 
+    /// Is called a few times a second, for what may take only so long.
+    fn look_at_time(&self) {}
+
     /// The orders so far, for a viewer that connects.
     fn orders(&self) -> serde_json::Value;
 }
@@ -234,6 +237,7 @@ impl Drop for Server {
 async fn serve(socket: TcpListener, shared: Shared, stopped: oneshot::Receiver<()>) {
     let Ok(socket) = tokio::net::TcpListener::from_std(socket) else { return };
     let hub = Arc::clone(&shared.hub);
+    let commands = Arc::clone(&shared.commands);
     let router = Router::new()
         .route("/ws", get(upgrade))
         .route("/surface", get(reference_surface))
@@ -248,6 +252,7 @@ async fn serve(socket: TcpListener, shared: Shared, stopped: oneshot::Receiver<(
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         loop {
             tick.tick().await;
+            commands.look_at_time();
             hub.status();
         }
     };

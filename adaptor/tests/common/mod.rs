@@ -48,7 +48,11 @@ pub struct Solver {
 
 impl Solver {
     pub fn new(settings: Settings) -> Self {
-        let reference = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+        Self::of_box([4, 4, 4], settings)
+    }
+
+    pub fn of_box(divisions: [usize; 3], settings: Settings) -> Self {
+        let reference = box_of_tets(divisions, [0.0; 3], [1.0; 3]);
         Self {
             adaptor: Adaptor::initialize(settings).expect("initialize"),
             mesh: reference.clone(),
@@ -143,6 +147,12 @@ impl Solver {
 
 pub fn bits(mesh: &Mesh) -> Vec<[u64; 3]> {
     mesh.points().iter().map(|point| point.map(f64::to_bits)).collect()
+}
+
+/// The lines of a journal that say what became of commands.
+pub fn statuses(journal: &str) -> Vec<Value> {
+    let lines = journal.lines().map(|line| serde_json::from_str(line).expect("a line of JSON"));
+    lines.filter(|line: &Value| line.get("status").is_some()).collect()
 }
 
 /// One viewer.

@@ -10,6 +10,7 @@ use super::guard::Guard;
 use super::path::least_on_path;
 use super::refusal::{BrokenPath, FailingCell, Refusal};
 use super::{CHUNK, Measure, WORST};
+use crate::cancellation::Cancellation;
 use crate::communicator::{Communicator, Garbled, Reader, Reduction, Writer};
 use crate::lanes::{LANES, Lanes, with_wide_registers};
 use crate::mesh::cell_geometry::{Scratch, centroid};
@@ -81,6 +82,22 @@ pub fn judge(
     fractions: &[f64],
     guard: &Guard,
 ) -> Result<PathQuality, Refusal> {
+    judge_unless(domain, start, end, fractions, guard, &Cancellation::default())
+}
+
+/// Judges a straight path as [`judge`] does, unless another thread has it given up. On several
+/// ranks all of them have to, or none.
+///
+/// # Errors
+/// [`Refusal::Cancelled`]; those of [`judge`].
+pub fn judge_unless(
+    domain: impl Into<Domain>,
+    start: &[Vector],
+    end: &[Vector],
+    fractions: &[f64],
+    guard: &Guard,
+    cancellation: &Cancellation,
+) -> Result<PathQuality, Refusal> {
     let domain = domain.into();
     let mesh = domain.mesh();
     let arguments = check_arguments(mesh, start, end, fractions, guard);
@@ -89,11 +106,10 @@ pub fn judge(
         return Err(Refusal::OtherRank);
     }
     let (path, floor) = Path::new(&domain, start, end, guard);
-    let parts =
-        parallel::map_chunks(mesh.cells().len(), CHUNK, |range| path.look(range, fractions));
+    let look = |range| (!cancellation.is_cancelled()).then(|| path.look(range, fractions));
     let mut total = Part::new(fractions.len());
-    for part in parts {
-        total.merge(part);
+    for part in parallel::map_chunks(mesh.cells().len(), CHUNK, look) {
+        total.merge(part.ok_or(Refusal::Cancelled)?);
     }
     if domain.communicator().size() > 1 {
         total = total.gathered(&**domain.communicator());

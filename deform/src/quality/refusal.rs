@@ -87,6 +87,9 @@ pub enum Refusal {
         /// The value.
         value: f64,
     },
+    /// The judgement was given up: see [`judge_unless`](super::judge_unless).
+    #[error("it was given up")]
+    Cancelled,
     /// The arguments of another rank make no sense.
     #[error("the shapes given on another rank make no sense")]
     OtherRank,

@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use super::Refused;
 use super::refused::Elsewhere;
+use crate::cancellation::Cancellation;
 use crate::communicator::{Communicator, Reduction, first_failure};
 use crate::distributed::PartBoundary;
 use crate::linear::Solvers;
 use crate::mesh::{Domain, Vector};
-use crate::quality::{Guard, PathQuality, Refusal, SurfaceRule, judge, keeps};
+use crate::quality::{Guard, PathQuality, Refusal, SurfaceRule, judge_unless, keeps};
 use crate::surface::{Surface, require_sound};
 
 /// A body: its domain, its boundary, and the choice of solvers for its volume. All that spans ranks
@@ -18,6 +19,7 @@ pub(super) struct Body {
     pub(super) domain: Domain,
     pub(super) boundary: PartBoundary,
     pub(super) solvers: Arc<dyn Solvers>,
+    pub(super) cancellation: Cancellation,
 }
 
 impl Body {
@@ -42,7 +44,12 @@ impl Body {
         fractions: &[f64],
         guard: &Guard,
     ) -> Result<PathQuality, Refusal> {
-        judge(&self.domain, start, end, fractions, guard)
+        judge_unless(&self.domain, start, end, fractions, guard, &self.cancellation)
+    }
+
+    /// Refuses to go on with what was given up. Of several ranks none gives anything up.
+    pub(super) fn require_wanted(&self) -> Result<(), Refused> {
+        if self.cancellation.is_cancelled() { Err(Refused::Cancelled) } else { Ok(()) }
     }
 
     pub(super) fn keeps(&self, start: &[Vector], end: &[Vector], guard: &Guard) -> bool {

@@ -55,6 +55,7 @@ impl BoundaryMotion for OnReference<'_> {
     type Error = Refused;
 
     fn at(&mut self, _: f64, to: f64, _: &[Vector]) -> Result<Vec<Vector>, Refused> {
+        self.body.require_wanted()?;
         if let Some(last) = self.stack.last_mut() {
             *last = self.edit.scaled(to);
         }
@@ -190,6 +191,7 @@ impl Shaper {
         guard: &Guard,
     ) -> Result<Plan, Refused> {
         schedule.check()?;
+        self.body.require_wanted()?;
         let watch = self.stopwatch();
         if target.surface_only || start.surface_only {
             let plan = self.along_surface(start, target, schedule, guard);

@@ -17,6 +17,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
+use crate::cancellation::Cancellation;
 use crate::communicator::{Communicator, agree};
 use crate::distributed::{DistributedError, PartBoundary};
 use crate::edit::{Edit, Editor};
@@ -201,7 +202,12 @@ impl Shaper {
         let editor = if ranks.size() == 1 { editor? } else { agree(&**ranks, editor)? };
         let reference = domain.mesh().points().into();
         Ok(Self {
-            body: Arc::new(Body { domain, boundary, solvers: Arc::new(BuiltIn) }),
+            body: Arc::new(Body {
+                domain,
+                boundary,
+                solvers: Arc::new(BuiltIn),
+                cancellation: Cancellation::default(),
+            }),
             editor,
             operators: Vec::new(),
             reference,
@@ -216,8 +222,13 @@ impl Shaper {
     /// The shaper with another choice of solvers for its volume. Before anything is asked of it.
     #[must_use]
     pub fn with_solvers(self, solvers: Arc<dyn Solvers>) -> Self {
-        let Body { domain, boundary, .. } = &*self.body;
-        let body = Body { domain: domain.clone(), boundary: boundary.clone(), solvers };
+        let Body { domain, boundary, cancellation, .. } = &*self.body;
+        let body = Body {
+            domain: domain.clone(),
+            boundary: boundary.clone(),
+            solvers,
+            cancellation: cancellation.clone(),
+        };
         Self { body: Arc::new(body), operators: Vec::new(), ..self }
     }
 
@@ -226,6 +237,15 @@ impl Shaper {
     #[must_use]
     pub fn with_clock(self, clock: fn() -> f64) -> Self {
         Self { clock, ..self }
+    }
+
+    /// By which another thread has a plan under way given up: it is refused with
+    /// [`Refused::Cancelled`] at the next sub-step, solve or check, and so are those that follow
+    /// until [`Cancellation::renew`]. Of one process alone: of several ranks each would have to be
+    /// told in the same moment.
+    #[must_use]
+    pub fn cancellation(&self) -> &Cancellation {
+        &self.body.cancellation
     }
 
     fn stopwatch(&self) -> Stopwatch {
@@ -321,6 +341,7 @@ impl Shaper {
     ) -> Result<Target, Refused> {
         check_stack(stack)?;
         deform.equation.validate()?;
+        self.body.require_wanted()?;
         let mut seconds = ShapeSeconds::default();
         let watch = self.stopwatch();
         let body = Arc::clone(&self.body);

@@ -83,6 +83,9 @@ pub enum Refused {
     /// There are more edits or shapes than are allowed.
     #[error(transparent)]
     Limit(#[from] Exceeded),
+    /// It was given up: see [`Shaper::cancellation`](super::Shaper::cancellation).
+    #[error("it was given up before its shapes were known")]
+    Cancelled,
     /// Another rank has the reason, in its own words.
     #[error("{0}")]
     Elsewhere(Elsewhere),
@@ -102,6 +105,12 @@ fn at_its_end(impossible: Option<&Impossible>, end_is_valid: bool) -> String {
 }
 
 impl Refused {
+    /// Whether it was given up, of which nothing follows for the next such request.
+    #[must_use]
+    pub fn is_cancelled(&self) -> bool {
+        matches!(self, Refused::Cancelled | Refused::Guard(Refusal::Cancelled))
+    }
+
     /// Whether it is the surface that is broken.
     pub(super) fn is_surface(&self) -> bool {
         matches!(self, Refused::Surface(_) | Refused::Elsewhere(Elsewhere { is_surface: true, .. }))

@@ -50,6 +50,7 @@ impl Shaper {
         if guard.surface == SurfaceRule::Reject {
             // Where it ends was looked at when it was made; the reference needs no look.
             for fraction in schedule.fractions().into_iter().filter(|&fraction| fraction < 1.0) {
+                self.body.require_wanted()?;
                 let at = |(&from, &to): (&Vector, &Vector)| shape_at(from, to, fraction);
                 let points: Vec<Vector> = start.points.iter().zip(&*end).map(at).collect();
                 let shape = self.body.gather(&points)?;

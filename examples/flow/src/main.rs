@@ -32,6 +32,9 @@ struct Arguments {
     /// Orders and commands to carry out at stated steps or times; a journal is one too
     #[arg(long, value_name = "ORDERS.json")]
     orders: Option<PathBuf>,
+    /// Carry the newest run of a journal out again: the same shapes at the same cycles, to the bit
+    #[arg(long, value_name = "JOURNAL.jsonl", conflicts_with = "orders")]
+    replay: Option<PathBuf>,
     /// How many steps to take; without it the case's when headless, else until stopped
     #[arg(long, value_name = "N")]
     steps: Option<u64>,
@@ -161,6 +164,7 @@ fn run(
         case: arguments.case,
         pipelines: arguments.pipelines,
         orders: arguments.orders,
+        replay: arguments.replay,
         steps: arguments.steps,
         headless: arguments.headless,
         listen: arguments.listen,

@@ -16,7 +16,7 @@ use tombolo_deform::mesh::{Mesh, MeshError, NumberType, Vector};
 use tombolo_deform::surface::{Surface, SurfaceError};
 use tombolo_pipelines::extract::{Association, Channel, Field, FieldView};
 use tombolo_pipelines::files::{self, Compression, FileError};
-use tombolo_pipelines::language::{Config, ReadError, StreamServer, TimedCommand};
+use tombolo_pipelines::language::{Config, ReadError, Recording, StreamServer, TimedCommand};
 
 use crate::case::{Case, CaseError};
 use crate::history::{History, Through};
@@ -35,6 +35,8 @@ pub struct Options {
     pub pipelines: Option<PathBuf>,
     /// The orders to carry out; without them those that the case names.
     pub orders: Option<PathBuf>,
+    /// The journal whose newest run is carried out again, in place of all orders.
+    pub replay: Option<PathBuf>,
     /// How many steps to take.
     pub steps: Option<u64>,
     /// Whether to run without a server for viewers.
@@ -124,6 +126,7 @@ struct Read {
     case: Case,
     config: Config,
     orders: Vec<TimedCommand>,
+    replay: Option<Recording>,
     mesh: Mesh,
     surface: Surface,
     patches: Vec<Patch>,
@@ -135,12 +138,13 @@ impl Read {
         let case = Case::read(&options.case)?;
         let config = config(options, &case)?;
         let orders = orders(options, &case)?;
+        let replay = replay(options)?;
         let mesh = files::read_mesh(&case.mesh)?.mesh;
         let surface = Surface::extract(&mesh, &FeatureSettings::default())?;
         let patches = case.patches(&options.case, &surface)?;
         let history = options.history.as_deref().filter(|_| is_first);
         let history = history.map(History::create).transpose().map_err(unwritten)?;
-        Ok(Self { case, config, orders, mesh, surface, patches, history })
+        Ok(Self { case, config, orders, replay, mesh, surface, patches, history })
     }
 }
 
@@ -178,7 +182,7 @@ impl Run {
     ) -> Result<Self, ProgramError> {
         let is_first = communicator.rank() == 0;
         let read = agreed(&*communicator, Read::new(options, is_first))?;
-        let Read { case, config, orders, mesh, surface, patches, history } = read;
+        let Read { case, config, orders, replay, mesh, surface, patches, history } = read;
         let (share, patches) = Share::of(&communicator, &mesh, &surface, patches, options.dealing)?;
         let whole = (is_first && options.out.is_some()).then_some(mesh);
         let declared = case.declared_parameters();
@@ -194,6 +198,7 @@ impl Run {
             solvers,
             parameters: declared,
             orders,
+            replay,
             output: options.out.clone().unwrap_or_else(|| PathBuf::from(".")),
             file: options.pipelines.clone().or(case.pipelines.clone()),
         })?;
@@ -393,5 +398,12 @@ fn orders(options: &Options, case: &Case) -> Result<Vec<TimedCommand>, ProgramEr
     match options.orders.as_ref().or(case.orders.as_ref()) {
         None => Ok(Vec::new()),
         Some(file) => Ok(Settings::default().orders_from_file(file)?.orders),
+    }
+}
+
+fn replay(options: &Options) -> Result<Option<Recording>, ProgramError> {
+    match &options.replay {
+        None => Ok(None),
+        Some(file) => Ok(Settings::default().replay_from_file(file)?.replay),
     }
 }

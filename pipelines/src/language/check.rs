@@ -6,6 +6,7 @@ use serde::de::DeserializeOwned;
 use serde_json::Number;
 use tombolo_deform::edit::Edit;
 
+use super::journal::{JournalNote, is_like_entry, is_note};
 use super::kind::Kind;
 use super::mend::{Mender, Piece, Taken, rescue, take, take_list};
 use super::order::{Change, Command, Order};
@@ -15,7 +16,7 @@ use super::scan::{Member, Node, Value};
 use super::timed::{JournalEntry, OrderStatus, OrdersText, TimedCommand, lines, torn_line};
 use super::unread::Unread;
 use super::{
-    Action, Config, Deformation, LanguageErrors, Pipeline, Problem, Stage, monitors_of, near,
+    Action, Config, Deformation, LanguageErrors, Pipeline, Problem, Stage, monitors_of,
     parse_orders,
 };
 use crate::limits::WAITING_BYTES;
@@ -258,7 +259,11 @@ fn errors_in_lines(text: &str, file: &str, trial: &mut Tried<'_>) -> Option<Lang
         let errors = match Document::read(content, file) {
             Err(_) if torn == Some(number) => None,
             Err(error) => Some(error.into()),
-            Ok(line) if is_like_journal(&line) => errors_in(&line, |mender, tree| {
+            Ok(line) if is_note(&line) => errors_in(&line, |mender, tree| {
+                mender.read::<JournalNote>(tree);
+                Vec::new()
+            }),
+            Ok(line) if is_like_entry(&line) => errors_in(&line, |mender, tree| {
                 let set = |entry: &mut JournalEntry, order| entry.command = Some(order);
                 let Some(entry) = command(mender, tree, set).value else { return Vec::new() };
                 let mut problems = entry.problems();
@@ -279,12 +284,6 @@ fn errors_in_lines(text: &str, file: &str, trial: &mut Tried<'_>) -> Option<Lang
         }
     }
     all
-}
-
-/// Whether a line is one of a journal, whose key may be misspelt.
-fn is_like_journal(line: &Document<'_>) -> bool {
-    let is_like = |member: &Member| near(&member.key, ["status"]).next().is_some();
-    line.root.members().iter().any(is_like)
 }
 
 /// The ids of the commands of a journal that were rejected.

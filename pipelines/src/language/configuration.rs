@@ -21,8 +21,8 @@ pub struct Config {
     /// The server that viewers connect to; left out, there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stream: Option<StreamServer>,
-    /// The file that every command and its outcome is written to, one JSON object a line. It can be
-    /// given as a file of orders to another run.
+    /// The file that every command, its outcome and every shape handed out are written to, one JSON
+    /// object a line, below those of earlier runs. A run can be carried out again from it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub journal: Option<String>,
     /// How orders from viewers are carried out.

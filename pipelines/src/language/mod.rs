@@ -30,6 +30,7 @@ mod errors;
 mod extracts;
 mod file_pattern;
 mod glyphs;
+mod journal;
 mod kind;
 mod mend;
 mod message;
@@ -66,10 +67,13 @@ pub use extracts::{
 pub use file_pattern::file_pattern;
 pub(crate) use file_pattern::picture_pattern;
 pub use glyphs::{GlyphShape, Glyphs, GlyphsAt};
+pub use journal::{
+    HandedShape, JournalNote, LostLines, Recording, RunEnd, RunHeader, is_journal, parse_journal,
+};
 pub use message::{Message, parse_message};
 pub(crate) use monitors::{Condition, Line, Scope, Slot, columns, line, monitors_of};
 pub use monitors::{Monitor, check_parameters, monitors};
-pub use order::{Change, Command, Order, Question};
+pub use order::{Cancel, Change, Command, Order, Question};
 pub use parameter::Parameter;
 pub use parse::{ReadError, Validate, locate, parse_json, parse_valid, read_text, text};
 pub use pipeline::{AgainAfter, At, Budget, Cadence, Due, Pipeline};
@@ -84,7 +88,7 @@ pub use render::{Color, ColorMap, Component, Render, Shading};
 pub use sinks::{Csv, Existing, Log, LogLevel};
 pub use stage::{Action, ErrorBound, OrderStage, Select, Stage, StreamStage, Write};
 pub use streamlines::{Direction, SeedFeatures, SeedPlane, Seeds, Streamlines};
-pub use timed::{JournalEntry, OrderStatus, TimedCommand, parse_orders};
+pub use timed::{CommandAuthor, JournalEntry, OrderStatus, TimedCommand, parse_orders};
 pub(crate) use tombolo_deform::names::near;
 pub use tombolo_deform::names::nearest;
 pub use tombolo_deform::shape::Deformation;

@@ -146,6 +146,17 @@ pub enum Command {
     Parameter(Parameter),
     /// Pipelines are added, replaced or removed.
     Pipelines(PipelineChange),
+    /// An order that has not begun to move the mesh is taken back.
+    Cancel(Cancel),
+}
+
+/// Takes an order back that waits or whose shapes are being found. One whose motion is under way is
+/// undone by another order.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cancel {
+    /// The id of the order.
+    pub order: String,
 }
 
 impl Command {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use tombolo_deform::edit::{Displacement, Edit};
 
-use super::{Pipeline, Stage};
+use super::{Command, Pipeline, Stage};
 
 /// Resolves the files that edits name against the folder of `file`, the JSON file that the edits
 /// stand in, where they are relative.
@@ -26,6 +26,15 @@ pub fn resolve_files(edits: &mut [Edit], file: &str) {
         if let Edit::Displacement(import) = edit {
             resolve(import, file);
         }
+    }
+}
+
+/// Does so for the edits and pipelines of a command.
+pub(super) fn resolve_command_files(command: &mut Command, file: &str) {
+    match command {
+        Command::Order(order) => resolve_files(order.edits_mut(), file),
+        Command::Pipelines(change) => resolve_pipeline_files(change.pipelines_mut(), file),
+        _ => {}
     }
 }
 

@@ -1,19 +1,18 @@
 //! Commands given beforehand: files of orders, and the journals of other runs.
 
-use std::collections::{HashMap, HashSet};
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::order::{Command, Order};
+use super::journal::{is_of_journal, is_torn_entry, parse_lines};
+use super::order::{Cancel, Command, Order};
 use super::parameter::Parameter;
 use super::parse::{Document, Validate, check_length};
-use super::relative_files::{resolve_files, resolve_pipeline_files};
+use super::relative_files::resolve_command_files;
 use super::{At, LanguageError, PipelineChange, Problem};
-use crate::limits::{Exceeded, WAITING, WAITING_BYTES};
+use crate::limits::{WAITING, WAITING_BYTES};
 
 /// A command and when it is carried out: exactly one of `order`, `pause`, `resume`, `stop`,
-/// `parameter` and `pipelines`.
+/// `parameter`, `pipelines` and `cancel`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "TimedFields", into = "TimedFields")]
 pub struct TimedCommand {
@@ -52,6 +51,9 @@ macro_rules! with_command {
             /// Pipelines are added, replaced or removed.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pipelines: Option<PipelineChange>,
+            /// An order that has not begun to move the mesh is taken back.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            cancel: Option<Cancel>,
         }
 
         impl $name {
@@ -64,6 +66,7 @@ macro_rules! with_command {
                     self.stop.take().map(|_| Command::Stop {}),
                     self.parameter.take().map(Command::Parameter),
                     self.pipelines.take().map(Command::Pipelines),
+                    self.cancel.take().map(Command::Cancel),
                 ]
                 .into_iter()
                 .flatten()
@@ -82,13 +85,14 @@ macro_rules! with_command {
                     Command::Stop {} => self.stop = Some(Empty {}),
                     Command::Parameter(parameter) => self.parameter = Some(parameter),
                     Command::Pipelines(change) => self.pipelines = Some(change),
+                    Command::Cancel(cancel) => self.cancel = Some(cancel),
                 }
             }
         }
     };
 }
 
-const COMMANDS: &str = "`order`, `pause`, `resume`, `stop`, `parameter` and `pipelines`";
+const COMMANDS: &str = "`order`, `pause`, `resume`, `stop`, `parameter`, `pipelines` and `cancel`";
 
 /// No settings.
 #[derive(Clone, Serialize, Deserialize, JsonSchema)]
@@ -141,6 +145,22 @@ pub enum OrderStatus {
     NotConfirmed,
 }
 
+/// Who gave a command.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CommandAuthor {
+    /// The viewer of this name.
+    Viewer(String),
+    /// A file of orders.
+    File,
+    /// The pipeline of this name.
+    Pipeline(String),
+    /// The file of the configuration, which has changed.
+    Configuration,
+    /// The program that the adaptor is linked into.
+    Program,
+}
+
 /// One line of a journal. A command has a line when it is accepted, which holds the command, and a
 /// line of the same id when it is applied or rejected; one more where the solver did not follow, or
 /// where nobody could see whether it did.
@@ -158,6 +178,8 @@ pub struct JournalEntry {
     pub time: f64,
     /// The command; in the line that says it was accepted.
     pub command: Option<Command>,
+    /// Who gave the command; in the line that says it was accepted.
+    pub by: Option<CommandAuthor>,
     /// Why it was rejected.
     pub reason: Option<String>,
     /// The least scaled Jacobian on the path; of an order that the guard rejected, what it would
@@ -179,6 +201,8 @@ with_command! {
         cycle: u64,
         /// The simulated time then.
         time: f64,
+        /// Who gave the command.
+        by: CommandAuthor,
         /// Why it was rejected.
         reason: String,
         /// The least scaled Jacobian on the path; of an order that the guard rejected, what it
@@ -205,6 +229,7 @@ impl TryFrom<JournalFields> for JournalEntry {
             cycle: fields.cycle.ok_or("the key `cycle` is missing")?,
             time: fields.time.ok_or("the key `time` is missing")?,
             command,
+            by: fields.by,
             reason: fields.reason,
             min_scaled_jacobian: fields.min_scaled_jacobian,
             fraction: fields.fraction,
@@ -219,6 +244,7 @@ impl From<JournalEntry> for JournalFields {
             status: Some(entry.status),
             cycle: Some(entry.cycle),
             time: Some(entry.time),
+            by: entry.by,
             reason: entry.reason,
             min_scaled_jacobian: entry.min_scaled_jacobian,
             fraction: entry.fraction,
@@ -261,9 +287,10 @@ impl Validate for JournalEntry {
 /// Reads a file of orders: a JSON array of timed commands, one timed command, or the lines of a
 /// journal.
 ///
-/// From a journal come the commands that were accepted and not rejected, at the cycle at which each
-/// took effect, or was accepted where the run ended before. A last line that a killed run left
-/// half-written is passed over.
+/// From a journal come the commands of its newest run that took effect, each at the cycle at which
+/// it did; those of pipelines do not, because a run with the same pipelines gives them again. A last
+/// line that a killed run left half-written is passed over. Where runs are to be the same to the
+/// bit, read a journal with [`parse_journal`](super::parse_journal).
 ///
 /// Files that edits name lie beside `file` where they are relative.
 ///
@@ -285,13 +312,7 @@ impl Validate for JournalEntry {
 pub fn parse_orders(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageError> {
     check_length(text.len(), file, WAITING_BYTES)?;
     let mut commands = parse_commands(text, file)?;
-    for command in &mut commands {
-        match &mut command.command {
-            Command::Order(order) => resolve_files(order.edits_mut(), file),
-            Command::Pipelines(change) => resolve_pipeline_files(change.pipelines_mut(), file),
-            _ => {}
-        }
-    }
+    commands.iter_mut().for_each(|timed| resolve_command_files(&mut timed.command, file));
     Ok(commands)
 }
 
@@ -324,11 +345,14 @@ impl<'a> OrdersText<'a> {
         }
         match Document::read(text, file) {
             Ok(document) if start.starts_with('[') => Ok(OrdersText::List(document)),
-            Ok(document) if !is_of_journal(&document) => Ok(OrdersText::One(document)),
-            Ok(_) => Ok(OrdersText::Lines),
+            Ok(document) if is_of_journal(&document) => Ok(OrdersText::Lines),
+            Ok(document) => Ok(OrdersText::One(document)),
             Err(error) if start.starts_with('[') => Err(error),
             // Of what is written over several lines, neither of the first two is a whole value.
-            Err(_) if lines(text).take(2).any(|(_, line)| Document::read(line, file).is_ok()) => {
+            Err(_)
+                if lines(text).take(2).any(|(_, line)| Document::read(line, file).is_ok())
+                    || is_torn_entry(text) =>
+            {
                 Ok(OrdersText::Lines)
             }
             Err(error) => Err(error),
@@ -344,56 +368,5 @@ pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 
 /// The number of the line that a killed run may have left half-written: the last.
 pub(super) fn torn_line(text: &str) -> Option<usize> {
-    text.lines().count().checked_sub(1).filter(|&last| last > 0 && !text.ends_with('\n'))
-}
-
-fn is_of_journal(line: &Document<'_>) -> bool {
-    line.root.member("status").is_some()
-}
-
-fn parse_lines(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageError> {
-    let mut commands: Vec<TimedCommand> = Vec::new();
-    let mut indices = HashMap::new();
-    let mut rejected = HashSet::new();
-    for (number, content) in lines(text) {
-        let moved =
-            |failure: LanguageError| LanguageError { line: failure.line + number, ..failure };
-        let line = match Document::read(content, file) {
-            Err(_) if torn_line(text) == Some(number) => break,
-            line => line.map_err(moved)?,
-        };
-        let too_many = |exceeded: Exceeded| moved(line.locate(exceeded.into()));
-        WAITING.check(commands.len() + 1).map_err(too_many)?;
-        if !is_of_journal(&line) {
-            commands.push(line.valid().map_err(moved)?);
-            continue;
-        }
-        let entry: JournalEntry = line.valid().map_err(moved)?;
-        let at = Some(At::Cycle(entry.cycle));
-        match (entry.status, entry.command) {
-            (OrderStatus::Accepted, Some(command)) => {
-                indices.insert(entry.id.clone(), commands.len());
-                commands.push(TimedCommand { at, id: Some(entry.id), command });
-            }
-            (OrderStatus::Applied, command) => match (indices.get(&entry.id), command) {
-                (Some(&index), _) => commands[index].at = at,
-                (None, Some(command)) => {
-                    commands.push(TimedCommand { at, id: Some(entry.id), command })
-                }
-                (None, None) => {}
-            },
-            (OrderStatus::Rejected, _) => {
-                rejected.extend(indices.get(&entry.id).copied());
-            }
-            // What became of the mesh; the replaying solver does with it what it does.
-            (OrderStatus::Accepted, None)
-            | (OrderStatus::NotFollowed | OrderStatus::NotConfirmed, _) => {}
-        }
-    }
-    let mut index = 0;
-    commands.retain(|_| {
-        index += 1;
-        !rejected.contains(&(index - 1))
-    });
-    Ok(commands)
+    text.lines().count().checked_sub(1).filter(|_| !text.ends_with('\n'))
 }

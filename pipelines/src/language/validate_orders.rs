@@ -132,7 +132,9 @@ impl Validate for Command {
             Command::Pipelines(change) => {
                 change.validate().map_err(|problem| problem.within("pipelines"))
             }
-            Command::Pause {} | Command::Resume {} | Command::Stop {} => Ok(()),
+            Command::Pause {} | Command::Resume {} | Command::Stop {} | Command::Cancel(_) => {
+                Ok(())
+            }
         }
     }
 

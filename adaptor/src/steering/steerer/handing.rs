@@ -66,9 +66,16 @@ impl Steerer {
         lock(&self.present).own.clone_from(&self.own.offsets);
     }
 
-    /// Notes that the run ends, and that no call will show whether the solver went to the last
-    /// shape that it was handed.
-    pub(crate) fn end(&mut self) {
+    /// Notes that the run ends: orders whose turn has not come change nothing, and no call will show
+    /// whether the solver went to the last shape that it was handed.
+    pub(crate) fn end(&mut self, moment: Moment) {
+        if let Some(computing) = self.computing.take() {
+            let reason = "it was given up: the run ended before its shapes were known";
+            self.log.reject(&computing.id, moment, &reason.into());
+        }
+        for task in std::mem::take(&mut self.waiting) {
+            self.log.reject(&task.id, moment, &"the run ended before its turn came".into());
+        }
         if let Some(Pending { id, shape, moment, .. }) = self.pending.take() {
             self.log.not_confirmed(&id, moment, shape);
         }
@@ -86,12 +93,22 @@ impl Steerer {
             return false;
         }
         let Some(motion) = self.motion.as_mut() else { return false };
-        let (cycles, time) =
-            (moment.cycle.saturating_sub(motion.begun.cycle), moment.time - motion.begun.time);
-        if !motion.plan.schedule().is_due(motion.taken, cycles, time) {
+        let next = motion.taken + 1;
+        let is_due = match &mut self.recorded {
+            Some(recorded) if !recorded.goes_on(&motion.id, next) => {
+                self.give_up("the run that is carried out again went no further");
+                return false;
+            }
+            Some(recorded) => recorded.is_due(&motion.id, next, moment.cycle),
+            None => {
+                let begun = motion.begun;
+                let cycles = moment.cycle.saturating_sub(begun.cycle);
+                motion.plan.schedule().is_due(motion.taken, cycles, moment.time - begun.time)
+            }
+        };
+        if !is_due {
             return false;
         }
-        let next = motion.taken + 1;
         if !motion.plan.is_straight(motion.reached, next) {
             let reason = format!(
                 "the mesh stayed at shape {}, from which shape {next} is not a straight step",
@@ -155,6 +172,7 @@ impl Steerer {
         let quality = motion.plan.quality().shapes.get(motion.taken as usize - 1);
         self.quality = quality.map(|quality| (quality.min, quality.mean));
         let taken = motion.taken;
+        self.log.handed(&motion.id, taken, moment);
         self.log.update(&motion.id, |order| {
             order.shape = taken;
             if last {

@@ -1,6 +1,7 @@
 //! The shape of one mesh and the orders that change it.
 
 mod handing;
+mod recorded;
 
 use std::{
     collections::VecDeque,
@@ -14,7 +15,7 @@ use tombolo_deform::{
     shape::{CurrentShape, Forecast, Plan, Shaper},
     surface::Surface,
 };
-use tombolo_pipelines::language::Order;
+use tombolo_pipelines::language::{HandedShape, Order};
 
 use super::{
     Defaults, EditStack, Forecaster, Log, MeshMotion, OrderStatus, Queue, SurfaceMotion,
@@ -26,6 +27,7 @@ use super::{
 };
 use crate::{lock::lock, step::Moment};
 use handing::{Motion, Pending};
+use recorded::Recorded;
 
 /// An order waiting for its turn.
 struct Task {
@@ -37,6 +39,11 @@ struct Task {
 /// An order whose plan is being made.
 struct Computing {
     id: String,
+    /// The number of the plan.
+    number: u64,
+    order: Order,
+    /// The settings of orders as they were when it was asked for.
+    defaults: Defaults,
     stack: EditStack,
     asked: PlanRequest,
     /// Whether the mesh stays where it is until the plan is made, because the one before started
@@ -70,6 +77,8 @@ pub(crate) struct Steerer {
     pending: Option<Pending>,
     /// The mesh as it was lent last, against the shape.
     own: Own,
+    /// The shapes of the journal that is carried out again, in place of the schedules.
+    recorded: Option<Recorded>,
     /// The quality of the present shape as far as it is known: least and mean scaled Jacobian.
     quality: Option<(f64, f64)>,
     reference_quality: Option<(f64, f64, usize)>,
@@ -166,9 +175,15 @@ impl Steerer {
                 surface: SurfaceMotion { vertices: boundary, ..SurfaceMotion::default() },
                 ..MeshMotion::default()
             },
+            recorded: None,
             quality: None,
             reference_quality: None,
         }
+    }
+
+    /// Hands the shapes of a journal out, each at its cycle, whatever the schedules say.
+    pub(crate) fn repeat(&mut self, shapes: Vec<HandedShape>) {
+        self.recorded = Some(Recorded::new(shapes));
     }
 
     /// Gives orders that begin from now on other settings where they bring none.
@@ -219,7 +234,9 @@ impl Steerer {
 
     fn asked(&self, order: &Order) -> Result<(EditStack, PlanRequest), StackError> {
         let (stack, request) = self.defaults.request(&self.stack, self.here.clone(), order)?;
-        Ok((stack, PlanRequest { request, own: self.own.offsets.clone() }))
+        // A journal holds only what was let through with the motion that the solver had then.
+        let own = self.own.offsets.clone().filter(|_| self.recorded.is_none());
+        Ok((stack, PlanRequest { request, own }))
     }
 
     /// How many vertices the mesh has.
@@ -256,6 +273,27 @@ impl Steerer {
         self.waiting.push_back(Task { id, order, background: background && self.worker.is_some() });
     }
 
+    /// Takes an order back that waits or whose plan is being made; the error says that it moves the
+    /// mesh already. `None` where it is neither.
+    pub(crate) fn cancel(&mut self, id: &str) -> Option<Result<(), String>> {
+        if let Some(index) = self.waiting.iter().position(|task| task.id == id) {
+            self.waiting.remove(index);
+            return Some(Ok(()));
+        }
+        if let Some(computing) = self.computing.take_if(|computing| computing.id == id) {
+            if let Some(worker) = &self.worker {
+                worker.cancel(computing.number);
+            }
+            return Some(Ok(()));
+        }
+        let motion = self.motion.as_ref().filter(|motion| motion.id == id)?;
+        Some(Err(format!(
+            "order '{id}' moves the mesh already (shape {} of {}), so that it cannot be cancelled; an order {{\"undo\": 1}} goes back",
+            motion.taken,
+            motion.plan.shapes()
+        )))
+    }
+
     /// Brings orders as far as they can come now; says whether anything changed. Called at safe
     /// points only.
     pub(crate) fn advance(&mut self, moment: Moment, step_seconds: Option<f64>) -> bool {
@@ -284,11 +322,7 @@ impl Steerer {
     fn collect(&mut self, moment: Moment, step_seconds: Option<f64>) -> bool {
         let mut changed = false;
         while let Some(done) = self.worker.as_ref().and_then(Worker::try_take) {
-            let is_gone = matches!(done, Done::Planned(_)) && self.computing.is_none();
             self.finish(done, moment, step_seconds);
-            if is_gone {
-                self.worker = None;
-            }
             changed = true;
         }
         changed
@@ -301,10 +335,12 @@ impl Steerer {
             Err(error) => return self.log.reject(&id, moment, &error.into()),
         };
         self.log.update(&id, |order| order.status = OrderStatus::Computing);
-        let computing = Computing { id, stack, asked, resting: false };
-        match &self.worker {
+        let defaults = self.defaults.clone();
+        let mut computing =
+            Computing { id, number: 0, order, defaults, stack, asked, resting: false };
+        match &mut self.worker {
             Some(worker) if background => {
-                worker.plan(computing.asked.clone());
+                computing.number = worker.plan(computing.asked.clone());
                 self.computing = Some(computing);
             }
             _ => {
@@ -321,26 +357,41 @@ impl Steerer {
                 let Quality { min, mean, inverted, .. } = *quality;
                 self.reference_quality = Some((min, mean, inverted));
             }
-            Done::Planned(plan) => {
-                if let Some(mut computing) = self.computing.take() {
-                    let is_stale = plan
-                        .as_ref()
-                        .as_ref()
-                        .is_ok_and(|plan| !Arc::ptr_eq(plan.start(), &self.here.points));
-                    if let Some(worker) = self.worker.as_ref().filter(|_| is_stale) {
-                        // The worker may be at a forecast: the mesh waits for the way from here,
-                        // not the solver.
-                        computing.asked.request.start = self.here.clone();
-                        computing.asked.own.clone_from(&self.own.offsets);
-                        computing.resting = true;
-                        worker.plan(computing.asked.clone());
-                        self.computing = Some(computing);
-                        return;
-                    }
-                    self.commit(computing, *plan, moment, Instant::now(), step_seconds);
+            Done::Gone => {
+                self.worker = None;
+                if let Some(computing) = self.computing.take() {
+                    let gone = Rejection::from("the thread that plans shapes has ended");
+                    self.log.reject(&computing.id, moment, &gone);
                 }
             }
+            Done::Planned(number, plan) => {
+                // One that was cancelled counts no more.
+                let Some(computing) = self.computing.take_if(|asked| asked.number == number) else {
+                    return;
+                };
+                let is_of_now = |plan: &Plan| Arc::ptr_eq(plan.start(), &self.here.points);
+                let is_stale = (*plan).as_ref().is_ok_and(|plan| !is_of_now(plan))
+                    || computing.defaults != self.defaults;
+                if is_stale && self.worker.is_some() {
+                    return self.plan_anew(computing, moment);
+                }
+                self.commit(computing, *plan, moment, Instant::now(), step_seconds);
+            }
         }
+    }
+
+    /// Has the plan of an order made from where the mesh is now. The worker may be at a forecast: the
+    /// mesh waits for the plan, not the solver.
+    fn plan_anew(&mut self, computing: Computing, moment: Moment) {
+        let (stack, asked) = match self.asked(&computing.order) {
+            Ok(asked) => asked,
+            Err(error) => return self.log.reject(&computing.id, moment, &error.into()),
+        };
+        let Some(worker) = &mut self.worker else { return };
+        let number = worker.plan(asked.clone());
+        let defaults = self.defaults.clone();
+        self.computing =
+            Some(Computing { number, defaults, stack, asked, resting: true, ..computing });
     }
 
     /// Makes a plan the motion under way, or says why not.

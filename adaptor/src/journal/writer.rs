@@ -1,0 +1,535 @@
+//! The thread that writes a journal, and what waits for it.
+//!
+//! All lines that have come while it wrote the ones before are written together and are on disk
+//! together. Where writing fails, lines are kept, up to a limit, and written once it goes on.
+
+use std::{
+    collections::VecDeque,
+    path::Path,
+    sync::{Arc, Condvar, Mutex},
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
+
+use tombolo_pipelines::{
+    language::{JournalEntry, JournalNote, LostLines, OrderStatus},
+    limits::{WAITING, WAITING_BYTES},
+};
+
+use super::{
+    JournalError,
+    store::{Append, Store},
+};
+use crate::lock::lock;
+
+/// Bytes of lines that nobody waits for and that are kept while nothing can be written.
+const KEPT: usize = 4 << 20;
+/// How long a disk may take before the journal counts as lost.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// How long a journal that cannot be written is left alone.
+const PAUSE: Duration = Duration::from_millis(500);
+/// How long the end of a run waits for the disk.
+const END: Duration = Duration::from_secs(2);
+
+/// What became of a line that somebody waits for: it is on disk, or why it will not be.
+type Outcome = Result<(), String>;
+
+/// Called once, on any thread.
+type Settle = Box<dyn FnOnce(Outcome) + Send>;
+/// Called with the reason when the journal is lost, and with `None` when it goes on.
+type Tell = Box<dyn Fn(Option<&str>) + Send + Sync>;
+
+/// A journal being written, or none. Dropping it writes what is left, if the disk lets it.
+pub(crate) struct Journal {
+    shared: Option<Arc<Shared>>,
+    thread: Mutex<Option<JoinHandle<()>>>,
+}
+
+struct Shared {
+    state: Mutex<Waiting>,
+    changed: Condvar,
+    tell: Tell,
+}
+
+/// A line that is not on disk yet.
+struct Line {
+    text: Vec<u8>,
+    /// Who waits for it; and the line that takes it back, should they have been told that it is not
+    /// written and then it is.
+    asked: Option<(Settle, Vec<u8>)>,
+    /// Somebody waited for it, and does not any more.
+    is_withdrawn: bool,
+}
+
+#[derive(Default)]
+struct Waiting {
+    lines: VecDeque<Line>,
+    /// The lines that are being written, and since when.
+    under_way: Vec<Line>,
+    since: Option<Instant>,
+    bytes: usize,
+    asked: usize,
+    /// Lines that could not be kept.
+    lost: u64,
+    /// Why nothing can be written.
+    trouble: Option<String>,
+    is_closed: bool,
+    has_ended: bool,
+}
+
+impl Journal {
+    /// No journal: every line is let go.
+    pub(crate) fn none() -> Self {
+        Self { shared: None, thread: Mutex::default() }
+    }
+
+    /// Goes on with the journal of a file, or begins it, with the first line of a run. `tell` is
+    /// called when the journal is lost, and when it goes on.
+    pub(crate) fn open(
+        path: &Path,
+        first: &JournalNote,
+        tell: impl Fn(Option<&str>) + Send + Sync + 'static,
+    ) -> Result<Self, JournalError> {
+        let mut store = Store::open(path)?;
+        store
+            .append(&line(first))
+            .map_err(|source| JournalError::Write { path: path.into(), source })?;
+        Self::start(store, tell)
+    }
+
+    fn start(
+        store: impl Append,
+        tell: impl Fn(Option<&str>) + Send + Sync + 'static,
+    ) -> Result<Self, JournalError> {
+        let shared = Arc::new(Shared {
+            state: Mutex::default(),
+            changed: Condvar::new(),
+            tell: Box::new(tell),
+        });
+        let writing = Arc::clone(&shared);
+        let thread = std::thread::Builder::new()
+            .name("tombolo-journal".into())
+            .spawn(move || writing.write_until_closed(store))
+            .map_err(JournalError::Thread)?;
+        Ok(Self { shared: Some(shared), thread: Mutex::new(Some(thread)) })
+    }
+
+    /// Hands a line over to be written. Never waits.
+    pub(crate) fn write(&self, entry: &JournalEntry) {
+        self.push(line(entry));
+    }
+
+    /// Hands a line about the run over to be written. Never waits.
+    pub(crate) fn note(&self, note: &JournalNote) {
+        self.push(line(note));
+    }
+
+    fn push(&self, text: Vec<u8>) {
+        let Some(shared) = &self.shared else { return };
+        let mut state = lock(&shared.state);
+        let is_stuck = state.trouble.is_some() || state.since.is_some();
+        if is_stuck && state.bytes + text.len() > KEPT {
+            state.lost += 1;
+            return;
+        }
+        state.push(Line { text, asked: None, is_withdrawn: false });
+        shared.changed.notify_all();
+    }
+
+    /// Has a line written, and `settle` called once it is on disk, or once it is known that it will
+    /// not be. Without a journal that is at once.
+    pub(crate) fn ask(&self, entry: &JournalEntry, settle: impl FnOnce(Outcome) + Send + 'static) {
+        let Some(shared) = &self.shared else { return settle(Ok(())) };
+        let taken_back = JournalEntry {
+            status: OrderStatus::Rejected,
+            command: None,
+            by: None,
+            reason: Some("it was refused: the journal took too long to write it".into()),
+            ..entry.clone()
+        };
+        let (text, taken_back) = (line(entry), line(&taken_back));
+        let mut state = lock(&shared.state);
+        let room = WAITING
+            .check(state.asked + 1)
+            .and_then(|()| WAITING_BYTES.check(state.bytes + text.len()));
+        let refused = match (&state.trouble, room) {
+            (Some(reason), _) => reason.clone(),
+            (None, Err(exceeded)) => format!("{exceeded}, that wait to be written to the journal"),
+            (None, Ok(())) => {
+                let asked = Some((Box::new(settle) as Settle, taken_back));
+                state.push(Line { text, asked, is_withdrawn: false });
+                shared.changed.notify_all();
+                return;
+            }
+        };
+        drop(state);
+        settle(Err(refused));
+    }
+
+    /// Finds out whether the disk takes too long, and refuses what waits for it then. To be called a
+    /// few times a second by somebody who does not wait for the disk.
+    pub(crate) fn look_at_time(&self) {
+        let Some(shared) = &self.shared else { return };
+        let mut state = lock(&shared.state);
+        if state.trouble.is_some() || state.since.is_none_or(|since| since.elapsed() < PATIENCE) {
+            return;
+        }
+        let reason = format!("the disk has not answered for {} seconds", PATIENCE.as_secs());
+        state.trouble = Some(reason.clone());
+        let refused = state.withdraw();
+        drop(state);
+        (shared.tell)(Some(&reason));
+        refused.into_iter().for_each(|settle| settle(Err(reason.clone())));
+    }
+
+    /// Why nothing can be written, or that lines are missing.
+    pub(crate) fn lost(&self) -> Option<String> {
+        let state = lock(&self.shared.as_ref()?.state);
+        let missing = (state.lost > 0).then(|| format!("{} lines are missing", state.lost));
+        state.trouble.clone().or(missing)
+    }
+
+    /// Waits until all lines are on disk, two seconds at most, and ends the thread. No line is
+    /// written afterwards.
+    pub(crate) fn close(&self) {
+        let Some(shared) = &self.shared else { return };
+        let Some(thread) = lock(&self.thread).take() else { return };
+        if thread.thread().id() == std::thread::current().id() {
+            return;
+        }
+        let mut state = lock(&shared.state);
+        state.is_closed = true;
+        shared.changed.notify_all();
+        let until = Instant::now() + END;
+        while !state.has_ended {
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                log::warn!(
+                    "the journal's last {} lines are not on disk: {}",
+                    state.lines.len() + state.under_way.len(),
+                    state.trouble.as_deref().unwrap_or("the disk does not answer")
+                );
+                // The thread hangs in the system; it ends with the process.
+                return;
+            }
+            state = shared
+                .changed
+                .wait_timeout(state, left)
+                .unwrap_or_else(std::sync::PoisonError::into_inner)
+                .0;
+        }
+        drop(state);
+        let _ = thread.join();
+    }
+}
+
+impl Drop for Journal {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+impl Waiting {
+    fn push(&mut self, line: Line) {
+        self.bytes += line.text.len();
+        self.asked += usize::from(line.asked.is_some());
+        self.lines.push_back(line);
+    }
+
+    /// Those who wait, who are to be told that it was in vain. What they asked for is not written
+    /// any more, or taken back if it is being written.
+    fn withdraw(&mut self) -> Vec<Settle> {
+        let mut refused = Vec::new();
+        let mut taken_back = Vec::new();
+        for line in &mut self.under_way {
+            if let Some((settle, back)) = line.asked.take() {
+                refused.push(settle);
+                taken_back.push(back);
+                line.is_withdrawn = true;
+            }
+        }
+        for mut line in std::mem::take(&mut self.lines) {
+            match line.asked.take() {
+                Some((settle, _)) => {
+                    self.bytes -= line.text.len();
+                    refused.push(settle);
+                }
+                None => self.lines.push_back(line),
+            }
+        }
+        for text in taken_back {
+            self.push(Line { text, asked: None, is_withdrawn: false });
+        }
+        self.asked = 0;
+        refused
+    }
+}
+
+impl Shared {
+    fn write_until_closed(&self, mut store: impl Append) {
+        let mut state = lock(&self.state);
+        loop {
+            while state.lines.is_empty() && state.lost == 0 && !state.is_closed {
+                state = crate::lock::wait(&self.changed, state);
+            }
+            if state.lines.is_empty() && state.lost == 0 {
+                break;
+            }
+            let lost = state.lost;
+            let mut text = Vec::with_capacity(state.bytes);
+            state.under_way = std::mem::take(&mut state.lines).into();
+            state.under_way.iter().for_each(|line| text.extend(&line.text));
+            if lost > 0 {
+                text.extend(line(&JournalNote::Lost(LostLines { lines: lost })));
+            }
+            state.since = Some(Instant::now());
+            drop(state);
+            let written = store.append(&text);
+            state = lock(&self.state);
+            state.since = None;
+            let lines = std::mem::take(&mut state.under_way);
+            let was_lost = state.trouble.take();
+            let (settled, trouble) = match written {
+                Ok(()) => {
+                    state.lost -= lost;
+                    state.bytes -= lines.iter().map(|line| line.text.len()).sum::<usize>();
+                    let asked = lines.into_iter().filter_map(|line| line.asked);
+                    let settled: Vec<Settle> = asked.map(|(settle, _)| settle).collect();
+                    state.asked -= settled.len();
+                    (settled, None)
+                }
+                Err(reason) => {
+                    let reason = reason.to_string();
+                    // Those who wait are refused; the other lines are for the next time. Lines that
+                    // take back what was never written are harmless.
+                    state.under_way = lines;
+                    let mut settled = state.withdraw();
+                    let kept = std::mem::take(&mut state.under_way).into_iter();
+                    let (withdrawn, kept): (Vec<_>, Vec<_>) =
+                        kept.partition(|line| line.is_withdrawn);
+                    state.bytes -= withdrawn.iter().map(|line| line.text.len()).sum::<usize>();
+                    kept.into_iter().rev().for_each(|line| state.lines.push_front(line));
+                    state.trouble = Some(reason.clone());
+                    let refused = settled.drain(..).collect();
+                    (refused, Some(reason))
+                }
+            };
+            drop(state);
+            match (&was_lost, &trouble) {
+                (Some(_), None) => (self.tell)(None),
+                (before, Some(now)) if before.as_ref() != Some(now) => (self.tell)(Some(now)),
+                _ => {}
+            }
+            let outcome = trouble.clone().map_or(Ok(()), Err);
+            settled.into_iter().for_each(|settle| settle(outcome.clone()));
+            state = lock(&self.state);
+            if trouble.is_some() {
+                if state.is_closed {
+                    break;
+                }
+                let until = Instant::now() + PAUSE;
+                while !state.is_closed && Instant::now() < until {
+                    let left = until.saturating_duration_since(Instant::now());
+                    state = self
+                        .changed
+                        .wait_timeout(state, left)
+                        .unwrap_or_else(std::sync::PoisonError::into_inner)
+                        .0;
+                }
+            }
+        }
+        if !state.lines.is_empty() {
+            log::warn!(
+                "the journal {} lacks its last {} lines: {}",
+                store.path().display(),
+                state.lines.len(),
+                state.trouble.as_deref().unwrap_or("")
+            );
+        }
+        state.has_ended = true;
+        self.changed.notify_all();
+    }
+}
+
+/// A line of JSON. What a journal holds has text keys alone and cannot fail.
+fn line(of: &impl serde::Serialize) -> Vec<u8> {
+    let mut line = serde_json::to_vec(of).unwrap_or_default();
+    line.push(b'\n');
+    line
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{
+        io,
+        sync::mpsc::{Receiver, Sender, channel},
+    };
+
+    use tombolo_pipelines::language::{Change, Command, Order, RunEnd};
+
+    use super::*;
+
+    /// A disk that answers as the test says: each write waits for its word.
+    struct Disk {
+        answers: Receiver<io::Result<()>>,
+        written: Arc<Mutex<String>>,
+    }
+
+    impl Append for Disk {
+        fn append(&mut self, lines: &[u8]) -> io::Result<()> {
+            self.answers.recv().unwrap_or(Ok(()))?;
+            lock(&self.written).push_str(std::str::from_utf8(lines).unwrap());
+            Ok(())
+        }
+
+        fn path(&self) -> &Path {
+            Path::new("journal.jsonl")
+        }
+    }
+
+    struct Desk {
+        journal: Journal,
+        disk: Sender<io::Result<()>>,
+        written: Arc<Mutex<String>>,
+        told: Arc<Mutex<Vec<Option<String>>>>,
+        outcomes: (Sender<(String, Outcome)>, Receiver<(String, Outcome)>),
+    }
+
+    impl Desk {
+        fn new() -> Self {
+            let (disk, answers) = channel();
+            let (written, told) =
+                (Arc::<Mutex<String>>::default(), Arc::<Mutex<Vec<_>>>::default());
+            let store = Disk { answers, written: Arc::clone(&written) };
+            let tells = Arc::clone(&told);
+            let tell = move |reason: Option<&str>| lock(&tells).push(reason.map(str::to_owned));
+            let journal = Journal::start(store, tell).unwrap();
+            Self { journal, disk, written, told, outcomes: channel() }
+        }
+
+        fn ask(&self, id: &str) {
+            let (tell, id) = (self.outcomes.0.clone(), id.to_owned());
+            let entry = entry(&id);
+            self.journal.ask(&entry, move |outcome| tell.send((id, outcome)).unwrap());
+        }
+
+        fn outcome(&self) -> (String, Outcome) {
+            self.outcomes.1.recv_timeout(Duration::from_secs(100)).unwrap()
+        }
+
+        /// Waits until the thread is at the disk.
+        fn wait_for_write(&self) {
+            let shared = self.journal.shared.as_ref().unwrap();
+            while lock(&shared.state).since.is_none() {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
+
+        fn finish(self) -> (String, Vec<Option<String>>) {
+            drop(self.disk);
+            self.journal.close();
+            (lock(&self.written).clone(), lock(&self.told).clone())
+        }
+    }
+
+    fn entry(id: &str) -> JournalEntry {
+        JournalEntry {
+            id: id.into(),
+            status: OrderStatus::Accepted,
+            cycle: 1,
+            time: 0.5,
+            command: Some(Command::Order(Order::from(Change::Stack(Vec::new())))),
+            by: None,
+            reason: None,
+            min_scaled_jacobian: None,
+            fraction: None,
+        }
+    }
+
+    fn end(cycle: u64) -> JournalNote {
+        JournalNote::End(RunEnd { cycle, time: 0.0 })
+    }
+
+    #[test]
+    fn what_came_meanwhile_is_written_together_and_then_answered() {
+        let desk = Desk::new();
+        desk.ask("a");
+        desk.wait_for_write();
+        desk.ask("b");
+        desk.journal.note(&end(7));
+        desk.ask("c");
+        assert!(desk.outcomes.1.try_recv().is_err(), "nothing is on disk yet");
+        desk.disk.send(Ok(())).unwrap();
+        assert_eq!(desk.outcome(), ("a".into(), Ok(())));
+        desk.disk.send(Ok(())).unwrap();
+        assert_eq!([desk.outcome().0, desk.outcome().0], ["b", "c"]);
+        let (written, told) = desk.finish();
+        assert_eq!((written.lines().count(), told.len()), (4, 0));
+    }
+
+    #[test]
+    fn on_a_full_disk_nothing_is_accepted_and_nothing_else_is_lost() {
+        let desk = Desk::new();
+        let full = || Err(io::Error::other("no space left"));
+        desk.ask("a");
+        desk.wait_for_write();
+        desk.journal.note(&end(1));
+        desk.disk.send(full()).unwrap();
+        assert_eq!(desk.outcome(), ("a".into(), Err("no space left".into())));
+        desk.ask("b");
+        assert_eq!(desk.outcome(), ("b".into(), Err("no space left".into())));
+        assert_eq!(desk.journal.lost().as_deref(), Some("no space left"));
+        desk.journal.note(&end(2));
+        desk.disk.send(full()).unwrap();
+        desk.disk.send(Ok(())).unwrap();
+        while desk.journal.lost().is_some() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        desk.disk.send(Ok(())).unwrap();
+        desk.ask("c");
+        assert_eq!(desk.outcome(), ("c".into(), Ok(())));
+        let (written, told) = desk.finish();
+        assert_eq!(told, [Some("no space left".into()), None]);
+        for (held, text) in [("\"cycle\":1,\"time\":0.0", 1), ("\"cycle\":2", 1), ("\"c\"", 1)] {
+            assert_eq!(written.matches(held).count(), text, "{held} in {written}");
+        }
+        for id in ["a", "b"] {
+            assert!(!written.contains(&format!("\"{id}\",\"status\":\"accepted\"")), "{written}");
+        }
+    }
+
+    #[test]
+    fn what_hangs_is_refused_and_taken_back_when_it_was_written_after_all() {
+        let desk = Desk::new();
+        desk.ask("a");
+        desk.wait_for_write();
+        desk.ask("b");
+        let shared = desk.journal.shared.as_ref().unwrap();
+        desk.journal.look_at_time();
+        assert!(desk.outcomes.1.try_recv().is_err(), "it has not waited long enough");
+        lock(&shared.state).since = Instant::now().checked_sub(PATIENCE);
+        desk.journal.look_at_time();
+        for id in ["a", "b"] {
+            let (refused, outcome) = desk.outcome();
+            assert_eq!(refused, id);
+            assert!(outcome.unwrap_err().contains("has not answered"));
+        }
+        let (written, told) = desk.finish();
+        assert_eq!(told.len(), 2, "{told:?}");
+        assert!(written.contains("\"a\",\"status\":\"accepted\""), "{written}");
+        assert!(written.contains("\"a\",\"status\":\"rejected\""), "{written}");
+        assert!(!written.contains("\"b\""), "{written}");
+    }
+
+    #[test]
+    fn more_than_can_be_kept_is_counted() {
+        let desk = Desk::new();
+        desk.journal.note(&end(1));
+        desk.wait_for_write();
+        let long = JournalEntry { reason: Some("x".repeat(1 << 20)), ..entry("a") };
+        (0..10).for_each(|_| desk.journal.write(&long));
+        let (written, _) = desk.finish();
+        assert_eq!(written.lines().count(), 1 + 3 + 1);
+        assert!(written.ends_with("{\"lost\":{\"lines\":7}}\n"), "{}", &written[..80]);
+    }
+}

@@ -1,0 +1,181 @@
+//! The commands of a run that are kept, by their names.
+
+use std::{
+    collections::{HashMap, VecDeque},
+    hash::{DefaultHasher, Hash, Hasher},
+};
+
+use serde_json::{Value, json};
+use tombolo_pipelines::language::Order;
+
+use super::order_report::{ORDERS_KEPT, OrderReport};
+
+/// Orders that a viewer is told of when it connects.
+const ORDERS_TOLD: usize = 100;
+/// Bytes of JSON up to which an order itself is told too; a longer one holds the numbers of a
+/// displacement.
+const TOLD_WHOLE: usize = 16 << 10;
+
+/// The commands that were given, as far as they are kept.
+#[derive(Default)]
+pub(super) struct KnownCommands {
+    orders: VecDeque<OrderReport>,
+    /// The newest orders as they were given, by their names.
+    given: VecDeque<(String, Value)>,
+    /// What became of the newest of the other commands, as their senders were told.
+    outcomes: VecDeque<(String, Value)>,
+    /// The names that are taken, with what their messages say; oldest first in `named`.
+    names: HashMap<String, Option<u64>>,
+    named: VecDeque<String>,
+    counted: u64,
+}
+
+/// A name for a command.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Named {
+    /// It is a new command.
+    New(String),
+    /// The same message came before.
+    Again(String),
+}
+
+impl KnownCommands {
+    /// Gives a command a name: the one that is wanted, or a new one. `text` is the message that it
+    /// came in.
+    ///
+    /// # Errors
+    /// Where another command has that name already.
+    pub(super) fn name(
+        &mut self,
+        wanted: Option<String>,
+        text: Option<&str>,
+    ) -> Result<Named, String> {
+        let digest = text.map(|text| {
+            let mut hasher = DefaultHasher::new();
+            text.hash(&mut hasher);
+            hasher.finish()
+        });
+        let id = match wanted {
+            Some(id) => match self.names.get(&id) {
+                Some(known) if known.is_some() && *known == digest => return Ok(Named::Again(id)),
+                Some(_) => return Err(format!("the id '{id}' was given to another command")),
+                None => id,
+            },
+            None => self.next_id(),
+        };
+        if self.named.len() >= 2 * ORDERS_KEPT
+            && let Some(oldest) = self.named.pop_front()
+        {
+            self.names.remove(&oldest);
+        }
+        self.names.insert(id.clone(), digest);
+        self.named.push_back(id.clone());
+        Ok(Named::New(id))
+    }
+
+    /// Lets go of the name of a command that was not taken.
+    pub(super) fn forget(&mut self, id: &str) {
+        self.names.remove(id);
+        self.named.retain(|named| named != id);
+    }
+
+    /// Notes an order, with what it asks for where that is told.
+    pub(super) fn add(&mut self, id: &str, given: Option<Value>) {
+        if self.given.len() >= ORDERS_TOLD {
+            self.given.pop_front();
+        }
+        self.given.extend(given.map(|given| (id.to_owned(), given)));
+        if self.orders.len() >= ORDERS_KEPT {
+            self.orders.pop_front();
+        }
+        self.orders.push_back(OrderReport { id: id.to_owned(), ..OrderReport::default() });
+    }
+
+    /// Notes what the sender of a command that is no order was told.
+    pub(super) fn settle(&mut self, id: &str, told: Value) {
+        if self.outcomes.len() >= ORDERS_KEPT {
+            self.outcomes.pop_front();
+        }
+        self.outcomes.push_back((id.to_owned(), told));
+    }
+
+    /// What became of a command, as a message for a viewer; `None` where nothing has yet.
+    pub(super) fn outcome(&self, id: &str) -> Option<Value> {
+        match self.order(id) {
+            Some(order) => Some(json!({"order": self.told(order)})),
+            None => self.outcomes.iter().rev().find(|known| known.0 == id).map(|it| it.1.clone()),
+        }
+    }
+
+    pub(super) fn order(&self, id: &str) -> Option<&OrderReport> {
+        self.orders.iter().rev().find(|order| order.id == id)
+    }
+
+    pub(super) fn order_mut(&mut self, id: &str) -> Option<&mut OrderReport> {
+        self.orders.iter_mut().rev().find(|order| order.id == id)
+    }
+
+    /// An order's report, with what was asked for.
+    pub(super) fn told(&self, order: &OrderReport) -> Value {
+        let mut told = json!(order);
+        if let Some((_, given)) = self.given.iter().rev().find(|(id, _)| *id == order.id) {
+            told["order"] = given.clone();
+        }
+        told
+    }
+
+    /// The newest orders, for a viewer that connects.
+    pub(super) fn newest(&self) -> Value {
+        let skipped = self.orders.len().saturating_sub(ORDERS_TOLD);
+        self.orders.iter().skip(skipped).map(|order| self.told(order)).collect()
+    }
+
+    pub(super) fn reports(&self) -> Vec<OrderReport> {
+        self.orders.iter().cloned().collect()
+    }
+
+    fn next_id(&mut self) -> String {
+        loop {
+            self.counted += 1;
+            let id = format!("o{}", self.counted);
+            if !self.names.contains_key(&id) {
+                return id;
+            }
+        }
+    }
+}
+
+/// An order as JSON, unless it is long; of a long one no more is written than it takes to find that
+/// out.
+pub(super) fn told_whole(order: &Order) -> Option<Value> {
+    let mut bytes = [0; TOLD_WHOLE];
+    let mut rest = &mut bytes[..];
+    serde_json::to_writer(&mut rest, order).ok()?;
+    let written = TOLD_WHOLE - rest.len();
+    serde_json::from_slice(&bytes[..written]).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_same_message_again_is_known_and_another_of_its_name_is_refused() {
+        let mut known = KnownCommands::default();
+        let named = |known: &mut KnownCommands, text| known.name(Some("a".into()), text);
+        assert_eq!(named(&mut known, Some("x")), Ok(Named::New("a".into())));
+        assert_eq!(named(&mut known, Some("x")), Ok(Named::Again("a".into())));
+        assert!(named(&mut known, Some("y")).is_err() && named(&mut known, None).is_err());
+        known.forget("a");
+        assert_eq!(named(&mut known, Some("y")), Ok(Named::New("a".into())));
+        assert_eq!(known.name(None, None), Ok(Named::New("o1".into())));
+        assert!(known.name(Some("o1".into()), None).is_err());
+    }
+
+    #[test]
+    fn names_are_not_kept_without_end() {
+        let mut known = KnownCommands::default();
+        (0..3 * ORDERS_KEPT).for_each(|_| drop(known.name(None, None)));
+        assert_eq!((known.names.len(), known.named.len()), (2 * ORDERS_KEPT, 2 * ORDERS_KEPT));
+    }
+}

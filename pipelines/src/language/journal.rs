@@ -1,0 +1,304 @@
+//! Journals: every command of a run and what became of it, and each shape that the solver was
+//! handed.
+
+use std::collections::HashMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tombolo_deform::quality::Guard;
+use tombolo_deform::schedule::Schedule;
+
+use super::order::Command;
+use super::parse::{Document, check_length};
+use super::relative_files::resolve_command_files;
+use super::scan::Member;
+use super::timed::{CommandAuthor, JournalEntry, OrderStatus, TimedCommand, lines, torn_line};
+use super::{At, Deformation, LanguageError, near};
+use crate::limits::{WAITING, WAITING_BYTES};
+
+/// A line of a journal that is about the run and not about one command.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum JournalNote {
+    /// A run begins. Lines of earlier runs may stand above it.
+    Run(RunHeader),
+    /// The solver was handed a shape.
+    Shape(HandedShape),
+    /// Lines are missing here.
+    Lost(LostLines),
+    /// The run came to its end.
+    End(RunEnd),
+}
+
+/// The first line of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunHeader {
+    /// The run, told apart from all others by a random number.
+    pub id: String,
+    /// The version of the library.
+    pub version: String,
+    /// When it began, in seconds since 1970-01-01 UTC.
+    pub began: u64,
+    /// How the motion of the surface is carried into the volume by orders that do not say so.
+    pub deform: Deformation,
+    /// The guard of orders that bring none.
+    pub guard: Guard,
+    /// The schedule of orders that bring none.
+    pub schedule: Schedule,
+}
+
+/// A shape that the solver was handed.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HandedShape {
+    /// The id of its order.
+    pub order: String,
+    /// Which shape of the order it is, counted from 1.
+    pub shape: u32,
+    /// The cycle over whose step the mesh moves there.
+    pub cycle: u64,
+}
+
+/// Lines that could neither be written nor kept until they could.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LostLines {
+    /// How many.
+    pub lines: u64,
+}
+
+/// The last line of a run that was not killed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunEnd {
+    /// The cycle of its last call.
+    pub cycle: u64,
+    /// The simulated time then.
+    pub time: f64,
+}
+
+/// The newest run of a journal, as it is carried out again: the same shapes at the same cycles.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Recording {
+    /// Its first line; `None` in a journal without one.
+    pub run: Option<RunHeader>,
+    /// The commands that took effect, in that order, each at its cycle. The commands of pipelines
+    /// are among them.
+    pub commands: Vec<TimedCommand>,
+    /// The shapes that the solver was handed, in that order.
+    pub shapes: Vec<HandedShape>,
+    /// The lines that are missing.
+    pub lost: u64,
+}
+
+/// Reads a journal as a recording of its newest run.
+///
+/// Orders that were rejected, cancelled or still waiting when the run ended are not in it. A last
+/// line that a killed run left half-written is passed over. Files that edits name lie beside `file`
+/// where they are relative.
+///
+/// # Errors
+/// A [`LanguageError`] at the first line that is wrong.
+///
+/// # Example
+/// ```
+/// use tombolo_pipelines::language::parse_journal;
+///
+/// let journal = r#"{"id":"a","status":"accepted","cycle":3,"time":0.3,"order":{"undo":1}}
+/// {"id":"b","status":"accepted","cycle":4,"time":0.4,"order":{"undo":1}}
+/// {"id":"a","status":"applied","cycle":5,"time":0.5}
+/// {"shape":{"order":"a","shape":1,"cycle":7}}
+/// {"id":"c","status":"acc"#;
+/// let recording = parse_journal(journal, "journal.jsonl").unwrap();
+/// assert_eq!((recording.commands.len(), recording.shapes[0].cycle), (1, 7));
+/// ```
+pub fn parse_journal(text: &str, file: &str) -> Result<Recording, LanguageError> {
+    check_length(text.len(), file, WAITING_BYTES)?;
+    let known = read_lines(text, file)?;
+    let commands = known.commands.into_iter().filter(|known| known.is_carried_out);
+    let mut commands: Vec<_> = commands.collect();
+    commands.sort_by_key(|known| known.took_effect);
+    let mut commands: Vec<TimedCommand> = commands.into_iter().map(|known| known.timed).collect();
+    commands.iter_mut().for_each(|timed| resolve_command_files(&mut timed.command, file));
+    Ok(Recording { run: known.run, commands, shapes: known.shapes, lost: known.lost })
+}
+
+/// The commands of a text whose lines are those of a journal, timed commands, or both.
+pub(super) fn parse_lines(text: &str, file: &str) -> Result<Vec<TimedCommand>, LanguageError> {
+    let is_given_again = |known: &Known| matches!(known.by, Some(CommandAuthor::Pipeline(_)));
+    let known = read_lines(text, file)?.commands.into_iter();
+    let mut commands: Vec<Known> =
+        known.filter(|known| known.is_carried_out && !is_given_again(known)).collect();
+    commands.sort_by_key(|known| known.took_effect);
+    Ok(commands.into_iter().map(|known| known.timed).collect())
+}
+
+/// A command of a journal.
+struct Known {
+    timed: TimedCommand,
+    by: Option<CommandAuthor>,
+    /// The number of the line that says when it took effect.
+    took_effect: usize,
+    is_carried_out: bool,
+}
+
+/// The lines of the newest run.
+#[derive(Default)]
+struct KnownLines {
+    run: Option<RunHeader>,
+    commands: Vec<Known>,
+    shapes: Vec<HandedShape>,
+    lost: u64,
+}
+
+fn read_lines(text: &str, file: &str) -> Result<KnownLines, LanguageError> {
+    let mut known = KnownLines::default();
+    let mut indices: HashMap<String, usize> = HashMap::new();
+    for (number, content) in lines(text) {
+        let moved =
+            |failure: LanguageError| LanguageError { line: failure.line + number, ..failure };
+        let line = match Document::read(content, file) {
+            Err(_) if torn_line(text) == Some(number) => break,
+            line => line.map_err(moved)?,
+        };
+        if is_note(&line) {
+            match line.value().map_err(moved)? {
+                JournalNote::Run(run) => {
+                    indices.clear();
+                    known = KnownLines { run: Some(run), ..KnownLines::default() };
+                }
+                JournalNote::Shape(shape) => known.shapes.push(shape),
+                JournalNote::Lost(LostLines { lines }) => known.lost += lines,
+                JournalNote::End(_) => {}
+            }
+            continue;
+        }
+        WAITING
+            .check(known.commands.len() + 1)
+            .map_err(|exceeded| moved(line.locate(exceeded.into())))?;
+        if !is_entry(&line) {
+            let timed = line.valid().map_err(moved)?;
+            let known_of = Known { timed, by: None, took_effect: number, is_carried_out: true };
+            known.commands.push(known_of);
+            continue;
+        }
+        let entry: JournalEntry = line.valid().map_err(moved)?;
+        let at = Some(At::Cycle(entry.cycle));
+        let index = indices.get(&entry.id).copied();
+        match (entry.status, entry.command, index) {
+            (status @ (OrderStatus::Accepted | OrderStatus::Applied), Some(command), None) => {
+                indices.insert(entry.id.clone(), known.commands.len());
+                // What it did stands in what became of the order that it took back.
+                let is_carried_out =
+                    status == OrderStatus::Applied && !matches!(command, Command::Cancel(_));
+                known.commands.push(Known {
+                    timed: TimedCommand { at, id: Some(entry.id), command },
+                    by: entry.by,
+                    took_effect: number,
+                    is_carried_out,
+                });
+            }
+            (OrderStatus::Applied, _, Some(index)) => {
+                let command = &mut known.commands[index];
+                command.timed.at = at;
+                command.took_effect = number;
+                command.is_carried_out = !matches!(command.timed.command, Command::Cancel(_));
+            }
+            (OrderStatus::Rejected, _, Some(index)) => {
+                known.commands[index].is_carried_out = false;
+            }
+            // What became of the mesh; the replaying solver does with it what it does.
+            _ => {}
+        }
+    }
+    Ok(known)
+}
+
+/// Whether a line is one of a journal: it holds a status, or is a note.
+pub(super) fn is_of_journal(line: &Document<'_>) -> bool {
+    is_entry(line) || is_note(line)
+}
+
+fn is_entry(line: &Document<'_>) -> bool {
+    line.root.member("status").is_some()
+}
+
+const NOTES: [&str; 4] = ["run", "shape", "lost", "end"];
+
+/// Whether a line is a note.
+pub(super) fn is_note(line: &Document<'_>) -> bool {
+    matches!(line.root.members(), [member] if NOTES.contains(&&*member.key))
+}
+
+/// Whether a line is one of a journal about a command, whose key may be misspelt.
+pub(super) fn is_like_entry(line: &Document<'_>) -> bool {
+    let is_like = |member: &Member| near(&member.key, ["status"]).next().is_some();
+    line.root.members().iter().any(is_like)
+}
+
+/// Whether a text could be a journal that is continued: it is empty, or its first line is one of a
+/// journal or torn.
+#[must_use]
+pub fn is_journal(text: &str) -> bool {
+    match lines(text).next() {
+        None => true,
+        Some((_, line)) => match Document::read(line, "journal") {
+            Ok(line) => is_of_journal(&line),
+            Err(_) => is_torn_entry(text),
+        },
+    }
+}
+
+/// Whether a text is nothing but the beginning of a journal's first line: that of a run that was
+/// killed while it wrote it.
+pub(super) fn is_torn_entry(text: &str) -> bool {
+    let begins = |start: &&str| text.starts_with(start);
+    text.lines().count() == 1
+        && !text.ends_with('\n')
+        && ["{\"run\":{", "{\"id\":\""].iter().any(begins)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_took_effect_in_the_newest_run_is_carried_out_again() {
+        let text = r#"{"run":{"id":"1","version":"0","began":0,"deform":{},"guard":{},"schedule":{"steps":1}}}
+{"id":"a","status":"accepted","cycle":1,"time":0.1,"pause":{}}
+{"id":"a","status":"applied","cycle":1,"time":0.1}
+{"run":{"id":"2","version":"0","began":0,"deform":{},"guard":{},"schedule":{"steps":2}}}
+{"id":"a","status":"accepted","cycle":3,"time":0.3,"order":{"undo":1},"by":{"viewer":"c1"}}
+{"id":"b","status":"accepted","cycle":3,"time":0.3,"order":{"undo":2},"by":{"pipeline":"p"}}
+{"id":"c","status":"accepted","cycle":3,"time":0.3,"order":{"undo":3},"by":"file"}
+{"id":"d","status":"accepted","cycle":3,"time":0.3,"cancel":{"order":"c"}}
+{"id":"e","status":"accepted","cycle":3,"time":0.3,"order":{"undo":4}}
+{"id":"b","status":"applied","cycle":4,"time":0.4}
+{"shape":{"order":"b","shape":1,"cycle":4}}
+{"id":"c","status":"rejected","cycle":5,"time":0.5,"reason":"cancelled"}
+{"id":"d","status":"applied","cycle":5,"time":0.5}
+{"id":"a","status":"applied","cycle":6,"time":0.6}
+{"lost":{"lines":2}}
+{"end":{"cycle":7,"time":0.7}}
+"#;
+        let recording = parse_journal(text, "journal.jsonl").unwrap();
+        let ids = |commands: &[TimedCommand]| -> Vec<(String, Option<At>)> {
+            commands.iter().map(|it| (it.id.clone().unwrap(), it.at)).collect()
+        };
+        let (b, a) = (("b".to_owned(), Some(At::Cycle(4))), ("a".to_owned(), Some(At::Cycle(6))));
+        assert_eq!(ids(&recording.commands), [b, a.clone()]);
+        assert_eq!(ids(&super::super::parse_orders(text, "journal.jsonl").unwrap()), [a]);
+        assert_eq!((recording.lost, recording.shapes.len()), (2, 1));
+        assert_eq!(recording.run.unwrap().id, "2");
+        assert!(is_journal(text) && is_journal("") && is_journal("{\"run\":{\"id\":"));
+        assert!(!is_journal("{\"version\": 1}\n") && !is_journal("cycle,time\n"));
+    }
+
+    #[test]
+    fn one_torn_line_is_a_journal_of_nothing() {
+        for text in ["{\"run\":{\"id\":\"1\",\"ver", "{\"id\":\"a\",\"status\":\"acc"] {
+            assert_eq!(parse_journal(text, "journal.jsonl").unwrap(), Recording::default());
+        }
+    }
+}

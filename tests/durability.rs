@@ -1,0 +1,109 @@
+//! What was promised is on disk: on a full disk nothing is promised, and a run that is killed has
+//! kept its word.
+
+use std::process::Command;
+
+use serde_json::{Value, json};
+use tombolo_tests::{PATIENCE, Run, Small, Viewer, programs};
+
+/// Bytes that a file of the run may have, in the blocks of the shell.
+const BLOCKS: u64 = 400;
+const LIMIT: u64 = BLOCKS << 10;
+
+fn pipelines() -> Value {
+    json!({"version": 1, "stream": {"listen": "127.0.0.1:0"}, "journal": "journal.jsonl", "pipelines": [
+        {"name": "hold", "at": {"cycle": 3}, "stages": [{"pause": {}}]}]})
+}
+
+fn pinch(factor: f64) -> Value {
+    json!({"edits": [{"scale_direction": {
+                "features": ["throat"], "fixed": ["inlet", "outlet"], "factors": [1, 1, factor], "harmonic_order": 2}}],
+           "schedule": {"steps": 2, "every": {"steps": 1}}})
+}
+
+fn is(id: &'static str, status: &'static str) -> impl Fn(&Value) -> bool {
+    move |order| order["id"] == id && order["status"] == status
+}
+
+/// Lines of an earlier run, so many bytes of them.
+fn earlier(bytes: u64) -> String {
+    let line = "{\"end\":{\"cycle\":1,\"time\":0.1}}\n";
+    line.repeat(usize::try_from(bytes).expect("a size") / line.len())
+}
+
+#[test]
+fn on_a_full_disk_no_order_is_taken_and_the_run_goes_on() {
+    let small = Small::new();
+    small.write("pipelines.json", &pipelines());
+    std::fs::create_dir_all(small.path("out")).expect("a folder");
+    std::fs::write(small.path("out/journal.jsonl"), earlier(LIMIT - 2000)).expect("a journal");
+    // The disk is full for every file that is as long as this.
+    let arguments = small.arguments(&["--pipelines", "@pipelines.json", "--steps", "12"]);
+    let script = format!("trap '' XFSZ; ulimit -S -f {BLOCKS}; exec \"$0\" \"$@\"");
+    let flow = programs().join("flow");
+    let mut shell = Command::new("bash");
+    let mut run = Run::start(shell.args(["-c", &script]).arg(flow).args(arguments));
+    let link = run.link();
+    let mut driver = Viewer::connect(&link).expect("the run lets in");
+    driver.wait_for("hello", |hello| hello["role"] == "driver");
+    driver.wait_for("status", |status| status["paused"] == true);
+
+    let mut long = pinch(0.9);
+    long["edits"][0]["scale_direction"]["name"] = json!("x".repeat(190));
+    let edit = long["edits"][0].clone();
+    long["edits"] = json!(vec![edit; 20]);
+    driver.send(&json!({"id": "long", "order": long}));
+    let refused = driver.wait_for("error", |error| error["id"] == "long");
+    let message = refused["message"].as_str().expect("a message");
+    assert!(message.contains("the journal cannot be written"), "{message}");
+    driver.wait_for("status", |status| status["journal_lost"].is_string());
+    let mut late = Viewer::connect(&link).expect("the run lets in");
+    late.wait_for("status", |status| status["journal_lost"].is_string());
+    driver.send(&json!({"id": "short", "order": pinch(0.9)}));
+    driver.wait_for("error", |error| error["id"] == "short");
+
+    // There is room again.
+    let process = run.process().to_string();
+    let raised = Command::new("prlimit").args(["--pid", &process, "--fsize=unlimited:"]).status();
+    assert!(raised.is_ok_and(|status| status.success()));
+    driver.wait_for("status", |status| status["journal_lost"].is_null());
+    driver.send(&json!({"id": "again", "order": pinch(0.9)}));
+    driver.wait_for("order", is("again", "applying"));
+    driver.resume();
+    let (status, text) = run.finish(PATIENCE);
+    assert!(status.success(), "{text}");
+    assert!(text.contains("cannot be written") && text.contains("is written again"), "{text}");
+    let report = small.read("report.json");
+    assert_eq!(report["orders"].as_array().map(Vec::len), Some(1), "{report}");
+    let journal = String::from_utf8(small.bytes("out/journal.jsonl")).expect("UTF-8");
+    assert!(journal.contains("\"id\":\"again\",\"status\":\"accepted\""), "{journal}");
+    for id in ["long", "short"] {
+        assert!(!journal.contains(&format!("\"id\":\"{id}\"")), "{id}");
+    }
+    for line in journal.lines() {
+        serde_json::from_str::<Value>(line).expect("no line is torn");
+    }
+}
+
+#[test]
+fn a_run_that_is_killed_has_what_it_acknowledged_and_the_next_goes_on_below() {
+    let small = Small::new();
+    small.write("pipelines.json", &pipelines());
+    let arguments = small.arguments(&["--pipelines", "@pipelines.json", "--steps", "12"]);
+    for round in 0..3 {
+        let mut run = Run::flow(&arguments);
+        let mut driver = Viewer::connect(&run.link()).expect("the run lets in");
+        driver.wait_for("hello", |hello| hello["role"] == "driver");
+        let id = format!("round-{round}");
+        driver.send(&json!({"id": id, "order": pinch(0.9)}));
+        driver.wait_for("order", |order| order["id"] == id && order["status"] == "accepted");
+        run.signal("KILL");
+        drop(run);
+        let journal = String::from_utf8(small.bytes("out/journal.jsonl")).expect("UTF-8");
+        for earlier in 0..=round {
+            let accepted = format!("\"id\":\"round-{earlier}\",\"status\":\"accepted\"");
+            assert_eq!(journal.matches(&accepted).count(), 1, "{journal}");
+        }
+        assert_eq!(journal.matches("{\"run\":").count(), round + 1, "{journal}");
+    }
+}
