@@ -55,7 +55,7 @@ const colours = new ColourPanel(scene, (colouring, map) => scalarBar.describe(co
 const monitors = new MonitorPanel(part("monitors"));
 const parameters = new ParameterPanel(part("parameters"), (name, value) => send({ parameter: { name, value } }), showProblem);
 const form = new EditForm(part("fields"), selection);
-const orders = new Orders(part("orders"), (text) => write(part("announcer"), text));
+const orders = new Orders(part("orders"), (text) => write(part("announcer"), text), (order) => send({ cancel: { order } }));
 const bar = new StatusBar();
 watchPointer(part("scene"), scene, selection);
 const addresses = streamAddress(window.location.href);
@@ -131,6 +131,8 @@ function takeMessage(message: ServerMessage): void {
     case "monitor": return monitors.update(message.body);
     // The hello that comes with it says what there is now.
     case "pipelines": return;
+    // The status shows what it has changed.
+    case "done": return;
     case "end": return bar.end(message.body);
     case "error": {
       const { id, message: text } = message.body;
@@ -200,6 +202,7 @@ function refresh(): void {
   pause.disabled = !driving || stopped;
   write(pause, status?.paused ? "Resume" : "Pause");
   pause.dataset.paused = String(status?.paused === true);
+  orders.allowCancelling(driving && !stopped);
   part("wheel").hidden = !connected || !hello || driving;
   if (frames > 0) return showEmpty("", "");
   if (connection.state === "refused") showEmpty("This link does not open the simulation", "The token in it is missing or wrong. Open the link that the simulation printed when it started.");

@@ -15,11 +15,13 @@ const PHASES: Record<OrderPhase, string> = {
 
 export class Orders {
   private readonly records = new Map<string, OrderRecord>();
-  private readonly shown = new Map<string, { item: HTMLElement; chip: HTMLElement; title: HTMLElement; detail: HTMLElement; bar: HTMLElement }>();
+  private readonly shown = new Map<string, { item: HTMLElement; chip: HTMLElement; title: HTMLElement; detail: HTMLElement; bar: HTMLElement; cancel: HTMLButtonElement }>();
   private readonly empty = element("p", { class: "hint" }, "No orders yet. Each change of the shape is listed here with what became of it.");
   private readonly list = element("ol", { class: "orders" });
 
-  constructor(root: HTMLElement, private readonly announce: (text: string) => void) {
+  private mayCancel = false;
+
+  constructor(root: HTMLElement, private readonly announce: (text: string) => void, private readonly cancel: (id: string) => void) {
     root.replaceChildren(this.empty, this.list);
     setInterval(() => this.tick(), 500);
   }
@@ -63,6 +65,20 @@ export class Orders {
     }
   }
 
+  /** Whether this viewer may take orders back that have not begun. */
+  allowCancelling(mayCancel: boolean): void {
+    if (mayCancel === this.mayCancel) return;
+    this.mayCancel = mayCancel;
+    for (const record of this.records.values()) {
+      const parts = this.shown.get(record.id);
+      if (parts) parts.cancel.hidden = !this.isCancellable(record);
+    }
+  }
+
+  private isCancellable(record: OrderRecord): boolean {
+    return this.mayCancel && (record.status === "accepted" || record.status === "computing");
+  }
+
   private put(record: OrderRecord): void {
     this.records.set(record.id, record);
     for (const id of this.records.keys()) {
@@ -78,15 +94,18 @@ export class Orders {
       const title = element("span", { class: "title" });
       const detail = element("div", { class: "detail" });
       const bar = element("div", { class: "bar", hidden: true }, element("div"));
-      const item = element("li", { "data-order": record.id }, element("div", { class: "line" }, title, chip), bar, detail);
+      const cancel = element("button", { type: "button", class: "cancel", hidden: true }, "Cancel");
+      cancel.addEventListener("click", () => this.cancel(record.id));
+      const item = element("li", { "data-order": record.id }, element("div", { class: "line" }, title, chip, cancel), bar, detail);
       this.list.prepend(item);
-      parts = { item, chip, title, detail, bar };
+      parts = { item, chip, title, detail, bar, cancel };
       this.shown.set(record.id, parts);
     }
     parts.item.dataset.status = record.status;
     write(parts.title, record.text);
     write(parts.chip, phaseOf(record));
     write(parts.detail, detailOf(record));
+    parts.cancel.hidden = !this.isCancellable(record);
     parts.bar.hidden = record.status !== "applying" && record.status !== "computing";
     parts.bar.classList.toggle("indefinite", record.status === "computing");
     const fraction = record.shapes ? (record.shape ?? 0) / record.shapes : 0;

@@ -41,6 +41,8 @@ export interface Status {
   viewers?: number;
   driver?: string | number | null;
   quality?: QualitySummary | null;
+  /** Why the journal cannot be written; while it cannot, no order is taken. */
+  journal_lost?: string | null;
 }
 
 export type OrderState = "accepted" | "computing" | "applying" | "applied" | "rejected";
@@ -93,6 +95,9 @@ export interface PipelineChange {
   removed?: string[];
 }
 
+/** A command that is no order has taken effect. */
+export interface Done { id: string; cycle: number; time: number }
+
 export interface ServerError { message: string; id?: string | null }
 
 /** The last word of a run. */
@@ -105,12 +110,13 @@ export type ServerMessage =
   | { kind: "forecast"; body: ForecastAnswer }
   | { kind: "monitor"; body: Monitor }
   | { kind: "pipelines"; body: PipelineChange }
+  | { kind: "done"; body: Done }
   | { kind: "end"; body: RunEnd }
   | { kind: "error"; body: ServerError };
 
 export type ClientMessage = { id?: string } & (
   | { order: Json } | { forecast: Json } | { pause: object } | { resume: object } | { stop: object }
-  | { parameter: { name: string; value: number } } | { pipelines: Json } | { drive: object }
+  | { parameter: { name: string; value: number } } | { pipelines: Json } | { cancel: { order: string } } | { drive: object }
 );
 
 /** Raised for a message that does not follow the protocol; the text says where it departs from it. */
@@ -166,7 +172,7 @@ export function parseServerMessage(text: string): ServerMessage {
     throw new ProtocolError("a text message that is not JSON");
   }
   if (!isObject(parsed)) throw new ProtocolError("a text message that is not a JSON object");
-  for (const kind of ["hello", "status", "order", "forecast", "monitor", "pipelines", "end", "error"] as const) {
+  for (const kind of ["hello", "status", "order", "forecast", "monitor", "pipelines", "done", "end", "error"] as const) {
     const body: unknown = parsed[kind];
     if (body === undefined) continue;
     if (!isObject(body)) throw new ProtocolError(`the message "${kind}" is not an object`);

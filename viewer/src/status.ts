@@ -58,6 +58,9 @@ export class StatusBar {
     const inverted = quality?.inverted ?? 0;
     shown.dataset.level = !quality ? "" : inverted > 0 || quality.min <= 0 ? "bad" : quality.min < 0.05 ? "low" : "good";
     shown.title = quality ? `smallest scaled Jacobian ${digits(quality.min, 4)}, mean ${digits(quality.mean, 3)}, ${inverted} inverted elements` : "";
+    const lost = part("journal");
+    lost.hidden = !status.journal_lost;
+    write(lost, status.journal_lost ? `no orders are taken: the journal cannot be written (${status.journal_lost})` : "");
     const run = part("run");
     run.dataset.state = status.stopped ? "stopped" : status.paused ? "paused" : "running";
     write(run, status.stopped ? "stopped" : status.paused ? "paused" : "running");
