@@ -74,7 +74,7 @@ fn walk(mesh: &Mesh, plan: &Plan, guard: &Guard) -> CurrentShape {
         assert_eq!(measured.inverted, 0);
         assert!((measured.min - plan.quality().shapes[shape as usize - 1].min).abs() < 1e-12);
         let points: Arc<[Vector]> = points.into();
-        place = plan.reached(shape, Arc::clone(&points));
+        place = plan.reached(f64::from(shape), Arc::clone(&points));
         before = points;
     }
     assert_eq!(before, *plan.end());
@@ -149,7 +149,7 @@ fn the_shape_does_not_depend_on_where_the_mesh_is() {
     let middle = second.shapes() / 2;
     let mut points = vec![[0.0; 3]; mesh.points().len()];
     second.write_shape(middle, &mut points);
-    let place = second.reached(middle, points.into());
+    let place = second.reached(f64::from(middle), points.into());
     let undone = reach(&mut other, &lift, &place, 3, &mending).unwrap();
     walk(&mesh, &undone, &mending);
     assert_eq!(undone.end(), lifted.end());
@@ -221,7 +221,7 @@ fn edits_that_are_there_already_are_not_clamped() {
     ]));
     let clamping = guard(Otherwise::Clamp);
     let first = shaper.plan(&asked(&stack[..1], &start, 1, &clamping)).unwrap();
-    let place = first.reached(1, Arc::clone(first.end()));
+    let place = first.reached(1.0, Arc::clone(first.end()));
     let plan = shaper.plan(&Request { kept: 1, ..asked(&stack, &place, 1, &clamping) }).unwrap();
     let fraction = plan.target().fraction;
     let top = plan.end().iter().map(|point| point[2]).fold(0.0, f64::max);

@@ -30,7 +30,7 @@ fn at(cycle: u64, order: Value) -> Value {
 }
 
 fn scheduled(mut order: Value, steps: u32, every: u32) -> Value {
-    order["schedule"] = json!({"steps": steps, "every": {"steps": every}});
+    order["schedule"] = json!({"steps": steps, "every": {"steps": every}, "motion": "at_once"});
     order
 }
 
@@ -59,6 +59,38 @@ fn a_schedule_is_kept_and_ends_exactly() {
     assert!(order.seconds.surface > 0.0 && order.seconds.volume > 0.0 && order.seconds.guard > 0.0);
     assert!(order.added_steps.is_some());
     assert_eq!(report.cycles, 20);
+}
+
+#[test]
+fn a_way_is_spread_over_its_steps_at_one_velocity() {
+    let mut order = squeeze(0.4);
+    order["schedule"] = json!({"steps": 2, "every": {"steps": 5}});
+    let mut solver = with_orders(&json!([at(3, order)]));
+    let top = |solver: &Solver| {
+        let heights = solver.mesh.points().iter().map(|point| point[2]);
+        heights.fold(f64::MIN, f64::max)
+    };
+    let mut heights = Vec::new();
+    for _ in 0..16 {
+        heights.push(top(&solver));
+        solver.step();
+        assert_eq!(quality(solver.mesh.cells(), solver.mesh.points()).inverted, 0);
+    }
+    let cycles: Vec<u64> = solver.motions.iter().map(|(cycle, _, _)| *cycle).collect();
+    assert_eq!(cycles, (3..13).collect::<Vec<_>>(), "it never rests on the way");
+    let shapes: Vec<u32> = solver.motions.iter().map(|(_, (shape, _), _)| *shape).collect();
+    assert_eq!(shapes, [1, 1, 1, 1, 1, 2, 2, 2, 2, 2]);
+    for pair in heights[3..14].windows(2) {
+        assert!((pair[0] - pair[1] - 0.04).abs() < 1e-12, "{heights:?}");
+    }
+    // The shapes themselves are those that the same schedule makes at once.
+    let mut order = squeeze(0.4);
+    order["schedule"] = json!({"steps": 2, "every": {"steps": 5}, "motion": "at_once"});
+    let mut at_once = with_orders(&json!([at(3, order)]));
+    at_once.steps(16);
+    assert!(bits(&at_once.mesh) == bits(&solver.mesh));
+    let report = solver.finish();
+    assert_eq!((report.orders[0].shape, report.orders[0].status), (2, OrderStatus::Applied));
 }
 
 #[test]
@@ -225,7 +257,7 @@ fn parameters_are_steered_within_their_bounds() {
 #[test]
 fn a_pipeline_gives_an_order_once() {
     let text = r#"{"version": 1, "pipelines": [
-        {"name": "shape", "on": "order", "stages": [{"schedule": {"steps": 2, "every": {"steps": 3}}}]},
+        {"name": "shape", "on": "order", "stages": [{"schedule": {"steps": 2, "every": {"steps": 3}, "motion": "at_once"}}]},
         {"name": "pinch", "at": {"time": 0.045}, "stages": [
             {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -0.2]}}, {"order": {}}]}]}"#;
     let mut solver = Solver::with_config(text);

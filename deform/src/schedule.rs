@@ -17,8 +17,9 @@ use crate::number::Number;
 ///
 /// let schedule: Schedule = serde_json::from_str(r#"{"steps": 4, "every": {"steps": 10}}"#).unwrap();
 /// assert_eq!(schedule.fractions(), [0.25, 0.5, 0.75, 1.0]);
-/// assert!(schedule.is_due(2, 20, 0.0), "the third shape is due twenty cycles after the first");
-/// assert!(!schedule.is_due(2, 19, 0.0));
+/// let steps = |cycles| schedule.position(cycles, 0.0, 0.1);
+/// assert_eq!([steps(0), steps(4), steps(9)], [0.1, 0.5, 1.0], "ten steps go to the first shape");
+/// assert_eq!([steps(24), steps(39), steps(40)], [2.5, 4.0, 4.0]);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -31,6 +32,20 @@ pub struct Schedule {
     pub every: Every,
     /// How far apart the shapes lie.
     pub ease: Ease,
+    /// How the mesh goes from one shape to the next.
+    pub motion: Motion,
+}
+
+/// How the mesh goes from one shape of a [`Schedule`] to the next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Motion {
+    /// At one mesh velocity, over all steps until the next shape is due. The guard's floor holds at
+    /// the shapes; between them no cell is turned inside out.
+    #[default]
+    Spread,
+    /// In one step, and then the mesh rests until the next shape is due: an impulse for the flow.
+    AtOnce,
 }
 
 /// How the shapes of a [`Schedule`] lie on the way.
@@ -99,7 +114,12 @@ impl From<Interval> for f64 {
 impl Default for Schedule {
     /// The whole change at once.
     fn default() -> Self {
-        Self { steps: NonZeroU32::MIN, every: Every::Steps(NonZeroU64::MIN), ease: Ease::Linear }
+        Self {
+            steps: NonZeroU32::MIN,
+            every: Every::Steps(NonZeroU64::MIN),
+            ease: Ease::Linear,
+            motion: Motion::Spread,
+        }
     }
 }
 
@@ -130,20 +150,36 @@ impl Schedule {
         }
     }
 
-    /// Whether the next shape is due when `shapes_taken` have been taken, and `cycles` and `time`
-    /// have gone by since the first could be taken. The first is due at once; nothing is due after
-    /// the last. Time is compared with a slack of one part in 10⁹ of the interval, so that adding
-    /// up time steps does not make a shape a step late.
+    /// Where the mesh is to be at the end of a step, counted in shapes: 0 is where the schedule
+    /// begins, 2.5 half way from the second shape to the third. The step begins `cycles` and `time`
+    /// after the schedule, and takes `time_step`.
+    ///
+    /// Time is compared with a slack of one part in 10⁹ of the interval, so that adding up time
+    /// steps does not make a shape a step late. In a steady solver, whose steps take no time, shapes
+    /// that are due at a time are reached at once.
     #[must_use]
-    pub fn is_due(&self, shapes_taken: u32, cycles: u64, time: f64) -> bool {
-        if shapes_taken >= self.steps.get() {
-            return false;
-        }
-        match self.every {
-            Every::Steps(steps) => cycles >= steps.get().saturating_mul(u64::from(shapes_taken)),
-            Every::Time(Interval(interval)) => time >= interval * (f64::from(shapes_taken) - 1e-9),
-        }
+    pub fn position(&self, cycles: u64, time: f64, time_step: f64) -> f64 {
+        let position = match (self.every, self.motion) {
+            (Every::Steps(steps), Motion::Spread) => (real(cycles) + 1.0) / real(steps.get()),
+            (Every::Steps(steps), Motion::AtOnce) => real(cycles / steps) + 1.0,
+            (Every::Time(Interval(interval)), Motion::Spread) if time_step > 0.0 => {
+                let position = (time + time_step) / interval;
+                let whole = position.round();
+                if (position - whole).abs() <= SLACK { whole } else { position }
+            }
+            (Every::Time(Interval(interval)), _) => (time / interval + SLACK).floor() + 1.0,
+        };
+        position.clamp(0.0, f64::from(self.steps.get()))
     }
+}
+
+/// What time is compared with, in parts of the interval.
+const SLACK: f64 = 1e-9;
+
+/// A count as a number.
+#[expect(clippy::cast_precision_loss, reason = "fewer than 2^53 cycles")]
+fn real(count: u64) -> f64 {
+    count as f64
 }
 
 #[cfg(test)]
@@ -199,31 +235,42 @@ mod tests {
     }
 
     #[test]
-    fn shapes_fall_due_by_steps() {
-        let schedule = parse(r#"{"steps": 3, "every": {"steps": 5}}"#).unwrap();
-        let mut taken = 0;
-        let mut cycles = Vec::new();
-        for cycle in 0..50 {
-            if schedule.is_due(taken, cycle, 0.0) {
-                taken += 1;
-                cycles.push(cycle);
-            }
+    fn a_way_is_spread_over_its_steps_or_made_in_one() {
+        let at = |text: &str, cycles: std::ops::Range<u64>| -> Vec<f64> {
+            let schedule = parse(text).unwrap();
+            cycles.map(|cycle| schedule.position(cycle, 0.0, 0.1)).collect()
+        };
+        let spread = at(r#"{"steps": 2, "every": {"steps": 4}}"#, 0..10);
+        assert_eq!(spread, [0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.0, 2.0]);
+        let at_once = at(r#"{"steps": 2, "every": {"steps": 4}, "motion": "at_once"}"#, 0..6);
+        assert_eq!(at_once, [1.0, 1.0, 1.0, 1.0, 2.0, 2.0]);
+        // Each shape is reached exactly, however many steps its way takes.
+        for steps in [3, 7, 10, 49] {
+            let text = format!(r#"{{"steps": 5, "every": {{"steps": {steps}}}}}"#);
+            let reached = at(&text, 0..5 * steps).into_iter().filter(|at| at.fract() == 0.0);
+            assert_eq!(reached.collect::<Vec<_>>(), [1.0, 2.0, 3.0, 4.0, 5.0]);
         }
-        assert_eq!(cycles, [0, 5, 10]);
     }
 
     #[test]
-    fn shapes_fall_due_by_time_in_spite_of_rounding() {
-        let schedule = parse(r#"{"steps": 4, "every": {"time": 0.3}}"#).unwrap();
-        let (mut taken, mut time, mut cycles) = (0, 0.0, Vec::new());
-        for cycle in 0..20 {
-            if schedule.is_due(taken, cycle, time) {
-                taken += 1;
-                cycles.push(cycle);
+    fn shapes_are_reached_by_time_in_spite_of_rounding() {
+        for (motion, expected) in [("spread", [2, 5, 8, 11]), ("at_once", [0, 3, 6, 9])] {
+            let text = format!(r#"{{"steps": 4, "every": {{"time": 0.3}}, "motion": "{motion}"}}"#);
+            let schedule = parse(&text).unwrap();
+            let (mut time, mut before, mut reached) = (0.0, 0.0, Vec::new());
+            for cycle in 0..20 {
+                let position = schedule.position(cycle, time, 0.1);
+                assert!(position >= before);
+                if position.fract() == 0.0 && position > before {
+                    reached.push(cycle);
+                }
+                before = position;
+                time += 0.1;
             }
-            time += 0.1;
+            assert_eq!(reached, expected, "{motion}");
         }
-        assert_eq!(cycles, [0, 3, 6, 9]);
+        let steady = parse(r#"{"steps": 2, "every": {"time": 0.3}}"#).unwrap();
+        assert_eq!([0.0, 0.3].map(|time| steady.position(0, time, 0.0)), [1.0, 2.0]);
     }
 
     #[test]

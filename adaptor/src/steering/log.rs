@@ -197,8 +197,8 @@ impl Log {
         lock(&self.state).order(id).is_some()
     }
 
-    /// Notes that the solver was handed a shape.
-    pub(crate) fn handed(&self, id: &str, shape: u32, moment: Moment) {
+    /// Notes that the solver was handed a shape, or a position between two.
+    pub(crate) fn handed(&self, id: &str, shape: f64, moment: Moment) {
         let handed = HandedShape { order: id.into(), shape, cycle: moment.cycle };
         self.journal.note(&JournalNote::Shape(handed));
     }

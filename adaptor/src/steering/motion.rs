@@ -34,8 +34,12 @@ pub struct MeshMotion {
     pub velocity: Arc<[Vector]>,
     /// The motion of the boundary's vertices alone, for a solver that moves its volume by itself.
     pub surface: SurfaceMotion,
-    /// Which shape of the order's schedule this is, counted from 1, and how many there are.
+    /// The shape of the order's schedule that the mesh is on its way to, or reaches, counted from 1,
+    /// and how many there are.
     pub shape: (u32, u32),
+    /// Where on the way of the order the mesh is at the end of the step, counted in shapes: 2.5 is
+    /// half way from the second to the third.
+    pub position: f64,
     /// The order's name.
     pub order: String,
 }

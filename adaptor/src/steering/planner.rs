@@ -224,7 +224,7 @@ mod tests {
         assert_eq!(forecast.min_scaled_jacobian, Some(plan.quality().min_scaled_jacobian));
         // From elsewhere: the same end by a way of its own.
         let aside = planner.plan(&asked(0.1)).unwrap();
-        let there = aside.reached(1, Arc::clone(aside.end()));
+        let there = aside.reached(1.0, Arc::clone(aside.end()));
         let from_there = PlanRequest { request: Request::new(stack(-0.2), there), own: None };
         let again = planner.plan(&from_there).unwrap();
         assert!(Arc::ptr_eq(again.end(), plan.end()) && Arc::ptr_eq(again.start(), aside.end()));

@@ -136,6 +136,52 @@ impl Plan {
         write(start, end, fraction, points);
     }
 
+    /// Writes the coordinates at a position on the way, counted in shapes, into `points`: at 0 the
+    /// start, at a whole number that shape, and between two shapes on the straight way from one to
+    /// the other.
+    ///
+    /// # Panics
+    /// Where `points` has another length than the mesh has vertices.
+    pub fn write_position(&self, position: f64, points: &mut [Vector]) {
+        let (before, after, fraction) = self.between(position);
+        self.write_shape(before, points);
+        if fraction > 0.0 {
+            let mut next = vec![[0.0; 3]; points.len()];
+            self.write_shape(after, &mut next);
+            for (point, &next) in points.iter_mut().zip(&next) {
+                *point = shape_at(*point, next, fraction);
+            }
+        }
+    }
+
+    /// The shapes between which a position lies, and how far along the way from one to the other.
+    fn between(&self, position: f64) -> (u32, u32, f64) {
+        let position = position.clamp(0.0, f64::from(self.shapes()));
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "clamped to the shapes"
+        )]
+        let before = position as u32;
+        (before, (before + 1).min(self.shapes()), position - f64::from(before))
+    }
+
+    /// The least and the mean scaled Jacobian at a position on the way; between two shapes those of
+    /// the worse one. `None` at the start, and where the volume was not judged.
+    #[must_use]
+    pub fn quality_at(&self, position: f64) -> Option<(f64, f64)> {
+        let (before, after, fraction) = self.between(position);
+        let of = |shape: u32| {
+            let quality = self.quality.shapes.get((shape as usize).checked_sub(1)?)?;
+            Some((quality.min, quality.mean))
+        };
+        match (of(before), of(after)) {
+            (before, _) if fraction == 0.0 => before,
+            (Some(before), Some(after)) => Some((before.0.min(after.0), before.1.min(after.1))),
+            (_, after) => after,
+        }
+    }
+
     /// Where it starts.
     #[must_use]
     pub fn start(&self) -> &Arc<[Vector]> {
@@ -172,14 +218,35 @@ impl Plan {
         (!self.surface_only).then_some(self.quality.min_scaled_jacobian)
     }
 
-    /// Whether the way from one shape to another, counted from 1 with 0 for the start, is a piece
-    /// of a straight one.
+    /// Whether the way from one position to another, counted in shapes with 0 for the start, is a
+    /// piece of a straight one.
     #[must_use]
-    pub fn is_straight(&self, from: u32, to: u32) -> bool {
-        let piece = |shape: u32| self.shape(shape).map(|at| at.piece);
+    pub fn is_straight(&self, from: f64, to: f64) -> bool {
+        let ((before, after, fraction), (other, ..)) = (self.between(from), self.between(to));
+        // From one shape to the next the mesh goes straight, whatever corners of the way lie there.
+        if before == other || to == f64::from(after) {
+            return true;
+        }
         // The end of a piece is the start of the next.
-        let begins = self.shape(from).map_or(0, |at| at.piece + usize::from(at.fraction >= 1.0));
-        piece(to) == piece(from) || piece(to) == Some(begins)
+        let begins = |shape: u32| {
+            self.shape(shape).map_or(0, |at| at.piece + usize::from(at.fraction >= 1.0))
+        };
+        let piece = |shape: u32| self.shape(shape).map(|at| at.piece);
+        let start = if fraction == 0.0 { Some(begins(before)) } else { self.piece_between(from) };
+        let end = self.piece_between(to);
+        start.is_some() && (start == end || piece(before).is_some() && piece(before) == end)
+    }
+
+    /// The straight piece of the way that holds a position, where the mesh does not leave it between
+    /// two shapes.
+    fn piece_between(&self, position: f64) -> Option<usize> {
+        let (before, after, fraction) = self.between(position);
+        if fraction == 0.0 {
+            return self.shape(before).map(|at| at.piece);
+        }
+        let begins = self.shape(before).map_or(0, |at| at.piece + usize::from(at.fraction >= 1.0));
+        let ends = self.shape(after)?.piece;
+        (begins == ends).then_some(ends)
     }
 
     /// The quality of the meshes on the way; nothing is known of it where only the surface was
@@ -212,18 +279,22 @@ impl Plan {
         Self { seconds, largest_displacement, ..self }
     }
 
-    /// The current shape once the mesh is at the `shape`-th shape, counted from 1, whose
+    /// The current shape once the mesh is at a position on the way, counted in shapes, where its
     /// coordinates are `points`.
     #[must_use]
-    pub fn reached(&self, shape: u32, points: Arc<[Vector]>) -> CurrentShape {
+    pub fn reached(&self, position: f64, points: Arc<[Vector]>) -> CurrentShape {
+        let is_at_end = position >= f64::from(self.shapes());
         if self.surface_only {
-            let surface_only = self.target.surface_only || shape < self.shapes();
+            let surface_only = self.target.surface_only || !is_at_end;
             return CurrentShape { points, back: Vec::new(), surface_only };
         }
-        if shape >= self.shapes() && !self.target.way.is_empty() {
+        if is_at_end && !self.target.way.is_empty() {
             return self.target.reached();
         }
-        let piece = self.shape(shape).map_or(0, |at| at.piece);
+        let is_at_shape = position.fract() == 0.0;
+        let Some(piece) = self.piece_between(position).or(is_at_shape.then_some(0)) else {
+            return CurrentShape { points, back: Vec::new(), surface_only: false };
+        };
         let mut back: Vec<_> = self.way[..=piece].iter().rev().cloned().collect();
         back.extend(self.back.iter().cloned());
         // The way back ends at the reference, or nothing is known of it.

@@ -141,7 +141,7 @@ fn shapes_are_those_of_one_process() {
                 let (change, expected) = (of_parts.change.unwrap(), forecast.change.unwrap());
                 assert!((change.volume_ratio.mean - expected.volume_ratio.mean).abs() < 1e-7);
                 // Back: exactly.
-                let there = found.reached(found.shapes(), Arc::clone(found.end()));
+                let there = found.reached(f64::from(found.shapes()), Arc::clone(found.end()));
                 let request = Request { deformation: deform.clone(), ..Request::new([], there) };
                 let back = shaper.plan(&request).unwrap();
                 assert_eq!(back.end(), shaper.reference());

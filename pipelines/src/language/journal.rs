@@ -49,13 +49,14 @@ pub struct RunHeader {
 }
 
 /// A shape that the solver was handed.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HandedShape {
     /// The id of its order.
     pub order: String,
-    /// Which shape of the order it is, counted from 1.
-    pub shape: u32,
+    /// Which shape of the order it is, counted from 1; 2.5 lies half way from the second to the
+    /// third.
+    pub shape: f64,
     /// The cycle over whose step the mesh moves there.
     pub cycle: u64,
 }
@@ -108,7 +109,7 @@ pub struct Recording {
 /// let journal = r#"{"id":"a","status":"accepted","cycle":3,"time":0.3,"order":{"undo":1}}
 /// {"id":"b","status":"accepted","cycle":4,"time":0.4,"order":{"undo":1}}
 /// {"id":"a","status":"applied","cycle":5,"time":0.5}
-/// {"shape":{"order":"a","shape":1,"cycle":7}}
+/// {"shape":{"order":"a","shape":0.5,"cycle":7}}
 /// {"id":"c","status":"acc"#;
 /// let recording = parse_journal(journal, "journal.jsonl").unwrap();
 /// assert_eq!((recording.commands.len(), recording.shapes[0].cycle), (1, 7));

@@ -23,10 +23,10 @@ pub(super) struct Motion {
     pub(super) plan: Plan,
     pub(super) guard: Guard,
     pub(super) begun: Moment,
-    /// Shapes that were handed out.
-    pub(super) taken: u32,
-    /// The shape that the mesh has, which is the last one taken if that was followed.
-    pub(super) reached: u32,
+    /// The position on the way that was handed out last, counted in shapes.
+    pub(super) taken: f64,
+    /// The position that the mesh has, which is the last one taken if that was followed.
+    pub(super) reached: f64,
 }
 
 /// The last shape that was handed out, until the next call shows whether the solver went there.
@@ -34,7 +34,7 @@ pub(super) struct Pending {
     handed: HandedOut,
     /// Where the shape was before, and its quality.
     before: (CurrentShape, Option<(f64, f64)>),
-    reached: u32,
+    reached: f64,
     id: String,
     shape: u32,
     moment: Moment,
@@ -86,43 +86,45 @@ impl Steerer {
         &self.handed_out
     }
 
-    /// Takes the next shape of the schedule under way for the coming step, if it is due; says
-    /// whether it was.
+    /// Moves the mesh on along the schedule under way over the coming step; says whether it moves.
     pub(crate) fn next_shape(&mut self, moment: Moment, time_step: f64) -> bool {
         if self.computing.as_ref().is_some_and(|computing| computing.resting) {
             return false;
         }
         let Some(motion) = self.motion.as_mut() else { return false };
-        let next = motion.taken + 1;
-        let is_due = match &mut self.recorded {
-            Some(recorded) if !recorded.goes_on(&motion.id, next) => {
+        let position = match &self.recorded {
+            Some(recorded) if !recorded.goes_on(&motion.id, moment.cycle) => {
                 self.give_up("the run that is carried out again went no further");
                 return false;
             }
-            Some(recorded) => recorded.is_due(&motion.id, next, moment.cycle),
+            Some(recorded) => recorded.position(&motion.id, moment.cycle).unwrap_or(motion.taken),
             None => {
                 let begun = motion.begun;
                 let cycles = moment.cycle.saturating_sub(begun.cycle);
-                motion.plan.schedule().is_due(motion.taken, cycles, moment.time - begun.time)
+                let schedule = motion.plan.schedule();
+                let due = schedule.position(cycles, moment.time - begun.time, time_step);
+                // No shape is left out, however long a step is.
+                due.min(motion.taken.floor() + 1.0)
             }
         };
-        if !is_due {
+        if position <= motion.taken {
             return false;
         }
-        if !motion.plan.is_straight(motion.reached, next) {
+        let shape = whole(position.ceil());
+        if !motion.plan.is_straight(motion.reached, position) {
             let reason = format!(
-                "the mesh stayed at shape {}, from which shape {next} is not a straight step",
+                "the mesh stayed at shape {}, from which the way to shape {shape} is not straight",
                 motion.reached
             );
             self.give_up(&reason);
             return false;
         }
-        let last = next >= motion.plan.shapes();
+        let last = position >= f64::from(motion.plan.shapes());
         let points: Arc<[Vector]> = if last {
             Arc::clone(motion.plan.end())
         } else {
             let mut points = vec![[0.0; 3]; self.here.points.len()];
-            motion.plan.write_shape(next, &mut points);
+            motion.plan.write_position(position, &mut points);
             points.into()
         };
         let before = self.own.lent.as_ref().unwrap_or(&self.here.points);
@@ -139,8 +141,9 @@ impl Steerer {
         if self.own.offsets.is_some() && motion.plan.judged() == Judged::Volume {
             let judged = judge(&self.domain, before, after, &[1.0], &motion.guard);
             if let Err(refusal) = judged {
-                let reason =
-                    format!("shape {next} is not handed out; with the mesh's own motion {refusal}");
+                let reason = format!(
+                    "shape {shape} is not handed out; with the mesh's own motion {refusal}"
+                );
                 self.give_up(&reason);
                 return false;
             }
@@ -161,24 +164,27 @@ impl Steerer {
             before: (self.here.clone(), self.quality),
             reached: motion.reached,
             id: motion.id.clone(),
-            shape: next,
+            shape,
             moment,
         });
-        (motion.taken, motion.reached) = (next, next);
-        self.handed_out.shape = (motion.taken, motion.plan.shapes());
+        let known = whole(motion.taken.floor());
+        (motion.taken, motion.reached) = (position, position);
+        self.handed_out.shape = (shape, motion.plan.shapes());
+        self.handed_out.position = position;
         self.handed_out.order.clone_from(&motion.id);
-        self.here = motion.plan.reached(motion.taken, points);
+        self.here = motion.plan.reached(position, points);
         lock(&self.present).here.clone_from(&self.here);
-        let quality = motion.plan.quality().shapes.get(motion.taken as usize - 1);
-        self.quality = quality.map(|quality| (quality.min, quality.mean));
-        let taken = motion.taken;
-        self.log.handed(&motion.id, taken, moment);
-        self.log.update(&motion.id, |order| {
-            order.shape = taken;
-            if last {
-                order.status = OrderStatus::Applied;
-            }
-        });
+        self.quality = motion.plan.quality_at(position);
+        self.log.handed(&motion.id, position, moment);
+        let reached = whole(position.floor());
+        if reached > known {
+            self.log.update(&motion.id, |order| {
+                order.shape = reached;
+                if last {
+                    order.status = OrderStatus::Applied;
+                }
+            });
+        }
         if last {
             self.motion = None;
         }
@@ -197,6 +203,12 @@ impl Steerer {
             ));
         });
     }
+}
+
+/// A whole number of shapes.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of shapes")]
+fn whole(shapes: f64) -> u32 {
+    shapes as u32
 }
 
 /// Writes vectors anew, into the same memory where nobody has kept it.

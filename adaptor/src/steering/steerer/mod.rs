@@ -437,8 +437,8 @@ impl Steerer {
             plan,
             guard: asked.request.guard,
             begun: moment,
-            taken: 0,
-            reached: 0,
+            taken: 0.0,
+            reached: 0.0,
         });
     }
 }
