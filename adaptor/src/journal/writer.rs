@@ -176,7 +176,7 @@ impl Journal {
         }
         let reason = format!("the disk has not answered for {} seconds", PATIENCE.as_secs());
         state.trouble = Some(reason.clone());
-        let refused = state.withdraw();
+        let refused = state.withdraw(true);
         drop(state);
         (shared.tell)(Some(&reason));
         refused.into_iter().for_each(|settle| settle(Err(reason.clone())));
@@ -237,8 +237,8 @@ impl Waiting {
     }
 
     /// Those who wait, who are to be told that it was in vain. What they asked for is not written
-    /// any more, or taken back if it is being written.
-    fn withdraw(&mut self) -> Vec<Settle> {
+    /// any more; what is being written is taken back by another line where `may_succeed`.
+    fn withdraw(&mut self, may_succeed: bool) -> Vec<Settle> {
         let mut refused = Vec::new();
         let mut taken_back = Vec::new();
         for line in &mut self.under_way {
@@ -257,7 +257,7 @@ impl Waiting {
                 None => self.lines.push_back(line),
             }
         }
-        for text in taken_back {
+        for text in taken_back.into_iter().filter(|_| may_succeed) {
             self.push(Line { text, asked: None, is_withdrawn: false });
         }
         self.asked = 0;
@@ -300,10 +300,9 @@ impl Shared {
                 }
                 Err(reason) => {
                     let reason = reason.to_string();
-                    // Those who wait are refused; the other lines are for the next time. Lines that
-                    // take back what was never written are harmless.
+                    // Those who wait are refused; the other lines are for the next time.
                     state.under_way = lines;
-                    let mut settled = state.withdraw();
+                    let mut settled = state.withdraw(false);
                     let kept = std::mem::take(&mut state.under_way).into_iter();
                     let (withdrawn, kept): (Vec<_>, Vec<_>) =
                         kept.partition(|line| line.is_withdrawn);
