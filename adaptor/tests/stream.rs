@@ -16,7 +16,7 @@ use tombolo::{
     Adaptor, InitializeError, OrderStatus, Parameter, Settings,
     pipelines::{
         encode::{Decoder, decode_surface},
-        language::{self, parse_orders},
+        language::{self, parse_journal, parse_orders},
         limits::{DOCUMENT, EDITS, SHAPES},
     },
     stream::StreamError,
@@ -642,7 +642,7 @@ fn orders_of_viewers_replay_from_the_journal() {
     solver.finish();
     let journal = std::fs::read_to_string(directory.path().join("run.jsonl")).unwrap();
     let mut replay = Solver::new(Settings {
-        orders: parse_orders(&journal, "run.jsonl").unwrap(),
+        replay: Some(parse_journal(&journal, "run.jsonl").unwrap()),
         ..Settings::default()
     });
     replay.steps(cycles);
