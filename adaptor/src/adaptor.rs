@@ -17,6 +17,7 @@ pub use stopper::Stopper;
 use std::{
     net::SocketAddr,
     path::Path,
+    path::PathBuf,
     sync::{
         Arc, OnceLock,
         atomic::{AtomicBool, Ordering},
@@ -81,6 +82,8 @@ pub struct Adaptor {
     /// Answers viewers, once there is a mesh.
     forecaster: Arc<OnceLock<Forecaster>>,
     server: Option<Server>,
+    /// The directory of the output.
+    output: PathBuf,
     mesh: SteeredMesh,
     lent: Lent,
     /// The step of the last call.
@@ -182,11 +185,41 @@ impl Adaptor {
         Ok(adaptor)
     }
 
-    /// The link that a viewer opens, with its token; `None` without a server. Of a server that listens
-    /// on all addresses it has the machine's name.
+    /// The link that a viewer opens, with the secret of those who may drive; `None` without a server.
+    /// Of a server that listens on all addresses it has the machine's name.
+    ///
+    /// It is for programs: whoever reads it can steer the run. To tell a person how to open the run
+    /// there is [`invitation`](Adaptor::invitation).
     #[must_use]
     pub fn link(&self) -> Option<String> {
         self.server.as_ref().map(Server::link)
+    }
+
+    /// The link of those who watch and can never drive; `None` without a server.
+    #[must_use]
+    pub fn watching_link(&self) -> Option<String> {
+        self.server.as_ref().map(Server::watching_link)
+    }
+
+    /// A new link that opens one browser, once; `None` without a server, or where the system has no
+    /// random numbers for it.
+    #[must_use]
+    pub fn browser_link(&self) -> Option<String> {
+        self.server.as_ref().and_then(Server::browser_link)
+    }
+
+    /// What a program prints for a person to open the run; `None` without a server.
+    ///
+    /// All links, for driving and for watching, are written to the file `tombolo-PORT.link` in the
+    /// directory of the output, which only its owner can read and which goes with the adaptor. On a
+    /// `terminal` the text has a link that opens one browser, once; anywhere else, such as in the log
+    /// of a batch job, it names the file alone.
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub fn invitation(&mut self, terminal: bool) -> std::io::Result<Option<String>> {
+        let invite = |server: &mut Server| server.invitation(&self.output, terminal);
+        self.server.as_mut().map(invite).transpose()
     }
 
     /// The address that viewers connect to; `None` without a server.

@@ -417,14 +417,20 @@ fn one_drives_and_the_others_watch() {
 fn a_driver_that_comes_back_has_the_wheel() {
     let solver = Solver::with_config(LINK_TO_ALL);
     let mut driver = Viewer::connect(&solver.adaptor);
-    let name = driver.hello()["client"].as_str().unwrap().to_owned();
+    let hello = driver.hello();
+    let (name, back) = (hello["client"].as_str().unwrap(), hello["back"].as_str().unwrap());
     let mut watcher = Viewer::connect(&solver.adaptor);
     watcher.hello();
     drop(driver);
     watcher.wait_for("status", |status| status["viewers"] == 1);
-    let mut again =
-        Viewer::try_connect(&format!("{}&client={name}", socket_url(&solver.adaptor))).unwrap();
-    assert_eq!(again.hello()["role"], "driver");
+    // The name alone is known to all.
+    let link = socket_url(&solver.adaptor);
+    let mut thief = Viewer::try_connect(&format!("{link}&client={name}&back=0")).unwrap();
+    let told = thief.hello();
+    assert!(told["role"] == "watcher" && told["client"] != name, "{told}");
+    let mut again = Viewer::try_connect(&format!("{link}&client={name}&back={back}")).unwrap();
+    let told = again.hello();
+    assert!(told["role"] == "driver" && told["client"] == name, "{told}");
 }
 
 #[test]

@@ -310,7 +310,7 @@ impl CommandSink for Intake {
             }
             Message::Command(command) => command,
             // The session has answered it.
-            Message::Drive => return Ok(()),
+            Message::Wheel(_) => return Ok(()),
         };
         check_files(&command)?;
         let bytes = text.len();

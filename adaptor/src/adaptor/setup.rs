@@ -111,6 +111,7 @@ impl Adaptor {
             watch,
             forecaster,
             server,
+            output,
             mesh: SteeredMesh::Unknown,
             lent: Lent::default(),
             moment: Moment::default(),

@@ -1,13 +1,13 @@
 //! Connections that cannot be held open by a client that says nothing, reads nothing, or never
-//! finishes its request.
+//! finishes its request, and that keep nobody out.
 
 use std::{
     future::Future,
     io,
-    net::SocketAddr,
+    net::{IpAddr, SocketAddr},
     pin::Pin,
     sync::{
-        Arc,
+        Arc, Mutex,
         atomic::{AtomicBool, Ordering},
     },
     task::{Context, Poll},
@@ -15,46 +15,157 @@ use std::{
 };
 
 use axum::{extract::connect_info::Connected, serve::IncomingStream};
+use futures_util::task::AtomicWaker;
 use tokio::{
     io::{AsyncRead, AsyncWrite, ReadBuf},
     net::{TcpListener, TcpStream},
-    sync::{OwnedSemaphorePermit, Semaphore},
     time::{Instant, Sleep, sleep_until},
 };
 
-/// How long a connection may go without a request answered before it has become a WebSocket.
+use super::credentials::Access;
+use crate::lock::lock;
+
+/// How long a connection may go without a request that shows a secret answered.
+const UNKNOWN_TIME: Duration = Duration::from_secs(5);
+/// How long one that has shown a secret may go without a request answered before it has become a
+/// WebSocket.
 const REQUEST_TIME: Duration = Duration::from_secs(15);
 /// How long a WebSocket may go without a byte from the viewer, who answers a ping every
 /// [`super::PING_PERIOD`].
 const SILENT_TIME: Duration = Duration::from_secs(30);
-/// How long a write may wait for a client that does not read.
-pub(super) const WRITE_TIME: Duration = Duration::from_secs(10);
-/// Connections open at once, viewers and others together. Beyond it the newest is closed
-/// unanswered.
-const CONNECTIONS: usize = 128;
+/// How long a write may wait for a client that takes no byte.
+const WRITE_TIME: Duration = Duration::from_secs(20);
+/// Connections open at once that have shown no secret. Beyond it the oldest makes way.
+const UNKNOWN: usize = 64;
+/// Of these, from one address that is not this machine's: behind the loopback address there may be
+/// everybody's tunnels.
+const UNKNOWN_OF_ADDRESS: usize = 8;
+/// Connections beyond the limit for those who may drive.
+const RESERVED: usize = 8;
+/// Bytes that the system may hold for a client: frames that lie there are not the newest when they
+/// are read.
+const SEND_BUFFER: usize = 64 << 10;
+/// Of these, bytes that are not on their way yet when more are asked for.
+#[cfg(target_os = "linux")]
+const UNSENT: u32 = 16 << 10;
+
+/// One client's connection, as its handlers and the pool know it.
+#[derive(Debug)]
+struct Guest {
+    address: IpAddr,
+    is_known: AtomicBool,
+    is_upgraded: AtomicBool,
+    is_cut: AtomicBool,
+    waker: AtomicWaker,
+}
+
+impl Guest {
+    fn cut(&self) {
+        self.is_cut.store(true, Ordering::Release);
+        self.waker.wake();
+    }
+}
+
+/// The connections that are open.
+#[derive(Debug)]
+struct Pool {
+    open: Mutex<Open>,
+    most: usize,
+}
+
+#[derive(Debug, Default)]
+struct Open {
+    /// Those that have shown no secret, the oldest first.
+    unknown: Vec<Arc<Guest>>,
+    known: usize,
+}
+
+impl Pool {
+    /// Takes in a connection; where there are too many like it, the oldest makes way. A flood of
+    /// them gives each little time, and keeps nobody out who is quicker than that.
+    fn enter(&self, address: IpAddr) -> Arc<Guest> {
+        let guest = Arc::new(Guest {
+            address,
+            is_known: AtomicBool::new(false),
+            is_upgraded: AtomicBool::new(false),
+            is_cut: AtomicBool::new(false),
+            waker: AtomicWaker::new(),
+        });
+        let mut open = lock(&self.open);
+        let of_address = |guest: &Arc<Guest>| guest.address == address;
+        let count = open.unknown.iter().filter(|guest| of_address(guest)).count();
+        let is_much = count >= UNKNOWN_OF_ADDRESS && !address.is_loopback();
+        let oldest = if is_much {
+            open.unknown.iter().position(of_address)
+        } else {
+            (open.unknown.len() >= UNKNOWN).then_some(0)
+        };
+        if let Some(oldest) = oldest {
+            open.unknown.remove(oldest).cut();
+        }
+        open.unknown.push(Arc::clone(&guest));
+        guest
+    }
+
+    /// Takes note that a connection has shown a secret; `false` where there are too many of them.
+    fn know(&self, guest: &Arc<Guest>, access: Access) -> bool {
+        if guest.is_known.load(Ordering::Acquire) {
+            return true;
+        }
+        let mut open = lock(&self.open);
+        let reserved = if access == Access::Drive { RESERVED } else { 0 };
+        if guest.is_cut.load(Ordering::Acquire) || open.known >= self.most + reserved {
+            return false;
+        }
+        open.unknown.retain(|other| !Arc::ptr_eq(other, guest));
+        open.known += 1;
+        guest.is_known.store(true, Ordering::Release);
+        true
+    }
+
+    fn leave(&self, guest: &Arc<Guest>) {
+        let mut open = lock(&self.open);
+        if guest.is_known.load(Ordering::Acquire) {
+            open.known -= 1;
+        } else {
+            open.unknown.retain(|other| !Arc::ptr_eq(other, guest));
+        }
+    }
+}
 
 /// The connection that a request came by, as a handler knows it.
 #[derive(Debug, Clone)]
 pub(super) struct Connection {
-    upgraded: Arc<AtomicBool>,
+    guest: Arc<Guest>,
+    pool: Arc<Pool>,
 }
 
 impl Connection {
+    pub(super) fn address(&self) -> IpAddr {
+        self.guest.address
+    }
+
+    /// Takes note that it has shown a secret; `false` where there are too many that have.
+    pub(super) fn known(&self, access: Access) -> bool {
+        self.pool.know(&self.guest, access)
+    }
+
     /// From here on silence is measured from the last byte, not from the last answer.
     pub(super) fn upgraded(&self) {
-        self.upgraded.store(true, Ordering::Relaxed);
+        self.guest.is_upgraded.store(true, Ordering::Relaxed);
     }
 }
 
 /// A listening socket whose connections are [`TimedStream`]s, a bounded number of them at once.
 pub(super) struct Listener {
     socket: TcpListener,
-    slots: Arc<Semaphore>,
+    pool: Arc<Pool>,
 }
 
 impl Listener {
-    pub(super) fn new(socket: TcpListener) -> Self {
-        Self { socket, slots: Arc::new(Semaphore::new(CONNECTIONS)) }
+    /// `most` connections at once may have shown a secret.
+    pub(super) fn new(socket: TcpListener, most: usize) -> Self {
+        Self { socket, pool: Arc::new(Pool { open: Mutex::default(), most }) }
     }
 }
 
@@ -66,11 +177,11 @@ impl axum::serve::Listener for Listener {
         loop {
             match self.socket.accept().await {
                 Ok((stream, address)) => {
-                    let Ok(slot) = Arc::clone(&self.slots).try_acquire_owned() else { continue };
-                    // Small messages (an order's outcome) should not wait for more bytes; a socket
-                    // that cannot be told so works too.
-                    let _ = stream.set_nodelay(true);
-                    return (TimedStream::new(stream, slot), address);
+                    set_up(&stream);
+                    let ip = address.ip().to_canonical();
+                    let connection =
+                        Connection { guest: self.pool.enter(ip), pool: Arc::clone(&self.pool) };
+                    return (TimedStream::new(stream, connection), address);
                 }
                 // Out of file descriptors, or a connection that was gone before it was taken: try
                 // again a little later.
@@ -84,38 +195,70 @@ impl axum::serve::Listener for Listener {
     }
 }
 
+/// Has small messages (an order's outcome) not wait for more bytes, and little lie in the system's
+/// buffers. A socket that cannot be told so works too.
+fn set_up(stream: &TcpStream) {
+    let _ = stream.set_nodelay(true);
+    let socket = socket2::SockRef::from(stream);
+    let _ = socket.set_send_buffer_size(SEND_BUFFER);
+    #[cfg(target_os = "linux")]
+    let _ = socket.set_tcp_notsent_lowat(UNSENT);
+}
+
+/// Bytes that the client's side has not taken yet, where the system tells.
+#[cfg(target_os = "linux")]
+fn untaken(stream: &TcpStream) -> Option<i32> {
+    use std::os::fd::AsRawFd;
+    let mut bytes: libc::c_int = 0;
+    // SAFETY: the descriptor is open as long as `stream` is borrowed, and the request writes one
+    // integer to where `bytes` is.
+    let result = unsafe { libc::ioctl(stream.as_raw_fd(), libc::TIOCOUTQ, &raw mut bytes) };
+    (result == 0).then_some(bytes)
+}
+
+#[cfg(not(target_os = "linux"))]
+fn untaken(_: &TcpStream) -> Option<i32> {
+    None
+}
+
 impl Connected<IncomingStream<'_, Listener>> for Connection {
     fn connect_info(stream: IncomingStream<'_, Listener>) -> Self {
-        Connection { upgraded: Arc::clone(&stream.io().upgraded) }
+        stream.io().connection.clone()
     }
 }
 
 /// A TCP stream that fails with [`io::ErrorKind::TimedOut`] instead of waiting for ever.
 pub(super) struct TimedStream {
     stream: TcpStream,
-    upgraded: Arc<AtomicBool>,
+    connection: Connection,
     read_deadline: Pin<Box<Sleep>>,
-    write_deadline: Option<Pin<Box<Sleep>>>,
-    _slot: OwnedSemaphorePermit,
+    /// When a write that waits is given up, unless fewer bytes than these are untaken then.
+    write_deadline: Option<(Pin<Box<Sleep>>, Option<i32>)>,
 }
 
 impl TimedStream {
-    fn new(stream: TcpStream, slot: OwnedSemaphorePermit) -> Self {
+    fn new(stream: TcpStream, connection: Connection) -> Self {
         Self {
             stream,
-            upgraded: Arc::new(AtomicBool::new(false)),
-            read_deadline: Box::pin(sleep_until(Instant::now() + REQUEST_TIME)),
+            connection,
+            read_deadline: Box::pin(sleep_until(Instant::now() + UNKNOWN_TIME)),
             write_deadline: None,
-            _slot: slot,
         }
     }
 
     fn still_here(&mut self) {
-        let time = if self.upgraded.load(Ordering::Relaxed) { SILENT_TIME } else { REQUEST_TIME };
+        let guest = &self.connection.guest;
+        let time = if guest.is_upgraded.load(Ordering::Relaxed) {
+            SILENT_TIME
+        } else if guest.is_known.load(Ordering::Relaxed) {
+            REQUEST_TIME
+        } else {
+            UNKNOWN_TIME
+        };
         self.read_deadline.as_mut().reset(Instant::now() + time);
     }
 
-    /// Makes a pending write fail once it has been pending for [`WRITE_TIME`].
+    /// Makes a pending write fail once the client has taken no byte for [`WRITE_TIME`].
     fn timed_write<T>(
         &mut self,
         context: &mut Context<'_>,
@@ -126,10 +269,24 @@ impl TimedStream {
             self.still_here();
             return written;
         }
-        let deadline = self
-            .write_deadline
-            .get_or_insert_with(|| Box::pin(sleep_until(Instant::now() + WRITE_TIME)));
-        deadline.as_mut().poll(context).map(|()| Err(timed_out("the client does not read")))
+        let (deadline, before) = self.write_deadline.get_or_insert_with(|| {
+            (Box::pin(sleep_until(Instant::now() + WRITE_TIME)), untaken(&self.stream))
+        });
+        while deadline.as_mut().poll(context).is_ready() {
+            let now = untaken(&self.stream);
+            if now == *before {
+                return Poll::Ready(Err(timed_out("the client does not read")));
+            }
+            *before = now;
+            deadline.as_mut().reset(Instant::now() + WRITE_TIME);
+        }
+        Poll::Pending
+    }
+}
+
+impl Drop for TimedStream {
+    fn drop(&mut self) {
+        self.connection.pool.leave(&self.connection.guest);
     }
 }
 
@@ -144,18 +301,27 @@ impl AsyncRead for TimedStream {
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
         let this = self.get_mut();
+        let guest = &this.connection.guest;
+        guest.waker.register(context.waker());
+        if guest.is_cut.load(Ordering::Acquire) {
+            return Poll::Ready(Err(timed_out("it makes way for a newer connection")));
+        }
         let read = Pin::new(&mut this.stream).poll_read(context, buffer);
         if read.is_ready() {
             // Before the upgrade a byte now and then must not keep a connection open.
-            if this.upgraded.load(Ordering::Relaxed) {
+            if guest.is_upgraded.load(Ordering::Relaxed) {
                 this.still_here();
             }
             return read;
         }
-        this.read_deadline
-            .as_mut()
-            .poll(context)
-            .map(|()| Err(timed_out("the client says nothing")))
+        while this.read_deadline.as_mut().poll(context).is_ready() {
+            // One who is behind with reading is judged by that.
+            if this.write_deadline.is_none() {
+                return Poll::Ready(Err(timed_out("the client says nothing")));
+            }
+            this.still_here();
+        }
+        Poll::Pending
     }
 }
 
@@ -190,5 +356,52 @@ impl AsyncWrite for TimedStream {
 
     fn poll_shutdown(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
         Pin::new(&mut self.get_mut().stream).poll_shutdown(context)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pool() -> Pool {
+        Pool { open: Mutex::default(), most: 2 }
+    }
+
+    fn address(last: u8) -> IpAddr {
+        IpAddr::from([10, 0, 0, last])
+    }
+
+    #[test]
+    fn the_oldest_unknown_makes_way_and_those_of_one_address_among_themselves() {
+        let pool = pool();
+        let other = pool.enter(address(1));
+        let flood: Vec<_> = (0..200).map(|_| pool.enter(address(2))).collect();
+        let cut = |guest: &Guest| guest.is_cut.load(Ordering::Relaxed);
+        assert!(!cut(&other));
+        assert_eq!(flood.iter().filter(|guest| !cut(guest)).count(), UNKNOWN_OF_ADDRESS);
+        assert!(!cut(&flood[199]));
+        // Behind the loopback address there may be anybody.
+        let local: Vec<_> = (0..200).map(|_| pool.enter([127, 0, 0, 1].into())).collect();
+        assert!(cut(&other));
+        assert_eq!(local.iter().filter(|guest| !cut(guest)).count(), UNKNOWN);
+        flood.iter().chain(&local).for_each(|guest| pool.leave(guest));
+        assert!(lock(&pool.open).unknown.is_empty());
+    }
+
+    #[test]
+    fn who_has_shown_a_secret_makes_way_for_nobody() {
+        let pool = pool();
+        let known: Vec<_> = (0..2).map(|_| pool.enter(address(1))).collect();
+        assert!(known.iter().all(|guest| pool.know(guest, Access::Watch)));
+        for _ in 0..200 {
+            pool.enter(address(1));
+        }
+        assert!(known.iter().all(|guest| !guest.is_cut.load(Ordering::Relaxed)));
+        let third = pool.enter(address(1));
+        assert!(!pool.know(&third, Access::Watch), "the limit");
+        assert!(pool.know(&third, Access::Drive), "a place is kept");
+        pool.leave(&known[0]);
+        pool.leave(&known[1]);
+        assert_eq!(lock(&pool.open).known, 1);
     }
 }

@@ -19,12 +19,12 @@ use tombolo_pipelines::{encode::Encoded, language::Pipeline, run::Cost};
 
 use super::{
     ReferenceSurface, StreamCounts,
+    credentials::Access,
     outbox::{Client, Frame},
+    wheel::Wheel,
 };
 use crate::lock::{lock, wait};
 
-/// How long the wheel is kept for a driver whose connection was lost.
-pub(super) const WHEEL_KEPT: Duration = Duration::from_secs(3);
 /// How often it is looked for a viewer that is waited for.
 const LOOK_AGAIN: Duration = Duration::from_millis(20);
 
@@ -92,9 +92,15 @@ struct View {
     key_wanted: bool,
 }
 
+/// What becomes of a viewer that wants to be let in.
+pub(super) enum Arrival {
+    Client(Arc<Client>),
+    Full,
+}
+
 /// The viewers, and the newest message of each kind for them.
 #[derive(Default)]
-struct HubState {
+pub(super) struct HubState {
     description: Map<String, Value>,
     conditions: Map<String, Value>,
     /// By their numbers, which no later view gets again.
@@ -102,17 +108,14 @@ struct HubState {
     /// The pipelines as JSON.
     pipelines: Arc<str>,
     surface: Option<Arc<ReferenceSurface>>,
-    clients: BTreeMap<u64, Arc<Client>>,
-    next_client: u64,
-    driver: Option<u64>,
-    /// When the driver's connection was lost, and whose it was.
-    wheel_lost: Option<(Instant, u64)>,
+    pub(super) clients: BTreeMap<u64, Arc<Client>>,
+    pub(super) wheel: Wheel,
     /// What each pipeline has cost, by name.
     costs: Vec<(String, Cost)>,
     /// Why the journal cannot be written.
     journal_lost: Option<String>,
     last_status: Option<(u64, Instant)>,
-    status_dirty: bool,
+    pub(super) status_dirty: bool,
     end: End,
     closed: bool,
 }
@@ -120,7 +123,7 @@ struct HubState {
 /// The newest messages of the solver, for all viewers.
 #[derive(Default)]
 pub(crate) struct Hub {
-    state: Mutex<HubState>,
+    pub(super) state: Mutex<HubState>,
     work: Condvar,
     pub(crate) clock: Arc<Clock>,
     counters: Counters,
@@ -128,7 +131,7 @@ pub(crate) struct Hub {
 }
 
 /// The name of a viewer in messages.
-fn name(client: u64) -> String {
+pub(super) fn name(client: u64) -> String {
     Hub::name(client)
 }
 
@@ -256,6 +259,11 @@ impl Hub {
         lock(&self.state).end = how;
     }
 
+    /// Whether the end has begun.
+    pub(super) fn is_closed(&self) -> bool {
+        lock(&self.state).closed
+    }
+
     /// Ends the encoder's thread.
     pub(crate) fn close(&self) {
         lock(&self.state).closed = true;
@@ -322,27 +330,29 @@ impl View {
 
 /// Done on the stream's thread.
 impl Hub {
-    /// Lets a viewer in, unless there are `limit` already. `returning` is what it was called before
-    /// its connection was lost.
-    pub(super) fn join(&self, limit: usize, returning: Option<&str>) -> Option<Arc<Client>> {
+    /// Lets a viewer in, unless there are `limit` already; one more of those who may drive has a
+    /// place beyond it. `returning` is what it was called before its connection was lost, and what it
+    /// was told to come back with.
+    pub(super) fn join(
+        &self,
+        limit: usize,
+        access: Access,
+        returning: Option<(&str, &str)>,
+    ) -> Result<Arrival, getrandom::Error> {
         let mut state = lock(&self.state);
-        if state.clients.len() >= limit {
-            return None;
-        }
-        state.next_client += 1;
-        let client = Arc::new(Client::new(state.next_client, state.views.keys().copied()));
-        let alone = state.clients.is_empty();
-        let kept_for_it =
-            state.wheel_lost.is_some_and(|(_, driver)| Some(&*name(driver)) == returning);
-        if state.driver.is_none() && (alone || kept_for_it || state.wheel_is_free()) {
-            state.take_wheel(client.id);
-        }
-        state.clients.insert(client.id, Arc::clone(&client));
+        let place = limit + usize::from(access == Access::Drive);
+        let known = returning.and_then(|(name, back)| state.recognise(access, name, back));
+        let (id, back) = match known {
+            Some(known) => known,
+            None if state.clients.len() >= place => return Ok(Arrival::Full),
+            None => state.wheel.stranger()?,
+        };
+        let client = Arc::new(Client::new(id, access, back, state.views.keys().copied()));
+        state.seat(&client);
         self.arrivals.fetch_add(1, Ordering::Relaxed);
-        state.status_dirty = true;
         drop(state);
         self.work.notify_one();
-        Some(client)
+        Ok(Arrival::Client(client))
     }
 
     /// Tells viewers the last status, and that and how the run has ended; what they have not read of
@@ -370,16 +380,6 @@ impl Hub {
         self.work.notify_one();
     }
 
-    pub(super) fn leave(&self, client: u64) {
-        let mut state = lock(&self.state);
-        state.clients.remove(&client);
-        if state.driver == Some(client) {
-            state.driver = None;
-            state.wheel_lost = Some((Instant::now(), client));
-        }
-        state.status_dirty = true;
-    }
-
     pub(super) fn surface(&self) -> Option<Arc<ReferenceSurface>> {
         lock(&self.state).surface.clone()
     }
@@ -392,38 +392,18 @@ impl Hub {
         lock(&self.state).views.contains_key(&view)
     }
 
-    pub(super) fn is_driver(&self, client: u64) -> bool {
-        lock(&self.state).driver == Some(client)
-    }
-
-    /// Gives a viewer the wheel; the message says why not.
-    pub(super) fn drive(&self, client: u64) -> Result<(), String> {
-        let mut state = lock(&self.state);
-        match state.driver {
-            Some(driver) if driver == client => Ok(()),
-            Some(driver) => {
-                Err(format!("{} has the wheel; it is free once that viewer has left", name(driver)))
-            }
-            None if state.wheel_is_free() => {
-                state.take_wheel(client);
-                state.greet();
-                Ok(())
-            }
-            None => Err(format!(
-                "the wheel is kept for {} seconds for the driver whose connection was lost; ask again",
-                WHEEL_KEPT.as_secs()
-            )),
-        }
-    }
-
     /// The `hello` of a viewer.
     pub(super) fn hello(&self, client: u64, orders: Value) -> Arc<str> {
         let state = lock(&self.state);
         let mut hello = state.description.clone();
         hello.insert("orders".into(), orders);
         hello.insert("client".into(), name(client).into());
-        let role = if state.driver == Some(client) { "driver" } else { "watcher" };
+        let role = if state.wheel.driver() == Some(client) { "driver" } else { "watcher" };
         hello.insert("role".into(), role.into());
+        if let Some(client) = state.clients.get(&client) {
+            hello.insert("back".into(), client.back.as_str().into());
+            hello.insert("may_drive".into(), (client.access == Access::Drive).into());
+        }
         json!({ "hello": hello }).to_string().into()
     }
 
@@ -460,7 +440,7 @@ impl Hub {
             status.insert("step_seconds".into(), Value::Null);
         }
         status.insert("viewers".into(), state.clients.len().into());
-        status.insert("driver".into(), state.driver.map(name).into());
+        status.insert("driver".into(), state.wheel.driver().map(name).into());
         status.insert("journal_lost".into(), state.journal_lost.clone().into());
         let pipeline = |(name, cost): &(String, Cost)| {
             json!({"name": name, "runs": cost.runs, "seconds": cost.seconds, "bytes": cost.bytes,
@@ -481,17 +461,7 @@ impl Hub {
 }
 
 impl HubState {
-    fn wheel_is_free(&self) -> bool {
-        self.driver.is_none() && self.wheel_lost.is_none_or(|(at, _)| at.elapsed() >= WHEEL_KEPT)
-    }
-
-    fn take_wheel(&mut self, client: u64) {
-        self.driver = Some(client);
-        self.wheel_lost = None;
-        self.status_dirty = true;
-    }
-
-    fn greet(&self) {
+    pub(super) fn greet(&self) {
         for client in self.clients.values() {
             client.greet();
         }

@@ -11,6 +11,7 @@ use axum::body::Bytes;
 use tokio::sync::Notify;
 use tombolo_pipelines::encode::Encoded;
 
+use super::{credentials::Access, secret::Secret};
 use crate::lock::lock;
 
 /// Texts that may wait for a viewer; one that leaves more unread is let go.
@@ -105,7 +106,8 @@ struct Outbox {
     /// How many frames were acknowledged; `None` for a viewer that does not.
     acknowledged: Option<u64>,
     sent: u64,
-    overflowed: bool,
+    /// The connection is to be closed at once, with this code and reason.
+    closing: Option<Closing>,
     /// Nothing comes any more.
     has_ended: bool,
 }
@@ -160,9 +162,16 @@ impl Outbox {
     }
 }
 
+/// The code and the reason with which a connection is closed.
+pub(super) type Closing = (u16, &'static str);
+
 /// One viewer.
 pub(super) struct Client {
     pub(super) id: u64,
+    /// What it may do.
+    pub(super) access: Access,
+    /// What it shows to come back under its name.
+    pub(super) back: Secret,
     pub(super) wake: Notify,
     outbox: Mutex<Outbox>,
 }
@@ -180,19 +189,24 @@ pub(super) enum Message {
 
 impl Client {
     /// A viewer that is to be greeted, and needs a key frame of each of these views.
-    pub(super) fn new(id: u64, views: impl Iterator<Item = usize>) -> Self {
+    pub(super) fn new(
+        id: u64,
+        access: Access,
+        back: Secret,
+        views: impl Iterator<Item = usize>,
+    ) -> Self {
         let behind = || Unread { is_behind: true, ..Unread::default() };
         let views = views.map(|view| (view, behind())).collect();
         let outbox = Outbox { hello: true, views, ..Outbox::default() };
-        Self { id, wake: Notify::new(), outbox: Mutex::new(outbox) }
+        Self { id, access, back, wake: Notify::new(), outbox: Mutex::new(outbox) }
     }
 
-    /// The next thing to send, the most urgent first; `Err` once the viewer has left too much
-    /// unread.
-    pub(super) fn next(&self) -> Result<Option<Message>, ()> {
+    /// The next thing to send, the most urgent first; `Err` once the connection is to be closed, as
+    /// when the viewer has left too much unread.
+    pub(super) fn next(&self) -> Result<Option<Message>, Closing> {
         let mut outbox = lock(&self.outbox);
-        if outbox.overflowed {
-            return Err(());
+        if let Some(closing) = outbox.closing {
+            return Err(closing);
         }
         if std::mem::take(&mut outbox.hello) {
             return Ok(Some(Message::Hello));
@@ -256,6 +270,11 @@ impl Client {
         lock(&self.outbox).views.remove(&view);
     }
 
+    /// Ends the connection at once.
+    pub(super) fn close(&self, closing: Closing) {
+        self.put(|outbox| outbox.closing = Some(closing));
+    }
+
     /// Ends the connection once all else was sent.
     pub(super) fn end(&self) {
         self.put(|outbox| outbox.has_ended = true);
@@ -264,8 +283,9 @@ impl Client {
     /// Adds a text, which is never left out; a viewer that leaves very many unread is let go.
     pub(super) fn text(&self, text: &Arc<str>) {
         self.put(|outbox| {
-            outbox.overflowed |= outbox.texts.len() >= TEXTS;
-            if !outbox.overflowed {
+            if outbox.texts.len() >= TEXTS {
+                outbox.closing.get_or_insert((1008, "too much was left unread"));
+            } else {
                 outbox.texts.push_back(Arc::clone(text));
             }
         });

@@ -1,10 +1,6 @@
 //! One viewer's WebSocket, from the upgrade to its end.
 
-use std::{
-    collections::HashMap,
-    sync::Arc,
-    time::{Duration, Instant},
-};
+use std::{collections::HashMap, sync::Arc, time::Duration};
 
 use axum::{
     body::Bytes,
@@ -15,20 +11,17 @@ use futures_util::{
     stream::{SplitSink, SplitStream},
 };
 use serde_json::json;
-use tombolo_pipelines::language::{Message as Said, parse_message};
+use tombolo_pipelines::language::{Message as Said, Wheel, parse_message};
 
 use super::{
     CommandSink, PING_PERIOD,
+    allowance::RATE,
+    credentials::{Access, Holder},
     hub::Hub,
     outbox::{Client, Message},
 };
+use crate::lock::lock;
 
-/// Messages that a viewer may send at once.
-const BURST: f64 = 40.0;
-/// Messages a second that a viewer may send in the long run.
-const RATE: f64 = 20.0;
-/// Bytes of a message that count as one more.
-const WEIGHT: usize = 1 << 20;
 /// Bytes that are read of a viewer that watches.
 const WATCHED: usize = 1 << 10;
 
@@ -36,9 +29,11 @@ const WATCHED: usize = 1 << 10;
 pub(super) async fn serve(
     socket: WebSocket,
     client: Arc<Client>,
+    holder: Holder,
     hub: Arc<Hub>,
     commands: Arc<dyn CommandSink>,
 ) {
+    let _seat = Seat { client: &client, hub: &hub };
     if hub.is_driver(client.id) {
         commands.driven();
     }
@@ -46,9 +41,20 @@ pub(super) async fn serve(
     // Reading goes on while a write waits, so that a command is never stuck behind a frame.
     tokio::select! {
         () = write(sink, &client, &hub, &*commands) => {}
-        () = read(stream, &client, &hub, &*commands) => {}
+        () = read(stream, &client, &holder, &hub, &*commands) => {}
     }
-    hub.leave(client.id);
+}
+
+/// A viewer's place among the others, which it leaves however its session ends.
+struct Seat<'a> {
+    client: &'a Arc<Client>,
+    hub: &'a Hub,
+}
+
+impl Drop for Seat<'_> {
+    fn drop(&mut self) {
+        self.hub.leave(self.client);
+    }
 }
 
 async fn write(
@@ -96,11 +102,9 @@ async fn write(
                     _ = ping.tick() => sink.send(Wire::Ping(Bytes::new())).await,
                 }
             }
-            Err(()) => {
-                let reason = "too much was left unread";
-                let _ = sink
-                    .send(Wire::Close(Some(CloseFrame { code: 1008, reason: reason.into() })))
-                    .await;
+            Err((code, reason)) => {
+                let _ =
+                    sink.send(Wire::Close(Some(CloseFrame { code, reason: reason.into() }))).await;
                 return;
             }
         };
@@ -113,17 +117,17 @@ async fn write(
 async fn read(
     mut stream: SplitStream<WebSocket>,
     client: &Client,
+    holder: &Holder,
     hub: &Hub,
     commands: &dyn CommandSink,
 ) {
-    let mut allowance = Allowance { left: BURST, since: Instant::now() };
     while let Some(Ok(message)) = stream.next().await {
         let answer = match message {
             Wire::Close(_) => return,
             Wire::Ping(_) | Wire::Pong(_) => continue,
             // Not counted: there is no more of it than there are frames.
             Wire::Binary(bytes) if acknowledged(&bytes, client) => continue,
-            message if !allowance.take(bytes(&message)) => {
+            message if !lock(&holder.allowance).take(bytes(&message)) => {
                 // Waiting here leaves the rest in the viewer's own socket.
                 tokio::time::sleep(Duration::from_secs(1)).await;
                 Err((None, format!("more than {RATE} messages a second; this one was not read")))
@@ -144,24 +148,33 @@ async fn read(
 }
 
 /// Takes one message: `{"id"?, "order" | "pause" | "resume" | "stop" | "parameter" | "pipelines" |
-/// "forecast" | "drive": ...}`.
+/// "forecast" | "drive" | "hand_over" | "kick" | "here": ...}`.
 fn receive(
     text: &str,
     client: &Client,
     hub: &Hub,
     commands: &dyn CommandSink,
 ) -> Result<(), (Option<String>, String)> {
-    let drives = hub.is_driver(client.id);
-    let watches =
-        "this viewer watches; only the one that drives steers. {\"drive\": {}} asks for the wheel";
+    let drives = hub.heard(client.id);
+    let watches = match client.access {
+        Access::Drive => {
+            "this viewer watches; only the one that drives steers. {\"drive\": {}} asks for the wheel"
+        }
+        Access::Watch => {
+            "this viewer watches: the secret or link that it came with is for watching"
+        }
+    };
     // What cannot be a `drive` is not worth reading from one that watches.
     if !drives && text.len() > WATCHED {
         return Err((None, watches.into()));
     }
     let (id, message) = parse_message(text);
     let answered = match message {
-        Ok(Said::Drive) => hub.drive(client.id),
+        Ok(Said::Wheel(Wheel::Here {})) => Ok(()),
+        Ok(Said::Wheel(Wheel::Drive {})) if client.access == Access::Drive => hub.drive(client.id),
         _ if !drives => Err(watches.into()),
+        Ok(Said::Wheel(Wheel::HandOver { to })) => hub.hand_over(client.id, &to),
+        Ok(Said::Wheel(Wheel::Kick { client: other })) => hub.kick(client.id, &other),
         Ok(message) => commands.receive(client.id, id.clone(), message, text),
         Err(error) => Err(error.to_string()),
     };
@@ -179,51 +192,5 @@ fn bytes(message: &Wire) -> usize {
         Wire::Text(text) => text.len(),
         Wire::Binary(bytes) | Wire::Ping(bytes) | Wire::Pong(bytes) => bytes.len(),
         Wire::Close(_) => 0,
-    }
-}
-
-/// A bucket that fills at [`RATE`] up to [`BURST`], and that each message takes one from, and one
-/// more for each [`WEIGHT`] of it.
-struct Allowance {
-    left: f64,
-    since: Instant,
-}
-
-impl Allowance {
-    fn take(&mut self, bytes: usize) -> bool {
-        let now = Instant::now();
-        self.left = (self.left + RATE * now.duration_since(self.since).as_secs_f64()).min(BURST);
-        self.since = now;
-        if self.left < 1.0 {
-            return false;
-        }
-        #[expect(clippy::cast_precision_loss, reason = "few")]
-        let weight = 1.0 + (bytes / WEIGHT) as f64;
-        // A long message is taken at once, and paid for by a wait after it.
-        self.left -= weight;
-        true
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_flood_is_held_back() {
-        let begun = Instant::now();
-        let mut allowance = Allowance { left: BURST, since: begun };
-        let taken = (0..1000).filter(|_| allowance.take(100)).count();
-        // As many more as have come in since, on however busy a machine.
-        let since = allowance.since.duration_since(begun).as_secs_f64();
-        assert!(taken >= 40 && taken as f64 <= 41.0 + RATE * since, "{taken} in {since} s");
-    }
-
-    #[test]
-    fn a_long_message_is_taken_and_paid_for() {
-        let mut allowance =
-            Allowance { left: 1.0, since: Instant::now() + Duration::from_secs(3600) };
-        assert!(allowance.take(100 * WEIGHT));
-        assert!(!allowance.take(0) && allowance.left < -90.0);
     }
 }

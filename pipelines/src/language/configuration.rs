@@ -55,15 +55,52 @@ pub struct StreamServer {
     /// address is open to the network.
     #[schemars(with = "String")]
     pub listen: SocketAddr,
-    /// The token that viewers must show: 16 to 128 letters, digits, `-` or `_`. Left out, a new one
-    /// is made for each run.
+    /// The secret of those who may drive: 16 to 128 letters, digits, `-` or `_`. Left out, a new one
+    /// is made for each run. A file that others can read is no place for it: see `secrets`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub token: Option<String>,
+    /// A file with the secrets, `{"drive": "...", "watch": "..."}` or one of them, that only its
+    /// owner can read (mode 0600). The environment variables `TOMBOLO_DRIVING_SECRET` and
+    /// `TOMBOLO_WATCHING_SECRET` go before it; those that nothing gives are made for each run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub secrets: Option<String>,
+    /// How many may connect, and how long a driver may be silent.
+    pub limits: StreamLimits,
 }
 
 impl Default for StreamServer {
     fn default() -> Self {
-        Self { listen: SocketAddr::from(([127, 0, 0, 1], 7070)), token: None }
+        Self {
+            listen: SocketAddr::from(([127, 0, 0, 1], 7070)),
+            token: None,
+            secrets: None,
+            limits: StreamLimits::default(),
+        }
+    }
+}
+
+/// How many may connect, and how long a driver may be silent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct StreamLimits {
+    /// Viewers at once. One more is let in with the secret for driving.
+    pub viewers: NonZeroU32,
+    /// Connections at once of those who have shown a secret, viewers and other requests together.
+    pub connections: NonZeroU32,
+    /// Seconds after which another may take the wheel from a driver who gives no command and sends
+    /// no sign of being there.
+    pub driver_silence: NonZeroU32,
+}
+
+impl Default for StreamLimits {
+    fn default() -> Self {
+        const fn number(number: u32) -> NonZeroU32 {
+            match NonZeroU32::new(number) {
+                Some(number) => number,
+                None => NonZeroU32::MIN,
+            }
+        }
+        Self { viewers: number(64), connections: number(256), driver_silence: number(60) }
     }
 }
 

@@ -17,14 +17,28 @@ pub enum Message {
     Command(Command),
     /// Asks something.
     Question(Question),
-    /// Asks to become the one that steers.
-    Drive,
+    /// Settles who drives.
+    Wheel(Wheel),
 }
 
-#[derive(Deserialize)]
+/// A message that settles who drives.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-enum Wheel {
+pub enum Wheel {
+    /// Asks to become the driver.
     Drive {},
+    /// The driver gives the wheel to another.
+    HandOver {
+        /// The other's name.
+        to: String,
+    },
+    /// The driver ends another's connection.
+    Kick {
+        /// The other's name.
+        client: String,
+    },
+    /// The driver is there, though it gives no command.
+    Here {},
 }
 
 /// Reads a message: an object with one key, and an `id` beside it at will.
@@ -80,7 +94,7 @@ fn message(document: &Document<'_>) -> Result<Message, LanguageError> {
     };
     match key {
         "forecast" => document.valid().map(Message::Question),
-        "drive" => document.value().map(|Wheel::Drive {}| Message::Drive),
+        "drive" | "hand_over" | "kick" | "here" => document.value().map(Message::Wheel),
         _ => document.valid().map(Message::Command),
     }
 }

@@ -56,7 +56,7 @@ mod validate_orders;
 
 pub use cameras::{Camera, Orbit, Viewpoint};
 pub use check::{Content, Trial, check, check_content, check_orders};
-pub use configuration::{Config, Steering, StreamServer};
+pub use configuration::{Config, Steering, StreamLimits, StreamServer};
 pub use derived::{Derived, Formula};
 pub(crate) use derived::{GIVEN, PARAMETER};
 pub use error::{LanguageError, Problem};
@@ -70,7 +70,7 @@ pub use glyphs::{GlyphShape, Glyphs, GlyphsAt};
 pub use journal::{
     HandedShape, JournalNote, LostLines, Recording, RunEnd, RunHeader, is_journal, parse_journal,
 };
-pub use message::{Message, parse_message};
+pub use message::{Message, Wheel, parse_message};
 pub(crate) use monitors::{Condition, Line, Scope, Slot, columns, line, monitors_of};
 pub use monitors::{Monitor, check_parameters, monitors};
 pub use order::{Cancel, Change, Command, Order, Question};

@@ -1,0 +1,336 @@
+//! What lets a client in, and what it may do then: two secrets, keys to use once, and the sessions
+//! that keys are traded for.
+
+use std::{
+    collections::VecDeque,
+    fs::File,
+    io::Read,
+    path::Path,
+    sync::{Arc, Mutex},
+};
+
+use axum::http::{HeaderMap, Uri, header};
+use serde::Deserialize;
+use tombolo_pipelines::language::StreamServer;
+
+use super::{StreamError, allowance::Allowance, secret::Secret};
+use crate::lock::lock;
+
+/// The variables of the environment that give the secrets.
+const DRIVING_VARIABLE: &str = "TOMBOLO_DRIVING_SECRET";
+const WATCHING_VARIABLE: &str = "TOMBOLO_WATCHING_SECRET";
+/// Keys that may wait to be used; older ones make way.
+const KEYS: usize = 64;
+/// Sessions that are known of each access; older ones make way.
+const SESSIONS: usize = 128;
+/// The longest file of secrets that is read, in bytes.
+const FILE: u64 = 4096;
+
+/// What the holder of a secret may do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Access {
+    /// Sees everything and changes nothing.
+    Watch,
+    /// May be the driver.
+    Drive,
+}
+
+/// One who has shown a secret.
+#[derive(Debug, Clone)]
+pub(super) struct Holder {
+    pub(super) access: Access,
+    pub(super) allowance: Arc<Mutex<Allowance>>,
+}
+
+impl Holder {
+    fn new(access: Access) -> Self {
+        Self { access, allowance: Arc::default() }
+    }
+}
+
+/// What a request shows.
+pub(super) enum Shown {
+    Nothing,
+    Wrong,
+    Right(Holder),
+}
+
+struct Session {
+    id: Secret,
+    holder: Holder,
+}
+
+#[derive(Default)]
+struct Issued {
+    keys: VecDeque<(Access, Secret)>,
+    sessions: VecDeque<Session>,
+}
+
+/// The secrets of a run, and what was given out for them.
+pub(super) struct Credentials {
+    drive: (Secret, Holder),
+    watch: (Secret, Holder),
+    issued: Mutex<Issued>,
+}
+
+/// A file of secrets.
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+struct SecretsFile {
+    drive: Option<String>,
+    watch: Option<String>,
+}
+
+impl Credentials {
+    /// The secrets that the environment, the file of secrets or the configuration gives, in this
+    /// order, and fresh ones for those that none of them gives.
+    pub(super) fn of(settings: &StreamServer) -> Result<Self, StreamError> {
+        let file = match &settings.secrets {
+            Some(file) => read(Path::new(file))?,
+            None => SecretsFile::default(),
+        };
+        let named = settings.secrets.as_deref().unwrap_or_default();
+        let drive = first([
+            (DRIVING_VARIABLE, variable(DRIVING_VARIABLE)),
+            (named, file.drive),
+            ("stream.token", settings.token.clone()),
+        ])?;
+        let watch = first([(WATCHING_VARIABLE, variable(WATCHING_VARIABLE)), (named, file.watch)])?;
+        if drive.matches(watch.as_str()) {
+            return Err(StreamError::Secrets(
+                "the secret for driving and the one for watching are the same".into(),
+            ));
+        }
+        Ok(Self {
+            drive: (drive, Holder::new(Access::Drive)),
+            watch: (watch, Holder::new(Access::Watch)),
+            issued: Mutex::default(),
+        })
+    }
+
+    pub(super) fn secret(&self, access: Access) -> &Secret {
+        match access {
+            Access::Drive => &self.drive.0,
+            Access::Watch => &self.watch.0,
+        }
+    }
+
+    /// A new key to use once.
+    pub(super) fn key(&self, access: Access) -> Result<Secret, getrandom::Error> {
+        let key = Secret::random()?;
+        let mut issued = lock(&self.issued);
+        if issued.keys.len() >= KEYS {
+            issued.keys.pop_front();
+        }
+        issued.keys.push_back((access, key.clone()));
+        Ok(key)
+    }
+
+    /// What a key gives access to, which is used up by it.
+    pub(super) fn redeem(&self, key: &str) -> Option<Access> {
+        let mut issued = lock(&self.issued);
+        let found = issued.keys.iter().position(|(_, known)| known.matches(key))?;
+        issued.keys.remove(found).map(|(access, _)| access)
+    }
+
+    /// Begins a session; its id is for the cookie.
+    pub(super) fn begin(&self, access: Access) -> Result<Secret, getrandom::Error> {
+        let id = Secret::random()?;
+        let mut issued = lock(&self.issued);
+        let alike = |session: &Session| session.holder.access == access;
+        // Those who watch must not push out those who drive.
+        if issued.sessions.iter().filter(|session| alike(session)).count() >= SESSIONS
+            && let Some(oldest) = issued.sessions.iter().position(alike)
+        {
+            issued.sessions.remove(oldest);
+        }
+        issued.sessions.push_back(Session { id: id.clone(), holder: Holder::new(access) });
+        Ok(id)
+    }
+
+    /// Who shows this secret.
+    pub(super) fn holder(&self, secret: &str) -> Option<Holder> {
+        let mut known = [&self.drive, &self.watch].into_iter();
+        known.find(|(own, _)| own.matches(secret)).map(|(_, holder)| holder.clone())
+    }
+
+    /// Who shows this cookie.
+    fn session(&self, id: &str) -> Option<Holder> {
+        let issued = lock(&self.issued);
+        let mut sessions = issued.sessions.iter();
+        sessions.find(|session| session.id.matches(id)).map(|session| session.holder.clone())
+    }
+
+    /// What a request shows. A secret in its header or query counts alone, also where it is wrong;
+    /// the cookie counts where there is none.
+    pub(super) fn shown(&self, headers: &HeaderMap, uri: &Uri) -> Shown {
+        let bearer = headers.get(header::AUTHORIZATION).map(|value| {
+            value.to_str().ok().and_then(|text| text.strip_prefix("Bearer ")).unwrap_or_default()
+        });
+        if let Some(secret) = bearer.or_else(|| parameter(uri, "token")) {
+            return self.holder(secret).map_or(Shown::Wrong, Shown::Right);
+        }
+        self.visitor(headers).map_or(Shown::Nothing, Shown::Right)
+    }
+
+    /// Who shows a cookie of this run.
+    pub(super) fn visitor(&self, headers: &HeaderMap) -> Option<Holder> {
+        let name = cookie_name(headers);
+        let cookies = headers.get_all(header::COOKIE).iter();
+        let mut pairs = cookies
+            .filter_map(|value| value.to_str().ok())
+            .flat_map(|text| text.split(';'))
+            .filter_map(|pair| pair.trim().split_once('='));
+        pairs.find_map(|(key, id)| if key == name { self.session(id) } else { None })
+    }
+}
+
+/// The name of the cookie. Cookies do not know ports, so that it has the one that the browser sees
+/// in it: several runs on one machine, or behind several tunnels, keep apart.
+pub(super) fn cookie_name(headers: &HeaderMap) -> String {
+    let host = headers.get(header::HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
+    let port = host.rsplit_once(':').and_then(|(_, port)| port.parse::<u16>().ok());
+    format!("tombolo-{}", port.unwrap_or(80))
+}
+
+/// A parameter of the query, as it stands there.
+pub(super) fn parameter<'a>(uri: &'a Uri, name: &str) -> Option<&'a str> {
+    let mut pairs = uri.query()?.split('&').filter_map(|pair| pair.split_once('='));
+    pairs.find(|(key, _)| *key == name).map(|(_, value)| value)
+}
+
+fn variable(name: &str) -> Option<String> {
+    std::env::var_os(name).map(|value| value.to_string_lossy().into_owned())
+}
+
+/// The first secret that is given, or a fresh one.
+fn first<const N: usize>(given: [(&str, Option<String>); N]) -> Result<Secret, StreamError> {
+    match given.into_iter().find_map(|(source, text)| Some((source, text?))) {
+        None => Secret::random().map_err(StreamError::Token),
+        Some((source, text)) => Secret::given(&text).ok_or_else(|| {
+            StreamError::Secrets(format!(
+                "{source}: expected a secret of 16 to 128 letters, digits, '-' or '_'"
+            ))
+        }),
+    }
+}
+
+/// Reads a file of secrets, which nobody but its owner may read.
+fn read(path: &Path) -> Result<SecretsFile, StreamError> {
+    let wrong = |reason: &str| StreamError::Secrets(format!("{}: {reason}", path.display()));
+    let failed = |error: std::io::Error| wrong(&error.to_string());
+    let file = File::open(path).map_err(failed)?;
+    let metadata = file.metadata().map_err(failed)?;
+    if !metadata.is_file() {
+        return Err(wrong("it is no file"));
+    }
+    #[cfg(unix)]
+    if std::os::unix::fs::PermissionsExt::mode(&metadata.permissions()) & 0o077 != 0 {
+        return Err(wrong("others than its owner can get at it; `chmod 600` it"));
+    }
+    let mut text = String::new();
+    file.take(FILE).read_to_string(&mut text).map_err(failed)?;
+    // The parser's own words could quote a secret.
+    serde_json::from_str(&text)
+        .map_err(|_| wrong(r#"expected {"drive": "SECRET", "watch": "SECRET"}, or one of them"#))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn credentials() -> Credentials {
+        Credentials::of(&StreamServer::default()).expect("secrets")
+    }
+
+    fn access(
+        credentials: &Credentials,
+        uri: &str,
+        headers: &[(&'static str, &str)],
+    ) -> Option<Access> {
+        let mut map = HeaderMap::new();
+        for (name, value) in headers {
+            map.insert(*name, value.parse().expect("a header"));
+        }
+        match credentials.shown(&map, &uri.parse().expect("a URL")) {
+            Shown::Right(holder) => Some(holder.access),
+            _ => None,
+        }
+    }
+
+    #[test]
+    fn each_way_of_showing_a_secret_gives_what_it_is_for() {
+        let credentials = credentials();
+        for wanted in [Access::Drive, Access::Watch] {
+            let secret = credentials.secret(wanted).as_str().to_owned();
+            assert_eq!(access(&credentials, &format!("/ws?a=b&token={secret}"), &[]), Some(wanted));
+            let bearer = format!("Bearer {secret}");
+            assert_eq!(access(&credentials, "/ws", &[("authorization", &bearer)]), Some(wanted));
+            let id = credentials.begin(wanted).expect("a session");
+            let cookie = format!("other=1; tombolo-7070={}", id.as_str());
+            let host = ("host", "localhost:7070");
+            assert_eq!(access(&credentials, "/ws", &[host, ("cookie", &cookie)]), Some(wanted));
+            // The cookie of another port, and a wrong secret beside a right cookie.
+            let other = ("host", "localhost:7071");
+            assert_eq!(access(&credentials, "/ws", &[other, ("cookie", &cookie)]), None);
+            let both = [host, ("cookie", &*cookie)];
+            assert_eq!(access(&credentials, "/ws?token=0", &both), None);
+            let both = [host, ("cookie", &*cookie), ("authorization", "Basic x")];
+            assert_eq!(access(&credentials, "/ws", &both), None);
+        }
+    }
+
+    #[test]
+    fn a_key_is_used_once() {
+        let credentials = credentials();
+        let key = credentials.key(Access::Watch).expect("a key");
+        assert_eq!(credentials.redeem(&key.as_str()[1..]), None);
+        assert_eq!(credentials.redeem(key.as_str()), Some(Access::Watch));
+        assert_eq!(credentials.redeem(key.as_str()), None);
+    }
+
+    #[test]
+    fn sessions_are_bounded_and_watching_ones_push_no_driving_one_out() {
+        let credentials = credentials();
+        let driving = credentials.begin(Access::Drive).expect("a session");
+        let watching = credentials.begin(Access::Watch).expect("a session");
+        for _ in 0..SESSIONS {
+            credentials.begin(Access::Watch).expect("a session");
+        }
+        assert!(credentials.session(driving.as_str()).is_some());
+        assert!(credentials.session(watching.as_str()).is_none());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_file_of_secrets_that_others_can_read_is_refused() {
+        use std::os::unix::fs::PermissionsExt;
+        let directory = tempfile::tempdir().expect("a directory");
+        let file = directory.path().join("secrets.json");
+        let settings = StreamServer {
+            secrets: Some(file.display().to_string()),
+            token: Some("0123456789abcdef-token".into()),
+            ..StreamServer::default()
+        };
+        let write = |text: &str, mode: u32| {
+            std::fs::write(&file, text).expect("written");
+            std::fs::set_permissions(&file, PermissionsExt::from_mode(mode)).expect("set");
+        };
+        let refused = || Credentials::of(&settings).err().expect("refused").to_string();
+        assert!(refused().contains("secrets.json"), "a file that is missing");
+        let good = r#"{"watch": "0123456789abcdef-watch"}"#;
+        write(good, 0o640);
+        assert!(refused().contains("chmod 600"));
+        write(good, 0o600);
+        let credentials = Credentials::of(&settings).expect("read");
+        assert_eq!(credentials.secret(Access::Watch).as_str(), "0123456789abcdef-watch");
+        assert_eq!(credentials.secret(Access::Drive).as_str(), "0123456789abcdef-token");
+        for wrong in ["", r#"{"watch": "short-one"}"#, r#"{"wotch": "0123456789abcdef-watch"}"#] {
+            write(wrong, 0o600);
+            let told = refused();
+            assert!(!told.contains("short-one") && !told.contains("0123456789"), "{told}");
+        }
+        write(r#"{"watch": "0123456789abcdef-token"}"#, 0o600);
+        assert!(refused().contains("the same"));
+    }
+}

@@ -1,0 +1,249 @@
+//! What each request must pass: the name and the page that it comes by, and what it shows.
+
+use std::{
+    collections::HashMap,
+    net::IpAddr,
+    sync::Mutex,
+    time::{Duration, Instant},
+};
+
+use axum::{
+    extract::{ConnectInfo, Request, State},
+    http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri, header},
+    middleware::Next,
+    response::{IntoResponse, Response},
+};
+
+use super::{
+    Shared,
+    connection::Connection,
+    credentials::{Access, Holder, Shown, cookie_name, parameter},
+};
+use crate::lock::lock;
+
+/// How long nothing more is logged of an address once a refusal of it was.
+const QUIET: Duration = Duration::from_secs(60);
+/// Addresses whose refusals are remembered.
+const ADDRESSES: usize = 256;
+
+const UNAUTHORIZED: &str = "the token or cookie is missing, wrong or of another run; open the link that this run told when it began\n";
+const USED: &str = "this link opens one browser, once: it has been used, or is of another run. In the browser that it opened, \
+go to this address without the key. For another browser take a link from the file that the run named when it began\n";
+
+const HEADERS: [(HeaderName, &str); 6] = [
+    (header::CACHE_CONTROL, "no-store"),
+    (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+    (header::REFERRER_POLICY, "no-referrer"),
+    (header::X_FRAME_OPTIONS, "DENY"),
+    (
+        header::CONTENT_SECURITY_POLICY,
+        "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; \
+         img-src 'self' data: blob:; worker-src 'self' blob:; connect-src 'self'; object-src 'none'; \
+         base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    ),
+    (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
+];
+
+/// Refuses requests under a foreign name, from a foreign page or with a wrong secret, trades what a
+/// link shows for a cookie, and puts the headers on every answer.
+pub(super) async fn guard(
+    State(shared): State<Shared>,
+    ConnectInfo(connection): ConnectInfo<Connection>,
+    mut request: Request,
+    next: Next,
+) -> Response {
+    let mut response = match admit(&shared, &connection, &mut request) {
+        Ok(()) => next.run(request).await,
+        Err(answer) => answer,
+    };
+    let refused = [StatusCode::UNAUTHORIZED, StatusCode::FORBIDDEN].contains(&response.status());
+    if refused && shared.refusals.is_to_be_told(connection.address()) {
+        log::warn!(
+            "a request from {} was refused: {}",
+            connection.address(),
+            if response.status() == StatusCode::UNAUTHORIZED {
+                "it showed no secret of this run"
+            } else {
+                "it came under a foreign name or from a page of another site"
+            }
+        );
+    }
+    for (name, value) in HEADERS {
+        response.headers_mut().insert(name, HeaderValue::from_static(value));
+    }
+    response
+}
+
+/// Takes note of who asks, or has the answer for who may not.
+fn admit(shared: &Shared, connection: &Connection, request: &mut Request) -> Result<(), Response> {
+    if let Some(reason) = foreign(request.uri(), request.headers(), shared.loopback) {
+        return Err((StatusCode::FORBIDDEN, reason).into_response());
+    }
+    let is_page = matches!(request.uri().path(), "/" | "/index.html");
+    if is_page && request.method() == Method::GET {
+        trade(shared, request)?;
+    }
+    match shared.credentials.shown(request.headers(), request.uri()) {
+        Shown::Right(holder) => {
+            if !connection.known(holder.access) {
+                let reason = "too many connections are open already\n";
+                return Err((StatusCode::SERVICE_UNAVAILABLE, reason).into_response());
+            }
+            request.extensions_mut().insert(holder);
+        }
+        Shown::Wrong => return Err(unauthorized()),
+        Shown::Nothing => {}
+    }
+    Ok(())
+}
+
+fn unauthorized() -> Response {
+    (StatusCode::UNAUTHORIZED, UNAUTHORIZED).into_response()
+}
+
+/// Lets only those on who have shown a secret.
+pub(super) async fn holders_only(request: Request, next: Next) -> Response {
+    match request.extensions().get::<Holder>() {
+        Some(_) => next.run(request).await,
+        None => unauthorized(),
+    }
+}
+
+/// Answers a link of a browser with a cookie, and with the same page without what must stay secret.
+fn trade(shared: &Shared, request: &Request) -> Result<(), Response> {
+    let (uri, headers) = (request.uri(), request.headers());
+    let visitor = shared.credentials.visitor(headers).map(|holder| holder.access);
+    let access = match (parameter(uri, "key"), parameter(uri, "token")) {
+        (Some(key), _) => match shared.credentials.redeem(key).or(visitor) {
+            Some(access) => access,
+            None => return Err((StatusCode::UNAUTHORIZED, USED).into_response()),
+        },
+        (None, Some(token)) => match shared.credentials.holder(token) {
+            Some(holder) => holder.access,
+            None => return Err(unauthorized()),
+        },
+        (None, None) => return Ok(()),
+    };
+    let mut response = StatusCode::SEE_OTHER.into_response();
+    let rest = uri.query().unwrap_or_default().split('&');
+    let rest: Vec<&str> =
+        rest.filter(|pair| !pair.starts_with("key=") && !pair.starts_with("token=")).collect();
+    // Relative, so that it holds behind a proxy's prefix too.
+    let place = if rest.is_empty() { "./".into() } else { format!("./?{}", rest.join("&")) };
+    if let Ok(place) = HeaderValue::from_str(&place) {
+        response.headers_mut().insert(header::LOCATION, place);
+    }
+    // One who has the cookie already keeps it.
+    if visitor != Some(access) {
+        match cookie(shared, headers, access) {
+            Some(cookie) => drop(response.headers_mut().insert(header::SET_COOKIE, cookie)),
+            None => return Err(StatusCode::INTERNAL_SERVER_ERROR.into_response()),
+        }
+    }
+    Err(response)
+}
+
+fn cookie(shared: &Shared, headers: &HeaderMap, access: Access) -> Option<HeaderValue> {
+    let id = shared.credentials.begin(access).ok()?;
+    let name = cookie_name(headers);
+    HeaderValue::from_str(&format!("{name}={}; HttpOnly; SameSite=Strict", id.as_str())).ok()
+}
+
+/// Why a request is refused for the name or the page that it comes by.
+fn foreign(uri: &Uri, headers: &HeaderMap, loopback: bool) -> Option<&'static str> {
+    let text = |name: HeaderName| headers.get(name).map(|value| value.to_str().unwrap_or(""));
+    let host = text(header::HOST).unwrap_or("");
+    if headers.get_all(header::HOST).iter().count() > 1
+        || uri.authority().is_some_and(|authority| authority.as_str() != host)
+    {
+        return Some("this request names more than one host\n");
+    }
+    // Any port will do: a tunnel may end on another one.
+    let name = host
+        .rsplit_once(':')
+        .map_or(host, |(name, port)| if port.ends_with(']') { host } else { name });
+    if loopback && !matches!(name, "localhost" | "127.0.0.1" | "[::1]") {
+        return Some("this server answers to localhost, 127.0.0.1 and [::1] only\n");
+    }
+    match text(header::ORIGIN) {
+        Some(origin) if origin.split_once("://").map(|(_, authority)| authority) != Some(host) => {
+            Some("this request comes from a page of another site\n")
+        }
+        _ => None,
+    }
+}
+
+/// Which addresses were refused of late.
+#[derive(Default)]
+pub(super) struct Refusals(Mutex<HashMap<IpAddr, Instant>>);
+
+impl Refusals {
+    /// Whether a refusal is the first of this address in a while.
+    pub(super) fn is_to_be_told(&self, address: IpAddr) -> bool {
+        let mut told = lock(&self.0);
+        told.retain(|_, at| at.elapsed() < QUIET);
+        let is_new = !told.contains_key(&address) && told.len() < ADDRESSES;
+        if is_new {
+            told.insert(address, Instant::now());
+        }
+        is_new
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn headers(host: &'static str, origin: Option<&'static str>) -> HeaderMap {
+        let mut headers = HeaderMap::new();
+        headers.insert(header::HOST, HeaderValue::from_static(host));
+        if let Some(origin) = origin {
+            headers.insert(header::ORIGIN, HeaderValue::from_static(origin));
+        }
+        headers
+    }
+
+    #[test]
+    fn foreign_pages_and_names_are_refused() {
+        for (host, origin) in [
+            ("127.0.0.1:7070", None),
+            ("localhost:9000", Some("http://localhost:9000")),
+            ("[::1]:7070", Some("http://[::1]:7070")),
+            ("localhost", Some("https://localhost")),
+        ] {
+            assert_eq!(
+                foreign(&Uri::from_static("/"), &headers(host, origin), true),
+                None,
+                "{host} {origin:?}"
+            );
+        }
+        for (host, origin) in [
+            ("rebound.example:7070", None),
+            ("127.0.0.1:7070", Some("http://evil.example")),
+            ("127.0.0.1:7070", Some("null")),
+            ("127.0.0.1:7070", Some("http://127.0.0.1:8080")),
+            ("127.0.0.1.evil.example:7070", None),
+            ("", None),
+        ] {
+            assert!(
+                foreign(&Uri::from_static("/"), &headers(host, origin), true).is_some(),
+                "{host} {origin:?}"
+            );
+        }
+        assert_eq!(
+            foreign(&Uri::from_static("/"), &headers("cluster.example:7070", None), false),
+            None
+        );
+    }
+
+    #[test]
+    fn refusals_are_told_once_for_each_address() {
+        let refusals = Refusals::default();
+        let address = |last: u32| IpAddr::from((0x0a00_0000 + last).to_be_bytes());
+        assert!(refusals.is_to_be_told(address(1)));
+        assert!(!refusals.is_to_be_told(address(1)));
+        assert!(refusals.is_to_be_told(address(2)));
+        let told = (0..1000).filter(|&last| refusals.is_to_be_told(address(last))).count();
+        assert!(told < ADDRESSES);
+    }
+}
