@@ -5,7 +5,7 @@
 import { parseServerMessage } from "./protocol";
 import type { ClientMessage, ServerMessage } from "./protocol";
 
-export type ConnectionState = "connecting" | "connected" | "reconnecting" | "refused" | "ended";
+export type ConnectionState = "connecting" | "connected" | "reconnecting" | "refused" | "dismissed" | "ended";
 
 /** The part of the browser that a connection needs, so that a test can stand in for it. */
 export interface Surroundings {
@@ -34,20 +34,20 @@ export function backOff(attempt: number, random: number): number {
   return Math.round(base * (0.75 + 0.5 * random));
 }
 
-/** The addresses of the page's own server and the token, from the page's address (`?token=` or `#token=`). */
-export function streamAddress(page: string): { address: string; probe: string; token: string; surface: string } {
-  const url = new URL(page);
-  const token = url.searchParams.get("token") ?? new URLSearchParams(url.hash.slice(1)).get("token") ?? "";
-  const stream = new URL("ws", url);
-  stream.search = new URLSearchParams({ token }).toString();
-  stream.hash = "";
+/** The addresses of the page's own server. The browser shows its cookie there, which no script can read. */
+export function streamAddress(page: string): { address: string; probe: string; surface: string } {
+  const place = (name: string): URL => new URL(name, page);
+  const stream = place("ws");
   const probe = stream.toString();
-  stream.protocol = url.protocol === "https:" ? "wss:" : "ws:";
-  const surface = new URL("surface", url);
-  surface.search = stream.search;
-  surface.hash = "";
-  return { address: stream.toString(), probe, token, surface: surface.toString() };
+  stream.protocol = stream.protocol === "https:" ? "wss:" : "ws:";
+  return { address: stream.toString(), probe, surface: place("surface").toString() };
 }
+
+/** What a viewer is called, and what it shows to come back under that name after its connection was lost. */
+export interface Identity { client: string; back: string }
+
+/** The codes with which the server closes a connection for good, or because the viewer has another. */
+const ENDED = 1000, KICKED = 4001, REPLACED = 4002;
 
 export const browserSurroundings: Surroundings = {
   open: (address) => new WebSocket(address),
@@ -70,11 +70,11 @@ export class Connection {
   private timer: number | null = null;
   private closed = false;
   state: ConnectionState = "connecting";
-  /** What the server calls this viewer: named when it comes back, so that it finds the wheel where it left it. */
-  client: string | null = null;
+  /** Who this viewer is: shown when it comes back, so that it finds the wheel where it left it. */
+  identity: Identity | null = null;
 
   constructor(
-    private readonly target: { address: string; probe: string; token: string },
+    private readonly target: { address: string; probe: string },
     private readonly listener: Listener,
     private readonly surroundings: Surroundings = browserSurroundings,
   ) {}
@@ -93,7 +93,7 @@ export class Connection {
 
   /** Tries again at once, if a connection is not there already. */
   retry(): void {
-    if (this.state === "connected" || this.timer === null) return;
+    if (this.state !== "dismissed" && (this.state === "connected" || this.timer === null)) return;
     this.attempt = 0;
     this.clearTimer();
     this.open();
@@ -128,8 +128,8 @@ export class Connection {
   private open(): void {
     let socket: WebSocket;
     try {
-      const client = this.client === null ? "" : `&client=${encodeURIComponent(this.client)}`;
-      socket = this.surroundings.open(this.target.address + client);
+      const identity = this.identity === null ? "" : `?${new URLSearchParams({ ...this.identity }).toString()}`;
+      socket = this.surroundings.open(this.target.address + identity);
     } catch (error) {
       this.again("reconnecting", error instanceof Error ? error.message : String(error), backOff(this.attempt++, this.surroundings.random()));
       return;
@@ -162,8 +162,11 @@ export class Connection {
       this.socket = null;
       if (this.closed) return;
       // The server's farewell: there is nothing to come back to.
-      if (event.code === 1000) this.change("ended", "");
-      else void this.lost(opened, event.reason);
+      if (event.code === ENDED) return this.change("ended", "");
+      if (event.code === KICKED) return this.change("dismissed", "The viewer that steers has ended this connection.");
+      // Another tab, copied from this one, goes by its name.
+      if (event.code === REPLACED) this.identity = null;
+      void this.lost(opened, event.reason);
     };
   }
 
@@ -172,7 +175,7 @@ export class Connection {
     const answer = opened ? null : await this.surroundings.probe(this.target.probe);
     if (this.closed) return;
     if (answer?.status === 401) {
-      this.again("refused", this.target.token === "" ? "The link has no token." : "The simulation does not accept the token in this link.", REFUSED_DELAY);
+      this.again("refused", "The simulation does not know this browser, or another one runs here now.", REFUSED_DELAY);
     } else if (answer?.status === 403) {
       this.again("refused", `The simulation does not accept this address: ${answer.text}.`, REFUSED_DELAY);
     } else {

@@ -19,6 +19,7 @@ import { Scene } from "./scene";
 import { Selection } from "./selection";
 import { ColourPanel, MonitorPanel, ParameterPanel, ViewList } from "./sidebar";
 import { StatusBar } from "./status";
+import { Wheel } from "./wheel";
 
 if (!document.createElement("canvas").getContext("webgl2")) {
   showEmpty("This browser cannot draw the picture", "It has no WebGL 2, or it is switched off. Any current Chrome, Firefox, Edge or Safari has it.");
@@ -57,6 +58,7 @@ const parameters = new ParameterPanel(part("parameters"), (name, value) => send(
 const form = new EditForm(part("fields"), selection);
 const orders = new Orders(part("orders"), (text) => write(part("announcer"), text), (order) => send({ cancel: { order } }));
 const bar = new StatusBar();
+const wheel = new Wheel(send, () => connection.state === "connected" && hello?.role === "driver");
 watchPointer(part("scene"), scene, selection);
 const addresses = streamAddress(window.location.href);
 const preview = new PreviewPanel(scene, addresses.surface, kernel, () => {
@@ -114,8 +116,9 @@ const connection = new Connection(addresses, {
   trouble: report,
 });
 
-const CLIENT = "tombolo-client";
-connection.client = sessionStorage.getItem(CLIENT);
+const CLIENT = "tombolo-client", BACK = "tombolo-back";
+const [client, back] = [sessionStorage.getItem(CLIENT), sessionStorage.getItem(BACK)];
+connection.identity = client !== null && back !== null ? { client, back } : null;
 
 function takeMessage(message: ServerMessage): void {
   bar.alive();
@@ -133,6 +136,7 @@ function takeMessage(message: ServerMessage): void {
     case "pipelines": return;
     // The status shows what it has changed.
     case "done": return;
+    case "wheel": return wheel.asked(message.body.asked_by);
     case "end": return bar.end(message.body);
     case "error": {
       const { id, message: text } = message.body;
@@ -143,8 +147,9 @@ function takeMessage(message: ServerMessage): void {
 
 function takeHello(body: Hello): void {
   hello = body;
-  connection.client = String(body.client);
-  sessionStorage.setItem(CLIENT, connection.client);
+  connection.identity = { client: String(body.client), back: body.back ?? "" };
+  sessionStorage.setItem(CLIENT, connection.identity.client);
+  sessionStorage.setItem(BACK, connection.identity.back);
   const names = body.features.map((feature) => feature.name);
   write(part("channel"), body.channel ?? "");
   scene.setViews(body.views);
@@ -203,9 +208,10 @@ function refresh(): void {
   write(pause, status?.paused ? "Resume" : "Pause");
   pause.dataset.paused = String(status?.paused === true);
   orders.allowCancelling(driving && !stopped);
-  part("wheel").hidden = !connected || !hello || driving;
+  part("wheel").hidden = !connected || !hello || driving || hello.may_drive === false;
+  wheel.refresh();
   if (frames > 0) return showEmpty("", "");
-  if (connection.state === "refused") showEmpty("This link does not open the simulation", "The token in it is missing or wrong. Open the link that the simulation printed when it started.");
+  if (connection.state === "refused") showEmpty("This link does not open the simulation", "It was used already, or is of another run. Open a link that this simulation told when it started.");
   else if (!connected) showEmpty("Waiting for the simulation", "Nothing answers at this address yet. The viewer connects by itself as soon as the run is there.");
   else if (hello && hello.views.length === 0) showEmpty("Nothing is streamed", "The simulation runs, but no pipeline of its configuration ends in a stream stage.");
   else showEmpty("Connected", "The first picture appears when the simulation has taken its next step.");
@@ -255,7 +261,7 @@ part("undo").addEventListener("click", () => {
 part("pause").addEventListener("click", () => send(status?.paused ? { resume: {} } : { pause: {} }));
 part("wheel").addEventListener("click", () => send({ drive: {} }));
 part("retry").addEventListener("click", () => connection.retry());
-window.addEventListener("online", () => connection.retry());
+window.addEventListener("online", () => { if (connection.state !== "dismissed") connection.retry(); });
 
 let side: 1 | -1 = 1;
 let looking = "";

@@ -17,7 +17,11 @@ export interface SurfaceInformation { id: string; vertices: number; faces: numbe
 export interface Hello {
   protocol: number;
   client: string | number;
+  /** What this viewer shows to come back under its name. */
+  back?: string;
   role: Role;
+  /** False for one that came with the secret for watching. */
+  may_drive?: boolean;
   channel?: string | null;
   views: ViewInformation[];
   features: FeatureInformation[];
@@ -100,6 +104,9 @@ export interface Done { id: string; cycle: number; time: number }
 
 export interface ServerError { message: string; id?: string | null }
 
+/** Another viewer asks the one that drives for the wheel. */
+export interface WheelAsked { asked_by: string }
+
 /** The last word of a run. */
 export interface RunEnd { how: "finished" | "stopped" | "failed"; cycle: number; time: number }
 
@@ -111,12 +118,14 @@ export type ServerMessage =
   | { kind: "monitor"; body: Monitor }
   | { kind: "pipelines"; body: PipelineChange }
   | { kind: "done"; body: Done }
+  | { kind: "wheel"; body: WheelAsked }
   | { kind: "end"; body: RunEnd }
   | { kind: "error"; body: ServerError };
 
 export type ClientMessage = { id?: string } & (
   | { order: Json } | { forecast: Json } | { pause: object } | { resume: object } | { stop: object }
   | { parameter: { name: string; value: number } } | { pipelines: Json } | { cancel: { order: string } } | { drive: object }
+  | { hand_over: { to: string } } | { kick: { client: string } } | { here: object }
 );
 
 /** Raised for a message that does not follow the protocol; the text says where it departs from it. */
@@ -172,7 +181,7 @@ export function parseServerMessage(text: string): ServerMessage {
     throw new ProtocolError("a text message that is not JSON");
   }
   if (!isObject(parsed)) throw new ProtocolError("a text message that is not a JSON object");
-  for (const kind of ["hello", "status", "order", "forecast", "monitor", "pipelines", "done", "end", "error"] as const) {
+  for (const kind of ["hello", "status", "order", "forecast", "monitor", "pipelines", "wheel", "done", "end", "error"] as const) {
     const body: unknown = parsed[kind];
     if (body === undefined) continue;
     if (!isObject(body)) throw new ProtocolError(`the message "${kind}" is not an object`);

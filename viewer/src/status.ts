@@ -5,7 +5,7 @@ import { digits, seconds } from "./number";
 import type { Hello, RunEnd, Status } from "./protocol";
 
 const CONNECTIONS: Record<ConnectionState, string> = {
-  connecting: "connecting", connected: "connected", reconnecting: "reconnecting", refused: "wrong token", ended: "ended",
+  connecting: "connecting", connected: "connected", reconnecting: "reconnecting", refused: "not let in", dismissed: "dismissed", ended: "ended",
 };
 /** Without a word from the simulation for this long, or for ten of its steps, the bar says so. */
 const SILENCE = 4000;
@@ -31,7 +31,8 @@ export class StatusBar {
     const banner = part("banner");
     banner.hidden = state === "connected" || state === "connecting";
     write(part("banner-text"), state === "refused"
-      ? `${explanation} Open the link that the simulation printed when it started.`
+      ? `${explanation} Open a link that the simulation told when it started.`
+      : state === "dismissed" ? explanation
       : state === "ended" ? this.last : `${explanation} Trying again.`);
     banner.dataset.state = state;
     this.silence();
@@ -40,7 +41,7 @@ export class StatusBar {
   role(hello: Hello, driver: Status["driver"]): void {
     const driving = hello.role === "driver";
     const text = part("role");
-    write(text, driving ? "you steer" : driver === null || driver === undefined ? "watching only" : "watching only · another viewer steers");
+    write(text, driving ? "you steer" : hello.may_drive === false || driver === null || driver === undefined ? "watching only" : "watching only · another viewer steers");
     text.dataset.role = hello.role;
   }
 

@@ -34,7 +34,7 @@ function setUp(status: number | null = null) {
     clearTimer: () => undefined,
     random: () => 0.5,
   };
-  const connection = new Connection({ address: "ws://x/ws?token=t", probe: "http://x/ws?token=t", token: "t" }, {
+  const connection = new Connection({ address: "ws://x/ws", probe: "http://x/ws" }, {
     state: (state, explanation) => states.push([state, explanation]),
     message: (message) => messages.push(message), binary: (bytes) => messages.push(bytes.byteLength), trouble: (text) => troubles.push(text),
   }, surroundings);
@@ -53,12 +53,10 @@ describe("back-off", () => {
 
 describe("the address of the stream", () => {
   it("follows the page, below any path and through TLS", () => {
-    expect(streamAddress("http://127.0.0.1:7070/?token=ab").address).toBe("ws://127.0.0.1:7070/ws?token=ab");
-    expect(streamAddress("https://host/run/7/index.html?token=ab#x").address).toBe("wss://host/run/7/ws?token=ab");
-    expect(streamAddress("http://host/#token=cd")).toEqual({
-      address: "ws://host/ws?token=cd", probe: "http://host/ws?token=cd", token: "cd", surface: "http://host/surface?token=cd",
+    expect(streamAddress("http://127.0.0.1:7070/").address).toBe("ws://127.0.0.1:7070/ws");
+    expect(streamAddress("https://host/run/7/index.html?view=ab#x")).toEqual({
+      address: "wss://host/run/7/ws", probe: "https://host/run/7/ws", surface: "https://host/run/7/surface",
     });
-    expect(streamAddress("http://host/").token).toBe("");
   });
 });
 
@@ -81,7 +79,7 @@ describe("a connection", () => {
     expect(states.map(([state]) => state)).toEqual(["connected", "reconnecting", "reconnecting", "reconnecting", "connected", "reconnecting"]);
   });
 
-  it("tells a wrong token from a server that is not there", async () => {
+  it("tells who is not let in from a server that is not there", async () => {
     for (const [status, state] of [[401, "refused"], [403, "refused"], [null, "reconnecting"], [426, "reconnecting"], [500, "reconnecting"]] as const) {
       const { sockets, states } = setUp(status);
       sockets[0]!.end(1006);
@@ -98,11 +96,28 @@ describe("a connection", () => {
   it("says who it was when it comes back", async () => {
     const { connection, addresses, sockets, timers } = setUp();
     sockets[0]!.open();
-    connection.client = "c 7";
+    connection.identity = { client: "c7", back: "b8" };
     sockets[0]!.end(1006);
     await settle();
     timers[0]!.action();
-    expect(addresses).toEqual(["ws://x/ws?token=t", "ws://x/ws?token=t&client=c%207"]);
+    expect(addresses).toEqual(["ws://x/ws", "ws://x/ws?client=c7&back=b8"]);
+  });
+
+  it("leaves its name to a tab that was copied from it, and stays away where it was sent away", async () => {
+    const { connection, addresses, sockets, states, timers } = setUp();
+    sockets[0]!.open();
+    connection.identity = { client: "c7", back: "b8" };
+    sockets[0]!.end(4002);
+    await settle();
+    timers[0]!.action();
+    expect(addresses.at(-1)).toBe("ws://x/ws");
+    sockets[1]!.open();
+    sockets[1]!.end(4001);
+    await settle();
+    expect(states.at(-1)![0]).toBe("dismissed");
+    expect(timers).toHaveLength(1);
+    connection.retry();
+    expect(addresses).toHaveLength(3);
   });
 
   it("says when nothing could be sent, and sends JSON when it could", () => {
