@@ -1,6 +1,6 @@
 //! From `catalyst_initialize` to `catalyst_finalize`: what the nodes say.
 
-use std::sync::Arc;
+use std::{io::IsTerminal, sync::Arc};
 
 use tombolo::communicator::{Alarm, Communicator};
 use tombolo::deform::linear::BuiltIn;
@@ -66,7 +66,7 @@ impl Session {
         } else {
             Stage::UnderWay(Box::new(Run::new(settings)?))
         };
-        let session = Self { stage, communicator, groups };
+        let mut session = Self { stage, communicator, groups };
         if session.communicator.rank() == 0 {
             notes.iter().for_each(|note| eprintln!("tombolo: {note}"));
         }
@@ -74,11 +74,15 @@ impl Session {
         Ok(session)
     }
 
-    fn tell_link(&self) {
-        if let Stage::UnderWay(run) = &self.stage
-            && let Some(link) = run.link().filter(|_| self.communicator.rank() == 0)
-        {
-            eprintln!("tombolo: open {link}");
+    fn tell_link(&mut self) {
+        let Stage::UnderWay(run) = &mut self.stage else { return };
+        if self.communicator.rank() != 0 {
+            return;
+        }
+        match run.invitation(std::io::stderr().is_terminal()) {
+            Ok(Some(invitation)) => eprintln!("tombolo: {invitation}"),
+            Ok(None) => {}
+            Err(error) => eprintln!("tombolo: the links to this run were not written: {error}"),
         }
     }
 

@@ -83,7 +83,7 @@ fn whatever_is_wrong_is_told_with_its_path() {
         "'catalyst/channels/grid/data/coordsets/coords/values/x': found a null pointer",
         "expected a length that memory can have",
         "cannot be read; expected values in the main memory of this process",
-        "tombolo: open http://127.0.0.1:",
+        "tombolo: the links to this run are in ",
         "tombolo: the solver has made another mesh",
     ] {
         assert!(errors.contains(told), "'{told}' is not in:\n{errors}");
@@ -337,7 +337,10 @@ fn pipelines_of_the_solver_and_of_the_user_run_together() {
     };
     // Files of the solver's, and the default view.
     let errors = output_of(None, None);
-    assert!(errors.contains("tombolo: open http://127.0.0.1:") && written("types.vtu"), "{errors}");
+    assert!(
+        errors.contains("tombolo: the links to this run are in ") && written("types.vtu"),
+        "{errors}"
+    );
     // Files of the solver's, and what the user asks for.
     let errors = output_of(None, Some(&user));
     assert!(
@@ -396,7 +399,7 @@ fn every_channel_is_watched_where_nobody_says_what_is() {
     let (output, errors) = run(&program, None, &[("TOMBOLO_REPORT", &report.to_string_lossy())]);
     assert!(output.status.success(), "{errors}");
     assert!(
-        errors.starts_with("tombolo: open http://127.0.0.1:") && errors.lines().count() == 1,
+        errors.starts_with("tombolo: the links to this run are in ") && errors.lines().count() == 1,
         "{errors}"
     );
     let report = std::fs::read_to_string(report).expect("a report");

@@ -21,9 +21,13 @@ pub struct Link {
 }
 
 impl Link {
-    /// The link in a line of output, if there is one.
+    /// The link in a line of output, or in the file that the line names, if there is one.
     #[must_use]
     pub fn find(line: &str) -> Option<Link> {
+        if let Some((_, path)) = line.split_once("the links to this run are in ") {
+            let text = std::fs::read_to_string(crate::project().join(path)).ok()?;
+            return Link::find(text.lines().find(|line| line.starts_with("drive: "))?);
+        }
         let rest = &line[line.find("http://")? + "http://".len()..];
         let address = rest.split('/').next()?.to_owned();
         let token = rest.split("token=").nth(1)?;

@@ -88,10 +88,18 @@ impl Run {
         self.adaptor.looks_at(step)
     }
 
-    /// The link that a viewer opens.
+    /// The link that a viewer opens, with the secret of those who may drive.
     #[must_use]
     pub fn link(&self) -> Option<String> {
         self.adaptor.link()
+    }
+
+    /// What a program prints for a person to open the run: see [`Adaptor::invitation`].
+    ///
+    /// # Errors
+    /// Where the file of the links cannot be written.
+    pub fn invitation(&mut self, terminal: bool) -> std::io::Result<Option<String>> {
+        self.adaptor.invitation(terminal)
     }
 
     /// The steering of the step that follows.

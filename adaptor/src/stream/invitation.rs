@@ -46,12 +46,14 @@ impl Server {
         // First the old one goes, which may be the same file.
         self.links = None;
         self.links = Some(LinkFile::write(path.clone(), &text)?);
+        // Whoever reads it may stand elsewhere.
+        let path = std::path::absolute(&path).unwrap_or(path);
         let path = path.display();
         Ok(match self.browser_link().filter(|_| terminal) {
             Some(link) => format!(
-                "Open {link}\nIt opens one browser, once. Links for others, and to watch only, are in {path}"
+                "open {link}\nIt opens one browser, once; links for others, and to watch only, are in {path}"
             ),
-            None => format!("The links to this run are in {path}"),
+            None => format!("the links to this run are in {path}"),
         })
     }
 }

@@ -25,6 +25,7 @@ mod gate;
 mod hub;
 mod invitation;
 mod outbox;
+mod pool;
 mod secret;
 mod session;
 mod surface;

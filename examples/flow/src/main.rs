@@ -1,6 +1,6 @@
 //! The program `flow`: see `flow --help`.
 
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -181,11 +181,13 @@ fn run(
         let opened = std::fs::OpenOptions::new().create(true).append(true).open(file);
         opened.map_err(|error| format!("{}: {error}", file.display()))?;
     }
-    let run = Run::solved_by(ranks, solvers, &options)?;
+    let mut run = Run::solved_by(ranks, solvers, &options)?;
     stop_on_signals(run.stopper())?;
-    if let Some(link) = run.link() {
-        let mut output = std::io::stdout();
-        writeln!(output, "Open {link}")?;
+    let mut output = std::io::stdout();
+    let invitation = run.invitation(output.is_terminal());
+    let invitation = invitation.map_err(|error| format!("the links were not written: {error}"))?;
+    if let Some(invitation) = invitation {
+        writeln!(output, "flow: {invitation}")?;
         output.flush()?;
     }
     let report = run.finish()?;

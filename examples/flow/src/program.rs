@@ -223,10 +223,18 @@ impl Run {
         })
     }
 
-    /// The link that viewers open; `None` without a server.
+    /// The link that programs open, with the secret of those who may drive; `None` without a server.
     #[must_use]
     pub fn link(&self) -> Option<String> {
         self.adaptor.link()
+    }
+
+    /// What to print for a person to open the run: see [`Adaptor::invitation`].
+    ///
+    /// # Errors
+    /// Where the file of the links cannot be written.
+    pub fn invitation(&mut self, terminal: bool) -> std::io::Result<Option<String>> {
+        self.adaptor.invitation(terminal)
     }
 
     /// Something that asks the run to stop, from another thread.

@@ -1,11 +1,11 @@
 //! Heat in a box that is watched and reshaped while it spreads: the smallest whole solver in Rust.
 //!
 //! ```sh
-//! cargo run --release --example heat -- examples/heat/rust/pipelines.json      # open the link it prints
+//! cargo run --release --example heat -- examples/heat/rust/pipelines.json      # open the link it tells
 //! cargo run --release --example heat -- examples/heat/rust/pipelines.json 100  # a hundred steps, and no more
 //! ```
 
-use std::error::Error;
+use std::{error::Error, io::IsTerminal};
 
 use tombolo::{Adaptor, Channel, FieldView, MeshView, Step, deform::shapes::box_of_tets};
 
@@ -19,8 +19,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut temperature = vec![0.0; points.len()];
 
     let mut adaptor = Adaptor::from_file(&file)?.parameter("heating", 1.0, 0.0..=10.0).start()?;
-    if let Some(link) = adaptor.link() {
-        println!("Open {link}");
+    if let Some(invitation) = adaptor.invitation(std::io::stdout().is_terminal())? {
+        println!("heat: {invitation}");
     }
     let time_step = 1e-3;
     for cycle in 0..steps {
