@@ -53,8 +53,8 @@ pub(super) async fn guard(
     next: Next,
 ) -> Response {
     let mut response = match admit(&shared, &connection, &mut request) {
-        Ok(()) => next.run(request).await,
-        Err(answer) => answer,
+        None => next.run(request).await,
+        Some(answer) => answer,
     };
     let refused = [StatusCode::UNAUTHORIZED, StatusCode::FORBIDDEN].contains(&response.status());
     if refused && shared.refusals.is_to_be_told(connection.address()) {
@@ -74,27 +74,30 @@ pub(super) async fn guard(
     response
 }
 
-/// Takes note of who asks, or has the answer for who may not.
-fn admit(shared: &Shared, connection: &Connection, request: &mut Request) -> Result<(), Response> {
+/// Takes note of who asks, or has the answer for who goes no further.
+fn admit(shared: &Shared, connection: &Connection, request: &mut Request) -> Option<Response> {
     if let Some(reason) = foreign(request.uri(), request.headers(), shared.loopback) {
-        return Err((StatusCode::FORBIDDEN, reason).into_response());
+        return Some((StatusCode::FORBIDDEN, reason).into_response());
     }
     let is_page = matches!(request.uri().path(), "/" | "/index.html");
-    if is_page && request.method() == Method::GET {
-        trade(shared, request)?;
+    if is_page
+        && request.method() == Method::GET
+        && let Some(answer) = trade(shared, request)
+    {
+        return Some(answer);
     }
     match shared.credentials.shown(request.headers(), request.uri()) {
-        Shown::Right(holder) => {
-            if !connection.known(holder.access) {
-                let reason = "too many connections are open already\n";
-                return Err((StatusCode::SERVICE_UNAVAILABLE, reason).into_response());
-            }
+        Shown::Right(holder) if connection.known(holder.access) => {
             request.extensions_mut().insert(holder);
+            None
         }
-        Shown::Wrong => return Err(unauthorized()),
-        Shown::Nothing => {}
+        Shown::Right(_) => {
+            let reason = "too many connections are open already\n";
+            Some((StatusCode::SERVICE_UNAVAILABLE, reason).into_response())
+        }
+        Shown::Wrong => Some(unauthorized()),
+        Shown::Nothing => None,
     }
-    Ok(())
 }
 
 fn unauthorized() -> Response {
@@ -110,19 +113,19 @@ pub(super) async fn holders_only(request: Request, next: Next) -> Response {
 }
 
 /// Answers a link of a browser with a cookie, and with the same page without what must stay secret.
-fn trade(shared: &Shared, request: &Request) -> Result<(), Response> {
+fn trade(shared: &Shared, request: &Request) -> Option<Response> {
     let (uri, headers) = (request.uri(), request.headers());
     let visitor = shared.credentials.visitor(headers).map(|holder| holder.access);
     let access = match (parameter(uri, "key"), parameter(uri, "token")) {
         (Some(key), _) => match shared.credentials.redeem(key).or(visitor) {
             Some(access) => access,
-            None => return Err((StatusCode::UNAUTHORIZED, USED).into_response()),
+            None => return Some((StatusCode::UNAUTHORIZED, USED).into_response()),
         },
         (None, Some(token)) => match shared.credentials.holder(token) {
             Some(holder) => holder.access,
-            None => return Err(unauthorized()),
+            None => return Some(unauthorized()),
         },
-        (None, None) => return Ok(()),
+        (None, None) => return None,
     };
     let mut response = StatusCode::SEE_OTHER.into_response();
     let rest = uri.query().unwrap_or_default().split('&');
@@ -137,10 +140,10 @@ fn trade(shared: &Shared, request: &Request) -> Result<(), Response> {
     if visitor != Some(access) {
         match cookie(shared, headers, access) {
             Some(cookie) => drop(response.headers_mut().insert(header::SET_COOKIE, cookie)),
-            None => return Err(StatusCode::INTERNAL_SERVER_ERROR.into_response()),
+            None => return Some(StatusCode::INTERNAL_SERVER_ERROR.into_response()),
         }
     }
-    Err(response)
+    Some(response)
 }
 
 fn cookie(shared: &Shared, headers: &HeaderMap, access: Access) -> Option<HeaderValue> {

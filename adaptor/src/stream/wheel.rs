@@ -82,8 +82,8 @@ impl HubState {
 
     /// Gives a viewer its place, and the wheel where it is its own or nobody else may want it.
     pub(super) fn seat(&mut self, client: &Arc<Client>) {
-        let others = self.clients.values().filter(|other| other.id != client.id);
-        let is_alone = others.filter(|other| other.access == Access::Drive).count() == 0;
+        let mut others = self.clients.values().filter(|other| other.id != client.id);
+        let is_alone = !others.any(|other| other.access == Access::Drive);
         let had_it = self.wheel.lost.is_some_and(|(_, driver)| driver == client.id);
         let is_there = is_alone || had_it || self.wheel.is_free();
         if client.access == Access::Drive && self.wheel.driver.is_none() && is_there {
