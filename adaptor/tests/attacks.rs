@@ -415,7 +415,7 @@ fn a_new_connection_is_no_way_around_the_limit_of_messages() {
     // Who drives has an allowance of its own.
     let mut driver = Viewer::connect(&solver.adaptor);
     driver.hello();
-    driver.send(&json!({"id": "wrong", "parameter": {"name": "none", "value": 1.0}}));
+    driver.send(&json!({"id": "wrong", "nothing": {}}));
     driver.wait_for("error", |error| error["id"] == "wrong");
     drop(driver);
     all_is_well(&mut solver);
