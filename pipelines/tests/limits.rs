@@ -104,7 +104,7 @@ fn a_displacement_of_as_many_vertices_as_are_allowed_is_a_document() {
     let edits: Vec<Edit> =
         serde_json::from_value(json!([{"displacement": {"vertices": [], "file": "x"}}])).unwrap();
     let Edit::Displacement(mut import) = edits[0].clone() else { unreachable!() };
-    (import.file, import.values) = (None, vec![value; count]);
+    (import.file, import.values) = (None, vec![value; count].into());
     import.vertices = (4_000_000_000_u32..).take(count).collect();
     let order: Order = Change::Edits(vec![Edit::Displacement(import)]).into();
     let written = serde_json::to_string(&order).unwrap();

@@ -4,15 +4,16 @@ use serde_json::{Value, json};
 use tombolo_deform::{features::FeatureSize, surface::Surface};
 
 use super::{Adaptor, SteeredMesh};
-use crate::steering::Defaults;
+use crate::steering::{Defaults, EditStack};
 
 impl Adaptor {
     /// Brings what `hello` tells up to date.
     pub(super) fn describe(&self) {
         let Some(hub) = &self.hub else { return };
+        // It may be long: whoever reads it writes it out, and not the solver.
         let stack = match &self.mesh {
-            SteeredMesh::Steered(steerer, _) => steerer.stack().edits(),
-            _ => Vec::new(),
+            SteeredMesh::Steered(steerer, _) => steerer.stack().clone(),
+            _ => EditStack::default(),
         };
         let list = |value: &Value| if value.is_null() { json!([]) } else { value.clone() };
         let Defaults { deform, guard, schedule } = &self.defaults;
@@ -27,11 +28,10 @@ impl Adaptor {
             "fields": list(&self.told.fields),
             "parameters": self.parameters.all(),
             "schemas": {"order": self.told.schema},
-            "stack": stack,
             "defaults": {"deform": deform, "guard": guard, "schedule": schedule},
         });
         if let Value::Object(description) = description {
-            hub.describe(description);
+            hub.describe(description, move || json!(stack.edits()));
         }
     }
 

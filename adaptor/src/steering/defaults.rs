@@ -50,7 +50,7 @@ impl Defaults {
             stack.after(&order.change, order.deform.as_ref(), order.guard, &default)?;
         let ShapeSettings { deform, guard } = settings;
         let request = Request {
-            stack: after.edits(),
+            stack: after.edits().into(),
             kept: stack.shared(&after),
             start,
             deformation: deform,

@@ -32,6 +32,9 @@ const LOOK_AGAIN: Duration = Duration::from_millis(20);
 /// says why it could not be done.
 pub(crate) type Encode = Arc<dyn Fn(bool) -> Result<Encoded, String> + Send + Sync>;
 
+/// Writes the stack of edits out.
+type TellStack = Arc<dyn Fn() -> Value + Send + Sync>;
+
 /// How a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum End {
@@ -101,7 +104,8 @@ pub(super) enum Arrival {
 /// The viewers, and the newest message of each kind for them.
 #[derive(Default)]
 pub(super) struct HubState {
-    description: Map<String, Value>,
+    description: Arc<Map<String, Value>>,
+    stack: Option<TellStack>,
     conditions: Map<String, Value>,
     /// By their numbers, which no later view gets again.
     views: BTreeMap<usize, View>,
@@ -150,9 +154,15 @@ impl Hub {
     }
 
     /// Replaces what `hello` tells about the run, and tells it to every viewer again.
-    pub(crate) fn describe(&self, description: Map<String, Value>) {
+    /// `stack` says what the stack of edits is; it is asked by the stream's thread.
+    pub(crate) fn describe(
+        &self,
+        description: Map<String, Value>,
+        stack: impl Fn() -> Value + Send + Sync + 'static,
+    ) {
         let mut state = lock(&self.state);
-        state.description = description;
+        state.description = Arc::new(description);
+        state.stack = Some(Arc::new(stack));
         state.greet();
     }
 
@@ -394,13 +404,20 @@ impl Hub {
 
     /// The `hello` of a viewer.
     pub(super) fn hello(&self, client: u64, orders: Value) -> Arc<str> {
-        let state = lock(&self.state);
-        let mut hello = state.description.clone();
+        // Nothing long is written while the solver could wait for the lock.
+        let (description, stack, is_driver, viewer) = {
+            let state = lock(&self.state);
+            let is_driver = state.wheel.driver() == Some(client);
+            let viewer = state.clients.get(&client).cloned();
+            (Arc::clone(&state.description), state.stack.clone(), is_driver, viewer)
+        };
+        let mut hello = Map::clone(&description);
+        hello.insert("stack".into(), stack.map_or_else(|| json!([]), |stack| stack()));
         hello.insert("orders".into(), orders);
         hello.insert("client".into(), name(client).into());
-        let role = if state.wheel.driver() == Some(client) { "driver" } else { "watcher" };
+        let role = if is_driver { "driver" } else { "watcher" };
         hello.insert("role".into(), role.into());
-        if let Some(client) = state.clients.get(&client) {
+        if let Some(client) = viewer {
             hello.insert("back".into(), client.back.as_str().into());
             hello.insert("may_drive".into(), (client.access == Access::Drive).into());
         }

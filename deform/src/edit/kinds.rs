@@ -1,5 +1,7 @@
 //! The kinds of edits: the types behind the JSON of a stack of edits.
 
+use std::sync::Arc;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -204,11 +206,11 @@ layer! {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pub file: Option<String>,
         /// The vertices that move, by mesh vertex numbers, where no file is given.
-        #[serde(default, skip_serializing_if = "Vec::is_empty")]
-        pub vertices: Vec<u32>,
+        #[serde(default, skip_serializing_if = "is_nothing")]
+        pub vertices: Arc<[u32]>,
         /// How far each of them moves along x, y and z, in units of the mesh.
-        #[serde(default, skip_serializing_if = "Vec::is_empty")]
-        pub values: Vec<Vector>,
+        #[serde(default, skip_serializing_if = "is_nothing")]
+        pub values: Arc<[Vector]>,
         /// A factor for all of them.
         #[serde(default = "one", skip_serializing_if = "is_one")]
         pub scale: f64,
@@ -259,8 +261,8 @@ impl Default for Displacement {
             fixed: Vec::new(),
             fixed_region: None,
             file: None,
-            vertices: Vec::new(),
-            values: Vec::new(),
+            vertices: Arc::default(),
+            values: Arc::default(),
             scale: 1.0,
             muted: false,
             name: None,
@@ -441,6 +443,10 @@ fn at_least_one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<String
 
 fn is_false(value: &bool) -> bool {
     !value
+}
+
+fn is_nothing<T>(list: &Arc<[T]>) -> bool {
+    list.is_empty()
 }
 
 fn one() -> f64 {

@@ -201,7 +201,7 @@ fn first_turned(surface: &Surface, handle: &Handle) -> Option<u32> {
 /// The displacement that an import adds to each surface vertex.
 pub(super) fn displacement(surface: &Surface, edit: &Displacement, handle: &Handle) -> Vec<Vector> {
     let mut displacement = vec![[0.0; 3]; surface.points().len()];
-    for (vertex, &value) in edit.vertices.iter().zip(&edit.values) {
+    for (vertex, &value) in edit.vertices.iter().zip(&*edit.values) {
         // Known to be on the surface since the handle was found.
         if let Ok(local) = surface.vertices().binary_search(vertex)
             && handle.roles[local] == Role::Handle

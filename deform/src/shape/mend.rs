@@ -162,7 +162,7 @@ impl Shaper {
     pub fn plan(&mut self, request: &Request) -> Result<Plan, Refused> {
         self.spent = ShapeSeconds::default();
         let Request { stack, start, deformation, schedule, guard, .. } = request;
-        check_stack(stack)?;
+        check_stack(&**stack)?;
         schedule.check()?;
         match guard.otherwise {
             Otherwise::Untangle if !deformation.surface_only => {

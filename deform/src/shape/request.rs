@@ -1,5 +1,7 @@
 //! A request for a shape.
 
+use std::sync::Arc;
+
 use super::{CurrentShape, Deformation};
 use crate::edit::Edit;
 use crate::quality::Guard;
@@ -18,7 +20,7 @@ use crate::schedule::Schedule;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Request {
     /// The edits, each measured from the reference mesh with those before it.
-    pub stack: Vec<Edit>,
+    pub stack: Arc<[Edit]>,
     /// How many of them, from the first on, the present shape has already: they stay whole where
     /// the others are clamped.
     pub kept: usize,
@@ -34,7 +36,7 @@ pub struct Request {
 
 impl Request {
     /// A request with the default deformation, schedule and guard.
-    pub fn new(stack: impl Into<Vec<Edit>>, start: impl Into<CurrentShape>) -> Self {
+    pub fn new(stack: impl Into<Arc<[Edit]>>, start: impl Into<CurrentShape>) -> Self {
         Self {
             stack: stack.into(),
             kept: 0,
@@ -48,7 +50,7 @@ impl Request {
     /// Whether both ask for the same shape, wherever they start and however they go there.
     #[must_use]
     pub fn ends_like(&self, other: &Self) -> bool {
-        self.stack == other.stack
+        (Arc::ptr_eq(&self.stack, &other.stack) || self.stack == other.stack)
             && self.kept == other.kept
             && self.deformation == other.deformation
             && self.guard == other.guard

@@ -127,15 +127,16 @@ fn edit() -> impl Strategy<Value = Edit> {
                         name,
                     }),
                     _ => {
-                        let (vertices, values) = import.into_iter().unzip();
+                        let (vertices, values): (Vec<u32>, Vec<Vector>) =
+                            import.into_iter().unzip();
                         Edit::Displacement(Displacement {
                             features,
                             region,
                             fixed,
                             fixed_region,
                             file: None,
-                            vertices,
-                            values,
+                            vertices: vertices.into(),
+                            values: values.into(),
                             scale: number,
                             muted,
                             name,

@@ -167,7 +167,9 @@ impl MeshTrial<'_> {
             && let Some(file) = import.file.take()
         {
             match read_displacement(&file, &self.surface) {
-                Ok(found) => (import.vertices, import.values) = (found.vertices, found.values),
+                Ok(found) => {
+                    (import.vertices, import.values) = (found.vertices.into(), found.values.into());
+                }
                 Err(error) => return vec![Problem::new(error.to_string()).within("file")],
             }
         }

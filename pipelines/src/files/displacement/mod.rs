@@ -159,7 +159,8 @@ pub fn read_displacements(edits: &mut [Edit], surface: &Surface) -> Result<(), U
         {
             let found = read_displacement(file, surface)
                 .map_err(|source| UnreadFile { edit: index, source })?;
-            (import.file, import.vertices, import.values) = (None, found.vertices, found.values);
+            (import.file, import.vertices, import.values) =
+                (None, found.vertices.into(), found.values.into());
         }
     }
     Ok(())
