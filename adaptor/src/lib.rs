@@ -45,6 +45,7 @@
 
 mod adaptor;
 mod changes;
+pub mod client;
 mod error;
 pub mod foreign;
 mod journal;

@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use tombolo_deform::{
     communicator::{Communicator, Reduction},
     mesh::{ArrayView, Domain, Vector},
@@ -19,7 +19,7 @@ const SINGLE: f64 = 1.0 / (1 << 22) as f64;
 const DOUBLE: f64 = 1.0 / (1_u64 << 48) as f64;
 
 /// A shape that the solver did not follow.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NotFollowed {
     /// The cycle of the call that handed the shape out.
     pub cycle: u64,

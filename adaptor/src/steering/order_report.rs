@@ -1,6 +1,6 @@
 //! The fate of each order, as the report and the viewers are told of it.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use tombolo_deform::shape::{Judged, ShapeSeconds};
 
 use super::NotFollowed;
@@ -9,7 +9,7 @@ use super::NotFollowed;
 pub const ORDERS_KEPT: usize = 4096;
 
 /// The fate of one order.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct OrderReport {
     /// Its name, unique in the run.
     pub id: String,
@@ -52,7 +52,7 @@ pub struct OrderReport {
 }
 
 /// How far an order has come.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OrderStatus {
     /// Read, found valid, and waiting for its turn.

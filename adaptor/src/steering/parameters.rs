@@ -1,11 +1,11 @@
 //! Numbers of the solver that can be steered.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use tombolo_deform::number::Number;
 use tombolo_pipelines::language::nearest;
 
 /// A scalar that the solver lets itself be steered by.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
     /// Its name.
     pub name: String,

@@ -1,7 +1,7 @@
 //! How cells have changed since the reference.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{CHUNK, Measure, normalized_scaled_jacobians};
 use crate::communicator::{Communicator, Reduction};
@@ -12,7 +12,7 @@ use crate::parallel;
 use crate::vector::{cross, dot, mean, subtract};
 
 /// How the cells of a mesh have changed since its reference.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Change {
     /// The scaled Jacobian of each cell by that of the same cell in the reference.
     pub normalized_scaled_jacobian: Spread,
@@ -22,7 +22,7 @@ pub struct Change {
 }
 
 /// The least, mean and largest of many values; 1 where there are none.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Spread {
     /// The least.
     pub min: f64,

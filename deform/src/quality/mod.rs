@@ -17,7 +17,7 @@ mod refusal;
 mod tests;
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 pub use crate::mesh::cell_geometry::scaled_jacobian;
 use crate::mesh::cell_geometry::{
@@ -46,7 +46,7 @@ pub(crate) const WORST: usize = 10;
 pub const CLASSES: usize = 20;
 
 /// The quality of a mesh: of its cells of the highest dimension, where that is 2 or 3.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Quality {
     /// How many cells were measured. Where there is none, nothing is broken: the values below are
     /// 1.
@@ -69,7 +69,7 @@ pub struct Quality {
 }
 
 /// A cell of poor quality.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct WorstCell {
     /// The cell's number in the mesh.
     pub cell: usize,

@@ -1,12 +1,12 @@
 //! The forecast of an order: what it would give, without giving it.
 
 use crate::quality::{Change, Quality, change, quality};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{Judged, Plan, Request, ShapeSeconds, Shaper};
 
 /// Whether an order would be carried out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
     /// All of it.
@@ -18,7 +18,7 @@ pub enum Outcome {
 }
 
 /// The forecast of an order.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Forecast {
     /// Whether it would be carried out.
     pub outcome: Outcome,

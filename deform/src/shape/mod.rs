@@ -15,7 +15,7 @@ mod tests;
 
 use std::sync::Arc;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::cancellation::Cancellation;
 use crate::communicator::{Communicator, agree};
@@ -54,7 +54,7 @@ pub fn check_stack<'a>(edits: impl IntoIterator<Item = &'a Edit>) -> Result<(), 
 const OPERATORS: usize = 2;
 
 /// Seconds that the parts of a plan took.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct ShapeSeconds {
     /// The displacement of the surface, from the edits, and its check.
     pub surface: f64,

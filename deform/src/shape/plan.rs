@@ -8,7 +8,7 @@ use crate::{
     quality::{Guard, PathQuality, Refusal, shape_at},
     schedule::Schedule,
 };
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{Refused, ShapeSeconds, Target, body::Body};
 use crate::communicator::{Communicator, Reduction};
@@ -68,7 +68,7 @@ pub struct Plan {
 }
 
 /// The part of every mesh on a way that the guard has judged.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Judged {
     /// All cells.

@@ -4,6 +4,7 @@ mod check;
 mod edit;
 mod features;
 mod mesh;
+mod remote;
 mod skeleton;
 
 use std::{
@@ -16,9 +17,11 @@ use std::{
 use clap::{Parser, Subcommand};
 use tombolo::pipelines::{language, limits};
 
-const EXIT_CODES: &str = "Exit codes: 0 done; 1 something is wrong with what was given; 2 the shape that was asked for is refused.";
+const EXIT_CODES: &str = "Exit codes: 0 done; 1 something is wrong with what was given; 2 the shape that was asked for is refused.
+The tasks that take a LINK have exit codes of their own; their --help tells them.";
 
-/// Checks configurations, looks at meshes, and gives them other shapes without a solver.
+/// Checks configurations, looks at meshes, gives them other shapes without a solver, and watches and
+/// steers runs through their links.
 #[derive(Debug, Parser)]
 #[command(name = "tombolo", version, after_help = EXIT_CODES)]
 struct Arguments {
@@ -44,6 +47,8 @@ enum Task {
     Edit(edit::Options),
     /// Find the curve skeleton of a mesh's surface
     Skeleton(skeleton::Options),
+    #[command(flatten)]
+    Remote(remote::Task),
 }
 
 #[derive(Debug, Subcommand)]
@@ -66,6 +71,10 @@ enum Failure {
     Told,
     /// The shape that was asked for is refused: exit code 2.
     Refused(String),
+    /// A run is not reached, or a task that would reach it was used wrongly: exit code 2.
+    NoConnection(String),
+    /// A run is not reached, and it was said already: exit code 2.
+    Unreached,
 }
 
 impl<E: std::error::Error> From<E> for Failure {
@@ -86,6 +95,7 @@ fn main() -> ExitCode {
         Task::Features(options) => features::features(&options),
         Task::Edit(options) => edit::edit(&options),
         Task::Skeleton(options) => skeleton::skeleton(&options),
+        Task::Remote(task) => remote::run(&task),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -98,14 +108,23 @@ fn main() -> ExitCode {
             eprintln!("tombolo: refused: {message}");
             ExitCode::from(2)
         }
+        Err(Failure::NoConnection(message)) => {
+            eprintln!("tombolo: {message}");
+            ExitCode::from(2)
+        }
+        Err(Failure::Unreached) => ExitCode::from(2),
     }
 }
 
 /// Prints the help or version that was asked for, or what is wrong with the arguments: 1 then,
-/// because 2 says that a shape is refused.
+/// because 2 says that a shape is refused. Of a task that reaches a run it is 2.
 fn answer(asked: &clap::Error) -> ExitCode {
     let printed = asked.print().is_ok();
-    if printed && asked.exit_code() == 0 { ExitCode::SUCCESS } else { ExitCode::from(1) }
+    if printed && asked.exit_code() == 0 {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(if remote::is_asked() { 2 } else { 1 })
+    }
 }
 
 /// The text of a file; an error names the file.

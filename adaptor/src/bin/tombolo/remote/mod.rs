@@ -1,0 +1,140 @@
+//! The tasks that reach a run: they watch and steer it through its link.
+
+mod doctor;
+mod order;
+mod status;
+mod steer;
+mod watch;
+
+use std::{io::Read, path::Path, time::Duration};
+
+use clap::{Args, Subcommand};
+use serde_json::json;
+use tombolo::client::{Client, ClientError, Link, Settings};
+
+use crate::{Failure, say};
+
+pub(crate) const EXIT_CODES: &str = "Exit codes: 0 done; 1 refused or failed; 2 wrong use, or no connection (`tombolo doctor LINK` says why).";
+
+/// The names of these tasks, which have exit codes of their own.
+const NAMES: [&str; 10] =
+    ["status", "watch", "order", "forecast", "undo", "pause", "resume", "stop", "set", "doctor"];
+
+/// How long the wheel is asked for: longer than a server keeps it for a driver that was lost.
+const WHEEL: Duration = Duration::from_secs(8);
+/// How long a run may take to answer what its server answers at once, with time to connect again.
+pub(crate) const ANSWER: Duration = Duration::from_secs(120);
+/// Bytes that are read of a file that holds a link.
+const LINK_FILE: u64 = 1 << 16;
+
+#[derive(Debug, Args)]
+pub(crate) struct Target {
+    /// The link that the run has printed, or a file that holds it
+    link: String,
+    /// Print one JSON object in each line: the messages of the protocol
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Task {
+    /// Tell how far a run is
+    #[command(after_help = EXIT_CODES)]
+    Status(Target),
+    /// Print what a run tells, as it comes: status, monitors, orders, errors
+    #[command(after_help = EXIT_CODES)]
+    Watch(watch::Options),
+    /// Give a run an order of a new shape
+    #[command(after_help = EXIT_CODES)]
+    Order(order::Options),
+    /// Ask what an order would come to; nothing changes
+    #[command(after_help = EXIT_CODES)]
+    Forecast(order::ForecastOptions),
+    /// Take the last orders back
+    #[command(after_help = EXIT_CODES)]
+    Undo(order::UndoOptions),
+    /// Hold the solver at its next safe point
+    #[command(after_help = EXIT_CODES)]
+    Pause(Target),
+    /// Let the solver go on
+    #[command(after_help = EXIT_CODES)]
+    Resume(Target),
+    /// Ask the solver to end
+    #[command(after_help = EXIT_CODES)]
+    Stop(Target),
+    /// Give a parameter of the solver a new value
+    #[command(after_help = EXIT_CODES)]
+    Set(steer::SetOptions),
+    /// Say why a connection does not work, and what to do about it
+    #[command(after_help = EXIT_CODES)]
+    Doctor(Target),
+}
+
+/// Whether the program was called with one of these tasks.
+pub(crate) fn is_asked() -> bool {
+    std::env::args().nth(1).is_some_and(|name| NAMES.contains(&name.as_str()))
+}
+
+pub(crate) fn run(task: &Task) -> Result<(), Failure> {
+    let (done, as_json) = match task {
+        Task::Status(target) => (status::status(target), target.json),
+        Task::Watch(options) => (watch::watch(options), options.target.json),
+        Task::Order(options) => (order::order(options), options.target.json),
+        Task::Forecast(options) => (order::forecast(options), options.target.json),
+        Task::Undo(options) => (order::undo(options), options.target.json),
+        Task::Pause(target) => (steer::pause(target), target.json),
+        Task::Resume(target) => (steer::resume(target), target.json),
+        Task::Stop(target) => (steer::stop(target), target.json),
+        Task::Set(options) => (steer::set(options), options.target.json),
+        Task::Doctor(target) => (doctor::doctor(target), target.json),
+    };
+    if let (Err(Failure::Wrong(message) | Failure::NoConnection(message)), true) = (&done, as_json)
+    {
+        say(json!({"error": {"message": message}}))?;
+    }
+    done
+}
+
+/// What a failure of the client is to the program.
+pub(crate) fn failed(error: ClientError) -> Failure {
+    match error {
+        ClientError::Closed
+        | ClientError::Rejected { .. }
+        | ClientError::NotDriver { .. }
+        | ClientError::NoAnswer { .. }
+        | ClientError::Answer { .. }
+        | ClientError::TooMuch { .. } => Failure::Wrong(error.to_string()),
+        error => Failure::NoConnection(error.to_string()),
+    }
+}
+
+/// The link itself, or the first one in a file.
+fn read_link(text: &str) -> Result<Link, ClientError> {
+    if text.contains("://") || !Path::new(text).is_file() {
+        return text.parse();
+    }
+    let mut bytes = Vec::new();
+    let read = std::fs::File::open(text).and_then(|file| {
+        file.take(LINK_FILE).read_to_end(&mut bytes)?;
+        Ok(())
+    });
+    let wrong = |reason: String| ClientError::Link { found: text.into(), reason };
+    read.map_err(|error| wrong(format!("the file cannot be read ({error})")))?;
+    let content = String::from_utf8_lossy(&bytes);
+    match content.split_whitespace().find(|word| word.starts_with("http://")) {
+        Some(link) => link.parse(),
+        None => Err(wrong("the file holds none".into())),
+    }
+}
+
+pub(crate) fn connect(target: &Target) -> Result<Client, Failure> {
+    let link = read_link(&target.link).map_err(failed)?;
+    Client::connect(&link, &Settings::default()).map_err(failed)
+}
+
+/// Connects and takes the wheel.
+pub(crate) fn steer(target: &Target) -> Result<Client, Failure> {
+    let client = connect(target)?;
+    client.drive(WHEEL).map_err(failed)?;
+    Ok(client)
+}

@@ -1,0 +1,265 @@
+//! `tombolo order`, `tombolo forecast` and `tombolo undo`.
+
+use std::{
+    io::{IsTerminal, Read, Write},
+    num::NonZeroU32,
+    path::PathBuf,
+    time::Duration,
+};
+
+use clap::Args;
+use tombolo::{
+    OrderReport, OrderStatus,
+    client::{Client, Event, Foretold, Told},
+    deform::{edit::Edit, shape::Outcome},
+    pipelines::{
+        files::read_displacements,
+        language::{self, Change, Command, Content, Order, check_content},
+        limits::DOCUMENT,
+    },
+};
+
+use super::{ANSWER, Target, failed, steer};
+use crate::{Failure, read, say};
+
+/// How long the bar is, in characters.
+const BAR: usize = 30;
+/// How long a solver that computes is waited for at once.
+const WAIT: Duration = Duration::from_secs(3600);
+
+#[derive(Debug, Args)]
+pub(crate) struct Options {
+    #[command(flatten)]
+    pub(super) target: Target,
+    /// An order or a list of edits as JSON; `-` reads it from the input
+    file: PathBuf,
+    /// Wait until the solver has been given the last shape. Else the run has taken the order when
+    /// this task ends, and may still reject it
+    #[arg(long)]
+    wait: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ForecastOptions {
+    #[command(flatten)]
+    pub(super) target: Target,
+    /// An order or a list of edits as JSON; `-` reads it from the input
+    file: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct UndoOptions {
+    #[command(flatten)]
+    pub(super) target: Target,
+    /// How many of the last orders to take back
+    #[arg(default_value = "1")]
+    count: NonZeroU32,
+    /// Wait until the solver has been given the last shape
+    #[arg(long)]
+    wait: bool,
+}
+
+pub(crate) fn order(options: &Options) -> Result<(), Failure> {
+    let order = read_order(&options.file)?;
+    let client = steer(&options.target)?;
+    let order = with_displacements(order, &client)?;
+    give(&client, &order, options.wait, options.target.json)
+}
+
+pub(crate) fn undo(options: &UndoOptions) -> Result<(), Failure> {
+    let client = steer(&options.target)?;
+    give(&client, &Change::Undo(options.count).into(), options.wait, options.target.json)
+}
+
+pub(crate) fn forecast(options: &ForecastOptions) -> Result<(), Failure> {
+    let order = read_order(&options.file)?;
+    let client = steer(&options.target)?;
+    let order = with_displacements(order, &client)?;
+    let id = client.forecast(&order).map_err(failed)?;
+    loop {
+        let told = next(&client, WAIT)?;
+        match &told.event {
+            Event::Forecast(forecast) if forecast.id.as_ref() == Some(&id) => {
+                if options.target.json {
+                    say(&told.text)?;
+                } else {
+                    print(forecast)?;
+                }
+                return match (forecast.order.outcome, options.target.json) {
+                    (Outcome::Rejected, true) => Err(Failure::Told),
+                    (Outcome::Rejected, false) => {
+                        Err(Failure::Wrong("the order would be rejected".into()))
+                    }
+                    _ => Ok(()),
+                };
+            }
+            event => refused(event, &id)?,
+        }
+    }
+}
+
+/// Reads an order and checks it as `tombolo check` does.
+fn read_order(file: &PathBuf) -> Result<Order, Failure> {
+    let (name, text) = if file.as_os_str() == "-" {
+        let mut bytes = Vec::new();
+        std::io::stdin().take(DOCUMENT.most as u64 + 1).read_to_end(&mut bytes)?;
+        DOCUMENT.check(bytes.len()).map_err(|error| Failure::NoConnection(error.to_string()))?;
+        ("input".to_owned(), language::text(&bytes, "input")?.to_owned())
+    } else {
+        (file.display().to_string(), read(file)?)
+    };
+    let wrong = |found: &str| {
+        Failure::NoConnection(format!(
+            "{name}: found {found}, expected an order of a new shape or a list of edits"
+        ))
+    };
+    match check_content(&text, &name, None)? {
+        Content::Order(order) => Ok(*order),
+        Content::Edits(edits) => Ok(Change::Edits(edits).into()),
+        Content::Configuration(_) => Err(wrong("a configuration")),
+        Content::Orders(commands) => match <[_; 1]>::try_from(commands) {
+            Ok([language::TimedCommand { at: None, command: Command::Order(order), .. }]) => {
+                Ok(order)
+            }
+            _ => Err(wrong("commands of a file of orders")),
+        },
+    }
+}
+
+/// The order with the numbers of the displacements whose files it names: a run reads none.
+fn with_displacements(mut order: Order, client: &Client) -> Result<Order, Failure> {
+    let names_file =
+        |edit: &Edit| matches!(edit, Edit::Displacement(import) if import.file.is_some());
+    if order.edits().iter().any(names_file) {
+        let surface = client.surface().map_err(failed)?;
+        read_displacements(order.edits_mut(), &surface)?;
+    }
+    Ok(order)
+}
+
+fn give(client: &Client, order: &Order, wait: bool, as_json: bool) -> Result<(), Failure> {
+    let id = client.order(order).map_err(failed)?;
+    let bar = !as_json && std::io::stderr().is_terminal();
+    loop {
+        let told = next(client, if wait { WAIT } else { ANSWER })?;
+        let report = match &told.event {
+            Event::Order(report) if report.id == id => report,
+            // The connection was made again, and the run has the order.
+            Event::Hello(hello) => match hello.orders.iter().find(|report| report.id == id) {
+                Some(report) => report,
+                None => continue,
+            },
+            event => {
+                refused(event, &id)?;
+                continue;
+            }
+        };
+        let is_over =
+            matches!(report.status, OrderStatus::Applied | OrderStatus::Rejected) || !wait;
+        if as_json {
+            say(serde_json::json!({"order": report}))?;
+        } else if is_over || !bar {
+            say(line(report))?;
+        } else {
+            draw(report);
+        }
+        match report.status {
+            OrderStatus::Rejected => {
+                let reason = report.reason.clone().unwrap_or_else(|| "no reason given".into());
+                return Err(if as_json {
+                    Failure::Told
+                } else {
+                    Failure::Wrong(format!("rejected: {reason}"))
+                });
+            }
+            _ if is_over => return Ok(()),
+            _ => {}
+        }
+    }
+}
+
+fn next(client: &Client, patience: Duration) -> Result<Told, Failure> {
+    let told = client.next(patience).map_err(failed)?;
+    told.ok_or_else(|| Failure::Wrong(format!("no answer within {} seconds", patience.as_secs())))
+}
+
+/// An error that answers a command.
+pub(super) fn refused(event: &Event, id: &str) -> Result<(), Failure> {
+    match event {
+        Event::Error(error) if error.id.as_deref() == Some(id) => {
+            Err(Failure::Wrong(error.message.clone()))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// How far an order has come, in one line.
+pub(super) fn line(report: &OrderReport) -> String {
+    let mut line = format!("order {}: ", report.id);
+    line += match (report.status, report.not_followed) {
+        (OrderStatus::Accepted, _) => "accepted",
+        (OrderStatus::Computing, _) => "computing",
+        (OrderStatus::Applying, _) => "applying",
+        (OrderStatus::Applied, None) => "applied",
+        (OrderStatus::Applied, Some(_)) => "applied, not followed",
+        (OrderStatus::Rejected, _) => "rejected",
+    };
+    if report.shapes > 0 {
+        line += &format!(", shape {} of {}", report.shape, report.shapes);
+    }
+    if let Some(cycle) = report.cycle_applied {
+        line += &format!(", from cycle {cycle}");
+    }
+    if let Some(least) = report.min_scaled_jacobian {
+        line += &format!(", least scaled Jacobian {least:.4}");
+    }
+    if let Some(reason) = &report.reason {
+        line += &format!(": {reason}");
+    }
+    line
+}
+
+/// Draws how many shapes were handed out, on a terminal.
+fn draw(report: &OrderReport) {
+    let (done, all) = (report.shape as usize, (report.shapes as usize).max(1));
+    let full = (BAR * done / all).min(BAR);
+    let bar = "#".repeat(full) + &".".repeat(BAR - full);
+    let end = if done == all { "\n" } else { "" };
+    let mut terminal = std::io::stderr();
+    // A bar that cannot be drawn is no reason to give up.
+    let _ = write!(terminal, "\r[{bar}] {done}/{} shapes{end}", report.shapes);
+    let _ = terminal.flush();
+}
+
+fn print(forecast: &Foretold) -> Result<(), Failure> {
+    let order = &forecast.order;
+    let percent = order.fraction.map(|fraction| format!("{:.2} %", 100.0 * fraction));
+    match (order.outcome, percent) {
+        (Outcome::Applied, _) => say("would be applied")?,
+        (Outcome::Clamped, percent) => {
+            say(format_args!(
+                "would be clamped to {} of the edits' amounts",
+                percent.unwrap_or_default()
+            ))?;
+        }
+        (Outcome::Rejected, percent) => {
+            say(format_args!(
+                "would be rejected: {}",
+                order.reason.as_deref().unwrap_or("no reason given")
+            ))?;
+            if let Some(percent) = percent {
+                say(format_args!("{percent} of the amounts would pass"))?;
+            }
+        }
+    }
+    if let Some(least) = order.min_scaled_jacobian {
+        say(format_args!("scaled Jacobian on the way: least {least:.4}"))?;
+    }
+    if let Some(quality) = &order.quality {
+        say(format_args!(
+            "scaled Jacobian after: least {:.4}, mean {:.4}, {} inverted",
+            quality.min, quality.mean, quality.inverted
+        ))?;
+    }
+    say(format_args!("{} shape(s)", order.shapes))
+}

@@ -1,0 +1,82 @@
+//! `tombolo watch`.
+
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+use tombolo::client::{ClientError, Event};
+
+use super::{Target, connect, failed, order, status};
+use crate::{Failure, say};
+
+/// How long nothing is waited for at once.
+const WAIT: Duration = Duration::from_secs(3600);
+
+#[derive(Debug, Args)]
+pub(crate) struct Options {
+    #[command(flatten)]
+    pub(super) target: Target,
+    /// How the run has to end for the exit code 0
+    #[arg(long, value_enum, default_value = "ended")]
+    until: Until,
+}
+
+/// How a run has to end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Until {
+    /// The solver came to its end, or was asked to stop
+    Ended,
+    /// The solver came to its end
+    Finished,
+}
+
+pub(crate) fn watch(options: &Options) -> Result<(), Failure> {
+    let client = connect(&options.target)?;
+    loop {
+        let told = match client.next(WAIT) {
+            Ok(Some(told)) => told,
+            Ok(None) => continue,
+            Err(ClientError::Closed) => break,
+            Err(error) => return Err(failed(error)),
+        };
+        if options.target.json {
+            match &told.event {
+                Event::Lost { reason } => eprintln!("tombolo: connection lost: {reason}"),
+                _ if told.text.is_empty() => {}
+                _ => say(&told.text)?,
+            }
+        } else if let Some(line) = line(&told.event) {
+            say(line)?;
+        }
+    }
+    let how = client.end().map_or_else(|| "unknown".to_owned(), |end| end.how);
+    match (how.as_str(), options.until) {
+        ("finished", _) | ("stopped", Until::Ended) => Ok(()),
+        _ => Err(Failure::Wrong(format!("the run has ended: {how}"))),
+    }
+}
+
+/// What is printed of an event.
+fn line(event: &Event) -> Option<String> {
+    Some(match event {
+        Event::Status(status) => status::line(status),
+        Event::Order(report) => order::line(report),
+        Event::Monitor(values) => {
+            let number = |value: &Option<f64>| match value {
+                Some(value) => value.to_string(),
+                None => "none".to_owned(),
+            };
+            let each =
+                values.values.iter().map(|(name, value)| format!("{name} {}", number(value)));
+            let all = each.collect::<Vec<_>>().join(", ");
+            format!("{}: cycle {}, time {}: {all}", values.pipeline, values.cycle, values.time)
+        }
+        Event::Pipelines(change) => match change.cycle {
+            Some(cycle) => format!("pipelines: {} at cycle {cycle}", change.status),
+            None => format!("pipelines: {}", change.status),
+        },
+        Event::Error(error) => format!("error: {}", error.message),
+        Event::Lost { reason } => format!("connection lost: {reason}"),
+        Event::End(end) => format!("{}: cycle {}, time {}", end.how, end.cycle, end.time),
+        _ => return None,
+    })
+}

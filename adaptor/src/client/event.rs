@@ -1,0 +1,289 @@
+//! What a run tells its clients.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde_json::Value;
+use tombolo_deform::shape::Forecast;
+use tombolo_pipelines::encode::DecodedFrame;
+
+use crate::{OrderReport, Parameter};
+
+/// Something that a run told.
+#[derive(Debug, Clone)]
+pub struct Told {
+    /// What it means.
+    pub event: Event,
+    /// The message as it came, one JSON object; empty for a frame and for what the client itself
+    /// tells ([`Event::Lost`], [`Event::Taken`]).
+    pub text: Arc<str>,
+}
+
+/// What a run tells its clients: the messages of the protocol.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub enum Event {
+    /// What there is: told first, and again when any of it changes.
+    Hello(Box<Hello>),
+    /// How far the solver is. Of several that nobody has read the newest is kept.
+    Status(Box<Status>),
+    /// A change in the life of an order.
+    Order(Box<OrderReport>),
+    /// The values of a pipeline's monitors.
+    Monitor(Values),
+    /// The answer to [`Client::forecast`](super::Client::forecast).
+    Forecast(Box<Foretold>),
+    /// What becomes of a change of the pipelines.
+    Pipelines(PipelinesChanged),
+    /// A command has taken effect.
+    Done(Done),
+    /// The run has said nothing against a command for a second. One that is older than the message
+    /// `done` says no more than that.
+    Taken {
+        /// The id of the command.
+        id: String,
+    },
+    /// Something is wrong, with a command of this client where it has an id.
+    Error(Complaint),
+    /// The run has ended: nothing comes after it.
+    End(End),
+    /// A frame of a view, where [`Settings::views`](super::Settings::views) asks for them.
+    Frame(Box<DecodedFrame>),
+    /// The connection was lost, and is made again.
+    Lost {
+        /// Why it was lost.
+        reason: String,
+    },
+    /// A message that this version does not know: one JSON value.
+    Unknown(Value),
+}
+
+/// Whether a client steers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// Its commands are obeyed.
+    Driver,
+    /// It looks on.
+    Watcher,
+}
+
+/// What there is in a run.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Hello {
+    /// The version of the protocol.
+    pub protocol: u32,
+    /// The name of this client.
+    pub client: String,
+    /// Whether this client steers.
+    pub role: Role,
+    /// The live views.
+    #[serde(default)]
+    pub views: Vec<View>,
+    /// The monitors.
+    #[serde(default)]
+    pub monitors: Vec<MonitorName>,
+    /// The parameters of the solver.
+    #[serde(default)]
+    pub parameters: Vec<Parameter>,
+    /// The orders so far, the oldest first.
+    #[serde(default)]
+    pub orders: Vec<OrderReport>,
+    /// The edits that make the shape, the oldest first.
+    #[serde(default)]
+    pub stack: Vec<Value>,
+    /// The named parts of the surface.
+    #[serde(default)]
+    pub features: Vec<Value>,
+    /// The reference surface; `None` where the shape cannot be changed, or not yet.
+    #[serde(default)]
+    pub surface: Option<Value>,
+}
+
+/// A live view.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+pub struct View {
+    /// The name of its pipeline.
+    pub name: String,
+    /// What it shows: `surface`, `slice`, ...
+    pub kind: String,
+}
+
+/// A monitor.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+pub struct MonitorName {
+    /// Its pipeline.
+    pub pipeline: String,
+    /// Its name.
+    pub name: String,
+    /// Its unit, where it is known.
+    #[serde(default)]
+    pub unit: Option<String>,
+}
+
+/// How far the solver is.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Status {
+    /// The last cycle that it told.
+    pub cycle: u64,
+    /// The simulated time, in the solver's unit.
+    pub time: f64,
+    /// Whether it waits to be resumed.
+    #[serde(default)]
+    pub paused: bool,
+    /// Whether it was asked to stop.
+    #[serde(default)]
+    pub stopped: bool,
+    /// Seconds that a step takes, where it is known.
+    #[serde(default)]
+    pub step_seconds: Option<f64>,
+    /// How many clients are connected.
+    #[serde(default)]
+    pub viewers: u32,
+    /// The name of the client that steers.
+    #[serde(default)]
+    pub driver: Option<String>,
+    /// The quality of the mesh, where it is known.
+    #[serde(default)]
+    pub quality: Option<StatusQuality>,
+}
+
+/// The quality of the mesh, in short.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub struct StatusQuality {
+    /// The least scaled Jacobian.
+    pub min: f64,
+    /// The mean scaled Jacobian.
+    pub mean: f64,
+    /// How many cells are inverted.
+    pub inverted: u64,
+}
+
+/// The values of a pipeline's monitors at a cycle.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Values {
+    /// The pipeline.
+    pub pipeline: String,
+    /// The cycle.
+    pub cycle: u64,
+    /// The simulated time.
+    pub time: f64,
+    /// The values by name; `None` where nothing could be measured.
+    pub values: BTreeMap<String, Option<f64>>,
+}
+
+/// What an order would come to.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Foretold {
+    /// The id of the question.
+    pub id: Option<String>,
+    /// The forecast.
+    pub order: Forecast,
+}
+
+/// What becomes of a change of the pipelines.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+pub struct PipelinesChanged {
+    /// The id of the change.
+    pub id: Option<String>,
+    /// `accepted` or `applied`.
+    pub status: String,
+    /// The cycle at which it was made.
+    #[serde(default)]
+    pub cycle: Option<u64>,
+}
+
+/// That a command has taken effect.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Done {
+    /// The id of the command.
+    pub id: String,
+    /// The cycle at which it took effect.
+    #[serde(default)]
+    pub cycle: Option<u64>,
+    /// The simulated time then.
+    #[serde(default)]
+    pub time: Option<f64>,
+}
+
+/// An error that the run tells.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+pub struct Complaint {
+    /// What is wrong.
+    pub message: String,
+    /// The id of the command that it answers.
+    #[serde(default)]
+    pub id: Option<String>,
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct End {
+    /// `finished`, `stopped` or `failed`.
+    pub how: String,
+    /// The last cycle.
+    pub cycle: u64,
+    /// The simulated time then.
+    pub time: f64,
+}
+
+impl Event {
+    /// Reads a text message; the reason says why it is none of this protocol.
+    ///
+    /// One that has another name or another form than is known is [`Event::Unknown`].
+    pub(super) fn read(text: &str) -> Result<Self, String> {
+        let message: Value = serde_json::from_str(text).map_err(|error| error.to_string())?;
+        let members = message.as_object().ok_or("expected an object")?;
+        let mut members = members.iter().filter(|(key, _)| *key != "id");
+        let (Some((key, value)), None) = (members.next(), members.next()) else {
+            return Err("expected an object of one key".into());
+        };
+        fn read<T: DeserializeOwned>(value: &Value) -> Option<T> {
+            T::deserialize(value).ok()
+        }
+        let event = match key.as_str() {
+            "hello" => read(value).map(Event::Hello),
+            "status" => read(value).map(Event::Status),
+            "order" => read(value).map(Event::Order),
+            "forecast" => read(value).map(Event::Forecast),
+            "monitor" => read(value).map(Event::Monitor),
+            "pipelines" => read(value).map(Event::Pipelines),
+            "done" => read(value).map(Event::Done),
+            "error" => read(value).map(Event::Error),
+            "end" => read(value).map(Event::End),
+            _ => None,
+        };
+        Ok(event.unwrap_or(Event::Unknown(message)))
+    }
+
+    /// The id of the command that this answers.
+    pub(super) fn answers(&self) -> Option<&str> {
+        match self {
+            Event::Order(order) => Some(&order.id),
+            Event::Forecast(forecast) => forecast.id.as_deref(),
+            Event::Pipelines(change) => change.id.as_deref(),
+            Event::Done(done) => Some(&done.id),
+            Event::Error(error) => error.id.as_deref(),
+            Event::Unknown(value) => {
+                value.as_object()?.values().find_map(|value| value.get("id")?.as_str())
+            }
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_known_is_passed_on_and_what_is_no_message_is_not() {
+        assert!(matches!(Event::read(r#"{"weather": {"id": "a"}}"#), Ok(Event::Unknown(_))));
+        assert!(matches!(Event::read(r#"{"status": {"cycle": -1}}"#), Ok(Event::Unknown(_))));
+        let done = Event::read(r#"{"done": {"id": "a", "cycle": 3, "time": 0.1}}"#).expect("known");
+        assert_eq!(done.answers(), Some("a"));
+        for nonsense in ["", "[]", "{}", "null", r#"{"status": {}, "error": {}}"#, "\u{0}"] {
+            assert!(Event::read(nonsense).is_err(), "{nonsense}");
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! One request for what a run serves beside its WebSocket.
+
+use std::time::Duration;
+
+use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt},
+    net::TcpStream,
+    time::timeout,
+};
+
+use super::{ClientError, Link};
+
+/// How long a host may take to take a connection.
+const CONNECT: Duration = Duration::from_secs(10);
+/// How long an answer may take as a whole. The first request for a surface has it encoded.
+const ANSWER: Duration = Duration::from_secs(120);
+/// Bytes that the head of an answer may have, and its headers.
+const HEAD: usize = 1 << 14;
+const HEADERS: usize = 64;
+/// Characters of a server's reason that are told.
+const REASON: usize = 200;
+
+/// A run's answer, or that of whatever else listens there.
+pub(super) struct Answer {
+    pub(super) status: u16,
+    pub(super) body: Vec<u8>,
+}
+
+/// The addresses that the system knows for a link's host, tried one after the other.
+pub(super) async fn open(link: &Link) -> Result<TcpStream, ClientError> {
+    let unknown = |reason: String| ClientError::Unknown { host: link.host().into(), reason };
+    let addresses = tokio::net::lookup_host((link.name(), link.port())).await;
+    let mut failure = unknown("the system names none".into());
+    for address in addresses.map_err(|error| unknown(error.to_string()))? {
+        let unreachable =
+            |reason: String| ClientError::Unreachable { address: link.address(), reason };
+        failure = match timeout(CONNECT, TcpStream::connect(address)).await {
+            Ok(Ok(stream)) => {
+                // Small messages should not wait for more bytes; without it works too.
+                let _ = stream.set_nodelay(true);
+                return Ok(stream);
+            }
+            Ok(Err(error)) if error.kind() == std::io::ErrorKind::ConnectionRefused => {
+                ClientError::Refused { address: link.address() }
+            }
+            Ok(Err(error)) => unreachable(error.to_string()),
+            Err(_) => unreachable(format!("no answer within {} seconds", CONNECT.as_secs())),
+        };
+    }
+    Err(failure)
+}
+
+/// Asks for a path of a run, of whose answer no more than `most` bytes are read.
+pub(super) async fn get(
+    link: &Link,
+    path: &'static str,
+    most: usize,
+) -> Result<Answer, ClientError> {
+    let mut stream = open(link).await?;
+    let not_tombolo = |found: String| not_tombolo(link, found);
+    let bytes = timeout(ANSWER, exchange(&mut stream, link, path, HEAD.saturating_add(most)));
+    let bytes = match bytes.await {
+        Ok(Ok(bytes)) => bytes,
+        Ok(Err(error)) => return Err(not_tombolo(format!("no answer ({error})"))),
+        Err(_) => return Err(not_tombolo(format!("no answer within {} s", ANSWER.as_secs()))),
+    };
+    let mut headers = [httparse::EMPTY_HEADER; HEADERS];
+    let mut response = httparse::Response::new(&mut headers);
+    let head = match response.parse(&bytes) {
+        Ok(httparse::Status::Complete(head)) if head <= HEAD => head,
+        _ => return Err(not_tombolo(shown(&bytes))),
+    };
+    let length = response
+        .headers
+        .iter()
+        .find(|header| header.name.eq_ignore_ascii_case("content-length"))
+        .and_then(|header| std::str::from_utf8(header.value).ok()?.trim().parse::<usize>().ok());
+    let body = bytes.get(head..).unwrap_or_default();
+    if body.len() > most || length.is_some_and(|length| length > most) {
+        let found = length.unwrap_or(body.len());
+        return Err(ClientError::TooMuch { what: "bytes of an answer", found, most });
+    }
+    if length.is_some_and(|length| length != body.len()) {
+        return Err(not_tombolo(format!("{} bytes of an answer of more", body.len())));
+    }
+    Ok(Answer { status: response.code.unwrap_or_default(), body: body.to_vec() })
+}
+
+async fn exchange(
+    stream: &mut TcpStream,
+    link: &Link,
+    path: &str,
+    most: usize,
+) -> std::io::Result<Vec<u8>> {
+    // HTTP/1.0 is answered in one piece, and the connection closed behind it.
+    let request = format!(
+        "GET {} HTTP/1.0\r\nHost: {}\r\nAuthorization: Bearer {}\r\nConnection: close\r\n\r\n",
+        link.path(path),
+        link.address(),
+        link.token()
+    );
+    stream.write_all(request.as_bytes()).await?;
+    let mut bytes = Vec::new();
+    stream.take(most as u64 + 1).read_to_end(&mut bytes).await?;
+    Ok(bytes)
+}
+
+/// The error of an answer that is not what was asked for.
+pub(super) fn refused(link: &Link, path: &'static str, status: u16, body: &[u8]) -> ClientError {
+    let address = link.address();
+    match status {
+        401 => ClientError::WrongToken { address },
+        403 => ClientError::HostRefused { address, reason: shown(body) },
+        _ => ClientError::Answer { address, path, status, reason: shown(body) },
+    }
+}
+
+pub(super) fn not_tombolo(link: &Link, found: String) -> ClientError {
+    let expected = "the WebSocket of a run, version 2 of the protocol";
+    ClientError::NotTombolo { address: link.address(), found, expected }
+}
+
+/// The beginning of what somebody else has said, in one line that can be printed.
+pub(super) fn shown(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes.get(..4 * REASON).unwrap_or(bytes));
+    let visible: String =
+        text.chars().map(|c| if c.is_control() { ' ' } else { c }).take(REASON).collect();
+    match visible.trim() {
+        "" => "no text".into(),
+        visible => visible.into(),
+    }
+}

@@ -1,0 +1,409 @@
+//! A client of a run: it watches and steers from another program what a browser watches and steers.
+//!
+//! A [`Link`] is what a run prints. [`Client::connect`] connects to it, and keeps the connection on a
+//! thread of its own until the run ends or the [`Client`] is dropped. Every call here blocks, for as
+//! long as it is told at most.
+//!
+//! ```
+//! use std::time::Duration;
+//! use tombolo::client::{Client, Event, Link, Settings};
+//! # use tombolo::{Adaptor, Channel, MeshView, Step, deform::shapes::box_of_tets, pipelines::language};
+//! # let config = language::parse(r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"}}"#, "run.json")?;
+//! # let mut adaptor = Adaptor::initialize(tombolo::Settings { config, ..Default::default() })?;
+//! # let printed = adaptor.link().ok_or("no server")?;
+//! # let solver = std::thread::spawn(move || {
+//! #     let mut mesh = box_of_tets([3, 3, 3], [0.0; 3], [1.0; 3]);
+//! #     for cycle in 0.. {
+//! #         let step = Step { cycle, time: 0.01 * cycle as f64, time_step: 0.01 };
+//! #         let channel = Channel { name: "solid", mesh: MeshView::from(&mesh), fields: &[] };
+//! #         let steering = adaptor.execute(&step, &[channel]).expect("a step");
+//! #         let moved = steering.motion.map(|motion| motion.coordinates.to_vec());
+//! #         if steering.stop { break }
+//! #         if let Some(points) = moved { mesh = mesh.with_points(points).expect("finite") }
+//! #         std::thread::sleep(Duration::from_millis(1));
+//! #     }
+//! #     adaptor.finalize().expect("the end");
+//! # });
+//! // `printed` is the link of a run that goes on elsewhere.
+//! let link: Link = printed.parse()?;
+//! let client = Client::connect(&link, &Settings::default())?;
+//! client.drive(Duration::from_secs(10))?;
+//!
+//! // Squeezes the box from above, and waits until the solver has the new shape.
+//! let order = language::parse_valid(r#"{"edits": [
+//!     {"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -0.2]}}]}"#, "order")?;
+//! # client.wait_for_status(Duration::from_secs(60), |status| status.cycle > 2)?;
+//! let id = client.order(&order)?;
+//! while let Some(told) = client.next(Duration::from_secs(60))? {
+//!     match told.event {
+//!         Event::Order(order) if order.id == id => {
+//!             println!("{:?}: shape {} of {}", order.status, order.shape, order.shapes);
+//!             if order.status == tombolo::OrderStatus::Applied { break }
+//! #           assert_ne!(order.status, tombolo::OrderStatus::Rejected, "{:?}", order.reason);
+//!         }
+//!         Event::Error(error) => println!("{}", error.message),
+//!         _ => {}
+//!     }
+//! }
+//! client.stop()?;
+//! # drop(client);
+//! # solver.join().expect("the solver");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # What it guarantees
+//!
+//! - A connection that is lost is made again with growing pauses ([`Settings::attempts`] of them), under
+//!   the client's old name, so that it has the wheel again. A command that was not answered is sent again
+//!   by its id, which is taken once: an order that the run knows is not given twice.
+//! - What waits to be read is bounded, by number and by bytes. Beyond it the oldest monitors make way,
+//!   then the oldest of all; of `hello` and `status` only the newest waits. [`Client::missed`] counts.
+//! - What comes from the network is no more than it may be, and never a panic: what is not understood is
+//!   passed on as [`Event::Unknown`], and what is no message at all ends the connection.
+//! - One that asks for no [views](Settings::views) is sent two frames of each view at most.
+//!
+//! # What it does not
+//!
+//! It does not encrypt: see [`stream`](crate::stream). A client that connects to a run that nobody
+//! watches is the one that drives, as any first viewer is.
+
+mod connection;
+mod error;
+mod event;
+mod get;
+mod link;
+mod state;
+
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
+
+use serde_json::{Value, json};
+use tombolo_deform::surface::Surface;
+use tombolo_pipelines::{
+    encode::decode_surface,
+    language::{Change, Command, Order, Parameter, Question},
+    limits::DOCUMENT,
+};
+
+pub use error::ClientError;
+pub use event::{
+    Complaint, Done, End, Event, Foretold, Hello, MonitorName, PipelinesChanged, Role, Status,
+    StatusQuality, Told, Values, View,
+};
+pub use link::Link;
+use state::{Pending, Shared};
+
+/// Bytes of a reference surface.
+const SURFACE: usize = 1 << 30;
+/// How long the wheel is asked for again, while it is kept for a driver that was lost.
+const ASK_AGAIN: Duration = Duration::from_millis(300);
+
+/// How a client behaves.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Settings {
+    /// Whether the frames of the live views are decoded and handed out; `false` if left out.
+    pub views: bool,
+    /// How often a lost connection is tried to be made again, one after the other; 0 for never.
+    pub attempts: u32,
+    /// The pause before the first attempt; each next one is twice as long.
+    pub first_pause: Duration,
+    /// The longest pause.
+    pub longest_pause: Duration,
+}
+
+impl Default for Settings {
+    /// No views, and ten attempts within about a minute.
+    fn default() -> Self {
+        Self {
+            views: false,
+            attempts: 10,
+            first_pause: Duration::from_millis(250),
+            longest_pause: Duration::from_secs(10),
+        }
+    }
+}
+
+/// A client that is connected to a run. Dropping it closes the connection.
+///
+/// See the [module](self) for an example.
+pub struct Client {
+    link: Link,
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+    /// What no other client's ids begin with.
+    mark: u32,
+    count: AtomicU64,
+}
+
+impl Client {
+    /// Connects to a run; returns once it has said hello.
+    ///
+    /// # Errors
+    /// [`ClientError`] says why there is no connection. The first one is tried once.
+    pub fn connect(link: &Link, settings: &Settings) -> Result<Self, ClientError> {
+        let system = |reason: String| ClientError::System { reason };
+        let mut mark = [0; 4];
+        getrandom::fill(&mut mark).map_err(|error| system(error.to_string()))?;
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()
+            .map_err(|error| system(error.to_string()))?;
+        let shared = Arc::new(Shared::default());
+        let (on_thread, of, settings) = (Arc::clone(&shared), link.clone(), settings.clone());
+        let serve = move || {
+            let failure = runtime.block_on(connection::run(&of, &settings, &on_thread));
+            // A name that is still being looked up is not waited for.
+            runtime.shutdown_background();
+            on_thread.with(|state| state.failure = Some(failure));
+        };
+        let thread = std::thread::Builder::new().name("tombolo-client".into()).spawn(serve);
+        let thread = Some(thread.map_err(|error| system(error.to_string()))?);
+        let mark = u32::from_le_bytes(mark);
+        let client = Self { link: link.clone(), shared, thread, mark, count: AtomicU64::new(0) };
+        let joined = client.shared.wait(Duration::MAX, |state| match &state.hello {
+            Some(_) => Some(Ok(())),
+            None => state.failure.clone().map(Err),
+        });
+        joined.unwrap_or(Err(ClientError::Closed)).map(|()| client)
+    }
+
+    /// The link it was connected by.
+    #[must_use]
+    pub fn link(&self) -> &Link {
+        &self.link
+    }
+
+    /// What there is in the run, as it was last told; `None` never, once connected.
+    #[must_use]
+    pub fn hello(&self) -> Option<Arc<Hello>> {
+        self.shared.with(|state| state.hello.clone())
+    }
+
+    /// How far the solver is, as it was last told.
+    #[must_use]
+    pub fn status(&self) -> Option<Arc<Status>> {
+        self.shared.with(|state| state.status.clone())
+    }
+
+    /// How the run has ended, where it has.
+    #[must_use]
+    pub fn end(&self) -> Option<End> {
+        self.shared.with(|state| state.end.clone())
+    }
+
+    /// Whether this client steers.
+    #[must_use]
+    pub fn drives(&self) -> bool {
+        self.hello().is_some_and(|hello| hello.role == Role::Driver)
+    }
+
+    /// How many events made way for newer ones before anybody had read them.
+    #[must_use]
+    pub fn missed(&self) -> u64 {
+        self.shared.with(|state| state.missed)
+    }
+
+    /// The next event, in the order in which they came, texts before frames; `None` where nothing
+    /// came within `patience`.
+    ///
+    /// # Errors
+    /// [`ClientError::Closed`] behind the last event of a run that has ended, and
+    /// [`ClientError::Lost`] where the connection could not be made again.
+    pub fn next(&self, patience: Duration) -> Result<Option<Told>, ClientError> {
+        self.shared.next(patience)
+    }
+
+    /// Waits until the status says something, also if it is that of before.
+    ///
+    /// # Errors
+    /// [`ClientError::NoAnswer`] after `patience`, or why nothing comes any more.
+    pub fn wait_for_status(
+        &self,
+        patience: Duration,
+        mut fits: impl FnMut(&Status) -> bool,
+    ) -> Result<Arc<Status>, ClientError> {
+        let found = self.shared.wait(patience, |state| {
+            let status = state.status.as_ref().filter(|status| fits(status));
+            match (status, &state.failure) {
+                (Some(status), _) => Some(Ok(Arc::clone(status))),
+                (None, failure) => failure.clone().map(Err),
+            }
+        });
+        found.unwrap_or_else(|| Err(no_answer("the question how far it is", patience)))
+    }
+
+    /// Asks for the wheel until it is there: at once where nobody drives, and after some seconds
+    /// where the last driver's connection was lost.
+    ///
+    /// # Errors
+    /// [`ClientError::NotDriver`] where somebody else drives, or after `patience`.
+    pub fn drive(&self, patience: Duration) -> Result<(), ClientError> {
+        let until = Instant::now() + patience.min(Duration::from_secs(1 << 30));
+        loop {
+            if self.drives() {
+                return Ok(());
+            }
+            let mark = self.id();
+            let message = json!({"id": mark, "drive": {}});
+            self.transmit(mark.clone(), &message, true)?;
+            let left = until.saturating_duration_since(Instant::now());
+            let answered = self.shared.wait(left.max(ASK_AGAIN), |state| {
+                let drives = state.hello.as_ref().is_some_and(|h| h.role == Role::Driver);
+                let waits = state.pending.iter().any(|pending| pending.id == mark);
+                match &state.failure {
+                    Some(failure) => Some(Err(failure.clone())),
+                    None => (drives || !waits).then(|| Ok((drives, state.said(&mark)))),
+                }
+            });
+            let (drives, reason) = answered.unwrap_or(Ok((false, None)))?;
+            if drives {
+                return Ok(());
+            }
+            let reason = reason.unwrap_or_else(|| "nothing was said".into());
+            let kept = self.status().is_none_or(|status| status.driver.is_none());
+            if !kept || Instant::now() >= until {
+                return Err(ClientError::NotDriver { reason });
+            }
+            self.shared.wait(ASK_AGAIN, |state| state.failure.clone());
+        }
+    }
+
+    /// Sends a command; returns its id, which comes back in the answers to it.
+    ///
+    /// # Errors
+    /// Where too much waits for an answer, or nothing is sent any more.
+    pub fn send(&self, command: &Command) -> Result<String, ClientError> {
+        let silent = !matches!(command, Command::Order(_) | Command::Pipelines(_));
+        self.say(&json!(command), silent)
+    }
+
+    /// Gives an order of a new shape; returns its id.
+    ///
+    /// # Errors
+    /// As of [`Client::send`].
+    pub fn order(&self, order: &Order) -> Result<String, ClientError> {
+        self.send(&Command::Order(order.clone()))
+    }
+
+    /// Takes the last orders back; returns the id of the order that does so.
+    ///
+    /// # Errors
+    /// As of [`Client::send`].
+    pub fn undo(&self, count: std::num::NonZeroU32) -> Result<String, ClientError> {
+        self.order(&Change::Undo(count).into())
+    }
+
+    /// Asks what an order would come to; the answer is an [`Event::Forecast`] of this id.
+    ///
+    /// # Errors
+    /// As of [`Client::send`].
+    pub fn forecast(&self, order: &Order) -> Result<String, ClientError> {
+        self.say(&json!(Question::Forecast(order.clone())), false)
+    }
+
+    /// Holds the solver at its next safe point.
+    ///
+    /// # Errors
+    /// As of [`Client::send`].
+    pub fn pause(&self) -> Result<String, ClientError> {
+        self.send(&Command::Pause {})
+    }
+
+    /// Lets the solver go on.
+    ///
+    /// # Errors
+    /// As of [`Client::send`].
+    pub fn resume(&self) -> Result<String, ClientError> {
+        self.send(&Command::Resume {})
+    }
+
+    /// Asks the solver to end.
+    ///
+    /// # Errors
+    /// As of [`Client::send`].
+    pub fn stop(&self) -> Result<String, ClientError> {
+        self.send(&Command::Stop {})
+    }
+
+    /// Gives a parameter of the solver a new value.
+    ///
+    /// # Errors
+    /// As of [`Client::send`].
+    pub fn set(&self, name: &str, value: f64) -> Result<String, ClientError> {
+        self.send(&Command::Parameter(Parameter { name: name.into(), value }))
+    }
+
+    /// The pipelines as they are now, a JSON list.
+    ///
+    /// # Errors
+    /// [`ClientError`] where the answer is none.
+    pub fn pipelines(&self) -> Result<Value, ClientError> {
+        let body = self.get("pipelines", DOCUMENT.most)?;
+        serde_json::from_slice(&body)
+            .map_err(|error| get::not_tombolo(&self.link, error.to_string()))
+    }
+
+    /// The reference surface, every bit of it: what edits are measured from.
+    ///
+    /// # Errors
+    /// [`ClientError::Answer`] with the status 404 as long as there is no mesh whose shape could be
+    /// changed.
+    pub fn surface(&self) -> Result<Surface, ClientError> {
+        let body = self.get("surface", SURFACE)?;
+        decode_surface(&body).map_err(|error| get::not_tombolo(&self.link, error.to_string()))
+    }
+
+    fn get(&self, path: &'static str, most: usize) -> Result<Vec<u8>, ClientError> {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+        let runtime = runtime.map_err(|error| ClientError::System { reason: error.to_string() })?;
+        let answer = runtime.block_on(get::get(&self.link, path, most));
+        runtime.shutdown_background();
+        let answer = answer?;
+        match answer.status {
+            200 => Ok(answer.body),
+            status => Err(get::refused(&self.link, path, status, &answer.body)),
+        }
+    }
+
+    fn id(&self) -> String {
+        let count = self.count.fetch_add(1, Ordering::Relaxed) + 1;
+        format!("k{:08x}-{count}", self.mark)
+    }
+
+    fn say(&self, message: &Value, may_be_silent: bool) -> Result<String, ClientError> {
+        let (id, mut message) = (self.id(), message.clone());
+        message["id"] = json!(id);
+        self.transmit(id.clone(), &message, may_be_silent)?;
+        Ok(id)
+    }
+
+    fn transmit(&self, id: String, message: &Value, silent: bool) -> Result<(), ClientError> {
+        let text = message.to_string();
+        DOCUMENT.check(text.len()).map_err(|exceeded| ClientError::TooMuch {
+            what: "bytes of a command",
+            found: exceeded.found,
+            most: exceeded.limit.most,
+        })?;
+        self.shared.send(Pending { id, text, may_be_silent: silent, sent: None })
+    }
+}
+
+fn no_answer(what: &str, patience: Duration) -> ClientError {
+    ClientError::NoAnswer { what: what.into(), seconds: patience.as_secs_f64() }
+}
+
+impl Drop for Client {
+    fn drop(&mut self) {
+        self.shared.with(|state| state.closing = true);
+        self.shared.wake.notify_one();
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}

@@ -1,0 +1,247 @@
+//! What a client's thread and its owner share: events that nobody has read, commands that nobody
+//! has answered.
+
+use std::{
+    collections::VecDeque,
+    sync::{Arc, Condvar, Mutex},
+    time::{Duration, Instant},
+};
+
+use tokio::sync::Notify;
+use tombolo_pipelines::encode::DecodedFrame;
+
+use super::{ClientError, End, Event, Hello, Role, Status, Told};
+use crate::lock::lock;
+
+/// Texts that wait to be read, and their bytes; beyond either the oldest make way.
+const TEXTS: usize = 4096;
+const BYTES: usize = 1 << 28;
+/// Frames that wait to be read; beyond it the oldest make way.
+const FRAMES: usize = 64;
+/// Commands that wait for an answer, and their bytes.
+const COMMANDS: usize = 256;
+const COMMAND_BYTES: usize = 1 << 28;
+/// How long a command that this server answers by nothing may take to be taken.
+pub(super) const UNANSWERED: Duration = Duration::from_secs(1);
+
+/// A command that was not answered yet.
+pub(super) struct Pending {
+    pub(super) id: String,
+    pub(super) text: String,
+    /// Whether a server that knows no `done` says nothing where all is well.
+    pub(super) may_be_silent: bool,
+    /// When it was sent over the connection there is.
+    pub(super) sent: Option<Instant>,
+}
+
+/// A frame that waits to be read.
+struct Waiting {
+    frame: Told,
+    connection: u64,
+}
+
+#[derive(Default)]
+pub(super) struct State {
+    texts: VecDeque<Told>,
+    bytes: usize,
+    frames: VecDeque<Waiting>,
+    pub(super) hello: Option<Arc<Hello>>,
+    pub(super) status: Option<Arc<Status>>,
+    pub(super) end: Option<End>,
+    pub(super) pending: VecDeque<Pending>,
+    /// The number of the connection there is.
+    pub(super) connection: u64,
+    /// Frames of this connection that were read or made way.
+    pub(super) taken: u64,
+    /// Whether this client has driven, and takes the wheel again after a lost connection.
+    pub(super) drives: bool,
+    pub(super) missed: u64,
+    /// Why nothing comes any more.
+    pub(super) failure: Option<ClientError>,
+    pub(super) closing: bool,
+}
+
+/// What both sides share.
+#[derive(Default)]
+pub(super) struct Shared {
+    state: Mutex<State>,
+    changed: Condvar,
+    /// Wakes the client's thread.
+    pub(super) wake: Notify,
+}
+
+impl Shared {
+    /// Reads or changes what is shared, and wakes whoever waits for it.
+    pub(super) fn with<T>(&self, change: impl FnOnce(&mut State) -> T) -> T {
+        let done = change(&mut lock(&self.state));
+        self.changed.notify_all();
+        done
+    }
+
+    /// Waits until `look` finds something, `patience` at most.
+    pub(super) fn wait<T>(
+        &self,
+        patience: Duration,
+        mut look: impl FnMut(&mut State) -> Option<T>,
+    ) -> Option<T> {
+        // So far away that no clock ends before.
+        let until = Instant::now() + patience.min(Duration::from_secs(1 << 30));
+        let mut state = lock(&self.state);
+        loop {
+            if let Some(found) = look(&mut state) {
+                return Some(found);
+            }
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return None;
+            }
+            let waited = self.changed.wait_timeout(state, left);
+            state = waited.unwrap_or_else(std::sync::PoisonError::into_inner).0;
+        }
+    }
+
+    /// Takes a command to be sent.
+    pub(super) fn send(&self, pending: Pending) -> Result<(), ClientError> {
+        self.with(|state| {
+            if let Some(failure) = &state.failure {
+                return Err(failure.clone());
+            }
+            let bytes = state.pending.iter().map(|pending| pending.text.len()).sum::<usize>();
+            let found = bytes + pending.text.len();
+            if found > COMMAND_BYTES {
+                let what = "bytes of commands without an answer";
+                return Err(ClientError::TooMuch { what, found, most: COMMAND_BYTES });
+            }
+            if state.pending.len() >= COMMANDS {
+                let (what, found) = ("commands without an answer", state.pending.len() + 1);
+                return Err(ClientError::TooMuch { what, found, most: COMMANDS });
+            }
+            state.pending.push_back(pending);
+            Ok(())
+        })?;
+        self.wake.notify_one();
+        Ok(())
+    }
+
+    /// The next event, the texts before the frames.
+    pub(super) fn next(&self, patience: Duration) -> Result<Option<Told>, ClientError> {
+        let next = self.wait(patience, |state| match state.take() {
+            Some(told) => Some(Ok(told)),
+            None => state.failure.clone().map(Err),
+        });
+        if matches!(&next, Some(Ok(told)) if matches!(told.event, Event::Frame(_))) {
+            self.wake.notify_one();
+        }
+        next.transpose()
+    }
+}
+
+impl State {
+    fn take(&mut self) -> Option<Told> {
+        if let Some(told) = self.texts.pop_front() {
+            self.bytes -= told.text.len();
+            return Some(told);
+        }
+        let Waiting { frame, connection } = self.frames.pop_front()?;
+        self.taken += u64::from(connection == self.connection);
+        Some(frame)
+    }
+
+    /// Takes an event in: what it tells is known from here on, and what it answers is answered.
+    pub(super) fn put(&mut self, event: Event, text: &str) {
+        match &event {
+            Event::Hello(hello) => {
+                self.drives |= hello.role == Role::Driver;
+                self.hello = Some(Arc::new((**hello).clone()));
+                self.texts.retain(|told| !matches!(told.event, Event::Hello(_)));
+            }
+            Event::Status(status) => {
+                self.status = Some(Arc::new((**status).clone()));
+                self.texts.retain(|told| !matches!(told.event, Event::Status(_)));
+            }
+            Event::End(end) => self.end = Some(end.clone()),
+            _ => {}
+        }
+        if let Some(id) = event.answers() {
+            self.pending.retain(|pending| pending.id != id);
+        }
+        self.bytes = self.texts.iter().map(|told| told.text.len()).sum::<usize>() + text.len();
+        self.texts.push_back(Told { event, text: text.into() });
+        while self.texts.len() > TEXTS || self.bytes > BYTES && self.texts.len() > 1 {
+            let monitor = self.texts.iter().position(|t| matches!(t.event, Event::Monitor(_)));
+            if let Some(gone) = self.texts.remove(monitor.unwrap_or(0)) {
+                self.bytes -= gone.text.len();
+            }
+            self.missed += 1;
+        }
+    }
+
+    /// Takes the error out that answers a command.
+    pub(super) fn said(&mut self, id: &str) -> Option<String> {
+        let answers = |told: &Told| matches!(&told.event, Event::Error(error) if error.id.as_deref() == Some(id));
+        let told =
+            self.texts.iter().position(answers).and_then(|found| self.texts.remove(found))?;
+        self.bytes -= told.text.len();
+        match told.event {
+            Event::Error(error) => Some(error.message),
+            _ => None,
+        }
+    }
+
+    /// Takes a frame in.
+    pub(super) fn put_frame(&mut self, frame: DecodedFrame) {
+        let frame = Told { event: Event::Frame(frame.into()), text: "".into() };
+        self.frames.push_back(Waiting { frame, connection: self.connection });
+        if self.frames.len() > FRAMES {
+            if let Some(Waiting { connection, .. }) = self.frames.pop_front() {
+                self.taken += u64::from(connection == self.connection);
+            }
+            self.missed += 1;
+        }
+    }
+
+    /// Begins a connection: what was not answered is sent again, but for orders that the run knows.
+    pub(super) fn begin(&mut self, hello: &Hello) {
+        self.connection += 1;
+        self.taken = 0;
+        self.pending.retain(|pending| hello.orders.iter().all(|order| order.id != pending.id));
+        self.pending.iter_mut().for_each(|pending| pending.sent = None);
+    }
+
+    /// Has the wheel asked for before any other command that waits.
+    pub(super) fn take_wheel(&mut self) {
+        let text = r#"{"id": "wheel", "drive": {}}"#.to_owned();
+        self.pending.retain(|pending| pending.id != "wheel");
+        let wheel = Pending { id: "wheel".into(), text, may_be_silent: true, sent: None };
+        self.pending.push_front(wheel);
+    }
+
+    /// The commands that were not sent over this connection.
+    pub(super) fn unsent(&mut self) -> Vec<String> {
+        let unsent = self.pending.iter_mut().filter(|pending| pending.sent.is_none());
+        let now = Instant::now();
+        unsent
+            .map(|pending| {
+                pending.sent = Some(now);
+                pending.text.clone()
+            })
+            .collect()
+    }
+
+    /// Tells of commands of which a server says nothing where all is well, once it had the time to
+    /// say what is wrong; they are not sent again.
+    pub(super) fn settle(&mut self) {
+        let (mut silent, now) = (Vec::new(), Instant::now());
+        self.pending.retain(|pending| {
+            let taken = pending.sent.is_some_and(|sent| now - sent > UNANSWERED);
+            let settled = pending.may_be_silent && taken;
+            if settled {
+                silent.push(pending.id.clone());
+            }
+            !settled
+        });
+        for id in silent {
+            self.put(Event::Taken { id }, "");
+        }
+    }
+}

@@ -1,0 +1,373 @@
+//! A client of a run: what it is told, what it does, and what becomes of it when the connection is
+//! lost or something else answers.
+
+mod common;
+
+use std::{
+    io::{Read, Write},
+    net::{SocketAddr, TcpListener, TcpStream},
+    path::Path,
+    process::{Command, Output},
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread::JoinHandle,
+    time::Duration,
+};
+
+use common::{LINK_TO_ALL, PATIENCE, Solver, config, squeeze};
+use serde_json::Value;
+use tombolo::{
+    OrderStatus, Parameter, Report,
+    client::{Client, ClientError, Event, Link, Settings, Told},
+    pipelines::language::{Order, parse_valid},
+};
+
+const MONITORED: &str = r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"}, "pipelines": [
+    {"name": "boundary", "every": {"steps": 1}, "stages": [{"surface": {}}, {"stream": {}}]},
+    {"name": "health", "every": {"steps": 1}, "stages": [{"statistics": {"field": "speed"}}]}]}"#;
+
+/// A run that goes on by itself until it is asked to stop.
+struct Run {
+    link: Link,
+    address: SocketAddr,
+    over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<Report>>,
+}
+
+impl Run {
+    fn new(text: &str) -> Self {
+        let parameter =
+            Parameter { name: "inflow".into(), value: 1.0, minimum: 0.0, maximum: 10.0 };
+        let settings = tombolo::Settings {
+            config: config(text),
+            parameters: vec![parameter],
+            ..Default::default()
+        };
+        let mut solver = Solver::new(settings);
+        let link = solver.adaptor.link().expect("a server").parse().expect("a link");
+        let address = solver.adaptor.address().expect("a server");
+        let over = Arc::new(AtomicBool::new(false));
+        let is_over = Arc::clone(&over);
+        solver.step();
+        let run = move || {
+            while !solver.stopped && !is_over.load(Ordering::Relaxed) {
+                solver.step();
+                std::thread::sleep(Duration::from_millis(2));
+            }
+            solver.finish()
+        };
+        Self { link, address, over, thread: Some(std::thread::spawn(run)) }
+    }
+
+    fn end(mut self) -> Report {
+        self.over.store(true, Ordering::Relaxed);
+        self.thread.take().expect("a run").join().expect("no panic")
+    }
+
+    fn over(&self, port: u16) -> Link {
+        let own = format!(":{}/", self.address.port());
+        self.link.to_string().replace(&own, &format!(":{port}/")).parse().expect("a link")
+    }
+}
+
+fn quick() -> Settings {
+    Settings { attempts: 1000, longest_pause: Duration::from_millis(250), ..Settings::default() }
+}
+
+fn order(by: f64) -> Order {
+    parse_valid(&squeeze(by).to_string(), "order").expect("an order")
+}
+
+/// Reads until an event fits.
+fn until<T>(client: &Client, what: &str, fits: impl Fn(&Told) -> Option<T>) -> T {
+    loop {
+        let told = client.next(PATIENCE).unwrap_or_else(|error| panic!("{what}: {error}"));
+        let told = told.unwrap_or_else(|| panic!("no {what}"));
+        if let Some(found) = fits(&told) {
+            return found;
+        }
+    }
+}
+
+fn applied(client: &Client, id: &str) {
+    until(client, "applied order", |told| match &told.event {
+        Event::Order(order) if order.id == id => {
+            assert_ne!(order.status, OrderStatus::Rejected, "{:?}", order.reason);
+            (order.status == OrderStatus::Applied).then_some(())
+        }
+        Event::Error(error) => panic!("{}", error.message),
+        _ => None,
+    });
+}
+
+/// Passes connections on to a run, and drops them when it is told to.
+struct Proxy {
+    port: u16,
+    open: Arc<Mutex<Vec<TcpStream>>>,
+}
+
+impl Proxy {
+    fn to(address: SocketAddr) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        let port = listener.local_addr().expect("an address").port();
+        let open = Arc::new(Mutex::new(Vec::new()));
+        let known = Arc::clone(&open);
+        std::thread::spawn(move || {
+            for near in listener.incoming().flatten() {
+                let Ok(far) = TcpStream::connect(address) else { continue };
+                let copy = |stream: &TcpStream| stream.try_clone().expect("a copy");
+                known.lock().expect("no panic").extend([copy(&near), copy(&far)]);
+                for (mut from, mut to) in [(copy(&near), copy(&far)), (far, near)] {
+                    std::thread::spawn(move || {
+                        let _ = std::io::copy(&mut from, &mut to);
+                        let _ = to.shutdown(std::net::Shutdown::Both);
+                    });
+                }
+            }
+        });
+        Self { port, open }
+    }
+
+    fn drop_all(&self) {
+        for stream in self.open.lock().expect("no panic").drain(..) {
+            let _ = stream.shutdown(std::net::Shutdown::Both);
+        }
+    }
+}
+
+#[test]
+fn a_client_watches_and_steers() {
+    let run = Run::new(MONITORED);
+    let client = Client::connect(&run.link, &Settings::default()).expect("connected");
+    client.drive(PATIENCE).expect("the wheel");
+    assert_eq!(client.hello().expect("said").parameters[0].name, "inflow");
+    until(&client, "monitor", |told| match &told.event {
+        Event::Monitor(values) => {
+            assert_eq!(values.pipeline, "health");
+            values.values.get("speed.max").copied().flatten()
+        }
+        _ => None,
+    });
+    let asked = client.forecast(&order(0.3)).expect("sent");
+    let foretold = until(&client, "forecast", |told| match &told.event {
+        Event::Forecast(foretold) if foretold.id.as_ref() == Some(&asked) => {
+            Some(foretold.order.clone())
+        }
+        Event::Error(error) => panic!("{}", error.message),
+        _ => None,
+    });
+    assert_eq!(foretold.quality.map(|quality| quality.inverted), Some(0));
+    applied(&client, &client.order(&order(0.3)).expect("sent"));
+    applied(&client, &client.undo(std::num::NonZeroU32::MIN).expect("sent"));
+    let refused = client.set("inflaw", 2.0).expect("sent");
+    until(&client, "error", |told| match &told.event {
+        Event::Error(error) if error.id.as_ref() == Some(&refused) => {
+            assert!(error.message.contains("inflow"), "{}", error.message);
+            Some(())
+        }
+        _ => None,
+    });
+    client.pause().expect("sent");
+    client.wait_for_status(PATIENCE, |status| status.paused).expect("paused");
+    client.resume().expect("sent");
+    client.wait_for_status(PATIENCE, |status| !status.paused).expect("going on");
+    assert_eq!(client.pipelines().expect("a list")[0]["name"], "boundary");
+    assert_eq!(client.surface().expect("a surface").points().len(), 98);
+
+    let other = Client::connect(&run.link, &Settings::default()).expect("connected");
+    let refused = other.drive(PATIENCE);
+    assert!(matches!(refused, Err(ClientError::NotDriver { .. })), "{refused:?}");
+    drop(other);
+
+    client.stop().expect("sent");
+    let end = until(&client, "end", |told| match &told.event {
+        Event::End(end) => Some(end.how.clone()),
+        _ => None,
+    });
+    assert_eq!(end, "stopped");
+    while client.next(PATIENCE).is_ok() {}
+    assert!(matches!(client.next(PATIENCE), Err(ClientError::Closed)));
+    assert_eq!(run.end().orders.len(), 2);
+}
+
+#[test]
+fn frames_come_decoded_to_those_who_ask_and_hardly_to_others() {
+    let run = Run::new(LINK_TO_ALL);
+    let settings = Settings { views: true, ..Settings::default() };
+    let seeing = Client::connect(&run.link, &settings).expect("connected");
+    let mut cycles: Vec<u64> = Vec::new();
+    while cycles.len() < 6 {
+        cycles.push(until(&seeing, "frame", |told| match &told.event {
+            Event::Frame(frame) => {
+                assert_eq!((frame.view.as_str(), frame.points.len()), ("boundary", 98));
+                Some(frame.cycle)
+            }
+            _ => None,
+        }));
+    }
+    assert!(cycles.is_sorted(), "{cycles:?}");
+    drop(seeing);
+    let blind = Client::connect(&run.link, &Settings::default()).expect("connected");
+    let from = blind.wait_for_status(PATIENCE, |_| true).expect("a status").cycle;
+    blind.wait_for_status(PATIENCE, |status| status.cycle > from + 300).expect("steps");
+    drop(blind);
+    let frames = run.end().stream.frames;
+    assert!(frames < 150, "{frames} frames for one that sees none");
+}
+
+#[test]
+fn a_lost_connection_is_made_again_and_an_order_is_given_once() {
+    let run = Run::new(LINK_TO_ALL);
+    let proxy = Proxy::to(run.address);
+    let client = Client::connect(&run.over(proxy.port), &quick()).expect("connected");
+    client.drive(PATIENCE).expect("the wheel");
+    let first = client.hello().expect("said").client.clone();
+    for round in 1..=3 {
+        // It may be lost before the order has come, or before its answer has.
+        let id = client.order(&order(0.05)).expect("sent");
+        proxy.drop_all();
+        let begun = std::time::Instant::now();
+        loop {
+            assert!(begun.elapsed() < PATIENCE, "order {round} is not applied");
+            let told = client.next(PATIENCE).expect("connected").expect("an event");
+            let reports = match &told.event {
+                Event::Order(report) => vec![(**report).clone()],
+                Event::Hello(hello) => hello.orders.clone(),
+                Event::Error(error) => panic!("{}", error.message),
+                _ => continue,
+            };
+            let own = reports.iter().find(|report| report.id == id);
+            assert!(own.is_none_or(|report| report.status != OrderStatus::Rejected), "{own:?}");
+            if own.is_some_and(|report| report.status == OrderStatus::Applied) {
+                break;
+            }
+        }
+    }
+    assert_ne!(client.hello().expect("said").client, first, "a name of each connection");
+    assert!(client.drives(), "it has the wheel again");
+    drop(client);
+    assert_eq!(run.end().orders.len(), 3);
+}
+
+/// What listens answers each connection so, and is asked by a client.
+fn answered_by(answer: &'static [u8]) -> ClientError {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = listener.local_addr().expect("an address").port();
+    std::thread::spawn(move || {
+        for mut stream in listener.incoming().flatten() {
+            let mut asked = [0; 4096];
+            let _ = stream.read(&mut asked);
+            let _ = stream.write_all(answer);
+        }
+    });
+    let link: Link = format!("http://127.0.0.1:{port}/?token=abc").parse().expect("a link");
+    Client::connect(&link, &Settings::default()).err().expect("no run")
+}
+
+#[test]
+fn what_is_no_run_or_not_this_one_is_told_by_name() {
+    for nonsense in [
+        &b"SSH-2.0-OpenSSH_9.6\r\n"[..],
+        b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\nhi",
+        b"HTTP/1.1 404 Not Found\r\n\r\n",
+        b"",
+        b"\xff\x00\xfe\xfe\xfe\xfe\r\n\r\n",
+    ] {
+        let error = answered_by(nonsense);
+        assert!(matches!(error, ClientError::NotTombolo { .. }), "{error:?}");
+    }
+    let run = Run::new(LINK_TO_ALL);
+    let wrong: Link = format!("http://{}/?token=0123", run.address).parse().expect("a link");
+    let error = Client::connect(&wrong, &Settings::default()).err();
+    assert!(matches!(error, Some(ClientError::WrongToken { .. })), "{error:?}");
+    let held: Vec<_> = (0..tombolo::stream::VIEWERS)
+        .map(|_| Client::connect(&run.link, &Settings::default()).expect("connected"))
+        .collect();
+    let error = Client::connect(&run.link, &Settings::default()).err();
+    assert!(matches!(error, Some(ClientError::TooManyViewers { .. })), "{error:?}");
+    drop(held);
+    let link = run.link.clone();
+    run.end();
+    let error = Client::connect(&link, &Settings::default()).err();
+    assert!(matches!(error, Some(ClientError::Refused { .. })), "{error:?}");
+}
+
+fn tombolo(directory: &Path, arguments: &[&str]) -> (i32, String, Output) {
+    let output = Command::new(env!("CARGO_BIN_EXE_tombolo"))
+        .args(arguments)
+        .current_dir(directory)
+        .output()
+        .expect("runs");
+    let said = String::from_utf8_lossy(&output.stdout).into_owned()
+        + &String::from_utf8_lossy(&output.stderr);
+    (output.status.code().expect("a code"), said, output)
+}
+
+fn lines(output: &Output) -> Vec<Value> {
+    let text = String::from_utf8_lossy(&output.stdout);
+    text.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect()
+}
+
+#[test]
+fn the_program_reaches_a_run() {
+    let run = Run::new(MONITORED);
+    let directory = tempfile::tempdir().expect("a directory");
+    let write = |name: &str, text: &str| {
+        std::fs::write(directory.path().join(name), text).expect("written");
+    };
+    write("link.txt", &format!("viewer: {}\n", run.link));
+    write("squeeze.json", &squeeze(0.3).to_string());
+    write("too-far.json", &squeeze(1.5).to_string());
+    write("slip.json", r#"[{"translate": {"featurs": ["z-max"], "by": [0, 0, 1]}}]"#);
+    let call = |arguments: &[&str]| tombolo(directory.path(), arguments);
+    for (arguments, code, expected) in [
+        (&["status", "link.txt"][..], 0, "running: cycle"),
+        (&["doctor", "link.txt"], 0, "token: ok"),
+        (&["forecast", "link.txt", "squeeze.json"], 0, "would be applied"),
+        (&["forecast", "link.txt", "too-far.json"], 1, "would be rejected"),
+        (&["order", "link.txt", "squeeze.json", "--wait"], 0, "applied"),
+        (&["order", "link.txt", "too-far.json", "--wait"], 1, "rejected"),
+        (&["order", "link.txt", "slip.json"], 1, "did you mean `features`?"),
+        (&["undo", "link.txt", "--wait"], 0, "applied"),
+        (&["set", "link.txt", "inflow", "2"], 0, ""),
+        (&["set", "link.txt", "inflow", "NaN"], 2, "expected a number"),
+        (&["set", "link.txt", "inflaw", "2"], 1, "inflow"),
+        (&["pause", "link.txt"], 0, "paused"),
+        (&["resume", "link.txt"], 0, ""),
+        (&["status"], 2, "LINK"),
+        (&["status", "nonsense"], 2, "expected http://HOST:PORT/?token=TOKEN"),
+        (&["doctor", "http://127.0.0.1:1/?token=a"], 2, "ssh -L 1:127.0.0.1:1 HOST"),
+    ] {
+        let (found, said, _) = call(arguments);
+        assert!(found == code && said.contains(expected), "{arguments:?}: {found}: {said}");
+    }
+    let (code, _, output) = call(&["status", "link.txt", "--json"]);
+    assert!(code == 0 && lines(&output)[0]["status"]["cycle"].is_u64());
+    let (code, _, output) = call(&["order", "link.txt", "squeeze.json", "--wait", "--json"]);
+    let told = lines(&output);
+    assert_eq!((code, &told.last().expect("a line")["order"]["status"]), (0, &"applied".into()));
+    let (code, _, output) =
+        call(&["doctor", &run.link.to_string().replace("token=", "token=x"), "--json"]);
+    let told = lines(&output);
+    assert_eq!((code, &told[4]["step"], &told[4]["ok"]), (2, &"token".into(), &false.into()));
+
+    let held = Client::connect(&run.link, &Settings::default()).expect("connected");
+    held.drive(PATIENCE).expect("the wheel");
+    let (code, said, _) = call(&["pause", "link.txt"]);
+    assert!(code == 1 && said.contains("has the wheel"), "{said}");
+    drop(held);
+
+    let watching = std::thread::scope(|scope| {
+        let watching = scope.spawn(|| call(&["watch", "link.txt", "--json"]));
+        // Told to stop once the watching program is there.
+        let other = Client::connect(&run.link, &Settings::default()).expect("connected");
+        other.wait_for_status(PATIENCE, |status| status.viewers >= 2).expect("a watcher");
+        run.over.store(true, Ordering::Relaxed);
+        watching.join().expect("no panic")
+    });
+    let told = lines(&watching.2);
+    assert_eq!((watching.0, &told.last().expect("a line")["end"]["how"]), (0, &"finished".into()));
+    assert_eq!(run.end().orders.len(), 4);
+}
