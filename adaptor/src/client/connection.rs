@@ -36,8 +36,8 @@ const TEXT: usize = 2 * DOCUMENT.most;
 const WRITE: Duration = Duration::from_secs(10);
 /// How long the last words to a server may take.
 const CLOSE: Duration = Duration::from_millis(500);
-/// How often it is looked for commands that nothing answers.
-const SETTLE: Duration = Duration::from_millis(100);
+/// How often it is looked for commands that nothing answers, and the wheel is asked for again.
+const SETTLE: Duration = Duration::from_millis(200);
 /// The version of the protocol.
 const PROTOCOL: u32 = 2;
 
@@ -153,9 +153,6 @@ async fn join(link: &Link, shared: &Shared) -> Result<Socket, ClientError> {
     };
     shared.with(|state| {
         state.begin(&hello);
-        if state.drives && hello.role == super::Role::Watcher {
-            state.take_wheel();
-        }
         state.put(Event::Hello(hello), &text);
     });
     Ok(socket)

@@ -21,6 +21,10 @@ const FRAMES: usize = 64;
 /// Commands that wait for an answer, and their bytes.
 const COMMANDS: usize = 256;
 const COMMAND_BYTES: usize = 1 << 28;
+/// The id under which the wheel is asked for again.
+const WHEEL: &str = "wheel";
+/// How long it is: longer than a server takes to see that a connection is gone.
+const REGAIN: Duration = Duration::from_secs(45);
 /// How long a command that this server answers by nothing may take to be taken.
 pub(super) const UNANSWERED: Duration = Duration::from_secs(1);
 
@@ -55,6 +59,10 @@ pub(super) struct State {
     pub(super) taken: u64,
     /// Whether this client has driven, and takes the wheel again after a lost connection.
     pub(super) drives: bool,
+    /// Until when the wheel is asked for again, before any command is sent.
+    regain: Option<Instant>,
+    /// The name under which this client drove.
+    former: Option<String>,
     pub(super) missed: u64,
     /// Why nothing comes any more.
     pub(super) failure: Option<ClientError>,
@@ -151,7 +159,11 @@ impl State {
     pub(super) fn put(&mut self, event: Event, text: &str) {
         match &event {
             Event::Hello(hello) => {
-                self.drives |= hello.role == Role::Driver;
+                if hello.role == Role::Driver {
+                    self.drives = true;
+                    self.regain = None;
+                    self.pending.retain(|pending| pending.id != WHEEL);
+                }
                 self.hello = Some(Arc::new((**hello).clone()));
                 self.texts.retain(|told| !matches!(told.event, Event::Hello(_)));
             }
@@ -164,6 +176,10 @@ impl State {
         }
         if let Some(id) = event.answers() {
             self.pending.retain(|pending| pending.id != id);
+            if id == WHEEL {
+                // It is asked for again, or the commands that wait are refused with the reason.
+                return;
+            }
         }
         self.bytes = self.texts.iter().map(|told| told.text.len()).sum::<usize>() + text.len();
         self.texts.push_back(Told { event, text: text.into() });
@@ -204,21 +220,33 @@ impl State {
     pub(super) fn begin(&mut self, hello: &Hello) {
         self.connection += 1;
         self.taken = 0;
+        self.former = self.hello.as_ref().map(|hello| hello.client.clone());
+        let regains = self.drives && hello.role == Role::Watcher;
+        self.regain = regains.then(|| Instant::now() + REGAIN);
         self.pending.retain(|pending| hello.orders.iter().all(|order| order.id != pending.id));
         self.pending.iter_mut().for_each(|pending| pending.sent = None);
     }
 
-    /// Has the wheel asked for before any other command that waits.
-    pub(super) fn take_wheel(&mut self) {
-        let text = r#"{"id": "wheel", "drive": {}}"#.to_owned();
-        self.pending.retain(|pending| pending.id != "wheel");
-        let wheel = Pending { id: "wheel".into(), text, may_be_silent: true, sent: None };
-        self.pending.push_front(wheel);
+    /// Asks for the wheel again after a lost connection: a server may take a while to see that the
+    /// old one is gone. Given up where somebody else drives.
+    fn regain(&mut self) {
+        let Some(until) = self.regain else { return };
+        let driver = self.status.as_ref().and_then(|status| status.driver.as_ref());
+        if Instant::now() >= until || driver.is_some() && driver != self.former.as_ref() {
+            self.regain = None;
+        } else if self.pending.iter().all(|pending| pending.id != WHEEL) {
+            let text = format!(r#"{{"id": "{WHEEL}", "drive": {{}}}}"#);
+            let wheel = Pending { id: WHEEL.into(), text, may_be_silent: true, sent: None };
+            self.pending.push_front(wheel);
+        }
     }
 
     /// The commands that were not sent over this connection.
     pub(super) fn unsent(&mut self) -> Vec<String> {
-        let unsent = self.pending.iter_mut().filter(|pending| pending.sent.is_none());
+        let waits = self.regain.is_some();
+        let is_next =
+            |pending: &&mut Pending| pending.sent.is_none() && (!waits || pending.id == WHEEL);
+        let unsent = self.pending.iter_mut().filter(is_next);
         let now = Instant::now();
         unsent
             .map(|pending| {
@@ -235,7 +263,7 @@ impl State {
         self.pending.retain(|pending| {
             let taken = pending.sent.is_some_and(|sent| now - sent > UNANSWERED);
             let settled = pending.may_be_silent && taken;
-            if settled {
+            if settled && pending.id != WHEEL {
                 silent.push(pending.id.clone());
             }
             !settled
@@ -243,5 +271,6 @@ impl State {
         for id in silent {
             self.put(Event::Taken { id }, "");
         }
+        self.regain();
     }
 }
