@@ -336,6 +336,7 @@ fn the_program_reaches_a_run() {
         (&["set", "link.txt", "inflaw", "2"], 1, "inflow"),
         (&["pause", "link.txt"], 0, "paused"),
         (&["resume", "link.txt"], 0, ""),
+        (&["cancel", "link.txt", "no-such-order"], 1, "no-such-order"),
         (&["status"], 2, "LINK"),
         (&["status", "nonsense"], 2, "expected http://HOST:PORT/?token=TOKEN"),
         (&["doctor", "http://127.0.0.1:1/?token=a"], 2, "ssh -L 1:127.0.0.1:1 HOST"),

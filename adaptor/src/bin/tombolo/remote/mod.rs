@@ -17,8 +17,10 @@ use crate::{Failure, say};
 pub(crate) const EXIT_CODES: &str = "Exit codes: 0 done; 1 refused or failed; 2 wrong use, or no connection (`tombolo doctor LINK` says why).";
 
 /// The names of these tasks, which have exit codes of their own.
-const NAMES: [&str; 10] =
-    ["status", "watch", "order", "forecast", "undo", "pause", "resume", "stop", "set", "doctor"];
+const NAMES: [&str; 11] = [
+    "status", "watch", "order", "forecast", "undo", "pause", "resume", "stop", "set", "cancel",
+    "doctor",
+];
 
 /// How long the wheel is asked for: longer than a server keeps it for a driver that was lost.
 const WHEEL: Duration = Duration::from_secs(8);
@@ -65,6 +67,9 @@ pub(crate) enum Task {
     /// Give a parameter of the solver a new value
     #[command(after_help = EXIT_CODES)]
     Set(steer::SetOptions),
+    /// Take an order back that has not begun to move the mesh
+    #[command(after_help = EXIT_CODES)]
+    Cancel(steer::CancelOptions),
     /// Say why a connection does not work, and what to do about it
     #[command(after_help = EXIT_CODES)]
     Doctor(Target),
@@ -86,6 +91,7 @@ pub(crate) fn run(task: &Task) -> Result<(), Failure> {
         Task::Resume(target) => (steer::resume(target), target.json),
         Task::Stop(target) => (steer::stop(target), target.json),
         Task::Set(options) => (steer::set(options), options.target.json),
+        Task::Cancel(options) => (steer::cancel(options), options.target.json),
         Task::Doctor(target) => (doctor::doctor(target), target.json),
     };
     if let (Err(Failure::Wrong(message) | Failure::NoConnection(message)), true) = (&done, as_json)

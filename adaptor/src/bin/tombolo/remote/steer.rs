@@ -1,10 +1,10 @@
-//! `tombolo pause`, `tombolo resume`, `tombolo stop` and `tombolo set`.
+//! `tombolo pause`, `tombolo resume`, `tombolo stop`, `tombolo set` and `tombolo cancel`.
 
 use clap::Args;
 use serde_json::json;
 use tombolo::{
     client::{Client, ClientError, Event},
-    pipelines::language::{Command, Parameter},
+    pipelines::language::{Cancel, Command, Parameter},
 };
 
 use super::{ANSWER, Target, failed, order::refused, steer};
@@ -19,6 +19,14 @@ pub(crate) struct SetOptions {
     /// Its new value, within its bounds
     #[arg(allow_negative_numbers = true)]
     value: f64,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CancelOptions {
+    #[command(flatten)]
+    pub(super) target: Target,
+    /// The id of the order, as `tombolo status` and `tombolo order` tell it
+    order: String,
 }
 
 pub(crate) fn pause(target: &Target) -> Result<(), Failure> {
@@ -40,6 +48,11 @@ pub(crate) fn set(options: &SetOptions) -> Result<(), Failure> {
     }
     let parameter = Parameter { name: name.clone(), value: *value };
     give(target, &Command::Parameter(parameter), "set")
+}
+
+pub(crate) fn cancel(options: &CancelOptions) -> Result<(), Failure> {
+    let cancel = Cancel { order: options.order.clone() };
+    give(&options.target, &Command::Cancel(cancel), "cancelled")
 }
 
 /// Sends a command and waits until it has taken effect, as far as the run tells.
