@@ -90,8 +90,7 @@ impl FromStr for Link {
         let rest = match text.split_once("://") {
             Some(("http", rest)) => rest,
             Some(("https", _)) => return Err(wrong("https is not supported yet")),
-            Some(_) => return Err(wrong("it does not begin with http://")),
-            None => return Err(wrong("it does not begin with http://")),
+            _ => return Err(wrong("it does not begin with http://")),
         };
         let rest = rest.split('#').next().unwrap_or_default();
         let (place, query) = rest.split_once('?').ok_or_else(|| wrong("it has no token"))?;
