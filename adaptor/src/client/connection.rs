@@ -110,13 +110,15 @@ async fn again(
 
 /// Connects and waits for the hello.
 async fn join(link: &Link, shared: &Shared) -> Result<Socket, ClientError> {
-    let before = shared.with(|state| state.hello.as_ref().map(|hello| hello.client.clone()));
-    let name = before.as_deref().filter(|name| name.chars().all(|c| c.is_ascii_alphanumeric()));
+    let before = shared.with(|state| state.hello.clone());
+    let is_plain = |text: &str| text.chars().all(|c| c.is_ascii_alphanumeric());
+    let name = before.as_ref().map(|hello| hello.client.as_str()).filter(|name| is_plain(name));
+    let back = before.as_ref().and_then(|hello| hello.back.as_deref()).filter(|it| is_plain(it));
     let stream = open(link).await?;
     let wrong = |found: String| not_tombolo(link, found);
     let late = || wrong(format!("no answer within {} seconds", HELLO.as_secs()));
     let mut request =
-        link.socket(name).into_client_request().map_err(|error| wrong(error.to_string()))?;
+        link.socket(name, back).into_client_request().map_err(|error| wrong(error.to_string()))?;
     if let Ok(value) = HeaderValue::from_str(&format!("Bearer {}", link.token())) {
         request.headers_mut().insert(header::AUTHORIZATION, value);
     }

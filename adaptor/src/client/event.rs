@@ -75,6 +75,9 @@ pub struct Hello {
     pub protocol: u32,
     /// The name of this client.
     pub client: String,
+    /// With its name, what this client comes back by after a lost connection.
+    #[serde(default)]
+    pub back: Option<String>,
     /// Whether this client steers.
     pub role: Role,
     /// The live views.

@@ -65,9 +65,12 @@ impl Link {
         format!("{}/{of}?token={}", self.prefix, self.token)
     }
 
-    /// The address of the WebSocket, for a client that had a name before.
-    pub(super) fn socket(&self, client: Option<&str>) -> String {
-        let client = client.map_or_else(String::new, |name| format!("&client={name}"));
+    /// The address of the WebSocket, for a client that had a name before, and what it comes back by.
+    pub(super) fn socket(&self, client: Option<&str>, back: Option<&str>) -> String {
+        let mut client = client.map_or_else(String::new, |name| format!("&client={name}"));
+        if let Some(back) = back {
+            client += &format!("&back={back}");
+        }
         format!("ws://{}{}{client}", self.address(), self.path("ws"))
     }
 }
@@ -138,10 +141,13 @@ mod tests {
     fn a_link_is_read_with_its_path_and_without_its_port() {
         let read = |text: &str| text.parse::<Link>();
         let link = read(" http://[::1]:7070/?token=abc\n").expect("a link");
-        assert_eq!((link.name(), &*link.socket(None)), ("::1", "ws://[::1]:7070/ws?token=abc"));
+        assert_eq!(
+            (link.name(), &*link.socket(None, None)),
+            ("::1", "ws://[::1]:7070/ws?token=abc")
+        );
         let link = read("http://host/a/b/?x=1&token=t-1#page").expect("a link");
         assert_eq!((link.port(), &*link.path("surface")), (80, "/a/b/surface?token=t-1"));
-        assert_eq!(link.socket(Some("c3")), "ws://host:80/a/b/ws?token=t-1&client=c3");
+        assert_eq!(link.socket(Some("c3"), None), "ws://host:80/a/b/ws?token=t-1&client=c3");
         assert!(!format!("{link:?}").contains("t-1"));
         for wrong in [
             "",
