@@ -109,7 +109,6 @@ struct Meetings {
 /// The part of `hello` that does not change from order to order.
 #[derive(Default)]
 struct Told {
-    schema: Value,
     channel: String,
     fields: Value,
     features: Value,

@@ -143,7 +143,6 @@ fn a_viewer_sees_the_run_and_changes_its_shape() {
     assert_eq!(hello["features"][5]["vertices"], 25);
     assert_eq!(hello["features"][5]["bounds"], json!([[0.0, 0.0, 1.0], [1.0, 1.0, 1.0]]));
     assert_eq!(hello["parameters"][0]["maximum"], 10.0);
-    assert!(hello["schemas"]["order"]["properties"]["edits"].is_object());
     assert_eq!((&hello["stack"], &hello["orders"]), (&json!([]), &json!([])));
     assert!(hello["defaults"]["schedule"]["steps"].is_number());
 
@@ -654,6 +653,65 @@ fn orders_of_viewers_replay_from_the_journal() {
     replay.steps(cycles);
     assert_eq!(replay.motions, motions);
     assert!(bits(&replay.mesh) == mesh);
+}
+
+#[test]
+fn what_a_monitoring_system_asks_is_answered() {
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    solver.steps(3);
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    viewer.send(&json!({"id": "a", "order": squeeze(0.2)}));
+    solver.step_until_told(&mut viewer, "order", |order| order["status"] == "applied");
+    let link = solver.adaptor.watching_link().expect("a server");
+    let secret = link.split_once("token=").expect("a secret").1;
+    let answer = get(&solver.adaptor, "/metrics", &format!("Authorization: Bearer {secret}\r\n"));
+    let cycle = format!("\ntombolo_cycle {}\n", solver.cycle - 1);
+    for line in [
+        "200 OK",
+        "text/plain; version=0.0.4",
+        &cycle,
+        "\ntombolo_viewers 1\n",
+        "\ntombolo_driver 1\n",
+        "\ntombolo_journal_lost 0\n",
+        "\ntombolo_orders{status=\"applied\"} 1\n",
+        "\ntombolo_pipeline_runs_total{pipeline=\"boundary\"} ",
+    ] {
+        assert!(answer.contains(line), "{line:?} is not in {answer}");
+    }
+    assert!(get(&solver.adaptor, "/metrics", "").contains("401 "));
+    solver.finish();
+}
+
+#[test]
+fn who_came_and_left_stands_in_the_journal() {
+    let directory = tempfile::tempdir().unwrap();
+    let text =
+        LINK_TO_ALL.replacen("\"version\": 1,", "\"version\": 1, \"journal\": \"run.jsonl\",", 1);
+    let mut solver = Solver::new(Settings {
+        config: config(&text),
+        output: directory.path().into(),
+        ..Settings::default()
+    });
+    solver.step();
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    drop(viewer);
+    assert!(get(&solver.adaptor, "/pipelines?token=wrong", "").contains("401 "));
+    let mut second = Viewer::connect(&solver.adaptor);
+    second.wait_for("status", |status| status["viewers"] == 1);
+    solver.finish();
+    let journal = std::fs::read_to_string(directory.path().join("run.jsonl")).unwrap();
+    let lines: Vec<Value> =
+        journal.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let did = |name: &str, did: &str| {
+        let is_it = |line: &&Value| line["viewer"]["name"] == name && line["viewer"]["did"] == did;
+        lines.iter().find(is_it).map(|line| line["viewer"]["address"].clone())
+    };
+    assert_eq!(did("c1", "came"), Some(json!("127.0.0.1")), "{journal}");
+    assert_eq!(did("c1", "left"), Some(json!("127.0.0.1")), "{journal}");
+    assert!(did("c2", "came").is_some(), "{journal}");
+    assert!(lines.iter().any(|line| line["refused"]["address"] == "127.0.0.1"), "{journal}");
 }
 
 mod any_bytes {

@@ -34,6 +34,8 @@ let sequence = 0;
 let everConnected = false;
 let fresh = false;
 let stack = "";
+let orderSchema: Json | null = null;
+let isLoadingSchema = false;
 let noticed = 0;
 const errors: string[] = [];
 const session = Array.from(crypto.getRandomValues(new Uint8Array(4)), (byte) => byte.toString(16).padStart(2, "0")).join("");
@@ -157,8 +159,7 @@ function takeHello(body: Hello): void {
   selection.keep(names);
   views.set(body.views);
   colours.set(body.fields);
-  form.setSchema(body.schemas.order, body.defaults);
-  form.setFeatures(body.features);
+  showForm(body);
   const moved = JSON.stringify(body.stack) !== stack;
   stack = JSON.stringify(body.stack);
   preview.set(body.surface ?? null, body.stack);
@@ -174,6 +175,28 @@ function takeHello(body: Hello): void {
   part("stack-empty").hidden = body.stack.length > 0;
   bar.role(body, status?.driver);
   refresh();
+}
+
+/** Asks for what an order may hold, which no hello says: it is long and stays the same. */
+async function loadSchema(): Promise<void> {
+  if (isLoadingSchema) return;
+  isLoadingSchema = true;
+  try {
+    const response = await fetch(addresses.schema, { cache: "no-store", redirect: "error" });
+    if (!response.ok) throw new Error(response.statusText);
+    orderSchema = await response.json() as Json;
+    if (hello) showForm(hello);
+  } catch (error) {
+    report(`what an order may hold: ${String(error)}`);
+  } finally {
+    isLoadingSchema = false;
+  }
+}
+
+function showForm(body: Hello): void {
+  if (orderSchema === null) return void loadSchema();
+  form.setSchema(orderSchema, body.defaults);
+  form.setFeatures(body.features);
 }
 
 function takeFrame(frame: Frame): void {

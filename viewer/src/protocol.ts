@@ -28,7 +28,6 @@ export interface Hello {
   surface?: SurfaceInformation | null;
   fields: FieldInformation[];
   parameters: ParameterInformation[];
-  schemas: { order?: Json };
   stack: Json[];
   orders: OrderStatus[];
   defaults: { deform?: Json; guard?: Json; schedule?: Json };
@@ -200,6 +199,6 @@ function completeHello(body: JsonObject): Hello {
   return {
     ...body,
     views: list("views"), features: list("features"), fields: list("fields"), parameters: list("parameters"),
-    stack: list("stack"), orders: list("orders"), schemas: object("schemas"), defaults: object("defaults"),
+    stack: list("stack"), orders: list("orders"), defaults: object("defaults"),
   } as unknown as Hello;
 }

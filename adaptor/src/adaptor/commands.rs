@@ -7,7 +7,7 @@ use tombolo_deform::communicator::Reduction;
 use tombolo_pipelines::{
     extract::Channel,
     files::{UnreadFile, read_displacements},
-    language::{Command, Message, Order, Problem, Question, locate},
+    language::{Command, JournalNote, Message, Order, Problem, Question, locate},
 };
 
 use super::{Adaptor, SteeredMesh};
@@ -351,5 +351,13 @@ impl CommandSink for Intake {
 
     fn orders(&self) -> Value {
         self.log.told()
+    }
+
+    fn order_counts(&self) -> Vec<(&'static str, usize)> {
+        self.log.order_counts()
+    }
+
+    fn note(&self, note: JournalNote) {
+        self.log.note(&note);
     }
 }

@@ -27,7 +27,6 @@ impl Adaptor {
             "surface": self.told.surface,
             "fields": list(&self.told.fields),
             "parameters": self.parameters.all(),
-            "schemas": {"order": self.told.schema},
             "defaults": {"deform": deform, "guard": guard, "schedule": schedule},
         });
         if let Value::Object(description) = description {

@@ -115,7 +115,7 @@ impl Adaptor {
             mesh: SteeredMesh::Unknown,
             lent: Lent::default(),
             moment: Moment::default(),
-            told: Told { schema: language::order_schema(), ..Told::default() },
+            told: Told::default(),
             paused: false,
             stopped: false,
             is_replay,

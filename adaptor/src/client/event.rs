@@ -89,7 +89,7 @@ pub struct Hello {
     /// The parameters of the solver.
     #[serde(default)]
     pub parameters: Vec<Parameter>,
-    /// The orders so far, the oldest first.
+    /// The orders so far, the oldest first; in the first of a connection.
     #[serde(default)]
     pub orders: Vec<OrderReport>,
     /// The edits that make the shape, the oldest first.

@@ -8,7 +8,7 @@ use std::{
 use serde_json::{Value, json};
 use tombolo_pipelines::language::Order;
 
-use super::order_report::{ORDERS_KEPT, OrderReport};
+use super::order_report::{ORDERS_KEPT, OrderReport, OrderStatus};
 
 /// Orders that a viewer is told of when it connects.
 const ORDERS_TOLD: usize = 100;
@@ -128,6 +128,20 @@ impl KnownCommands {
     pub(super) fn newest(&self) -> Value {
         let skipped = self.orders.len().saturating_sub(ORDERS_TOLD);
         self.orders.iter().skip(skipped).map(|order| self.told(order)).collect()
+    }
+
+    /// How many of the orders have come to which state.
+    pub(super) fn counts(&self) -> Vec<(&'static str, usize)> {
+        use OrderStatus::{Accepted, Applied, Applying, Computing, Rejected};
+        let states = [
+            ("accepted", Accepted),
+            ("computing", Computing),
+            ("applying", Applying),
+            ("applied", Applied),
+            ("rejected", Rejected),
+        ];
+        let count = |status| self.orders.iter().filter(|order| order.status == status).count();
+        states.map(|(name, status)| (name, count(status))).into()
     }
 
     pub(super) fn reports(&self) -> Vec<OrderReport> {

@@ -203,6 +203,16 @@ impl Log {
         self.journal.note(&JournalNote::Shape(handed));
     }
 
+    /// Hands a line about the run to the journal.
+    pub(crate) fn note(&self, note: &JournalNote) {
+        self.journal.note(note);
+    }
+
+    /// How many orders have come to which state.
+    pub(crate) fn order_counts(&self) -> Vec<(&'static str, usize)> {
+        lock(&self.state).counts()
+    }
+
     /// Notes that the run comes to its end, and waits for the disk, for two seconds at most.
     pub(crate) fn end(&self, moment: Moment) {
         let Moment { cycle, time } = moment;

@@ -20,6 +20,7 @@ use super::{
     credentials::{Access, Holder, Shown, cookie_name, parameter},
 };
 use crate::lock::lock;
+use tombolo_pipelines::language::{JournalNote, RefusedRequest};
 
 /// How long nothing more is logged of an address once a refusal of it was.
 const QUIET: Duration = Duration::from_secs(60);
@@ -58,6 +59,8 @@ pub(super) async fn guard(
     };
     let refused = [StatusCode::UNAUTHORIZED, StatusCode::FORBIDDEN].contains(&response.status());
     if refused && shared.refusals.is_to_be_told(connection.address()) {
+        let address = connection.address().to_string();
+        shared.commands.note(JournalNote::Refused(RefusedRequest { address }));
         log::warn!(
             "a request from {} was refused: {}",
             connection.address(),

@@ -106,7 +106,7 @@ pub(super) enum Arrival {
 pub(super) struct HubState {
     description: Arc<Map<String, Value>>,
     stack: Option<TellStack>,
-    conditions: Map<String, Value>,
+    pub(super) conditions: Map<String, Value>,
     /// By their numbers, which no later view gets again.
     views: BTreeMap<usize, View>,
     /// The pipelines as JSON.
@@ -115,9 +115,9 @@ pub(super) struct HubState {
     pub(super) clients: BTreeMap<u64, Arc<Client>>,
     pub(super) wheel: Wheel,
     /// What each pipeline has cost, by name.
-    costs: Vec<(String, Cost)>,
+    pub(super) costs: Vec<(String, Cost)>,
     /// Why the journal cannot be written.
-    journal_lost: Option<String>,
+    pub(super) journal_lost: Option<String>,
     last_status: Option<(u64, Instant)>,
     pub(super) status_dirty: bool,
     end: End,
@@ -181,9 +181,6 @@ impl Hub {
     /// Replaces what the status tells of the cost of pipelines.
     pub(crate) fn costs<'a>(&self, costs: impl Iterator<Item = (&'a str, Cost)>) {
         let mut state = lock(&self.state);
-        if state.clients.is_empty() {
-            return;
-        }
         state.costs.clear();
         state.costs.extend(costs.map(|(name, cost)| (name.to_owned(), cost)));
     }
@@ -402,8 +399,8 @@ impl Hub {
         lock(&self.state).views.contains_key(&view)
     }
 
-    /// The `hello` of a viewer.
-    pub(super) fn hello(&self, client: u64, orders: Value) -> Arc<str> {
+    /// The `hello` of a viewer; the first has the orders so far.
+    pub(super) fn hello(&self, client: u64, orders: Option<Value>) -> Arc<str> {
         // Nothing long is written while the solver could wait for the lock.
         let (description, stack, is_driver, viewer) = {
             let state = lock(&self.state);
@@ -413,7 +410,7 @@ impl Hub {
         };
         let mut hello = Map::clone(&description);
         hello.insert("stack".into(), stack.map_or_else(|| json!([]), |stack| stack()));
-        hello.insert("orders".into(), orders);
+        hello.extend(orders.map(|orders| ("orders".into(), orders)));
         hello.insert("client".into(), name(client).into());
         let role = if is_driver { "driver" } else { "watcher" };
         hello.insert("role".into(), role.into());

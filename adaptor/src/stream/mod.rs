@@ -1,7 +1,8 @@
 //! The server that viewers connect to, on a thread of its own.
 //!
 //! It serves the viewer's files at `/`, one WebSocket at `/ws`, the reference surface at `/surface`,
-//! the pipelines at `/pipelines` and the schema of one at `/schema` (the protocol is in
+//! the pipelines at `/pipelines`, the schema of one at `/schema` and that of an order at
+//! `/schema/order`, and `/metrics` (the protocol is in
 //! `docs/protocol.md`). Nothing that a client does reaches the solver but commands that were read
 //! and found valid.
 //!
@@ -24,6 +25,7 @@ mod credentials;
 mod gate;
 mod hub;
 mod invitation;
+mod metrics;
 mod outbox;
 mod pool;
 mod secret;
@@ -52,7 +54,7 @@ use axum::{
 use serde::Serialize;
 use tokio::sync::oneshot;
 use tombolo_pipelines::{
-    language::{Message, StreamLimits, StreamServer, pipeline_schema},
+    language::{JournalNote, Message, StreamLimits, StreamServer, order_schema, pipeline_schema},
     limits::DOCUMENT,
 };
 
@@ -97,6 +99,12 @@ pub(crate) trait CommandSink: Send + Sync {
 
     /// The orders so far, for a viewer that connects.
     fn orders(&self) -> serde_json::Value;
+
+    /// How many orders have come to which state.
+    fn order_counts(&self) -> Vec<(&'static str, usize)>;
+
+    /// Notes in the journal who came, went or was refused.
+    fn note(&self, note: JournalNote);
 }
 
 /// How much was streamed.
@@ -323,6 +331,8 @@ async fn serve(
         .route("/surface", get(reference_surface))
         .route("/pipelines", get(pipelines))
         .route("/schema", get(schema))
+        .route("/schema/order", get(schema_of_order))
+        .route("/metrics", get(metrics::metrics))
         .route_layer(middleware::from_fn(gate::holders_only))
         .fallback(file)
         .layer(middleware::from_fn_with_state(shared.clone(), gate::guard))
@@ -373,7 +383,8 @@ async fn upgrade(
         let limit = shared.limits.viewers.get() as usize;
         let refusal = match shared.hub.join(limit, holder.access, returning) {
             Ok(Arrival::Client(client)) => {
-                return session::serve(socket, client, holder, shared.hub, shared.commands).await;
+                let address = connection.address();
+                return session::serve(socket, client, holder, address, shared).await;
             }
             Ok(Arrival::Full) => format!("{limit} viewers watch already"),
             Err(error) => format!("no secret could be made: {error}"),
@@ -411,6 +422,11 @@ async fn pipelines(State(shared): State<Shared>) -> Response {
 /// The JSON Schema of a pipeline.
 async fn schema() -> Response {
     (JSON, pipeline_schema().to_string()).into_response()
+}
+
+/// The JSON Schema of an order.
+async fn schema_of_order() -> Response {
+    (JSON, order_schema().to_string()).into_response()
 }
 
 async fn file(State(shared): State<Shared>, uri: Uri, request: Request) -> Response {

@@ -97,6 +97,7 @@ struct Outbox {
     monitors: VecDeque<Arc<str>>,
     status: Option<Arc<str>>,
     hello: bool,
+    has_been_greeted: bool,
     views: BTreeMap<usize, Unread>,
     /// The view that was served last: they take turns.
     last_view: usize,
@@ -179,7 +180,10 @@ pub(super) struct Client {
 /// A message for a viewer.
 pub(super) enum Message {
     Text(Arc<str>),
-    Hello,
+    /// The first of a connection, or one more.
+    Hello {
+        is_first: bool,
+    },
     Frame(usize, Arc<Frame>),
     /// The viewer is ready for a view of which it missed frames.
     Behind(usize),
@@ -209,7 +213,8 @@ impl Client {
             return Err(closing);
         }
         if std::mem::take(&mut outbox.hello) {
-            return Ok(Some(Message::Hello));
+            let is_first = !std::mem::replace(&mut outbox.has_been_greeted, true);
+            return Ok(Some(Message::Hello { is_first }));
         }
         if let Some(text) = outbox.texts.pop_front() {
             return Ok(Some(Message::Text(text)));

@@ -1,6 +1,6 @@
 //! One viewer's WebSocket, from the upgrade to its end.
 
-use std::{collections::HashMap, sync::Arc, time::Duration};
+use std::{collections::HashMap, net::IpAddr, sync::Arc, time::Duration};
 
 use axum::{
     body::Bytes,
@@ -11,10 +11,12 @@ use futures_util::{
     stream::{SplitSink, SplitStream},
 };
 use serde_json::json;
-use tombolo_pipelines::language::{Message as Said, Wheel, parse_message};
+use tombolo_pipelines::language::{
+    JournalNote, Message as Said, ViewerMove, ViewerNote, Wheel, parse_message,
+};
 
 use super::{
-    CommandSink, PING_PERIOD,
+    CommandSink, PING_PERIOD, Shared,
     allowance::RATE,
     credentials::{Access, Holder},
     hub::Hub,
@@ -30,10 +32,12 @@ pub(super) async fn serve(
     socket: WebSocket,
     client: Arc<Client>,
     holder: Holder,
-    hub: Arc<Hub>,
-    commands: Arc<dyn CommandSink>,
+    address: IpAddr,
+    shared: Shared,
 ) {
-    let _seat = Seat { client: &client, hub: &hub };
+    let Shared { hub, commands, .. } = shared;
+    let mut seat = Seat { client: &client, hub: &hub, commands: &*commands, address };
+    seat.note(ViewerMove::Came);
     if hub.is_driver(client.id) {
         commands.driven();
     }
@@ -49,11 +53,26 @@ pub(super) async fn serve(
 struct Seat<'a> {
     client: &'a Arc<Client>,
     hub: &'a Hub,
+    commands: &'a dyn CommandSink,
+    address: IpAddr,
+}
+
+impl Seat<'_> {
+    /// Notes in the journal who came and went.
+    fn note(&mut self, did: ViewerMove) {
+        self.commands.note(JournalNote::Viewer(ViewerNote {
+            name: Hub::name(self.client.id),
+            address: self.address.to_string(),
+            may_drive: self.client.access == Access::Drive,
+            did,
+        }));
+    }
 }
 
 impl Drop for Seat<'_> {
     fn drop(&mut self) {
         self.hub.leave(self.client);
+        self.note(ViewerMove::Left);
     }
 }
 
@@ -68,9 +87,11 @@ async fn write(
     let mut ping = tokio::time::interval(PING_PERIOD);
     loop {
         let written = match client.next() {
-            Ok(Some(Message::Hello)) => {
+            Ok(Some(Message::Hello { is_first })) => {
                 topologies.retain(|&view, _| hub.has_view(view));
-                sink.send(Wire::text(&*hub.hello(client.id, commands.orders()))).await
+                // Of later ones the viewer hears one by one.
+                let orders = is_first.then(|| commands.orders());
+                sink.send(Wire::text(&*hub.hello(client.id, orders))).await
             }
             Ok(Some(Message::Text(text))) => sink.send(Wire::text(&*text)).await,
             Ok(Some(Message::Frame(view, frame))) => {

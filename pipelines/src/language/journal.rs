@@ -24,6 +24,10 @@ pub enum JournalNote {
     Run(RunHeader),
     /// The solver was handed a shape.
     Shape(HandedShape),
+    /// A viewer came or left.
+    Viewer(ViewerNote),
+    /// A request was refused; told once a minute for each address.
+    Refused(RefusedRequest),
     /// Lines are missing here.
     Lost(LostLines),
     /// The run came to its end.
@@ -59,6 +63,38 @@ pub struct HandedShape {
     pub shape: f64,
     /// The cycle over whose step the mesh moves there.
     pub cycle: u64,
+}
+
+/// Who came or left.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ViewerNote {
+    /// The viewer's name in the run.
+    pub name: String,
+    /// The address that it came from.
+    pub address: String,
+    /// Whether it came with the secret or link for driving.
+    pub may_drive: bool,
+    /// What it did.
+    pub did: ViewerMove,
+}
+
+/// What a viewer did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ViewerMove {
+    /// It was let in.
+    Came,
+    /// Its connection has ended.
+    Left,
+}
+
+/// Who was not let in.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RefusedRequest {
+    /// The address that the request came from.
+    pub address: String,
 }
 
 /// Lines that could neither be written nor kept until they could.
@@ -171,7 +207,7 @@ fn read_lines(text: &str, file: &str) -> Result<KnownLines, LanguageError> {
                 }
                 JournalNote::Shape(shape) => known.shapes.push(shape),
                 JournalNote::Lost(LostLines { lines }) => known.lost += lines,
-                JournalNote::End(_) => {}
+                JournalNote::Viewer(_) | JournalNote::Refused(_) | JournalNote::End(_) => {}
             }
             continue;
         }
@@ -225,7 +261,7 @@ fn is_entry(line: &Document<'_>) -> bool {
     line.root.member("status").is_some()
 }
 
-const NOTES: [&str; 4] = ["run", "shape", "lost", "end"];
+const NOTES: [&str; 6] = ["run", "shape", "viewer", "refused", "lost", "end"];
 
 /// Whether a line is a note.
 pub(super) fn is_note(line: &Document<'_>) -> bool {

@@ -68,7 +68,8 @@ pub use file_pattern::file_pattern;
 pub(crate) use file_pattern::picture_pattern;
 pub use glyphs::{GlyphShape, Glyphs, GlyphsAt};
 pub use journal::{
-    HandedShape, JournalNote, LostLines, Recording, RunEnd, RunHeader, is_journal, parse_journal,
+    HandedShape, JournalNote, LostLines, Recording, RefusedRequest, RunEnd, RunHeader, ViewerMove,
+    ViewerNote, is_journal, parse_journal,
 };
 pub use message::{Message, Wheel, parse_message};
 pub(crate) use monitors::{Condition, Line, Scope, Slot, columns, line, monitors_of};
