@@ -245,7 +245,7 @@ fn a_lost_connection_is_made_again_and_an_order_is_given_once() {
             }
         }
     }
-    assert_ne!(client.hello().expect("said").client, first, "a name of each connection");
+    assert_eq!(client.hello().expect("said").client, first, "it came back by its name");
     assert!(client.drives(), "it has the wheel again");
     drop(client);
     assert_eq!(run.end().orders.len(), 3);

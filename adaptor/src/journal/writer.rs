@@ -302,14 +302,13 @@ impl Shared {
                     let reason = reason.to_string();
                     // Those who wait are refused; the other lines are for the next time.
                     state.under_way = lines;
-                    let mut settled = state.withdraw(false);
+                    let refused = state.withdraw(false);
                     let kept = std::mem::take(&mut state.under_way).into_iter();
                     let (withdrawn, kept): (Vec<_>, Vec<_>) =
                         kept.partition(|line| line.is_withdrawn);
                     state.bytes -= withdrawn.iter().map(|line| line.text.len()).sum::<usize>();
                     kept.into_iter().rev().for_each(|line| state.lines.push_front(line));
                     state.trouble = Some(reason.clone());
-                    let refused = settled.drain(..).collect();
                     (refused, Some(reason))
                 }
             };
@@ -386,12 +385,16 @@ mod tests {
         }
     }
 
+    /// What was said of the line of this name.
+    type Answer = (String, Outcome);
+
     struct Desk {
         journal: Journal,
         disk: Sender<io::Result<()>>,
         written: Arc<Mutex<String>>,
         told: Arc<Mutex<Vec<Option<String>>>>,
-        outcomes: (Sender<(String, Outcome)>, Receiver<(String, Outcome)>),
+        answer: Sender<Answer>,
+        answers: Receiver<Answer>,
     }
 
     impl Desk {
@@ -403,17 +406,18 @@ mod tests {
             let tells = Arc::clone(&told);
             let tell = move |reason: Option<&str>| lock(&tells).push(reason.map(str::to_owned));
             let journal = Journal::start(store, tell).unwrap();
-            Self { journal, disk, written, told, outcomes: channel() }
+            let (answer, answers) = channel();
+            Self { journal, disk, written, told, answer, answers }
         }
 
         fn ask(&self, id: &str) {
-            let (tell, id) = (self.outcomes.0.clone(), id.to_owned());
+            let (tell, id) = (self.answer.clone(), id.to_owned());
             let entry = entry(&id);
             self.journal.ask(&entry, move |outcome| tell.send((id, outcome)).unwrap());
         }
 
         fn outcome(&self) -> (String, Outcome) {
-            self.outcomes.1.recv_timeout(Duration::from_secs(100)).unwrap()
+            self.answers.recv_timeout(Duration::from_secs(100)).unwrap()
         }
 
         /// Waits until the thread is at the disk.
@@ -457,7 +461,7 @@ mod tests {
         desk.ask("b");
         desk.journal.note(&end(7));
         desk.ask("c");
-        assert!(desk.outcomes.1.try_recv().is_err(), "nothing is on disk yet");
+        assert!(desk.answers.try_recv().is_err(), "nothing is on disk yet");
         desk.disk.send(Ok(())).unwrap();
         assert_eq!(desk.outcome(), ("a".into(), Ok(())));
         desk.disk.send(Ok(())).unwrap();
@@ -505,7 +509,7 @@ mod tests {
         desk.ask("b");
         let shared = desk.journal.shared.as_ref().unwrap();
         desk.journal.look_at_time();
-        assert!(desk.outcomes.1.try_recv().is_err(), "it has not waited long enough");
+        assert!(desk.answers.try_recv().is_err(), "it has not waited long enough");
         lock(&shared.state).since = Instant::now().checked_sub(PATIENCE);
         desk.journal.look_at_time();
         for id in ["a", "b"] {

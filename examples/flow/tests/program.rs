@@ -75,7 +75,8 @@ fn runs_a_case_with_orders_and_undoes_them_bit_for_bit() {
     options.orders = Some(orders);
     options.out = Some(folder.path().join("out"));
 
-    options.steps = Some(5);
+    // Two shapes, two steps each.
+    options.steps = Some(6);
     let squeezed = run(&options);
     assert_eq!(squeezed.error, None);
     let mesh = files::read_mesh(folder.path().join("out/final.vtu")).unwrap().mesh;

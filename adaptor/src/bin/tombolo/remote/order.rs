@@ -3,7 +3,7 @@
 use std::{
     io::{IsTerminal, Read, Write},
     num::NonZeroU32,
-    path::PathBuf,
+    path::{Path, PathBuf},
     time::Duration,
 };
 
@@ -99,7 +99,7 @@ pub(crate) fn forecast(options: &ForecastOptions) -> Result<(), Failure> {
 }
 
 /// Reads an order and checks it as `tombolo check` does.
-fn read_order(file: &PathBuf) -> Result<Order, Failure> {
+fn read_order(file: &Path) -> Result<Order, Failure> {
     let (name, text) = if file.as_os_str() == "-" {
         let mut bytes = Vec::new();
         std::io::stdin().take(DOCUMENT.most as u64 + 1).read_to_end(&mut bytes)?;
