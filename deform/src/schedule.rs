@@ -36,7 +36,7 @@ pub struct Schedule {
     pub motion: Motion,
 }
 
-/// How the mesh goes from one shape of a [`Schedule`] to the next.
+/// How the mesh goes from one shape of a schedule to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Motion {

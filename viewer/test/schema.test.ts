@@ -37,7 +37,7 @@ describe("the schema of an order", () => {
     expect(kinds("skeleton")).toMatchObject({ at: "optional", by: "optional", skinning: "choice" });
     const schedule = form.settings[2]!.field;
     expect(schedule.kind === "optional" && schedule.field.kind === "object" && schedule.field.properties.map((property) => [property.name, property.field.kind])).toEqual([
-      ["ease", "choice"], ["steps", "number"], ["every", "variants"],
+      ["ease", "choice"], ["motion", "choice"], ["steps", "number"], ["every", "variants"],
     ]);
   });
 
@@ -96,7 +96,7 @@ describe("the form", () => {
     input("factors z").value = "0.5";
     expect(form.read()).toEqual({
       edits: [{ scale_direction: { features: ["throat"], fixed: ["inlet", "outlet"], factors: [1, 1, 0.5], harmonic_order: 2, muted: false } }],
-      schedule: { steps: 10, every: { steps: 5 }, ease: "linear" },
+      schedule: { steps: 10, every: { steps: 5 }, ease: "linear", motion: "spread" },
     });
   });
 
