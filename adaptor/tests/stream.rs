@@ -658,6 +658,20 @@ fn orders_of_viewers_replay_from_the_journal() {
 }
 
 #[test]
+fn one_that_only_watches_never_has_the_wheel() {
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    solver.step();
+    let url = format!("{}&role=watch", socket_url(&solver.adaptor));
+    let mut watcher = Viewer::try_connect(&url).expect("connected");
+    assert_eq!(watcher.hello()["role"], "watcher");
+    watcher.send(&json!({"id": "a", "drive": {}}));
+    watcher.wait_for("error", |error| error["id"] == "a");
+    let mut driver = Viewer::connect(&solver.adaptor);
+    assert_eq!(driver.hello()["role"], "driver");
+    solver.finish();
+}
+
+#[test]
 fn what_a_monitoring_system_asks_is_answered() {
     let mut solver = Solver::with_config(LINK_TO_ALL);
     solver.steps(3);

@@ -53,7 +53,7 @@ enum Over {
 
 /// Keeps the connection until the run has ended, the owner lets go, or it cannot be made again.
 pub(super) async fn run(link: &Link, settings: &Settings, shared: &Arc<Shared>) -> ClientError {
-    let mut socket = match until_closing(shared, join(link, shared)).await {
+    let mut socket = match until_closing(shared, join(link, settings.watches, shared)).await {
         Some(Ok(socket)) => socket,
         Some(Err(error)) => return error,
         None => return ClientError::Closed,
@@ -96,7 +96,7 @@ async fn again(
     for _ in 0..settings.attempts {
         sleep(pause).await;
         pause = pause.saturating_mul(2).min(settings.longest_pause);
-        match join(link, shared).await {
+        match join(link, settings.watches, shared).await {
             Ok(socket) => return Ok(socket),
             // Another run listens there now.
             Err(error @ (ClientError::WrongToken { .. } | ClientError::HostRefused { .. })) => {
@@ -109,7 +109,7 @@ async fn again(
 }
 
 /// Connects and waits for the hello.
-async fn join(link: &Link, shared: &Shared) -> Result<Socket, ClientError> {
+async fn join(link: &Link, watches: bool, shared: &Shared) -> Result<Socket, ClientError> {
     let before = shared.with(|state| state.hello.clone());
     let is_plain = |text: &str| text.chars().all(|c| c.is_ascii_alphanumeric());
     let name = before.as_ref().map(|hello| hello.client.as_str()).filter(|name| is_plain(name));
@@ -117,8 +117,10 @@ async fn join(link: &Link, shared: &Shared) -> Result<Socket, ClientError> {
     let stream = open(link).await?;
     let wrong = |found: String| not_tombolo(link, found);
     let late = || wrong(format!("no answer within {} seconds", HELLO.as_secs()));
-    let mut request =
-        link.socket(name, back).into_client_request().map_err(|error| wrong(error.to_string()))?;
+    let mut request = link
+        .socket(watches, name, back)
+        .into_client_request()
+        .map_err(|error| wrong(error.to_string()))?;
     if let Ok(value) = HeaderValue::from_str(&format!("Bearer {}", link.token())) {
         request.headers_mut().insert(header::AUTHORIZATION, value);
     }

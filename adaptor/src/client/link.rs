@@ -66,8 +66,11 @@ impl Link {
     }
 
     /// The address of the WebSocket, for a client that had a name before, and what it comes back by.
-    pub(super) fn socket(&self, client: Option<&str>, back: Option<&str>) -> String {
+    pub(super) fn socket(&self, watches: bool, client: Option<&str>, back: Option<&str>) -> String {
         let mut client = client.map_or_else(String::new, |name| format!("&client={name}"));
+        if watches {
+            client += "&role=watch";
+        }
         if let Some(back) = back {
             client += &format!("&back={back}");
         }
@@ -142,12 +145,12 @@ mod tests {
         let read = |text: &str| text.parse::<Link>();
         let link = read(" http://[::1]:7070/?token=abc\n").expect("a link");
         assert_eq!(
-            (link.name(), &*link.socket(None, None)),
+            (link.name(), &*link.socket(false, None, None)),
             ("::1", "ws://[::1]:7070/ws?token=abc")
         );
         let link = read("http://host/a/b/?x=1&token=t-1#page").expect("a link");
         assert_eq!((link.port(), &*link.path("surface")), (80, "/a/b/surface?token=t-1"));
-        assert_eq!(link.socket(Some("c3"), None), "ws://host:80/a/b/ws?token=t-1&client=c3");
+        assert_eq!(link.socket(false, Some("c3"), None), "ws://host:80/a/b/ws?token=t-1&client=c3");
         assert!(!format!("{link:?}").contains("t-1"));
         for wrong in [
             "",

@@ -65,7 +65,8 @@
 //! # What it does not
 //!
 //! It does not encrypt: see [`stream`](crate::stream). A client that connects to a run that nobody
-//! watches is the one that drives, as any first viewer is.
+//! watches is the one that drives, as any first viewer is, unless it [only
+//! watches](Settings::watches).
 
 mod connection;
 mod error;
@@ -109,6 +110,9 @@ const ASK_AGAIN: Duration = Duration::from_millis(300);
 pub struct Settings {
     /// Whether the frames of the live views are decoded and handed out; `false` if left out.
     pub views: bool,
+    /// Whether the client only watches, whatever its link is for: it never has the wheel, also where
+    /// nobody else is connected; `false` if left out.
+    pub watches: bool,
     /// How often a lost connection is tried to be made again, one after the other; 0 for never.
     pub attempts: u32,
     /// The pause before the first attempt; each next one is twice as long.
@@ -122,6 +126,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             views: false,
+            watches: false,
             attempts: 10,
             first_pause: Duration::from_millis(250),
             longest_pause: Duration::from_secs(10),

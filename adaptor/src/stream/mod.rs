@@ -381,7 +381,9 @@ async fn upgrade(
         connection.upgraded();
         let returning = parameter(&uri, "client").zip(parameter(&uri, "back"));
         let limit = shared.limits.viewers.get() as usize;
-        let refusal = match shared.hub.join(limit, holder.access, returning) {
+        let only_watches = parameter(&uri, "role") == Some("watch");
+        let access = if only_watches { Access::Watch } else { holder.access };
+        let refusal = match shared.hub.join(limit, access, returning) {
             Ok(Arrival::Client(client)) => {
                 let address = connection.address();
                 return session::serve(socket, client, holder, address, shared).await;

@@ -133,14 +133,14 @@ fn read_link(text: &str) -> Result<Link, ClientError> {
     }
 }
 
-pub(crate) fn connect(target: &Target) -> Result<Client, Failure> {
+pub(crate) fn connect(target: &Target, watches: bool) -> Result<Client, Failure> {
     let link = read_link(&target.link).map_err(failed)?;
-    Client::connect(&link, &Settings::default()).map_err(failed)
+    Client::connect(&link, &Settings { watches, ..Settings::default() }).map_err(failed)
 }
 
 /// Connects and takes the wheel.
 pub(crate) fn steer(target: &Target) -> Result<Client, Failure> {
-    let client = connect(target)?;
+    let client = connect(target, false)?;
     client.drive(WHEEL).map_err(failed)?;
     Ok(client)
 }

@@ -6,7 +6,7 @@ use super::{ANSWER, Target, connect, failed};
 use crate::{Failure, say};
 
 pub(crate) fn status(target: &Target) -> Result<(), Failure> {
-    let client = connect(target)?;
+    let client = connect(target, true)?;
     loop {
         let Some(told) = client.next(ANSWER).map_err(failed)? else {
             return Err(Failure::Wrong("the run tells nothing".into()));

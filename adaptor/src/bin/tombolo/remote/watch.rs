@@ -30,7 +30,7 @@ enum Until {
 }
 
 pub(crate) fn watch(options: &Options) -> Result<(), Failure> {
-    let client = connect(&options.target)?;
+    let client = connect(&options.target, true)?;
     loop {
         let told = match client.next(WAIT) {
             Ok(Some(told)) => told,
