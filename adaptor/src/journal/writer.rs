@@ -6,7 +6,7 @@
 use std::{
     collections::VecDeque,
     path::Path,
-    sync::{Arc, Condvar, Mutex},
+    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
     thread::JoinHandle,
     time::{Duration, Instant},
 };
@@ -28,6 +28,9 @@ const KEPT: usize = 4 << 20;
 const PATIENCE: Duration = Duration::from_secs(2);
 /// How long a journal that cannot be written is left alone.
 const PAUSE: Duration = Duration::from_millis(500);
+/// How long lines that nobody waits for are gathered, so that a run which moves its mesh at every step
+/// does not have the disk busy with it.
+const GATHERED: Duration = Duration::from_millis(200);
 /// How long the end of a run waits for the disk.
 const END: Duration = Duration::from_secs(2);
 
@@ -212,11 +215,7 @@ impl Journal {
                 // The thread hangs in the system; it ends with the process.
                 return;
             }
-            state = shared
-                .changed
-                .wait_timeout(state, left)
-                .unwrap_or_else(std::sync::PoisonError::into_inner)
-                .0;
+            state = shared.wait(state, left);
         }
         drop(state);
         let _ = thread.join();
@@ -266,14 +265,28 @@ impl Waiting {
 }
 
 impl Shared {
+    /// Waits for a change, for so long at most.
+    fn wait<'a>(&self, state: MutexGuard<'a, Waiting>, time: Duration) -> MutexGuard<'a, Waiting> {
+        self.changed.wait_timeout(state, time).unwrap_or_else(PoisonError::into_inner).0
+    }
+
     fn write_until_closed(&self, mut store: impl Append) {
         let mut state = lock(&self.state);
+        let mut last: Option<Instant> = None;
         loop {
             while state.lines.is_empty() && state.lost == 0 && !state.is_closed {
                 state = crate::lock::wait(&self.changed, state);
             }
             if state.lines.is_empty() && state.lost == 0 {
                 break;
+            }
+            let until = last.map(|last| last + GATHERED);
+            while state.asked == 0 && !state.is_closed {
+                let left = until.map(|until| until.saturating_duration_since(Instant::now()));
+                match left.filter(|left| !left.is_zero()) {
+                    Some(left) => state = self.wait(state, left),
+                    None => break,
+                }
             }
             let lost = state.lost;
             let mut text = Vec::with_capacity(state.bytes);
@@ -283,6 +296,7 @@ impl Shared {
                 text.extend(line(&JournalNote::Lost(LostLines { lines: lost })));
             }
             state.since = Some(Instant::now());
+            last = state.since;
             drop(state);
             let written = store.append(&text);
             state = lock(&self.state);
@@ -328,11 +342,7 @@ impl Shared {
                 let until = Instant::now() + PAUSE;
                 while !state.is_closed && Instant::now() < until {
                     let left = until.saturating_duration_since(Instant::now());
-                    state = self
-                        .changed
-                        .wait_timeout(state, left)
-                        .unwrap_or_else(std::sync::PoisonError::into_inner)
-                        .0;
+                    state = self.wait(state, left);
                 }
             }
         }
