@@ -115,7 +115,9 @@ fn in_one_step_of_a_running_flow() {
 
 #[test]
 fn in_ten_steps_of_a_running_flow() {
-    let (small, report) =
-        pinch(&order(json!({"time": 0.02}), json!({"steps": 10, "every": {"steps": 3}})));
+    let (small, report) = pinch(&order(
+        json!({"time": 0.02}),
+        json!({"steps": 10, "every": {"steps": 3}, "motion": "at_once"}),
+    ));
     check(&small, &report, 10);
 }

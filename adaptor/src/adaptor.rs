@@ -212,11 +212,13 @@ impl Adaptor {
     /// All links, for driving and for watching, are written to the file `tombolo-PORT.link` in the
     /// directory of the output, which only its owner can read and which goes with the adaptor. On a
     /// `terminal` the text has a link that opens one browser, once; anywhere else, such as in the log
-    /// of a batch job, it names the file alone.
+    /// of a batch job, it names the file alone. So it does on several ranks: what starts them lends
+    /// them a terminal of its own, and passes what they print on to wherever it goes.
     ///
     /// # Errors
     /// Where the file cannot be written.
     pub fn invitation(&mut self, terminal: bool) -> std::io::Result<Option<String>> {
+        let terminal = terminal && self.communicator.size() == 1;
         let invite = |server: &mut Server| server.invitation(&self.output, terminal);
         self.server.as_mut().map(invite).transpose()
     }

@@ -452,7 +452,7 @@ const ORDERS: &str = r#"[
     {"id": "press", "at": {"cycle": 2}, "order": {
         "edits": [{"translate": {"region": {"half_space": {"origin": [0, 0, 0.99], "normal": [0, 0, 1]}},
             "fixed_region": {"half_space": {"origin": [0, 0, 0.01], "normal": [0, 0, -1]}}, "by": [0, 0, -0.2]}}],
-        "schedule": {"steps": 2, "every": {"steps": 2}}}},
+        "schedule": {"steps": 2, "every": {"steps": 2}, "motion": "at_once"}}},
     {"at": {"cycle": 3}, "parameter": {"name": "heating", "value": 2.5}},
     {"at": {"cycle": 6}, "stop": {}}]"#;
 

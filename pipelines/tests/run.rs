@@ -258,7 +258,7 @@ fn monitors_conditions_and_orders() {
             });
         }
     }
-    let order = r#"3 order {"edits":[{"translate":{"features":["x-min"],"fixed":[],"by":[0.1,0.0,0.0],"harmonic_order":2}}],"schedule":{"steps":4,"every":{"steps":1},"ease":"linear"}}"#;
+    let order = r#"3 order {"edits":[{"translate":{"features":["x-min"],"fixed":[],"by":[0.1,0.0,0.0],"harmonic_order":2}}],"schedule":{"steps":4,"every":{"steps":1},"ease":"linear","motion":"spread"}}"#;
     assert_eq!(
         seen,
         [

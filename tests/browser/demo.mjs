@@ -94,7 +94,7 @@ page.on("console", (message) => {
 /** What the page has sent beside forecasts and how far its decoder is, and how often it has asked for the reference surface. */
 const traffic = { messages: 0, surfaces: 0, requests: 0 };
 // Forecasts are questions: they change nothing.
-page.on("websocket", (socket) => socket.on("framesent", ({ payload }) => { traffic.messages += typeof payload !== "string" || payload.includes('"forecast"') ? 0 : 1; }));
+page.on("websocket", (socket) => socket.on("framesent", ({ payload }) => { traffic.messages += typeof payload !== "string" || /"(forecast|here)"/.test(payload) ? 0 : 1; }));
 page.on("request", (request) => {
   traffic.requests++;
   if (new URL(request.url()).pathname === "/surface") traffic.surfaces++;
