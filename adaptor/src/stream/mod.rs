@@ -28,6 +28,7 @@ mod invitation;
 mod metrics;
 mod outbox;
 mod pool;
+mod seats;
 mod secret;
 mod session;
 mod surface;

@@ -10,10 +10,11 @@ use super::journal::{JournalNote, is_like_entry, is_note};
 use super::kind::Kind;
 use super::mend::{Mender, Piece, Taken, rescue, take, take_list};
 use super::order::{Change, Command, Order};
+use super::orders_text::OrdersText;
 use super::parse::{Document, Validate};
 use super::relative_files::{resolve_files, resolve_pipeline_files};
 use super::scan::{Member, Node, Value};
-use super::timed::{JournalEntry, OrderStatus, OrdersText, TimedCommand, lines, torn_line};
+use super::timed::{JournalEntry, OrderStatus, TimedCommand, lines, torn_line};
 use super::unread::Unread;
 use super::{
     Action, Config, Deformation, LanguageErrors, Pipeline, Problem, Stage, monitors_of,

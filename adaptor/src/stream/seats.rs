@@ -1,0 +1,164 @@
+//! Viewers come and go, and the wheel goes from one to the other.
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use serde_json::json;
+
+use super::{
+    credentials::Access,
+    hub::{Hub, HubState, name},
+    outbox::Client,
+    secret::Secret,
+    wheel::{LEFT, WHEEL_KEPT},
+};
+use crate::lock::lock;
+
+impl HubState {
+    /// The viewer that comes back, where what it shows is right. A connection of it that is not known
+    /// to be lost yet is closed.
+    pub(super) fn recognise(
+        &mut self,
+        access: Access,
+        called: &str,
+        back: &str,
+    ) -> Option<(u64, Secret)> {
+        if let Some(client) = self.clients.values().find(|client| name(client.id) == called) {
+            let is_right = client.back.matches(back) && client.access == access;
+            return is_right.then(|| {
+                client.close((4002, "this viewer has come back by another connection"));
+                (client.id, client.back.clone())
+            });
+        }
+        let mut left = self.wheel.left.iter();
+        let found = left.position(|(id, known, of)| {
+            name(*id) == called && known.matches(back) && *of == access
+        })?;
+        self.wheel.left.remove(found).map(|(id, back, _)| (id, back))
+    }
+
+    /// Gives a viewer its place, and the wheel where it is its own or nobody else may want it.
+    pub(super) fn seat(&mut self, client: &Arc<Client>) {
+        let mut others = self.clients.values().filter(|other| other.id != client.id);
+        let is_alone = !others.any(|other| other.access == Access::Drive);
+        let had_it = self.wheel.lost.is_some_and(|(_, driver)| driver == client.id);
+        let is_there = is_alone || had_it || self.wheel.is_free();
+        if client.access == Access::Drive && self.wheel.driver.is_none() && is_there {
+            self.take_wheel(client.id);
+        }
+        self.clients.insert(client.id, Arc::clone(client));
+        self.status_dirty = true;
+    }
+
+    fn take_wheel(&mut self, client: u64) {
+        self.wheel.driver = Some(client);
+        self.wheel.heard = Some(Instant::now());
+        self.wheel.lost = None;
+        self.status_dirty = true;
+    }
+
+    fn named(&self, called: &str) -> Result<&Arc<Client>, String> {
+        let mut clients = self.clients.values();
+        clients
+            .find(|client| name(client.id) == called)
+            .ok_or_else(|| format!("there is no viewer {called:?}"))
+    }
+}
+
+impl Hub {
+    /// Sets how long a driver may be silent before another may take the wheel.
+    pub(super) fn set_driver_silence(&self, silence: Duration) {
+        lock(&self.state).wheel.silence = silence;
+    }
+
+    /// Lets a viewer go.
+    pub(super) fn leave(&self, client: &Arc<Client>) {
+        let mut state = lock(&self.state);
+        // It may have come back by another connection.
+        if !state.clients.get(&client.id).is_some_and(|seated| Arc::ptr_eq(seated, client)) {
+            return;
+        }
+        state.clients.remove(&client.id);
+        if state.wheel.driver == Some(client.id) {
+            state.wheel.driver = None;
+            state.wheel.lost = Some((Instant::now(), client.id));
+        }
+        if state.wheel.left.len() >= LEFT {
+            state.wheel.left.pop_front();
+        }
+        state.wheel.left.push_back((client.id, client.back.clone(), client.access));
+        state.status_dirty = true;
+    }
+
+    pub(super) fn is_driver(&self, client: u64) -> bool {
+        lock(&self.state).wheel.driver == Some(client)
+    }
+
+    /// Takes note that a viewer has said something; whether it is the driver.
+    pub(super) fn heard(&self, client: u64) -> bool {
+        let mut state = lock(&self.state);
+        let drives = state.wheel.driver == Some(client);
+        if drives {
+            state.wheel.heard = Some(Instant::now());
+        }
+        drives
+    }
+
+    /// Gives a viewer the wheel, or tells the driver that it wants it; the message says why not.
+    pub(super) fn drive(&self, client: u64) -> Result<(), String> {
+        let mut state = lock(&self.state);
+        match state.wheel.driver {
+            Some(driver) if driver == client => Ok(()),
+            Some(driver) if !state.wheel.is_silent() => {
+                if let Some(driver) = state.clients.get(&driver) {
+                    let asked = json!({"wheel": {"asked_by": name(client)}});
+                    driver.text(&asked.to_string().into());
+                }
+                Err(format!(
+                    "{} has the wheel and is told that you ask for it; it is free once that viewer \
+                     hands it over, has left, or has been silent for {} seconds",
+                    name(driver),
+                    state.wheel.silence.as_secs()
+                ))
+            }
+            None if !state.wheel.is_free() => Err(format!(
+                "the wheel is kept for {} seconds for the driver whose connection was lost; ask again",
+                WHEEL_KEPT.as_secs()
+            )),
+            _ => {
+                state.take_wheel(client);
+                state.greet();
+                Ok(())
+            }
+        }
+    }
+
+    /// The driver gives the wheel to another viewer; the message says why not.
+    pub(super) fn hand_over(&self, driver: u64, to: &str) -> Result<(), String> {
+        let mut state = lock(&self.state);
+        if state.wheel.driver != Some(driver) {
+            return Err("only the one that drives hands the wheel over".into());
+        }
+        let other = state.named(to)?;
+        if other.access != Access::Drive {
+            return Err(format!("{to} came with the secret for watching"));
+        }
+        let other = other.id;
+        state.take_wheel(other);
+        state.greet();
+        Ok(())
+    }
+
+    /// The driver ends the connection of another viewer; the message says why not.
+    pub(super) fn kick(&self, driver: u64, other: &str) -> Result<(), String> {
+        let state = lock(&self.state);
+        let other = state.named(other)?;
+        if state.wheel.driver != Some(driver) || other.id == driver {
+            return Err("only the one that drives ends connections, those of others".into());
+        }
+        other.close((4001, "the one that drives has ended this connection"));
+        Ok(())
+    }
+}
