@@ -2,11 +2,11 @@
  * `window.tombolo`: what the viewer knows, for tests and for the curious. It can be read and not written, and every value is
  * a copy; the numbers of `views` and `featureBounds` are those of the newest frame.
  */
-import type { ConnectionState } from "./connection";
-import type { ForecastInspection } from "./forecast";
-import type { OrderRecord } from "./orders";
-import type { QualitySummary, Role, Status, Vector } from "./protocol";
-import type { Picture } from "./scene";
+import type { ConnectionState } from "./connection/connection";
+import type { ForecastInspection } from "./preview/forecast";
+import type { OrderRecord } from "./panels/orders";
+import type { QualitySummary, Role, Status, Vector } from "./connection/protocol";
+import type { Picture } from "./picture/scene";
 
 export interface ViewInspection { bounds: [Vector, Vector] | null; points: number; triangles: number; topology: string | null }
 

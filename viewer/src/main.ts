@@ -1,25 +1,28 @@
 /** Puts the parts together: messages in, orders out. */
-import { Connection, streamAddress } from "./connection";
-import { InputError } from "./controls";
-import { Decoder } from "./decoder";
-import { watchDrags } from "./drag";
-import type { DecodeWorker } from "./decoder";
+import { Connection, streamAddress } from "./connection/connection";
+import { InputError } from "./form/controls";
+import { Decoder } from "./connection/decoder";
+import { watchDrags } from "./picture/drag";
+import type { DecodeWorker } from "./connection/decoder";
 import { part, write } from "./dom";
-import { Forecasts } from "./forecast";
-import { EditForm } from "./form";
-import { compileKernel } from "./kernel";
-import { showLayers } from "./layers";
+import { Forecasts } from "./preview/forecast";
+import { EditForm } from "./form/form";
+import { compileKernel } from "./kernel/kernel";
+import { showLayers } from "./panels/layers";
 import { publish } from "./inspection";
-import { Orders } from "./orders";
-import { ScalarBar, Triad, showEmpty } from "./overlay";
-import { watchPointer } from "./pointer";
-import { PreviewPanel } from "./preview-panel";
-import type { ClientMessage, Frame, Hello, Json, ServerMessage, Status } from "./protocol";
-import { Scene } from "./scene";
-import { Selection } from "./selection";
-import { ColourPanel, MonitorPanel, ParameterPanel, ViewList } from "./sidebar";
-import { StatusBar } from "./status";
-import { Wheel } from "./wheel";
+import { Orders } from "./panels/orders";
+import { ScalarBar, Triad, showEmpty } from "./picture/overlay";
+import { watchPointer } from "./picture/pointer";
+import { PreviewPanel } from "./preview/preview-panel";
+import type { ClientMessage, Frame, Hello, Json, ServerMessage, Status } from "./connection/protocol";
+import { Scene } from "./picture/scene";
+import { Selection } from "./store/selection";
+import { ColourPanel } from "./panels/colours";
+import { MonitorPanel } from "./panels/monitors";
+import { ParameterPanel } from "./panels/parameters";
+import { ViewList } from "./panels/views";
+import { StatusBar } from "./panels/status";
+import { Wheel } from "./panels/wheel";
 
 if (!document.createElement("canvas").getContext("webgl2")) {
   showEmpty("This browser cannot draw the picture", "It has no WebGL 2, or it is switched off. Any current Chrome, Firefox, Edge or Safari has it.");
@@ -95,7 +98,7 @@ function composed(): void {
   forecasts.changed(wished());
 }
 
-const worker = new Worker(new URL("./decode.worker.ts", import.meta.url), { type: "module" });
+const worker = new Worker(new URL("./connection/decode.worker.ts", import.meta.url), { type: "module" });
 kernel.then((module) => worker.postMessage({ module }), (error: unknown) => report(String(error)));
 const decoder = new Decoder(worker as unknown as DecodeWorker, {
   frame: takeFrame,

@@ -1,0 +1,231 @@
+/** One view in the picture: its surface or lines, the edges of its features and their highlights. */
+import vtkActor from "@kitware/vtk.js/Rendering/Core/Actor";
+import vtkMapper from "@kitware/vtk.js/Rendering/Core/Mapper";
+import vtkPolyData from "@kitware/vtk.js/Common/DataModel/PolyData";
+import vtkPoints from "@kitware/vtk.js/Common/Core/Points";
+import vtkCellArray from "@kitware/vtk.js/Common/Core/CellArray";
+import vtkDataArray from "@kitware/vtk.js/Common/Core/DataArray";
+import type vtkColorTransferFunction from "@kitware/vtk.js/Rendering/Core/ColorTransferFunction";
+import type vtkRenderer from "@kitware/vtk.js/Rendering/Core/Renderer";
+import type { Colour, Colouring } from "./colour";
+import { extremes, scalars } from "./colour";
+import { featureEdges } from "./picking";
+import type { DataArray, DataFrame, TopologyFrame } from "../connection/protocol";
+
+export type Highlight = "hover" | "handle" | "fixed";
+export const HIGHLIGHT_COLOURS: Record<Highlight, Colour> = {
+  hover: [1, 1, 1], handle: [1, 0.6, 0.2], fixed: [0.35, 0.72, 1],
+};
+const HIGHLIGHT_OPACITY: Record<Highlight, number> = { hover: 0.25, handle: 0.35, fixed: 0.4 };
+const SOLID: Colour = [0.72, 0.76, 0.8];
+const EDGE: Colour = [0.82, 0.85, 0.88];
+
+/** Cells as vtk.js wants them: the number of points before each cell's points. */
+function cells(points: Uint32Array, size: number): Uint32Array {
+  const result = new Uint32Array((points.length / size) * (size + 1));
+  for (let cell = 0, at = 0; cell < points.length; cell += size) {
+    result[at++] = size;
+    for (let k = 0; k < size; k++) result[at++] = points[cell + k]!;
+  }
+  return result;
+}
+
+function linesFirst(values: Float32Array, triangles: number): Float32Array {
+  const result = new Float32Array(values.length);
+  result.set(values.subarray(triangles));
+  result.set(values.subarray(0, triangles), values.length - triangles);
+  return result;
+}
+
+export class Piece {
+  readonly data = vtkPolyData.newInstance();
+  readonly mapper = vtkMapper.newInstance();
+  readonly actor = vtkActor.newInstance();
+
+  constructor(points: vtkPoints, renderer: vtkRenderer) {
+    this.data.setPoints(points);
+    this.mapper.setInputData(this.data);
+    this.actor.setMapper(this.mapper);
+    this.actor.setPickable(false);
+    renderer.addActor(this.actor);
+  }
+
+  setTriangles(triangles: Uint32Array): void {
+    this.data.setPolys(vtkCellArray.newInstance({ values: cells(triangles, 3) }));
+    this.data.modified();
+  }
+
+  setPoints(points: Uint32Array): void {
+    this.data.setVerts(vtkCellArray.newInstance({ values: cells(points, 1) }));
+    this.data.modified();
+  }
+
+  setLines(lines: Uint32Array): void {
+    this.data.setLines(vtkCellArray.newInstance({ values: cells(lines, 2) }));
+    this.data.modified();
+  }
+}
+
+export class Layer {
+  topology: TopologyFrame | null = null;
+  frame: DataFrame | null = null;
+  /** Coordinates that are drawn now, interleaved. */
+  coordinates = new Float32Array(0);
+  visible = true;
+  opacity = 1;
+  /** Whether the field colours this view; it is plain otherwise. */
+  coloured = true;
+  private colouredBy: DataArray | null = null;
+  private readonly points = vtkPoints.newInstance();
+  private readonly surface: Piece;
+  private readonly edges: Piece;
+  private readonly highlights: Record<Highlight, { tint: Piece; outline: Piece }>;
+  private readonly highlighted: Record<Highlight, string> = { hover: "", handle: "", fixed: "" };
+
+  constructor(readonly name: string, readonly kind: string, private readonly renderer: vtkRenderer, colours: vtkColorTransferFunction) {
+    this.surface = new Piece(this.points, renderer);
+    const { mapper, actor } = this.surface;
+    mapper.setLookupTable(colours);
+    mapper.setUseLookupTableScalarRange(true);
+    mapper.setInterpolateScalarsBeforeMapping(true);
+    mapper.setScalarVisibility(false);
+    const property = actor.getProperty();
+    property.setColor(...SOLID);
+    property.setInterpolationToFlat();
+    if (kind === "surface") {
+      property.setAmbient(0.3);
+      property.setDiffuse(0.75);
+    } else {
+      property.setLighting(false);
+    }
+    this.edges = new Piece(this.points, renderer);
+    this.edges.actor.getProperty().setColor(...EDGE);
+    this.edges.actor.getProperty().setLighting(false);
+    this.edges.actor.getProperty().setOpacity(0.5);
+    this.raise(this.edges, -2);
+    const highlight = (kindOf: Highlight, order: number): { tint: Piece; outline: Piece } => {
+      const tint = new Piece(this.points, renderer);
+      const outline = new Piece(this.points, renderer);
+      for (const piece of [tint, outline]) {
+        piece.actor.getProperty().setColor(...HIGHLIGHT_COLOURS[kindOf]);
+        piece.actor.setVisibility(false);
+        this.raise(piece, piece === tint ? order : order - 2);
+      }
+      tint.actor.getProperty().setOpacity(HIGHLIGHT_OPACITY[kindOf]);
+      tint.actor.getProperty().setAmbient(0.5);
+      tint.actor.getProperty().setDiffuse(0.5);
+      outline.actor.getProperty().setLighting(false);
+      return { tint, outline };
+    };
+    this.highlights = { fixed: highlight("fixed", -1), handle: highlight("handle", -1), hover: highlight("hover", -1.5) };
+  }
+
+  private raise(piece: Piece, order: number): void {
+    piece.mapper.setResolveCoincidentTopologyToPolygonOffset();
+    piece.mapper.setRelativeCoincidentTopologyPolygonOffsetParameters(order, order);
+    piece.mapper.setRelativeCoincidentTopologyLineOffsetParameters(order, order);
+  }
+
+  remove(): void {
+    for (const piece of this.pieces()) this.renderer.removeActor(piece.actor);
+  }
+
+  private pieces(): Piece[] {
+    return [this.surface, this.edges, ...Object.values(this.highlights).flatMap(({ tint, outline }) => [tint, outline])];
+  }
+
+  setTopology(topology: TopologyFrame): void {
+    this.topology = topology;
+    this.frame = null;
+    this.colouredBy = null;
+    for (const key of Object.keys(this.highlighted) as Highlight[]) this.highlighted[key] = "";
+  }
+
+  /** Takes the newest values. Returns why it cannot, if it cannot. */
+  setData(frame: DataFrame): string | null {
+    const topology = this.topology;
+    if (!topology || topology.topology !== frame.topology) return null;
+    const fresh = this.frame === null;
+    if (frame.points.length !== topology.points * 3) {
+      return `view ${this.name}: ${frame.points.length / 3} points, its topology has ${topology.points}`;
+    }
+    const triangles = topology.triangles.length / 3;
+    const elements = triangles + topology.lines.length / 2;
+    for (const field of frame.fields) {
+      const expected = field.association === "vertex" ? topology.points : elements;
+      if (field.values.length !== expected * field.components) {
+        return `view ${this.name}: field ${field.name} has ${field.values.length / field.components} values, expected ${expected}`;
+      }
+    }
+    this.frame = frame;
+    this.coordinates = frame.points as Float32Array<ArrayBuffer>;
+    this.points.setData(frame.points, 3);
+    this.points.modified();
+    if (fresh) this.setCells(topology);
+    for (const piece of this.pieces()) piece.data.modified();
+    return null;
+  }
+
+  private setCells(topology: TopologyFrame): void {
+    this.surface.setTriangles(topology.triangles);
+    this.surface.setLines(topology.lines);
+    this.edges.setLines(topology.triangleFeatures
+      ? featureEdges(topology.triangles, topology.triangleFeatures, topology.points) : new Uint32Array(0));
+  }
+
+  /** Colours by a field; returns the range of what is shown, null when this view does not carry the field. */
+  colour(colouring: Colouring | null): [number, number] | null {
+    const field = colouring && this.coloured ? this.frame?.fields.find((candidate) => candidate.name === colouring.field) : undefined;
+    const { data, mapper } = this.surface;
+    if (!field || !colouring) {
+      this.colouredBy = null;
+      mapper.setScalarVisibility(false);
+      return null;
+    }
+    const vertex = field.association === "vertex";
+    let values = scalars(field, colouring.component);
+    // vtk.js numbers the lines of a view before its triangles.
+    const triangles = vertex ? 0 : this.topology!.triangles.length / 3;
+    if (triangles > 0 && triangles < values.length) values = linesFirst(values, triangles);
+    const array = vtkDataArray.newInstance({ name: field.name, numberOfComponents: 1, values });
+    data.getPointData().setScalars(vertex ? array : (null as never));
+    data.getCellData().setScalars(vertex ? (null as never) : array);
+    if (vertex) mapper.setScalarModeToUsePointData();
+    else mapper.setScalarModeToUseCellData();
+    mapper.setScalarVisibility(true);
+    data.modified();
+    this.colouredBy = field;
+    return extremes(values);
+  }
+
+  get fieldShown(): string | null {
+    return this.colouredBy?.name ?? null;
+  }
+
+  highlight(kind: Highlight, names: readonly string[], features: readonly string[]): void {
+    const topology = this.topology;
+    const key = names.join("\u0000");
+    if (!topology?.triangleFeatures || !this.frame || this.highlighted[kind] === key) return;
+    this.highlighted[kind] = key;
+    const wanted = new Set(names.map((name) => features.indexOf(name)));
+    const picked: number[] = [];
+    topology.triangleFeatures.forEach((feature, triangle) => {
+      if (wanted.has(feature)) picked.push(topology.triangles[3 * triangle]!, topology.triangles[3 * triangle + 1]!, topology.triangles[3 * triangle + 2]!);
+    });
+    const triangles = Uint32Array.from(picked);
+    const { tint, outline } = this.highlights[kind];
+    tint.setTriangles(triangles);
+    outline.setLines(featureEdges(triangles, new Uint32Array(triangles.length / 3), topology.points));
+  }
+
+  /** Brings what is shown in line with `visible` and `opacity`. */
+  show(): void {
+    const drawn = this.visible && this.frame !== null;
+    this.surface.actor.setVisibility(drawn && this.opacity > 0);
+    this.surface.actor.getProperty().setOpacity(this.opacity);
+    this.edges.actor.setVisibility(drawn && this.topology?.triangleFeatures !== null);
+    for (const kind of Object.keys(this.highlights) as Highlight[]) {
+      for (const piece of Object.values(this.highlights[kind])) piece.actor.setVisibility(drawn && this.highlighted[kind] !== "");
+    }
+  }
+}

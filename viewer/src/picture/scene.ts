@@ -1,0 +1,476 @@
+/** The picture: a vtk.js render window that draws when something changed, and never waits for the network. */
+import "@kitware/vtk.js/Rendering/Profiles/Geometry";
+import vtkRenderWindow from "@kitware/vtk.js/Rendering/Core/RenderWindow";
+import vtkRenderer from "@kitware/vtk.js/Rendering/Core/Renderer";
+import vtkRenderWindowInteractor from "@kitware/vtk.js/Rendering/Core/RenderWindowInteractor";
+import vtkInteractorStyleTrackballCamera from "@kitware/vtk.js/Interaction/Style/InteractorStyleTrackballCamera";
+import vtkColorTransferFunction from "@kitware/vtk.js/Rendering/Core/ColorTransferFunction";
+import vtkOpenGLRenderWindow from "@kitware/vtk.js/Rendering/OpenGL/RenderWindow";
+import { BonesPicture } from "./bones";
+import type { ColourMap, Colouring } from "./colour";
+import { Ghost } from "./ghost";
+import { Layer } from "./layer";
+import { bounds, firstTriangle } from "./picking";
+import type { PreviewSurface } from "../preview/preview";
+import type { DataFrame, TopologyFrame, Vector, ViewInformation } from "../connection/protocol";
+import type { Selection } from "../store/selection";
+import { REACH, nearestWithin } from "./skeleton";
+import type { Bones } from "./skeleton";
+
+const BACKGROUND: Vector = [0.086, 0.094, 0.106];
+
+/** The longest pause between two pictures of new values, in milliseconds. */
+const LONGEST_REST = 500;
+
+export interface SceneEvents {
+  /** The range of the values that are drawn now; null when nothing is coloured. */
+  range(range: [number, number] | null): void;
+  /** After each picture, with the directions of the axes on the screen. */
+  drawn(axes: [number, number][]): void;
+  trouble(message: string): void;
+}
+
+/** What was drawn: the newest cycle in it, and a number made of all its pixels. */
+export interface Picture { cycle: number | null; pixels: number }
+
+export class Scene {
+  readonly layers = new Map<string, Layer>();
+  private readonly window = vtkRenderWindow.newInstance();
+  private readonly renderer = vtkRenderer.newInstance();
+  private readonly canvas = vtkOpenGLRenderWindow.newInstance();
+  private readonly interactor = vtkRenderWindowInteractor.newInstance();
+  private readonly colours = vtkColorTransferFunction.newInstance();
+  private readonly pending = new Map<string, DataFrame>();
+  private readonly ghost: Ghost;
+  private readonly bones: BonesPicture;
+  private features: string[] = [];
+  private colouring: Colouring | null = null;
+  private locked: [number, number] | null = null;
+  private map: ColourMap | null = null;
+  private scheduled = false;
+  /** Who waits for the next picture. */
+  private readonly drawn: (() => void)[] = [];
+  /** The time before which new values do not ask for a picture. */
+  private rested = 0;
+  private waiting: number | null = null;
+  private placed = false;
+  private recolour = true;
+
+  constructor(private readonly container: HTMLElement, private readonly selection: Selection, private readonly events: SceneEvents) {
+    this.window.addRenderer(this.renderer);
+    this.window.addView(this.canvas);
+    this.renderer.setBackground(...BACKGROUND);
+    this.canvas.setContainer(container);
+    this.interactor.setView(this.canvas);
+    this.interactor.initialize();
+    this.interactor.bindEvents(container);
+    this.interactor.setInteractorStyle(vtkInteractorStyleTrackballCamera.newInstance());
+    this.interactor.onRenderEvent(() => this.turned());
+    container.addEventListener("keypress", (event) => event.stopImmediatePropagation(), true);
+    container.addEventListener("keydown", (event) => this.key(event));
+    new ResizeObserver(() => this.resize()).observe(container);
+    selection.onChange(() => this.request());
+    this.ghost = new Ghost(this.renderer);
+    // What lies in the middle of a shape would be hidden by it.
+    const above = vtkRenderer.newInstance();
+    above.setLayer(1);
+    above.setInteractive(false);
+    above.setActiveCamera(this.renderer.getActiveCamera());
+    this.window.setNumberOfLayers(2);
+    this.window.addRenderer(above);
+    this.bones = new BonesPicture(above);
+    this.resize();
+  }
+
+  /** The surface that previews are shapes of. */
+  setPreviewSurface(surface: PreviewSurface): void {
+    this.ghost.setSurface(surface);
+    this.request();
+  }
+
+  /** Shows the shape that an edit would make, with its broken triangles; null takes it away. `drawn` is called once it is seen. */
+  setPreview(points: Float32Array | null, broken?: Uint32Array, drawn?: () => void): void {
+    this.ghost.setPoints(points, broken);
+    this.request(drawn);
+  }
+
+  /** Shows a skeleton; null takes it away. */
+  setBones(bones: Bones | null): void {
+    this.bones.show(bones);
+    this.request();
+  }
+
+  get shownBones(): Bones | null {
+    return this.bones.shown;
+  }
+
+  /** Marks the place that a node is dragged to; null for none. */
+  holdNode(place: Vector | null): void {
+    this.bones.hold(place);
+    this.request();
+  }
+
+  /** The node under a place of the page that can be dragged: where it is now, and where in the reference. Null when there is none. */
+  nodeAt(clientX: number, clientY: number): { now: Vector; reference: Vector } | null {
+    const free = this.bones.shown?.free;
+    if (!free) return null;
+    const places = new Float32Array(2 * free.length);
+    free.forEach((node, i) => places.set(this.onPage(this.bones.node(node)?.now ?? [NaN, NaN, NaN]), 2 * i));
+    const found = nearestWithin(places, clientX, clientY, REACH);
+    return found < 0 ? null : this.bones.node(free[found]!);
+  }
+
+  /** The place of the page at which a point is drawn. */
+  private onPage(point: Vector): [number, number] {
+    const box = this.container.getBoundingClientRect();
+    const [width, height] = this.canvas.getSize();
+    const place = this.canvas.worldToDisplay(...point, this.renderer) as Vector;
+    return [box.left + (place[0] / width) * box.width, box.top + (1 - place[1] / height) * box.height];
+  }
+
+  /** The places of the page of the nodes that can be dragged. */
+  nodePlaces(): [number, number][] {
+    const free = this.bones.shown?.free ?? new Uint32Array(0);
+    return Array.from(free, (node) => this.onPage(this.bones.node(node)?.now ?? [NaN, NaN, NaN]));
+  }
+
+  /** The box around the preview that is drawn; null when there is none. */
+  get previewBounds(): [Vector, Vector] | null {
+    return this.ghost.coordinates && bounds(this.ghost.coordinates);
+  }
+
+  /** The views that the server streams; those that are gone are removed, the others keep their state. */
+  setViews(views: readonly ViewInformation[]): void {
+    const names = new Set(views.map((view) => view.name));
+    for (const [name, layer] of this.layers) {
+      if (names.has(name)) continue;
+      layer.remove();
+      this.layers.delete(name);
+      this.pending.delete(name);
+    }
+    const inside = views.some((view) => view.kind !== "surface");
+    for (const view of views) {
+      if (this.layers.has(view.name)) continue;
+      const layer = new Layer(view.name, view.kind, this.renderer, this.colours);
+      // A surface that hides what is inside it is of little use: it starts as a shell of glass.
+      if (view.kind === "surface" && inside) {
+        layer.opacity = 0.15;
+        layer.coloured = false;
+      }
+      this.layers.set(view.name, layer);
+    }
+    this.request();
+  }
+
+  setFeatures(names: string[]): void {
+    this.features = names;
+    this.request();
+  }
+
+  setTopology(frame: TopologyFrame): void {
+    this.pending.delete(frame.view);
+    this.layers.get(frame.view)?.setTopology(frame);
+  }
+
+  /** Takes values to be drawn with the next picture; returns whether the view and its topology are known. */
+  setData(frame: DataFrame): boolean {
+    const layer = this.layers.get(frame.view);
+    if (!layer?.topology || layer.topology.topology !== frame.topology) return false;
+    this.pending.set(frame.view, frame);
+    this.requestGently();
+    return true;
+  }
+
+  setVisible(name: string, visible: boolean): void {
+    const layer = this.layers.get(name);
+    if (layer) layer.visible = visible;
+    this.recolour = true;
+    this.request();
+  }
+
+  setOpacity(name: string, opacity: number): void {
+    const layer = this.layers.get(name);
+    if (layer) layer.opacity = opacity;
+    this.request();
+  }
+
+  setColoured(name: string, coloured: boolean): void {
+    const layer = this.layers.get(name);
+    if (layer) layer.coloured = coloured;
+    this.recolour = true;
+    this.request();
+  }
+
+  setColouring(colouring: Colouring | null, map: ColourMap, locked: [number, number] | null): void {
+    this.colouring = colouring;
+    this.locked = locked;
+    this.map = map;
+    this.recolour = true;
+    this.request();
+  }
+
+  /** The newest coordinates of a feature, whether or not they are drawn yet. */
+  featureBounds(name: string): [Vector, Vector] | null {
+    const number = this.features.indexOf(name);
+    if (number < 0) return null;
+    for (const layer of this.layers.values()) {
+      const { topology } = layer;
+      if (!topology?.triangleFeatures) continue;
+      const points = this.pending.get(layer.name)?.points ?? layer.coordinates;
+      if (points.length !== topology.points * 3) continue;
+      const found = bounds(points, topology.triangles, (triangle) => topology.triangleFeatures?.[triangle] === number);
+      if (found) return found;
+    }
+    return null;
+  }
+
+  viewBounds(name: string): [Vector, Vector] | null {
+    const layer = this.layers.get(name);
+    return layer ? bounds(this.pending.get(name)?.points ?? layer.coordinates) : null;
+  }
+
+  /** The feature under a place of the page; null when there is none. */
+  featureAt(clientX: number, clientY: number): string | null {
+    return this.pick(clientX, clientY)?.feature ?? null;
+  }
+
+  /** A place of the page on the canvas: x and y from its lower left corner, in its own pixels. */
+  private onCanvas(clientX: number, clientY: number): [number, number] {
+    const box = this.container.getBoundingClientRect();
+    const [width, height] = this.canvas.getSize();
+    return [((clientX - box.left) / box.width) * width, (1 - (clientY - box.top) / box.height) * height];
+  }
+
+  /** The point at a place of the page that is as deep in the picture as another point. */
+  pointAt(clientX: number, clientY: number, as: Vector): Vector {
+    const [x, y] = this.onCanvas(clientX, clientY);
+    const depth = (this.canvas.worldToDisplay(...as, this.renderer) as Vector)[2];
+    return this.canvas.displayToWorld(x, y, depth, this.renderer) as Vector;
+  }
+
+  /** The feature under a place of the page, and where it is met; null when there is none. */
+  pick(clientX: number, clientY: number): { feature: string; point: Vector } | null {
+    const [x, y] = this.onCanvas(clientX, clientY);
+    const near = this.canvas.displayToWorld(x, y, 0, this.renderer) as Vector;
+    const far = this.canvas.displayToWorld(x, y, 1, this.renderer) as Vector;
+    const direction: Vector = [far[0] - near[0], far[1] - near[1], far[2] - near[2]];
+    let nearest = Infinity;
+    let feature: string | null = null;
+    for (const layer of this.layers.values()) {
+      const { topology } = layer;
+      if (!layer.visible || !topology?.triangleFeatures || layer.coordinates.length !== topology.points * 3) continue;
+      const hit = firstTriangle(layer.coordinates, topology.triangles, near, direction);
+      if (!hit || hit.distance >= nearest) continue;
+      nearest = hit.distance;
+      feature = this.features[topology.triangleFeatures[hit.triangle] ?? -1] ?? null;
+    }
+    if (feature === null) return null;
+    const point = [0, 1, 2].map((axis) => near[axis]! + nearest * direction[axis]!) as Vector;
+    return { feature, point };
+  }
+
+  /** A place of the page at which this feature is seen and would be picked; null when nothing of it is. */
+  featurePlace(name: string): [number, number] | null {
+    const number = this.features.indexOf(name);
+    for (const { topology, coordinates } of this.layers.values()) {
+      if (!topology?.triangleFeatures || coordinates.length !== topology.points * 3) continue;
+      const own = [...topology.triangleFeatures.keys()].filter((triangle) => topology.triangleFeatures?.[triangle] === number);
+      const stride = Math.max(1, Math.floor(own.length / 200));
+      for (let i = Math.floor(stride / 2); i < own.length; i += stride) {
+        const corner = (k: number, axis: number): number => coordinates[3 * topology.triangles[3 * own[i]! + k]! + axis]!;
+        const middle = [0, 1, 2].map((axis) => (corner(0, axis) + corner(1, axis) + corner(2, axis)) / 3);
+        const [x, y] = this.onPage(middle as Vector);
+        if (this.featureAt(x, y) === name && document.elementFromPoint(x, y)?.closest("#scene")) return [x, y];
+      }
+    }
+    return null;
+  }
+
+  /** The whole in the picture, seen across its flat side. */
+  reset(): void {
+    const box = this.box();
+    if (!box) return;
+    const size = [box[1] - box[0], box[3] - box[2], box[5] - box[4]];
+    const order = [0, 1, 2].sort((a, b) => size[a]! - size[b]!);
+    const direction: Vector = [0, 0, 0];
+    direction[order[0]!] = 1;
+    direction[order[1]!] = 0.32;
+    direction[order[2]!] = order[0] === 1 ? -0.32 : 0.32;
+    this.look(direction, order[0] === 2 ? [0, 1, 0] : [0, 0, 1]);
+  }
+
+  /** Looks along an axis, from its positive side or its negative one. */
+  axis(axis: 0 | 1 | 2, sign: 1 | -1): void {
+    const direction: Vector = [0, 0, 0];
+    direction[axis] = sign;
+    this.look(direction, axis === 2 ? [0, 1, 0] : [0, 0, 1]);
+  }
+
+  get parallel(): boolean {
+    return this.renderer.getActiveCamera().getParallelProjection();
+  }
+
+  set parallel(parallel: boolean) {
+    this.renderer.getActiveCamera().setParallelProjection(parallel);
+    this.request();
+  }
+
+  private look(direction: Vector, up: Vector): void {
+    const box = this.box();
+    if (!box) return;
+    const camera = this.renderer.getActiveCamera();
+    const center: Vector = [(box[0] + box[1]) / 2, (box[2] + box[3]) / 2, (box[4] + box[5]) / 2];
+    camera.setFocalPoint(...center);
+    camera.setPosition(center[0] + direction[0], center[1] + direction[1], center[2] + direction[2]);
+    camera.setViewUp(...up);
+    camera.orthogonalizeViewUp();
+    this.renderer.resetCamera(box);
+    this.fill(box);
+    this.request();
+  }
+
+  /** Moves closer until the box fills the picture: vtk.js leaves room for a sphere around it. */
+  private fill(box: number[]): void {
+    const camera = this.renderer.getActiveCamera();
+    const [width, height] = this.canvas.getSize();
+    let largest = 0;
+    for (let corner = 0; corner < 8; corner++) {
+      const place = this.canvas.worldToDisplay(box[corner & 1]!, box[2 + ((corner >> 1) & 1)]!, box[4 + (corner >> 2)]!, this.renderer) as Vector;
+      largest = Math.max(largest, Math.abs(place[0] / width - 0.5), Math.abs(place[1] / height - 0.5));
+    }
+    if (largest > 0) camera.zoom(Math.min(6, 0.45 / largest));
+  }
+
+  private box(): [number, number, number, number, number, number] | null {
+    const low = [Infinity, Infinity, Infinity];
+    const high = [-Infinity, -Infinity, -Infinity];
+    for (const layer of this.layers.values()) {
+      const found = layer.visible ? bounds(layer.coordinates) : null;
+      if (!found) continue;
+      for (let k = 0; k < 3; k++) {
+        low[k] = Math.min(low[k]!, found[0][k]!);
+        high[k] = Math.max(high[k]!, found[1][k]!);
+      }
+    }
+    return low[0]! <= high[0]! ? [low[0]!, high[0]!, low[1]!, high[1]!, low[2]!, high[2]!] : null;
+  }
+
+  private resize(): void {
+    const box = this.container.getBoundingClientRect();
+    const ratio = window.devicePixelRatio || 1;
+    this.canvas.setSize(Math.max(1, Math.floor(box.width * ratio)), Math.max(1, Math.floor(box.height * ratio)));
+    this.request();
+  }
+
+  private request(drawn?: () => void): void {
+    if (drawn) this.drawn.push(drawn);
+    if (this.scheduled) return;
+    this.scheduled = true;
+    requestAnimationFrame(() => {
+      this.scheduled = false;
+      const start = performance.now();
+      this.draw();
+      for (const told of this.drawn.splice(0)) told();
+      // What a picture costs is known once the browser takes up its next task.
+      setTimeout(() => {
+        this.rested = performance.now();
+        this.rested += Math.min(LONGEST_REST, this.rested - start);
+      }, 0);
+    });
+  }
+
+  /** Draws all that has come, and says what was drawn. */
+  picture(): Promise<Picture> {
+    return new Promise((resolve) => this.request(() => {
+      const cycles = [...this.layers.values()].flatMap((layer) => (layer.frame ? [layer.frame.cycle] : []));
+      resolve({ cycle: cycles.length > 0 ? Math.max(...cycles) : null, pixels: this.pixels() });
+    }));
+  }
+
+  /** A number made of all pixels (FNV-1a). They are there only in the task that has drawn them. */
+  private pixels(): number {
+    const [width, height] = this.canvas.getSize();
+    const context = this.canvas.get3DContext({}) as WebGL2RenderingContext;
+    const bytes = new Uint8Array(4 * width * height);
+    context.readPixels(0, 0, width, height, context.RGBA, context.UNSIGNED_BYTE, bytes);
+    return bytes.reduce((hash, byte) => Math.imul(hash ^ byte, 0x01000193), 0x811c9dc5) >>> 0;
+  }
+
+  /** Draws new values, but leaves as much time between pictures as they take: messages and the person come first. */
+  private requestGently(): void {
+    const rest = this.rested - performance.now();
+    if (rest <= 0) this.request();
+    else this.waiting ??= window.setTimeout(() => {
+      this.waiting = null;
+      this.request();
+    }, rest);
+  }
+
+  private draw(): void {
+    for (const [name, frame] of this.pending) {
+      const trouble = this.layers.get(name)?.setData(frame) ?? null;
+      if (trouble) this.events.trouble(trouble);
+      else this.recolour = true;
+    }
+    this.pending.clear();
+    if (this.recolour) this.applyColours();
+    for (const layer of this.layers.values()) {
+      const names = this.features;
+      layer.highlight("handle", this.selection.chosen("handle", names), names);
+      layer.highlight("fixed", this.selection.chosen("fixed", names), names);
+      layer.highlight("hover", this.selection.hovered ? [this.selection.hovered] : [], names);
+      layer.show();
+    }
+    if (!this.placed && this.box()) {
+      this.placed = true;
+      this.reset();
+    }
+    this.renderer.resetCameraClippingRange();
+    this.window.render();
+    this.turned();
+  }
+
+  private applyColours(): void {
+    this.recolour = false;
+    let range: [number, number] | null = null;
+    for (const layer of this.layers.values()) {
+      const found = layer.colour(this.colouring);
+      if (!found || !layer.visible) continue;
+      range = range ? [Math.min(range[0], found[0]), Math.max(range[1], found[1])] : found;
+    }
+    const shown = this.locked ?? range;
+    if (shown && this.map) {
+      const [low, high] = shown;
+      const width = high > low ? high - low : Math.max(Math.abs(low) * 1e-6, 1e-12);
+      const { stops } = this.map;
+      this.colours.removeAllPoints();
+      stops.forEach((stop, i) => this.colours.addRGBPoint(low + (width * i) / (stops.length - 1), ...stop));
+      this.colours.setMappingRange(low, low + width);
+      this.colours.updateRange();
+    }
+    this.events.range(shown);
+  }
+
+  private turned(): void {
+    const matrix = this.renderer.getActiveCamera().getViewMatrix();
+    this.events.drawn([0, 1, 2].map((axis) => [matrix[axis] ?? 0, matrix[4 + axis] ?? 0]));
+  }
+
+  private key(event: KeyboardEvent): void {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const camera = this.renderer.getActiveCamera();
+    const actions: Record<string, () => void> = {
+      ArrowLeft: () => camera.azimuth(8), ArrowRight: () => camera.azimuth(-8),
+      ArrowUp: () => camera.elevation(-8), ArrowDown: () => camera.elevation(8),
+      "+": () => camera.zoom(1.1), "=": () => camera.zoom(1.1), "-": () => camera.zoom(1 / 1.1),
+      r: () => this.reset(), x: () => this.axis(0, 1), y: () => this.axis(1, -1), z: () => this.axis(2, 1),
+      X: () => this.axis(0, -1), Y: () => this.axis(1, 1), Z: () => this.axis(2, -1),
+    };
+    const action = actions[event.key];
+    if (!action) return;
+    event.preventDefault();
+    action();
+    camera.orthogonalizeViewUp();
+    this.request();
+  }
+}

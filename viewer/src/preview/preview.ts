@@ -1,0 +1,170 @@
+/**
+ * The preview of an edit: the shape that it would make, computed in this browser from the reference surface.
+ *
+ * The surface is asked for once, when the first preview needs it; from then on nothing waits for the network. While one preview is
+ * computed the newest wish waits and those before it are forgotten, so that a preview never falls behind the hand that makes it.
+ */
+import type { Json, SurfaceInformation } from "../connection/protocol";
+import type { FailureKind, ShapeFaults } from "../kernel/kernel";
+import type { PreviewAnswer, PreviewRequest } from "./preview.worker";
+import type { Bones } from "../picture/skeleton";
+
+/** What computes: a Worker, or something that looks like one in a test. */
+export interface PreviewWorker {
+  onmessage: ((event: MessageEvent<PreviewAnswer>) => void) | null;
+  postMessage(request: PreviewRequest, transfer: Transferable[]): void;
+}
+
+export interface PreviewSurface { triangles: Uint32Array; triangleFeatures: Uint32Array; features: string[] }
+/**
+ * A shape: its points, how far the edits move any of them, when it was asked for, and the milliseconds that the kernel took.
+ * `newest` says whether nothing newer is wished for already.
+ */
+export interface PreviewShape { points: Float32Array; largest: number; asked: number; computing: number; newest: boolean }
+
+export interface PreviewEvents {
+  surface(surface: PreviewSurface): void;
+  shape(shape: PreviewShape): void;
+  /** What is wrong with the shape that was shown last; null where it is sound. */
+  checked(faults: ShapeFaults | null): void;
+  /** The skeleton that was asked for; or why there is none. */
+  skeleton(bones: Bones | null, reason: string): void;
+  /** An edit that cannot be previewed, or nothing to preview it with. */
+  failed(kind: FailureKind | "surface-missing", reason: string): void;
+  cleared(): void;
+}
+
+/** Milliseconds without a new wish after which a shape is looked at. */
+const REST = 120;
+
+interface Wish { stack: Json[]; edits: Json[]; at: number }
+
+export class Preview {
+  private known: string | null = null;
+  private state: "absent" | "fetching" | "ready" = "absent";
+  private waiting: Wish | null = null;
+  private wanted: Json[] | null = null;
+  private computing: { number: number; at: number } | null = null;
+  private number = 0;
+  private resting: ReturnType<typeof setTimeout> | undefined;
+
+  constructor(
+    private readonly worker: PreviewWorker,
+    private readonly fetchSurface: () => Promise<ArrayBuffer>,
+    private readonly events: PreviewEvents,
+  ) {
+    worker.onmessage = (event) => this.answer(event.data);
+  }
+
+  /** Which surface the server measures shapes from; null when it has none. */
+  offer(surface: SurfaceInformation | null): void {
+    const id = surface?.id ?? null;
+    if (id === this.known) return;
+    this.known = id;
+    this.state = "absent";
+    this.wanted = null;
+    this.clear();
+  }
+
+  /** Asks for the skeleton of the shape that `stack` has made. */
+  skeleton(stack: Json[]): void {
+    if (this.known === null) return this.events.skeleton(null, "the simulation has no reference surface");
+    this.wanted = stack;
+    this.next();
+  }
+
+  /** Whether there is a surface to preview edits of. */
+  get possible(): boolean {
+    return this.known !== null;
+  }
+
+  /** Asks for the shape that `edits` make of the one that `stack` has made. */
+  show(stack: Json[], edits: Json[]): void {
+    if (this.known === null) return;
+    clearTimeout(this.resting);
+    this.waiting = { stack, edits, at: performance.now() };
+    this.next();
+  }
+
+  /** Takes the preview away; what is still computed for it is not shown. */
+  clear(): void {
+    clearTimeout(this.resting);
+    this.waiting = null;
+    this.number++;
+    this.events.cleared();
+  }
+
+  private next(): void {
+    if (this.wanted !== null) {
+      if (this.state === "absent") return void this.fetch();
+      if (this.state === "ready" && this.known !== null) {
+        this.worker.postMessage({ skeleton: this.known, stack: this.wanted }, []);
+        this.wanted = null;
+      }
+    }
+    if (this.waiting === null || this.computing !== null) return;
+    if (this.state === "absent") void this.fetch();
+    if (this.state !== "ready") return;
+    const { stack, edits, at } = this.waiting;
+    this.waiting = null;
+    this.computing = { number: ++this.number, at };
+    this.worker.postMessage({ number: this.number, stack, edits }, []);
+  }
+
+  /** Looks at a shape at which the hand rests: that may take longer than the shape itself. */
+  private check(shown: { number: number; at: number }): void {
+    if (this.computing !== null || shown.number !== this.number) return;
+    this.computing = shown;
+    this.worker.postMessage({ check: shown.number }, []);
+  }
+
+  private async fetch(): Promise<void> {
+    const id = this.known;
+    if (id === null) return;
+    this.state = "fetching";
+    try {
+      const surface = await this.fetchSurface();
+      if (id === this.known) this.worker.postMessage({ id, surface }, [surface]);
+    } catch (error) {
+      if (id === this.known) this.without("surface-missing", error instanceof Error ? error.message : String(error));
+    }
+  }
+
+  /** There is no surface; the next wish asks for it again. */
+  private without(kind: FailureKind | "surface-missing", reason: string): void {
+    this.state = "absent";
+    this.waiting = null;
+    if (this.wanted !== null) this.events.skeleton(null, reason);
+    this.wanted = null;
+    this.events.failed(kind, reason);
+  }
+
+  private answer(answer: PreviewAnswer): void {
+    if ("id" in answer) {
+      if (answer.id !== this.known) return;
+      if ("error" in answer) return this.without(answer.kind, answer.error);
+      this.state = "ready";
+      this.events.surface(answer.surface);
+    } else if ("skeleton" in answer) {
+      if (answer.skeleton !== this.known) return;
+      if ("error" in answer) this.events.skeleton(null, answer.error);
+      else this.events.skeleton(answer.bones, "");
+    } else if ("check" in answer) {
+      this.computing = null;
+      if (answer.check === this.number && this.waiting === null) this.events.checked(answer.faults);
+    } else {
+      const asked = this.computing;
+      this.computing = null;
+      // One that was taken away or overtaken meanwhile is not shown.
+      if (asked?.number === this.number) {
+        if ("error" in answer) this.events.failed(answer.kind, answer.error);
+        else {
+          const { points, largest, milliseconds } = answer;
+          this.events.shape({ points, largest, asked: asked.at, computing: milliseconds, newest: this.waiting === null });
+          this.resting = setTimeout(() => this.check(asked), REST);
+        }
+      }
+    }
+    this.next();
+  }
+}
