@@ -71,7 +71,7 @@ pub struct Adaptor {
     clock: Arc<Clock>,
     /// The changes of pipelines that were taken in.
     changes: Arc<Changes>,
-    /// Those that all ranks were told of, and that were not made yet.
+    /// Changes of pipelines that all ranks know of and that were not made yet.
     told_changes: Vec<changing::Told>,
     /// How many changes of pipelines were made.
     changed: u64,
@@ -207,7 +207,7 @@ impl Adaptor {
         self.server.as_ref().and_then(Server::browser_link)
     }
 
-    /// What a program prints for a person to open the run; `None` without a server.
+    /// The text that invites a person to open the run; `None` without a server.
     ///
     /// All links, for driving and for watching, are written to the file `tombolo-PORT.link` in the
     /// directory of the output, which only its owner can read and which goes with the adaptor. On a

@@ -159,8 +159,8 @@ fn parse(file: &Path, parameters: &[String]) -> Result<Config, String> {
     Ok(config)
 }
 
-/// What was changed in a file, changed in the pipelines as they are: those that the file did not
-/// change stay, whoever brought them.
+/// The pipelines as they are, with the changes of a file made in them: pipelines that the file did
+/// not change stay, whoever brought them.
 fn merged(before: &[Pipeline], after: &[Pipeline], now: &[Pipeline]) -> Vec<Pipeline> {
     if before == now {
         return after.to_vec();

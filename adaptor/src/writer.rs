@@ -34,7 +34,7 @@ pub(crate) struct Job {
     pub(crate) content: Content,
 }
 
-/// What is written.
+/// The content of a file.
 pub(crate) enum Content {
     /// A file of its own; of the pipeline only so many stay.
     Extract(Arc<Extract>, Option<NonZeroU32>),
@@ -104,7 +104,7 @@ fn note(faults: &Mutex<Vec<String>>, fault: String) {
     }
 }
 
-/// What has been written so far.
+/// The files written so far.
 #[derive(Default)]
 struct Written {
     /// Of each pipeline.

@@ -173,7 +173,7 @@ impl Schedule {
     }
 }
 
-/// What time is compared with, in parts of the interval.
+/// The tolerance of comparisons of time, as a fraction of the interval.
 const SLACK: f64 = 1e-9;
 
 /// A count as a number.

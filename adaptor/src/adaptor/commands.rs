@@ -272,7 +272,7 @@ impl Intake {
     }
 }
 
-/// What comes over the network names no files of this machine.
+/// Refuses a command from the network that names a file of this machine.
 fn check_files(command: &Command) -> Result<(), String> {
     match command.file() {
         None => Ok(()),

@@ -11,7 +11,7 @@ pub enum ClientError {
     Link {
         /// The text, without its token.
         found: String,
-        /// What is wrong with it.
+        /// A text that says what is wrong with it.
         reason: String,
     },
     /// The host has no address.
@@ -55,9 +55,9 @@ pub enum ClientError {
     NotTombolo {
         /// The host and port.
         address: String,
-        /// What it said.
+        /// The answer that came.
         found: String,
-        /// What a run would have said.
+        /// The answer that a run would have given.
         expected: &'static str,
     },
     /// As many viewers watch as may (1013).
@@ -110,7 +110,7 @@ pub enum ClientError {
     /// The run did not answer in time.
     #[error("no answer within {seconds} seconds to {what}")]
     NoAnswer {
-        /// What was asked.
+        /// The request.
         what: String,
         /// How long was waited.
         seconds: f64,

@@ -12,18 +12,18 @@ use crate::{OrderReport, Parameter};
 /// Something that a run told.
 #[derive(Debug, Clone)]
 pub struct Told {
-    /// What it means.
+    /// The message, decoded.
     pub event: Event,
     /// The message as it came, one JSON object; empty for a frame and for what the client itself
     /// tells ([`Event::Lost`], [`Event::Taken`]).
     pub text: Arc<str>,
 }
 
-/// What a run tells its clients: the messages of the protocol.
+/// A message of the protocol from a run to its clients.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum Event {
-    /// What there is: told first, and again when any of it changes.
+    /// The facts of a run: sent first, and again when any of them changes.
     Hello(Box<Hello>),
     /// How far the solver is. Of several that nobody has read the newest is kept.
     Status(Box<Status>),
@@ -33,7 +33,7 @@ pub enum Event {
     Monitor(Values),
     /// The answer to [`Client::forecast`](super::Client::forecast).
     Forecast(Box<Foretold>),
-    /// What becomes of a change of the pipelines.
+    /// The outcome of a change of the pipelines.
     Pipelines(PipelinesChanged),
     /// A command has taken effect.
     Done(Done),
@@ -68,7 +68,7 @@ pub enum Role {
     Watcher,
 }
 
-/// What there is in a run.
+/// The facts of a run: views, features, fields, parameters, edits and orders.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Hello {
     /// The version of the protocol.
@@ -108,7 +108,7 @@ pub struct Hello {
 pub struct View {
     /// The name of its pipeline.
     pub name: String,
-    /// What it shows: `surface`, `slice`, ...
+    /// The kind of extract: `surface`, `slice`, ...
     pub kind: String,
 }
 
@@ -175,7 +175,7 @@ pub struct Values {
     pub values: BTreeMap<String, Option<f64>>,
 }
 
-/// What an order would come to.
+/// The forecast of an order.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Foretold {
     /// The id of the question.
@@ -184,7 +184,7 @@ pub struct Foretold {
     pub order: Forecast,
 }
 
-/// What becomes of a change of the pipelines.
+/// The outcome of a change of the pipelines.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 pub struct PipelinesChanged {
     /// The id of the change.
@@ -196,7 +196,7 @@ pub struct PipelinesChanged {
     pub cycle: Option<u64>,
 }
 
-/// That a command has taken effect.
+/// A command that has taken effect.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Done {
     /// The id of the command.
@@ -212,7 +212,7 @@ pub struct Done {
 /// An error that the run tells.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 pub struct Complaint {
-    /// What is wrong.
+    /// A text that says what is wrong.
     pub message: String,
     /// The id of the command that it answers.
     #[serde(default)]

@@ -141,7 +141,7 @@ pub struct Client {
     link: Link,
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
-    /// What no other client's ids begin with.
+    /// The prefix of this client's ids, which no other client uses.
     mark: u32,
     count: AtomicU64,
 }
@@ -184,7 +184,7 @@ impl Client {
         &self.link
     }
 
-    /// What there is in the run, as it was last told; `None` never, once connected.
+    /// The facts of the run as last received; never `None` once connected.
     #[must_use]
     pub fn hello(&self) -> Option<Arc<Hello>> {
         self.shared.with(|state| state.hello.clone())

@@ -69,7 +69,7 @@ pub(super) struct State {
     pub(super) closing: bool,
 }
 
-/// What both sides share.
+/// The state that the client and its connection's thread share.
 #[derive(Default)]
 pub(super) struct Shared {
     state: Mutex<State>,

@@ -94,7 +94,7 @@ impl Run {
         self.adaptor.link()
     }
 
-    /// What a program prints for a person to open the run: see [`Adaptor::invitation`].
+    /// The text that invites a person to open the run: see [`Adaptor::invitation`].
     ///
     /// # Errors
     /// Where the file of the links cannot be written.

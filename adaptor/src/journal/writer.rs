@@ -34,7 +34,7 @@ const GATHERED: Duration = Duration::from_millis(200);
 /// How long the end of a run waits for the disk.
 const END: Duration = Duration::from_secs(2);
 
-/// What became of a line that somebody waits for: it is on disk, or why it will not be.
+/// The outcome of a line that somebody waits for: it is on disk, or the reason why it will not be.
 type Outcome = Result<(), String>;
 
 /// Called once, on any thread.
@@ -395,7 +395,7 @@ mod tests {
         }
     }
 
-    /// What was said of the line of this name.
+    /// The outcome of the line of this name.
     type Answer = (String, Outcome);
 
     struct Desk {

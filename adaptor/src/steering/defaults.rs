@@ -62,7 +62,7 @@ impl Defaults {
 }
 
 impl From<RunHeader> for Defaults {
-    /// Those that the run of a journal began with.
+    /// The settings that the run of a journal began with.
     fn from(run: RunHeader) -> Self {
         let RunHeader { deform, guard, schedule, .. } = run;
         Self { deform, guard, schedule }

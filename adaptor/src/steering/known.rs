@@ -22,7 +22,7 @@ pub(super) struct KnownCommands {
     orders: VecDeque<OrderReport>,
     /// The newest orders as they were given, by their names.
     given: VecDeque<(String, Value)>,
-    /// What became of the newest of the other commands, as their senders were told.
+    /// The answers to the newest of the other commands.
     outcomes: VecDeque<(String, Value)>,
     /// The names that are taken, with what their messages say; oldest first in `named`.
     names: HashMap<String, Option<u64>>,
@@ -35,7 +35,7 @@ pub(super) struct KnownCommands {
 pub(crate) enum Named {
     /// It is a new command.
     New(String),
-    /// The same message came before.
+    /// The message came before, with the same text.
     Again(String),
 }
 
@@ -99,7 +99,7 @@ impl KnownCommands {
         self.outcomes.push_back((id.to_owned(), told));
     }
 
-    /// What became of a command, as a message for a viewer; `None` where nothing has yet.
+    /// The answer to a command, as a message for a viewer; `None` where there is none yet.
     pub(super) fn outcome(&self, id: &str) -> Option<Value> {
         match self.order(id) {
             Some(order) => Some(json!({"order": self.told(order)})),

@@ -29,8 +29,7 @@ pub struct OrderReport {
     /// The part of every shape that the guard judged: the volume, or the surface alone where the
     /// volume is left to the solver.
     pub judged: Option<Judged>,
-    /// That the solver did not move its mesh as it was asked to; the first shape that it did not
-    /// follow.
+    /// The first shape that the solver did not move its mesh to; `None` where it followed them all.
     pub not_followed: Option<NotFollowed>,
     /// The shape that the last call of the run handed out: no later one shows whether the solver
     /// went there.

@@ -26,7 +26,7 @@ const SESSIONS: usize = 128;
 /// The longest file of secrets that is read, in bytes.
 const FILE: u64 = 4096;
 
-/// What the holder of a secret may do.
+/// The rights of a secret's holder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Access {
     /// Sees everything and changes nothing.
@@ -48,7 +48,7 @@ impl Holder {
     }
 }
 
-/// What a request shows.
+/// The credentials of a request.
 pub(super) enum Shown {
     Nothing,
     Wrong,
@@ -126,7 +126,7 @@ impl Credentials {
         Ok(key)
     }
 
-    /// What a key gives access to, which is used up by it.
+    /// Uses up a key, and returns the rights that it gives.
     pub(super) fn redeem(&self, key: &str) -> Option<Access> {
         let mut issued = lock(&self.issued);
         let found = issued.keys.iter().position(|(_, known)| known.matches(key))?;
@@ -161,7 +161,7 @@ impl Credentials {
         sessions.find(|session| session.id.matches(id)).map(|session| session.holder.clone())
     }
 
-    /// What a request shows. A secret in its header or query counts alone, also where it is wrong;
+    /// The credentials of a request. A secret in its header or query counts alone, also where it is wrong;
     /// the cookie counts where there is none.
     pub(super) fn shown(&self, headers: &HeaderMap, uri: &Uri) -> Shown {
         let bearer = headers.get(header::AUTHORIZATION).map(|value| {

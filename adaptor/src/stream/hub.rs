@@ -87,15 +87,15 @@ struct Counters {
 
 #[derive(Default)]
 struct View {
-    /// What is newer than the last frame.
+    /// The extract that is newer than the last frame.
     waiting: Option<Encode>,
-    /// What the last frame was made of.
+    /// The extract of the last frame.
     newest: Option<Encode>,
     /// Somebody cannot go on without a key frame.
     key_wanted: bool,
 }
 
-/// What becomes of a viewer that wants to be let in.
+/// The answer to a viewer that connects.
 pub(super) enum Arrival {
     Client(Arc<Client>),
     Full,
@@ -114,7 +114,7 @@ pub(super) struct HubState {
     surface: Option<Arc<ReferenceSurface>>,
     pub(super) clients: BTreeMap<u64, Arc<Client>>,
     pub(super) wheel: Wheel,
-    /// What each pipeline has cost, by name.
+    /// The cost of each pipeline, by name.
     pub(super) costs: Vec<(String, Cost)>,
     /// Why the journal cannot be written.
     pub(super) journal_lost: Option<String>,
@@ -323,7 +323,7 @@ impl Hub {
 }
 
 impl View {
-    /// What is to be encoded, and whether as a key frame.
+    /// The extract to encode next, and whether as a key frame.
     fn due(&mut self, index: usize) -> Option<(usize, Encode, bool)> {
         if let Some(waiting) = self.waiting.take() {
             self.newest = Some(waiting);

@@ -169,9 +169,9 @@ pub(super) type Closing = (u16, &'static str);
 /// One viewer.
 pub(super) struct Client {
     pub(super) id: u64,
-    /// What it may do.
+    /// The client's rights.
     pub(super) access: Access,
-    /// What it shows to come back under its name.
+    /// The secret with which it comes back under its name.
     pub(super) back: Secret,
     pub(super) wake: Notify,
     outbox: Mutex<Outbox>,

@@ -51,7 +51,7 @@ pub(super) struct Pool {
 
 #[derive(Debug, Default)]
 struct Open {
-    /// Those that have shown no secret, the oldest first.
+    /// Connections that have shown no secret, the oldest first.
     unknown: Vec<Arc<Guest>>,
     known: usize,
 }

@@ -22,7 +22,7 @@ pub(super) struct Wheel {
     pub(super) lost: Option<(Instant, u64)>,
     /// How long a driver may be silent.
     pub(super) silence: Duration,
-    /// Those who have left, the oldest first.
+    /// Clients that have left, the oldest first.
     pub(super) left: VecDeque<(u64, Secret, Access)>,
     last: u64,
 }

@@ -215,7 +215,7 @@ mod tests {
     use super::super::Reduction;
     use super::*;
 
-    /// What every communicator must do; the ranks of MPI are held to the same.
+    /// Checks the contract of a communicator; the tests of MPI check the same.
     fn check(ranks: &dyn Communicator) {
         let (rank, size) = (ranks.rank(), ranks.size());
         let mut bytes = if rank == size - 1 { vec![7; 1000] } else { vec![1] };

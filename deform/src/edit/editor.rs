@@ -176,8 +176,8 @@ impl Editor {
         Ok(displacement)
     }
 
-    /// What keeps edits from being made on this surface, the first thing of each edit; nothing is
-    /// evaluated. Edits that drag the skeleton have it extracted.
+    /// The first problem of each edit on this surface; nothing is evaluated. Edits that drag the
+    /// skeleton have it extracted.
     pub fn check(&mut self, edits: &[Edit]) -> Vec<EditError> {
         let mut errors = Vec::new();
         for (index, edit) in edits.iter().enumerate() {

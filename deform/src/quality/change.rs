@@ -202,7 +202,7 @@ mod tests {
     }
 
     proptest! {
-        /// What goes in through the faces is what the volume grows by, for cells of every type.
+        /// The volume swept by a cell's faces equals the change of its volume, for every cell type.
         #[test]
         fn swept_volumes_sum_up_to_the_change_of_volume(moves in prop::collection::vec(-0.4..0.4f64, 2 * 36)) {
             for cell_type in CellType::ALL.into_iter().filter(|cell| cell.dimension() == 3) {

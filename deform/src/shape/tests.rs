@@ -39,7 +39,7 @@ fn stack(edits: serde_json::Value) -> Vec<Edit> {
     serde_json::from_value(edits).unwrap()
 }
 
-/// What each rank makes of its part, with the number in the whole mesh of each of its vertices.
+/// Runs a function on each rank's part, with the global number of each of its vertices.
 fn on_ranks<T: Send>(
     mesh: &Mesh,
     of_cells: &[usize],
@@ -150,7 +150,7 @@ fn shapes_are_those_of_one_process() {
     }
 }
 
-/// The same points are judged alike, whatever parts they are in.
+/// Quality does not depend on how the mesh is divided.
 #[test]
 fn quality_is_that_of_one_process() {
     let mesh = box_of_tets([6, 5, 4], [0.0; 3], [1.0; 3]);
@@ -276,7 +276,7 @@ fn what_one_solve_does_not_reach_is_mended_alike() {
     }
 }
 
-/// What is wrong on one rank alone is told on all of them, in the same words.
+/// An error of one rank is the error of all ranks, in the same words.
 #[test]
 fn an_error_of_one_rank_is_that_of_all() {
     let mesh = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);

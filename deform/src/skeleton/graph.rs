@@ -9,7 +9,7 @@ use crate::vector::{dot, subtract};
 ///
 /// Polylines ([`Curve`]) run between nodes that are no inner node of a curve: ends (degree 1) and
 /// branch nodes (degree 3 and more). A loop without a branch node starts and ends in the same node.
-/// What shrinks to a point is a node of degree 0.
+/// A component that shrinks to a point is a node of degree 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Skeleton {
     nodes: Vec<Vector>,

@@ -168,7 +168,7 @@ impl<'a> Prescribed<'a> {
 
     /// A free vertex and four half-spaces that it must be in, which have no point in common.
     ///
-    /// That half-spaces have none is shown by four of them (E. Helly 1923): normals that add up to
+    /// Four of the half-spaces prove that they share no point (E. Helly 1923): normals that add up to
     /// zero with factors that are not negative, while the offsets with these factors do not come
     /// below zero (J. Farkas 1902).
     fn torn_vertex(&self, points: &[Vector]) -> Option<Impossible> {

@@ -305,7 +305,7 @@ mod tests {
         }
     }
 
-    /// What the reference has of poor cells is not what untangling is to mend.
+    /// Poor cells of the reference are no failure of untangling.
     #[test]
     fn slivers_of_the_reference_are_no_failure() {
         let whole = shapes::box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);

@@ -229,7 +229,7 @@ impl Run {
         self.adaptor.link()
     }
 
-    /// What to print for a person to open the run: see [`Adaptor::invitation`].
+    /// The text that invites a person to open the run: see [`Adaptor::invitation`].
     ///
     /// # Errors
     /// Where the file of the links cannot be written.

@@ -26,7 +26,7 @@ pub struct Report {
     pub adaptor_seconds: BTreeMap<&'static str, Spread>,
     /// The frames that were streamed.
     pub stream: StreamCounts,
-    /// What each pipeline has cost and measured.
+    /// The cost and the monitors of each pipeline.
     pub pipelines: Vec<PipelineReport>,
     /// The flow.
     pub flow: FlowReport,

@@ -73,7 +73,7 @@ pub(super) trait Bits {
     }
 }
 
-/// What is known of the lengths of numbers.
+/// The adaptive model of the lengths of numbers.
 #[derive(Debug, Clone)]
 pub(super) struct Number([Model; 128]);
 

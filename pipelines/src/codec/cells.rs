@@ -7,7 +7,7 @@ use super::connectivity::{Across, Guide, Third, walk};
 /// Positions are at most so many steps of their grid.
 pub(super) const MOST_STEPS: f64 = 268_435_456.0;
 
-/// What a walk finds, points numbered in the order of the walk.
+/// The result of a walk, with points numbered in the order of the walk.
 pub(super) struct Walked {
     pub(super) places: Vec<[i32; 3]>,
     pub(super) triangles: Vec<[u32; 3]>,

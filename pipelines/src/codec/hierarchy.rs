@@ -20,7 +20,7 @@ pub struct Hierarchy {
     stencils: Vec<Stencil>,
 }
 
-/// What a value is predicted from: places of the order, all before its own, the nearest first, and
+/// The points that a value is predicted from, all earlier in the order, the nearest first, with
 /// their weights. Where there are fewer than eight the nearest stands again, with no weight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Stencil {

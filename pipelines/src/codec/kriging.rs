@@ -6,7 +6,7 @@
 
 /// The most neighbours of a point.
 pub(super) const NEIGHBOURS: usize = 8;
-/// What repeated values at one place would differ by.
+/// The variance of repeated values at one point.
 const NUGGET: f64 = 0.02;
 /// The covariance at no distance; what it is does not change the weights.
 const SILL: f64 = 64.0;

@@ -19,7 +19,7 @@ const FIRST_TABLES: [u8; CLASSES] =
     [2, 7, 9, 10, 11, 11, 12, 14, 15, 16, 18, 19, 20, 21, 23, 25, 28];
 /// No difference counts for more than this in a context.
 const MOST: u32 = 64;
-/// What the difference of the last frame, and that of the component before, count for.
+/// The weights of the last frame's difference and of the preceding component's.
 const LAST: f32 = 20.0;
 const BESIDE: f32 = 12.0;
 /// No difference is larger: in single precision all of them are exact.
@@ -54,7 +54,7 @@ fn nearest(value: f32) -> f32 {
     (value + WHOLE) - WHOLE
 }
 
-/// The same in double precision, up to 2⁵¹.
+/// The nearest whole number in double precision, up to 2⁵¹.
 #[inline(always)]
 fn nearest_double(value: f64) -> f64 {
     const WHOLE: f64 = 6_755_399_441_055_744.0;

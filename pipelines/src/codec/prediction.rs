@@ -3,11 +3,11 @@
 use super::hierarchy::{CONTEXT, Stencil};
 use super::kriging::NEIGHBOURS;
 
-/// What is known of a component at one point: its value, that of the frame before, and of the one
-/// before that, in steps of the grid; and the magnitude of the last difference.
+/// The state of a component at one point: its values in this frame and the two before, in steps of
+/// the grid, and the magnitude of the last difference.
 pub(super) type Node = [f32; 4];
 
-/// What four differences count for: of the neighbours' prediction to that of the last frame; of the
+/// The weights of four differences: of the neighbours' prediction to that of the last frame; of the
 /// neighbours' prediction to the last value; of the last value to the one before; of the
 /// neighbours' prediction of the last frame to that of the one before.
 pub(super) type Coefficients = [f32; 4];

@@ -31,7 +31,7 @@ pub struct Topology {
 /// A topology, its message, and where everything came from.
 #[derive(Debug, Clone)]
 pub struct Coded {
-    /// What will be decoded.
+    /// The topology as a decoder will return it.
     pub topology: Topology,
     /// The bytes.
     pub message: Vec<u8>,

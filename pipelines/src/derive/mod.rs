@@ -16,7 +16,7 @@ use crate::language::{Derived, Stage};
 pub(crate) use running::{Running, follow};
 pub(crate) use wall::wall_shear_stress;
 
-/// What fields are derived from.
+/// The input of a derived field.
 #[derive(Clone, Copy)]
 pub(crate) struct Basis<'a> {
     /// The channel, with the fields that were derived before.
@@ -41,7 +41,7 @@ pub(crate) fn with_derived<'a>(channel: &Channel<'a>, derived: &'a [Field]) -> V
 /// The field that a stage derives; `None` where another rank says why there is none. Collective.
 ///
 /// # Errors
-/// What is missing or does not fit.
+/// A text that says what is missing or does not fit.
 pub(crate) fn derive(stage: &Stage, basis: &Basis) -> Result<Option<Field>, String> {
     let Some(name) = stage.derived_name() else { return Ok(None) };
     let of = |derived: &Derived| basis.operand(&derived.field);

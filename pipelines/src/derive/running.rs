@@ -133,7 +133,7 @@ fn greater(a: f64, b: f64) -> f64 {
 /// the field is of another kind. Collective.
 ///
 /// # Errors
-/// What is missing or does not fit.
+/// A text that says what is missing or does not fit.
 pub(crate) fn follow(
     stage: &TimeStatistics,
     basis: &Basis,

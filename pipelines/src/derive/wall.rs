@@ -14,7 +14,7 @@ use crate::reduce::traction_of;
 /// gradient. Collective.
 ///
 /// # Errors
-/// What is missing or does not fit.
+/// A text that says what is missing or does not fit.
 pub(crate) fn wall_shear_stress(
     stage: &WallShearStress,
     gradient: &str,

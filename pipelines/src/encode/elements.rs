@@ -5,7 +5,7 @@ use tombolo_deform::mesh::CellType;
 use super::error::EncodeError;
 use crate::extract::Extract;
 
-/// What a viewer draws of an extract.
+/// The elements of an extract that a viewer draws.
 #[derive(Debug, Default)]
 pub(super) struct Elements {
     pub(super) triangles: Vec<[u32; 3]>,

@@ -306,7 +306,7 @@ impl Chain {
     }
 }
 
-/// What is known of the positions of the last frame.
+/// The positions of the last frame.
 #[derive(Debug)]
 enum Positions {
     Bounded(Box<Motion>),

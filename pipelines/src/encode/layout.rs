@@ -12,7 +12,7 @@ pub(super) const PREAMBLE: usize = 8;
 /// The longest name of a view, field or feature, in bytes.
 const LONGEST_NAME: usize = 4096;
 
-/// What a message holds.
+/// The kind of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     /// Positions and fields of a view whose topology the reader has.

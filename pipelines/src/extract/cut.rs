@@ -125,7 +125,7 @@ impl Hasher for EdgeHasher {
     }
 }
 
-/// What is known by the numbers of vertices.
+/// A map with the global numbers of vertices as keys.
 pub(super) type ByVertices<K> = HashMap<K, u32, BuildHasherDefault<EdgeHasher>>;
 
 /// The points of a layer by the edges that they lie on: for each vertex a chain of the points on

@@ -22,7 +22,7 @@ const BORDER: f64 = 4.0;
 /// The cosine of the angle that a face may turn by when a vertex goes.
 const TURN: f64 = 0.2;
 
-/// What is left of a surface.
+/// A surface with fewer triangles, and how it was made.
 #[derive(Debug)]
 pub(crate) struct Decimation {
     /// The surface that it was made of.
@@ -87,7 +87,7 @@ impl Decimation {
             && (Arc::ptr_eq(&self.cells, &extract.cells) || self.cells == extract.cells)
     }
 
-    /// What is left of the surface, with its fields of now.
+    /// The surface with fewer triangles, with the present fields.
     pub(crate) fn apply(&self, extract: &Extract) -> Extract {
         let field = |field: &Field| {
             let of = |entities: &[u32]| {

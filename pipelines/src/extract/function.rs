@@ -75,7 +75,7 @@ fn unit(direction: Vector) -> Vector {
     direction.map(|x| x / length)
 }
 
-/// What one function is at each vertex.
+/// The values of one function, one for each vertex.
 pub(super) type Samples = Vec<f64>;
 
 /// The values of a function at each point.

@@ -65,7 +65,7 @@ impl Layout {
         Ok(cells)
     }
 
-    /// What is told of points outside of the mesh.
+    /// The error for points outside the mesh; `None` where there are none.
     pub(super) fn error(&self) -> Option<ExtractError> {
         let Self { outside, asked: points, .. } = *self;
         self.told.map(|first| ExtractError::OutsidePoints { outside, points, first })

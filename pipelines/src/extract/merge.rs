@@ -175,8 +175,8 @@ fn probed(
     })))
 }
 
-/// What all ranks call a point of an extract, and whether other ranks may have it too; `None` for a
-/// point that none has.
+/// The name that all ranks give a point of an extract, and whether other ranks may have it too;
+/// `None` for a point that none has.
 pub(super) fn name(whole: &Whole, piece: &Extracted, index: usize) -> Option<(Support, bool)> {
     let numbers = whole.shared.numbers();
     let support = match &piece.origin {

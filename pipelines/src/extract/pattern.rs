@@ -11,7 +11,7 @@ use super::source::{Extracted, Origin, Support};
 use super::{Channel, Extract};
 use tombolo_deform::communicator::Communicator;
 
-/// What a source stage takes an extract from.
+/// The input of a source stage.
 #[derive(Clone, Copy)]
 pub struct Input<'a> {
     /// The channel at this step.
@@ -32,7 +32,7 @@ pub struct Kept {
 }
 
 impl Kept {
-    /// What was made of this version of the mesh.
+    /// The pattern of this version of the mesh; `None` where it is of another version.
     pub(super) fn of(&self, version: u64) -> Option<Arc<Pattern>> {
         self.pattern.clone().filter(|_| self.version == version)
     }

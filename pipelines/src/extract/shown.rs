@@ -21,7 +21,7 @@ pub(crate) struct Shown {
     pub(crate) shared: Vec<(u32, Support)>,
 }
 
-/// What this rank shows of an extract. Together the ranks show what one process would, each face
+/// This rank's visible part of an extract. Together the ranks show what one process would, each face
 /// once. Collective.
 ///
 /// # Errors

@@ -93,7 +93,7 @@ impl Faces {
         self.faces.push(Face { key: key(face), cell, start, end: self.corners.len() });
     }
 
-    /// Those that are there once.
+    /// The faces that occur once.
     pub(super) fn outside(self) -> Outside {
         let Self { mut faces, corners } = self;
         faces.sort_by_key(|face| (face.key, face.cell));

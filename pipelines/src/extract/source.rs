@@ -53,7 +53,7 @@ pub(crate) enum Origin {
 pub(crate) struct Support {
     /// Up to four vertices, rising; `u32::MAX` where there is none.
     pub(crate) vertices: [u32; 4],
-    /// What tells it from other points between these vertices.
+    /// Distinguishes it from other points between these vertices.
     pub(crate) layer: u64,
 }
 

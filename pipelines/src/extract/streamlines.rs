@@ -98,7 +98,7 @@ struct Line {
     slopes: [Vector; 7],
 }
 
-/// What became of a line on this rank.
+/// How a line ended on this rank.
 enum Outcome {
     Ended,
     /// It needs the field at this point, which this rank does not have.

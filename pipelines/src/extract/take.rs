@@ -257,7 +257,8 @@ impl Source {
         }
     }
 
-    /// What is kept of this mesh, or is made anew on all ranks, with the fields of this step.
+    /// The kept pattern of this mesh, made anew on all ranks where it is out of date, with the fields of
+    /// this step.
     fn kept(
         &mut self,
         input: &Input,
@@ -348,7 +349,7 @@ impl Source {
         }
     }
 
-    /// What a vertex field decides by, at each vertex.
+    /// The value of a vertex field that decides, at each vertex.
     fn vertex_values(&self, input: &Input, name: &str) -> Result<Vec<f64>, ExtractError> {
         match self.field(input, name)? {
             None => Ok(Vec::new()),

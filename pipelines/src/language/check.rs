@@ -24,15 +24,15 @@ use crate::limits::WAITING_BYTES;
 
 /// Something that what was read is tried on, such as a mesh.
 pub trait Trial {
-    /// What is wrong with the pipelines of a configuration. Only of those at whose index `is_sound`
+    /// The problems of a configuration's pipelines. Only of those at whose index `is_sound`
     /// holds do all stages and actions mean something; the others must not be run. Their conditions
     /// may be wrong all the same.
     fn configuration(&mut self, config: &Config, is_sound: &dyn Fn(usize) -> bool) -> Vec<Problem>;
 
-    /// What is wrong with edits that mean something by themselves.
+    /// The problems of edits that are valid by themselves.
     fn edits(&mut self, edits: &[Edit]) -> Vec<Problem>;
 
-    /// What is wrong with how a shape is to be reached.
+    /// The problems of a deformation's settings.
     fn deformation(&mut self, deformation: &Deformation) -> Vec<Problem>;
 }
 
@@ -181,7 +181,7 @@ pub enum Content {
 /// # Ok::<(), tombolo_pipelines::language::LanguageErrors>(())
 /// ```
 ///
-/// What means something by itself is then tried, where there is a `trial`:
+/// Whatever is valid by itself is then tried, where there is a `trial`:
 /// [`MeshTrial`](crate::run::MeshTrial) is one on a mesh.
 ///
 /// # Errors
@@ -389,7 +389,7 @@ fn of_list<T>(
     pieces
 }
 
-/// What the monitors of a stage may begin with: its key, its name and its field.
+/// The prefixes of a stage's monitors: its key, its name and its field.
 fn names_in(stage: &Node) -> Vec<String> {
     let mut names = Vec::new();
     for member in stage.members() {

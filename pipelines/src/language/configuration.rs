@@ -15,7 +15,7 @@ pub struct Config {
     /// The version of this language: 1.
     #[schemars(range(min = 1, max = 1))]
     pub version: u32,
-    /// What the file is for, in words for people.
+    /// A description of the file, for people.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub description: Option<String>,
     /// The server that viewers connect to; left out, there is none.

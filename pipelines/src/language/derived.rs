@@ -71,7 +71,7 @@ impl From<Formula> for FormulaKeys {
 /// The names that formulas give to what is no field.
 pub(crate) const GIVEN: [&str; 5] = ["x", "y", "z", "time", "cycle"];
 
-/// What the name of a parameter begins with, in formulas and conditions.
+/// The prefix of a parameter's name in formulas and conditions.
 pub(crate) const PARAMETER: &str = "parameter.";
 
 /// Checks of a new field's name what can be checked without a mesh.

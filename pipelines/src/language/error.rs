@@ -30,7 +30,7 @@ fn prefix(path: &str) -> String {
     if path.is_empty() { String::new() } else { format!("{path}: ") }
 }
 
-/// What stands before the name that was likely meant.
+/// The text before a suggested name.
 const MEANT: &str = "; did you mean `";
 
 fn hint(suggestion: Option<&str>) -> String {
@@ -304,7 +304,7 @@ pub(super) struct Fault {
     pub(super) kind: FaultKind,
 }
 
-/// What can be done about a fault.
+/// How a fault can be mended.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum FaultKind {
     /// A key that is not known: the last step.
@@ -327,7 +327,7 @@ pub(super) fn from_serde(
     error(text, file, place.start, show(&steps), message, suggestion)
 }
 
-/// What is wrong by an error of serde, in the words of what stands in the text.
+/// The fault that an error of serde stands for, in the words of the text.
 pub(super) fn fault(
     failure: &serde_path_to_error::Error<serde_json::Error>,
     root: &Node,

@@ -53,7 +53,7 @@ impl LanguageErrors {
         }
     }
 
-    /// The same errors so many lines further down.
+    /// Moves the errors so many lines down.
     pub(super) fn moved(mut self, lines: usize) -> Self {
         self.first.line += lines;
         self.others.iter_mut().for_each(|error| error.line += lines);

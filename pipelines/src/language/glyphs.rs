@@ -11,7 +11,7 @@ use crate::limits::GLYPHS;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "GlyphsKeys", into = "GlyphsKeys")]
 pub struct Glyphs {
-    /// What each of them is.
+    /// The shape of each glyph.
     pub shape: GlyphShape,
     /// The vertex field that arrows point along, and that scales.
     pub field: Option<String>,
@@ -49,7 +49,7 @@ pub enum GlyphShape {
 #[derive(Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct GlyphsKeys {
-    /// What each of them is.
+    /// The shape of each glyph.
     #[serde(default)]
     shape: GlyphShape,
     /// The vertex field that arrows point along, of 2 or 3 components, and that scales; spheres

@@ -75,11 +75,11 @@ pub struct ViewerNote {
     pub address: String,
     /// Whether it came with the secret or link for driving.
     pub may_drive: bool,
-    /// What it did.
+    /// The action.
     pub did: ViewerMove,
 }
 
-/// What a viewer did.
+/// An action of a viewer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ViewerMove {

@@ -44,7 +44,7 @@ impl<'a> Mender<'a> {
         Self { document, faults: Vec::new(), more: 0, lacking: HashSet::new() }
     }
 
-    /// What was wrong, in the order of the text; `None` where nothing was.
+    /// The errors in the order of the text; `None` where there are none.
     pub(super) fn into_errors(mut self) -> Option<LanguageErrors> {
         let Document { root, text, file } = self.document;
         self.faults.sort_by_key(|fault| fault.place.start);
@@ -183,7 +183,7 @@ impl<'a> Mender<'a> {
     }
 }
 
-/// What mending has come to.
+/// The outcome of mending.
 enum Mended {
     /// Names are put right, or keys that mean nothing are gone.
     Named,

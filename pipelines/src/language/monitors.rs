@@ -30,7 +30,7 @@ impl Monitor {
     }
 }
 
-/// What the names of vectors' components end in.
+/// The suffixes of the names of vector components.
 const XYZ: [&str; 3] = ["x", "y", "z"];
 
 /// The monitors of a pipeline, in the order in which the runner gives their values; the first two
@@ -129,7 +129,7 @@ pub(crate) enum Slot {
 /// The names that a pipeline may use.
 pub(crate) struct Scope {
     own: Vec<Monitor>,
-    /// Those of other pipelines, by their indices.
+    /// The monitors of other pipelines, by the pipelines' indices.
     others: Vec<(usize, String, Vec<Monitor>)>,
 }
 
@@ -421,7 +421,7 @@ fn tables(pipeline: &Pipeline) -> impl Iterator<Item = &Csv> {
     }))
 }
 
-/// What is wrong with the names that a pipeline uses, and with those that it gives twice.
+/// The problems of the names that a pipeline uses, and of those that it defines twice.
 fn check_pipeline(pipeline: &Pipeline, scope: &Scope) -> (Found, Vec<Problem>) {
     let (mut found, mut all_twice) = (Found::default(), Vec::new());
     let has_faces = pipeline.stages.iter().any(Stage::takes_faces);

@@ -14,7 +14,7 @@ use super::stage::{Action, Stage};
 pub struct Pipeline {
     /// Its name, which is also that of its view; no two pipelines share one.
     pub name: String,
-    /// What it is for, in words for people.
+    /// A description of the pipeline, for people.
     pub description: Option<String>,
     /// The channel it reads, and of one that runs on orders the channel whose mesh they change;
     /// `None` is the solver's first.
@@ -132,7 +132,7 @@ pub struct Budget {
 struct PipelineFields {
     /// Its name, which is also that of its view; no two pipelines share one.
     name: String,
-    /// What it is for, in words for people.
+    /// A description of the pipeline, for people.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     description: Option<String>,
     /// The channel it reads; left out, the solver's first. Of a pipeline with `"on": "order"`, the

@@ -71,7 +71,7 @@ pub struct Histogram {
     /// those of the field at each time it is measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub range: Option<[f64; 2]>,
-    /// What a value counts as.
+    /// The weight of a value.
     #[serde(default)]
     pub by: Weight,
     /// After `surface`: the features that count; left out, the whole surface.
@@ -86,7 +86,7 @@ fn default_bins() -> u32 {
     16
 }
 
-/// What a value counts as in a histogram.
+/// The weight of a value in a histogram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Weight {
@@ -126,7 +126,7 @@ pub struct Force {
     /// over the density the kinematic one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub viscosity: Option<Viscosity>,
-    /// What both parts are multiplied by: the density, for a solver whose pressure is over it.
+    /// The factor of both parts: the density, for a solver that divides its pressure by it.
     #[serde(default = "one")]
     pub density: f64,
     /// The point that the moment is about.
@@ -149,7 +149,7 @@ fn one() -> f64 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "expected a number or the name of a field")]
 pub enum Viscosity {
-    /// The same everywhere.
+    /// A constant.
     Number(f64),
     /// The name of a scalar field.
     Field(String),
@@ -165,7 +165,7 @@ pub struct WallShearStress {
     pub velocity: String,
     /// The dynamic viscosity, or the kinematic one beside a `density`.
     pub viscosity: Viscosity,
-    /// What the stress is multiplied by.
+    /// The factor of the stress.
     #[serde(default = "one")]
     pub density: f64,
     /// The name of the new field; left out, that of the stage.
@@ -173,7 +173,7 @@ pub struct WallShearStress {
     pub name: Option<String>,
 }
 
-/// What one monitor has more than another: the monitor `<name>`, such as a pressure drop.
+/// The difference between two monitors: the monitor `<name>`, such as a pressure drop.
 ///
 /// Monitors of other pipelines have the value that was measured last; a pipeline that stands before
 /// in the file and is due at the same step has measured its own already.
@@ -231,7 +231,7 @@ fn all_measures() -> Vec<Measure> {
     vec![Measure::Mean, Measure::Rms, Measure::Min, Measure::Max]
 }
 
-/// What is kept of a value over time.
+/// A statistic of a value over time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {

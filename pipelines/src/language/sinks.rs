@@ -17,12 +17,12 @@ pub struct Csv {
     /// The monitors and parameters, as in conditions; left out, all monitors of the pipeline.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub monitors: Vec<String>,
-    /// What becomes of a file that is there already.
+    /// How a file that exists already is treated.
     #[serde(default)]
     pub existing: Existing,
 }
 
-/// What becomes of a file that is there when the run begins.
+/// How a file that exists when the run begins is treated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Existing {

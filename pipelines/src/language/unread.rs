@@ -13,7 +13,7 @@ pub(super) struct Unread {
     pub(super) of_configuration: bool,
     /// The pipelines that lack a setting, a stage or an action.
     pub(super) pipelines: HashSet<usize>,
-    /// What the names of monitors begin with that stages may measure which could not be read.
+    /// The prefixes of monitors that stages which could not be read may measure.
     pub(super) monitors: HashSet<String>,
 }
 

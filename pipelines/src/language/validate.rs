@@ -36,7 +36,7 @@ impl Validate for Config {
 }
 
 impl Config {
-    /// What means nothing, beside what could not be read.
+    /// The problems of meaning, given what could not be read.
     pub(super) fn problems_beside(&self, unread: &Unread) -> Found {
         let mut found = Found::default();
         self.check_settings(unread, &mut found);
@@ -88,7 +88,7 @@ impl Config {
 }
 
 impl Pipeline {
-    /// What means nothing in a pipeline by itself; `is_whole` says whether all of it could be read.
+    /// The problems of meaning in a pipeline by itself; `is_whole` says whether all of it could be read.
     pub(super) fn problems(&self, is_whole: bool) -> Vec<Problem> {
         let mut found = Found::default();
         if self.name.trim().is_empty()

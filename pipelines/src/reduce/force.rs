@@ -77,7 +77,7 @@ fn values(stage: &Force, sums: &[f64; COUNT]) -> Vec<f64> {
     values
 }
 
-/// What a rank adds up.
+/// A rank's contribution to the force.
 struct Terms<'a> {
     stage: &'a Force,
     part: &'a Part<'a>,

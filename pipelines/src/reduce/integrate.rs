@@ -78,7 +78,7 @@ impl Sums {
     }
 }
 
-/// What a rank integrates.
+/// A rank's contribution to the integral.
 struct Terms<'a> {
     cells: &'a Cells,
     points: &'a [Vector],

@@ -16,7 +16,7 @@ use crate::language::{Slice, Stage};
 /// How many cells are added up before their sum is: the sums lose less to rounding.
 pub(super) const CHUNK: usize = 4096;
 
-/// What is integrated over.
+/// The region of an integral.
 #[derive(Clone, Copy)]
 pub(crate) struct Region<'a> {
     /// The channel, with the fields that were derived; its points are known to the source where
@@ -25,7 +25,7 @@ pub(crate) struct Region<'a> {
     pub(crate) source: &'a Source,
     /// The source stage; without one the region is the whole mesh.
     pub(crate) stage: Option<&'a Stage>,
-    /// What the stage has taken; `None` where it has failed, which has been told.
+    /// The stage's extract; `None` where it has failed, which has been reported.
     pub(crate) extracted: Option<&'a Extracted>,
     /// Fields of the extract that no later stage is to see.
     pub(crate) unselected: &'a [Field],
@@ -40,7 +40,7 @@ pub(super) struct Wanted<'a> {
     pub(super) components: &'a [usize],
 }
 
-/// What a rank has of a region.
+/// A rank's part of a region.
 pub(super) struct Part<'a> {
     pub(super) cells: &'a Cells,
     pub(super) points: &'a [Vector],
@@ -60,7 +60,7 @@ pub(super) enum Gathered {
     Elsewhere,
 }
 
-/// What all ranks agree on.
+/// The properties of a region that all ranks agree on.
 pub(super) struct Chosen {
     /// The highest dimension of any cell.
     pub(super) dimension: usize,
@@ -112,7 +112,7 @@ impl<'a> Region<'a> {
         }
     }
 
-    /// What this rank has of the region; an error without a text has been told already.
+    /// This rank's part of the region; an error without a text has been reported already.
     pub(super) fn part<'b>(
         &'b self,
         gathered: &'b Result<Gathered, String>,
@@ -151,7 +151,7 @@ impl<'a> Region<'a> {
         Ok(Part { cells, points, fields, of_cells })
     }
 
-    /// What the ranks agree on. Collective.
+    /// The properties of the region that all ranks agree on. Collective.
     pub(super) fn agreed(&self, part: &Result<Part, String>) -> Chosen {
         let is_known = agree(self.communicator, part.as_ref().map(|_| ())).is_ok();
         let dimension = part.as_ref().map_or(0, |part| part.cells.dimension());

@@ -8,7 +8,7 @@ use super::image::Image;
 use super::text::{Anchor, Font, fill};
 use crate::language::Render;
 
-/// What stands beside the scene.
+/// The labels beside the scene.
 pub(super) struct Annotation<'a> {
     pub(super) stage: &'a Render,
     /// The colours, their range, and what they are of; `None` where no field colours.

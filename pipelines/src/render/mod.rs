@@ -48,7 +48,7 @@ pub struct Picture {
     pub image: Image,
 }
 
-/// What is drawn, and when.
+/// The extract that is drawn, and the step.
 pub(crate) struct Subject<'a> {
     pub(crate) shown: &'a Shown,
     /// The field that colours; `None` where the stage names none, or this rank has nothing.
@@ -277,7 +277,7 @@ impl Drawing<'_> {
         clip::line(pen.view, size, [corner; 2]).map(|ends| ends.map(|end| pen.place(&end)))
     }
 
-    /// What is to be drawn in each band.
+    /// The elements to draw in each band.
     fn sorted(&self, pen: &Pen, size: [f64; 2], rows: usize, bands: usize) -> Sorted {
         let step = i64::from(self.stage.samples) * 256;
         #[expect(clippy::cast_possible_truncation, reason = "some pixels")]

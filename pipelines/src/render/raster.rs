@@ -7,7 +7,7 @@
 use super::camera::{Seen, View};
 use super::lattice::rounded;
 
-/// What nothing has been drawn on.
+/// A pixel that nothing has been drawn on.
 pub(super) const EMPTY: u64 = u64::MAX;
 /// The bits of a colour and of the kind of thing that has it.
 const COLOR_BITS: u32 = 26;

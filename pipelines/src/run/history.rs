@@ -37,7 +37,7 @@ impl History {
         &self.monitors
     }
 
-    /// What is kept, the oldest first.
+    /// The values that are kept, the oldest first.
     pub fn measured(&self) -> impl ExactSizeIterator<Item = &Measured> {
         self.measured.iter()
     }

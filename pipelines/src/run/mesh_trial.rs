@@ -161,7 +161,7 @@ impl MeshTrial<'_> {
         problems.into_iter().flatten().map(|problem| problem.within("deform")).collect()
     }
 
-    /// What keeps an edit from being made, within the edit.
+    /// The problems of an edit, located within it.
     fn edit(&mut self, mut edit: Edit) -> Vec<Problem> {
         if let Edit::Displacement(import) = &mut edit
             && let Some(file) = import.file.take()

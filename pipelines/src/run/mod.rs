@@ -62,7 +62,7 @@ pub struct Runner {
     sources: HashMap<String, Source>,
     communicator: Arc<dyn Communicator>,
     board: Board,
-    /// What all ranks were told of the world outside.
+    /// The clock and the viewers, equal on all ranks.
     outside: Now,
     clock: Box<dyn Fn() -> f64 + Send + Sync>,
 }
@@ -130,7 +130,7 @@ impl Runner {
         prepared.and_then(|prepared| self.board.histories.get(prepared.index))
     }
 
-    /// What each pipeline has cost so far, by name.
+    /// The cost of each pipeline so far, by name.
     pub fn costs(&self) -> impl Iterator<Item = (&str, Cost)> {
         self.pipelines.iter().map(|prepared| {
             let history = self.board.histories.get(prepared.index).map_or(0, History::bytes);

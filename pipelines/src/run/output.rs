@@ -69,7 +69,7 @@ pub struct Table {
     pub file: String,
     /// The titles of the columns behind `cycle` and `time`, with units.
     pub titles: Vec<String>,
-    /// What becomes of a file that is there already.
+    /// How a file that exists already is treated.
     pub existing: Existing,
 }
 

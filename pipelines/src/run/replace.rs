@@ -21,7 +21,7 @@ pub enum ReplaceError {
     Mesh {
         /// The pipeline.
         pipeline: String,
-        /// What is wrong, and what was expected.
+        /// The problem, and what was expected.
         message: String,
     },
 }

@@ -106,7 +106,7 @@ impl<'call> Rows<'call> {
         entry(array, format_args!("{}/{name}", self.path), index, limit)
     }
 
-    /// That a cell names a vertex that does not exist.
+    /// The error of a cell that names a vertex which does not exist.
     pub(super) fn no_such_vertex(&self, cell: usize, vertex: u32, vertices: usize) -> RunError {
         no_such_vertex(format_args!("{}/connectivity", self.path), cell, vertex.into(), vertices)
     }

@@ -11,10 +11,10 @@ const CHUNK: usize = 4096;
 /// From this least quality on, it is the mean that counts.
 pub(super) const ENOUGH: f64 = 0.8;
 
-/// What a sweep must add to the quality of each worn cell, in the mean.
+/// The least mean gain in quality per worn cell that makes a sweep worthwhile.
 const GAIN: f64 = 1e-3;
 
-/// What it must add to the mean or to the least where that is not enough yet.
+/// The least gain in the mean or the least quality while that is still too low.
 const REST: f64 = 1e-6;
 
 /// The quality of what can be moved, on all ranks.

@@ -32,7 +32,7 @@ fn cube_boundary(mesh: &Mesh) -> Vec<u32> {
     (0..).zip(mesh.points()).filter(|(_, point)| outside(point)).map(|(vertex, _)| vertex).collect()
 }
 
-/// The same mesh with every vertex inside the unit cube moved by up to `amount` along each axis.
+/// Moves every vertex inside the unit cube by up to `amount` along each axis.
 fn jiggled(mesh: &Mesh, amount: f64) -> Mesh {
     let mut points = mesh.points().to_vec();
     for (vertex, point) in points.iter_mut().enumerate() {

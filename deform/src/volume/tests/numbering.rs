@@ -4,7 +4,7 @@
 use super::*;
 use crate::mesh::shuffled;
 
-/// What each vertex of `mesh` has, from what those of the shuffled one have.
+/// Values in the order of the original mesh, from those in the order of the shuffled one.
 fn unshuffled(values: &[Vector], number: &[u32]) -> Vec<Vector> {
     number.iter().map(|&number| values[number as usize]).collect()
 }

@@ -47,7 +47,7 @@ MAAAAAAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAAAAAAAAAAAAAAAAACAPw==</DataAr
 <DataArray type="UInt8" Name="types" format="ascii">10</DataArray></Cells>
 <CellData><DataArray type="UInt8" Name="vtkGhostType" format="ascii">0</DataArray></CellData></Piece></UnstructuredGrid></VTKFile>"#;
 
-/// The same cell as a polyhedron in the way of file version 2.3.
+/// A polyhedron in the form of file version 2.3.
 const NEW_POLYHEDRA: &str = r#"<VTKFile type="UnstructuredGrid" version="2.3"><UnstructuredGrid><Piece NumberOfPoints="4" NumberOfCells="1">
 <Points><DataArray type="Float64" NumberOfComponents="3" format="ascii">0 0 0 1 0 0 0 1 0 0 0 1</DataArray></Points><Cells>
 <DataArray type="Int64" Name="connectivity" format="ascii">0 1 2 3</DataArray>

@@ -109,7 +109,7 @@ fn fields(mesh: &Mesh) -> Vec<Field> {
     ]
 }
 
-/// The same mesh as an extract whose features are those of its cells.
+/// A mesh as an extract whose features are those of its cells.
 fn extract(mesh: &Mesh) -> Extract {
     let names = vec!["even".to_owned(), "odd".to_owned()];
     let of_cells = (0..mesh.cells().len() as u32).map(|cell| cell % 2).collect();

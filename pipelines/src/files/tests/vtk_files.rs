@@ -188,7 +188,7 @@ fn vtk(arguments: &[&Path]) -> Option<String> {
     Some(String::from_utf8(output.stdout).unwrap())
 }
 
-/// What `read_back.py` prints of a file: every number as its bits.
+/// The output of `read_back.py` for a file: every number as its bits.
 pub(super) fn described(
     points: &[Vector],
     cells: &[(u8, Vec<u32>)],

@@ -15,7 +15,7 @@ use super::xml_file::{Array, Compression, Values, XmlFile};
 use super::{FACE_DIMENSION, FEATURES};
 use crate::extract::{Association, Extract, Field};
 
-/// What a file of VTK's holds, and how.
+/// The kind of a VTK file and its encoding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in super::super) enum Format {
     /// A .vtu file.

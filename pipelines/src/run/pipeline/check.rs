@@ -68,7 +68,7 @@ impl Prepared {
     }
 }
 
-/// What is wrong, each thing once.
+/// The problems, each once.
 #[derive(Default)]
 struct Noted {
     problems: Vec<Problem>,

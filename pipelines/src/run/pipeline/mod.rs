@@ -45,7 +45,7 @@ pub(super) struct Prepared {
     pub(super) name: Arc<str>,
     /// The stages, and those that derive what they need.
     stages: Vec<Stage>,
-    /// What each stage names, and what it keeps.
+    /// The names that each stage uses, and its state.
     names: Vec<Names>,
     states: Vec<State>,
     names_of_actions: Vec<Names>,
@@ -59,9 +59,9 @@ pub(super) struct Prepared {
     monitors: Vec<Monitor>,
     /// The errors of the last run, so that it is told once and not at every step.
     reported: HashSet<String>,
-    /// What the source stage keeps as long as the mesh does not move.
+    /// The source stage's pattern, kept as long as the mesh does not move.
     kept: Kept,
-    /// The same of a stage that leaves fewer triangles.
+    /// The decimated surface, kept as long as the mesh does not move.
     decimation: Option<Arc<Decimation>>,
 }
 
@@ -79,7 +79,7 @@ struct Progress<'a> {
     kept: Kept,
     decimation: Option<Arc<Decimation>>,
     extracted: Option<Extracted>,
-    /// What is handed out instead of the extract, on rank 0.
+    /// The decimated extract that replaces the extract, on rank 0.
     decimated: Option<Arc<Extract>>,
     is_decimated: bool,
     /// Fields of the extract that are used, but not selected.
@@ -95,7 +95,7 @@ struct Progress<'a> {
     outputs: &'a mut Vec<Output>,
 }
 
-/// What monitors and parameters are at a step.
+/// The values of monitors and parameters at a step.
 struct Seen<'a> {
     cycle: u64,
     time: f64,
@@ -113,7 +113,7 @@ impl Seen<'_> {
 }
 
 impl Progress<'_> {
-    /// What the monitors are so far.
+    /// The values of the monitors so far.
     fn seen(&self) -> Seen<'_> {
         Seen {
             cycle: self.snapshot.cycle,
@@ -148,7 +148,7 @@ impl Prepared {
         self.reported = keys;
     }
 
-    /// What a run begins with.
+    /// The state at the beginning of a run.
     fn begin<'a>(
         &mut self,
         snapshot: &'a Snapshot<'a>,

@@ -26,7 +26,7 @@ pub(super) enum Names {
     Line(Line),
 }
 
-/// What a stage keeps from run to run.
+/// The state that a stage keeps from run to run.
 #[derive(Debug)]
 pub(super) enum State {
     None,

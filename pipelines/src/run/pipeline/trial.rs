@@ -68,7 +68,7 @@ impl Prepared {
     }
 }
 
-/// What rank 0 has to say is what all ranks say. Collective.
+/// Broadcasts rank 0's error, if any. Collective.
 fn told_by_first(communicator: &dyn Communicator, said: Option<String>) -> Result<(), String> {
     let mut bytes = said.unwrap_or_default().into_bytes();
     communicator.broadcast(0, &mut bytes);

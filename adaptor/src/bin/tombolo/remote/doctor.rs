@@ -6,7 +6,7 @@ use tombolo::client::{Client, ClientError, Link, Settings};
 use super::{Target, read_link};
 use crate::{Failure, say};
 
-/// What is looked at, one after the other.
+/// The steps, in their order.
 const STEPS: [&str; 5] = ["link", "name", "connection", "server", "token"];
 
 pub(crate) fn doctor(target: &Target) -> Result<(), Failure> {
@@ -65,7 +65,7 @@ fn well(step: usize, link: &Link) -> String {
     }
 }
 
-/// What to do about it.
+/// The advice for an error.
 fn advice(error: &ClientError, link: Option<&Link>) -> String {
     let port = link.map_or(7070, Link::port);
     match error {

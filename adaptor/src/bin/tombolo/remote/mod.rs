@@ -101,7 +101,7 @@ pub(crate) fn run(task: &Task) -> Result<(), Failure> {
     done
 }
 
-/// What a failure of the client is to the program.
+/// The program's failure for an error of the client.
 pub(crate) fn failed(error: ClientError) -> Failure {
     match error {
         ClientError::Closed

@@ -55,7 +55,7 @@ pub(crate) fn watch(options: &Options) -> Result<(), Failure> {
     }
 }
 
-/// What is printed of an event.
+/// The line that is printed for an event.
 fn line(event: &Event) -> Option<String> {
     Some(match event {
         Event::Status(status) => status::line(status),
