@@ -3,24 +3,21 @@
  * a copy; the numbers of `views` and `featureBounds` are those of the newest frame.
  */
 import type { ConnectionState } from "./connection/connection";
-import type { ForecastInspection } from "./preview/forecast";
-import type { OrderRecord } from "./panels/orders";
-import type { QualitySummary, Role, Status, Vector } from "./connection/protocol";
+import type { QualitySummary, Role, RunEnd, Status, Vector } from "./connection/protocol";
 import type { Picture } from "./picture/scene";
+import type { OrderRecord, PreviewState } from "./store/state";
 
 export interface ViewInspection { bounds: [Vector, Vector] | null; points: number; triangles: number; topology: string | null }
 
-export interface PreviewInspection {
-  state: "none" | "waiting" | "shown" | "failed";
-  /** How far the edits would move any point of the surface. */
-  largest: number | null;
-  /** Milliseconds from the newest change of the form to its picture, and those of them that went into computing it. */
-  milliseconds: number | null;
-  computing: number | null;
-  bounds: [Vector, Vector] | null;
+export interface PreviewInspection extends PreviewState { bounds: [Vector, Vector] | null }
+
+export interface ForecastInspection {
+  state: "none" | "waiting" | "told" | "failed";
+  outcome: "applied" | "clamped" | "rejected" | null;
+  min: number | null;
+  inverted: number | null;
+  fraction: number | null;
   reason: string | null;
-  /** What is wrong with the shape; empty where it is sound, null as long as it was not looked at. */
-  faults: string | null;
 }
 
 export interface Inspection {
@@ -37,6 +34,8 @@ export interface Inspection {
   readonly status: Status | null;
   readonly quality: QualitySummary | null;
   readonly stack: readonly unknown[];
+  /** The last word of a run that has ended. */
+  readonly end: RunEnd | null;
   /** Handle and fixed features, by name. */
   readonly selection: { handle: string[]; fixed: string[] };
   /** The preview that is drawn, or why there is none. */

@@ -89,6 +89,8 @@ export class Connection {
     this.closed = true;
     this.clearTimer();
     this.socket?.close();
+    this.socket = null;
+    this.change("ended", "");
   }
 
   /** Tries again at once, if a connection is not there already. */

@@ -7,7 +7,9 @@ export type Json = null | boolean | number | string | Json[] | { [key: string]: 
 export type Role = "driver" | "watcher";
 
 export interface ViewInformation { name: string; kind: string }
-export interface FeatureInformation { name: string; faces: number; vertices: number; bounds: [Vector, Vector] }
+/** What a feature is to the solver; null where it has not said. */
+export type Condition = "inflow" | "outflow" | "wall" | "symmetry";
+export interface FeatureInformation { name: string; faces: number; vertices: number; bounds: [Vector, Vector]; condition?: Condition | null }
 export interface FieldInformation { name: string; association: Association; components: number }
 export interface ParameterInformation { name: string; value: number; minimum?: number | null; maximum?: number | null }
 
@@ -29,6 +31,8 @@ export interface Hello {
   fields: FieldInformation[];
   parameters: ParameterInformation[];
   stack: Json[];
+  /** How many orders can be taken back. */
+  undoable?: number;
   orders: OrderStatus[];
   defaults: { deform?: Json; guard?: Json; schedule?: Json };
 }
@@ -82,6 +86,8 @@ export interface ForecastAnswer {
     largest_displacement?: number | null;
     shapes?: number | null;
     sub_steps?: number | null;
+    /** Of one that would be rejected: the worst cells, the worst first. */
+    worst?: { cell: number; position: Vector; scaled_jacobian: number }[];
     quality?: QualitySummary | null;
     seconds?: { surface?: number; volume?: number; guard?: number } | null;
   };

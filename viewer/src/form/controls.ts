@@ -1,22 +1,21 @@
-/** One control for each kind of field: it shows a value, reads it back, and says what is wrong with it. */
-import { element, identifier } from "../dom";
-import { readNumber, words } from "../number";
+/** One control for each kind of field: it shows a value, reads it back, and says beside it what is wrong. */
 import type { Json } from "../connection/protocol";
+import { element, identifier, write as writeText } from "../dom";
+import { readNumber, words } from "../number";
+import type { Problem } from "../store/state";
+import { startOf, startOfObject } from "./schema";
 import type { Field, Property } from "./schema";
-
-/** Thrown by `read` when what stands in a control cannot be sent; the control is marked and `field` can take the focus. */
-export class InputError extends Error {
-  constructor(message: string, readonly field: HTMLElement | null) {
-    super(message);
-  }
-}
 
 export interface Control {
   root: HTMLElement;
-  /** The value to send; undefined where nothing is to be sent. Throws `InputError`. */
-  read(): Json | undefined;
-  write(value: Json): void;
+  /** The value to send; undefined where nothing is to be sent, or where something is wrong, which then is one of `problems`. */
+  read(problems: Problem[]): Json | undefined;
+  /** Shows a value; undefined for that with which the field begins. */
+  write(value: Json | undefined): void;
 }
+
+/** How a control is named: `path` tells it from others of its form, and a unit stands behind the number. */
+interface Naming { label: string; path: string; unit: string; hint: string }
 
 /** Makes a control of the caller's own for a property; null leaves it to the schema. */
 export type Special = (property: Property) => Control | null;
@@ -24,20 +23,25 @@ export type Special = (property: Property) => Control | null;
 const AXES = ["x", "y", "z"];
 const HARMONIC = ["1 · harmonic", "2 · biharmonic", "3 · triharmonic"];
 
-export function makeControl(field: Field, label: string, special: Special = () => null): Control {
+export function makeControl(field: Field, label: string, special: Special = () => null, naming: Partial<Naming> = {}): Control {
+  return make(field, { label, path: label, unit: "", hint: "", ...naming }, special);
+}
+
+function make(field: Field, naming: Naming, special: Special): Control {
   switch (field.kind) {
-    case "number": return numberControl(field, label);
-    case "vector": return vectorControl(field, label);
-    case "choice": return choiceControl(field, label);
-    case "boolean": return booleanControl(label);
-    case "text": return textControl(label, (text) => text, String);
-    case "matrix": return matrixControl(field, label);
-    case "numbers": return textControl(label, parseNumbers, (value) => (Array.isArray(value) ? value.join(", ") : ""));
-    case "names": return textControl(label, (text) => text.split(",").map((name) => name.trim()).filter(Boolean), (value) => (Array.isArray(value) ? value.join(", ") : ""));
-    case "optional": return optionalControl(field, label, special);
-    case "object": return objectControl(field.properties, special);
-    case "variants": return variantsControl(field, label, special);
-    case "json": return textControl(label, parseJson, (value) => JSON.stringify(value));
+    case "number": return numberControl(field, naming);
+    case "vector": return vectorControl(field, naming);
+    case "choice": return choiceControl(field, naming);
+    case "boolean": return booleanControl(naming);
+    case "text": return textControl(naming, (text) => text, String, "");
+    case "matrix": return matrixControl(field, naming);
+    case "numbers": return textControl(naming, parseNumbers, (value) => (Array.isArray(value) ? value.join(", ") : ""), undefined);
+    case "names": return textControl(naming, (text) => text.split(",").map((name) => name.trim()).filter(Boolean), (value) => (Array.isArray(value) ? value.join(", ") : ""), []);
+    case "list": return listControl(field, naming, special);
+    case "optional": return optionalControl(field, naming, special);
+    case "object": return objectControl(field.properties, special, naming.path);
+    case "variants": return variantsControl(field, naming, special);
+    case "json": return textControl(naming, parseJson, (value) => JSON.stringify(value), undefined);
   }
 }
 
@@ -51,182 +55,305 @@ function parseJson(text: string): Json | undefined {
 }
 
 function parseNumbers(text: string): Json | undefined {
-  const words = text.split(/[\s,]+/).filter(Boolean);
-  if (words.some((word) => !/^\d+$/.test(word))) throw new Error("must be whole numbers, parted by commas");
-  return words.length > 0 ? words.map(Number) : undefined;
+  const parts = text.split(/[\s,]+/).filter(Boolean);
+  if (parts.some((word) => !/^\d+$/.test(word))) throw new Error("must be whole numbers, parted by commas");
+  return parts.length > 0 ? parts.map(Number) : undefined;
 }
 
-function row(label: string, input: HTMLElement, hint = ""): HTMLElement {
+/** An input with its label, and room for what is wrong with it. */
+function row({ label, hint, unit }: Naming, input: HTMLElement, wrong: HTMLElement): HTMLElement {
   const id = identifier("field");
   input.id = id;
-  return element("div", { class: "field" }, element("label", { for: id, title: hint || undefined }, label), input);
+  const shown = unit === "" ? input : element("span", { class: "with-unit" }, input, element("span", { class: "unit" }, unit));
+  return element("div", { class: "field" }, element("label", { for: id, title: hint || undefined }, label), shown, wrong);
+}
+
+const wrongText = (): HTMLElement => element("small", { class: "wrong", hidden: true, id: identifier("wrong") });
+
+/** Shows what is wrong with an input beside it; empty for nothing. */
+export function mark(input: HTMLElement, wrong: HTMLElement, text: string): void {
+  wrong.hidden = text === "";
+  writeText(wrong, text);
+  if (text === "") {
+    input.removeAttribute("aria-invalid");
+    input.removeAttribute("aria-describedby");
+  } else {
+    input.setAttribute("aria-invalid", "true");
+    input.setAttribute("aria-describedby", wrong.id);
+  }
 }
 
 function numberInput(label: string): HTMLInputElement {
   return element("input", { type: "text", inputmode: "decimal", autocomplete: "off", spellcheck: "false", "aria-label": label });
 }
 
-/** Reads a number from an input within the bounds of its field, and marks the input when it cannot. */
-export function readInput(input: HTMLInputElement, field: Field & { kind: "number" }, label: string): number {
-  const value = readNumber(input.value);
-  const fail = (message: string): never => {
-    input.setAttribute("aria-invalid", "true");
-    input.title = `${label} ${message}`;
-    throw new InputError(`${label} ${message}`, input);
-  };
-  if (value === null) return fail(input.value.trim() === "" ? "is empty" : `“${input.value}” is not a number`);
-  if (field.integer && !Number.isInteger(value)) return fail("must be a whole number");
-  if (value < field.minimum || (field.exclusiveMinimum && value === field.minimum)) return fail(`must be ${field.exclusiveMinimum ? "more than" : "at least"} ${field.minimum}`);
-  if (value > field.maximum || (field.exclusiveMaximum && value === field.maximum)) return fail(`must be ${field.exclusiveMaximum ? "less than" : "at most"} ${field.maximum}`);
-  input.removeAttribute("aria-invalid");
-  input.title = "";
+/** The number that a text is, within the bounds of its field; or what is wrong with it. */
+export function numberFrom(text: string, field: Field & { kind: "number" }): number | string {
+  const value = readNumber(text);
+  if (value === null) return text.trim() === "" ? "is empty" : `“${text}” is not a number`;
+  if (field.integer && !Number.isInteger(value)) return "must be a whole number";
+  if (value < field.minimum || (field.exclusiveMinimum && value === field.minimum)) return `must be ${field.exclusiveMinimum ? "more than" : "at least"} ${field.minimum}`;
+  if (value > field.maximum || (field.exclusiveMaximum && value === field.maximum)) return `must be ${field.exclusiveMaximum ? "less than" : "at most"} ${field.maximum}`;
   return value;
 }
 
-function numberControl(field: Field & { kind: "number" }, label: string): Control {
-  const input = numberInput(label);
-  input.value = field.minimum > 0 && Number.isFinite(field.minimum) ? String(field.minimum) : "0";
-  return { root: row(label, input), read: () => readInput(input, field, label), write: (value) => { input.value = String(value); } };
+/** How a number is written into an input: all of it where that is short, else the digits that a person can use. */
+export function numberText(value: Json | undefined): string {
+  if (typeof value !== "number") return "";
+  const whole = String(value);
+  return whole.length <= 10 ? whole : String(Number(value.toPrecision(6)));
 }
 
-function vectorControl(field: Field & { kind: "vector" }, label: string): Control {
-  // What changes nothing, or is at least a direction.
-  const start = (i: number): string => (label === "factors" || ((label === "axis" || label === "normal") && i === field.length - 1) ? "1" : "0");
-  const names = field.length <= 3 ? AXES : Array.from({ length: field.length }, (_, i) => String(i + 1));
-  const inputs = Array.from({ length: field.length }, (_, i) => {
-    const input = numberInput(`${label} ${names[i]}`);
-    input.value = start(i);
-    return input;
-  });
-  const cells = inputs.map((input, i) => element("span", { class: "component" }, element("span", { "aria-hidden": "true" }, names[i]!), input));
-  const root = element("div", { class: "field", role: "group", "aria-label": label }, element("span", { class: "label" }, label), element("div", { class: "vector" }, ...cells));
+/** An input for a number. A value that was written into it and not touched since is read as it was, to the last bit. */
+function numberCell(field: Field & { kind: "number" }, label: string, wrong: HTMLElement): { input: HTMLInputElement; read(problems: Problem[]): number | undefined; write(value: Json | undefined): void } {
+  const input = numberInput(label);
+  let written: { text: string; value: number } | null = null;
   return {
-    root,
-    read: () => inputs.map((input, i) => readInput(input, field.item, `${label} ${names[i]}`)),
-    write: (value) => { if (Array.isArray(value)) inputs.forEach((input, i) => { input.value = String(value[i] ?? start(i)); }); },
+    input,
+    read: (problems) => {
+      const value = written !== null && input.value === written.text ? written.value : numberFrom(input.value, field);
+      if (typeof value === "number") {
+        mark(input, wrong, "");
+        return value;
+      }
+      mark(input, wrong, `${label} ${value}`);
+      problems.push({ field: label, text: `${label} ${value}` });
+      return undefined;
+    },
+    write: (value) => {
+      input.value = numberText(value);
+      written = typeof value === "number" ? { text: input.value, value } : null;
+      mark(input, wrong, "");
+    },
+  };
+}
+
+function numberControl(field: Field & { kind: "number" }, naming: Naming): Control {
+  const wrong = wrongText();
+  const cell = numberCell(field, naming.path, wrong);
+  cell.write(startOf(field));
+  return { root: row(naming, cell.input, wrong), read: cell.read, write: (value) => cell.write(value ?? startOf(field)) };
+}
+
+function vectorControl(field: Field & { kind: "vector" }, { label, path, unit, hint }: Naming): Control {
+  const names = field.length <= 3 ? AXES : Array.from({ length: field.length }, (_, i) => String(i + 1));
+  const wrongs = Array.from({ length: field.length }, wrongText);
+  const cells = wrongs.map((wrong, i) => numberCell(field.item, `${path} ${names[i]}`, wrong));
+  const shown = cells.map((cell, i) => element("span", { class: "component" }, element("span", { "aria-hidden": "true" }, names[i]!), cell.input));
+  const start = startOf(field);
+  const write = (value: Json | undefined): void => cells.forEach((cell, i) => cell.write(Array.isArray(value) ? value[i] : Array.isArray(start) ? start[i] : 0));
+  write(undefined);
+  return {
+    root: element("div", { class: "field vector-field", role: "group", "aria-label": path },
+      element("span", { class: "label", title: hint || undefined }, label, unit === "" ? null : element("small", {}, unit)),
+      element("div", { class: "vector" }, ...shown), ...wrongs),
+    read: (problems) => {
+      const values = cells.map((cell) => cell.read(problems));
+      return values.every((value) => value !== undefined) ? values : undefined;
+    },
+    write,
   };
 }
 
 /** Rows of numbers; they begin as the identity. */
-function matrixControl(field: Field & { kind: "matrix" }, label: string): Control {
-  const rows = Array.from({ length: field.rows }, (_, i) => {
-    const control = vectorControl(field.row, `${label} row ${i + 1}`);
-    control.write(Array.from({ length: field.row.length }, (_, k) => (k === i ? 1 : 0)));
-    return control;
-  });
+function matrixControl(field: Field & { kind: "matrix" }, naming: Naming): Control {
+  const rows = Array.from({ length: field.rows }, (_, i) =>
+    vectorControl(field.row, { ...naming, unit: "", label: `${naming.label} row ${i + 1}`, path: `${naming.path} row ${i + 1}` }));
+  const start = startOf(field) as Json[];
+  const write = (value: Json | undefined): void => rows.forEach((control, i) => control.write(Array.isArray(value) ? value[i] : start[i]));
+  write(undefined);
   return {
-    root: element("div", { role: "group", "aria-label": label }, ...rows.map((control) => control.root)),
-    read: () => rows.map((control) => control.read() as Json),
-    write: (value) => { if (Array.isArray(value)) rows.forEach((control, i) => { if (value[i] !== undefined) control.write(value[i]!); }); },
+    root: element("div", { role: "group", "aria-label": naming.path }, ...rows.map((control) => control.root)),
+    read: (problems) => {
+      const values = rows.map((control) => control.read(problems));
+      return values.every((value) => value !== undefined) ? values : undefined;
+    },
+    write,
   };
 }
 
-function choiceControl(field: Field & { kind: "choice" }, label: string): Control {
+function choiceControl(field: Field & { kind: "choice" }, naming: Naming): Control {
   const select = element("select", {}, ...field.options.map((option, i) => {
-    const title = label === "harmonic order" && typeof option.value === "number" ? HARMONIC[option.value - 1] ?? option.title : option.title;
+    const title = naming.path === "harmonic order" && typeof option.value === "number" ? HARMONIC[option.value - 1] ?? option.title : option.title;
     return element("option", { value: i }, title);
   }));
   return {
-    root: row(label, select),
+    root: row(naming, select, wrongText()),
     read: () => field.options[Number(select.value)]?.value,
-    write: (value) => {
-      const index = field.options.findIndex((option) => option.value === value);
-      if (index >= 0) select.value = String(index);
-    },
+    write: (value) => { select.value = String(Math.max(0, field.options.findIndex((option) => option.value === value))); },
   };
 }
 
-function booleanControl(label: string): Control {
+function booleanControl(naming: Naming): Control {
   const input = element("input", { type: "checkbox" });
-  return { root: row(label, input), read: () => input.checked, write: (value) => { input.checked = value === true; } };
+  return { root: row(naming, input, wrongText()), read: () => input.checked, write: (value) => { input.checked = value === true; } };
 }
 
-function textControl(label: string, parse: (text: string) => Json | undefined, format: (value: Json) => string): Control {
+function textControl(naming: Naming, parse: (text: string) => Json | undefined, format: (value: Json) => string, start: Json | undefined): Control {
   const input = element("input", { type: "text", autocomplete: "off", spellcheck: "false" });
+  const wrong = wrongText();
   return {
-    root: row(label, input),
-    read: () => {
+    root: row(naming, input, wrong),
+    read: (problems) => {
       try {
-        return parse(input.value);
+        const value = parse(input.value);
+        mark(input, wrong, "");
+        return value;
       } catch (error) {
-        throw new InputError(`${label} ${error instanceof Error ? error.message : String(error)}`, input);
+        const text = `${naming.path} ${error instanceof Error ? error.message : String(error)}`;
+        mark(input, wrong, text);
+        problems.push({ field: naming.path, text });
+        return undefined;
       }
     },
-    write: (value) => { input.value = format(value); },
+    write: (value) => {
+      const shown = value ?? start;
+      input.value = shown === undefined ? "" : format(shown);
+      mark(input, wrong, "");
+    },
   };
 }
 
-function optionalControl(field: Field & { kind: "optional" }, label: string, special: Special): Control {
-  const inner = makeControl(field.field, label, special);
+function optionalControl(field: Field & { kind: "optional" }, naming: Naming, special: Special): Control {
+  const inner = make(field.field, naming, special);
   const input = element("input", { type: "checkbox", id: identifier("field"), onchange: () => show() });
   const body = element("div", { class: "optional" }, inner.root);
+  const wrong = wrongText();
   const show = (): void => { body.hidden = !input.checked; };
   show();
   return {
-    root: element("div", { class: "choice" }, element("div", { class: "field" }, element("label", { for: input.id }, `set ${label}`), input), body),
-    read: () => {
-      const value = input.checked ? inner.read() : undefined;
+    root: element("div", { class: "choice" }, element("div", { class: "field" }, element("label", { for: input.id, title: naming.hint || undefined }, naming.label), input, wrong), body),
+    read: (problems) => {
+      mark(input, wrong, "");
+      if (!input.checked) return undefined;
+      const before = problems.length;
+      const value = inner.read(problems);
       // What was ticked and left empty is no wish to leave it out.
-      if (input.checked && value === undefined) throw new InputError(`${label} is empty`, inner.root.querySelector("input, select") ?? input);
+      if (value === undefined && problems.length === before) {
+        const text = `${naming.path} is empty`;
+        mark(input, wrong, text);
+        problems.push({ field: naming.path, text });
+      }
       return value;
     },
     write: (value) => {
-      input.checked = value !== null;
-      if (value !== null) inner.write(value);
+      input.checked = value !== undefined && value !== null;
+      if (input.checked) inner.write(value);
+      mark(input, wrong, "");
       show();
     },
   };
 }
 
-export function objectControl(properties: Property[], special: Special = () => null): Control {
-  const parts = properties.map((property) => {
-    const control = special(property) ?? makeControl(property.field, words(property.name), special);
-    if (property.description) control.root.title = property.description;
-    if (property.initial !== undefined) control.write(property.initial);
-    return { property, control };
-  });
+/** Entries of one kind, one below the other, each of which can be taken out. They are added by hand in the picture. */
+function listControl(field: Field & { kind: "list" }, naming: Naming, special: Special): Control {
+  const root = element("div", { class: "list", role: "group", "aria-label": naming.path });
+  const empty = element("p", { class: "hint" }, naming.hint || `No ${naming.label} yet.`);
+  let entries: { control: Control; shown: HTMLElement }[] = [];
+  const show = (): void => root.replaceChildren(...(entries.length > 0 ? entries.map((entry) => entry.shown) : [empty]));
+  const entry = (value: Json, index: number): { control: Control; shown: HTMLElement } => {
+    const label = `${naming.label.replace(/s$/, "")} ${index + 1}`;
+    const control = objectControl(field.item.properties, special, label);
+    control.write(value);
+    const remove = element("button", {
+      type: "button", class: "small", title: "Take it out", "aria-label": `Take out ${label}`,
+      onclick: () => {
+        entries = entries.filter((other) => other !== made);
+        show();
+        root.dispatchEvent(new Event("input", { bubbles: true }));
+      },
+    }, "×");
+    const made = { control, shown: element("div", { class: "entry" }, element("div", { class: "line" }, element("span", { class: "label" }, label), remove), control.root) };
+    return made;
+  };
+  show();
   return {
-    root: element("div", { class: "object" }, ...parts.map(({ control }) => control.root)),
-    read: () => {
-      const value: { [key: string]: Json } = {};
-      for (const { property, control } of parts) {
-        const read = control.read();
-        if (read !== undefined) value[property.name] = read;
-        else if (property.required) throw new InputError(`${words(property.name)} is empty`, control.root.querySelector("input, select"));
-      }
-      return value;
+    root,
+    read: (problems) => {
+      const values = entries.map(({ control }) => control.read(problems));
+      return values.every((value) => value !== undefined) ? values : undefined;
     },
     write: (value) => {
-      if (typeof value !== "object" || value === null || Array.isArray(value)) return;
-      for (const { property, control } of parts) if (value[property.name] !== undefined) control.write(value[property.name]!);
+      const values = Array.isArray(value) ? value : [];
+      // The inputs stay what they are while they are written into: a hand may be on one of them.
+      if (values.length === entries.length) entries.forEach(({ control }, i) => control.write(values[i]!));
+      else {
+        entries = values.map(entry);
+        show();
+      }
     },
   };
 }
 
-function variantsControl(field: Field & { kind: "variants" }, label: string, special: Special): Control {
+/** A value that is shown elsewhere or nowhere, and kept. */
+export function keepingControl(): Control {
+  let kept: Json | undefined;
+  return { root: element("span", { hidden: true }), read: () => kept, write: (value) => { kept = value; } };
+}
+
+/** The controls of an object: by groups, and what is rarely needed folded away. `within` is what the names of its fields begin with. */
+export function objectControl(properties: readonly Property[], special: Special = () => null, within = ""): Control {
+  const start = startOfObject(properties);
+  const parts = properties.map((property) => {
+    const path = within === "" ? words(property.name) : `${within} ${words(property.name)}`;
+    const control = special(property) ?? (property.hidden ? keepingControl()
+      : make(property.field, { label: property.label, path, unit: property.unit, hint: property.description }, special));
+    control.write(start[property.name]);
+    return { property, path, control };
+  });
+  const folded = parts.filter(({ property }) => property.advanced && !property.hidden);
+  const open = parts.filter((part) => !folded.includes(part));
+  const groups = [...new Set(open.map(({ property }) => property.group))];
+  const root = element("div", { class: "object" },
+    ...groups.flatMap((group) => {
+      const roots = open.filter(({ property }) => property.group === group).map(({ control }) => control.root);
+      return group === "" ? roots : [element("div", { class: "group", role: "group", "aria-label": group }, element("h4", {}, group), ...roots)];
+    }),
+    folded.length > 0 ? element("details", { class: "advanced" }, element("summary", {}, "Advanced"), ...folded.map(({ control }) => control.root)) : null);
+  return {
+    root,
+    read: (problems) => {
+      const value: { [key: string]: Json } = {};
+      const before = problems.length;
+      for (const { property, path, control } of parts) {
+        const known = problems.length;
+        const read = control.read(problems);
+        if (read !== undefined) value[property.name] = read;
+        else if (property.required && problems.length === known) problems.push({ field: path, text: `${path} is empty` });
+      }
+      return problems.length === before || within === "" ? value : undefined;
+    },
+    write: (value) => {
+      const values = typeof value === "object" && value !== null && !Array.isArray(value) ? value : start;
+      for (const { property, control } of parts) control.write(values[property.name] ?? undefined);
+    },
+  };
+}
+
+function variantsControl(field: Field & { kind: "variants" }, naming: Naming, special: Special): Control {
   // Variants that are a single number read as one line: "every [10] steps".
-  const controls = field.options.map((option) => makeControl(option.field, option.field.kind === "number" ? label : words(option.key), special));
   const inline = field.options.every((option) => option.field.kind === "number");
-  const select = element("select", { "aria-label": `${label}: kind`, onchange: () => show() }, ...field.options.map((option, i) => element("option", { value: i }, words(option.key))));
+  const controls = field.options.map((option) => make(option.field, inline
+    ? { ...naming, unit: "" } : { label: option.label, path: `${naming.path} ${words(option.key)}`, unit: option.unit, hint: option.description }, special));
+  const select = element("select", { "aria-label": `${naming.path}: kind`, onchange: () => show() }, ...field.options.map((option, i) => element("option", { value: i }, option.label)));
   const body = element("div", { class: "variant" }, ...controls.map((control) => control.root));
   const show = (): void => controls.forEach((control, i) => { control.root.hidden = String(i) !== select.value; });
   show();
   const root = inline
     ? element("div", { class: "inline" }, body, select)
-    : element("div", { class: "choice" }, element("div", { class: "field" }, element("span", { class: "label" }, label), select), body);
+    : element("div", { class: "choice" }, element("div", { class: "field" }, element("span", { class: "label", title: naming.hint || undefined }, naming.label), select), body);
   return {
     root,
-    read: () => {
+    read: (problems) => {
       const index = Number(select.value);
-      const value = controls[index]?.read();
+      const value = controls[index]?.read(problems);
       return value === undefined ? undefined : { [field.options[index]!.key]: value };
     },
     write: (value) => {
-      if (typeof value !== "object" || value === null || Array.isArray(value)) return;
-      const index = field.options.findIndex((option) => Object.hasOwn(value, option.key));
-      if (index < 0) return;
+      const values = typeof value === "object" && value !== null && !Array.isArray(value) ? value : {};
+      const index = Math.max(0, field.options.findIndex((option) => Object.hasOwn(values, option.key)));
       select.value = String(index);
-      controls[index]!.write(value[field.options[index]!.key]!);
+      controls.forEach((control, i) => control.write(i === index ? values[field.options[i]!.key] : undefined));
       show();
     },
   };

@@ -1,187 +1,177 @@
-/** The form for an order: made from the schema that the server sends, never from knowledge of its own. */
-import type { Control, Special } from "./controls";
-import { InputError, makeControl, objectControl } from "./controls";
-import { element, write } from "../dom";
-import { digits, words } from "../number";
+/** The form for an order: made from the schema that the simulation sends, never from knowledge of its own. */
 import type { FeatureInformation, Json } from "../connection/protocol";
-import type { OrderForm } from "./schema";
-import { orderForm } from "./schema";
-import type { Part, Selection } from "../store/selection";
+import { element, write } from "../dom";
+import { digits } from "../number";
+import type { Action } from "../store/actions";
+import { bodyOf, isObject } from "../store/draft";
+import type { Part, Problem, State } from "../store/state";
+import { sameJson } from "../store/store";
+import type { Store } from "../store/store";
+import { keepingControl, objectControl } from "./controls";
+import type { Control, Special } from "./controls";
+import { ROLES } from "./schema";
+import type { OrderForm, Property, Values } from "./schema";
 
-type JsonObject = { [key: string]: Json };
-const PARTS: Record<string, Part> = { features: "handle", fixed: "fixed" };
 /** Files lie with the solver: no order over the network may name one. */
 const FILE = "file";
 
 export class EditForm {
   private form: OrderForm | null = null;
-  private source = "";
-  private features: FeatureInformation[] = [];
   private action: HTMLSelectElement | null = null;
   private edits: Control[] = [];
-  private settings: Control | null = null;
+  private settings: Control = keepingControl();
   private readonly table = element("div", { class: "features", role: "group", "aria-label": "Features" });
   private readonly description = element("p", { class: "hint" });
+  /** What the controls show, as they were last read or written. */
+  private shown: { key: string | null; body: Values; settings: Values } = { key: null, body: {}, settings: {} };
 
-  constructor(private readonly root: HTMLElement, private readonly selection: Selection) {
-    selection.onChange(() => this.keepInStep());
+  constructor(private readonly root: HTMLElement, private readonly store: Store<State, Action>) {
+    store.watch((state) => state.form, (form) => this.build(form));
+    store.watch((state) => state.hello?.features ?? [], (features) => this.showFeatures(features), sameJson);
+    store.watch((state) => state.selection, () => this.showParts());
+    store.watch((state) => state.draft, () => this.showDraft());
+    for (const event of ["input", "change"]) root.addEventListener(event, (input) => this.changed(input.target as HTMLElement));
   }
 
-  /** Shows the features; the part that each plays stays as it is. */
-  setFeatures(features: FeatureInformation[]): void {
-    if (JSON.stringify(features.map((feature) => [feature.name, feature.faces])) === JSON.stringify(this.features.map((feature) => [feature.name, feature.faces]))) return;
-    this.features = features;
+  /** The input that has something wrong in it, if there is one. */
+  focusProblem(): void {
+    const [wrong] = this.root.querySelectorAll<HTMLElement>('[aria-invalid="true"]');
+    (wrong ?? this.table.querySelector("input"))?.focus();
+  }
+
+  private showFeatures(features: readonly FeatureInformation[]): void {
     this.table.replaceChildren(
       element("div", { class: "row head", "aria-hidden": "true" }, element("span", {}, "Feature"), element("span", {}, "Handle"), element("span", {}, "Fixed")),
       ...features.map((feature) => this.featureRow(feature)),
     );
     if (features.length === 0) this.table.replaceChildren(element("p", { class: "hint" }, "This mesh has no features."));
-    this.keepInStep();
+    this.showParts();
   }
 
-  private featureRow(feature: FeatureInformation): HTMLElement {
-    const box = (part: Part): HTMLInputElement => element("input", {
-      type: "checkbox", "data-part": part, "aria-label": `${feature.name}: ${part}`, class: part,
-      onchange: (event) => this.selection.set(feature.name, (event.target as HTMLInputElement).checked ? part : null),
-    });
-    const low = feature.bounds?.[0];
-    const high = feature.bounds?.[1];
-    const size = low && high ? `, extent ${[0, 1, 2].map((k) => digits(high[k]! - low[k]!, 3)).join(" × ")}` : "";
+  private featureRow({ name, faces, bounds, condition }: FeatureInformation): HTMLElement {
+    const box = (part: Part): HTMLElement => element("label", { class: "box" }, element("input", {
+      type: "checkbox", "data-part": part, "aria-label": `${name}: ${part}`, class: part,
+      onchange: (event) => this.store.dispatch({ type: "part", feature: name, part: (event.target as HTMLInputElement).checked ? part : null }),
+    }));
+    const hover = (feature: string | null) => () => this.store.dispatch({ type: "hover", feature });
+    const size = bounds ? `, extent ${[0, 1, 2].map((k) => digits(bounds[1][k]! - bounds[0][k]!, 3)).join(" × ")}` : "";
     return element("div", {
-      class: "row", "data-feature": feature.name, title: `${feature.faces} faces${size}`,
-      onmouseenter: () => { this.selection.hovered = feature.name; },
-      onmouseleave: () => { this.selection.hovered = null; },
-      onfocusin: () => { this.selection.hovered = feature.name; },
-      onfocusout: () => { this.selection.hovered = null; },
-    }, element("span", { class: "name" }, feature.name), box("handle"), box("fixed"));
+      class: "row", "data-feature": name, title: `${faces} faces${size}`,
+      onmouseenter: hover(name), onmouseleave: hover(null), onfocusin: hover(name), onfocusout: hover(null),
+    }, element("span", { class: "name" }, name, condition ? element("small", { class: "condition", "data-condition": condition }, condition) : null), box("handle"), box("fixed"));
   }
 
-  private keepInStep(): void {
+  private showParts(): void {
+    const { parts, hovered } = this.store.state.selection;
     for (const row of this.table.querySelectorAll<HTMLElement>("[data-feature]")) {
       const name = row.dataset.feature ?? "";
-      const part = this.selection.get(name);
-      row.classList.toggle("hover", this.selection.hovered === name);
-      for (const box of row.querySelectorAll<HTMLInputElement>("input")) box.checked = box.dataset.part === part;
+      row.classList.toggle("hover", hovered === name);
+      for (const box of row.querySelectorAll<HTMLInputElement>("input")) box.checked = box.dataset.part === parts[name];
     }
   }
 
-  /** Builds the form anew when the schema changed; what stands in it is kept otherwise. */
-  setSchema(schema: Json | undefined, defaults: { schedule?: Json; deform?: Json; guard?: Json }): void {
-    const source = JSON.stringify([schema, defaults]);
-    if (source === this.source) return;
-    this.source = source;
-    this.form = orderForm(schema);
-    if (!this.form) {
-      this.root.replaceChildren(element("p", { class: "hint" }, "The simulation does not say which edits it can make."));
+  private build(form: OrderForm | null): void {
+    this.form = form;
+    this.edits = [];
+    this.action = null;
+    if (!form) {
+      this.root.replaceChildren(element("p", { class: "hint" }, "The form appears once the simulation has said which edits it can make."));
       return;
     }
-    const special: Special = (property) => (PARTS[property.name] && property.field.kind === "names" ? this.featureControl(PARTS[property.name]!)
-      : property.name === FILE ? { root: element("span", { hidden: true }), read: () => undefined, write: () => undefined } : null);
-    this.edits = this.form.edits.map((edit) => makeControl(edit.field, words(edit.key), special));
-    this.action = element("select", { id: "action", onchange: () => this.showAction() }, ...this.form.edits.map((edit, i) => element("option", { value: i }, words(edit.key))));
-    const preferred = this.form.edits.findIndex((edit) => edit.key === "scale_direction");
-    if (preferred >= 0) this.action.value = String(preferred);
+    const special: Special = (property) => (ROLES[property.name] ? keepingControl() : property.name === FILE ? keepingControl() : null);
+    this.edits = form.edits.map((edit) => objectControl(edit.field.kind === "object" ? edit.field.properties : [], special));
+    this.action = element("select", { id: "action" }, ...form.edits.map((edit, i) => element("option", { value: i }, edit.label)));
     this.root.replaceChildren(
       element("div", { class: "field" }, element("label", { for: "action" }, "action"), this.action), this.description,
-      this.table, ...this.edits.map((control) => control.root), this.settingsPart(this.form, defaults),
+      this.table, ...this.edits.map((control) => control.root), this.settingsPart(form),
     );
-    this.showAction();
-    this.keepInStep();
+    this.shown = { key: null, body: {}, settings: {} };
+    this.showDraft();
   }
 
-  /** A property that the table of features stands for: it has nothing of its own to show. */
-  private featureControl(part: Part): Control {
-    const root = element("span", { hidden: true });
-    return {
-      root,
-      read: () => {
-        const chosen = this.selection.chosen(part, this.features.map((feature) => feature.name));
-        return chosen.length > 0 || part === "fixed" ? chosen : undefined;
-      },
-      write: () => undefined,
-    };
-  }
-
-  /** The schedule stands open; what else an order can set is folded away, and sent only where it is set. */
-  private settingsPart(form: OrderForm, defaults: { [key: string]: Json | undefined }): HTMLElement {
-    const unwrap = form.settings.map((property) =>
-      property.name === "schedule" && property.field.kind === "optional" ? { ...property, field: property.field.field } : property);
-    const open = unwrap.filter((property) => property.name === "schedule");
-    const folded = unwrap.filter((property) => property.name !== "schedule").map((property) =>
-      property.field.kind === "optional" ? property : { ...property, field: { kind: "optional" as const, field: property.field } });
-    const schedule = objectControl(open.map((property) => ({ ...property, initial: undefined })));
-    const others = objectControl(folded.map((property) => ({ ...property, initial: undefined })));
-    if (defaults.schedule) schedule.write({ schedule: defaults.schedule });
-    // The values of the server stand ready in the folded part, unticked.
-    for (const property of folded) {
-      const value = defaults[property.name];
-      if (value !== undefined && value !== null) {
-        others.write({ [property.name]: value });
-        others.write({ [property.name]: null });
-      }
-    }
+  /** The schedule as one sentence, which unfolds; what else an order can set is sent only where it is set. */
+  private settingsPart(form: OrderForm): HTMLElement {
+    const isSchedule = (property: Property): boolean => property.name === "schedule";
+    const unwrapped = form.settings.map((property) => ({
+      ...property, initial: undefined, advanced: false,
+      field: isSchedule(property) === (property.field.kind === "optional")
+        ? (property.field.kind === "optional" ? property.field.field : { kind: "optional" as const, field: property.field }) : property.field,
+    }));
+    const schedule = objectControl(unwrapped.filter(isSchedule));
+    const others = unwrapped.filter((property) => !isSchedule(property));
+    const rest = objectControl(others);
+    const sentence = element("summary", {});
     this.settings = {
       root: element("div"),
-      read: () => ({ ...(schedule.read() as JsonObject), ...(others.read() as JsonObject) }),
-      write: () => undefined,
+      read: (problems) => {
+        const values: Values = { ...(schedule.read(problems) as Values), ...(rest.read(problems) as Values) };
+        write(sentence, scheduleSentence(values.schedule));
+        return values;
+      },
+      write: (value) => {
+        schedule.write(value);
+        rest.write(value);
+        write(sentence, scheduleSentence(isObject(value) ? value.schedule : undefined));
+      },
     };
-    return element("div", {}, open.length > 0 ? element("h3", {}, "Schedule") : null, schedule.root,
-      folded.length > 0 ? element("details", {}, element("summary", {}, `More: ${folded.map((property) => words(property.name)).join(", ")}`), others.root) : null);
+    return element("div", { class: "settings" },
+      form.settings.some(isSchedule) ? element("details", { class: "schedule" }, sentence, schedule.root) : null,
+      others.length > 0 ? element("details", {}, element("summary", {}, `More: ${others.map((property) => property.label).join(", ")}`), rest.root) : null);
   }
 
-  private showAction(): void {
-    const index = Number(this.action?.value ?? 0);
+  /** Brings the controls in line with what is composed; those that show it already are left as they are. */
+  private showDraft(): void {
+    const { form, action } = this;
+    if (!form || !action) return;
+    const { draft } = this.store.state;
+    const index = Math.max(0, form.edits.findIndex((edit) => edit.key === draft.key));
+    const edit = form.edits[index];
+    action.value = String(index);
+    action.disabled = draft.updating !== null;
     this.edits.forEach((control, i) => { control.root.hidden = i !== index; });
-    const text = this.form?.edits[index]?.description ?? "";
-    write(this.description, text);
-    this.description.hidden = text === "";
-    this.table.hidden = this.form?.edits[index]?.field.kind !== "object";
+    write(this.description, edit?.description ?? "");
+    this.description.hidden = this.description.textContent === "";
+    this.table.hidden = edit?.field.kind !== "object";
+    const next = { key: draft.key, body: bodyOf(draft), settings: draft.settings };
+    // Where something is wrong, what stands in the input is not in the body: it is not for this to wipe it out.
+    if (draft.problems.length > 0 && draft.key === this.shown.key) return;
+    if (next.key !== this.shown.key || !sameJson(next.body, this.shown.body)) this.edits[index]?.write(next.body);
+    if (!sameJson(next.settings, this.shown.settings)) this.settings.write(next.settings);
+    this.shown = next;
   }
 
-  /** Chooses an action and fills in some of its fields; false where there is no such action. */
-  compose(key: string, values: JsonObject): boolean {
-    const index = this.form?.edits.findIndex((edit) => edit.key === key) ?? -1;
-    if (index < 0 || !this.action) return false;
-    this.action.value = String(index);
-    this.edits[index]!.write(values);
-    this.showAction();
-    return true;
-  }
-
-  /** The order that the form describes. Throws `InputError` when something is missing or wrong. */
-  read(): JsonObject {
-    if (!this.form || !this.action) throw new InputError("There is no edit to make yet.", null);
-    const index = Number(this.action.value);
-    const edit = this.form.edits[index]!;
-    const body = (this.edits[index]!.read() ?? {}) as JsonObject;
-    const needed = edit.field.kind === "object" ? edit.field.oneOf ?? [] : [];
-    if (needed.length > 0 && needed.every((name) => body[name] === undefined)) {
-      throw new InputError("Choose at least one feature as the handle (click it in the picture, or tick it in the list), or set a region.", this.table.querySelector("input"));
+  private changed(target: HTMLElement): void {
+    const { form, action } = this;
+    if (!form || !action || this.table.contains(target)) return;
+    const edit = form.edits[Number(action.value)];
+    if (!edit) return;
+    if (target === action) {
+      this.store.dispatch({ type: "action chosen", key: edit.key });
+      return;
     }
-    return { edits: [{ [edit.key]: body }], ...((this.settings?.read() ?? {}) as JsonObject) };
+    const problems: Problem[] = [];
+    const body = (this.edits[Number(action.value)]!.read(problems) ?? {}) as Values;
+    const settings = (this.settings.read(problems) ?? {}) as Values;
+    this.shown = { key: edit.key, body, settings };
+    this.store.dispatch({ type: "form read", key: edit.key, body, settings, problems, step: `input ${target.id || target.getAttribute("aria-label")}` });
   }
 }
 
-/** An order in words, for the list of orders. */
-export function describeOrder(order: Json): string {
-  if (typeof order !== "object" || order === null || Array.isArray(order)) return "order";
-  if (order.undo !== undefined) return order.undo === 1 || order.undo === null ? "undo" : `undo ${JSON.stringify(order.undo)} orders`;
-  const edits = Array.isArray(order.edits) ? order.edits : Array.isArray(order.stack) ? order.stack : [];
-  const parts = edits.map(describeEdit);
-  return parts.length > 0 ? parts.join("; ") : Array.isArray(order.stack) ? "back to the reference shape" : "order";
+/** The settings that an order begins with: of the server's own only the schedule is always sent. */
+export function initialSettings(defaults: { schedule?: Json }): Values {
+  return defaults.schedule === undefined || defaults.schedule === null ? {} : { schedule: defaults.schedule };
 }
 
-export function describeEdit(edit: Json): string {
-  if (typeof edit !== "object" || edit === null || Array.isArray(edit)) return "edit";
-  const [key, body] = Object.entries(edit)[0] ?? ["edit", null];
-  if (typeof body !== "object" || body === null || Array.isArray(body)) return words(key);
-  const features = Array.isArray(body.features) ? ` ${body.features.join(", ")}` : "";
-  const region = typeof body.region === "object" && body.region !== null ? ` in a ${words(Object.keys(body.region)[0] ?? "region")}` : "";
-  const amount = [body.by, body.factors, body.distance].find((value) => value !== undefined);
-  const numbers = Array.isArray(amount) ? amount : amount === undefined ? [] : [amount];
-  const shown = numbers.map((value) => (typeof value === "number" ? digits(value, 3) : String(value)));
-  const turn = typeof body.degrees === "number" ? ` by ${digits(body.degrees, 3)}°` : "";
-  const joined = body.factors !== undefined ? ` × (${shown.join(", ")})` : body.by !== undefined ? ` by (${shown.join(", ")})` : shown.length ? ` by ${shown[0]}` : turn;
-  const name = typeof body.name === "string" ? `${body.name}: ` : "";
-  return `${name}${words(key)}${features}${region}${joined}${body.muted === true ? " (muted)" : ""}`;
+/** A schedule in one sentence, such as "10 shapes over 20 steps". */
+export function scheduleSentence(schedule: Json | undefined): string {
+  if (!isObject(schedule)) return "Schedule";
+  const { steps, every } = schedule;
+  if (typeof steps !== "number") return "Schedule";
+  const shapes = steps === 1 ? "1 shape" : `${steps} shapes`;
+  if (isObject(every) && typeof every.steps === "number") {
+    const all = steps * every.steps;
+    return steps === 1 ? "In 1 shape, at once" : `${shapes} over ${all} ${all === 1 ? "step" : "steps"}`;
+  }
+  if (isObject(every) && typeof every.time === "number") return `${shapes} over ${digits(steps * every.time, 3)} of simulated time`;
+  return shapes;
 }

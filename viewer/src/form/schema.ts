@@ -5,6 +5,8 @@
  * for JSON, so that nothing the server can do is out of reach.
  */
 import type { Json } from "../connection/protocol";
+import { words } from "../number";
+import type { Part } from "../store/state";
 
 export type Field =
   | { kind: "number"; integer: boolean; minimum: number; maximum: number; exclusiveMinimum: boolean; exclusiveMaximum: boolean }
@@ -16,11 +18,38 @@ export type Field =
   | { kind: "numbers" }
   | { kind: "names" }
   | { kind: "object"; properties: Property[]; oneOf?: string[] }
-  | { kind: "variants"; options: { key: string; field: Field; description: string }[] }
+  | { kind: "variants"; options: Variant[] }
+  | { kind: "list"; item: Field & { kind: "object" } }
   | { kind: "optional"; field: Field }
   | { kind: "json" };
 
-export interface Property { name: string; required: boolean; field: Field; description: string; initial: Json | undefined }
+export interface Variant { key: string; label: string; unit: string; field: Field; description: string }
+
+/** The fields of an edit that the selection stands for. */
+export const ROLES: Readonly<Record<string, Part>> = { features: "handle", fixed: "fixed" };
+
+/** What the annotations of the schema say of how a property is shown. */
+export interface Presentation {
+  label: string;
+  /** Behind the number, such as "°"; empty for none. */
+  unit: string;
+  /** Under which heading it stands; empty for none. */
+  group: string;
+  /** Rarely needed: it is folded away. */
+  advanced: boolean;
+  /** Shown elsewhere or nowhere; what is written into it is kept. */
+  hidden: boolean;
+  /** Of an amount: its value where nothing is asked for. */
+  neutral: Json | undefined;
+}
+
+export interface Property extends Presentation { name: string; required: boolean; field: Field; description: string; initial: Json | undefined }
+
+/** An edit that there is: its name in the JSON, how it is asked for, and what stands in its form before anything is asked. */
+export interface EditKind { key: string; label: string; field: Field; description: string; neutral: Values }
+
+/** The fields of an edit, as JSON. */
+export type Values = { [key: string]: Json };
 
 type Schema = { [key: string]: Json };
 const isObject = (value: unknown): value is Schema => typeof value === "object" && value !== null && !Array.isArray(value);
@@ -82,7 +111,7 @@ function objectOf(root: Schema, schema: Schema, depth: number): Field {
 }
 
 function alternativesOf(root: Schema, entries: Json[], depth: number): Field {
-  const options: { key: string; field: Field; description: string }[] = [];
+  const options: Variant[] = [];
   const values: { value: Json; title: string }[] = [];
   for (const entry of entries) {
     const schema = resolve(root, entry);
@@ -94,7 +123,9 @@ function alternativesOf(root: Schema, entries: Json[], depth: number): Field {
     }
     const keys = isObject(schema.properties) ? Object.keys(schema.properties) : [];
     if (keys.length !== 1) return { kind: "json" };
-    options.push({ key: keys[0]!, field: fieldOf(root, (schema.properties as Schema)[keys[0]!], depth + 1), description: described });
+    const inner = (schema.properties as Schema)[keys[0]!];
+    const { label, unit } = presentation(keys[0]!, resolve(root, inner));
+    options.push({ key: keys[0]!, label, unit, field: fieldOf(root, inner, depth + 1), description: described });
   }
   if (options.length === 0) return { kind: "choice", options: values };
   return values.length === 0 ? { kind: "variants", options } : { kind: "json" };
@@ -123,6 +154,7 @@ function arrayOf(root: Schema, schema: Schema, depth: number): Field {
   if (item.kind === "number" && length > 0 && length <= 9) return { kind: "vector", item, length };
   if (item.kind === "vector" && length > 0 && length <= 4) return { kind: "matrix", row: item, rows: length };
   if (item.kind === "number" && item.integer && length === 0) return { kind: "numbers" };
+  if (item.kind === "object" && length === 0) return { kind: "list", item };
   return item.kind === "text" ? { kind: "names" } : { kind: "json" };
 }
 
@@ -132,7 +164,7 @@ function propertiesOf(root: Schema, schema: Schema, depth: number): Property[] {
     const resolved = resolve(root, entry);
     return {
       name, required: required.includes(name), field: fieldOf(root, entry, depth + 1),
-      description: plain(resolved.description), initial: resolved.default,
+      description: plain(resolved.description), initial: resolved.default, ...presentation(name, resolved),
     };
   });
   // JSON does not keep an order: what must be given comes first, what is rarely given last.
@@ -141,19 +173,59 @@ function propertiesOf(root: Schema, schema: Schema, depth: number): Property[] {
   return properties.sort((a, b) => rank(a) - rank(b));
 }
 
+/** The annotations that the library's types carry for a form. */
+function presentation(name: string, schema: Schema): Presentation {
+  const text = (key: string, otherwise: string): string => (typeof schema[key] === "string" ? schema[key] : otherwise);
+  return {
+    label: text("x-label", words(name)), unit: text("x-unit", ""), group: text("x-group", ""),
+    advanced: schema["x-advanced"] === true, hidden: schema["x-hidden"] === true, neutral: schema["x-neutral"],
+  };
+}
+
 /** The first paragraph of a description, without the marks of rustdoc. */
 const plain = (description: Json | undefined): string =>
   typeof description !== "string" ? "" : (description.split(/\n\s*\n/)[0] ?? "").replaceAll("\n", " ").replace(/\[?`([^`]*)`\]?/g, "$1");
 
 const title = (value: Json): string => (typeof value === "string" ? value.replaceAll("_", " ") : JSON.stringify(value));
 
+/** The value with which a field begins: what the schema says, or what asks for nothing. Undefined where there is none to send. */
+export function startOf(field: Field, property?: Pick<Property, "name" | "initial" | "neutral">): Json | undefined {
+  if (property?.initial !== undefined && property.initial !== null) return property.initial;
+  if (property?.neutral !== undefined) return property.neutral;
+  switch (field.kind) {
+    case "number": return Number.isFinite(field.minimum) && field.minimum > 0 ? field.minimum : 0;
+    // What changes nothing, or is at least a direction.
+    case "vector": return Array.from({ length: field.length }, (_, i) =>
+      property?.name === "factors" || (["axis", "normal"].includes(property?.name ?? "") && i === field.length - 1) ? 1 : 0);
+    case "matrix": return Array.from({ length: field.rows }, (_, i) => Array.from({ length: field.row.length }, (_, k) => (k === i ? 1 : 0)));
+    case "choice": return field.options[0]?.value;
+    case "boolean": return false;
+    case "text": return "";
+    case "names": case "list": return [];
+    case "object": return startOfObject(field.properties);
+    case "variants": {
+      const first = field.options[0];
+      const value = first && startOf(first.field);
+      return value === undefined ? undefined : { [first!.key]: value };
+    }
+    case "optional": case "numbers": case "json": return undefined;
+  }
+}
+
+export function startOfObject(properties: readonly Property[]): Values {
+  return Object.fromEntries(properties.flatMap((property) => {
+    const value = startOf(property.field, property);
+    return value === undefined ? [] : [[property.name, value]];
+  }));
+}
+
 /** What an order can hold beside its edits, and the edits that there are. */
-export interface OrderForm { edits: { key: string; field: Field; description: string }[]; settings: Property[] }
+export interface OrderForm { edits: EditKind[]; settings: Property[] }
 
 /** Finds the edits and the settings in the schema of an order, however its variants are laid out. */
 export function orderForm(schema: Json | undefined): OrderForm | null {
   if (!isObject(schema)) return null;
-  let edits: OrderForm["edits"] | null = null;
+  let edits: EditKind[] | null = null;
   const settings = new Map<string, Property>();
   const visit = (entry: Json, depth: number): void => {
     const resolved = resolve(schema, entry);
@@ -162,7 +234,11 @@ export function orderForm(schema: Json | undefined): OrderForm | null {
       const items = resolve(schema, resolved.properties.edits);
       if (edits === null && items.items !== undefined) {
         const field = fieldOf(schema, items.items);
-        if (field.kind === "variants") edits = field.options;
+        if (field.kind === "variants") {
+          edits = field.options.map((option) => ({
+            ...option, neutral: option.field.kind === "object" ? startOfObject(option.field.properties.filter(({ name }) => !ROLES[name])) : {},
+          }));
+        }
       }
       for (const property of propertiesOf(schema, resolved, 0)) {
         if (["edits", "stack", "undo"].includes(property.name)) continue;

@@ -1,54 +1,70 @@
-/** The bar at the top: the connection, the progress of the run, the quality of its mesh, and who steers. */
+/** The bar at the top: the connection, how the run stands, the quality of its mesh, who steers; and the banner, where something is amiss. */
 import type { ConnectionState } from "../connection/connection";
+import type { RunEnd } from "../connection/protocol";
 import { part, write } from "../dom";
 import { digits, seconds } from "../number";
-import type { Hello, RunEnd, Status } from "../connection/protocol";
+import type { Action } from "../store/actions";
+import type { Commands } from "../store/commands";
+import { runState, whyNotSteering } from "../store/run";
+import type { State } from "../store/state";
+import type { Store } from "../store/store";
 
 const CONNECTIONS: Record<ConnectionState, string> = {
   connecting: "connecting", connected: "connected", reconnecting: "reconnecting", refused: "not let in", dismissed: "dismissed", ended: "ended",
 };
+const ENDS: Record<RunEnd["how"], string> = { finished: "steps reached", stopped: "stopped", failed: "failed" };
+
 /** Without a word from the simulation for this long, or for ten of its steps, the bar says so. */
 const SILENCE = 4000;
 
 export class StatusBar {
   private heard = 0;
-  private still = false;
-  private patience = SILENCE;
-  private state: ConnectionState = "connecting";
-  private last = "The run has ended.";
 
-  constructor() {
+  constructor(private readonly store: Store<State, Action>, commands: Commands) {
+    part("pause").addEventListener("click", () => commands.pauseOrResume());
+    store.watch((state) => state.connection, () => this.alive());
+    store.watch((state) => state.status, () => this.alive());
+    store.watch((state) => state, (state) => this.show(state));
     setInterval(() => this.silence(), 1000);
   }
 
-  connection(state: ConnectionState, explanation: string): void {
-    this.state = state;
+  /** Something arrived, whatever it was. */
+  alive(): void {
     this.heard = performance.now();
-    const pill = part("connection");
-    pill.dataset.state = state;
-    write(pill, CONNECTIONS[state]);
-    pill.title = explanation || (state === "connected" ? "The simulation streams to this viewer." : "");
-    const banner = part("banner");
-    banner.hidden = state === "connected" || state === "connecting";
-    write(part("banner-text"), state === "refused"
-      ? `${explanation} Open a link that the simulation told when it started.`
-      : state === "dismissed" ? explanation
-      : state === "ended" ? this.last : `${explanation} Trying again.`);
-    banner.dataset.state = state;
     this.silence();
   }
 
-  role(hello: Hello, driver: Status["driver"]): void {
-    const driving = hello.role === "driver";
-    const text = part("role");
-    write(text, driving ? "you steer" : hello.may_drive === false || driver === null || driver === undefined ? "watching only" : "watching only · another viewer steers");
-    text.dataset.role = hello.role;
-  }
+  private show(state: State): void {
+    const { connection: { state: connection, explanation }, hello, status, end } = state;
+    const pill = part("connection");
+    pill.dataset.state = connection;
+    write(pill, CONNECTIONS[connection]);
+    pill.title = explanation || (connection === "connected" ? "The simulation streams to this viewer." : "");
+    const banner = part("banner");
+    banner.hidden = end === null && (connection === "connected" || connection === "connecting");
+    banner.dataset.state = connection;
+    write(part("banner-text"), bannerText(state));
+    part("retry").hidden = end !== null || connection === "ended";
 
-  update(status: Status): void {
-    this.heard = performance.now();
-    this.still = status.stopped || status.paused;
-    this.patience = Math.max(SILENCE, 10000 * (status.step_seconds ?? 0));
+    const run = part("run");
+    const now = runState(state);
+    run.dataset.state = now;
+    write(run, end ? `ended: ${ENDS[end.how]}` : now);
+    run.title = now === "unknown" && status ? "There is no connection: nobody here can say how the run stands." : "";
+    write(part("channel"), hello?.channel ?? "");
+
+    const role = part("role");
+    role.dataset.role = hello?.role ?? "";
+    write(role, !hello || end ? "" : hello.role === "driver" ? "you steer" : hello.may_drive === false || (status?.driver ?? null) === null ? "watching" : `watching · viewer ${status?.driver} steers`);
+
+    const pause = part("pause") as HTMLButtonElement;
+    const why = whyNotSteering(state);
+    pause.disabled = why !== "";
+    pause.title = why;
+    pause.dataset.paused = String(status?.paused === true);
+    write(pause, status?.paused ? "Resume" : "Pause");
+
+    if (!status) return;
     write(part("cycle"), String(status.cycle));
     write(part("time"), digits(status.time, 5));
     write(part("step"), seconds(status.step_seconds));
@@ -62,31 +78,26 @@ export class StatusBar {
     const lost = part("journal");
     lost.hidden = !status.journal_lost;
     write(lost, status.journal_lost ? `no orders are taken: the journal cannot be written (${status.journal_lost})` : "");
-    const run = part("run");
-    run.dataset.state = status.stopped ? "stopped" : status.paused ? "paused" : "running";
-    write(run, status.stopped ? "stopped" : status.paused ? "paused" : "running");
-    this.silence();
-  }
-
-  /** The run has said that it ends. */
-  end({ how, cycle }: RunEnd): void {
-    const ways = { finished: "it was finished", stopped: "it was stopped", failed: "its program ended without finishing it" };
-    this.last = `The run ended at cycle ${cycle}: ${ways[how]}. The picture stays as it was.`;
-    this.still = true;
-    const run = part("run");
-    run.dataset.state = "stopped";
-    write(run, how);
-  }
-
-  /** Something arrived, whatever it was. */
-  alive(): void {
-    this.heard = performance.now();
   }
 
   private silence(): void {
+    const { connection, status, end } = this.store.state;
     const note = part("silence");
     const quiet = performance.now() - this.heard;
-    note.hidden = this.state !== "connected" || this.still || quiet < this.patience;
+    const still = status?.stopped === true || status?.paused === true || end !== null;
+    note.hidden = connection.state !== "connected" || still || quiet < Math.max(SILENCE, 10000 * (status?.step_seconds ?? 0));
     if (!note.hidden) write(note, `no word for ${Math.round(quiet / 1000)} s`);
+  }
+}
+
+/** What is amiss with the connection or over with the run, and what can be done. */
+export function bannerText({ connection: { state, explanation }, end }: Pick<State, "connection" | "end">): string {
+  if (end) return `The run ended at cycle ${end.cycle}: ${ENDS[end.how]}. The picture stays as it was.`;
+  switch (state) {
+    case "refused": return `${explanation} Open a link that the simulation told when it started.`;
+    case "dismissed": return explanation;
+    case "ended": return "The run has ended. The picture stays as it was.";
+    case "reconnecting": return `${explanation} Whether the run goes on is unknown. Trying again.`;
+    case "connecting": case "connected": return "";
   }
 }

@@ -1,46 +1,49 @@
-/** The wheel: another viewer asks for it, and the simulation hears that the one who steers is still there. */
-import { part, write } from "../dom";
+/** The wheel: a watcher asks for it, the one who steers hands it over or keeps it, and the simulation hears that somebody is there. */
 import type { ClientMessage } from "../connection/protocol";
+import { part, write } from "../dom";
+import type { Action } from "../store/actions";
+import type { Commands } from "../store/commands";
+import { isSteering } from "../store/run";
+import type { State } from "../store/state";
+import type { Store } from "../store/store";
 
 /** The least time between two signs of being there, in milliseconds. */
 const SIGN_PERIOD = 10000;
 
-export class Wheel {
-  private asking: string | null = null;
-  private told = -Infinity;
+export class WheelPanel {
+  private shown = -Infinity;
 
-  constructor(private readonly send: (message: ClientMessage) => unknown, private readonly drives: () => boolean) {
+  constructor(private readonly store: Store<State, Action>, private readonly commands: Commands) {
+    part("wheel").addEventListener("click", () => commands.askToSteer());
     part("hand-over").addEventListener("click", () => this.answer((other) => ({ hand_over: { to: other } })));
     part("dismiss").addEventListener("click", () => this.answer((other) => ({ kick: { client: other } })));
     part("keep").addEventListener("click", () => this.answer(() => ({ here: {} })));
     for (const kind of ["pointermove", "pointerdown", "wheel", "keydown"]) {
       window.addEventListener(kind, () => this.here(), { passive: true, capture: true });
     }
-  }
-
-  /** Another viewer asks for the wheel. */
-  asked(by: string): void {
-    this.asking = by;
-    write(part("asked-text"), `Viewer ${by} asks for the wheel.`);
-    this.refresh();
-  }
-
-  refresh(): void {
-    if (!this.drives()) this.asking = null;
-    part("asked").hidden = this.asking === null;
+    store.watch((state) => (isSteering(state) ? state.askedBy : null), (by) => {
+      part("asked").hidden = by === null;
+      if (by !== null) write(part("asked-text"), `Viewer ${by} asks to steer.`);
+    });
+    store.watch(mayAsk, (may) => { part("wheel").hidden = !may; });
   }
 
   private answer(message: (other: string) => ClientMessage): void {
-    if (this.asking !== null && this.drives()) this.send(message(this.asking));
-    this.asking = null;
-    this.refresh();
+    const { askedBy } = this.store.state;
+    if (askedBy !== null && isSteering(this.store.state)) this.commands.send(message(askedBy));
+    this.store.dispatch({ type: "wheel answered" });
   }
 
   /** A person does something at this viewer. */
   private here(): void {
     const now = performance.now();
-    if (!this.drives() || now - this.told < SIGN_PERIOD) return;
-    this.told = now;
-    this.send({ here: {} });
+    if (!isSteering(this.store.state) || now - this.shown < SIGN_PERIOD) return;
+    this.shown = now;
+    this.commands.ask({ here: {} });
   }
+}
+
+/** Whether this viewer could have the wheel and does not. */
+function mayAsk({ connection, hello, end }: State): boolean {
+  return !end && connection.state === "connected" && hello !== null && hello.role !== "driver" && hello.may_drive !== false;
 }

@@ -13,12 +13,31 @@ export function translation(from: Vector, to: Vector): Vector {
   return by.map((value) => round(value) + 0) as Vector;
 }
 
-/**
- * `moved` is told the translation from where the drag began, parallel to the picture, and the node of the skeleton that is dragged,
- * by its place in the reference; null where the handle is.
- */
-export function watchDrags(stage: HTMLElement, scene: Scene, selection: Selection, moved: (by: Vector, node: Vector | null) => void): void {
-  let from: { pointer: number; point: Vector; node: Vector | null } | null = null;
+export interface DragListener {
+  /**
+   * The translation from where the drag began, parallel to the picture, and the node of the skeleton that is dragged, by its place
+   * in the reference; null where the handle is. `step` names the drag.
+   */
+  moved(by: Vector, node: Vector | null, step: string): void;
+  /** The drag was given up with Escape: all that it did is to be taken back. */
+  aborted(step: string): void;
+}
+
+let drags = 0;
+
+export function watchDrags(stage: HTMLElement, scene: Scene, selection: Selection, listener: DragListener): void {
+  let from: { pointer: number; point: Vector; node: Vector | null; step: string } | null = null;
+  const end = (): void => {
+    scene.holdNode(null);
+    from = null;
+  };
+  window.addEventListener("keydown", (event) => {
+    if (event.key !== "Escape" || !from) return;
+    event.stopPropagation();
+    const { step } = from;
+    end();
+    listener.aborted(step);
+  }, true);
   // Before the camera sees them.
   stage.addEventListener("pointerdown", (event) => {
     if (event.button !== 0 || !(event.ctrlKey || event.metaKey)) return;
@@ -28,7 +47,7 @@ export function watchDrags(stage: HTMLElement, scene: Scene, selection: Selectio
     event.stopPropagation();
     event.preventDefault();
     if (picked && selection.get(picked.feature) !== "handle") selection.set(picked.feature, "handle");
-    from = { pointer: event.pointerId, point: node?.now ?? picked!.point, node: node?.reference ?? null };
+    from = { pointer: event.pointerId, point: node?.now ?? picked!.point, node: node?.reference ?? null, step: `drag ${++drags}` };
     if (node) scene.holdNode(node.now);
     stage.setPointerCapture(event.pointerId);
   }, true);
@@ -37,14 +56,13 @@ export function watchDrags(stage: HTMLElement, scene: Scene, selection: Selectio
     event.stopPropagation();
     const to = scene.pointAt(event.clientX, event.clientY, from.point);
     if (from.node) scene.holdNode(to);
-    moved(translation(from.point, to), from.node);
+    listener.moved(translation(from.point, to), from.node, from.step);
   }, true);
-  for (const end of ["pointerup", "pointercancel"] as const) {
-    stage.addEventListener(end, (event) => {
+  for (const kind of ["pointerup", "pointercancel"] as const) {
+    stage.addEventListener(kind, (event) => {
       if (from?.pointer !== event.pointerId) return;
       event.stopPropagation();
-      scene.holdNode(null);
-      from = null;
+      end();
     }, true);
   }
 }

@@ -306,6 +306,22 @@ export class Scene {
     this.look(direction, axis === 2 ? [0, 1, 0] : [0, 0, 1]);
   }
 
+  /** Takes the camera close to a place, seen from where it is now. */
+  flyTo(place: Vector): void {
+    const box = this.box();
+    if (!box) return;
+    const camera = this.renderer.getActiveCamera();
+    const [from, to] = [camera.getPosition(), camera.getFocalPoint()];
+    const away = [0, 1, 2].map((k) => from[k]! - to[k]!);
+    const length = Math.hypot(...away) || 1;
+    const distance = 0.15 * Math.hypot(box[1] - box[0], box[3] - box[2], box[5] - box[4]);
+    camera.setFocalPoint(...place);
+    camera.setPosition(...([0, 1, 2].map((k) => place[k]! + (distance * away[k]!) / length) as Vector));
+    if (this.parallel) camera.setParallelScale(distance / 3);
+    this.renderer.resetCameraClippingRange();
+    this.request();
+  }
+
   get parallel(): boolean {
     return this.renderer.getActiveCamera().getParallelProjection();
   }

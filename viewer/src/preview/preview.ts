@@ -17,10 +17,10 @@ export interface PreviewWorker {
 
 export interface PreviewSurface { triangles: Uint32Array; triangleFeatures: Uint32Array; features: string[] }
 /**
- * A shape: its points, how far the edits move any of them, when it was asked for, and the milliseconds that the kernel took.
+ * A shape: its points, how far the edits move any of them and each feature, the size of the surface, when it was asked for, and the milliseconds that the kernel took.
  * `newest` says whether nothing newer is wished for already.
  */
-export interface PreviewShape { points: Float32Array; largest: number; asked: number; computing: number; newest: boolean }
+export interface PreviewShape { points: Float32Array; largest: number; moved: number[]; size: number; asked: number; computing: number; newest: boolean }
 
 export interface PreviewEvents {
   surface(surface: PreviewSurface): void;
@@ -37,7 +37,7 @@ export interface PreviewEvents {
 /** Milliseconds without a new wish after which a shape is looked at. */
 const REST = 120;
 
-interface Wish { stack: Json[]; edits: Json[]; at: number }
+interface Wish { stack: Json[]; wished: Json[]; at: number }
 
 export class Preview {
   private known: string | null = null;
@@ -78,11 +78,11 @@ export class Preview {
     return this.known !== null;
   }
 
-  /** Asks for the shape that `edits` make of the one that `stack` has made. */
-  show(stack: Json[], edits: Json[]): void {
+  /** Asks for the shape of the edits `wished`, and how far it is from the one that `stack` has made. */
+  show(stack: Json[], wished: Json[]): void {
     if (this.known === null) return;
     clearTimeout(this.resting);
-    this.waiting = { stack, edits, at: performance.now() };
+    this.waiting = { stack, wished, at: performance.now() };
     this.next();
   }
 
@@ -105,10 +105,10 @@ export class Preview {
     if (this.waiting === null || this.computing !== null) return;
     if (this.state === "absent") void this.fetch();
     if (this.state !== "ready") return;
-    const { stack, edits, at } = this.waiting;
+    const { stack, wished, at } = this.waiting;
     this.waiting = null;
     this.computing = { number: ++this.number, at };
-    this.worker.postMessage({ number: this.number, stack, edits }, []);
+    this.worker.postMessage({ number: this.number, stack, wished }, []);
   }
 
   /** Looks at a shape at which the hand rests: that may take longer than the shape itself. */
@@ -159,8 +159,8 @@ export class Preview {
       if (asked?.number === this.number) {
         if ("error" in answer) this.events.failed(answer.kind, answer.error);
         else {
-          const { points, largest, milliseconds } = answer;
-          this.events.shape({ points, largest, asked: asked.at, computing: milliseconds, newest: this.waiting === null });
+          const { points, largest, moved, size, milliseconds } = answer;
+          this.events.shape({ points, largest, moved, size, asked: asked.at, computing: milliseconds, newest: this.waiting === null });
           this.resting = setTimeout(() => this.check(asked), REST);
         }
       }

@@ -11,8 +11,8 @@ type PreviewModule = { module: WebAssembly.Module };
 export type PreviewRequest =
   /** A reference surface, as the server sends it. */
   | { id: string; surface: ArrayBuffer }
-  /** The edits that the shape has now, and those to be previewed with them. */
-  | { number: number; stack: Json[]; edits: Json[] }
+  /** The edits that the shape has now, and those of the shape to be previewed. */
+  | { number: number; stack: Json[]; wished: Json[] }
   /** Whether the shape of the last preview is sound. */
   | { check: number }
   /** The skeleton of the surface that is open, and where these edits have brought it. */
@@ -20,7 +20,7 @@ export type PreviewRequest =
 
 export type PreviewAnswer =
   | { id: string; surface: Pick<SurfaceDescription, "triangles" | "triangleFeatures" | "features"> }
-  | { number: number; points: Float32Array; largest: number; milliseconds: number }
+  | { number: number; points: Float32Array; largest: number; moved: number[]; size: number; milliseconds: number }
   | { check: number; faults: ShapeFaults | null }
   | { skeleton: string; bones: Bones }
   | { skeleton: string; kind: FailureKind; error: string }
@@ -36,6 +36,9 @@ let loaded: (kernel: Kernel) => void;
 const kernel = new Promise<Kernel>((resolve) => { loaded = resolve; });
 let surface: KernelSurface | null = null;
 let reference: Float64Array = new Float64Array(0);
+let size = 0;
+/** The triangles of the reference and the feature of each, to say how far each feature moves. */
+let faces: { triangles: Uint32Array; features: Uint32Array; count: number } = { triangles: new Uint32Array(0), features: new Uint32Array(0), count: 0 };
 /** The displacement that the shape has now, and the stack that it is of. */
 let now: { stack: string; displacement: Float64Array } = { stack: "", displacement: new Float64Array(0) };
 
@@ -46,6 +49,8 @@ async function answer(request: PreviewRequest): Promise<void> {
     surface = (await kernel).openSurface(new Uint8Array(request.surface));
     const { points, triangles, triangleFeatures, features } = surface.describe();
     reference = points;
+    size = diagonal(points);
+    faces = { triangles: triangles.slice(), features: triangleFeatures.slice(), count: features.length };
     now = { stack: "[]", displacement: new Float64Array(points.length) };
     worker.postMessage({ id: request.id, surface: { triangles, triangleFeatures, features } }, [triangles.buffer, triangleFeatures.buffer]);
     return;
@@ -63,8 +68,9 @@ async function answer(request: PreviewRequest): Promise<void> {
     worker.postMessage({ skeleton: request.skeleton, bones }, []);
     return;
   }
-  const displacement = surface.displacement([...request.stack, ...request.edits]);
+  const displacement = surface.displacement(request.wished);
   const points = new Float32Array(displacement.length);
+  const ways = new Float64Array(displacement.length / 3);
   let largest = 0;
   for (let i = 0; i < displacement.length; i += 3) {
     let squared = 0;
@@ -72,9 +78,24 @@ async function answer(request: PreviewRequest): Promise<void> {
       points[k] = reference[k]! + displacement[k]!;
       squared += (displacement[k]! - now.displacement[k]!) ** 2;
     }
+    ways[i / 3] = squared;
     largest = Math.max(largest, squared);
   }
-  worker.postMessage({ number: request.number, points, largest: Math.sqrt(largest), milliseconds: performance.now() - start }, [points.buffer]);
+  const moved = new Array<number>(faces.count).fill(0);
+  faces.features.forEach((feature, triangle) => {
+    for (let k = 3 * triangle; k < 3 * triangle + 3; k++) moved[feature] = Math.max(moved[feature] ?? 0, ways[faces.triangles[k]!]!);
+  });
+  worker.postMessage({ number: request.number, points, largest: Math.sqrt(largest), moved: moved.map(Math.sqrt), size, milliseconds: performance.now() - start }, [points.buffer]);
+}
+
+/** The diagonal of the box around points. */
+function diagonal(points: Float64Array): number {
+  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+  points.forEach((value, i) => {
+    low[i % 3] = Math.min(low[i % 3]!, value);
+    high[i % 3] = Math.max(high[i % 3]!, value);
+  });
+  return points.length === 0 ? 0 : Math.hypot(high[0]! - low[0]!, high[1]! - low[1]!, high[2]! - low[2]!);
 }
 
 /** A skeleton, each node moved by the mean of what the vertices that it carries have moved. */

@@ -1,30 +1,32 @@
-/** Which features are handles and which are held fixed; the picture and the form both show it and both change it. */
-
-export type Part = "handle" | "fixed";
+/** Which features are handles and which are held fixed, as the picture asks for it; the state of it is in the store. */
+import type { Action } from "./actions";
+import { chosen } from "./draft";
+import type { Part, State } from "./state";
+import type { Store } from "./store";
 
 export class Selection {
-  private readonly parts = new Map<string, Part>();
-  private readonly listeners: (() => void)[] = [];
-  private hover: string | null = null;
+  constructor(private readonly store: Store<State, Action>) {}
 
+  /** Calls `listener` whenever another feature is chosen or under the pointer. */
   onChange(listener: () => void): void {
-    this.listeners.push(listener);
+    let first = true;
+    this.store.watch((state) => state.selection, () => {
+      if (!first) listener();
+    });
+    first = false;
   }
 
   get(feature: string): Part | null {
-    return this.parts.get(feature) ?? null;
+    return this.store.state.selection.parts[feature] ?? null;
   }
 
-  /** The features that play a part, in the order of `names`. */
-  chosen(part: Part, names: readonly string[]): string[] {
-    return names.filter((name) => this.parts.get(name) === part);
+  /** The features that play a part, in the order of `names`, or of the mesh. */
+  chosen(part: Part, names?: readonly string[]): string[] {
+    return names ? names.filter((name) => this.get(name) === part) : chosen(this.store.state, part);
   }
 
   set(feature: string, part: Part | null): void {
-    if (this.get(feature) === part) return;
-    if (part) this.parts.set(feature, part);
-    else this.parts.delete(feature);
-    this.changed();
+    this.store.dispatch({ type: "part", feature, part });
   }
 
   toggle(feature: string, part: Part): void {
@@ -33,23 +35,10 @@ export class Selection {
 
   /** The feature under the pointer, wherever the pointer is. */
   get hovered(): string | null {
-    return this.hover;
+    return this.store.state.selection.hovered;
   }
 
   set hovered(feature: string | null) {
-    if (feature === this.hover) return;
-    this.hover = feature;
-    this.changed();
-  }
-
-  /** Forgets features that are no more. */
-  keep(names: readonly string[]): void {
-    for (const name of [...this.parts.keys()]) if (!names.includes(name)) this.parts.delete(name);
-    if (this.hover !== null && !names.includes(this.hover)) this.hover = null;
-    this.changed();
-  }
-
-  private changed(): void {
-    for (const listener of this.listeners) listener();
+    this.store.dispatch({ type: "hover", feature });
   }
 }

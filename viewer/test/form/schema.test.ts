@@ -1,16 +1,11 @@
 // @vitest-environment jsdom
-import { beforeEach, describe, expect, it } from "vitest";
-import { InputError, makeControl } from "../../src/form/controls";
-import { EditForm, describeOrder } from "../../src/form/form";
+import { describe, expect, it } from "vitest";
 import type { Json } from "../../src/connection/protocol";
-import { fieldOf, orderForm } from "../../src/form/schema";
-import { Selection } from "../../src/store/selection";
-// As the server sends it; `tombolo schema` and the crate tombolo-pipelines make it.
-import orderSchema from "../order-schema.json";
+import { makeControl, numberText, objectControl } from "../../src/form/controls";
+import { ROLES, fieldOf, orderForm } from "../../src/form/schema";
+import type { Problem } from "../../src/store/state";
+import { schema } from "../page";
 
-const schema = orderSchema as unknown as Json;
-const features = ["inlet", "outlet", "wall", "throat"].map((name) => ({ name, faces: 4, vertices: 4, bounds: [[0, 0, 0], [1, 1, 1]] as [[number, number, number], [number, number, number]] }));
-const defaults = { schedule: { steps: 10, every: { steps: 5 } }, guard: { min_scaled_jacobian: 0.03, otherwise: "reject" } };
 
 describe("the schema of an order", () => {
   it("holds the edits and what an order can set", () => {
@@ -54,12 +49,13 @@ describe("the schema of an order", () => {
     const field = fieldOf({}, { type: "number", minimum: 0, exclusiveMaximum: 0.5 });
     const control = makeControl(field, "ratio");
     const attempt = (value: string): unknown => {
-      control.write(value);
-      try {
-        return control.read();
-      } catch (error) {
-        return (error as InputError).message;
-      }
+      control.root.querySelector("input")!.value = value;
+      const problems: Problem[] = [];
+      const read = control.read(problems);
+      const said = control.root.querySelector<HTMLElement>(".wrong")!;
+      expect(said.textContent).toBe(problems[0]?.text ?? "");
+      expect(said.hidden).toBe(problems.length === 0);
+      return problems[0]?.text ?? read;
     };
     expect(attempt("0.25")).toBe(0.25);
     expect(attempt("1e-1")).toBe(0.1);
@@ -68,135 +64,30 @@ describe("the schema of an order", () => {
     for (const text of ["NaN", "Infinity", "0x10", "1e999", "one", "1 2"]) expect(attempt(text)).toBe(`ratio “${text}” is not a number`);
     expect(attempt("")).toBe("ratio is empty");
   });
-});
 
-describe("the form", () => {
-  let root: HTMLElement;
-  let selection: Selection;
-  let form: EditForm;
-  beforeEach(() => {
-    root = document.createElement("div");
-    document.body.replaceChildren(root);
-    selection = new Selection();
-    form = new EditForm(root, selection);
-    form.setSchema(schema, defaults);
-    form.setFeatures(features);
-  });
-  const input = (label: string): HTMLInputElement => root.querySelector<HTMLInputElement>(`.object:not([hidden]) input[aria-label="${label}"]`)!;
-  const tick = (label: string): void => {
-    const box = root.querySelector<HTMLInputElement>(`input[aria-label="${label}"]`)!;
-    box.checked = !box.checked;
-    box.dispatchEvent(new Event("change"));
-  };
-
-  it("makes the order that the protocol asks for", () => {
-    tick("throat: handle");
-    tick("outlet: fixed");
-    tick("inlet: fixed");
-    input("factors z").value = "0.5";
-    expect(form.read()).toEqual({
-      edits: [{ scale_direction: { features: ["throat"], fixed: ["inlet", "outlet"], factors: [1, 1, 0.5], harmonic_order: 2, muted: false } }],
-      schedule: { steps: 10, every: { steps: 5 }, ease: "linear", motion: "spread" },
-    });
+  it("begins every edit with values that its controls read back as they are", () => {
+    for (const { key, field, neutral } of orderForm(schema)!.edits) {
+      expect(field.kind, key).toBe("object");
+      const control = objectControl(field.kind === "object" ? field.properties.filter(({ name }) => !ROLES[name]) : []);
+      const problems: Problem[] = [];
+      const read = control.read(problems);
+      expect(problems, key).toEqual([]);
+      expect(read, key).toEqual(neutral);
+      control.write(read);
+      expect(control.read([]), key).toEqual(neutral);
+    }
   });
 
-  it("needs a handle, and numbers", () => {
-    expect(() => form.read()).toThrow(/at least one feature/);
-    tick("throat: handle");
-    input("factors x").value = "wide";
-    expect(() => form.read()).toThrow("factors x “wide” is not a number");
-    expect(input("factors x").getAttribute("aria-invalid")).toBe("true");
-  });
-
-  const label = (text: string): HTMLInputElement => {
-    const found = [...root.querySelectorAll<HTMLLabelElement>(".object:not([hidden]) label")].find((entry) => entry.textContent === text && !entry.closest("[hidden]"))!;
-    return document.getElementById(found.htmlFor) as HTMLInputElement;
-  };
-  const choose = (action: string): void => {
-    const select = root.querySelector<HTMLSelectElement>("#action")!;
-    select.value = [...select.options].find((option) => option.textContent === action)!.value;
-    select.dispatchEvent(new Event("change"));
-  };
-  const check = (box: HTMLInputElement): void => {
-    box.checked = !box.checked;
-    box.dispatchEvent(new Event("change"));
-  };
-
-  it("takes a region for a handle, mutes, and names", () => {
-    choose("rotate");
-    label("degrees").value = "15";
-    check(label("muted"));
-    check(label("set name"));
-    label("name").value = "tilt";
-    check(label("set region"));
-    const kind = root.querySelector<HTMLSelectElement>('.object:not([hidden]) select[aria-label="region: kind"]')!;
-    kind.value = [...kind.options].find((option) => option.textContent === "sphere")!.value;
-    kind.dispatchEvent(new Event("change"));
-    label("radius").value = "0.2";
-    expect(form.read().edits).toEqual([{ rotate: {
-      axis: [0, 0, 1], degrees: 15, fixed: [], harmonic_order: 2, muted: true, name: "tilt",
-      region: { sphere: { center: [0, 0, 0], radius: 0.2 } },
-    } }]);
-    kind.value = [...kind.options].find((option) => option.textContent === "faces")!.value;
-    kind.dispatchEvent(new Event("change"));
-    expect(() => form.read()).toThrow("region is empty");
-    label("faces").value = "1, 2 30";
-    expect((form.read().edits as { rotate: Json }[])[0]!.rotate).toMatchObject({ region: { faces: [1, 2, 30] } });
-    label("faces").value = "1, -2";
-    expect(() => form.read()).toThrow("faces must be whole numbers");
-  });
-
-  it("asks for a matrix row by row, and never for a file", () => {
-    choose("affine");
-    tick("throat: handle");
-    input("matrix row 2 x").value = "0.5";
-    expect((form.read().edits as { affine: Json }[])[0]!.affine).toMatchObject({ matrix: [[1, 0, 0], [0.5, 1, 0], [0, 0, 1]], translation: [0, 0, 0] });
-    choose("displacement");
-    expect([...root.querySelectorAll(".object:not([hidden]) label")].some((entry) => entry.textContent?.includes("file"))).toBe(false);
-  });
-
-  it("keeps list and picture in step", () => {
-    selection.toggle("throat", "handle");
-    expect(root.querySelector<HTMLInputElement>('input[aria-label="throat: handle"]')!.checked).toBe(true);
-    selection.toggle("throat", "fixed");
-    expect(root.querySelector<HTMLInputElement>('input[aria-label="throat: handle"]')!.checked).toBe(false);
-    tick("throat: fixed");
-    expect(selection.get("throat")).toBeNull();
-    selection.set("wall", "fixed");
-    selection.keep(["inlet"]);
-    expect(selection.get("wall")).toBeNull();
-  });
-
-  it("sends the settings of the folded part only where they are set", () => {
-    tick("throat: handle");
-    const details = root.querySelector("details")!;
-    const guard = [...details.querySelectorAll("label")].find((label) => label.textContent === "set guard")!;
-    const box = document.getElementById(guard.htmlFor) as HTMLInputElement;
-    box.checked = true;
-    expect(form.read().guard).toEqual({ min_scaled_jacobian: 0.03, otherwise: "reject", surface: "reject" });
-    expect(form.read().deform).toBeUndefined();
-  });
-
-  it("keeps what was typed when the same schema comes again", () => {
-    input("factors z").value = "0.7";
-    form.setSchema(structuredClone(schema), structuredClone(defaults));
-    expect(input("factors z").value).toBe("0.7");
-  });
-
-  it("says so when the server describes no edits", () => {
-    form.setSchema({}, {});
-    expect(root.textContent).toMatch(/does not say which edits/);
-    expect(() => form.read()).toThrow(InputError);
-  });
-});
-
-describe("an order in words", () => {
-  it("names what is done", () => {
-    expect(describeOrder({ undo: 1 })).toBe("undo");
-    expect(describeOrder({ edits: [{ scale_direction: { features: ["throat"], factors: [1, 1, 0.5] } }] })).toBe("scale direction throat × (1, 1, 0.5)");
-    expect(describeOrder({ edits: [{ translate: { features: ["a", "b"], by: [0, -2e-4, 0] } }] })).toBe("translate a, b by (0, −2e−4, 0)");
-    expect(describeOrder({ stack: [{ rotate: { region: { half_space: {} }, axis: [0, 0, 1], degrees: -15, name: "tilt", muted: true } }] })).toBe("tilt: rotate in a half space by −15° (muted)");
-    expect(describeOrder({ stack: [] })).toBe("back to the reference shape");
-    for (const odd of [null, 3, [], {}, { edits: [null, 3, {}] }] as Json[]) expect(describeOrder(odd)).toBeTypeOf("string");
+  it("keeps every bit of a number that is shown short", () => {
+    const exact = 0.000023655170326576326;
+    const control = makeControl(fieldOf({}, { type: "array", items: { type: "number" }, minItems: 3, maxItems: 3 }), "at");
+    control.write([exact, 1, -0.25]);
+    const [first] = control.root.querySelectorAll("input");
+    expect(first!.value).toBe("0.0000236552");
+    expect(first!.value.length).toBeLessThan(13);
+    expect(control.read([])).toEqual([exact, 1, -0.25]);
+    first!.value = "0.02";
+    expect(control.read([])).toEqual([0.02, 1, -0.25]);
+    expect(numberText(0.1 + 0.2)).toBe("0.3");
   });
 });

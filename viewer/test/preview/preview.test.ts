@@ -26,9 +26,9 @@ function setUp(fetchSurface = async () => new ArrayBuffer(8)) {
   const numbers = () => asked.flatMap((request) => ("number" in request ? [request] : []));
   /** Answers the newest question with the amount that it asked for. */
   const work = (): void => {
-    const { number, edits } = numbers().at(-1)!;
-    const largest = (edits as { translate: { by: number } }[])[0]!.translate.by;
-    answer({ number, points: new Float32Array(0), largest, milliseconds: 1 });
+    const { number, wished } = numbers().at(-1)!;
+    const largest = (wished as { translate: { by: number } }[])[0]!.translate.by;
+    answer({ number, points: new Float32Array(0), largest, moved: [], size: 1, milliseconds: 1 });
   };
   return { preview, asked, heard, answer, opened, numbers, work, fetched: () => fetched };
 }
@@ -46,7 +46,7 @@ describe("the preview", () => {
     await settled();
     expect(numbers().length).toBe(0);
     opened("a");
-    expect(numbers().map(({ edits }) => edits)).toEqual([edit(3)]);
+    expect(numbers().map(({ wished }) => wished)).toEqual([edit(3)]);
     work();
     preview.offer({ ...A });
     preview.show([], edit(4));
@@ -65,7 +65,7 @@ describe("the preview", () => {
     for (const by of [2, 3, 4]) preview.show([], edit(by));
     expect(numbers().length).toBe(1);
     work();
-    expect(numbers().map(({ edits }) => edits)).toEqual([edit(1), edit(4)]);
+    expect(numbers().map(({ wished }) => wished)).toEqual([edit(1), edit(4)]);
     preview.clear();
     work();
     expect(heard).toEqual(["shape 1", "cleared"]);

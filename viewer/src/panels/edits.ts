@@ -1,0 +1,256 @@
+/**
+ * The list of what was done to the shape: its edits, what is on its way, and what was refused. A click on an edit loads it into
+ * the form; every change here is an order of the whole new stack.
+ */
+import type { Json } from "../connection/protocol";
+import { element, part, write } from "../dom";
+import { isMuted, titleOf } from "../form/describe";
+import { digits, seconds } from "../number";
+import type { Action } from "../store/actions";
+import type { Commands } from "../store/commands";
+import { isCancellable, isPending, isRedoable, isRefused, move, provenance, remove, rename, toggleMute, undoable, whyNotEditable } from "../store/edits";
+import { whyNotSteering } from "../store/run";
+import type { OrderPhase, OrderRecord, State } from "../store/state";
+import { sameJson } from "../store/store";
+import type { Store } from "../store/store";
+
+const REFUSED_SHOWN = 3;
+const PHASES: Record<OrderPhase, string> = {
+  sent: "sent", accepted: "waiting", computing: "computing", applying: "applying", applied: "applied", rejected: "refused", lost: "lost",
+};
+
+export class EditsPanel {
+  private readonly list = part("stack");
+  private readonly pending = part("pending");
+  private readonly history = part("orders");
+  /** The row that is being dragged, and the one whose name is being typed. */
+  private dragged: number | null = null;
+  private renaming: number | null = null;
+  private announced = new Map<string, OrderPhase>();
+
+  constructor(private readonly store: Store<State, Action>, private readonly commands: Commands) {
+    const seen = (state: State): unknown => [state.hello?.stack, state.orders, state.draft.updating, whyNotEditable(state), state.form];
+    store.watch(seen, () => this.show(), (a, b) => (a as unknown[]).every((value, i) => Object.is(value, (b as unknown[])[i])));
+    store.watch((state) => state.orders, (orders) => this.announce(orders));
+    store.watch(undoState, (now) => this.showUndo(now), sameJson);
+    part("undo").addEventListener("click", () => this.commands.undo());
+    part("redo").addEventListener("click", () => this.commands.redo());
+    // How long an order has been waited for.
+    setInterval(() => this.tick(), 500);
+  }
+
+  private get stack(): readonly Json[] {
+    return this.store.state.hello?.stack ?? [];
+  }
+
+  private show(): void {
+    const focus = this.focused();
+    const { state } = this.store;
+    const by = provenance(state.orders, this.stack);
+    this.list.replaceChildren(...this.stack.map((edit, i) => this.row(edit, i, by[i] ?? null)));
+    part("stack-empty").hidden = this.stack.length > 0 || state.orders.some(isPending);
+    this.pending.replaceChildren(...state.orders.filter(isPending).map((order) => this.pendingRow(order)),
+      ...state.orders.filter((order) => isRefused(order) && !order.dismissed).slice(-REFUSED_SHOWN).map((order) => this.refusedRow(order)));
+    part("history").hidden = state.orders.length === 0;
+    write(part("history-title"), `Everything that happened (${state.orders.length})`);
+    this.history.replaceChildren(...[...state.orders].reverse().map(historyRow));
+    if (focus) (this.list.querySelector<HTMLElement>(focus.exact) ?? this.list.querySelector<HTMLElement>(focus.near) ?? part("undo")).focus();
+  }
+
+  /** Where the focus is in the list, so that it can be put there again. */
+  private focused(): { exact: string; near: string } | null {
+    const active = document.activeElement as HTMLElement | null;
+    const row = active?.closest<HTMLElement>("[data-edit]");
+    if (!active || !row || !this.list.contains(active)) return null;
+    const act = active.dataset.act ?? "load";
+    const last = Math.max(0, Math.min(Number(row.dataset.edit), this.stack.length - 1));
+    return { exact: `[data-edit="${row.dataset.edit}"] [data-act="${act}"]`, near: `[data-edit="${last}"] [data-act="${act}"]` };
+  }
+
+  private row(edit: Json, index: number, order: OrderRecord | null): HTMLElement {
+    const { state } = this.store;
+    const why = whyNotEditable(state);
+    const title = titleOf(edit, state.form);
+    const muted = isMuted(edit);
+    const act = (name: string, sign: string, label: string, act: () => void): HTMLElement => element("button", {
+      type: "button", class: "icon", "data-act": name, title: why || label, "aria-label": `${label}: ${title}`, "aria-disabled": why !== "" ? "true" : "false",
+      onclick: () => { if (whyNotEditable(this.store.state) === "") act(); },
+    }, sign);
+    const text = this.renaming === index ? this.nameInput(edit, index) : element("button", {
+      type: "button", class: "load", "data-act": "load", title: "Load its values into the form, to change it", "aria-pressed": String(state.draft.updating === index),
+      onclick: () => this.store.dispatch({ type: "edit loaded", index }),
+      onkeydown: (event) => this.key(event as KeyboardEvent, index),
+    }, element("span", { class: "title" }, title), element("span", { class: "detail" }, muted ? "muted" : order ? outcomeOf(order) : ""));
+    const row = element("li", {
+      "data-edit": index, "data-muted": String(muted), "data-updating": String(state.draft.updating === index), "data-status": order?.not_followed ? "rejected" : "applied",
+      draggable: why === "" && this.renaming === null ? "true" : "false",
+    }, element("span", { class: "grip", "aria-hidden": "true", title: "Drag to reorder; Alt with the arrow keys does the same" }, "⠿"),
+      element("span", { class: "number", "aria-hidden": "true" }, String(index + 1)), text,
+      act("mute", muted ? "○" : "●", muted ? "Unmute" : "Mute", () => this.commands.setStack(toggleMute(this.stack, index))),
+      act("rename", "✎", "Rename", () => {
+        this.renaming = index;
+        this.show();
+        this.list.querySelector<HTMLInputElement>("input")?.select();
+      }),
+      act("remove", "×", "Delete", () => this.commands.setStack(remove(this.stack, index))));
+    this.watchDrag(row, index);
+    return row;
+  }
+
+  private nameInput(edit: Json, index: number): HTMLElement {
+    const before = partsName(edit);
+    let isOver = false;
+    const end = (name: string | null): void => {
+      if (isOver) return;
+      isOver = true;
+      this.renaming = null;
+      if (name !== null && name.trim() !== before) this.commands.setStack(rename(this.stack, index, name));
+      this.show();
+      this.list.querySelector<HTMLElement>(`[data-edit="${index}"] [data-act="rename"]`)?.focus();
+    };
+    const input = element("input", {
+      type: "text", class: "name", value: before, maxlength: 80, "data-act": "load", "aria-label": "name of the edit", placeholder: titleOf(edit),
+      onkeydown: (event) => {
+        const { key } = event as KeyboardEvent;
+        if (key === "Enter" || key === "Escape") {
+          event.preventDefault();
+          event.stopPropagation();
+          end(key === "Enter" ? input.value : null);
+        }
+      },
+      onblur: () => end(input.value),
+    });
+    return input;
+  }
+
+  private key(event: KeyboardEvent, index: number): void {
+    const to = event.altKey && event.key === "ArrowUp" ? index - 1 : event.altKey && event.key === "ArrowDown" ? index + 1 : null;
+    if (to === null) return;
+    event.preventDefault();
+    this.reorder(index, to);
+  }
+
+  private reorder(from: number, to: number): void {
+    if (from === to || to < 0 || to >= this.stack.length || whyNotEditable(this.store.state) !== "") return;
+    this.commands.setStack(move(this.stack, from, to));
+  }
+
+  private watchDrag(row: HTMLElement, index: number): void {
+    row.addEventListener("dragstart", (event) => {
+      this.dragged = index;
+      event.dataTransfer?.setData("text/plain", String(index));
+    });
+    row.addEventListener("dragover", (event) => {
+      if (this.dragged === null) return;
+      event.preventDefault();
+      row.classList.add("over");
+    });
+    row.addEventListener("dragleave", () => row.classList.remove("over"));
+    row.addEventListener("dragend", () => { this.dragged = null; });
+    row.addEventListener("drop", (event) => {
+      event.preventDefault();
+      row.classList.remove("over");
+      const from = this.dragged;
+      this.dragged = null;
+      if (from !== null) this.reorder(from, index);
+    });
+  }
+
+  private pendingRow(order: OrderRecord): HTMLElement {
+    const steering = whyNotSteering(this.store.state) === "";
+    const fraction = order.shapes ? (order.shape ?? 0) / order.shapes : 0;
+    const bar = element("div", { class: order.status === "applying" ? "bar" : "bar indefinite" }, element("div", order.status === "applying" ? { style: `width: ${100 * fraction}%` } : {}));
+    return element("li", { "data-order": order.id, "data-status": order.status },
+      element("div", { class: "line" }, element("span", { class: "title" }, order.text), element("span", { class: "chip" }, PHASES[order.status] ?? order.status),
+        steering && isCancellable(order) ? element("button", { type: "button", class: "cancel", onclick: () => this.commands.cancel(order.id) }, "Cancel") : null),
+      bar, element("div", { class: "detail" }, detailOf(order)));
+  }
+
+  private refusedRow(order: OrderRecord): HTMLElement {
+    return element("li", { "data-order": order.id, "data-status": order.status },
+      element("div", { class: "line" }, element("span", { class: "title" }, order.text), element("span", { class: "chip" }, PHASES[order.status] ?? order.status),
+        element("button", { type: "button", class: "icon", title: "Take it off the list", "aria-label": `Dismiss: ${order.text}`, onclick: () => this.store.dispatch({ type: "order dismissed", id: order.id }) }, "×")),
+      element("div", { class: "detail" }, detailOf(order)));
+  }
+
+  private showUndo({ undo, redo, why, composing }: ReturnType<typeof undoState>): void {
+    const [undoButton, redoButton] = [part("undo"), part("redo")] as [HTMLButtonElement, HTMLButtonElement];
+    undoButton.disabled = why !== "" || !undo;
+    redoButton.disabled = why !== "" || !redo;
+    undoButton.title = why || (undo ? "Take the last order back; the earlier shape returns exactly (Ctrl+Z)" : "There is nothing to take back.");
+    redoButton.title = why || (redo ? "Bring back what the last undo took away (Ctrl+Shift+Z)" : "There is nothing to bring back.");
+    if (composing && undo) undoButton.title += ". Ctrl+Z first takes back what stands in the form.";
+  }
+
+  private tick(): void {
+    for (const order of this.store.state.orders) {
+      if (!isPending(order) || order.status === "applying") continue;
+      const shown = [...this.pending.children].find((row) => (row as HTMLElement).dataset.order === order.id)?.querySelector(".detail");
+      if (shown) write(shown, detailOf(order));
+    }
+  }
+
+  private announce(orders: readonly OrderRecord[]): void {
+    for (const { id, status, text, reason, not_followed: lost } of orders) {
+      if (this.announced.get(id) === status) continue;
+      const isNew = this.announced.size > 0 || status === "sent";
+      this.announced.set(id, status);
+      if (isNew && (status === "applied" || status === "rejected")) {
+        write(part("announcer"), `${text}: ${PHASES[status]}${lost ? ", not followed" : ""}${reason ? `, ${reason}` : ""}`);
+      }
+    }
+    if (this.announced.size > 1000) this.announced = new Map(orders.map(({ id, status }) => [id, status]));
+  }
+}
+
+function undoState(state: State): { undo: boolean; redo: boolean; why: string; composing: boolean } {
+  return { undo: undoable(state) > 0, redo: isRedoable(state), why: whyNotSteering(state), composing: state.draft.past.length > 0 };
+}
+
+function partsName(edit: Json): string {
+  const [body] = Object.values(typeof edit === "object" && edit !== null && !Array.isArray(edit) ? edit : {});
+  const name = typeof body === "object" && body !== null && !Array.isArray(body) ? body.name : null;
+  return typeof name === "string" ? name : "";
+}
+
+function historyRow(order: OrderRecord): HTMLElement {
+  return element("li", { "data-status": order.status },
+    element("div", { class: "line" }, element("span", { class: "title" }, order.text), element("span", { class: "chip" }, phaseOf(order))),
+    element("div", { class: "detail" }, detailOf(order)));
+}
+
+function phaseOf(order: OrderRecord): string {
+  return (PHASES[order.status] ?? String(order.status)) + (order.not_followed ? ", not followed" : "");
+}
+
+/** What became of an applied order, in a few words. */
+function outcomeOf(order: OrderRecord): string {
+  if (order.status === "applying") return `shape ${order.shape ?? "?"} of ${order.shapes ?? "?"}`;
+  const parts = [`cycle ${order.cycle_applied ?? "?"}`];
+  if (order.not_followed) parts.unshift("not followed");
+  if (typeof order.min_scaled_jacobian === "number") parts.push(`quality ${digits(order.min_scaled_jacobian, 3)}`);
+  return parts.join(" · ");
+}
+
+export function detailOf(order: OrderRecord): string {
+  const waited = order.sentAt === null ? "" : ` · ${Math.round((performance.now() - order.sentAt) / 1000)} s`;
+  switch (order.status) {
+    case "sent": return `waiting for the simulation${waited}`;
+    case "accepted": return `waiting for its turn${waited}`;
+    case "computing": return `moving the mesh and checking every shape on the way${waited}`;
+    case "applying": return `shape ${order.shape ?? "?"} of ${order.shapes ?? "?"}`;
+    case "lost": return order.reason ?? "";
+    case "rejected": return order.reason ?? "no reason was given";
+    case "applied": {
+      const parts = [`at cycle ${order.cycle_applied ?? "?"}`];
+      const not = order.not_followed;
+      if (not) parts.push(`not followed: the mesh was ${digits(not.distance, 3)} from shape ${not.shape} of cycle ${not.cycle}`);
+      if (order.judged === "surface") parts.push("only the surface was judged");
+      if (typeof order.min_scaled_jacobian === "number") parts.push(`quality ${digits(order.min_scaled_jacobian, 3)}`);
+      const spent = order.seconds;
+      if (spent) parts.push(`computed in ${seconds((spent.surface ?? 0) + (spent.volume ?? 0) + (spent.guard ?? 0))}`);
+      if (order.added_steps && order.added_steps >= 0.05) parts.push(`cost ${digits(order.added_steps, 2)} steps`);
+      return parts.join(" · ");
+    }
+  }
+}

@@ -1,0 +1,22 @@
+/** The keys that hold everywhere on the page: taking back and bringing back, before and after Apply; Escape ends what is under way. */
+import type { Action } from "../store/actions";
+import type { Commands } from "../store/commands";
+import { isRedoable, undoable } from "../store/edits";
+import { isSteering } from "../store/run";
+import type { State } from "../store/state";
+import type { Store } from "../store/store";
+
+export function watchKeys(store: Store<State, Action>, commands: Commands): void {
+  window.addEventListener("keydown", (event) => {
+    if (!(event.ctrlKey || event.metaKey) || event.altKey || event.key.toLowerCase() !== "z") return;
+    const { state } = store;
+    // The name of an edit is text: the browser takes back what is typed there.
+    if ((event.target as HTMLElement | null)?.closest?.("input.name")) return;
+    event.preventDefault();
+    if (!event.shiftKey) {
+      if (state.draft.past.length > 0) store.dispatch({ type: "step back" });
+      else if (isSteering(state) && undoable(state) > 0) commands.undo();
+    } else if (state.draft.future.length > 0) store.dispatch({ type: "step forward" });
+    else if (isSteering(state) && isRedoable(state)) commands.redo();
+  });
+}

@@ -1,0 +1,56 @@
+/**
+ * What the order that stands in the form would come to: the quality of the mesh that it would make, before Apply is pressed.
+ *
+ * The simulation finds it out beside its own work and changes nothing. One is asked for when the form has rested for a moment;
+ * the server forgets those that were overtaken.
+ */
+import type { ForecastAnswer, Json } from "../connection/protocol";
+import type { Action } from "../store/actions";
+import { wishedOrder } from "../store/draft";
+import { isSteering } from "../store/run";
+import type { State } from "../store/state";
+import { sameJson } from "../store/store";
+import type { Store } from "../store/store";
+
+/** Milliseconds without a change after which a forecast is asked for. */
+const REST = 250;
+
+interface Wish { order: Json | null; stack: Json[]; steering: boolean }
+
+export class Forecasts {
+  private asked: string | null = null;
+  private resting: ReturnType<typeof setTimeout> | undefined;
+
+  /** `send` asks for the forecast of an order and says under what name it was asked, or null where nobody can be asked. */
+  constructor(private readonly store: Store<State, Action>, private readonly send: (order: Json) => string | null) {
+    store.watch(
+      (state): Wish => ({ order: wishedOrder(state), stack: state.hello?.stack ?? [], steering: isSteering(state) }),
+      (wish) => this.changed(wish),
+      (a, b) => sameJson(a.order, b.order) && a.steering === b.steering && sameJson(a.stack, b.stack),
+    );
+  }
+
+  /** Another order is composed, or it would start from another shape. */
+  private changed({ order, steering }: Wish): void {
+    clearTimeout(this.resting);
+    this.asked = null;
+    if (order === null || !steering) return this.store.dispatch({ type: "forecast cleared" });
+    this.store.dispatch({ type: "forecast asked" });
+    this.resting = setTimeout(() => {
+      this.asked = this.send(order);
+      if (this.asked === null) this.store.dispatch({ type: "forecast cleared" });
+    }, REST);
+  }
+
+  answer(answer: ForecastAnswer): void {
+    if (this.asked === null || answer.id !== this.asked) return;
+    this.store.dispatch({ type: "forecast told", answer: answer.order });
+  }
+
+  /** The server could not take the question of this name; whether it was one of ours. */
+  refused(id: string, reason: string): boolean {
+    if (this.asked === null || id !== this.asked) return false;
+    this.store.dispatch({ type: "forecast failed", reason });
+    return true;
+  }
+}

@@ -1,0 +1,120 @@
+/** Keeps the preview in step with the form: what is being composed there is seen in the picture before anything is sent. */
+import type { Json, SurfaceInformation } from "../connection/protocol";
+import type { ShapeFaults } from "../kernel/kernel";
+import type { Scene } from "../picture/scene";
+import type { Action } from "../store/actions";
+import { wishedStack } from "../store/draft";
+import { NO_PREVIEW } from "../store/state";
+import type { PreviewState, State } from "../store/state";
+import { sameJson } from "../store/store";
+import type { Store } from "../store/store";
+import { Preview } from "./preview";
+import type { PreviewShape, PreviewSurface, PreviewWorker } from "./preview";
+
+export class Previewer {
+  private preview: Preview | null = null;
+  private wished: Json[] | null = null;
+  private features: string[] = [];
+  private points: Float32Array = new Float32Array(0);
+  private bones = false;
+
+  constructor(
+    private readonly scene: Scene, private readonly address: string, private readonly module: Promise<WebAssembly.Module>,
+    private readonly store: Store<State, Action>,
+  ) {
+    store.watch((state) => state.hello?.surface ?? null, (surface) => this.preview?.offer(surface), sameJson);
+    store.watch((state) => state.hello?.stack ?? [], () => {
+      if (this.bones) this.showSkeleton(true);
+      this.show(this.wished);
+    }, sameJson);
+    store.watch(wishedStack, (wished) => this.show(wished), sameJson);
+  }
+
+  /** Shows the skeleton, by which the shape can be dragged, or takes it away. */
+  showSkeleton(shown: boolean): void {
+    this.bones = shown;
+    if (shown) this.started().skeleton(this.stack);
+    else this.scene.setBones(null);
+  }
+
+  private get stack(): Json[] {
+    return this.store.state.hello?.stack ?? [];
+  }
+
+  private get surface(): SurfaceInformation | null {
+    return this.store.state.hello?.surface ?? null;
+  }
+
+  private show(wished: Json[] | null): void {
+    this.wished = wished;
+    if (!wished || !this.surface) {
+      if (this.preview) this.preview.clear();
+      else this.say(NO_PREVIEW);
+      return;
+    }
+    this.say({ ...this.store.state.preview, state: "waiting", faults: null });
+    this.started().show(this.stack, wished);
+  }
+
+  /** The kernel is loaded when it is first needed. */
+  private started(): Preview {
+    if (this.preview) return this.preview;
+    const worker = new Worker(new URL("./preview.worker.ts", import.meta.url), { type: "module" });
+    this.module.then((module) => worker.postMessage({ module }), (error: unknown) => this.fail(String(error)));
+    this.preview = new Preview(worker as unknown as PreviewWorker, () => fetchSurface(this.address), {
+      surface: (surface) => this.takeSurface(surface),
+      shape: (shape) => this.take(shape),
+      checked: (faults) => this.judge(faults),
+      skeleton: (bones, reason) => {
+        if (!this.bones) return;
+        this.scene.setBones(bones);
+        if (bones === null) this.fail(`there is no skeleton: ${reason}`);
+      },
+      failed: (_, reason) => this.fail(reason),
+      cleared: () => {
+        this.scene.setPreview(null);
+        this.say(NO_PREVIEW);
+      },
+    });
+    worker.addEventListener("error", (event) => this.fail(event.message || "the geometry kernel could not be started"));
+    this.preview.offer(this.surface);
+    return this.preview;
+  }
+
+  private takeSurface(surface: PreviewSurface): void {
+    this.features = surface.features;
+    this.scene.setPreviewSurface(surface);
+  }
+
+  private take({ points, largest, moved, size, asked, computing, newest }: PreviewShape): void {
+    const { wished } = this;
+    this.points = points;
+    this.scene.setPreview(points, undefined, () => {
+      // A wish that came while the picture was drawn is answered by a later one.
+      if (!newest || wished !== this.wished) return;
+      const byName = Object.fromEntries(this.features.map((name, i) => [name, moved[i] ?? 0]));
+      const { faults } = this.store.state.preview;
+      this.say({ ...NO_PREVIEW, faults, state: "shown", largest, moved: byName, size, computing, milliseconds: performance.now() - asked });
+    });
+  }
+
+  private judge(faults: ShapeFaults | null): void {
+    this.say({ ...this.store.state.preview, faults: faults?.text ?? "" });
+    if (faults) this.scene.setPreview(this.points, faults.triangles);
+  }
+
+  private fail(reason: string): void {
+    this.scene.setPreview(null);
+    this.say({ ...NO_PREVIEW, state: "failed", reason });
+  }
+
+  private say(preview: PreviewState): void {
+    if (!sameJson(preview, this.store.state.preview)) this.store.dispatch({ type: "preview", preview });
+  }
+}
+
+async function fetchSurface(address: string): Promise<ArrayBuffer> {
+  const response = await fetch(address, { cache: "no-store", redirect: "error" });
+  if (!response.ok) throw new Error((await response.text()).slice(0, 300).trim() || response.statusText);
+  return response.arrayBuffer();
+}

@@ -1,0 +1,42 @@
+/** What can happen: from the simulation, or from the person at the page. */
+import type { ConnectionState } from "../connection/connection";
+import type { ForecastAnswer, Hello, Json, OrderStatus, RunEnd, Status } from "../connection/protocol";
+import type { OrderForm, Values } from "../form/schema";
+import type { Part, PreviewState, Problem } from "./state";
+
+export type Action =
+  // From the simulation.
+  | { type: "connection"; state: ConnectionState; explanation: string }
+  | { type: "hello"; hello: Hello }
+  | { type: "status"; status: Status }
+  | { type: "frame"; cycle: number }
+  | { type: "order"; status: OrderStatus }
+  | { type: "end"; end: RunEnd }
+  | { type: "wheel asked"; by: string }
+  | { type: "refused"; id: string | null; text: string }
+  | { type: "unreadable"; text: string }
+  | { type: "schema"; form: OrderForm | null; settings: Values }
+  // What was sent.
+  | { type: "order sent"; id: string; order: Json; at: number }
+  | { type: "order dismissed"; id: string }
+  | { type: "wheel answered" }
+  // The features.
+  | { type: "part"; feature: string; part: Part | null }
+  | { type: "hover"; feature: string | null }
+  // The form. `step` names the field or gesture: all that it does is one step to take back.
+  | { type: "form read"; key: string; body: Values; settings: Values; problems: readonly Problem[]; step: string }
+  | { type: "action chosen"; key: string }
+  | { type: "composed"; key: string; values: Values; step: string }
+  | { type: "aborted"; step: string }
+  | { type: "amount"; fraction: number }
+  | { type: "remedy"; settings: Values }
+  | { type: "cleared" }
+  | { type: "edit loaded"; index: number }
+  | { type: "step back" }
+  | { type: "step forward" }
+  // What is computed of it.
+  | { type: "preview"; preview: PreviewState }
+  | { type: "forecast asked" }
+  | { type: "forecast told"; answer: ForecastAnswer["order"] }
+  | { type: "forecast failed"; reason: string }
+  | { type: "forecast cleared" };

@@ -1,0 +1,37 @@
+/** The orders that are known of: what each asked for, and what became of it. */
+import type { Json, OrderStatus } from "../connection/protocol";
+import { describeOrder } from "../form/describe";
+import type { OrderRecord } from "./state";
+
+const LONGEST_LIST = 200;
+
+function put(orders: readonly OrderRecord[], record: OrderRecord): readonly OrderRecord[] {
+  const known = orders.some((other) => other.id === record.id);
+  return (known ? orders.map((other) => (other.id === record.id ? record : other)) : [...orders, record]).slice(-LONGEST_LIST);
+}
+
+/** An order of this viewer's own, just sent. */
+export function orderSent(orders: readonly OrderRecord[], id: string, order: Json, text: string, at: number): readonly OrderRecord[] {
+  return put(orders, { id, status: "sent", text, order, sentAt: at });
+}
+
+/** What the simulation tells of an order. */
+export function orderTold(orders: readonly OrderRecord[], status: OrderStatus): readonly OrderRecord[] {
+  const known = orders.find((order) => order.id === status.id);
+  const text = known?.text ?? (status.order === undefined ? `order ${status.id}` : describeOrder(status.order));
+  return put(orders, { ...known, ...status, text, sentAt: known?.sentAt ?? null });
+}
+
+/** A message that the simulation could not take; the same orders where it was none of them. */
+export function orderRefused(orders: readonly OrderRecord[], id: string | null, reason: string): readonly OrderRecord[] {
+  return orders.some((order) => order.id === id) ? orders.map((order) => (order.id === id ? { ...order, status: "rejected" as const, reason } : order)) : orders;
+}
+
+/** All orders that the simulation knows of. After a connection came back, what it does not know of never reached it. */
+export function ordersReconciled(orders: readonly OrderRecord[], statuses: readonly OrderStatus[], reconnected: boolean): readonly OrderRecord[] {
+  const told = statuses.reduce(orderTold, orders);
+  const known = new Set(statuses.map((status) => status.id));
+  if (!reconnected || told.every((order) => order.status !== "sent" || known.has(order.id))) return told;
+  const reason = "The connection ended before the simulation had the order. Nothing was changed.";
+  return told.map((order) => (order.status === "sent" && !known.has(order.id) ? { ...order, status: "lost" as const, reason } : order));
+}

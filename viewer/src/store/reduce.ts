@@ -1,0 +1,179 @@
+/** The next state, of the present one and what happened. */
+import type { Hello, Json } from "../connection/protocol";
+import { describeOrder } from "../form/describe";
+import { ROLES } from "../form/schema";
+import type { Values } from "../form/schema";
+import type { Action } from "./actions";
+import { bodyOf, isObject, kindOf, openBoundaries, partsOf, scaled, withoutShorthand } from "./draft";
+import { orderRefused, orderSent, orderTold, ordersReconciled } from "./orders";
+import { NO_FORECAST } from "./state";
+import type { Composed, Draft, Part, State } from "./state";
+import { sameJson } from "./store";
+
+/** Steps of the form that can be taken back. */
+const LONGEST_PAST = 100;
+const LONGEST_UNDONE = 50;
+const LONGEST_ERRORS = 50;
+
+export function reduce(state: State, action: Action): State {
+  switch (action.type) {
+    case "connection": {
+      const connected = action.state === "connected";
+      return {
+        ...state, askedBy: connected ? state.askedBy : null,
+        connection: { ...state.connection, state: action.state, explanation: action.explanation, fresh: connected },
+      };
+    }
+    case "hello": return withHello(state, action.hello);
+    case "status": return { ...state, status: action.status };
+    case "frame": return { ...state, frames: { count: state.frames.count + 1, cycle: action.cycle } };
+    case "order": {
+      // What another orders leaves nothing that an undo of ours could bring back.
+      const isOurs = state.orders.some((order) => order.id === action.status.id);
+      return { ...state, orders: orderTold(state.orders, action.status), undone: isOurs ? state.undone : [] };
+    }
+    case "order dismissed": return { ...state, orders: state.orders.map((order) => (order.id === action.id ? { ...order, dismissed: true } : order)) };
+    case "end": return { ...state, end: action.end, askedBy: null };
+    case "wheel asked": return { ...state, askedBy: action.by };
+    case "wheel answered": return { ...state, askedBy: null };
+    case "refused": {
+      const orders = orderRefused(state.orders, action.id, action.text);
+      return orders === state.orders ? { ...state, refusal: action.text } : { ...state, orders };
+    }
+    case "unreadable": return { ...state, errors: [...state.errors, action.text].slice(-LONGEST_ERRORS) };
+    case "schema": return withSchema(state, action.form, action.settings);
+    case "order sent": return withOrderSent(state, action.id, action.order, action.at);
+    case "part": {
+      const parts = withPart(state.selection.parts, action.feature, action.part);
+      return parts === state.selection.parts ? state : { ...state, selection: { ...state.selection, parts } };
+    }
+    case "hover": return action.feature === state.selection.hovered ? state : { ...state, selection: { ...state.selection, hovered: action.feature } };
+    case "form read": {
+      const { key, body, settings, problems, step } = action;
+      const draft = { ...state.draft, key, settings, problems, bodies: { ...state.draft.bodies, [key]: body } };
+      return sameJson(draft, state.draft) ? state : stepped({ ...state, refusal: "" }, { ...draft, amount: null }, step);
+    }
+    case "action chosen": return stepped(state, { ...state.draft, key: action.key, problems: [], amount: null }, `action ${action.key}`);
+    case "composed": {
+      const kind = kindOf(state, action.key);
+      if (!kind) return state;
+      const body = { ...kind.neutral, ...state.draft.bodies[action.key], ...action.values };
+      const draft = { ...state.draft, key: action.key, bodies: { ...state.draft.bodies, [action.key]: body }, problems: [], amount: null };
+      return stepped({ ...state, refusal: "" }, draft, action.step);
+    }
+    case "aborted": return state.draft.step === action.step ? steppedBack(state, false) : state;
+    case "amount": return withAmount(state, action.fraction);
+    case "remedy": return { ...state, draft: { ...state.draft, remedy: action.settings } };
+    case "cleared": return cleared(state);
+    case "edit loaded": return withEditLoaded(state, action.index);
+    case "step back": return steppedBack(state, true);
+    case "step forward": return steppedForward(state);
+    case "preview": return { ...state, preview: action.preview };
+    case "forecast asked": return { ...state, forecast: { ...NO_FORECAST, state: "waiting" } };
+    case "forecast told": return { ...state, forecast: { state: "told", answer: action.answer, reason: action.answer.reason ?? null } };
+    case "forecast failed": return { ...state, forecast: { state: "failed", answer: null, reason: action.reason } };
+    case "forecast cleared": return state.forecast.state === "none" ? state : { ...state, forecast: NO_FORECAST };
+  }
+}
+
+function withHello(state: State, hello: Hello): State {
+  const names = new Set(hello.features.map((feature) => feature.name));
+  const before = new Set(state.hello?.features.map((feature) => feature.name));
+  const parts = Object.fromEntries(Object.entries(state.selection.parts).filter(([name]) => names.has(name)));
+  // What flows in and out stays where it is, unless somebody wants otherwise.
+  for (const name of openBoundaries({ hello })) if (!before.has(name) && parts[name] === undefined) parts[name] = "fixed";
+  const { hovered } = state.selection;
+  const next: State = {
+    ...state, hello,
+    connection: { ...state.connection, known: true, fresh: false },
+    selection: { parts: sameJson(parts, state.selection.parts) ? state.selection.parts : parts, hovered: hovered !== null && names.has(hovered) ? hovered : null },
+    orders: ordersReconciled(state.orders, hello.orders, state.connection.fresh && state.connection.known),
+    askedBy: hello.role === "driver" ? state.askedBy : null,
+    // Whoever has the wheel now need not know that it was refused before.
+    refusal: hello.role !== state.hello?.role ? "" : state.refusal,
+  };
+  const { updating } = state.draft;
+  const isGone = updating !== null && !sameJson(hello.stack[updating], state.hello?.stack[updating]);
+  return isGone ? cleared(next) : next;
+}
+
+function withSchema(state: State, form: State["form"], settings: Values): State {
+  if (!form) return { ...state, form };
+  const bodies = Object.fromEntries(form.edits.map((edit) => [edit.key, state.draft.bodies[edit.key] ?? edit.neutral]));
+  const known = form.edits.some((edit) => edit.key === state.draft.key);
+  const key = known ? state.draft.key : form.edits.find((edit) => edit.key === "scale_direction")?.key ?? form.edits[0]?.key ?? null;
+  return { ...state, form, draft: { ...state.draft, key, bodies, settings: known ? state.draft.settings : settings } };
+}
+
+function withOrderSent(state: State, id: string, order: Json, at: number): State {
+  const undoes = isObject(order) && order.undo !== undefined;
+  const stack = state.hello?.stack ?? [];
+  const redoes = isObject(order) && sameJson(order.stack, state.undone.at(-1));
+  return {
+    ...state, refusal: "", orders: orderSent(state.orders, id, order, describeOrder(order, state.form), at),
+    undone: undoes ? [...state.undone, stack].slice(-LONGEST_UNDONE) : redoes ? state.undone.slice(0, -1) : [],
+  };
+}
+
+function withPart(parts: State["selection"]["parts"], feature: string, part: Part | null): State["selection"]["parts"] {
+  if ((parts[feature] ?? null) === part) return parts;
+  const { [feature]: _, ...rest } = parts;
+  return part === null ? rest : { ...rest, [feature]: part };
+}
+
+const composed = (state: State): Composed => ({ key: state.draft.key, bodies: state.draft.bodies, parts: state.selection.parts, updating: state.draft.updating });
+
+/** The state with another draft, as a step that can be taken back; all of one step together. */
+function stepped(state: State, draft: Draft, step: string): State {
+  const past = state.draft.step === step ? state.draft.past : [...state.draft.past, composed(state)].slice(-LONGEST_PAST);
+  return { ...state, draft: { ...draft, step, past, future: [] } };
+}
+
+function brought(state: State, to: Composed, past: readonly Composed[], future: readonly Composed[]): State {
+  const { key, bodies, parts, updating } = to;
+  const draft = { ...state.draft, key, bodies, updating, problems: [], amount: null, step: null, past, future };
+  return { ...state, draft, selection: { ...state.selection, parts } };
+}
+
+function steppedBack(state: State, canReturn: boolean): State {
+  const { past, future } = state.draft;
+  const to = past.at(-1);
+  return to ? brought(state, to, past.slice(0, -1), canReturn ? [...future, composed(state)] : future) : state;
+}
+
+function steppedForward(state: State): State {
+  const { past, future } = state.draft;
+  const to = future.at(-1);
+  return to ? brought(state, to, [...past, composed(state)], future.slice(0, -1)) : state;
+}
+
+/** The form asks for nothing; a handle stays chosen, so that it can be worked on. */
+function cleared(state: State): State {
+  const bodies = Object.fromEntries((state.form?.edits ?? []).map((edit) => [edit.key, edit.neutral]));
+  const draft = { ...state.draft, bodies, remedy: {}, problems: [], updating: null, amount: null, step: null, past: [], future: [] };
+  return { ...state, refusal: "", draft, forecast: NO_FORECAST };
+}
+
+/** An edit of the stack in the form, to be changed. */
+function withEditLoaded(state: State, index: number): State {
+  const loaded = partsOf(state.hello?.stack[index]);
+  const kind = kindOf(state, loaded?.key ?? null);
+  if (!loaded || !kind) return state;
+  const own = Object.fromEntries(Object.entries(withoutShorthand(kind, loaded.body)).filter(([name, value]) => ROLES[name] === undefined && value !== null));
+  const parts: Record<string, Part> = {};
+  for (const [name, part] of Object.entries(ROLES)) {
+    const names = loaded.body[name];
+    if (Array.isArray(names)) for (const feature of names) if (typeof feature === "string" && parts[feature] === undefined) parts[feature] = part;
+  }
+  const before = cleared(state);
+  const draft = { ...before.draft, key: kind.key, bodies: { ...before.draft.bodies, [kind.key]: { ...kind.neutral, ...own } }, updating: index };
+  return { ...before, draft, selection: { ...state.selection, parts } };
+}
+
+function withAmount(state: State, fraction: number): State {
+  const kind = kindOf(state, state.draft.key);
+  if (!kind) return state;
+  const whole = state.draft.amount?.whole ?? bodyOf(state.draft);
+  const draft = { ...state.draft, bodies: { ...state.draft.bodies, [kind.key]: scaled(kind.field, whole, fraction) } };
+  return stepped(state, { ...draft, amount: { whole, fraction } }, "amount");
+}

@@ -1,0 +1,103 @@
+/** What the page knows: of the run, of what is being composed, and of what became of it. */
+import type { ConnectionState } from "../connection/connection";
+import type { ForecastAnswer, Hello, Json, OrderStatus, RunEnd, Status } from "../connection/protocol";
+import type { OrderForm, Values } from "../form/schema";
+
+export type Part = "handle" | "fixed";
+
+/** Which features move and which are held; the one under the pointer. */
+export interface SelectionState { parts: Readonly<Record<string, Part>>; hovered: string | null }
+
+/** Something in the form that cannot be sent: which field it is, such as `factors z`, and what is wrong with it. */
+export interface Problem { field: string; text: string }
+
+/** What a step back in the form brings back. */
+export interface Composed { key: string | null; bodies: Readonly<Record<string, Values>>; parts: Readonly<Record<string, Part>>; updating: number | null }
+
+/** What stands in the form. */
+export interface Draft {
+  /** The edit that is composed, by its name in the JSON; null before the form is there. */
+  key: string | null;
+  /** The fields of each edit, without its features: those are the selection. */
+  bodies: Readonly<Record<string, Values>>;
+  /** What the order sets beside its edits. */
+  settings: Values;
+  /** What a remedy for this edit alone sets beside them. */
+  remedy: Values;
+  problems: readonly Problem[];
+  /** The edit of the stack that is being changed, counted from 0; null for a new one. */
+  updating: number | null;
+  /** The fields at their full amount, and the part of it that stands in the form, from 0 to 1. */
+  amount: { whole: Values; fraction: number } | null;
+  /** The step that is under way: what belongs to one gesture or one field is taken back at once. */
+  step: string | null;
+  past: readonly Composed[];
+  future: readonly Composed[];
+}
+
+/** The states that the server tells, and the two that only this viewer knows. */
+export type OrderPhase = OrderStatus["status"] | "sent" | "lost";
+export interface OrderRecord extends Omit<OrderStatus, "status"> { status: OrderPhase; text: string; sentAt: number | null; /** Taken off the list by hand. */ dismissed?: boolean }
+
+export interface PreviewState {
+  state: "none" | "waiting" | "shown" | "failed";
+  /** How far the edits would move any point of the surface. */
+  largest: number | null;
+  /** How far they would move each feature, by name. */
+  moved: Readonly<Record<string, number>>;
+  /** The diagonal of the box around the surface. */
+  size: number | null;
+  /** Milliseconds from the newest change of the form to its picture, and those of them that went into computing it. */
+  milliseconds: number | null;
+  computing: number | null;
+  reason: string | null;
+  /** What is wrong with the shape; empty where it is sound, null as long as it was not looked at. */
+  faults: string | null;
+}
+
+export interface ForecastState {
+  state: "none" | "waiting" | "told" | "failed";
+  answer: ForecastAnswer["order"] | null;
+  reason: string | null;
+}
+
+export interface State {
+  connection: { state: ConnectionState; explanation: string; /** Whether there has been a connection before this one. */ known: boolean; fresh: boolean };
+  hello: Hello | null;
+  status: Status | null;
+  /** The last word of a run that has ended. */
+  end: RunEnd | null;
+  /** Data frames taken since the page was opened, and the cycle of the newest. */
+  frames: { count: number; cycle: number | null };
+  selection: SelectionState;
+  /** The form for an order; null before the schema has come. */
+  form: OrderForm | null;
+  draft: Draft;
+  /** Orders by the time they became known. */
+  orders: readonly OrderRecord[];
+  /** Stacks that an undo has left, the newest last. */
+  undone: readonly Json[][];
+  preview: PreviewState;
+  forecast: ForecastState;
+  /** The viewer that asks for the wheel. */
+  askedBy: string | null;
+  /** What the simulation refused, in its own words; empty for nothing. */
+  refusal: string;
+  /** What went wrong on the way here: frames or messages that could not be read, newest last. */
+  errors: readonly string[];
+}
+
+export const NO_PREVIEW: PreviewState = { state: "none", largest: null, moved: {}, size: null, milliseconds: null, computing: null, reason: null, faults: null };
+export const NO_FORECAST: ForecastState = { state: "none", answer: null, reason: null };
+
+export const INITIAL: State = {
+  connection: { state: "connecting", explanation: "", known: false, fresh: false },
+  hello: null, status: null, end: null,
+  frames: { count: 0, cycle: null },
+  selection: { parts: {}, hovered: null },
+  form: null,
+  draft: { key: null, bodies: {}, settings: {}, remedy: {}, problems: [], updating: null, amount: null, step: null, past: [], future: [] },
+  orders: [], undone: [],
+  preview: NO_PREVIEW, forecast: NO_FORECAST,
+  askedBy: null, refusal: "", errors: [],
+};

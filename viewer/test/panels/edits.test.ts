@@ -1,0 +1,115 @@
+// @vitest-environment jsdom
+import { beforeEach, describe, expect, it } from "vitest";
+import type { Json } from "../../src/connection/protocol";
+import { EditsPanel } from "../../src/panels/edits";
+import { move, remove, rename, toggleMute } from "../../src/store/edits";
+import { page } from "../page";
+import { openDocument } from "./document";
+
+const shift = (x: number, more: { [key: string]: Json } = {}): Json => ({ translate: { features: ["wall"], by: [x, 0, 0], ...more } });
+
+describe("the list of edits", () => {
+  let made: ReturnType<typeof page>;
+  const stack = [shift(1), shift(2, { muted: true }), shift(3, { name: "nudge" })];
+  beforeEach(() => {
+    openDocument();
+    made = page({ stack });
+    new EditsPanel(made.store, made.commands);
+  });
+  const button = (row: number, act: string): HTMLElement => document.querySelector<HTMLElement>(`#stack [data-edit="${row}"] [data-act="${act}"]`)!;
+  const rows = (): string[] => [...document.querySelectorAll("#stack .title")].map((title) => title.textContent!);
+
+  it("says what each does, in words, or its name", () => {
+    expect(rows()).toEqual(["Wall: moved by 1 along x", "Wall: moved by 2 along x", "nudge"]);
+    expect(document.querySelector<HTMLElement>('#stack [data-edit="1"]')!.dataset.muted).toBe("true");
+    expect(button(0, "remove").getAttribute("aria-label")).toBe("Delete: Wall: moved by 1 along x");
+  });
+
+  it("changes them by ordering the whole stack", () => {
+    button(0, "mute").click();
+    button(1, "mute").click();
+    button(1, "remove").click();
+    button(2, "load").dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowUp", altKey: true }));
+    expect(made.orders()).toEqual([{ stack: [shift(1, { muted: true }), stack[1], stack[2]] }]);
+    // The others wait until what was sent has come: they would be made of an old stack.
+    expect(button(1, "mute").getAttribute("aria-disabled")).toBe("true");
+    made.store.dispatch({ type: "order", status: { id: made.store.state.orders[0]!.id, status: "applied" } });
+    button(2, "load").dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowUp", altKey: true }));
+    expect(made.orders().at(-1)).toEqual({ stack: [stack[0], stack[2], stack[1]] });
+  });
+
+  it("loads an edit into the form with a click", () => {
+    button(2, "load").click();
+    expect(made.store.state.draft).toMatchObject({ updating: 2, key: "translate" });
+    expect(button(2, "load").getAttribute("aria-pressed")).toBe("true");
+  });
+
+  it("keeps the focus where it was, over every change of the list", () => {
+    button(1, "mute").focus();
+    button(1, "mute").click();
+    made.store.dispatch({ type: "order", status: { id: made.store.state.orders[0]!.id, status: "applied" } });
+    made.greet({ stack: [stack[0]!, shift(2), stack[2]!] });
+    expect(document.activeElement).toBe(button(1, "mute"));
+    expect(button(1, "mute").getAttribute("aria-label")).toMatch(/^Mute/);
+    button(2, "remove").focus();
+    made.greet({ stack: [stack[0]!, shift(2)] });
+    expect(document.activeElement).toBe(button(1, "remove"));
+  });
+
+  it("gives a name with Enter, and none with Escape", () => {
+    const type = (text: string, key: string): void => {
+      button(2, "rename").click();
+      const input = document.querySelector<HTMLInputElement>("#stack input")!;
+      expect(input.value).toBe("nudge");
+      input.value = text;
+      input.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
+    };
+    type("other", "Escape");
+    expect(made.orders()).toEqual([]);
+    type("push", "Enter");
+    expect(made.orders()).toEqual([{ stack: [stack[0], stack[1], shift(3, { name: "push" })] }]);
+  });
+
+  it("shows what is on its way with a way to take it back, and what was refused until it is dismissed", () => {
+    const order = (status: "computing" | "applying" | "rejected", more: object = {}): void => made.store.dispatch({ type: "order", status: { id: "o1", status, order: { edits: [shift(9)] }, ...more } });
+    order("computing");
+    document.querySelector<HTMLElement>("#pending .cancel")!.click();
+    expect(made.sent.at(-1)).toMatchObject({ cancel: { order: "o1" } });
+    order("applying", { shape: 4, shapes: 10 });
+    expect(document.querySelector("#pending .cancel")).toBeNull();
+    expect(document.querySelector("#pending .detail")!.textContent).toBe("shape 4 of 10");
+    order("rejected", { reason: "cells invert" });
+    expect(document.querySelector("#pending")!.textContent).toMatch(/Wall: moved by 9 along x.*refused.*cells invert/);
+    document.querySelector<HTMLElement>("#pending .icon")!.click();
+    expect(document.querySelector("#pending")!.textContent).toBe("");
+    expect(document.querySelector("#orders")!.textContent).toMatch(/cells invert/);
+  });
+
+  it("lets nobody take back what is not there, and no watcher anything, with the reason", () => {
+    const undo = document.querySelector<HTMLButtonElement>("#undo")!;
+    expect(undo.disabled).toBe(false);
+    made.greet({ stack: [] });
+    expect([undo.disabled, undo.title]).toEqual([true, "There is nothing to take back."]);
+    made.greet({ stack, role: "watcher" });
+    expect(undo.disabled).toBe(true);
+    expect(button(0, "mute").getAttribute("aria-disabled")).toBe("true");
+    expect(button(0, "mute").title).toMatch(/ask to steer/);
+    button(0, "mute").click();
+    expect(made.sent).toEqual([]);
+  });
+});
+
+describe("a stack", () => {
+  it("survives edits that make no sense", () => {
+    for (const odd of [null, 3, "x", [], {}, { translate: null }] as Json[]) {
+      expect(toggleMute([odd], 0)).toEqual([odd]);
+      expect(rename([odd], 0, "a")).toEqual([odd]);
+      expect(move([odd, 1], 1, 0)).toEqual([1, odd]);
+      expect(remove([odd, 1], 0)).toEqual([1]);
+      openDocument();
+      const made = page({ stack: [odd] });
+      new EditsPanel(made.store, made.commands);
+      document.querySelector<HTMLElement>('#stack [data-act="load"]')!.click();
+    }
+  });
+});

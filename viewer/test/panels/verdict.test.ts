@@ -1,0 +1,59 @@
+// @vitest-environment jsdom
+import { beforeEach, describe, expect, it } from "vitest";
+import type { ForecastAnswer, Vector } from "../../src/connection/protocol";
+import { VerdictPanel } from "../../src/panels/verdict";
+import { wishedOrder } from "../../src/store/draft";
+import { page } from "../page";
+import { openDocument } from "./document";
+
+const REFUSED: ForecastAnswer["order"] = { outcome: "rejected", reason: "cell 9856 at (1, 2, 3) would invert", fraction: 0.479, worst: [{ cell: 9856, position: [1, 2, 3], scaled_jacobian: -0.2 }] };
+
+describe("the foot of the form", () => {
+  let made: ReturnType<typeof page>;
+  let flights: Vector[];
+  const at = (id: string): HTMLButtonElement => document.getElementById(id) as HTMLButtonElement;
+  beforeEach(() => {
+    openDocument();
+    made = page();
+    flights = [];
+    new VerdictPanel(made.store, made.commands, (place) => flights.push(place), () => undefined);
+    made.store.dispatch({ type: "part", feature: "throat", part: "handle" });
+    made.store.dispatch({ type: "composed", key: "scale_direction", values: { factors: [1, 1, 0.5] }, step: "typed" });
+  });
+
+  it("gives the order once, and is neutral then", () => {
+    expect(at("apply").disabled).toBe(false);
+    at("apply").click();
+    at("apply").click();
+    expect(made.orders()).toHaveLength(1);
+    expect(at("apply").disabled).toBe(true);
+    expect(at("apply").title).toMatch(/Nothing is asked for/);
+    expect(at("cancel").hidden).toBe(true);
+  });
+
+  it("turns Apply off where it would be refused, and offers what helps", () => {
+    made.store.dispatch({ type: "forecast told", answer: REFUSED });
+    expect(at("apply").disabled).toBe(true);
+    expect(at("forecast").textContent).toBe("Forecast: it would be refused: 47 % of it would pass");
+    expect(at("verdict-reasons").textContent).toBe("cell 9856 at (1, 2, 3) would invert");
+    expect([at("apply-part").textContent, at("apply-part").hidden, at("untangle").hidden]).toEqual(["Apply 47 %", false, false]);
+    at("show-worst").click();
+    expect(flights).toEqual([[1, 2, 3]]);
+    at("untangle").click();
+    expect(wishedOrder(made.store.state)!.guard).toMatchObject({ otherwise: "untangle", min_scaled_jacobian: 0.03 });
+  });
+
+  it("takes Cancel for asking for nothing", () => {
+    at("cancel").click();
+    expect(wishedOrder(made.store.state)).toBeNull();
+    expect(made.sent).toEqual([]);
+  });
+
+  it("says what is missing when it is pressed, and no longer once it is there", () => {
+    made.store.dispatch({ type: "part", feature: "throat", part: null });
+    at("apply").click();
+    expect(at("problem").textContent).toMatch(/at least one feature/);
+    made.store.dispatch({ type: "composed", key: "scale_direction", values: { factors: [1, 1, 0.6] }, step: "typed" });
+    expect(at("problem").hidden).toBe(true);
+  });
+});

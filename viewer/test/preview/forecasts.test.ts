@@ -1,0 +1,79 @@
+import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
+import type { ForecastAnswer, Json } from "../../src/connection/protocol";
+import { Forecasts } from "../../src/preview/forecasts";
+import { page } from "../page";
+
+const TOLD: ForecastAnswer["order"] = {
+  outcome: "applied", shapes: 10, quality: { min: 0.2143, mean: 0.71, inverted: 0 }, seconds: { surface: 0.1, volume: 0.2, guard: 0.05 },
+};
+
+describe("a forecast", () => {
+  let sent: { edits: Json[] }[];
+  let made: ReturnType<typeof page>;
+  let forecasts: Forecasts;
+  const ask = (x: number): void => made.store.dispatch({ type: "composed", key: "translate", values: { by: [x, 0, 0] }, step: "typed" });
+  const asked = (): Json[] => sent.map(({ edits }) => (edits[0] as { translate: { by: Json } }).translate.by);
+  const state = (): string => made.store.state.forecast.state;
+
+  beforeEach(() => {
+    vi.useFakeTimers();
+    sent = [];
+    made = page();
+    made.store.dispatch({ type: "part", feature: "throat", part: "handle" });
+    forecasts = new Forecasts(made.store, (order) => `f${sent.push(order as { edits: Json[] })}`);
+  });
+  afterEach(() => { vi.useRealTimers(); });
+
+  it("is asked for once the form rests, for the newest order alone", () => {
+    ask(1);
+    vi.advanceTimersByTime(100);
+    ask(2);
+    ask(2);
+    vi.advanceTimersByTime(1000);
+    expect(asked()).toEqual([[2, 0, 0]]);
+    expect(state()).toBe("waiting");
+    forecasts.answer({ id: "f1", order: TOLD });
+    expect(made.store.state.forecast).toMatchObject({ state: "told", answer: { outcome: "applied" } });
+  });
+
+  it("that was overtaken or taken back is not shown", () => {
+    ask(1);
+    vi.advanceTimersByTime(1000);
+    ask(2);
+    forecasts.answer({ id: "f1", order: TOLD });
+    expect(state()).toBe("waiting");
+    made.store.dispatch({ type: "cleared" });
+    vi.advanceTimersByTime(1000);
+    expect(sent).toHaveLength(1);
+    expect(state()).toBe("none");
+  });
+
+  it("is asked for again when the shape has changed", () => {
+    made.greet({ stack: [{ translate: { features: ["wall"], by: [9, 0, 0] } }] });
+    vi.advanceTimersByTime(1000);
+    expect(sent).toHaveLength(0);
+    ask(1);
+    vi.advanceTimersByTime(1000);
+    made.greet({ stack: [] });
+    vi.advanceTimersByTime(1000);
+    expect(asked()).toEqual([[1, 0, 0], [1, 0, 0]]);
+  });
+
+  it("is not asked for by a watcher", () => {
+    made.greet({ role: "watcher" });
+    ask(1);
+    vi.advanceTimersByTime(1000);
+    expect(sent).toHaveLength(0);
+    made.greet({ role: "driver" });
+    vi.advanceTimersByTime(1000);
+    expect(sent).toHaveLength(1);
+  });
+
+  it("that the server cannot take says why, and leaves other errors alone", () => {
+    ask(1);
+    vi.advanceTimersByTime(1000);
+    expect(forecasts.refused("other", "no")).toBe(false);
+    expect(forecasts.refused("f1", "there is no mesh")).toBe(true);
+    expect(made.store.state.forecast).toMatchObject({ state: "failed", reason: "there is no mesh" });
+  });
+});

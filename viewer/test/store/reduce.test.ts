@@ -1,0 +1,229 @@
+import { describe, expect, it } from "vitest";
+import type { Json } from "../../src/connection/protocol";
+import { asksNothing, bodyOf, chosen, openBoundariesMoved, wishedOrder, wishedStack, withMove } from "../../src/store/draft";
+import { isRedoable, provenance, undoable, whyNotEditable } from "../../src/store/edits";
+import { runState, whyNotSteering } from "../../src/store/run";
+import { NO_PREVIEW } from "../../src/store/state";
+import { applyButton, forecastLine, openBoundaryWarning, percent, previewLine, remedies } from "../../src/store/verdict";
+import { STATUS, feature, page } from "../page";
+
+const pinch = (z: number): Json => ({ scale_direction: { features: ["throat"], fixed: [], factors: [1, 1, z], harmonic_order: 2 } });
+const FEATURES = [feature("inlet", "inflow"), feature("outlet", "outflow"), feature("walls", "wall"), feature("throat")];
+
+/** A page on which the throat is to be half as high. */
+function composed(hello: Parameters<typeof page>[0] = {}) {
+  const made = page(hello);
+  made.store.dispatch({ type: "part", feature: "throat", part: "handle" });
+  made.store.dispatch({ type: "composed", key: "scale_direction", values: { factors: [1, 1, 0.5] }, step: "typed" });
+  return made;
+}
+
+describe("open boundaries", () => {
+  it("are held at first, where the solver says which they are, and stay as somebody wants them", () => {
+    const { store, greet } = page({ features: FEATURES });
+    expect(chosen(store.state, "fixed")).toEqual(["inlet", "outlet"]);
+    store.dispatch({ type: "part", feature: "outlet", part: null });
+    greet({ stack: [pinch(0.9)] });
+    expect(chosen(store.state, "fixed")).toEqual(["inlet"]);
+    expect(chosen(page().store.state, "fixed")).toEqual([]);
+  });
+
+  it("are not moved by more than a hundredth without a word", () => {
+    const { store } = composed({ features: FEATURES });
+    const moved = (outlet: number): void => store.dispatch({ type: "preview", preview: { ...NO_PREVIEW, state: "shown", largest: 0.5, size: 2, moved: { throat: 0.5, walls: 0.5, outlet } } });
+    moved(0.019);
+    expect(openBoundaryWarning(store.state)).toBe("");
+    expect(applyButton(store.state).label).toBe("Apply");
+    moved(0.021);
+    expect(openBoundariesMoved(store.state).map(({ name }) => name)).toEqual(["outlet"]);
+    expect(openBoundaryWarning(store.state)).toBe("outlet (outflow) would move by 0.021, 1.1 % of the size.");
+    expect(applyButton(store.state)).toEqual({ label: "Apply anyway", why: "", isAnyway: true });
+  });
+});
+
+describe("the form's state", () => {
+  it("asks for nothing after Apply, so that a second one does nothing", () => {
+    const { store, commands, orders } = composed();
+    expect(commands.apply()).toBe("");
+    expect(orders()).toEqual([{ edits: [{ scale_direction: { features: ["throat"], fixed: [], factors: [1, 1, 0.5], harmonic_order: 2, muted: false } }] }]);
+    expect(asksNothing(store.state)).toBe(true);
+    expect(commands.apply()).toMatch(/Nothing is asked for/);
+    expect(applyButton(store.state).why).toMatch(/Nothing is asked for/);
+    expect(orders()).toHaveLength(1);
+    expect(chosen(store.state, "handle")).toEqual(["throat"]);
+  });
+
+  it("asks for nothing after Cancel", () => {
+    const { store } = composed();
+    store.dispatch({ type: "cleared" });
+    expect(bodyOf(store.state.draft).factors).toEqual([1, 1, 1]);
+    expect(wishedStack(store.state)).toBeNull();
+  });
+
+  it("adds a second node of the skeleton to the first", () => {
+    const { store } = page();
+    const drag = (at: Json, by: Json, step: string): void => store.dispatch({ type: "composed", key: "skeleton", values: { moves: withMove(bodyOf(store.state.draft).moves, at, by) }, step });
+    drag([0, 0, 1], [0.1, 0, 0], "drag 1");
+    drag([0, 0, 1], [0.2, 0, 0], "drag 1");
+    drag([0, 0, 5], [0, 0.3, 0], "drag 2");
+    expect((wishedStack(store.state)![0] as { skeleton: Json }).skeleton).toMatchObject({ moves: [{ at: [0, 0, 1], by: [0.2, 0, 0] }, { at: [0, 0, 5], by: [0, 0.3, 0] }] });
+    store.dispatch({ type: "step back" });
+    expect(bodyOf(store.state.draft).moves).toEqual([{ at: [0, 0, 1], by: [0.2, 0, 0] }]);
+  });
+});
+
+describe("an earlier edit", () => {
+  const stack = [pinch(0.5), { translate: { features: ["wall"], fixed: ["inlet"], by: [1, 0, 0], harmonic_order: 2, name: "shift" } }];
+
+  it("is loaded, changed, and ordered with the whole stack", () => {
+    const { store, commands, orders } = page({ stack });
+    store.dispatch({ type: "edit loaded", index: 1 });
+    expect(chosen(store.state, "handle")).toEqual(["wall"]);
+    expect(chosen(store.state, "fixed")).toEqual(["inlet"]);
+    expect(applyButton(store.state)).toMatchObject({ label: "Update edit 2", why: "The edit is as it was." });
+    expect(wishedStack(store.state)).toBeNull();
+    store.dispatch({ type: "composed", key: "translate", values: { by: [2, 0, 0] }, step: "typed" });
+    expect(applyButton(store.state).why).toBe("");
+    commands.apply();
+    expect(orders()).toEqual([{ stack: [stack[0], { translate: { features: ["wall"], fixed: ["inlet"], by: [2, 0, 0], harmonic_order: 2, muted: false, name: "shift" } }] }]);
+    expect(store.state.draft.updating).toBeNull();
+    expect(asksNothing(store.state)).toBe(true);
+  });
+
+  it("of a skeleton comes back from its short form", () => {
+    const { store } = page({ stack: [{ skeleton: { at: [0, 0, 1], by: [1, 0, 0], fixed: [], skinning: "linear" } }] });
+    store.dispatch({ type: "edit loaded", index: 0 });
+    expect(bodyOf(store.state.draft).moves).toEqual([{ at: [0, 0, 1], by: [1, 0, 0] }]);
+    expect(asksNothing(store.state)).toBe(true);
+  });
+
+  it("that another changes meanwhile is no longer what is in the form", () => {
+    const { store, greet } = page({ stack });
+    store.dispatch({ type: "edit loaded", index: 1 });
+    greet({ stack: [stack[0]!] });
+    expect(store.state.draft.updating).toBeNull();
+    expect(wishedOrder(store.state)).toBeNull();
+  });
+
+  it("waits while another order is under way", () => {
+    const { store } = page({ stack });
+    store.dispatch({ type: "order", status: { id: "x", status: "computing", order: { edits: [pinch(0.9)] } } });
+    expect(whyNotEditable(store.state)).toMatch(/under way/);
+    store.dispatch({ type: "order", status: { id: "x", status: "applied" } });
+    expect(whyNotEditable(store.state)).toBe("");
+  });
+
+  it("is known by the order that brought it", () => {
+    const order = (id: string, asked: Json) => ({ id, status: "applied" as const, text: id, order: asked, sentAt: null });
+    const orders = [order("a", { edits: [pinch(0.5)] }), order("b", { edits: [pinch(0.6)] }), order("c", { undo: 1 }), order("d", { edits: [pinch(0.7)] }), order("e", { stack: [pinch(0.7), pinch(0.4)] })];
+    expect(provenance(orders, [pinch(0.7), pinch(0.4)]).map((known) => known?.id)).toEqual(["d", "e"]);
+    expect(provenance(orders.slice(0, 2), [pinch(0.7)])).toEqual([null]);
+  });
+});
+
+describe("taking back", () => {
+  it("is offered only where there is something", () => {
+    const { store } = page();
+    expect(undoable(store.state)).toBe(0);
+    expect(undoable(page({ stack: [pinch(0.5)] }).store.state)).toBe(1);
+    expect(undoable(page({ stack: [], undoable: 2 }).store.state)).toBe(2);
+  });
+
+  it("of an undo brings the same stack back", () => {
+    const { store, commands, greet, orders } = page({ stack: [pinch(0.5)] });
+    expect(isRedoable(store.state)).toBe(false);
+    commands.undo();
+    greet({ stack: [] });
+    expect(isRedoable(store.state)).toBe(true);
+    commands.redo();
+    expect(orders()).toEqual([{ undo: 1 }, { stack: [pinch(0.5)] }]);
+    greet({ stack: [pinch(0.5)] });
+    expect(isRedoable(store.state)).toBe(false);
+    commands.redo();
+    expect(orders()).toHaveLength(2);
+  });
+
+  it("does not go over what another has ordered meanwhile", () => {
+    const { store, commands, greet } = page({ stack: [pinch(0.5)] });
+    commands.undo();
+    greet({ stack: [] });
+    store.dispatch({ type: "order", status: { id: "other", status: "accepted", order: { edits: [pinch(0.8)] } } });
+    expect(isRedoable(store.state)).toBe(false);
+  });
+});
+
+describe("the verdict", () => {
+  const refused = { outcome: "rejected" as const, reason: "cell 9856 would invert", fraction: 0.479, worst: [{ cell: 9856, position: [1, 2, 3] as [number, number, number], scaled_jacobian: -0.2 }] };
+
+  it("is a line each of preview and forecast, with the rest folded", () => {
+    const { store } = composed();
+    store.dispatch({ type: "preview", preview: { ...NO_PREVIEW, state: "shown", largest: 0.0123456, size: 0.3 } });
+    expect(previewLine(store.state)).toEqual({ tone: "good", text: "Preview: moves the surface by up to 0.0123 (4.1 % of its size)", details: "" });
+    store.dispatch({ type: "status", status: { ...STATUS, quality: { min: 0.25 } } });
+    store.dispatch({ type: "forecast told", answer: { outcome: "applied", shapes: 10, quality: { min: 0.2143, mean: 0.71, inverted: 0 }, seconds: { surface: 0.1, volume: 0.2, guard: 0.05 } } });
+    expect(forecastLine(store.state)).toEqual({ tone: "good", text: "Forecast: least quality 0.214 (now 0.25), 0 inverted", details: "mean quality 0.71 · in 10 shapes · computed in 350\u00a0ms" });
+    store.dispatch({ type: "forecast told", answer: { outcome: "clamped", fraction: 0.5, quality: { min: 0.02 } } });
+    expect(forecastLine(store.state)).toMatchObject({ tone: "warning", text: "Forecast: 50 % of it is done, least quality 0.02 (now 0.25), 0 inverted" });
+  });
+
+  it("of a refusal turns Apply off and offers ways out", () => {
+    const { store } = composed();
+    store.dispatch({ type: "forecast told", answer: refused });
+    expect(applyButton(store.state).why).toBe("It would be refused.");
+    expect(forecastLine(store.state)).toEqual({ tone: "bad", text: "Forecast: it would be refused: 47 % of it would pass", details: "cell 9856 would invert" });
+    expect(remedies(store.state)).toEqual({ fraction: 0.479, untangle: true, worst: [1, 2, 3] });
+    store.dispatch({ type: "remedy", settings: { guard: { otherwise: "untangle" } } });
+    expect(wishedOrder(store.state)!.guard).toEqual({ otherwise: "untangle" });
+    expect(remedies(store.state)!.untangle).toBe(false);
+    store.dispatch({ type: "cleared" });
+    expect(store.state.draft.remedy).toEqual({});
+  });
+
+  it("never promises more than passes", () => {
+    expect([0.479, 0.4799, 0.1, 0.0567, 0.999].map(percent)).toEqual(["47 %", "47 %", "10 %", "5.6 %", "99 %"]);
+  });
+});
+
+describe("who steers, and how the run stands", () => {
+  it("is said in words wherever a command would not be obeyed", () => {
+    const { store, greet } = page();
+    expect(whyNotSteering(store.state)).toBe("");
+    greet({ role: "watcher" });
+    store.dispatch({ type: "status", status: { ...STATUS, driver: "c9" } });
+    expect(whyNotSteering(store.state)).toMatch(/Viewer c9 steers: ask/);
+    greet({ role: "watcher", may_drive: false });
+    expect(whyNotSteering(store.state)).toBe("This link is for watching only.");
+    expect(applyButton(store.state).why).toBe("This link is for watching only.");
+  });
+
+  it("keeps a refusal only until the wheel is won", () => {
+    const { store, greet } = page({ role: "watcher" });
+    store.dispatch({ type: "refused", id: "1", text: "only the driver gives orders" });
+    expect(store.state.refusal).toMatch(/driver/);
+    greet({ role: "watcher" });
+    expect(store.state.refusal).toMatch(/driver/);
+    greet({ role: "driver" });
+    expect(store.state.refusal).toBe("");
+  });
+
+  it("is unknown after a bare loss, and ended after a last word", () => {
+    const { store } = page();
+    expect(runState(store.state)).toBe("running");
+    store.dispatch({ type: "connection", state: "reconnecting", explanation: "The connection was lost." });
+    expect(runState(store.state)).toBe("unknown");
+    expect(whyNotSteering(store.state)).toMatch(/no connection/);
+    store.dispatch({ type: "end", end: { how: "finished", cycle: 420, time: 1 } });
+    expect(runState(store.state)).toBe("ended");
+    expect(whyNotSteering(store.state)).toBe("The run has ended.");
+  });
+
+  it("tells an order that never arrived from one that did", () => {
+    const { store, commands, greet } = composed();
+    commands.apply();
+    const { id } = store.state.orders[0]!;
+    store.dispatch({ type: "connection", state: "reconnecting", explanation: "" });
+    store.dispatch({ type: "connection", state: "connected", explanation: "" });
+    greet({ orders: [] });
+    expect(store.state.orders[0]).toMatchObject({ id, status: "lost" });
+  });
+});
