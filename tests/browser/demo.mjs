@@ -353,7 +353,7 @@ const steps = [
     await page.mouse.up();
     await page.keyboard.up("Control");
     check(traffic.messages === messages, "messages were sent while bending");
-    const by = await Promise.all(["x", "y", "z"].map((axis) => page.inputValue(`.object:not([hidden]) input[aria-label="by ${axis}"]`)));
+    const by = await Promise.all(["x", "y", "z"].map((axis) => page.inputValue(`.object:not([hidden]) .entry input[aria-label$=" by ${axis}"]`)));
     const { preview } = await look();
     const length = Math.hypot(...by.map(Number));
     check(length > 0 && preview.largest > 0.5 * length && preview.largest < 3 * length, `a node was dragged by ${by}, the surface moves by up to ${preview.largest}`);
