@@ -10,7 +10,9 @@ import type vtkRenderer from "@kitware/vtk.js/Rendering/Core/Renderer";
 import type { Colour, Colouring } from "./colour";
 import { extremes, scalars } from "./colour";
 import { featureEdges } from "./picking";
-import type { DataArray, DataFrame, TopologyFrame } from "../connection/protocol";
+import type { DataArray, DataFrame, TopologyFrame, Vector } from "../connection/protocol";
+import { TriangleTree } from "./triangle-tree";
+import type { Hit } from "./triangle-tree";
 
 export type Highlight = "hover" | "handle" | "fixed";
 export const HIGHLIGHT_COLOURS: Record<Highlight, Colour> = {
@@ -18,7 +20,7 @@ export const HIGHLIGHT_COLOURS: Record<Highlight, Colour> = {
 };
 const HIGHLIGHT_OPACITY: Record<Highlight, number> = { hover: 0.25, handle: 0.35, fixed: 0.4 };
 const SOLID: Colour = [0.72, 0.76, 0.8];
-const EDGE: Colour = [0.82, 0.85, 0.88];
+const EDGE: Colour = [0.45, 0.47, 0.49];
 
 /** Cells as vtk.js wants them: the number of points before each cell's points. */
 function cells(points: Uint32Array, size: number): Uint32Array {
@@ -76,6 +78,9 @@ export class Layer {
   /** Whether the field colours this view; it is plain otherwise. */
   coloured = true;
   private colouredBy: DataArray | null = null;
+  /** Over the triangles of the topology; made when it is first asked, and brought up to the coordinates that are drawn. */
+  private tree: TriangleTree | null = null;
+  private treeOf: Float32Array | null = null;
   private readonly points = vtkPoints.newInstance();
   private readonly surface: Piece;
   private readonly edges: Piece;
@@ -101,7 +106,6 @@ export class Layer {
     this.edges = new Piece(this.points, renderer);
     this.edges.actor.getProperty().setColor(...EDGE);
     this.edges.actor.getProperty().setLighting(false);
-    this.edges.actor.getProperty().setOpacity(0.5);
     this.raise(this.edges, -2);
     const highlight = (kindOf: Highlight, order: number): { tint: Piece; outline: Piece } => {
       const tint = new Piece(this.points, renderer);
@@ -136,9 +140,20 @@ export class Layer {
 
   setTopology(topology: TopologyFrame): void {
     this.topology = topology;
+    this.tree = null;
     this.frame = null;
     this.colouredBy = null;
     for (const key of Object.keys(this.highlighted) as Highlight[]) this.highlighted[key] = "";
+  }
+
+  /** The first triangle that is drawn and that a ray meets. */
+  firstHit(origin: Vector, direction: Vector): Hit | null {
+    const { topology, coordinates } = this;
+    if (!topology || coordinates.length !== topology.points * 3) return null;
+    if (!this.tree) this.tree = new TriangleTree(topology.triangles, coordinates);
+    else if (this.treeOf !== coordinates) this.tree.refit(coordinates);
+    this.treeOf = coordinates;
+    return this.tree.firstHit(origin, direction);
   }
 
   /** Takes the newest values. Returns why it cannot, if it cannot. */

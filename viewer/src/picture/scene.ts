@@ -1,16 +1,15 @@
 /** The picture: a vtk.js render window that draws when something changed, and never waits for the network. */
-import "@kitware/vtk.js/Rendering/Profiles/Geometry";
 import vtkRenderWindow from "@kitware/vtk.js/Rendering/Core/RenderWindow";
 import vtkRenderer from "@kitware/vtk.js/Rendering/Core/Renderer";
 import vtkRenderWindowInteractor from "@kitware/vtk.js/Rendering/Core/RenderWindowInteractor";
 import vtkInteractorStyleTrackballCamera from "@kitware/vtk.js/Interaction/Style/InteractorStyleTrackballCamera";
 import vtkColorTransferFunction from "@kitware/vtk.js/Rendering/Core/ColorTransferFunction";
-import vtkOpenGLRenderWindow from "@kitware/vtk.js/Rendering/OpenGL/RenderWindow";
 import { BonesPicture } from "./bones";
+import { makeCanvas } from "./canvas";
 import type { ColourMap, Colouring } from "./colour";
 import { Ghost } from "./ghost";
 import { Layer } from "./layer";
-import { bounds, firstTriangle } from "./picking";
+import { bounds } from "./picking";
 import type { PreviewSurface } from "../preview/preview";
 import type { DataFrame, TopologyFrame, Vector, ViewInformation } from "../connection/protocol";
 import type { Selection } from "../store/selection";
@@ -37,7 +36,7 @@ export class Scene {
   readonly layers = new Map<string, Layer>();
   private readonly window = vtkRenderWindow.newInstance();
   private readonly renderer = vtkRenderer.newInstance();
-  private readonly canvas = vtkOpenGLRenderWindow.newInstance();
+  private readonly canvas = makeCanvas().window;
   private readonly interactor = vtkRenderWindowInteractor.newInstance();
   private readonly colours = vtkColorTransferFunction.newInstance();
   private readonly pending = new Map<string, DataFrame>();
@@ -258,8 +257,8 @@ export class Scene {
     let feature: string | null = null;
     for (const layer of this.layers.values()) {
       const { topology } = layer;
-      if (!layer.visible || !topology?.triangleFeatures || layer.coordinates.length !== topology.points * 3) continue;
-      const hit = firstTriangle(layer.coordinates, topology.triangles, near, direction);
+      if (!layer.visible || !topology?.triangleFeatures) continue;
+      const hit = layer.firstHit(near, direction);
       if (!hit || hit.distance >= nearest) continue;
       nearest = hit.distance;
       feature = this.features[topology.triangleFeatures[hit.triangle] ?? -1] ?? null;

@@ -1,22 +1,13 @@
 import { describe, expect, it } from "vitest";
 import { extremes, scalars } from "../../src/picture/colour";
 import { digits, readNumber, seconds, within } from "../../src/number";
-import { bounds, featureEdges, firstTriangle } from "../../src/picture/picking";
+import { bounds, featureEdges } from "../../src/picture/picking";
 
 // Two parallel unit squares, at z = 0 and z = 1, of two triangles each.
 const points = Float32Array.from([0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1, 1, 1, 1, 0, 1, 1]);
 const triangles = Uint32Array.from([0, 1, 2, 0, 2, 3, 4, 5, 6, 4, 6, 7]);
 
 describe("picking", () => {
-  it("meets the nearest triangle, from either side", () => {
-    expect(firstTriangle(points, triangles, [0.8, 0.2, 5], [0, 0, -1])).toEqual({ triangle: 2, distance: 4 });
-    expect(firstTriangle(points, triangles, [0.2, 0.8, -5], [0, 0, 1])).toEqual({ triangle: 1, distance: 5 });
-    expect(firstTriangle(points, triangles, [0.2, 0.8, 0.5], [0, 0, 1])?.triangle).toBe(3);
-    expect(firstTriangle(points, triangles, [1.2, 0.8, 5], [0, 0, -1])).toBeNull();
-    expect(firstTriangle(points, triangles, [0.2, 0.8, 5], [0, 0, 1])).toBeNull();
-    expect(firstTriangle(points, triangles, [NaN, 0, 0], [0, 0, 1])).toBeNull();
-  });
-
   it("finds the edges between features and at the border", () => {
     const edges = (features: number[]): string[] => {
       const found = featureEdges(triangles, Uint32Array.from(features), 8);
