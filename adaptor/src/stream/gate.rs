@@ -31,8 +31,7 @@ const UNAUTHORIZED: &str = "the token or cookie is missing, wrong or of another 
 const USED: &str = "this link opens one browser, once: it has been used, or is of another run. In the browser that it opened, \
 go to this address without the key. For another browser take a link from the file that the run named when it began\n";
 
-const HEADERS: [(HeaderName, &str); 6] = [
-    (header::CACHE_CONTROL, "no-store"),
+const HEADERS: [(HeaderName, &str); 5] = [
     (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
     (header::REFERRER_POLICY, "no-referrer"),
     (header::X_FRAME_OPTIONS, "DENY"),
@@ -71,9 +70,12 @@ pub(super) async fn guard(
             }
         );
     }
+    let headers = response.headers_mut();
     for (name, value) in HEADERS {
-        response.headers_mut().insert(name, HeaderValue::from_static(value));
+        headers.insert(name, HeaderValue::from_static(value));
     }
+    // What holds data of the run, or a secret, is kept nowhere.
+    headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
     response
 }
 

@@ -436,10 +436,8 @@ async fn file(State(shared): State<Shared>, uri: Uri, request: Request) -> Respo
     if request.method() != axum::http::Method::GET {
         return StatusCode::METHOD_NOT_ALLOWED.into_response();
     }
-    match shared.files.get(uri.path()) {
-        Some((content_type, bytes)) => {
-            ([(header::CONTENT_TYPE, content_type)], bytes).into_response()
-        }
+    match shared.files.answer(uri.path(), request.headers()) {
+        Some(answer) => answer,
         None => (StatusCode::NOT_FOUND, "no such file\n").into_response(),
     }
 }
