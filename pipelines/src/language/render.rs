@@ -218,6 +218,8 @@ pub enum ColorMap {
     Inferno,
     /// Blue over white to red, for values on both sides of a middle.
     CoolWarm,
+    /// White, blue, black, red, white; ends as it begins, for angles.
+    Twilight,
     /// Dark to light.
     Grey,
 }
