@@ -13,6 +13,7 @@
 //! cargo run --release -p tombolo-benchmarks -- untangle
 //! cargo run --release -p tombolo-benchmarks -- growth --json
 //! cargo run --release -p tombolo-benchmarks -- extract --json
+//! cargo run --release -p tombolo-benchmarks -- viewer --json
 //! cargo run --release -p tombolo-benchmarks --features distributed -- volume --json
 //! ```
 
@@ -32,6 +33,7 @@ mod stiffening;
 mod surface;
 mod surface_wasm;
 mod untangle;
+mod viewer;
 mod volume;
 mod volume_case;
 #[cfg(feature = "distributed")]
@@ -95,6 +97,8 @@ enum Name {
     Volume,
     /// Extracts and derived fields, beside VTK's filters.
     Extract,
+    /// The viewer in a browser, watching a run: its pictures, its previews, its memory.
+    Viewer,
     /// The time and the memory of an order, from ten thousand cells to five million.
     Growth,
 }
@@ -123,6 +127,7 @@ fn main() -> ExitCode {
         Name::Volume => text(volume::run(), json),
         Name::Growth => text(growth::run(), json),
         Name::Extract => text(extract::run(), json),
+        Name::Viewer => text(viewer::run(), json),
     })
 }
 

@@ -1,0 +1,109 @@
+/**
+ * Measures the viewer in Debian's Chromium, watching the run at TOMBOLO_URL, and prints one line of JSON: seconds and bytes. The
+ * picture is turned while frames come, the throat, where there is one, is dragged, and the heap is looked at before and after.
+ *
+ * CHROMIUM  the browser (default /usr/bin/chromium)
+ *
+ * Needs the packages of viewer/ (`npm ci` there).
+ */
+import { createRequire } from "node:module";
+
+const { chromium } = createRequire(new URL("../../viewer/package.json", import.meta.url))("playwright-core");
+
+const FRAMES = 150, DRAGS = 60, HEAP_SECONDS = 30, HANDLE = "throat";
+const link = process.env.TOMBOLO_URL;
+if (!link) throw new Error("TOMBOLO_URL is not set: it is the link that the run printed");
+
+const sorted = (list) => [...list].sort((a, b) => a - b);
+const spread = (list) => ({ median: sorted(list)[list.length >> 1], late: sorted(list)[Math.floor(0.95 * (list.length - 1))] });
+
+const browser = await chromium.launch({
+  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+  args: ["--headless", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync", "--js-flags=--expose-gc"],
+});
+try {
+  const page = await browser.newPage({ viewport: { width: 1280, height: 800 } });
+  page.setDefaultTimeout(120_000);
+  const network = await page.context().newCDPSession(page);
+  await network.send("Network.enable");
+  let wire = 0;
+  network.on("Network.loadingFinished", ({ encodedDataLength }) => { wire += encodedDataLength; });
+  await page.addInitScript(() => {
+    window.longest = 0;
+    new PerformanceObserver((list) => { for (const task of list.getEntries()) window.longest = Math.max(window.longest, task.duration); }).observe({ type: "longtask" });
+    const look = () => {
+      if (window.tombolo?.frames > 0) {
+        void window.tombolo.picture().then(() => { window.firstPicture = performance.now(); });
+      } else requestAnimationFrame(look);
+    };
+    requestAnimationFrame(look);
+  });
+  await page.goto(link);
+  const firstPicture = await (await page.waitForFunction(() => window.firstPicture)).jsonValue();
+  await page.waitForTimeout(1000);
+  const triangles = await page.evaluate(() => Object.values(window.tombolo.views).reduce((sum, view) => sum + view.triangles, 0));
+
+  const turn = (frames) => page.evaluate(async (count) => {
+    const scene = document.getElementById("scene");
+    const next = () => new Promise((resolve) => { requestAnimationFrame(resolve); });
+    const times = [];
+    let last = await next();
+    const cycle = window.tombolo.cycle;
+    for (let i = 0; i < count; i++) {
+      scene.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft", bubbles: true }));
+      const now = await next();
+      times.push((now - last) / 1000);
+      last = now;
+    }
+    if (!(window.tombolo.cycle > cycle)) throw new Error("no frames came while the picture was turned");
+    return times;
+  }, frames);
+  await turn(20);
+  await page.evaluate(() => { window.longest = 0; });
+  const rotating = spread(await turn(FRAMES));
+  const longestTask = await page.evaluate(() => window.longest / 1000);
+
+  let firstPreview = null, dragging = null;
+  await page.click('[data-camera="0"]');
+  const place = await page.evaluate(async (name) => {
+    await window.tombolo.picture();
+    return window.tombolo.featurePlace(name);
+  }, HANDLE);
+  if (place) {
+    const shown = () => page.waitForFunction(() => {
+      const { state, milliseconds, reason } = window.tombolo.preview;
+      if (state === "failed") throw new Error(reason);
+      return state === "shown" && milliseconds;
+    }, null, { polling: 5 });
+    const times = [];
+    await page.keyboard.down("Control");
+    await page.mouse.move(...place);
+    await page.mouse.down();
+    for (let step = 1; step <= DRAGS; step++) {
+      await page.mouse.move(place[0] + 2 * step, place[1] - step);
+      times.push(await (await shown()).jsonValue() / 1000);
+    }
+    await page.mouse.up();
+    await page.keyboard.up("Control");
+    firstPreview = times[0];
+    dragging = spread(times.slice(1));
+    await page.keyboard.press("Escape");
+    if (await page.locator("#cancel").isVisible()) await page.click("#cancel");
+  }
+
+  const heap = () => page.evaluate(() => {
+    window.gc();
+    return performance.memory.usedJSHeapSize;
+  });
+  await page.waitForTimeout(3000);
+  const before = await heap();
+  await page.waitForTimeout(HEAP_SECONDS * 1000);
+  const heapGrowth = (await heap()) - before;
+
+  console.log(JSON.stringify({
+    triangles, first_picture: firstPicture / 1000, wire, rotating, longest_task: longestTask, first_preview: firstPreview, dragging, heap_growth: heapGrowth,
+  }));
+} finally {
+  await browser.close();
+}

@@ -1,0 +1,117 @@
+//! `viewer`: the viewer in Debian's Chromium, whose WebGL a processor draws, watching a run of
+//! `flow`.
+
+use std::error::Error;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use serde::Deserialize;
+use serde_json::json;
+use tombolo_tests::{Run, project};
+
+use crate::peer::{self, mesh_file};
+use crate::report::{Report, Row, Target};
+
+/// Slices of the channel of 60 000 tetrahedra that have 200 000 triangles together.
+const PLANES: usize = 60;
+
+/// The figures that `benchmarks/browser/viewer.mjs` prints, of one run: seconds, or bytes.
+#[derive(Deserialize)]
+struct Seen {
+    triangles: usize,
+    first_picture: f64,
+    wire: f64,
+    rotating: Spread,
+    longest_task: f64,
+    first_preview: Option<f64>,
+    dragging: Option<Spread>,
+    heap_growth: f64,
+}
+
+/// The median and the 95th percentile.
+#[derive(Deserialize)]
+struct Spread {
+    median: f64,
+    late: f64,
+}
+
+/// Measures the demo, and a view with ten times as many triangles.
+pub fn run() -> Result<Report, Box<dyn Error>> {
+    mesh_file("channel-60k")?;
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let release = ["build", "--release", "--quiet", "-p", "tombolo-flow"];
+    peer::run(Command::new(cargo).current_dir(project()).args(release))?;
+    let directory = tempfile::tempdir()?;
+    let demo = watch(None)?;
+    let many = directory.path().join("many.json");
+    fs::write(&many, many_triangles().to_string())?;
+    let many = watch(Some(&many))?;
+
+    let mut rows = Vec::new();
+    for (seen, what) in [(&demo, "demo"), (&many, "slices")] {
+        let name = |measured: &str| format!("{what}, {} triangles: {measured}", seen.triangles);
+        rows.push(Row::new(name("page to first picture"), seen.first_picture));
+        rows.push(Row::new(name("frame, rotating while streaming"), seen.rotating.median));
+        rows.push(Row::new(name("the same, 95th percentile"), seen.rotating.late));
+        rows.push(Row::new(name("longest task while streaming"), seen.longest_task));
+        if let Some(first) = seen.first_preview {
+            rows.push(Row::new(name("first preview"), first));
+        }
+        if let Some(dragging) = &seen.dragging {
+            rows.push(Row::new(name("drag to picture"), dragging.median));
+            rows.push(Row::new(name("the same, 95th percentile"), dragging.late));
+        }
+    }
+    let dragging = demo.dragging.as_ref().ok_or("nothing was dragged")?;
+    let targets = vec![
+        Target::at_most("22 k, frame, rotating while streaming [s]", demo.rotating.median, 0.025),
+        Target::at_most("200 k, frame, rotating while streaming [s]", many.rotating.median, 0.06),
+        Target::at_most("page to first picture [s]", demo.first_picture, 0.6),
+        Target::at_most("first load on the wire [bytes]", demo.wire, 0.7e6),
+        Target::at_most(
+            "first preview [s]",
+            demo.first_preview.ok_or("there was no preview")?,
+            0.3,
+        ),
+        Target::at_most("drag to picture [s]", dragging.median, 0.035),
+        Target::at_most("drag to picture, 95th percentile [s]", dragging.late, 0.06),
+        Target::at_most("heap grown in half a minute of streaming [bytes]", demo.heap_growth, 2e6),
+    ];
+    Ok(Report { rows, targets })
+}
+
+/// Watches a run of the nozzle, with its own pipelines or others.
+fn watch(pipelines: Option<&Path>) -> Result<Seen, Box<dyn Error>> {
+    let output = tempfile::tempdir()?;
+    let mut flow = Command::new(project().join("target/release/flow"));
+    flow.current_dir(project())
+        .args(["--case", "examples/flow/cases/nozzle.json", "--listen", "127.0.0.1:0", "--out"])
+        .arg(output.path());
+    if let Some(pipelines) = pipelines {
+        flow.arg("--pipelines").arg(pipelines);
+    }
+    let mut run = Run::start(&mut flow);
+    let link = run.link();
+    let printed = peer::run(
+        Command::new("node")
+            .current_dir(project())
+            .env("TOMBOLO_URL", link.url())
+            .arg("benchmarks/browser/viewer.mjs"),
+    )?;
+    Ok(serde_json::from_str(&printed)?)
+}
+
+/// Slices along the channel, as one view.
+fn many_triangles() -> serde_json::Value {
+    let planes: Vec<_> = (0..PLANES)
+        .map(|plane| {
+            let height = -0.045 + 0.09 * plane as f64 / (PLANES - 1) as f64;
+            json!({"origin": [0, 0, height], "normal": [0, 0, 1]})
+        })
+        .collect();
+    json!({"version": 1, "stream": {"listen": "127.0.0.1:0"}, "pipelines": [
+        {"name": "slices", "every": {"steps": 5}, "stages": [
+            {"slice": {"planes": planes}}, {"select": {"fields": ["velocity"]}},
+            {"stream": {"error": {"relative": 1e-3}}}]}]})
+}
