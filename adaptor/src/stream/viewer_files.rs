@@ -67,9 +67,10 @@ impl ViewerFiles {
             headers.insert(header::ETAG, HeaderValue::from_str(&tag).ok()?);
         }
         headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(content_type(name)));
-        let copy = ENCODINGS.into_iter().filter(|(coding, _)| takes(request, coding)).find_map(
-            |(coding, ending)| Some((coding, self.read(&format!("{name}.{ending}"))?)),
-        );
+        let copy = ENCODINGS
+            .into_iter()
+            .filter(|(coding, _)| takes(request, coding))
+            .find_map(|(coding, ending)| Some((coding, self.read(&format!("{name}.{ending}"))?)));
         let bytes = match copy {
             Some((coding, copy)) => {
                 headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static(coding));
