@@ -1,5 +1,5 @@
 import { defineConfig } from "vitest/config";
-import { compress } from "./compress";
+import { compress } from "./compress.ts";
 
 // Every address is relative, so that the viewer can be served below any path (a reverse proxy, an SSH tunnel).
 export default defineConfig({

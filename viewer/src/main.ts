@@ -2,23 +2,27 @@
 import { Connection, streamAddress } from "./connection/connection";
 import { Decoder } from "./connection/decoder";
 import type { DecodeWorker } from "./connection/decoder";
-import type { Frame, Json, ServerMessage } from "./connection/protocol";
+import type { Frame, Json, Monitor, ServerMessage } from "./connection/protocol";
 import { part, write } from "./dom";
 import { EditForm, initialSettings } from "./form/form";
 import { orderForm } from "./form/schema";
 import { publish } from "./inspection";
 import { compileKernel } from "./kernel/kernel";
-import { ColourPanel } from "./panels/colours";
+import { History } from "./history/series";
+import { HistoryDock } from "./history/dock";
 import { EditsPanel } from "./panels/edits";
 import { watchKeys } from "./panels/keys";
+import { FIELD_TITLES, LookPanel } from "./panels/look";
 import { MonitorPanel } from "./panels/monitors";
 import { ParameterPanel } from "./panels/parameters";
 import { StatusBar } from "./panels/status";
 import { VerdictPanel } from "./panels/verdict";
+import { CameraTools, Theming } from "./panels/tools";
 import { ViewList } from "./panels/views";
 import { WheelPanel } from "./panels/wheel";
 import { watchDrags } from "./picture/drag";
-import { ScalarBar, Triad, showEmpty } from "./picture/overlay";
+import { ScalarBars, fieldText } from "./picture/bars";
+import { Triad, showEmpty } from "./picture/overlay";
 import { watchPointer } from "./picture/pointer";
 import { Scene } from "./picture/scene";
 import { Forecasts } from "./preview/forecasts";
@@ -26,6 +30,8 @@ import { Previewer } from "./preview/previewer";
 import type { Action } from "./store/actions";
 import { Commands } from "./store/commands";
 import { bodyOf, chosen, withMove } from "./store/draft";
+import { appliedOrders, isShapeUnderWay } from "./store/orders";
+import { Kept } from "./store/kept";
 import { reduce } from "./store/reduce";
 import { Selection } from "./store/selection";
 import { INITIAL } from "./store/state";
@@ -37,7 +43,8 @@ if (!document.createElement("canvas").getContext("webgl2")) {
   throw new Error("WebGL 2 is missing");
 }
 
-const store = new Store<State, Action>(INITIAL, reduce);
+const kept = new Kept(window.localStorage);
+const store = new Store<State, Action>({ ...INITIAL, looks: kept.looks }, reduce);
 const addresses = streamAddress(window.location.href);
 /** The kernel decodes the frames and computes the previews: it is fetched once, at once. */
 const kernel = compileKernel();
@@ -59,12 +66,20 @@ const commands = new Commands(store, (message) => connection.send(message));
 
 // The picture.
 const selection = new Selection(store);
-const scalarBar = new ScalarBar();
 const triad = new Triad();
+const bars = new ScalarBars(part("bars"), ({ look: { field, component } }) => {
+  const components = store.state.hello?.fields.find((candidate) => candidate.name === field)?.components ?? 1;
+  return { title: fieldText(field ?? "", components, component, FIELD_TITLES[field ?? ""]), unit: null };
+}, (names, [low, high]) => {
+  for (const view of names) {
+    const look = store.state.looks[view];
+    if (look) store.dispatch({ type: "look", view, look: { range: { ...look.range, kind: "fixed", low, high } } });
+  }
+});
 const scene = new Scene(part("scene"), selection, {
-  range: (range) => {
-    scalarBar.range(range);
-    colours.setRange(range);
+  bars: (shown) => {
+    bars.show(shown);
+    look.setBars(shown);
   },
   drawn: (axes) => triad.turn(axes),
   trouble: report,
@@ -72,8 +87,12 @@ const scene = new Scene(part("scene"), selection, {
 watchPointer(part("scene"), scene, selection);
 
 // What stands around it.
-const views = new ViewList(part("views"), scene);
-const colours = new ColourPanel(scene, (colouring, map) => scalarBar.describe(colouring, map, store.state.hello?.fields ?? []));
+new ViewList(part("views"), store);
+const look = new LookPanel(part("look"), store);
+new CameraTools(part("tools"), scene);
+new Theming(part("theme") as HTMLButtonElement, kept, (theme) => scene.setTheme(theme));
+const history = new History();
+const dock = new HistoryDock(part("dock"), history, kept.dock, (state) => { kept.dock = state; });
 const monitors = new MonitorPanel(part("monitors"));
 const parameters = new ParameterPanel(part("parameters"), store, commands);
 const bar = new StatusBar(store, commands);
@@ -100,7 +119,7 @@ function takeMessage(message: ServerMessage): void {
     case "status": return store.dispatch({ type: "status", status: message.body });
     case "order": return store.dispatch({ type: "order", status: message.body });
     case "forecast": return forecasts.answer(message.body);
-    case "monitor": return monitors.update(message.body);
+    case "monitor": return takeMonitor(message.body);
     // The hello that comes with it says what there is now.
     case "pipelines": return;
     // The status shows what it has changed.
@@ -118,6 +137,13 @@ function takeMessage(message: ServerMessage): void {
   }
 }
 
+function takeMonitor(monitor: Monitor): void {
+  monitors.update(monitor);
+  history.add(monitor.pipeline, monitor.cycle, monitor.time ?? monitor.cycle, monitor.values);
+  for (const { pipeline, name, unit } of store.state.hello?.monitors ?? []) history.setUnit(pipeline, name, unit ?? null);
+  dock.update();
+}
+
 function takeFrame(frame: Frame): void {
   if (frame.kind === "topology") scene.setTopology(frame);
   else if (scene.setData(frame)) store.dispatch({ type: "frame", cycle: frame.cycle });
@@ -132,10 +158,7 @@ store.watch((state) => state.hello, (hello) => {
   connection.identity = { client: String(hello.client), back: hello.back ?? "" };
   sessionStorage.setItem(CLIENT, connection.identity.client);
   sessionStorage.setItem(BACK, connection.identity.back);
-  scene.setViews(hello.views);
   scene.setFeatures(hello.features.map((feature) => feature.name));
-  views.set(hello.views);
-  colours.set(hello.fields);
   if (!store.state.form) void loadSchema(hello.defaults);
 });
 
@@ -182,22 +205,10 @@ store.watch(emptyText, ([title, text]) => showEmpty(title, text), sameJson);
 part("retry").addEventListener("click", () => connection.retry());
 window.addEventListener("online", () => { if (connection.state !== "dismissed" && !store.state.end) connection.retry(); });
 
-let side: 1 | -1 = 1;
-let looking = "";
-part("tools").addEventListener("click", (event) => {
-  const button = (event.target as HTMLElement).closest("button");
-  const camera = button?.dataset.camera;
-  if (!button || !camera) return;
-  if (camera === "reset") scene.reset();
-  else if (camera === "parallel") {
-    scene.parallel = !scene.parallel;
-    button.setAttribute("aria-pressed", String(scene.parallel));
-  } else {
-    side = looking === camera ? (side === 1 ? -1 : 1) : camera === "1" ? -1 : 1;
-    scene.axis(Number(camera) as 0 | 1 | 2, side);
-  }
-  looking = camera;
-});
+store.watch((state) => ({ views: state.hello?.views ?? [], looks: state.looks, held: isShapeUnderWay(state.orders) }),
+  ({ views, looks, held }) => scene.setLooks(views, looks, held), sameJson);
+store.watch((state) => state.looks, (looks) => { kept.looks = looks; });
+store.watch((state) => appliedOrders(state.orders), (marks) => dock.setMarks(marks), sameJson);
 
 watchDrags(part("stage"), scene, selection, {
   moved: (by, node, step) => {

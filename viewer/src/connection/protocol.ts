@@ -26,6 +26,7 @@ export interface Hello {
   may_drive?: boolean;
   channel?: string | null;
   views: ViewInformation[];
+  monitors?: MonitorInformation[];
   features: FeatureInformation[];
   surface?: SurfaceInformation | null;
   fields: FieldInformation[];
@@ -93,7 +94,8 @@ export interface ForecastAnswer {
   };
 }
 
-export interface Monitor { pipeline: string; cycle: number; values: Record<string, number> }
+export interface Monitor { pipeline: string; cycle: number; time?: number; values: Record<string, number | null> }
+export interface MonitorInformation { pipeline: string; name: string; unit?: string | null }
 /** What became of a change of the pipelines. */
 export interface PipelineChange {
   id: string;

@@ -1,42 +1,49 @@
-/** The views that the simulation streams: which are seen, how opaque, and which carry the colours. */
+/** The views that the simulation streams: which are seen, how opaque, and which one is being changed. */
 import type { ViewInformation } from "../connection/protocol";
 import { element, identifier } from "../dom";
-import type { Scene } from "../picture/scene";
+import type { Action } from "../store/actions";
+import type { State } from "../store/state";
+import { sameJson } from "../store/store";
+import type { Store } from "../store/store";
 
 export class ViewList {
-  private key = "";
-
-  constructor(private readonly root: HTMLElement, private readonly scene: Scene) {}
-
-  set(views: readonly ViewInformation[]): void {
-    const key = JSON.stringify(views);
-    if (key === this.key) return;
-    this.key = key;
-    this.root.replaceChildren(...views.map((view) => this.row(view)));
-    if (views.length === 0) this.root.replaceChildren(element("p", { class: "hint" }, "No views are streamed."));
+  constructor(private readonly root: HTMLElement, private readonly store: Store<State, Action>) {
+    store.watch((state) => state.hello?.views ?? [], (views) => this.list(views), sameJson);
+    store.watch((state) => [state.looks, state.chosenView], () => this.show(), sameJson);
   }
 
-  private row(view: ViewInformation): HTMLElement {
-    const layer = this.scene.layers.get(view.name);
+  private list(views: readonly ViewInformation[]): void {
+    this.root.replaceChildren(...views.map((view) => this.row(view)));
+    if (views.length === 0) this.root.replaceChildren(element("p", { class: "hint" }, "No views are streamed."));
+    this.show();
+  }
+
+  private row({ name, kind }: ViewInformation): HTMLElement {
     const id = identifier("view");
-    const slider = element("input", {
-      type: "range", min: 0, max: 100, step: 5, value: Math.round((layer?.opacity ?? 1) * 100), "aria-label": `opacity of ${view.name}`,
-      title: "opacity", oninput: () => this.scene.setOpacity(view.name, Number(slider.value) / 100),
+    const opacity = element("input", {
+      type: "range", min: 0, max: 100, step: 5, "aria-label": `${name}: opacity`, title: "opacity",
+      oninput: () => this.store.dispatch({ type: "look", view: name, look: { opacity: Number(opacity.value) / 100 } }),
     });
-    const box = element("input", {
-      type: "checkbox", id, onchange: () => {
-        this.scene.setVisible(view.name, box.checked);
-        slider.disabled = !box.checked;
-      },
+    const visible = element("input", {
+      type: "checkbox", id, title: "shown", onchange: () => this.store.dispatch({ type: "look", view: name, look: { visible: visible.checked } }),
     });
-    box.checked = layer?.visible ?? true;
-    const coloured = element("input", {
-      type: "checkbox", "aria-label": `${view.name}: coloured by the field`,
-      onchange: () => this.scene.setColoured(view.name, coloured.checked),
-    });
-    coloured.checked = layer?.coloured ?? true;
-    return element("div", { class: "view", "data-view": view.name }, box,
-      element("label", { for: id }, view.name, view.kind === view.name ? null : element("small", {}, view.kind)),
-      element("label", { class: "coloured", title: "colour by the field" }, coloured, "field"), slider);
+    const chosen = element("button", {
+      type: "button", class: "choose", title: "Change how this view looks", onclick: () => this.store.dispatch({ type: "view chosen", view: name }),
+    }, name, kind === name ? null : element("small", {}, kind));
+    visible.setAttribute("aria-label", `${name}: shown`);
+    return element("div", { class: "view", "data-view": name }, visible, chosen, opacity);
+  }
+
+  private show(): void {
+    const { looks, chosenView } = this.store.state;
+    for (const row of this.root.querySelectorAll<HTMLElement>("[data-view]")) {
+      const look = looks[row.dataset.view ?? ""];
+      if (!look) continue;
+      row.querySelector<HTMLInputElement>('input[type="checkbox"]')!.checked = look.visible;
+      const opacity = row.querySelector<HTMLInputElement>('input[type="range"]')!;
+      opacity.value = String(Math.round(100 * look.opacity));
+      opacity.disabled = !look.visible;
+      row.querySelector("button")!.setAttribute("aria-pressed", String(row.dataset.view === chosenView));
+    }
   }
 }

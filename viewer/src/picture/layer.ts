@@ -5,11 +5,13 @@ import vtkPolyData from "@kitware/vtk.js/Common/DataModel/PolyData";
 import vtkPoints from "@kitware/vtk.js/Common/Core/Points";
 import vtkCellArray from "@kitware/vtk.js/Common/Core/CellArray";
 import vtkDataArray from "@kitware/vtk.js/Common/Core/DataArray";
-import type vtkColorTransferFunction from "@kitware/vtk.js/Rendering/Core/ColorTransferFunction";
+import vtkColorTransferFunction from "@kitware/vtk.js/Rendering/Core/ColorTransferFunction";
 import type vtkRenderer from "@kitware/vtk.js/Rendering/Core/Renderer";
-import type { Colour, Colouring } from "./colour";
-import { extremes, scalars } from "./colour";
+import type { Colour } from "./colour";
+import { colourMap, extremes, scalars } from "./colour";
 import { featureEdges } from "./picking";
+import type { Look } from "../store/looks";
+import type { Range } from "./ranges";
 import type { DataArray, DataFrame, TopologyFrame, Vector } from "../connection/protocol";
 import { TriangleTree } from "./triangle-tree";
 import type { Hit } from "./triangle-tree";
@@ -20,7 +22,6 @@ export const HIGHLIGHT_COLOURS: Record<Highlight, Colour> = {
 };
 const HIGHLIGHT_OPACITY: Record<Highlight, number> = { hover: 0.25, handle: 0.35, fixed: 0.4 };
 const SOLID: Colour = [0.72, 0.76, 0.8];
-const EDGE: Colour = [0.45, 0.47, 0.49];
 
 /** Cells as vtk.js wants them: the number of points before each cell's points. */
 function cells(points: Uint32Array, size: number): Uint32Array {
@@ -73,11 +74,9 @@ export class Layer {
   frame: DataFrame | null = null;
   /** Coordinates that are drawn now, interleaved. */
   coordinates = new Float32Array(0);
-  visible = true;
-  opacity = 1;
-  /** Whether the field colours this view; it is plain otherwise. */
-  coloured = true;
+  look: Look;
   private colouredBy: DataArray | null = null;
+  private readonly colours = vtkColorTransferFunction.newInstance();
   /** Over the triangles of the topology; made when it is first asked, and brought up to the coordinates that are drawn. */
   private tree: TriangleTree | null = null;
   private treeOf: Float32Array | null = null;
@@ -87,10 +86,11 @@ export class Layer {
   private readonly highlights: Record<Highlight, { tint: Piece; outline: Piece }>;
   private readonly highlighted: Record<Highlight, string> = { hover: "", handle: "", fixed: "" };
 
-  constructor(readonly name: string, readonly kind: string, private readonly renderer: vtkRenderer, colours: vtkColorTransferFunction) {
+  constructor(readonly name: string, readonly kind: string, look: Look, private readonly renderer: vtkRenderer) {
+    this.look = look;
     this.surface = new Piece(this.points, renderer);
     const { mapper, actor } = this.surface;
-    mapper.setLookupTable(colours);
+    mapper.setLookupTable(this.colours);
     mapper.setUseLookupTableScalarRange(true);
     mapper.setInterpolateScalarsBeforeMapping(true);
     mapper.setScalarVisibility(false);
@@ -104,7 +104,6 @@ export class Layer {
       property.setLighting(false);
     }
     this.edges = new Piece(this.points, renderer);
-    this.edges.actor.getProperty().setColor(...EDGE);
     this.edges.actor.getProperty().setLighting(false);
     this.raise(this.edges, -2);
     const highlight = (kindOf: Highlight, order: number): { tint: Piece; outline: Piece } => {
@@ -188,33 +187,43 @@ export class Layer {
       ? featureEdges(topology.triangles, topology.triangleFeatures, topology.points) : new Uint32Array(0));
   }
 
-  /** Colours by a field; returns the range of what is shown, null when this view does not carry the field. */
-  colour(colouring: Colouring | null): [number, number] | null {
-    const field = colouring && this.coloured ? this.frame?.fields.find((candidate) => candidate.name === colouring.field) : undefined;
+  /** Takes the scalars of the field that colours; returns their range, null when this view does not carry the field. */
+  takeScalars(): Range | null {
+    const { field: name, component, range: { logarithmic } } = this.look;
+    const field = this.frame?.fields.find((candidate) => candidate.name === name);
     const { data, mapper } = this.surface;
-    if (!field || !colouring) {
-      this.colouredBy = null;
-      mapper.setScalarVisibility(false);
-      return null;
-    }
+    this.colouredBy = field ?? null;
+    mapper.setScalarVisibility(field !== undefined);
+    if (!field) return null;
     const vertex = field.association === "vertex";
-    let values = scalars(field, colouring.component);
+    let values = scalars(field, component);
+    const found = extremes(values);
     // vtk.js numbers the lines of a view before its triangles.
     const triangles = vertex ? 0 : this.topology!.triangles.length / 3;
     if (triangles > 0 && triangles < values.length) values = linesFirst(values, triangles);
+    if (logarithmic) values = values.map((value) => (value > 0 ? Math.log10(value) : -38));
     const array = vtkDataArray.newInstance({ name: field.name, numberOfComponents: 1, values });
     data.getPointData().setScalars(vertex ? array : (null as never));
     data.getCellData().setScalars(vertex ? (null as never) : array);
     if (vertex) mapper.setScalarModeToUsePointData();
     else mapper.setScalarModeToUseCellData();
-    mapper.setScalarVisibility(true);
     data.modified();
-    this.colouredBy = field;
-    return extremes(values);
+    return found;
   }
 
-  get fieldShown(): string | null {
-    return this.colouredBy?.name ?? null;
+  /** Lets the colours of its map stand for a range. */
+  paint([low, high]: Range): void {
+    const [from, to] = this.look.range.logarithmic ? [Math.log10(low), Math.log10(high)] : [low, high];
+    const { stops } = colourMap(this.look.map);
+    this.colours.removeAllPoints();
+    stops.forEach((stop, i) => this.colours.addRGBPoint(from + ((to - from) * i) / (stops.length - 1), ...stop));
+    this.colours.setMappingRange(from, to);
+    this.colours.updateRange();
+  }
+
+  /** The field that colours it now. */
+  get coloured(): DataArray | null {
+    return this.colouredBy;
   }
 
   highlight(kind: Highlight, names: readonly string[], features: readonly string[]): void {
@@ -233,12 +242,21 @@ export class Layer {
     outline.setLines(featureEdges(triangles, new Uint32Array(triangles.length / 3), topology.points));
   }
 
-  /** Brings what is shown in line with `visible` and `opacity`. */
+  /** The colours of lines that are not a field's: dark lines on a light ground. */
+  setTheme(edge: Colour): void {
+    this.edges.actor.getProperty().setColor(...edge);
+    this.surface.actor.getProperty().setEdgeColor(...edge);
+  }
+
+  /** Brings what is shown in line with the look. */
   show(): void {
-    const drawn = this.visible && this.frame !== null;
-    this.surface.actor.setVisibility(drawn && this.opacity > 0);
-    this.surface.actor.getProperty().setOpacity(this.opacity);
-    this.edges.actor.setVisibility(drawn && this.topology?.triangleFeatures !== null);
+    const { visible, opacity, edges } = this.look;
+    const drawn = visible && this.frame !== null;
+    const property = this.surface.actor.getProperty();
+    this.surface.actor.setVisibility(drawn && opacity > 0);
+    property.setOpacity(opacity);
+    property.setEdgeVisibility(edges === "mesh");
+    this.edges.actor.setVisibility(drawn && edges !== "none" && this.topology?.triangleFeatures !== null);
     for (const kind of Object.keys(this.highlights) as Highlight[]) {
       for (const piece of Object.values(this.highlights[kind])) piece.actor.setVisibility(drawn && this.highlighted[kind] !== "");
     }

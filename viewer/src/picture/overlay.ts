@@ -1,37 +1,5 @@
-/** What lies over the picture: scalar bar, axes, the name under the pointer, and the empty state. */
-import type { ColourMap, Colouring } from "./colour";
-import { componentNames, gradient } from "./colour";
-import { element, part, write } from "../dom";
-import { within, words } from "../number";
-import type { FieldInformation } from "../connection/protocol";
-
-const TICKS = 6;
-
-export class ScalarBar {
-  private shown = false;
-  private readonly ticks: HTMLElement[];
-
-  constructor() {
-    this.ticks = Array.from({ length: TICKS }, () => element("li"));
-    part("bar-ticks").replaceChildren(...this.ticks);
-  }
-
-  describe(colouring: Colouring | null, map: ColourMap, fields: readonly FieldInformation[]): void {
-    this.shown = colouring !== null;
-    part("bar-colours").style.background = gradient(map, "to top");
-    const components = fields.find((field) => field.name === colouring?.field)?.components ?? 1;
-    const suffix = !colouring || components <= 1 ? "" : colouring.component < 0 ? " magnitude" : ` ${componentNames(components)[colouring.component] ?? ""}`;
-    write(part("bar-title"), colouring ? words(colouring.field) + suffix : "");
-    if (!this.shown) part("scalar-bar").hidden = true;
-  }
-
-  range(range: [number, number] | null): void {
-    part("scalar-bar").hidden = !this.shown || range === null;
-    if (!range) return;
-    const [low, high] = range;
-    this.ticks.forEach((tick, i) => write(tick, within(high - ((high - low) * i) / (TICKS - 1), range)));
-  }
-}
+/** What lies over the picture: axes, the name under the pointer, and the empty state. */
+import { part, write } from "../dom";
 
 const AXIS_COLOURS = ["#ff6b6b", "#6fdc7f", "#6ea8ff"];
 const AXIS_NAMES = ["x", "y", "z"];

@@ -2,28 +2,35 @@
 import vtkRenderWindow from "@kitware/vtk.js/Rendering/Core/RenderWindow";
 import vtkRenderer from "@kitware/vtk.js/Rendering/Core/Renderer";
 import vtkRenderWindowInteractor from "@kitware/vtk.js/Rendering/Core/RenderWindowInteractor";
-import vtkInteractorStyleTrackballCamera from "@kitware/vtk.js/Interaction/Style/InteractorStyleTrackballCamera";
-import vtkColorTransferFunction from "@kitware/vtk.js/Rendering/Core/ColorTransferFunction";
 import { BonesPicture } from "./bones";
 import { makeCanvas } from "./canvas";
-import type { ColourMap, Colouring } from "./colour";
 import { Ghost } from "./ghost";
 import { Layer } from "./layer";
 import { bounds } from "./picking";
+import { mouse } from "./mouse";
+import { cornersOf, readProbe, weights } from "./probe";
+import type { Probe, ProbeReading } from "./probe";
+import { Ranges } from "./ranges";
+import type { Range } from "./ranges";
+import { colourKey } from "../store/looks";
+import type { Look, Looks } from "../store/looks";
+import { THEMES } from "./theme";
+import type { Theme } from "./theme";
 import type { PreviewSurface } from "../preview/preview";
 import type { DataFrame, TopologyFrame, Vector, ViewInformation } from "../connection/protocol";
 import type { Selection } from "../store/selection";
 import { REACH, nearestWithin } from "./skeleton";
 import type { Bones } from "./skeleton";
 
-const BACKGROUND: Vector = [0.086, 0.094, 0.106];
-
 /** The longest pause between two pictures of new values, in milliseconds. */
 const LONGEST_REST = 500;
 
+/** The colours that some views have in common, and the range that they stand for. */
+export interface Bar { key: string; look: Look; views: string[]; range: Range }
+
 export interface SceneEvents {
-  /** The range of the values that are drawn now; null when nothing is coloured. */
-  range(range: [number, number] | null): void;
+  /** What the colours stand for that are drawn now. */
+  bars(bars: Bar[]): void;
   /** After each picture, with the directions of the axes on the screen. */
   drawn(axes: [number, number][]): void;
   trouble(message: string): void;
@@ -38,14 +45,13 @@ export class Scene {
   private readonly renderer = vtkRenderer.newInstance();
   private readonly canvas = makeCanvas().window;
   private readonly interactor = vtkRenderWindowInteractor.newInstance();
-  private readonly colours = vtkColorTransferFunction.newInstance();
+  private readonly ranges = new Ranges();
   private readonly pending = new Map<string, DataFrame>();
   private readonly ghost: Ghost;
   private readonly bones: BonesPicture;
   private features: string[] = [];
-  private colouring: Colouring | null = null;
-  private locked: [number, number] | null = null;
-  private map: ColourMap | null = null;
+  private held = false;
+  private theme: Theme = "dark";
   private scheduled = false;
   /** Who waits for the next picture. */
   private readonly drawn: (() => void)[] = [];
@@ -53,17 +59,18 @@ export class Scene {
   private rested = 0;
   private waiting: number | null = null;
   private placed = false;
+  /** Whether the whole is in the picture as `reset` has put it there, and nobody has moved the camera since. */
+  private whole: { camera: string } | null = null;
   private recolour = true;
 
   constructor(private readonly container: HTMLElement, private readonly selection: Selection, private readonly events: SceneEvents) {
     this.window.addRenderer(this.renderer);
     this.window.addView(this.canvas);
-    this.renderer.setBackground(...BACKGROUND);
     this.canvas.setContainer(container);
     this.interactor.setView(this.canvas);
     this.interactor.initialize();
     this.interactor.bindEvents(container);
-    this.interactor.setInteractorStyle(vtkInteractorStyleTrackballCamera.newInstance());
+    this.interactor.setInteractorStyle(mouse());
     this.interactor.onRenderEvent(() => this.turned());
     container.addEventListener("keypress", (event) => event.stopImmediatePropagation(), true);
     container.addEventListener("keydown", (event) => this.key(event));
@@ -138,8 +145,8 @@ export class Scene {
     return this.ghost.coordinates && bounds(this.ghost.coordinates);
   }
 
-  /** The views that the server streams; those that are gone are removed, the others keep their state. */
-  setViews(views: readonly ViewInformation[]): void {
+  /** The views that there are and how they look; those that are gone are removed. While `held`, automatic ranges stay as they are. */
+  setLooks(views: readonly ViewInformation[], looks: Looks, held: boolean): void {
     const names = new Set(views.map((view) => view.name));
     for (const [name, layer] of this.layers) {
       if (names.has(name)) continue;
@@ -147,17 +154,23 @@ export class Scene {
       this.layers.delete(name);
       this.pending.delete(name);
     }
-    const inside = views.some((view) => view.kind !== "surface");
-    for (const view of views) {
-      if (this.layers.has(view.name)) continue;
-      const layer = new Layer(view.name, view.kind, this.renderer, this.colours);
-      // A surface that hides what is inside it is of little use: it starts as a shell of glass.
-      if (view.kind === "surface" && inside) {
-        layer.opacity = 0.15;
-        layer.coloured = false;
-      }
-      this.layers.set(view.name, layer);
+    for (const { name, kind } of views) {
+      const look = looks[name];
+      if (!look) continue;
+      const layer = this.layers.get(name) ?? new Layer(name, kind, look, this.renderer);
+      layer.look = look;
+      layer.setTheme(THEMES[this.theme].edge);
+      this.layers.set(name, layer);
     }
+    this.held = held;
+    this.recolour = true;
+    this.request();
+  }
+
+  setTheme(theme: Theme): void {
+    this.theme = theme;
+    this.renderer.setBackground(...THEMES[theme].background);
+    for (const layer of this.layers.values()) layer.setTheme(THEMES[theme].edge);
     this.request();
   }
 
@@ -178,34 +191,6 @@ export class Scene {
     this.pending.set(frame.view, frame);
     this.requestGently();
     return true;
-  }
-
-  setVisible(name: string, visible: boolean): void {
-    const layer = this.layers.get(name);
-    if (layer) layer.visible = visible;
-    this.recolour = true;
-    this.request();
-  }
-
-  setOpacity(name: string, opacity: number): void {
-    const layer = this.layers.get(name);
-    if (layer) layer.opacity = opacity;
-    this.request();
-  }
-
-  setColoured(name: string, coloured: boolean): void {
-    const layer = this.layers.get(name);
-    if (layer) layer.coloured = coloured;
-    this.recolour = true;
-    this.request();
-  }
-
-  setColouring(colouring: Colouring | null, map: ColourMap, locked: [number, number] | null): void {
-    this.colouring = colouring;
-    this.locked = locked;
-    this.map = map;
-    this.recolour = true;
-    this.request();
   }
 
   /** The newest coordinates of a feature, whether or not they are drawn yet. */
@@ -247,25 +232,46 @@ export class Scene {
     return this.canvas.displayToWorld(x, y, depth, this.renderer) as Vector;
   }
 
-  /** The feature under a place of the page, and where it is met; null when there is none. */
-  pick(clientX: number, clientY: number): { feature: string; point: Vector } | null {
+  /** The line through a place of the page, from the nearest depth of the picture to the farthest. */
+  private ray(clientX: number, clientY: number): { origin: Vector; direction: Vector } {
     const [x, y] = this.onCanvas(clientX, clientY);
     const near = this.canvas.displayToWorld(x, y, 0, this.renderer) as Vector;
     const far = this.canvas.displayToWorld(x, y, 1, this.renderer) as Vector;
-    const direction: Vector = [far[0] - near[0], far[1] - near[1], far[2] - near[2]];
-    let nearest = Infinity;
-    let feature: string | null = null;
+    return { origin: near, direction: [far[0] - near[0], far[1] - near[1], far[2] - near[2]] };
+  }
+
+  /** The nearest triangle under a place of the page of the layers that are wanted. */
+  private hit(clientX: number, clientY: number, wanted: (layer: Layer) => boolean): { layer: Layer; triangle: number; point: Vector } | null {
+    const { origin, direction } = this.ray(clientX, clientY);
+    let nearest: { layer: Layer; triangle: number; distance: number } | null = null;
     for (const layer of this.layers.values()) {
-      const { topology } = layer;
-      if (!layer.visible || !topology?.triangleFeatures) continue;
-      const hit = layer.firstHit(near, direction);
-      if (!hit || hit.distance >= nearest) continue;
-      nearest = hit.distance;
-      feature = this.features[topology.triangleFeatures[hit.triangle] ?? -1] ?? null;
+      if (!layer.look.visible || !wanted(layer)) continue;
+      const hit = layer.firstHit(origin, direction);
+      if (hit && (!nearest || hit.distance < nearest.distance)) nearest = { layer, ...hit };
     }
-    if (feature === null) return null;
-    const point = [0, 1, 2].map((axis) => near[axis]! + nearest * direction[axis]!) as Vector;
-    return { feature, point };
+    if (!nearest) return null;
+    const { layer, triangle, distance } = nearest;
+    return { layer, triangle, point: [0, 1, 2].map((axis) => origin[axis]! + distance * direction[axis]!) as Vector };
+  }
+
+  /** The feature under a place of the page, and where it is met; null when there is none. */
+  pick(clientX: number, clientY: number): { feature: string; point: Vector } | null {
+    const hit = this.hit(clientX, clientY, (layer) => layer.topology?.triangleFeatures != null);
+    const feature = hit && this.features[hit.layer.topology?.triangleFeatures?.[hit.triangle] ?? -1];
+    return hit && feature !== null && feature !== undefined ? { feature, point: hit.point } : null;
+  }
+
+  /** The place under a place of the page: of what carries colours, where anything does. */
+  probe(clientX: number, clientY: number): Probe | null {
+    const hit = this.hit(clientX, clientY, (layer) => layer.coloured !== null) ?? this.hit(clientX, clientY, () => true);
+    const corners = hit?.layer.topology && cornersOf(hit.triangle, hit.layer.topology, hit.layer.coordinates);
+    return hit && corners ? { view: hit.layer.name, triangle: hit.triangle, weights: weights(hit.point, corners.places) } : null;
+  }
+
+  /** What a view has at a place now; null where the view is no more, or has no such triangle. */
+  read(probe: Probe): ProbeReading | null {
+    const layer = this.layers.get(probe.view);
+    return layer?.topology && layer.frame ? readProbe(probe, layer.topology, layer.frame, layer.look) : null;
   }
 
   /** A place of the page at which this feature is seen and would be picked; null when nothing of it is. */
@@ -296,6 +302,11 @@ export class Scene {
     direction[order[1]!] = 0.32;
     direction[order[2]!] = order[0] === 1 ? -0.32 : 0.32;
     this.look(direction, order[0] === 2 ? [0, 1, 0] : [0, 0, 1]);
+    this.whole = { camera: this.cameraState() };
+  }
+
+  private cameraState(): string {
+    return JSON.stringify(this.renderer.getActiveCamera().getPosition());
   }
 
   /** Looks along an axis, from its positive side or its negative one. */
@@ -319,6 +330,11 @@ export class Scene {
     if (this.parallel) camera.setParallelScale(distance / 3);
     this.renderer.resetCameraClippingRange();
     this.request();
+  }
+
+  /** Looks from a corner, so that all three directions are seen. */
+  corner(): void {
+    this.look([1, -1.4, 0.8], [0, 0, 1]);
   }
 
   get parallel(): boolean {
@@ -360,7 +376,7 @@ export class Scene {
     const low = [Infinity, Infinity, Infinity];
     const high = [-Infinity, -Infinity, -Infinity];
     for (const layer of this.layers.values()) {
-      const found = layer.visible ? bounds(layer.coordinates) : null;
+      const found = layer.look.visible ? bounds(layer.coordinates) : null;
       if (!found) continue;
       for (let k = 0; k < 3; k++) {
         low[k] = Math.min(low[k]!, found[0][k]!);
@@ -374,6 +390,8 @@ export class Scene {
     const box = this.container.getBoundingClientRect();
     const ratio = window.devicePixelRatio || 1;
     this.canvas.setSize(Math.max(1, Math.floor(box.width * ratio)), Math.max(1, Math.floor(box.height * ratio)));
+    // As much as there is room for: the page has grown or another panel is open.
+    if (this.whole?.camera === this.cameraState()) this.reset();
     this.request();
   }
 
@@ -447,23 +465,27 @@ export class Scene {
 
   private applyColours(): void {
     this.recolour = false;
-    let range: [number, number] | null = null;
+    const groups = new Map<string, { look: Look; now: Range | null; layers: Layer[] }>();
     for (const layer of this.layers.values()) {
-      const found = layer.colour(this.colouring);
-      if (!found || !layer.visible) continue;
-      range = range ? [Math.min(range[0], found[0]), Math.max(range[1], found[1])] : found;
+      const now = layer.takeScalars();
+      const key = colourKey(layer.look);
+      if (key === null || !now || !layer.look.visible) continue;
+      const group = groups.get(key);
+      if (!group) groups.set(key, { look: layer.look, now, layers: [layer] });
+      else {
+        group.now = group.now ? [Math.min(group.now[0], now[0]), Math.max(group.now[1], now[1])] : now;
+        group.layers.push(layer);
+      }
     }
-    const shown = this.locked ?? range;
-    if (shown && this.map) {
-      const [low, high] = shown;
-      const width = high > low ? high - low : Math.max(Math.abs(low) * 1e-6, 1e-12);
-      const { stops } = this.map;
-      this.colours.removeAllPoints();
-      stops.forEach((stop, i) => this.colours.addRGBPoint(low + (width * i) / (stops.length - 1), ...stop));
-      this.colours.setMappingRange(low, low + width);
-      this.colours.updateRange();
+    const bars: Bar[] = [];
+    for (const [key, { look, now, layers }] of groups) {
+      const range = this.ranges.range(key, look.range, now, this.held);
+      if (!range) continue;
+      for (const layer of layers) layer.paint(range);
+      bars.push({ key, look, range, views: layers.map((layer) => layer.name) });
     }
-    this.events.range(shown);
+    this.ranges.keep(new Set(groups.keys()));
+    this.events.bars(bars);
   }
 
   private turned(): void {

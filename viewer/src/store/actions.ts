@@ -2,6 +2,7 @@
 import type { ConnectionState } from "../connection/connection";
 import type { ForecastAnswer, Hello, Json, OrderStatus, RunEnd, Status } from "../connection/protocol";
 import type { OrderForm, Values } from "../form/schema";
+import type { Look } from "./looks";
 import type { Part, PreviewState, Problem } from "./state";
 
 export type Action =
@@ -20,6 +21,9 @@ export type Action =
   | { type: "order sent"; id: string; order: Json; at: number }
   | { type: "order dismissed"; id: string }
   | { type: "wheel answered" }
+  // The views; `view` is null for all of them.
+  | { type: "look"; view: string | null; look: Partial<Look> }
+  | { type: "view chosen"; view: string }
   // The features.
   | { type: "part"; feature: string; part: Part | null }
   | { type: "hover"; feature: string | null }

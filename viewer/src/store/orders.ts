@@ -35,3 +35,10 @@ export function ordersReconciled(orders: readonly OrderRecord[], statuses: reado
   const reason = "The connection ended before the simulation had the order. Nothing was changed.";
   return told.map((order) => (order.status === "sent" && !known.has(order.id) ? { ...order, status: "lost" as const, reason } : order));
 }
+
+/** Whether the shape is on its way to another: an order is being computed or carried out. */
+export const isShapeUnderWay = (orders: readonly OrderRecord[]): boolean => orders.some(({ status }) => status === "computing" || status === "applying");
+
+/** When orders began to change the shape, and what they asked for. */
+export const appliedOrders = (orders: readonly OrderRecord[]): { cycle: number; label: string }[] =>
+  orders.flatMap(({ cycle_applied, text }) => (typeof cycle_applied === "number" ? [{ cycle: cycle_applied, label: text }] : []));

@@ -6,6 +6,7 @@ import type { Values } from "../form/schema";
 import type { Action } from "./actions";
 import { bodyOf, isObject, kindOf, openBoundaries, partsOf, scaled, withoutShorthand } from "./draft";
 import { orderRefused, orderSent, orderTold, ordersReconciled } from "./orders";
+import { looksOf, withLook } from "./looks";
 import { NO_FORECAST } from "./state";
 import type { Composed, Draft, Part, State } from "./state";
 import { sameJson } from "./store";
@@ -43,6 +44,8 @@ export function reduce(state: State, action: Action): State {
     case "unreadable": return { ...state, errors: [...state.errors, action.text].slice(-LONGEST_ERRORS) };
     case "schema": return withSchema(state, action.form, action.settings);
     case "order sent": return withOrderSent(state, action.id, action.order, action.at);
+    case "look": return { ...state, looks: withLook(state.looks, action.view, action.look) };
+    case "view chosen": return { ...state, chosenView: action.view };
     case "part": {
       const parts = withPart(state.selection.parts, action.feature, action.part);
       return parts === state.selection.parts ? state : { ...state, selection: { ...state.selection, parts } };
@@ -84,7 +87,7 @@ function withHello(state: State, hello: Hello): State {
   for (const name of openBoundaries({ hello })) if (!before.has(name) && parts[name] === undefined) parts[name] = "fixed";
   const { hovered } = state.selection;
   const next: State = {
-    ...state, hello,
+    ...state, hello, ...viewsOf(state, hello),
     connection: { ...state.connection, known: true, fresh: false },
     selection: { parts: sameJson(parts, state.selection.parts) ? state.selection.parts : parts, hovered: hovered !== null && names.has(hovered) ? hovered : null },
     orders: ordersReconciled(state.orders, hello.orders, state.connection.fresh && state.connection.known),
@@ -95,6 +98,13 @@ function withHello(state: State, hello: Hello): State {
   const { updating } = state.draft;
   const isGone = updating !== null && !sameJson(hello.stack[updating], state.hello?.stack[updating]);
   return isGone ? cleared(next) : next;
+}
+
+function viewsOf(state: State, { views, fields }: Hello): Pick<State, "looks" | "chosenView"> {
+  const looks = looksOf(views, fields, state.looks);
+  const known = state.chosenView !== null && looks[state.chosenView] !== undefined;
+  const coloured = views.find((view) => looks[view.name]?.field != null) ?? views[0];
+  return { looks: sameJson(looks, state.looks) ? state.looks : looks, chosenView: known ? state.chosenView : coloured?.name ?? null };
 }
 
 function withSchema(state: State, form: State["form"], settings: Values): State {

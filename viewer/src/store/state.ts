@@ -2,6 +2,7 @@
 import type { ConnectionState } from "../connection/connection";
 import type { ForecastAnswer, Hello, Json, OrderStatus, RunEnd, Status } from "../connection/protocol";
 import type { OrderForm, Values } from "../form/schema";
+import type { Looks } from "./looks";
 
 export type Part = "handle" | "fixed";
 
@@ -69,6 +70,9 @@ export interface State {
   end: RunEnd | null;
   /** Data frames taken since the page was opened, and the cycle of the newest. */
   frames: { count: number; cycle: number | null };
+  /** How each view looks, and the one whose look is being changed. */
+  looks: Looks;
+  chosenView: string | null;
   selection: SelectionState;
   /** The form for an order; null before the schema has come. */
   form: OrderForm | null;
@@ -94,6 +98,7 @@ export const INITIAL: State = {
   connection: { state: "connecting", explanation: "", known: false, fresh: false },
   hello: null, status: null, end: null,
   frames: { count: 0, cycle: null },
+  looks: {}, chosenView: null,
   selection: { parts: {}, hovered: null },
   form: null,
   draft: { key: null, bodies: {}, settings: {}, remedy: {}, problems: [], updating: null, amount: null, step: null, past: [], future: [] },

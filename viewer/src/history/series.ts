@@ -1,0 +1,144 @@
+/** What monitors have said over time, within bounds: old values thin out, however long a run lasts. */
+
+/** The most times of one source. Where there are more, every other one of the older half is forgotten. */
+export const TIMES = 2000;
+/** The most values that are kept side by side; later ones are not. */
+export const SERIES = 200;
+
+/** Values that come together, such as those of one pipeline. */
+interface Source { cycles: number[]; times: number[]; columns: Map<string, (number | null)[]> }
+
+/** One value over time: its name in the list, and whence it comes. */
+export interface Series { key: string; source: string; name: string; unit: string | null }
+
+export class History {
+  private readonly sources = new Map<string, Source>();
+  private readonly list = new Map<string, Series>();
+
+  /** The series in the order in which they came up. */
+  get series(): Series[] {
+    return [...this.list.values()];
+  }
+
+  /** Takes values of one cycle. A cycle that was there already, after a connection came back, is passed over; an earlier one begins anew. */
+  add(source: string, cycle: number, time: number, values: Record<string, number | null>): void {
+    let kept = this.sources.get(source);
+    const last = kept?.cycles.at(-1);
+    if (last !== undefined && cycle === last) return;
+    if (!kept || (last !== undefined && cycle < last)) {
+      kept = { cycles: [], times: [], columns: new Map(kept ? [...kept.columns.keys()].map((name) => [name, []]) : []) };
+      this.sources.set(source, kept);
+    }
+    for (const name of Object.keys(values)) {
+      if (kept.columns.has(name) || this.list.size >= SERIES) continue;
+      kept.columns.set(name, new Array<null>(kept.cycles.length).fill(null));
+      const key = seriesKey(source, name);
+      this.list.set(key, { key, source, name, unit: this.list.get(key)?.unit ?? null });
+    }
+    kept.cycles.push(cycle);
+    kept.times.push(time);
+    for (const [name, column] of kept.columns) {
+      const value = values[name];
+      column.push(typeof value === "number" && Number.isFinite(value) ? value : null);
+    }
+    if (kept.cycles.length > TIMES) thin(kept);
+  }
+
+  setUnit(source: string, name: string, unit: string | null): void {
+    const series = this.list.get(seriesKey(source, name));
+    if (series) series.unit = unit;
+  }
+
+  /** Forgets a source, and its series. */
+  remove(source: string): void {
+    this.sources.delete(source);
+    for (const [key, series] of this.list) if (series.source === source) this.list.delete(key);
+  }
+
+  /** The cycles of several series together, and the values of each at them; null where it has none. */
+  table(keys: readonly string[]): { cycles: number[]; times: number[]; columns: (number | null)[][] } {
+    const chosen = keys.flatMap((key) => this.list.get(key) ?? []);
+    const used = new Set(chosen.map((series) => series.source));
+    const at = new Map<number, number>();
+    for (const name of used) {
+      const source = this.sources.get(name);
+      source?.cycles.forEach((cycle, i) => at.set(cycle, source.times[i]!));
+    }
+    const cycles = [...at.keys()].sort((a, b) => a - b);
+    const rows = new Map(cycles.map((cycle, row) => [cycle, row]));
+    const columns = chosen.map((series) => {
+      const result = new Array<number | null>(cycles.length).fill(null);
+      const source = this.sources.get(series.source);
+      const column = source?.columns.get(series.name);
+      source?.cycles.forEach((cycle, i) => { result[rows.get(cycle)!] = column?.[i] ?? null; });
+      return result;
+    });
+    return { cycles, times: cycles.map((cycle) => at.get(cycle)!), columns };
+  }
+
+  /** The newest value of a series at a cycle or before it; null when there is none. */
+  at(key: string, cycle: number): number | null {
+    const series = this.list.get(key);
+    const source = series && this.sources.get(series.source);
+    const column = series && source?.columns.get(series.name);
+    if (!source || !column) return null;
+    for (let i = lastAt(source.cycles, cycle); i >= 0; i--) if (column[i] !== null) return column[i]!;
+    return null;
+  }
+
+  /** All that is kept, as comma-separated values: cycle, time, then a column for each series. */
+  csv(): string {
+    const { series } = this;
+    const { cycles, times, columns } = this.table(series.map(({ key }) => key));
+    const name = ({ source, name, unit }: Series): string => quoted(`${source}: ${name}${unit ? ` [${unit}]` : ""}`);
+    const lines = [["cycle", "time", ...series.map(name)].join(",")];
+    cycles.forEach((cycle, row) => lines.push([cycle, times[row], ...columns.map((column) => column[row] ?? "")].join(",")));
+    return `${lines.join("\n")}\n`;
+  }
+}
+
+export const seriesKey = (source: string, name: string): string => `${source}\u0000${name}`;
+
+/** The last index whose cycle is not beyond one; -1 where all are. */
+function lastAt(cycles: readonly number[], cycle: number): number {
+  let low = 0, high = cycles.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (cycles[middle]! <= cycle) low = middle + 1;
+    else high = middle;
+  }
+  return low - 1;
+}
+
+function thin(source: Source): void {
+  const half = source.cycles.length >> 1;
+  const keep = <T>(list: T[]): T[] => list.filter((_, i) => i >= half || i % 2 === 0);
+  source.cycles = keep(source.cycles);
+  source.times = keep(source.times);
+  for (const [name, column] of source.columns) source.columns.set(name, keep(column));
+}
+
+// A text that a spreadsheet would take for a formula is not made by a solver's names.
+const quoted = (text: string): string => (/[",\n\r]/.test(text) || /^[=+\-@]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+
+/** An order in the plot: where the shape began to change. */
+export interface Mark { cycle: number; label: string }
+
+/** A value at a cycle, and what it was before the last order that came before it. */
+export interface Comparison { value: number | null; order: Mark | null; before: number | null; difference: number | null }
+
+export function compare(history: History, key: string, cycle: number, marks: readonly Mark[]): Comparison {
+  const value = history.at(key, cycle);
+  const order = marks.reduce<Mark | null>((last, mark) => (mark.cycle <= cycle && (!last || mark.cycle >= last.cycle) ? mark : last), null);
+  // What was measured at the cycle of the order was measured before the shape changed.
+  const before = order ? history.at(key, order.cycle) : null;
+  return { value, order, before, difference: value !== null && before !== null ? value - before : null };
+}
+
+/** What a person who asks for nothing wants to see: the pressure, what goes in and out, and the quality of the mesh; at most three. */
+export function firstChoice(series: readonly Series[]): string[] {
+  const wanted = [/quality\.min$/, /pressure|drop/, /mass|flux|balance|flow/];
+  const found = wanted.flatMap((pattern) => series.find(({ source, name }) => pattern.test(name) || pattern.test(source) && !/quality/.test(name)) ?? []);
+  const keys = new Set((found.length > 0 ? found : series.slice(0, 2)).map(({ key }) => key));
+  return [...keys];
+}

@@ -1,0 +1,137 @@
+/** How the chosen view looks: by which field it is coloured, on which map, over which range; and its edges. */
+import type { FieldInformation } from "../connection/protocol";
+import { element, identifier, write } from "../dom";
+import { digits, readNumber, words } from "../number";
+import { COLOUR_MAPS, componentNames, gradient, colourMap } from "../picture/colour";
+import type { Range, RangeChoice, RangeKind } from "../picture/ranges";
+import type { Bar } from "../picture/scene";
+import type { Action } from "../store/actions";
+import { EDGES } from "../store/looks";
+import type { Look } from "../store/looks";
+import type { State } from "../store/state";
+import { sameJson } from "../store/store";
+import type { Store } from "../store/store";
+
+const RANGES: readonly [RangeKind, string][] = [["auto", "of each frame"], ["over time", "of all frames so far"], ["fixed", "fixed"]];
+
+const option = (value: string | number, text: string): HTMLElement => element("option", { value }, text);
+
+export class LookPanel {
+  private readonly heading = element("h2");
+  private readonly field = element("select", { onchange: () => this.change({ field: this.field.value === "" ? null : this.field.value, component: -1 }) });
+  private readonly component = element("select", { onchange: () => this.change({ component: Number(this.component.value) }) });
+  private readonly map = element("select", { onchange: () => this.change({ map: this.map.value }) }, ...COLOUR_MAPS.map(({ name, title, kind }) => option(name, `${title} (${kind})`)));
+  private readonly sample = element("div", { class: "sample", "aria-hidden": "true" });
+  private readonly kind = element("select", { onchange: () => this.changeKind(this.kind.value as RangeKind) }, ...RANGES.map(([kind, text]) => option(kind, text)));
+  private readonly low = this.end("lowest value");
+  private readonly high = this.end("highest value");
+  private readonly symmetric = element("input", { type: "checkbox", onchange: () => this.changeRange({ symmetric: this.symmetric.checked, logarithmic: false }) });
+  private readonly logarithmic = element("input", { type: "checkbox", onchange: () => this.changeRange({ logarithmic: this.logarithmic.checked, symmetric: false }) });
+  private readonly edges = element("select", { onchange: () => this.change({ edges: this.edges.value as Look["edges"] }) }, ...EDGES.map((edges) => option(edges, edges === "none" ? "none" : `of ${edges === "mesh" ? "the mesh" : "features"}`)));
+  private readonly rows: HTMLElement;
+  private shown: Range | null = null;
+
+  constructor(root: HTMLElement, private readonly store: Store<State, Action>) {
+    const row = (text: string, control: HTMLElement): HTMLElement => {
+      control.id = identifier("look");
+      return element("div", { class: "field" }, element("label", { for: control.id }, text), control);
+    };
+    const component = row("component", this.component);
+    component.id = "component-row";
+    this.rows = element("div", {}, row("field", this.field), component,
+      element("div", { class: "coloured" }, row("colours", this.map), this.sample, row("range", this.kind),
+        element("div", { class: "range" }, this.low, element("span", { "aria-hidden": "true" }, "to"), this.high),
+        element("div", { class: "checks" }, element("label", {}, this.symmetric, "about 0"), element("label", {}, this.logarithmic, "logarithmic"))),
+      row("edges", this.edges),
+      element("button", { type: "button", class: "small", title: "Colour every view like this one", onclick: () => this.spread() }, "Use for all views"));
+    root.replaceChildren(this.heading, this.rows);
+    store.watch((state) => [state.looks, state.chosenView, state.hello?.fields], () => this.show(), sameJson);
+  }
+
+  /** What the colours of the picture stand for now. */
+  setBars(bars: readonly Bar[]): void {
+    const { chosenView } = this.store.state;
+    this.shown = bars.find((bar) => chosenView !== null && bar.views.includes(chosenView))?.range ?? null;
+    this.showEnds();
+  }
+
+  private get look(): Look | null {
+    const { looks, chosenView } = this.store.state;
+    return chosenView === null ? null : looks[chosenView] ?? null;
+  }
+
+  private change(look: Partial<Look>): void {
+    this.store.dispatch({ type: "look", view: this.store.state.chosenView ?? "", look });
+  }
+
+  private changeRange(range: Partial<RangeChoice>): void {
+    if (this.look) this.change({ range: { ...this.look.range, ...range } });
+  }
+
+  private changeKind(kind: RangeKind): void {
+    const [low, high] = this.shown ?? [0, 1];
+    this.changeRange(kind === "fixed" ? { kind, low, high } : { kind });
+  }
+
+  private spread(): void {
+    if (!this.look) return;
+    const { field, component, map, range, edges } = this.look;
+    this.store.dispatch({ type: "look", view: null, look: { field, component, map, range, edges } });
+  }
+
+  private end(label: string): HTMLInputElement {
+    const input: HTMLInputElement = element("input", { type: "text", inputmode: "decimal", "aria-label": label, autocomplete: "off", onchange: () => this.typed() });
+    return input;
+  }
+
+  /** A number typed at either end fixes the range. */
+  private typed(): void {
+    const [low, high] = [readNumber(this.low.value), readNumber(this.high.value)];
+    const wrong = { low: low === null, high: high === null || (low !== null && high <= low) };
+    for (const [input, bad] of [[this.low, wrong.low], [this.high, wrong.high]] as const) input.setAttribute("aria-invalid", String(bad));
+    if (low !== null && high !== null && low < high) this.changeRange({ kind: "fixed", low, high });
+  }
+
+  private show(): void {
+    const { look } = this;
+    const { chosenView, hello } = this.store.state;
+    this.rows.hidden = look === null;
+    write(this.heading, chosenView === null ? "Look" : `Look of ${chosenView}`);
+    if (!look) return;
+    const fields: readonly FieldInformation[] = hello?.fields ?? [];
+    fill(this.field, [...fields.map(({ name }): [string, string] => [name, FIELD_TITLES[name] ?? words(name)]), ["", "none"]]);
+    this.field.value = look.field ?? "";
+    const count = fields.find((field) => field.name === look.field)?.components ?? 1;
+    fill(this.component, count > 1 ? [["-1", "magnitude"], ...componentNames(count).map((name, i): [string, string] => [String(i), name])] : []);
+    this.component.value = String(look.component);
+    this.component.hidden = count <= 1;
+    this.map.value = look.map;
+    this.sample.style.background = gradient(colourMap(look.map), "to right");
+    this.kind.value = look.range.kind;
+    this.symmetric.checked = look.range.symmetric;
+    this.logarithmic.checked = look.range.logarithmic;
+    this.edges.value = look.edges;
+    this.rows.querySelector<HTMLElement>(".coloured")!.hidden = look.field === null;
+    this.showEnds();
+  }
+
+  private showEnds(): void {
+    const { look } = this;
+    const range: Range | null = look?.range.kind === "fixed" ? [look.range.low, look.range.high] : this.shown;
+    for (const [input, value] of [[this.low, range?.[0]], [this.high, range?.[1]]] as const) {
+      if (document.activeElement === input) continue;
+      input.value = value === undefined ? "" : digits(value, 5);
+      input.removeAttribute("aria-invalid");
+    }
+  }
+}
+
+/** What a field that has a name of the library's own is called on the page. */
+export const FIELD_TITLES: Readonly<Record<string, string>> = { scaled_jacobian: "mesh quality" };
+
+function fill(select: HTMLSelectElement, options: readonly [string, string][]): void {
+  const key = JSON.stringify(options);
+  if (select.dataset.options === key) return;
+  select.dataset.options = key;
+  select.replaceChildren(...options.map(([value, text]) => option(value, text)));
+}

@@ -1,0 +1,68 @@
+/** The scalar bars: what the colours in the picture stand for. A number typed at the end of one fixes its range. */
+import { element, write } from "../dom";
+import { readNumber, within, words } from "../number";
+import { colourMap, componentNames, gradient } from "./colour";
+import { valueAt } from "./ranges";
+import type { Range } from "./ranges";
+import type { Bar } from "./scene";
+
+const TICKS = 6;
+
+/** What a bar is called: its field, and the component of a vector. */
+export interface BarText { title: string; unit: string | null }
+
+export class ScalarBars {
+  private readonly shown = new Map<string, { root: HTMLElement; ticks: HTMLElement[]; ends: [HTMLInputElement, HTMLInputElement]; range: Range; typed: (range: Range) => void }>();
+
+  /** `fix` is told the range that somebody typed, and the views that it is for. */
+  constructor(private readonly root: HTMLElement, private readonly describe: (bar: Bar) => BarText, private readonly fix: (views: readonly string[], range: Range) => void) {}
+
+  show(bars: readonly Bar[]): void {
+    const keys = new Set(bars.map(({ key }) => key));
+    for (const [key, { root }] of this.shown) {
+      if (keys.has(key)) continue;
+      root.remove();
+      this.shown.delete(key);
+    }
+    for (const bar of bars) this.update(bar);
+    this.root.hidden = bars.length === 0;
+  }
+
+  private update(bar: Bar): void {
+    const shown = this.shown.get(bar.key) ?? this.make(bar);
+    const { ticks, ends } = shown;
+    shown.range = bar.range;
+    shown.typed = (range) => this.fix(bar.views, range);
+    const at = (i: number): string => within(valueAt(bar.range, 1 - i / (TICKS - 1), bar.look.range.logarithmic), bar.look.range.logarithmic ? [0, valueAt(bar.range, 1 - i / (TICKS - 1), true)] : bar.range);
+    ticks.forEach((tick, i) => write(tick, at(i + 1)));
+    ends.forEach((input, i) => {
+      if (document.activeElement !== input) input.value = at(i === 0 ? TICKS - 1 : 0);
+    });
+  }
+
+  private make(bar: Bar): NonNullable<ReturnType<typeof this.shown.get>> {
+    const { title, unit } = this.describe(bar);
+    const end = (label: string): HTMLInputElement => element("input", {
+      type: "text", inputmode: "decimal", autocomplete: "off", "aria-label": `${title}: ${label}`, title: "Type a number to fix the range", onchange: () => {
+        const [low, high] = [readNumber(ends[0].value) ?? shown.range[0], readNumber(ends[1].value) ?? shown.range[1]];
+        if (low < high) shown.typed([low, high]);
+      },
+    });
+    const ends: [HTMLInputElement, HTMLInputElement] = [end("lowest value"), end("highest value")];
+    const ticks = Array.from({ length: TICKS - 2 }, () => element("li"));
+    const colours = element("div", { class: "colours" });
+    colours.style.background = gradient(colourMap(bar.look.map), "to top");
+    const root = element("div", { class: "scalar-bar", role: "group", "aria-label": title }, element("div", { class: "title" }, title, unit ? element("small", {}, unit) : null),
+      element("div", { class: "body" }, colours, element("ol", {}, element("li", {}, ends[1]), ...ticks, element("li", {}, ends[0]))));
+    this.root.append(root);
+    const shown = { root, ticks, ends, range: bar.range, typed: (_: Range): void => undefined };
+    this.shown.set(bar.key, shown);
+    return shown;
+  }
+}
+
+/** A field and its component in words. */
+export function fieldText(field: string, components: number, component: number, title?: string): string {
+  const suffix = components <= 1 ? "" : component < 0 ? " magnitude" : ` ${componentNames(components)[component] ?? ""}`;
+  return (title ?? words(field)) + suffix;
+}

@@ -1,0 +1,65 @@
+/** How each view looks: whether it is seen, and what its colours stand for. */
+import type { FieldInformation, ViewInformation } from "../connection/protocol";
+import { COLOUR_MAPS } from "../picture/colour";
+import type { RangeChoice } from "../picture/ranges";
+
+export type Edges = "none" | "features" | "mesh";
+export const EDGES: readonly Edges[] = ["none", "features", "mesh"];
+
+export interface Look {
+  visible: boolean;
+  /** From 0 to 1. */
+  opacity: number;
+  edges: Edges;
+  /** The field that colours it; null for none. */
+  field: string | null;
+  /** Which component of the field; -1 for its magnitude. */
+  component: number;
+  map: string;
+  range: RangeChoice;
+}
+
+export type Looks = Readonly<Record<string, Look>>;
+
+const RANGE: RangeChoice = { kind: "auto", low: 0, high: 1, symmetric: false, logarithmic: false };
+
+/** How a view looks at first. A surface that hides what is inside it is of little use: it is a shell of glass then. */
+export function firstLook(view: ViewInformation, views: readonly ViewInformation[], fields: readonly FieldInformation[]): Look {
+  const isShell = view.kind === "surface" && views.some((other) => other.kind !== "surface");
+  const field = fields.find((candidate) => candidate.components === 3) ?? fields[0];
+  return {
+    visible: true, opacity: isShell ? 0.15 : 1, edges: "features", field: isShell ? null : field?.name ?? null, component: -1,
+    map: COLOUR_MAPS[0]!.name, range: RANGE,
+  };
+}
+
+/** The looks of the views that there are now: those that are new look as they do at first, the others as they did. */
+export function looksOf(views: readonly ViewInformation[], fields: readonly FieldInformation[], before: Looks): Looks {
+  return Object.fromEntries(views.map((view) => [view.name, before[view.name] ?? firstLook(view, views, fields)]));
+}
+
+/** The looks with some of one view's, or of all, another. */
+export function withLook(looks: Looks, view: string | null, look: Partial<Look>): Looks {
+  return Object.fromEntries(Object.entries(looks).map(([name, before]) => [name, view === null || name === view ? { ...before, ...look } : before]));
+}
+
+/** The looks that were kept over a reload, as far as they are looks; rubbish is passed over. */
+export function readLooks(kept: unknown): Looks {
+  if (typeof kept !== "object" || kept === null || Array.isArray(kept)) return {};
+  return Object.fromEntries(Object.entries(kept).filter((entry): entry is [string, Look] => isLook(entry[1])));
+}
+
+function isLook(value: unknown): value is Look {
+  if (typeof value !== "object" || value === null) return false;
+  const { visible, opacity, edges, field, component, map, range } = value as Partial<Record<keyof Look, unknown>>;
+  const { kind, low, high, symmetric, logarithmic } = (range ?? {}) as Partial<Record<keyof RangeChoice, unknown>>;
+  return typeof visible === "boolean" && typeof opacity === "number" && opacity >= 0 && opacity <= 1 && EDGES.includes(edges as Edges)
+    && (field === null || typeof field === "string") && Number.isInteger(component) && COLOUR_MAPS.some((known) => known.name === map)
+    && ["auto", "over time", "fixed"].includes(kind as string) && Number.isFinite(low) && Number.isFinite(high)
+    && typeof symmetric === "boolean" && typeof logarithmic === "boolean";
+}
+
+/** What a view's colours have in common with those of others: they share a bar and a range. */
+export function colourKey({ field, component, map, range }: Look): string | null {
+  return field === null ? null : JSON.stringify([field, component, map, range]);
+}

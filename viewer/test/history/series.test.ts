@@ -1,0 +1,60 @@
+import { describe, expect, it } from "vitest";
+import { History, SERIES, TIMES, compare, firstChoice, seriesKey } from "../../src/history/series";
+
+describe("the history", () => {
+  it("puts sources of different cadence side by side", () => {
+    const history = new History();
+    for (const cycle of [2, 4, 6]) history.add("a", cycle, cycle / 10, { p: cycle });
+    for (const cycle of [3, 6]) history.add("b", cycle, cycle / 10, { q: -cycle, r: null });
+    const keys = [seriesKey("a", "p"), seriesKey("b", "q"), seriesKey("b", "r")];
+    expect(history.table(keys)).toEqual({
+      cycles: [2, 3, 4, 6], times: [0.2, 0.3, 0.4, 0.6], columns: [[2, null, 4, 6], [null, -3, null, -6], [null, null, null, null]],
+    });
+    expect([history.at(keys[0]!, 5), history.at(keys[1]!, 5), history.at(keys[1]!, 2), history.at("none", 5)]).toEqual([4, -3, null, null]);
+  });
+
+  it("takes a cycle once, and begins anew where a run goes back", () => {
+    const history = new History();
+    for (const cycle of [1, 2, 2, 3]) history.add("a", cycle, cycle, { p: cycle });
+    expect(history.table([seriesKey("a", "p")]).cycles).toEqual([1, 2, 3]);
+    history.add("a", 1, 1, { p: 9 });
+    expect(history.table([seriesKey("a", "p")])).toEqual({ cycles: [1], times: [1], columns: [[9]] });
+  });
+
+  it("stays within its bounds, and keeps the newest and the oldest", () => {
+    const history = new History();
+    for (let cycle = 0; cycle < 20 * TIMES; cycle++) history.add("a", cycle, cycle, { p: cycle });
+    const { cycles, columns } = history.table([seriesKey("a", "p")]);
+    expect(cycles.length).toBeLessThanOrEqual(TIMES);
+    expect(cycles.length).toBeGreaterThan(TIMES / 2);
+    expect([cycles[0], cycles.at(-1)]).toEqual([0, 20 * TIMES - 1]);
+    expect(columns[0]).toEqual(cycles);
+    for (let i = 0; i < 2 * SERIES; i++) history.add(`s${i}`, 0, 0, { p: 1 });
+    expect(history.series.length).toBe(SERIES);
+  });
+
+  it("is written as a table, with what has commas quoted", () => {
+    const history = new History();
+    history.add('a,"b"', 1, 0.5, { p: 2, q: NaN });
+    history.setUnit('a,"b"', "p", "Pa");
+    expect(history.csv()).toBe('cycle,time,"a,""b"": p [Pa]","a,""b"": q"\n1,0.5,2,\n');
+  });
+
+  it("compares with what was before the last order", () => {
+    const history = new History();
+    for (const [cycle, p] of [[10, 5], [20, 5], [30, 8], [40, 7]] as const) history.add("a", cycle, cycle, { p });
+    const marks = [{ cycle: 25, label: "pinch" }, { cycle: 5, label: "first" }];
+    const key = seriesKey("a", "p");
+    expect(compare(history, key, 40, marks)).toEqual({ value: 7, order: marks[0], before: 5, difference: 2 });
+    expect(compare(history, key, 20, marks)).toEqual({ value: 5, order: marks[1], before: null, difference: null });
+    expect(compare(history, key, 3, marks)).toEqual({ value: null, order: null, before: null, difference: null });
+  });
+
+  it("shows pressure, flow and quality at first", () => {
+    const make = (source: string, name: string) => ({ key: seriesKey(source, name), source, name, unit: null });
+    const all = [make("health", "quality.max"), make("health", "quality.min"), make("health", "velocity.max"), make("duct", "pressure.mean"), make("duct", "mass.net")];
+    expect(firstChoice(all)).toEqual([all[1]!.key, all[3]!.key, all[4]!.key]);
+    expect(firstChoice([all[2]!])).toEqual([all[2]!.key]);
+    expect(firstChoice([])).toEqual([]);
+  });
+});
