@@ -56,6 +56,7 @@ mod meeting;
 pub mod mpi;
 #[cfg(feature = "distributed")]
 pub mod petsc;
+pub mod program;
 mod report;
 mod settings;
 mod stages;

@@ -14,6 +14,7 @@
 //! cargo run --release -p tombolo-benchmarks -- growth --json
 //! cargo run --release -p tombolo-benchmarks -- extract --json
 //! cargo run --release -p tombolo-benchmarks -- viewer --json
+//! cargo run --release -p tombolo-benchmarks -- python --json
 //! cargo run --release -p tombolo-benchmarks --features distributed -- volume --json
 //! ```
 
@@ -26,6 +27,7 @@ mod measure;
 mod overhead;
 mod paper;
 mod peer;
+mod python;
 mod report;
 mod scaling;
 mod skeleton;
@@ -99,6 +101,8 @@ enum Name {
     Extract,
     /// The viewer in a browser, watching a run: its pictures, its previews, its memory.
     Viewer,
+    /// The cost of `execute` from Python when nothing is due, and the memory that lending a mesh takes.
+    Python,
     /// The time and the memory of an order, from ten thousand cells to five million.
     Growth,
 }
@@ -125,6 +129,7 @@ fn main() -> ExitCode {
         Name::Codec => text(codec::run(), json),
         Name::Skeleton => text(skeleton::run(), json),
         Name::Volume => text(volume::run(), json),
+        Name::Python => text(python::run(), json),
         Name::Growth => text(growth::run(), json),
         Name::Extract => text(extract::run(), json),
         Name::Viewer => text(viewer::run(), json),

@@ -15,12 +15,15 @@ pub fn conduit_type(number: i64) -> Option<NumberType> {
 }
 
 /// Numbers of any type at any distance from each other, borrowed from the solver for the length of
-/// one call.
+/// one call: a list, or a table read row by row.
 #[derive(Debug, Clone, Copy)]
 pub struct Array<'call> {
     first: *const u8,
     count: usize,
-    stride: usize,
+    /// From one row to the next, in bytes; of a list from one number to the next.
+    stride: isize,
+    /// Numbers of a row, and from one to the next, in bytes. A list has rows of one.
+    columns: (usize, isize),
     number: NumberType,
     swapped: bool,
     call: PhantomData<&'call [u8]>,
@@ -41,8 +44,48 @@ impl<'call> Array<'call> {
         number: NumberType,
         big_endian: bool,
     ) -> Self {
+        // SAFETY: the caller's promise; `isize` holds a distance within an array.
+        unsafe { Self::table(first, [count, 1], [stride.cast_signed(), 0], number, big_endian) }
+    }
+
+    /// A table of rows and columns at an address, with these distances in bytes from one row and
+    /// from one column to the next: of any sign, and not aligned, it may be. It is read row by row.
+    ///
+    /// # Safety
+    /// There is a number of this type at every `first + row * strides[0] + column * strides[1]`,
+    /// that lives and does not change during `'call`; all lie in one piece of memory.
+    pub unsafe fn table(
+        first: *const u8,
+        [rows, columns]: [usize; 2],
+        [mut stride, of_column]: [isize; 2],
+        number: NumberType,
+        big_endian: bool,
+    ) -> Self {
         let swapped = big_endian && cfg!(target_endian = "little");
-        Self { first, count, stride, number, swapped, call: PhantomData }
+        let count = rows * columns;
+        // Rows that follow each other without a gap are one list.
+        let is_list = columns <= 1
+            || rows == 1
+            || of_column.checked_mul(columns.cast_signed()).is_some_and(|row| row == stride);
+        let mut columns = (columns.max(1), of_column);
+        if is_list {
+            if columns.0 > 1 {
+                stride = of_column;
+            }
+            columns = (1, 0);
+        }
+        Self { first, count, stride, columns, number, swapped, call: PhantomData }
+    }
+
+    /// The distance of a number from the first, in bytes.
+    fn offset(&self, index: usize) -> isize {
+        match self.columns {
+            (1, _) => index.cast_signed() * self.stride,
+            (columns, stride) => {
+                (index / columns).cast_signed() * self.stride
+                    + (index % columns).cast_signed() * stride
+            }
+        }
     }
 
     /// How many numbers there are.
@@ -67,7 +110,7 @@ impl<'call> Array<'call> {
         assert!(index < self.count && N == self.number.bytes(), "element {index}");
         // SAFETY: the element is there (`new`), and bytes need no alignment.
         let mut bytes: [u8; N] =
-            unsafe { self.first.add(index * self.stride).cast::<[u8; N]>().read_unaligned() };
+            unsafe { self.first.offset(self.offset(index)).cast::<[u8; N]>().read_unaligned() };
         if self.swapped {
             bytes.reverse();
         }
@@ -134,7 +177,10 @@ impl<'call> Array<'call> {
         if self.count == 0 {
             return Some((&[], 1));
         }
-        let stride = if self.count == 1 { size } else { self.stride };
+        if self.columns.0 > 1 {
+            return None;
+        }
+        let stride = if self.count == 1 { size } else { usize::try_from(self.stride).ok()? };
         if !stride.is_multiple_of(size)
             || stride == 0
             || !self.first.addr().is_multiple_of(align_of::<T>())
@@ -167,7 +213,7 @@ impl<'call> Array<'call> {
 
     /// The values as vertex numbers, one beside the other; `None` where they have to be copied.
     pub(super) fn indices(&self) -> Option<Indices<'call>> {
-        if self.count > 1 && self.stride != self.number.bytes() {
+        if !self.is_compact() {
             return None;
         }
         match self.number {
@@ -179,9 +225,15 @@ impl<'call> Array<'call> {
         }
     }
 
-    /// Where the first and the last value lie: the bounds of the memory that is lent.
+    /// Whether its numbers lie one beside the other.
+    fn is_compact(&self) -> bool {
+        let beside = self.stride == self.number.bytes().cast_signed();
+        self.count <= 1 || self.columns.0 == 1 && beside
+    }
+
+    /// Where the first and the last value lie.
     pub(super) fn ends(&self) -> Option<[(*const u8, usize); 2]> {
-        let last = self.first.wrapping_add(self.count.checked_sub(1)? * self.stride);
+        let last = self.first.wrapping_offset(self.offset(self.count.checked_sub(1)?));
         Some([(self.first, self.number.bytes()), (last, self.number.bytes())])
     }
 
@@ -199,9 +251,10 @@ impl<'call> Array<'call> {
     /// Takes the values into a fingerprint.
     pub(super) fn fingerprint(&self, into: &mut Fingerprint) {
         into.add(self.count as u64);
-        if self.stride == self.number.bytes() && self.count > 0 {
+        if self.is_compact() && self.count > 0 {
+            let bytes = self.count * self.number.bytes();
             // SAFETY: the values lie one beside the other (`new`), and any bytes are bytes.
-            into.bytes(unsafe { std::slice::from_raw_parts(self.first, self.count * self.stride) });
+            into.bytes(unsafe { std::slice::from_raw_parts(self.first, bytes) });
         } else {
             (0..self.count).for_each(|index| into.add(self.get(index).to_bits()));
         }

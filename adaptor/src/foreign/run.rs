@@ -11,7 +11,7 @@ use crate::foreign::asked::Asked;
 use crate::foreign::error::RunError;
 use crate::foreign::mesh::{Block, Channel, Grid, Kept};
 use crate::foreign::ranks;
-use crate::{Adaptor, FinalizeError, OrderReport, Report, Settings, Step};
+use crate::{Adaptor, FinalizeError, OrderReport, Report, Settings, Step, Stopper};
 
 /// Why orders are rejected from then on.
 const OTHER_MESH: &str = "the solver has made another mesh: shapes are measured from the mesh of the first step, so its cells must stay the same";
@@ -92,6 +92,18 @@ impl Run {
     #[must_use]
     pub fn link(&self) -> Option<String> {
         self.adaptor.link()
+    }
+
+    /// The link of those who watch and can never drive.
+    #[must_use]
+    pub fn watching_link(&self) -> Option<String> {
+        self.adaptor.watching_link()
+    }
+
+    /// Asks the solver to end, from any thread.
+    #[must_use]
+    pub fn stopper(&self) -> Stopper {
+        self.adaptor.stopper()
     }
 
     /// The text that invites a person to open the run: see [`Adaptor::invitation`].

@@ -1,7 +1,7 @@
 //! One mesh: a topology with its coordinates, its fields and its features.
 
 use super::coordset::Coordset;
-use super::field::Field;
+use super::field::{self, Field};
 use super::topology::Topology;
 use crate::foreign::array::{Array, Fingerprint};
 use crate::foreign::error::RunError;
@@ -27,6 +27,19 @@ pub struct Faces<'call> {
     pub topology: Topology<'call>,
     /// Of each face: the number of its feature.
     pub tags: Array<'call>,
+}
+
+/// How an array of a mesh is lent to the adaptor.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Lending {
+    /// Its name: `points`, `cells`, or that of a field; of points and fields one for each component.
+    pub name: String,
+    /// The address of its first number.
+    pub address: usize,
+    /// How many numbers it has.
+    pub count: usize,
+    /// Whether it is read where it lies, rather than copied.
+    pub is_borrowed: bool,
 }
 
 /// One mesh on this rank.
@@ -61,6 +74,25 @@ impl<'call> Domain<'call> {
         {
             array.fingerprint(into);
         }
+    }
+
+    /// How the arrays of its points, cells and fields are lent.
+    #[must_use]
+    pub fn lending(&self) -> Vec<Lending> {
+        let lending = |name: &str, array: &Array<'_>, is_borrowed: bool| Lending {
+            name: name.to_owned(),
+            address: array.address(),
+            count: array.len(),
+            is_borrowed,
+        };
+        let (points, cells) = (self.coordset.lent().is_some(), self.topology.lent().is_some());
+        let points = self.coordset.arrays().iter().map(|axis| lending("points", axis, points));
+        let cells = self.topology.arrays().into_iter().map(|array| lending("cells", array, cells));
+        let fields = self.fields.iter().flat_map(|field| {
+            let is_borrowed = field::lent(&field.components).is_some();
+            field.components.iter().map(move |array| lending(&field.name, array, is_borrowed))
+        });
+        points.chain(cells).chain(fields).collect()
     }
 
     /// Refuses arrays whose memory cannot be read.

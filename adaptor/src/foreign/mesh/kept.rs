@@ -5,8 +5,8 @@ use std::collections::HashMap;
 
 use tombolo_deform::bounds::Bounds;
 use tombolo_deform::mesh::{
-    ArrayView, Cells, CellsView, FeatureSource, Indices, MeshView, TaggedFaces, Values, Vector,
-    ghosts,
+    ArrayView, Cells, CellsView, FeatureSource, Indices, Mesh, MeshView, TaggedFaces, Values,
+    Vector, ghosts,
 };
 use tombolo_pipelines::extract::{ABSENT, Association, FieldView, GHOST_FIELD};
 
@@ -238,6 +238,19 @@ impl Kept {
             ghost_cells: ghosts.as_deref(),
             grid_boxes: &self.boxes,
         }
+    }
+}
+
+impl Channel<'_> {
+    /// Its mesh, copied.
+    ///
+    /// # Errors
+    /// [`RunError`] for arrays that make no mesh.
+    pub fn to_mesh(&self) -> Result<Mesh, RunError> {
+        let mut kept = Kept::default();
+        kept.update(self, true)?;
+        let mesh = kept.views(self, &mut Vec::new()).to_mesh();
+        mesh.map_err(|source| RunError::Cells { path: self.path.clone(), source })
     }
 }
 

@@ -15,7 +15,7 @@ mod topology;
 
 pub use channel::{Block, Channel};
 pub use coordset::Coordset;
-pub use domain::{Domain, Faces, Roles};
+pub use domain::{Domain, Faces, Lending, Roles};
 pub use field::{COMPONENTS, Field};
 pub(super) use kept::Kept;
 pub use levels::{Grid, Mask};

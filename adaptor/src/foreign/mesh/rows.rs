@@ -11,9 +11,17 @@ use crate::foreign::error::RunError;
 #[derive(Debug, Clone)]
 pub struct Rows<'call> {
     connectivity: Array<'call>,
-    sizes: Array<'call>,
-    offsets: Option<Array<'call>>,
+    extents: Extents<'call>,
     path: String,
+}
+
+/// Where rows begin and end.
+#[derive(Debug, Clone)]
+enum Extents<'call> {
+    /// By their sizes, and by where they begin unless they lie one behind the other.
+    Sizes(Array<'call>, Option<Array<'call>>),
+    /// By where they begin, one more than there are rows: each ends where the next begins.
+    Offsets(Array<'call>),
 }
 
 impl<'call> Rows<'call> {
@@ -26,13 +34,23 @@ impl<'call> Rows<'call> {
         offsets: Option<Array<'call>>,
         path: String,
     ) -> Self {
-        Self { connectivity, sizes, offsets, path }
+        Self { connectivity, extents: Extents::Sizes(sizes, offsets), path }
+    }
+
+    /// Rows each of which ends where the next begins, by offsets of which there is one more than
+    /// there are rows; `path` is what errors call them.
+    #[must_use]
+    pub fn between(connectivity: Array<'call>, offsets: Array<'call>, path: String) -> Self {
+        Self { connectivity, extents: Extents::Offsets(offsets), path }
     }
 
     /// How many rows there are.
     #[must_use]
     pub fn count(&self) -> usize {
-        self.sizes.len()
+        match &self.extents {
+            Extents::Sizes(sizes, _) => sizes.len(),
+            Extents::Offsets(offsets) => offsets.len().saturating_sub(1),
+        }
     }
 
     /// Calls `visit` with each row, whose entries are vertices, of which there are `vertices`.
@@ -68,13 +86,7 @@ impl<'call> Rows<'call> {
         let mut row = Vec::new();
         let mut next = 0;
         for index in 0..self.count() {
-            let size: usize = self.at(&self.sizes, "sizes", index, u64::from(u32::MAX))?;
-            let start: usize = match &self.offsets {
-                Some(offsets) => {
-                    self.at(offsets, "offsets", index, self.connectivity.len() as u64 + 1)?
-                }
-                None => next,
-            };
+            let (start, size) = self.extent(index, next)?;
             let end = start.checked_add(size).filter(|end| *end <= self.connectivity.len());
             let Some(end) = end else {
                 let entries = self.connectivity.len();
@@ -94,6 +106,35 @@ impl<'call> Rows<'call> {
             visit(index, &row)?;
         }
         Ok(())
+    }
+
+    /// Where a row begins, and its size; it begins at `next` where nothing else is said.
+    fn extent(&self, index: usize, next: usize) -> Result<(usize, usize), RunError> {
+        let limit = self.connectivity.len() as u64 + 1;
+        match &self.extents {
+            Extents::Sizes(sizes, offsets) => {
+                let size = self.at(sizes, "sizes", index, u64::from(u32::MAX))?;
+                let start = match offsets {
+                    Some(offsets) => self.at(offsets, "offsets", index, limit)?,
+                    None => next,
+                };
+                Ok((start, size))
+            }
+            Extents::Offsets(offsets) => {
+                let [start, end]: [usize; 2] = [
+                    self.at(offsets, "offsets", index, limit)?,
+                    self.at(offsets, "offsets", index + 1, limit)?,
+                ];
+                let size = end.checked_sub(start).ok_or_else(|| {
+                    RunError::wrong(
+                        format_args!("{}/offsets", self.path),
+                        format_args!("{end} behind {start} at entry {}", index + 1),
+                        "offsets that do not fall",
+                    )
+                })?;
+                Ok((start, size))
+            }
+        }
     }
 
     fn at<T: TryFrom<u64>>(
@@ -120,7 +161,11 @@ impl<'call> Rows<'call> {
     }
 
     pub(super) fn arrays(&self) -> impl Iterator<Item = &Array<'call>> {
-        [&self.connectivity, &self.sizes].into_iter().chain(&self.offsets)
+        let (first, second) = match &self.extents {
+            Extents::Sizes(sizes, offsets) => (sizes, offsets.as_ref()),
+            Extents::Offsets(offsets) => (offsets, None),
+        };
+        [&self.connectivity, first].into_iter().chain(second)
     }
 }
 

@@ -26,6 +26,8 @@ pub enum Topology<'call> {
         /// The name of the connectivity in errors.
         path: String,
     },
+    /// Those of one type after those of another: topologies of uniform cells.
+    Types(Vec<Topology<'call>>),
     /// Polygons.
     Polygonal(Rows<'call>),
     /// Polyhedra by their faces.
@@ -60,6 +62,7 @@ impl<'call> Topology<'call> {
             Topology::Uniform { cell_type, connectivity, .. } => {
                 connectivity.len() / cell_type.vertex_count().unwrap_or(1)
             }
+            Topology::Types(types) => types.iter().map(Topology::cell_count).sum(),
             Topology::Polygonal(rows)
             | Topology::Polyhedral { cells: rows, .. }
             | Topology::Mixed { cells: rows, .. } => rows.count(),
@@ -73,6 +76,7 @@ impl<'call> Topology<'call> {
             Topology::Points(_) => 0,
             Topology::Grid { cells } => cells.iter().filter(|count| **count > 0).count(),
             Topology::Uniform { cell_type, .. } => cell_type.dimension(),
+            Topology::Types(types) => types.iter().map(Topology::dimension).max().unwrap_or(0),
             Topology::Polygonal(_) => 2,
             Topology::Polyhedral { .. } => 3,
             Topology::Mixed { map, .. } => {
@@ -140,6 +144,13 @@ impl<'call> Topology<'call> {
                     push(path, cell, *cell_type, &row)?;
                 }
             }
+            Topology::Types(types) => {
+                let mut first = 0;
+                for of_type in types {
+                    of_type.append(cells, base, points, &|cell| keep(first + cell))?;
+                    first += of_type.cell_count();
+                }
+            }
             Topology::Polygonal(rows) => rows.for_each_of_vertices(vertices, |cell, row| {
                 let pushed = if keep(cell) { push_polygon(cells, &shifted(row)) } else { Ok(()) };
                 pushed.map_err(|found| rows.error(cell, found, "three vertices or more"))
@@ -204,6 +215,7 @@ impl<'call> Topology<'call> {
                 into.add(100 + u64::from(cell_type.vtk()));
                 connectivity.fingerprint(into);
             }
+            Topology::Types(types) => types.iter().for_each(|of_type| of_type.fingerprint(into)),
             Topology::Polygonal(rows) => rows.fingerprint(into),
             Topology::Polyhedral { cells, faces } => {
                 cells.fingerprint(into);
@@ -226,6 +238,7 @@ impl<'call> Topology<'call> {
         match self {
             Topology::Points(_) | Topology::Grid { .. } => Vec::new(),
             Topology::Uniform { connectivity, .. } => vec![connectivity],
+            Topology::Types(types) => types.iter().flat_map(Topology::arrays).collect(),
             Topology::Polygonal(rows) => rows.arrays().collect(),
             Topology::Polyhedral { cells, faces } => cells.arrays().chain(faces.arrays()).collect(),
             Topology::Mixed { cells, shapes, faces, .. } => {

@@ -1,10 +1,10 @@
 //! `tombolo doctor`.
 
+use crate::client::{Client, ClientError, Link, Settings};
 use serde_json::json;
-use tombolo::client::{Client, ClientError, Link, Settings};
 
 use super::{Target, read_link};
-use crate::{Failure, say};
+use crate::program::{Failure, say};
 
 /// The steps, in their order.
 const STEPS: [&str; 5] = ["link", "name", "connection", "server", "token"];

@@ -1,9 +1,9 @@
 //! `tombolo status`.
 
-use tombolo::client::{Event, Hello, Status};
+use crate::client::{Event, Hello, Status};
 
 use super::{ANSWER, Target, connect, failed};
-use crate::{Failure, say};
+use crate::program::{Failure, say};
 
 pub(crate) fn status(target: &Target) -> Result<(), Failure> {
     let client = connect(target, true)?;
@@ -45,7 +45,7 @@ pub(super) fn line(status: &Status) -> String {
 
 fn describe(hello: &Hello) -> Result<(), Failure> {
     for parameter in &hello.parameters {
-        let tombolo::Parameter { name, value, minimum, maximum } = parameter;
+        let crate::Parameter { name, value, minimum, maximum } = parameter;
         say(format_args!("parameter {name}: {value}, from {minimum} to {maximum}"))?;
     }
     for order in &hello.orders {

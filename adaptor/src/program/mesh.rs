@@ -2,8 +2,7 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use serde::Serialize;
-use tombolo::{
+use crate::{
     deform::{
         bounds::Bounds,
         features::{FeatureSettings, FeatureSize},
@@ -13,8 +12,9 @@ use tombolo::{
     },
     pipelines::files::read_mesh,
 };
+use serde::Serialize;
 
-use crate::{Failure, json, say};
+use super::{Failure, json, say};
 
 #[derive(Serialize)]
 struct Info {

@@ -2,9 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
-use serde::Serialize;
-use tombolo::{
+use crate::{
     deform::{
         features::{FeatureSettings, FeatureSize},
         mesh::{FeatureSource, Mesh, TaggedFaces},
@@ -12,8 +10,10 @@ use tombolo::{
     },
     pipelines::files::{Compression, check_mesh_name, read_mesh, write_mesh},
 };
+use clap::Args;
+use serde::Serialize;
 
-use crate::{Failure, json, say};
+use super::{Failure, json, say};
 
 #[derive(Debug, Args)]
 pub(crate) struct Options {

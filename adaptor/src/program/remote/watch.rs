@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
+use crate::client::{ClientError, Event};
 use clap::{Args, ValueEnum};
-use tombolo::client::{ClientError, Event};
 
 use super::{Target, connect, failed, order, status};
-use crate::{Failure, say};
+use crate::program::{Failure, say};
 
 /// How long nothing is waited for at once.
 const WAIT: Duration = Duration::from_secs(3600);

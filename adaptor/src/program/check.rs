@@ -2,8 +2,7 @@
 
 use std::{path::PathBuf, str::FromStr, sync::Arc};
 
-use clap::Args;
-use tombolo::{
+use crate::{
     deform::mesh::{ArrayView, MeshView, NumberType, Values},
     pipelines::{
         extract::{Association, Channel, Field, FieldView},
@@ -13,8 +12,9 @@ use tombolo::{
         run::MeshTrial,
     },
 };
+use clap::Args;
 
-use crate::{Failure, features::surface, json, say};
+use super::{Failure, features::surface, json, say};
 
 pub(crate) const EXIT_CODES: &str = "Exit codes: 0 all is well; 1 there are errors, or a file could not be read.
 

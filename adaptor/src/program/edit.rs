@@ -2,9 +2,7 @@
 
 use std::{num::NonZeroU32, path::PathBuf, sync::Arc, time::Instant};
 
-use clap::{ArgGroup, Args, ValueEnum};
-use serde::Serialize;
-use tombolo::{
+use crate::{
     deform::shape::{Forecast, Outcome as Expected, Refused, Request, Shaper},
     deform::{
         distributed::DistributedError,
@@ -22,8 +20,10 @@ use tombolo::{
         language::{Change, Order, Validate, parse_valid, resolve_files},
     },
 };
+use clap::{ArgGroup, Args, ValueEnum};
+use serde::Serialize;
 
-use crate::{Failure, features::surface, json, read, say};
+use super::{Failure, features::surface, json, read, say};
 
 #[derive(Debug, Args)]
 #[command(group(ArgGroup::new("result").required(true).multiple(true).args(["out", "displacement", "forecast"])))]
@@ -114,7 +114,7 @@ pub(crate) fn edit(options: &Options) -> Result<(), Failure> {
     check_results(options, &mesh)?;
     let made = timed(&mut seconds.features, || {
         let surface = Arc::new(surface(&mesh, options.angle)?);
-        let shaper = Shaper::new(&mesh, Arc::clone(&surface))?.with_clock(tombolo::steering::clock);
+        let shaper = Shaper::new(&mesh, Arc::clone(&surface))?.with_clock(crate::steering::clock);
         Ok::<_, DistributedError>((shaper, surface))
     });
     let (mut shaper, surface) = made?;

@@ -1,4 +1,6 @@
 //! The program `tombolo`: see `tombolo --help`.
+//!
+//! It is in the library so that the package of Python carries it too; `src/bin/tombolo.rs` runs it.
 
 mod check;
 mod edit;
@@ -8,14 +10,14 @@ mod remote;
 mod skeleton;
 
 use std::{
+    ffi::OsString,
     fmt::Display,
     io::Write,
     path::{Path, PathBuf},
-    process::ExitCode,
 };
 
+use crate::pipelines::{language, limits};
 use clap::{Parser, Subcommand};
-use tombolo::pipelines::{language, limits};
 
 const EXIT_CODES: &str = "Exit codes: 0 done; 1 something is wrong with what was given; 2 the shape that was asked for is refused.
 The tasks that take a LINK have exit codes of their own; their --help tells them.";
@@ -83,10 +85,13 @@ impl<E: std::error::Error> From<E> for Failure {
     }
 }
 
-fn main() -> ExitCode {
-    let arguments = match Arguments::try_parse() {
+/// Does what the arguments ask for, the first of which is the name of the program; returns its exit
+/// code.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let given: Vec<OsString> = arguments.into_iter().collect();
+    let arguments = match Arguments::try_parse_from(&given) {
         Ok(arguments) => arguments,
-        Err(asked) => return answer(&asked),
+        Err(asked) => return answer(&asked, given.get(1)),
     };
     let done = match arguments.task {
         Task::Check(options) => check::check(&options),
@@ -98,32 +103,32 @@ fn main() -> ExitCode {
         Task::Remote(task) => remote::run(&task),
     };
     match done {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(Failure::Wrong(message)) => {
             eprintln!("tombolo: {message}");
-            ExitCode::from(1)
+            1
         }
-        Err(Failure::Told) => ExitCode::from(1),
+        Err(Failure::Told) => 1,
         Err(Failure::Refused(message)) => {
             eprintln!("tombolo: refused: {message}");
-            ExitCode::from(2)
+            2
         }
         Err(Failure::NoConnection(message)) => {
             eprintln!("tombolo: {message}");
-            ExitCode::from(2)
+            2
         }
-        Err(Failure::Unreached) => ExitCode::from(2),
+        Err(Failure::Unreached) => 2,
     }
 }
 
 /// Prints the help or version that was asked for, or what is wrong with the arguments: 1 then,
 /// because 2 says that a shape is refused. Of a task that reaches a run it is 2.
-fn answer(asked: &clap::Error) -> ExitCode {
+fn answer(asked: &clap::Error, task: Option<&OsString>) -> u8 {
     let printed = asked.print().is_ok();
-    if printed && asked.exit_code() == 0 {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::from(if remote::is_asked() { 2 } else { 1 })
+    match task.and_then(|task| task.to_str()) {
+        _ if printed && asked.exit_code() == 0 => 0,
+        Some(task) if remote::has(task) => 2,
+        _ => 1,
     }
 }
 

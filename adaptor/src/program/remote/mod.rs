@@ -8,11 +8,11 @@ mod watch;
 
 use std::{io::Read, path::Path, time::Duration};
 
+use crate::client::{Client, ClientError, Event, Link, Settings};
 use clap::{Args, Subcommand};
 use serde_json::json;
-use tombolo::client::{Client, ClientError, Link, Settings};
 
-use crate::{Failure, say};
+use crate::program::{Failure, say};
 
 pub(crate) const EXIT_CODES: &str = "Exit codes: 0 done; 1 refused or failed; 2 wrong use, or no connection (`tombolo doctor LINK` says why).";
 
@@ -75,9 +75,9 @@ pub(crate) enum Task {
     Doctor(Target),
 }
 
-/// Whether the program was called with one of these tasks.
-pub(crate) fn is_asked() -> bool {
-    std::env::args().nth(1).is_some_and(|name| NAMES.contains(&name.as_str()))
+/// Whether one of these tasks has this name.
+pub(crate) fn has(name: &str) -> bool {
+    NAMES.contains(&name)
 }
 
 pub(crate) fn run(task: &Task) -> Result<(), Failure> {
@@ -143,4 +143,14 @@ pub(crate) fn steer(target: &Target) -> Result<Client, Failure> {
     let client = connect(target, false)?;
     client.drive(WHEEL).map_err(failed)?;
     Ok(client)
+}
+
+/// An error that answers a command.
+fn refused(event: &Event, id: &str) -> Result<(), Failure> {
+    match event {
+        Event::Error(error) if error.id.as_deref() == Some(id) => {
+            Err(Failure::Wrong(error.message.clone()))
+        }
+        _ => Ok(()),
+    }
 }

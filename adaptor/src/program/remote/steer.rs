@@ -1,14 +1,14 @@
 //! `tombolo pause`, `tombolo resume`, `tombolo stop`, `tombolo set` and `tombolo cancel`.
 
-use clap::Args;
-use serde_json::json;
-use tombolo::{
+use crate::{
     client::{Client, ClientError, Event},
     pipelines::language::{Cancel, Command, Parameter},
 };
+use clap::Args;
+use serde_json::json;
 
-use super::{ANSWER, Target, failed, order::refused, steer};
-use crate::{Failure, say};
+use super::{ANSWER, Target, failed, refused, steer};
+use crate::program::{Failure, say};
 
 #[derive(Debug, Args)]
 pub(crate) struct SetOptions {

@@ -7,8 +7,7 @@ use std::{
     time::Duration,
 };
 
-use clap::Args;
-use tombolo::{
+use crate::{
     OrderReport, OrderStatus,
     client::{Client, Event, Foretold, Told},
     deform::{edit::Edit, shape::Outcome},
@@ -18,9 +17,10 @@ use tombolo::{
         limits::DOCUMENT,
     },
 };
+use clap::Args;
 
-use super::{ANSWER, Target, failed, steer};
-use crate::{Failure, read, say};
+use super::{ANSWER, Target, failed, refused, steer};
+use crate::program::{Failure, read, say};
 
 /// How long the bar is, in characters.
 const BAR: usize = 30;
@@ -181,16 +181,6 @@ fn give(client: &Client, order: &Order, wait: bool, as_json: bool) -> Result<(),
 fn next(client: &Client, patience: Duration) -> Result<Told, Failure> {
     let told = client.next(patience).map_err(failed)?;
     told.ok_or_else(|| Failure::Wrong(format!("no answer within {} seconds", patience.as_secs())))
-}
-
-/// An error that answers a command.
-pub(super) fn refused(event: &Event, id: &str) -> Result<(), Failure> {
-    match event {
-        Event::Error(error) if error.id.as_deref() == Some(id) => {
-            Err(Failure::Wrong(error.message.clone()))
-        }
-        _ => Ok(()),
-    }
 }
 
 /// How far an order has come, in one line.

@@ -2,8 +2,7 @@
 
 use std::{path::PathBuf, sync::Arc, time::Instant};
 
-use serde::Serialize;
-use tombolo::{
+use crate::{
     deform::{
         features::FeatureSettings,
         mesh::{CellType, Cells},
@@ -15,8 +14,9 @@ use tombolo::{
         files::{check_mesh_name, read_mesh, write},
     },
 };
+use serde::Serialize;
 
-use crate::{Failure, json, say};
+use super::{Failure, json, say};
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
@@ -101,7 +101,7 @@ fn polylines(skeleton: &Skeleton, surface: &Surface) -> Result<Extract, Failure>
         name: name.to_owned(),
         association,
         components: 1,
-        number: tombolo::deform::mesh::NumberType::F64,
+        number: crate::deform::mesh::NumberType::F64,
         values,
     };
     let fields = vec![

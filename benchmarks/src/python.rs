@@ -1,0 +1,100 @@
+//! What the adaptor costs a solver in Python at steps at which nothing is due, and the memory that
+//! lending a mesh takes.
+
+use std::error::Error;
+use std::fs;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use tombolo_tests::{project, target};
+
+use crate::peer;
+use crate::report::{Line, Report, Target};
+
+/// Cubes along an edge, each of six tetrahedra: 1 296 000 of them, and a hundredth of that.
+const SIZES: [u32; 2] = [60, 13];
+const CALLS: u32 = 20_000;
+const NEVER: u64 = 1_000_000_000_000;
+
+/// A mesh that is shown at steps at which nothing is due.
+#[derive(Serialize)]
+pub struct Row {
+    case: &'static str,
+    #[serde(flatten)]
+    measured: Measured,
+}
+
+/// The figures that the program prints.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+struct Measured {
+    tets: u64,
+    /// The median and the 95th percentile of a call.
+    seconds: f64,
+    p95: f64,
+    /// Bytes of memory since before the adaptor was made, after its first call; and how far they rose.
+    added_bytes: i64,
+    peak_bytes: i64,
+    /// Bytes of the solver's own arrays.
+    mesh_bytes: u64,
+}
+
+/// Runs the benchmark on the package that `scripts/python --release` compiles; about a minute.
+///
+/// # Errors
+/// The first error of building and running.
+pub fn run() -> Result<Report<Row>, Box<dyn Error>> {
+    peer::run(std::process::Command::new(project().join("scripts/python")).arg("--release"))?;
+    let directory = target().join("benchmark-python");
+    fs::create_dir_all(&directory)?;
+    let pipeline = format!(
+        r#""pipelines": [{{"name": "q", "at": {{"cycle": {NEVER}}}, "stages": [{{"quality": {{}}}}]}}]"#
+    );
+    let mut rows = Vec::new();
+    for (case, config) in [
+        ("nobody watches", format!(r#"{{"version": 1, {pipeline}}}"#)),
+        (
+            "a server for viewers",
+            format!(r#"{{"version": 1, "stream": {{"listen": "127.0.0.1:0"}}, {pipeline}}}"#),
+        ),
+    ] {
+        let file = directory.join("pipelines.json");
+        fs::write(&file, config)?;
+        for size in SIZES {
+            rows.push(Row { case, measured: measure(&file, size)? });
+        }
+    }
+    let slowest = rows.iter().map(|row| row.measured.seconds).fold(0.0, f64::max);
+    let lent = rows.first().map_or(f64::NAN, |row| row.measured.peak_bytes as f64);
+    let targets = vec![
+        Target::at_most("execute from Python with nothing due [s]", slowest, 5e-6),
+        // What the adaptor has for itself, whatever the mesh: less than one of the mesh's arrays.
+        Target::at_most("memory added by lending 1 296 000 tets [bytes]", lent, 4e6),
+    ];
+    Ok(Report { rows, targets })
+}
+
+fn measure(config: &Path, size: u32) -> Result<Measured, Box<dyn Error>> {
+    let mut command = peer::python();
+    command.arg(project().join("benchmarks/peers/python.py"));
+    command.args([size.to_string(), CALLS.to_string()]).arg(config);
+    Ok(serde_json::from_str(&peer::run(&mut command)?)?)
+}
+
+impl Line for Row {
+    const HEADINGS: &'static [&'static str] =
+        &["case", "tets", "median [s]", "p95 [s]", "added [MB]", "peak [MB]", "own mesh [MB]"];
+
+    fn cells(&self) -> Vec<String> {
+        let Measured { tets, seconds, p95, added_bytes, peak_bytes, mesh_bytes } = self.measured;
+        let megabytes = |bytes: f64| format!("{:.1}", bytes / 1e6);
+        vec![
+            self.case.to_owned(),
+            tets.to_string(),
+            format!("{seconds:.2e}"),
+            format!("{p95:.2e}"),
+            megabytes(added_bytes as f64),
+            megabytes(peak_bytes as f64),
+            megabytes(mesh_bytes as f64),
+        ]
+    }
+}

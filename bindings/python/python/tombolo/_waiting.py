@@ -1,0 +1,39 @@
+"""Waits that Ctrl-C ends."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import TypeVar
+
+Result = TypeVar("Result")
+
+
+def forever() -> float:
+    """A moment that never comes."""
+    return float("inf")
+
+
+def in_thread(call: Callable[[], Result]) -> Result:
+    """What a call of Rust's returns that may take long: on a thread of its own, so that this one can be interrupted.
+
+    A call that is interrupted goes on by itself, and what it returns is dropped.
+    """
+    done = threading.Event()
+    results: list[Result] = []
+    errors: list[BaseException] = []
+
+    def work() -> None:
+        try:
+            results.append(call())
+        except BaseException as error:
+            errors.append(error)
+        finally:
+            done.set()
+
+    threading.Thread(target=work, name="tombolo-call", daemon=True).start()
+    while not done.wait(1.0):
+        pass
+    if errors:
+        raise errors[0]
+    return results[0]

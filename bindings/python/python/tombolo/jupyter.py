@@ -1,0 +1,119 @@
+"""How a run shows itself in a notebook."""
+
+from __future__ import annotations
+
+import html
+import time as clock
+from typing import TYPE_CHECKING, Any, Optional
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .run import Run
+
+__all__ = ["Plot", "viewer"]
+
+#: Size of a plot and its margins, in pixels; the most points that its line is drawn with.
+_WIDTH, _HEIGHT, _LEFT, _REST = 640, 220, 76, 28
+_POINTS = 2000
+#: Seconds between two drawings of a plot that lives.
+_PAUSE = 0.5
+
+
+def viewer(link: str, *, height: int = 640) -> str:
+    """The viewer of a run as HTML: what a notebook shows of a `Run`.
+
+    Parameters
+    ----------
+    link : str
+        The run's link. It is in the HTML, and with it in the notebook's file: whoever reads that can do what it is for
+        while the run goes on.
+    height : int
+        In pixels.
+
+    Examples
+    --------
+    >>> from tombolo.jupyter import viewer
+    >>> viewer("http://127.0.0.1:7070/?token=a&b", height=300)
+    '<iframe src="http://127.0.0.1:7070/?token=a&amp;b" width="100%" height="300" style="border: 0"></iframe>'
+    """
+    source = html.escape(link, quote=True)
+    return f'<iframe src="{source}" width="100%" height="{height}" style="border: 0"></iframe>'
+
+
+class Plot:
+    """A monitor over the cycles, as a picture (SVG) that a notebook shows, and that grows while the run goes on.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    pipeline, monitor : str
+        The monitor.
+
+    Examples
+    --------
+    ::
+
+        tombolo.jupyter.Plot(run, "outlet", "flow")           # as it is now
+        tombolo.jupyter.Plot(run, "outlet", "flow").live()    # until the run ends, or the cell is interrupted
+    """
+
+    def __init__(self, run: Run, pipeline: str, monitor: str) -> None:
+        self.run = run
+        self.pipeline = pipeline
+        self.monitor = monitor
+
+    def _repr_svg_(self) -> str:
+        table = self.run.monitors[self.pipeline]
+        values = table[self.monitor]
+        cycles = table["cycle"][: len(values)]
+        title = html.escape(f"{self.pipeline}: {self.monitor}")
+        return _svg(title, np.asarray(cycles), np.asarray(values[: len(cycles)]))
+
+    def live(self, timeout: Optional[float] = None) -> None:
+        """Show the plot, and draw it anew about twice a second until the run ends.
+
+        Parameters
+        ----------
+        timeout : float, optional
+            Seconds, at most. The cell can be interrupted, too.
+        """
+        from IPython.display import display
+
+        until = float("inf") if timeout is None else clock.monotonic() + timeout
+        self.run.wait_for(lambda: self.run.monitors.get(self.pipeline), timeout)
+        handle: Any = display(self, display_id=True)
+        while self.run.connected and clock.monotonic() < until:
+            clock.sleep(_PAUSE)
+            handle.update(self)
+
+    def __repr__(self) -> str:
+        return f"<tombolo.jupyter.Plot of {self.pipeline}: {self.monitor}>"
+
+
+def _svg(title: str, cycles: Any, values: Any) -> str:
+    """A line with its bounds, parted where nothing could be measured."""
+    every = max(1, -(-len(values) // _POINTS))
+    cycles, values = cycles[::every], values[::every]
+    known = np.isfinite(values)
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" width="{_WIDTH}" '
+        f'font-family="sans-serif" font-size="12"><text x="{_LEFT}" y="18">{title}</text>'
+    ]
+    if known.any():
+        least, most = float(values[known].min()), float(values[known].max())
+        first, last = float(cycles[0]), float(cycles[-1])
+        across = _LEFT + (cycles - first) / max(last - first, 1) * (_WIDTH - _LEFT - _REST)
+        down = _HEIGHT - _REST - (values - least) / ((most - least) or 1) * (_HEIGHT - 2 * _REST)
+        for piece in np.split(np.arange(len(values)), np.flatnonzero(~known)):
+            line = " ".join(f"{across[at]:.1f},{down[at]:.1f}" for at in piece if known[at])
+            if line:
+                parts.append(f'<polyline fill="none" stroke="#1f6feb" stroke-width="1.5" points="{line}"/>')
+        for text, y in ((f"{most:.6g}", _REST + 4), (f"{least:.6g}", _HEIGHT - _REST + 4)):
+            parts.append(f'<text x="{_LEFT - 6}" y="{y}" text-anchor="end">{text}</text>')
+        parts.append(f'<text x="{_LEFT}" y="{_HEIGHT - 8}">cycle {first:.0f}</text>')
+        parts.append(f'<text x="{_WIDTH - _REST}" y="{_HEIGHT - 8}" text-anchor="end">{last:.0f}</text>')
+    else:
+        parts.append(f'<text x="{_LEFT}" y="{_HEIGHT / 2}">nothing measured yet</text>')
+    return "".join(parts) + "</svg>"

@@ -1,0 +1,124 @@
+"""A solver's mesh and its fields, as they lie in its memory."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, MutableMapping, Sequence
+from typing import Any, Literal, Optional, Union
+
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["Cells", "Field", "Mesh", "Values"]
+
+Cells = Mapping[Union[str, int], ArrayLike]
+"""Cells: from types to vertex numbers, a row for each cell; or `connectivity`, `offsets` and `types` of VTK."""
+
+Values = Union[ArrayLike, Sequence[NDArray[Any]], "Field"]
+"""Values of a field: `(n,)` or `(n, k)`, or one array `(n,)` for each component."""
+
+
+class Field:
+    """Values with where they are, for a mesh that has as many cells as vertices.
+
+    Parameters
+    ----------
+    values : array of shape (n,) or (n, k)
+        A value for each vertex or for each cell, of at most 9 components.
+    association : {"vertex", "element"}
+        Whether they are at vertices or in cells.
+
+    Examples
+    --------
+    >>> import numpy as np, tombolo
+    >>> tombolo.Field(np.zeros(8), "element").association
+    'element'
+    """
+
+    __slots__ = ("association", "values")
+
+    def __init__(self, values: Values, association: Literal["vertex", "element"]) -> None:
+        self.values = values
+        self.association = association
+
+
+class Mesh:
+    """A mesh and its fields, borrowed: nothing is copied here, nor while nobody looks at it.
+
+    It holds the arrays that it is given, and they are read anew in each call of `Adaptor.execute`: so it is made once,
+    before the first step. Where a solver makes new arrays in each step, it puts them in: ``mesh.fields["T"] = T``.
+
+    Parameters
+    ----------
+    points : array of shape (n, 2) or (n, 3)
+        The coordinates of each vertex, in the solver's unit; also one array `(n,)` for each axis.
+    cells : dict, optional
+        From cell types to vertex numbers, counted from 0, a row for each cell: ``{"tetra": tets}`` with an array
+        `(m, 4)`. Types are called `vertex`, `line`, `triangle`, `quad`, `tetra`, `hexahedron`, `wedge`, `pyramid`, ...
+        (as meshio does), or by VTK's numbers; vertices are numbered as VTK numbers them. Of several types the cells
+        count in the order of the dict. Or, as VTK has them, ``{"connectivity": ..., "offsets": ..., "types": ...}``
+        with one more offset than there are cells. Left out: points alone.
+    fields : dict, optional
+        From names to values: an array with as many values as there are vertices or cells, `(n,)` or `(n, k)` of at
+        most 9 components; a `Field` where it has to be said which.
+    faces : dict, optional
+        Named parts of the boundary, which edits can move or hold: from names to faces by their vertices, `(m, 3)` or
+        `(m, 4)`, or a dict from types to such arrays. Left out: parts are found between sharp edges.
+    vertex_features : array of shape (n,), optional
+        In place of `faces`: of each vertex the number of its part.
+    ghost_cells : array of shape (m,), optional
+        On several ranks: VTK's `vtkGhostType` of each cell, 0 for those of this rank.
+    global_vertices : array of shape (n,), optional
+        On several ranks: the number of each vertex among those of all ranks.
+    global_cells : array of shape (m,), optional
+        On several ranks: the number of each cell among those of all ranks.
+
+    Notes
+    -----
+    Arrays of float32, float64, int32, int64 and uint8 are borrowed in any layout: rows or columns first, with strides,
+    read-only. Cells of one type are borrowed where their array is contiguous. Anything else, such as another byte
+    order, negative strides or float16, is copied once it is looked at or is an error that says so.
+
+    Examples
+    --------
+    >>> import numpy as np, tombolo
+    >>> points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
+    >>> mesh = tombolo.Mesh(points, {"tetra": np.array([[0, 1, 2, 3]])}, {"temperature": np.ones(4)})
+    >>> mesh.fields["pressure"] = np.zeros(1)
+    >>> sorted(mesh.fields)
+    ['pressure', 'temperature']
+    """
+
+    __slots__ = (
+        "cells",
+        "faces",
+        "fields",
+        "ghost_cells",
+        "global_cells",
+        "global_vertices",
+        "points",
+        "vertex_features",
+    )
+
+    def __init__(
+        self,
+        points: Union[ArrayLike, Sequence[NDArray[Any]]],
+        cells: Optional[Cells] = None,
+        fields: Optional[Mapping[str, Values]] = None,
+        *,
+        faces: Optional[Mapping[str, Union[ArrayLike, Mapping[Union[str, int], ArrayLike]]]] = None,
+        vertex_features: Optional[ArrayLike] = None,
+        ghost_cells: Optional[ArrayLike] = None,
+        global_vertices: Optional[ArrayLike] = None,
+        global_cells: Optional[ArrayLike] = None,
+    ) -> None:
+        self.points = points
+        self.cells = cells
+        self.fields: MutableMapping[str, Values] = dict(fields or {})
+        self.faces = faces
+        self.vertex_features = vertex_features
+        self.ghost_cells = ghost_cells
+        self.global_vertices = global_vertices
+        self.global_cells = global_cells
+
+    def __repr__(self) -> str:
+        fields = ", ".join(self.fields) or "none"
+        return f"<tombolo.Mesh with the fields: {fields}>"

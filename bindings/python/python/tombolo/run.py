@@ -1,0 +1,764 @@
+"""A run that goes on elsewhere: watched, and steered."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import threading
+import time as clock
+import weakref
+from collections import OrderedDict, deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from types import MappingProxyType, TracebackType
+from typing import TYPE_CHECKING, Any, NamedTuple, Optional, TypeVar, Union
+
+import numpy as np
+
+from . import _json, _native
+from ._waiting import forever, in_thread
+from .errors import CallError, EndedError, LinkError, NotDriverError, RejectedError, TomboloError, WaitError
+from .monitors import Monitors
+from .orders import Command, Forecast, Order
+from .views import Surface, View
+
+if TYPE_CHECKING:
+    from .aio import AsyncRun
+    from .jupyter import Plot
+
+__all__ = ["Event", "Parameter", "Run", "Status", "connect"]
+
+Edits = Union[str, "os.PathLike[str]", Mapping[str, Any], Sequence[Mapping[str, Any]]]
+Found = TypeVar("Found")
+
+#: How long the thread that reads waits for an event at once, in seconds: so long a run takes to close.
+_SLICE = 0.2
+#: How long the wheel is asked for: longer than a server keeps it for a driver that was lost.
+_WHEEL = 8.0
+#: Answers to commands and forecasts that are kept until somebody asks for them.
+_ANSWERS = 4096
+#: Events that wait for one who iterates over them; beyond it the oldest make way.
+_EVENTS = 4096
+
+_RUNS: weakref.WeakSet[Run] = weakref.WeakSet()
+
+
+class Event(NamedTuple):
+    """Something that a run told.
+
+    Attributes
+    ----------
+    kind : str
+        `hello`, `status`, `order`, `monitor`, `forecast`, `pipelines`, `done`, `error`, `frame`, `lost` (the connection
+        was lost, and is made again), `ended` (nothing comes behind it) or the name of a message that this version does
+        not know.
+    data : dict, View or str
+        The message as a dict, as docs/protocol.md says it; of a `frame` the `View`, of `lost` and `ended` the reason.
+    """
+
+    kind: str
+    data: Any
+
+
+class Status(NamedTuple):
+    """How far the solver is.
+
+    Attributes
+    ----------
+    cycle : int
+        The last step that it told.
+    time : float
+        The simulated time, in the solver's unit.
+    paused, stopped : bool
+        Whether it waits to be resumed; whether it was asked to stop.
+    step_seconds : float or None
+        Seconds that a step takes, where that is known.
+    viewers : int
+        How many clients are connected.
+    driver : str or None
+        The name of the client that steers.
+    quality : dict or None
+        The scaled Jacobian of the mesh: `min`, `mean`, and how many cells are `inverted`.
+    message : dict
+        The whole message.
+    """
+
+    cycle: int
+    time: float
+    paused: bool
+    stopped: bool
+    step_seconds: Optional[float]
+    viewers: int
+    driver: Optional[str]
+    quality: Optional[dict[str, Any]]
+    message: dict[str, Any]
+
+    @classmethod
+    def _of(cls, message: dict[str, Any]) -> Status:
+        return cls(
+            message["cycle"],
+            message["time"],
+            message.get("paused", False),
+            message.get("stopped", False),
+            message.get("step_seconds"),
+            message.get("viewers", 0),
+            message.get("driver"),
+            message.get("quality"),
+            message,
+        )
+
+
+class Parameter(NamedTuple):
+    """A number of the solver that can be steered: its value now, and the least and greatest it may take."""
+
+    value: float
+    minimum: float
+    maximum: float
+
+
+class Run:
+    """A run that goes on elsewhere, as `connect` returns it.
+
+    A thread of its own reads what the run tells, so that `status`, `views` and `monitors` are always the newest. A
+    connection that is lost is made again with growing pauses. Any thread may use it. Every wait ends with Ctrl-C. It
+    closes with `close`, at the end of a `with` block, or with the interpreter; the run itself goes on.
+
+    Attributes
+    ----------
+    link : str
+        The link that it was connected by: whoever has it can do what it is for.
+    views : mapping of str to View
+        The newest frame of each live view that has come.
+    monitors : Monitors
+        For each pipeline that has monitors a table that grows.
+    """
+
+    def __init__(self, link: str, *, watch: bool, views: bool, attempts: int) -> None:
+        self.link = link
+        self.monitors = Monitors()
+        self._watch = watch
+        self._process = os.getpid()
+        self._changed = threading.Condition()
+        self._hello: dict[str, Any] = {}
+        self._status: Optional[Status] = None
+        self._end: Optional[dict[str, Any]] = None
+        self._failure: Optional[TomboloError] = None
+        self._views: dict[str, View] = {}
+        self._orders: OrderedDict[str, dict[str, Any]] = OrderedDict()
+        self._answers: OrderedDict[str, tuple[str, Any]] = OrderedDict()
+        self._listeners: list[weakref.ref[deque[Event]]] = []
+        self._callbacks: list[tuple[Optional[str], Callable[[Event], object]]] = []
+        self._calls: Optional[threading.Thread] = None
+        self._closing = False
+        self._client = in_thread(lambda: _native.Client(link, views, watch, attempts))
+        self._thread = threading.Thread(target=self._read, name="tombolo-run", daemon=True)
+        self._thread.start()
+        _RUNS.add(self)
+        self.wait_for(lambda: bool(self._hello), 20.0)
+
+    # ---- What the run tells.
+
+    def _read(self) -> None:
+        while not self._closing:
+            try:
+                told = self._client.next(_SLICE)
+            except TomboloError as error:
+                with self._changed:
+                    self._failure = error
+                    self._tell(Event("ended", str(error)))
+                    self._changed.notify_all()
+                return
+            if told is None:
+                continue
+            kind, payload = told
+            data = _json.loads(payload) if isinstance(payload, str) and kind not in ("lost", "taken") else payload
+            with self._changed:
+                self._take(kind, data)
+                self._changed.notify_all()
+
+    def _take(self, kind: str, data: Any) -> None:
+        if kind == "frame":
+            data = self._view(data)
+            self._views[data.name] = data
+        elif kind == "taken":
+            self._answer(data, kind, {})
+            return
+        elif kind != "lost":
+            identity = data.get("id")
+            kind, data = next((key, value) for key, value in data.items() if key != "id")
+            if isinstance(data, dict):
+                identity = data.get("id", identity)
+            self._take_message(kind, data, identity)
+        self._tell(Event(kind, data))
+
+    def _take_message(self, kind: str, data: Any, identity: Optional[str]) -> None:
+        if kind == "hello":
+            for report in data.pop("orders", []):
+                self._take_order(report)
+            self._hello = data
+        elif kind == "status":
+            self._status = Status._of(data)
+        elif kind == "order":
+            self._take_order(data)
+        elif kind == "monitor":
+            self.monitors._table(data["pipeline"])._append(data)
+        elif kind == "end":
+            self._end = data
+        elif isinstance(identity, str) and kind in ("forecast", "done", "error", "pipelines"):
+            self._answer(identity, kind, data)
+
+    def _take_order(self, report: dict[str, Any]) -> None:
+        known = self._orders.setdefault(report["id"], {})
+        known.update(report)
+        while len(self._orders) > _ANSWERS:
+            self._orders.popitem(last=False)
+
+    def _answer(self, identity: str, kind: str, data: Any) -> None:
+        self._answers[identity] = (kind, data)
+        while len(self._answers) > _ANSWERS:
+            self._answers.popitem(last=False)
+
+    def _view(self, frame: dict[str, Any]) -> View:
+        name = frame["view"]
+        before = self._views.get(name)
+        if "triangles" in frame or before is None:
+            triangles = frame.get("triangles", np.empty((0, 3), np.uint32))
+            lines = frame.get("lines", np.empty((0, 2), np.uint32))
+            features = frame.get("features")
+        else:
+            triangles, lines, features = before.triangles, before.lines, before.features
+        return View(
+            name,
+            frame["cycle"],
+            frame["time"],
+            frame["points"],
+            triangles,
+            lines,
+            features,
+            {field: values for field, _, values in frame["fields"]},
+            {field: association for field, association, _ in frame["fields"]},
+        )
+
+    def _tell(self, event: Event) -> None:
+        self._listeners = [listener for listener in self._listeners if listener() is not None]
+        for listener in self._listeners:
+            waiting = listener()
+            if waiting is not None:
+                waiting.append(event)
+
+    # ---- What is known.
+
+    @property
+    def status(self) -> Status:
+        """How far the solver is, as it was last told; waits for the first status."""
+        if self._status is None:
+            self.wait_for(lambda: self._status is not None, 20.0)
+        status = self._status
+        assert status is not None
+        return status
+
+    @property
+    def views(self) -> Mapping[str, View]:
+        """The newest frame of each live view that has come."""
+        return MappingProxyType(self._views)
+
+    @property
+    def hello(self) -> Mapping[str, Any]:
+        """What there is in the run, as docs/protocol.md says it; the newest that was told."""
+        return MappingProxyType(self._hello)
+
+    @property
+    def view_names(self) -> list[str]:
+        """The names of the live views."""
+        return [view["name"] for view in self._hello.get("views", [])]
+
+    @property
+    def features(self) -> list[dict[str, Any]]:
+        """The named parts of the surface, each with `name`, `faces`, `vertices` and `bounds`."""
+        return list(self._hello.get("features", []))
+
+    @property
+    def fields(self) -> list[dict[str, Any]]:
+        """The fields of the steered channel, each with `name`, `association` and `components`."""
+        return list(self._hello.get("fields", []))
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """The numbers of the solver that can be steered."""
+        told = self._hello.get("parameters", [])
+        return {it["name"]: Parameter(it["value"], it["minimum"], it["maximum"]) for it in told}
+
+    @property
+    def stack(self) -> list[dict[str, Any]]:
+        """The edits that make the present shape, the oldest first."""
+        return list(self._hello.get("stack", []))
+
+    @property
+    def orders(self) -> list[Order]:
+        """The orders so far, the oldest first."""
+        with self._changed:
+            return [Order(self, identity) for identity in self._orders]
+
+    @property
+    def drives(self) -> bool:
+        """Whether this client steers."""
+        return self._client.drives
+
+    @property
+    def end(self) -> Optional[dict[str, Any]]:
+        """How the run has ended, where it has: `how` (`finished`, `stopped` or `failed`), `cycle` and `time`."""
+        return self._end
+
+    @property
+    def connected(self) -> bool:
+        """Whether anything can still come: the run has not ended, and the connection is not given up."""
+        return self._failure is None and not self._closing
+
+    @property
+    def missed(self) -> int:
+        """How many events made way for newer ones before they were read."""
+        return self._client.missed
+
+    @property
+    def surface(self) -> Surface:
+        """The reference surface, from which all shapes are measured.
+
+        Raises
+        ------
+        LinkError
+            Where there is no mesh whose shape could be changed, or not yet.
+        """
+        self._check()
+        return Surface(**in_thread(self._client.surface))
+
+    @property
+    def pipelines(self) -> list[dict[str, Any]]:
+        """The pipelines as they are now."""
+        self._check()
+        pipelines: list[dict[str, Any]] = _json.loads(in_thread(self._client.pipelines))
+        return pipelines
+
+    # ---- Waiting.
+
+    def wait_for(self, found: Callable[[], Found], timeout: Optional[float] = None) -> Found:
+        """Wait until `found` returns something true, and return that.
+
+        It is called again whenever the run has told something. Ctrl-C ends the wait.
+
+        Parameters
+        ----------
+        found : callable
+            Looks at what is known, such as ``lambda: run.status.cycle > 100``. It must not wait itself.
+        timeout : float, optional
+            Seconds, at most; without it there is no limit.
+
+        Raises
+        ------
+        WaitError
+            It did not come in time.
+        EndedError, LinkError
+            It did not come before the run has ended, or the connection was lost for good.
+
+        Examples
+        --------
+        Waits until a monitor has settled within a hundredth over its last 50 rows::
+
+            table = run.monitors["outlet"]
+            def settled():
+                flow = table["flow"][-50:]
+                return len(flow) == 50 and np.ptp(flow) < 0.01 * abs(flow.mean())
+            run.wait_for(settled)
+        """
+        until = forever() if timeout is None else clock.monotonic() + timeout
+        with self._changed:
+            while True:
+                self._check()
+                answer = found()
+                if answer:
+                    return answer
+                if self._failure is not None:
+                    raise self._over()
+                left = until - clock.monotonic()
+                if left <= 0:
+                    raise WaitError(f"it did not come within {timeout} seconds")
+                # Short enough for Ctrl-C on every system.
+                self._changed.wait(min(left, 1.0))
+
+    def wait_for_cycle(self, cycle: int, timeout: Optional[float] = None) -> Status:
+        """Wait until the solver has told a step from `cycle` on, and return its status."""
+
+        def found() -> Optional[Status]:
+            return self._status if self._status is not None and self._status.cycle >= cycle else None
+
+        status = self.wait_for(found, timeout)
+        assert status is not None
+        return status
+
+    def wait_for_view(self, name: str, *, after: Optional[int] = None, timeout: Optional[float] = None) -> View:
+        """Wait for a frame of a view, of a step after the cycle `after` where that is given, and return it."""
+
+        def found() -> Optional[View]:
+            view = self._views.get(name)
+            return view if view is not None and (after is None or view.cycle > after) else None
+
+        known = self.view_names
+        if known and name not in known:
+            raise KeyError(f"no view '{name}'; there are: {', '.join(known)}")
+        view = self.wait_for(found, timeout)
+        assert view is not None
+        return view
+
+    def wait(self, timeout: Optional[float] = None) -> dict[str, Any]:
+        """Wait until the run has ended, and return how."""
+        try:
+            end = self.wait_for(lambda: self._end, timeout)
+        except EndedError:
+            end = self._end
+        return end or {"how": "unknown"}
+
+    def _over(self) -> TomboloError:
+        failure = self._failure
+        assert failure is not None
+        if isinstance(failure, EndedError) and self._end is not None:
+            end = self._end
+            return EndedError(f"the run has ended: {end['how']} at cycle {end['cycle']}")
+        return type(failure)(*failure.args)
+
+    def _check(self) -> None:
+        if os.getpid() != self._process:
+            raise CallError("the run was connected before this process was forked; connect here")
+        if self._closing:
+            raise CallError("the run was closed; connect again")
+
+    # ---- Events.
+
+    def events(self, *kinds: str, timeout: Optional[float] = None) -> Iterator[Event]:
+        """Iterate over what the run tells from now on, until it ends.
+
+        Parameters
+        ----------
+        *kinds : str
+            Only events of these kinds; without any, all.
+        timeout : float, optional
+            Seconds to wait for each, at most.
+
+        Yields
+        ------
+        Event
+            Each event, in the order in which they came. Of more than 4096 that wait the oldest make way.
+
+        Raises
+        ------
+        WaitError
+            None came in time.
+        """
+        return self._iterate(self._listen(), kinds, timeout)
+
+    def _listen(self) -> deque[Event]:
+        """What the run tells from now on, until whoever asked lets go of it."""
+        self._check()
+        waiting: deque[Event] = deque(maxlen=_EVENTS)
+        with self._changed:
+            if self._failure is not None:
+                waiting.append(Event("ended", str(self._failure)))
+            self._listeners.append(weakref.ref(waiting))
+        return waiting
+
+    def _next(self, waiting: deque[Event], timeout: Optional[float]) -> Event:
+        self.wait_for(lambda: len(waiting) > 0, timeout)
+        return waiting.popleft()
+
+    def _iterate(self, waiting: deque[Event], kinds: tuple[str, ...], timeout: Optional[float]) -> Iterator[Event]:
+        while True:
+            try:
+                event = self._next(waiting, timeout)
+            except CallError:
+                return
+            if event.kind == "ended":
+                if kinds and "ended" not in kinds:
+                    return
+                yield event
+                return
+            if not kinds or event.kind in kinds:
+                yield event
+
+    def on(self, kind: Optional[str], callback: Callable[[Event], object]) -> Callable[[], None]:
+        """Have a function called with each event of a kind, or with every one where `kind` is None.
+
+        It is called on a thread of its own, one event at a time, and may wait and give orders. What it raises is
+        printed, and it is called again.
+
+        Returns
+        -------
+        callable
+            Call it to have the function called no more.
+        """
+        self._check()
+        entry = (kind, callback)
+        with self._changed:
+            self._callbacks.append(entry)
+            if self._calls is None:
+                events = self.events()
+                self._calls = threading.Thread(target=self._call, args=(events,), name="tombolo-calls", daemon=True)
+                self._calls.start()
+
+        def remove() -> None:
+            with self._changed:
+                if entry in self._callbacks:
+                    self._callbacks.remove(entry)
+
+        return remove
+
+    def _call(self, events: Iterator[Event]) -> None:
+        import traceback
+
+        for event in events:
+            with self._changed:
+                chosen = [callback for kind, callback in self._callbacks if kind in (None, event.kind)]
+            for callback in chosen:
+                try:
+                    callback(event)
+                except Exception:
+                    traceback.print_exc()
+
+    # ---- Steering.
+
+    def drive(self, timeout: float = _WHEEL) -> None:
+        """Take the wheel: what every command does first.
+
+        Raises
+        ------
+        NotDriverError
+            Somebody else steers, or this client may only watch.
+        """
+        self._check()
+        if self._watch:
+            raise NotDriverError("this client only watches: it was connected with watch=True")
+        until = clock.monotonic() + timeout
+        while not self._client.drives:
+            try:
+                in_thread(lambda: self._client.drive(_SLICE))
+            except NotDriverError:
+                taken = self._status is not None and self._status.driver is not None
+                if taken or clock.monotonic() >= until:
+                    raise
+
+    def order(
+        self,
+        edits: Edits,
+        *,
+        schedule: Optional[Mapping[str, Any]] = None,
+        deform: Optional[Mapping[str, Any]] = None,
+        guard: Optional[Mapping[str, Any]] = None,
+    ) -> Order:
+        """Give an order of a new shape; it is on its way when this returns, and `Order.wait` waits for it.
+
+        Parameters
+        ----------
+        edits : list of dict, dict or path
+            The edits, or a whole order (`edits`, `stack` or `undo`, with its settings), or a JSON file of either.
+            Arrays of NumPy may stand in for lists of numbers.
+        schedule, deform, guard : dict, optional
+            In how many steps the shape is reached; how the volume follows; what the mesh must keep to. Left out: what
+            the run's configuration says.
+
+        Raises
+        ------
+        ConfigurationError
+            Something is wrong with it: the text has line, column, path and the nearest known name.
+        NotDriverError
+            Somebody else steers.
+
+        Examples
+        --------
+        ::
+
+            order = run.order([{"translate": {"features": ["throat"], "fixed": ["inlet"], "by": [0, 0, 0.1]}}],
+                              schedule={"steps": 10})
+            order.wait()
+        """
+        text, name = _json.order(edits, {"schedule": schedule, "deform": deform, "guard": guard})
+        self.drive()
+        return Order(self, in_thread(lambda: self._client.order(text, name)))
+
+    def forecast(
+        self,
+        edits: Edits,
+        *,
+        schedule: Optional[Mapping[str, Any]] = None,
+        deform: Optional[Mapping[str, Any]] = None,
+        guard: Optional[Mapping[str, Any]] = None,
+        timeout: Optional[float] = None,
+    ) -> Forecast:
+        """Ask what an order would come to, were it given now; nothing changes. The parameters are those of `order`."""
+        question = self._ask(edits, {"schedule": schedule, "deform": deform, "guard": guard})
+        kind, data = self.wait_for(lambda: self._answers.get(question), timeout) or ("", {})
+        if kind == "error":
+            raise RejectedError(data["message"])
+        return Forecast(data["order"])
+
+    def _ask(self, edits: Edits, settings: Mapping[str, Any]) -> str:
+        text, name = _json.order(edits, settings)
+        self.drive()
+        return in_thread(lambda: self._client.forecast(text, name))
+
+    def undo(self, count: int = 1) -> Order:
+        """Take the last orders back; returns the order that does so."""
+        self.drive()
+        return Order(self, self._client.undo(count))
+
+    def cancel(self, order: Union[Order, str], *, wait: bool = True, timeout: Optional[float] = None) -> Command:
+        """Take back an order that has not begun to move the mesh: it is rejected then."""
+        identity = order.id if isinstance(order, Order) else order
+        return self._give(lambda: self._client.cancel(identity), "cancel", wait, timeout)
+
+    def set(self, parameter: str, value: float, *, wait: bool = True, timeout: Optional[float] = None) -> Command:
+        """Give a parameter of the solver a new value, within its bounds.
+
+        Parameters
+        ----------
+        parameter : str
+            Its name.
+        value : float
+            Its new value.
+        wait : bool
+            Whether to wait until the solver has it.
+        timeout : float, optional
+            Seconds to wait, at most.
+        """
+        return self._give(lambda: self._client.set(parameter, float(value)), "set", wait, timeout)
+
+    def pause(self, *, wait: bool = True, timeout: Optional[float] = None) -> Command:
+        """Hold the solver at its next safe point."""
+        return self._give(self._client.pause, "pause", wait, timeout)
+
+    def resume(self, *, wait: bool = True, timeout: Optional[float] = None) -> Command:
+        """Let the solver go on."""
+        return self._give(self._client.resume, "resume", wait, timeout)
+
+    def stop(self, *, wait: bool = True, timeout: Optional[float] = None) -> Command:
+        """Ask the solver to end."""
+        return self._give(self._client.stop, "stop", wait, timeout)
+
+    def change_pipelines(
+        self, change: Mapping[str, Any], *, wait: bool = True, timeout: Optional[float] = None
+    ) -> Command:
+        """Change the pipelines while the run goes on.
+
+        Parameters
+        ----------
+        change : dict
+            ``{"set": [...]}`` adds or replaces, ``{"remove": [...]}`` takes names, ``{"all": [...]}`` replaces all.
+        wait : bool
+            Whether to wait until the change is made.
+        timeout : float, optional
+            Seconds to wait, at most.
+        """
+        text = _json.text(change, "pipelines")
+        return self._give(lambda: self._client.change_pipelines(text), "pipelines", wait, timeout)
+
+    def _give(self, give: Callable[[], str], task: str, wait: bool, timeout: Optional[float]) -> Command:
+        self.drive()
+        command = Command(self, give(), task)
+        return command.wait(timeout) if wait else command
+
+    # ---- Elsewhere.
+
+    @property
+    def aio(self) -> AsyncRun:
+        """The same for `await`: every method that waits, as a coroutine."""
+        from .aio import AsyncRun
+
+        return AsyncRun(self)
+
+    def close(self) -> None:
+        """Close the connection. The run goes on."""
+        if self._closing or os.getpid() != self._process:
+            return
+        with self._changed:
+            self._closing = True
+            self._changed.notify_all()
+        if threading.current_thread() is not self._thread:
+            self._thread.join(5.0)
+
+    def __enter__(self) -> Run:
+        return self
+
+    def __exit__(
+        self,
+        kind: Optional[type[BaseException]],
+        error: Optional[BaseException],
+        trace: Optional[TracebackType],
+    ) -> None:
+        self.close()
+
+    def plot(self, pipeline: str, monitor: str) -> Plot:
+        """A monitor as a picture that a notebook shows; `Plot.live` has it grow while the run goes on."""
+        from .jupyter import Plot
+
+        return Plot(self, pipeline, monitor)
+
+    def _repr_html_(self) -> str:
+        from .jupyter import viewer
+
+        return viewer(self.link)
+
+    def __repr__(self) -> str:
+        # The link has a secret in it.
+        place = self.link.split("?")[0]
+        if self._end is not None:
+            return f"<tombolo.Run {place}, {self._end['how']} at cycle {self._end['cycle']}>"
+        cycle = "no step told yet" if self._status is None else f"cycle {self._status.cycle}"
+        return f"<tombolo.Run {place}, {cycle}{', driving' if self.drives else ''}>"
+
+
+@atexit.register
+def _close_all() -> None:
+    # A thread that reads must not outlive the interpreter.
+    for run in list(_RUNS):
+        run.close()
+
+
+def connect(link: Union[str, os.PathLike[str]], *, watch: bool = False, views: bool = True, attempts: int = 10) -> Run:
+    """Connect to a run.
+
+    Parameters
+    ----------
+    link : str or path
+        The link that the run has printed, or the file ``tombolo-PORT.link`` that holds it.
+    watch : bool
+        Whether to only watch: never to have the wheel.
+    views : bool
+        Whether the frames of the live views are wanted.
+    attempts : int
+        How often a connection that is lost is tried to be made again, with growing pauses: 10 take about a minute.
+
+    Returns
+    -------
+    Run
+        The run. It steers from the first command on.
+
+    Raises
+    ------
+    LinkError
+        The run is not reached: the text says why.
+
+    Examples
+    --------
+    ::
+
+        with tombolo.connect("http://127.0.0.1:7070/?token=...") as run:
+            print(run.status.cycle, run.monitors["health"].last)
+            run.order([{"translate": {"features": ["throat"], "fixed": ["inlet"], "by": [0, 0, 0.1]}}]).wait()
+    """
+    text = os.fspath(link)
+    if "://" not in text and os.path.isfile(text):
+        try:
+            with open(text, encoding="utf-8") as file:
+                words = file.read(1 << 16).split()
+        except (OSError, UnicodeDecodeError) as error:
+            raise LinkError(f"{text}: the file cannot be read ({error})") from None
+        links = [word for word in words if word.startswith("http://")]
+        if not links:
+            raise LinkError(f"{text}: found a file without a link, expected http://HOST:PORT/?token=TOKEN in it")
+        text = links[0]
+    return Run(text, watch=watch, views=views, attempts=attempts)

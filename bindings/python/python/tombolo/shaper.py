@@ -1,0 +1,256 @@
+"""Other shapes for a mesh, without a run."""
+
+from __future__ import annotations
+
+import threading
+import time as clock
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple, Optional, TypeVar, Union
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _json, _native
+from .mesh import Cells, Mesh
+from .orders import Forecast
+from .views import Surface
+
+if TYPE_CHECKING:
+    from .run import Edits
+
+__all__ = ["Progress", "Shape", "Shaper", "Skeleton"]
+
+Result = TypeVar("Result")
+Progress = Callable[[float], object]
+"""Called about ten times a second with the seconds so far; what it raises ends the work."""
+
+
+class Shape(NamedTuple):
+    """A mesh in another shape.
+
+    Attributes
+    ----------
+    points : array of shape (n, 2) or (n, 3)
+        The coordinates of each vertex, in as many columns as the mesh was given with.
+    fraction : float
+        The fraction of the edits that was done: below 1 where the guard clamped them.
+    min_scaled_jacobian : float or None
+        The least scaled Jacobian of all meshes on the way.
+    quality : dict
+        The scaled Jacobian in the end: `min`, `mean`, `max`, how many cells are `inverted`, the `worst` of them, ...
+    details : dict
+        All of that, and how it was found: `iterations`, `sub_steps`, `largest_displacement`, `seconds`.
+    """
+
+    points: NDArray[np.float64]
+    fraction: float
+    min_scaled_jacobian: Optional[float]
+    quality: dict[str, Any]
+    details: dict[str, Any]
+
+    def __repr__(self) -> str:
+        return f"<tombolo.Shape of {len(self.points)} points, least scaled Jacobian {self.quality['min']:.4f}>"
+
+
+class Skeleton(NamedTuple):
+    """The curve skeleton of a surface: polylines along its middle.
+
+    Attributes
+    ----------
+    nodes : array of shape (k, 3), float64
+        The coordinates of each node.
+    radii : array of shape (k,), float64
+        How far the surface is from each node, in units of the mesh.
+    curves : list of arrays, uint32
+        The nodes of each curve, from end to end; a closed one ends with its first.
+    node_of_vertex : array of shape (b,), uint32
+        The node that each vertex of the surface goes with.
+    """
+
+    nodes: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    curves: list[NDArray[np.uint32]]
+    node_of_vertex: NDArray[np.uint32]
+
+    def __repr__(self) -> str:
+        return f"<tombolo.Skeleton: {len(self.nodes)} nodes on {len(self.curves)} curves>"
+
+
+def _of_meshio(mesh: Any) -> Mesh:
+    highest = {"triangle": 2, "quad": 2, "tetra": 3, "hexahedron": 3, "wedge": 3, "pyramid": 3}
+    parts: dict[Union[str, int], list[Any]] = {}
+    for block in mesh.cells:
+        parts.setdefault(block.type, []).append(block.data)
+    # Faces and edges beside volume cells are of the boundary.
+    most = max((highest.get(kind, 0) for kind in map(str, parts)), default=0)
+    cells = {kind: np.concatenate(rows) for kind, rows in parts.items() if highest.get(str(kind), most) == most}
+    return Mesh(mesh.points, cells)
+
+
+def _of_pyvista(mesh: Any) -> Mesh:
+    grid = mesh if hasattr(mesh, "celltypes") else mesh.cast_to_unstructured_grid()
+    cells: Cells = {"connectivity": grid.cell_connectivity, "offsets": grid.offset, "types": grid.celltypes}
+    return Mesh(grid.points, cells)
+
+
+class Shaper:
+    """Gives a mesh other shapes: what `tombolo edit` does, to the bit.
+
+    The operators are set up once, by the first shape, and serve all that follow. Every shape is measured from the mesh
+    as it was given. Work ends with Ctrl-C, and with `cancel` from another thread.
+
+    Parameters
+    ----------
+    mesh : Mesh, meshio.Mesh, pyvista mesh, or array of shape (n, 2) or (n, 3)
+        The mesh, or the coordinates of its vertices. It is copied.
+    cells : dict, optional
+        With coordinates: the cells, as `Mesh` takes them.
+    faces : dict, optional
+        With coordinates: named parts of the boundary, as `Mesh` takes them.
+    angle : float, optional
+        Name the parts of the surface between edges of so many degrees or more, whatever parts the mesh names.
+
+    Raises
+    ------
+    MeshError
+        It is no mesh whose shape could be changed: the text says why, and where.
+
+    Examples
+    --------
+    >>> import numpy as np, tombolo
+    >>> points = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)
+    >>> cells = {"hexahedron": np.array([[0, 1, 3, 2, 4, 5, 7, 6]])}
+    >>> shaper = tombolo.Shaper(points, cells, {"top": [[4, 5, 7, 6]], "bottom": [[0, 1, 3, 2]]})
+    >>> [feature["name"] for feature in shaper.features]
+    ['top', 'bottom', 'untagged']
+    >>> shape = shaper.shape([{"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, 0.5]}}])
+    >>> float(shape.points[:, 2].max()), shape.quality["inverted"]
+    (1.5, 0)
+    """
+
+    def __init__(
+        self,
+        mesh: Any,
+        cells: Optional[Cells] = None,
+        faces: Optional[Mapping[str, Union[ArrayLike, Mapping[Union[str, int], ArrayLike]]]] = None,
+        *,
+        angle: Optional[float] = None,
+    ) -> None:
+        if cells is not None:
+            mesh = Mesh(mesh, cells, faces=faces)
+        elif not isinstance(mesh, (Mesh, Mapping)):
+            if hasattr(mesh, "cells_dict") and hasattr(mesh, "point_sets"):
+                mesh = _of_meshio(mesh)
+            elif hasattr(mesh, "celltypes") or hasattr(mesh, "cast_to_unstructured_grid"):
+                mesh = _of_pyvista(mesh)
+        self._shaper = _native.Shaper(mesh, angle)
+
+    # ---- What the mesh is.
+
+    @property
+    def features(self) -> list[dict[str, Any]]:
+        """The named parts of the surface, each with `name`, `faces`, `vertices`, `area` and `bounds`."""
+        features: list[dict[str, Any]] = _json.loads(self._shaper.features())
+        return features
+
+    @property
+    def surface(self) -> Surface:
+        """The surface of the mesh."""
+        return Surface(**self._shaper.surface())
+
+    def skeleton(self, *, progress: Optional[Progress] = None) -> Skeleton:
+        """Find the curve skeleton of the surface, on which an edit `skeleton` drags nodes."""
+        return Skeleton(**self._work(self._shaper.skeleton, progress))
+
+    def quality(self, points: Optional[ArrayLike] = None) -> dict[str, Any]:
+        """Measure the scaled Jacobian of the mesh, or of it with other points.
+
+        Returns
+        -------
+        dict
+            `min`, `mean`, `max`, how many cells are `inverted`, a `histogram` of 20 classes from -1 to 1, and the
+            `worst` cells. Of a mesh with volume cells it is that of those.
+        """
+        quality: dict[str, Any] = _json.loads(self._shaper.quality(points))
+        return quality
+
+    def scaled_jacobians(self, points: Optional[ArrayLike] = None) -> NDArray[np.float64]:
+        """Measure the scaled Jacobian of each cell, `(m,)`; NaN for cells of a lower dimension than the mesh's."""
+        return self._shaper.scaled_jacobians(points)
+
+    # ---- Other shapes.
+
+    def shape(self, edits: Edits, *, progress: Optional[Progress] = None, **settings: Mapping[str, Any]) -> Shape:
+        """Find the shape that edits make, and see to it that no cell is inverted there or on the way.
+
+        Parameters
+        ----------
+        edits : list of dict, dict or path
+            The edits, or an order with its settings, or a JSON file of either.
+        progress : callable, optional
+            Called about ten times a second with the seconds so far.
+        **settings : dict
+            `deform`: how the volume follows; `guard`: what the mesh must keep to; `schedule`: in how many shapes the
+            way is looked at.
+
+        Raises
+        ------
+        ConfigurationError
+            Something is wrong with the edits, with line, column and path.
+        RejectedError
+            The mesh would be broken. The text says where; `report` has the fraction that would pass.
+        """
+        text, name = _json.order(edits, settings)
+        points, told = self._work(lambda: self._shaper.shape(text, name), progress)
+        details = _json.loads(told)
+        return Shape(points, details["fraction"], details["min_scaled_jacobian"], details["quality"], details)
+
+    def forecast(self, edits: Edits, *, progress: Optional[Progress] = None, **settings: Mapping[str, Any]) -> Forecast:
+        """Find out what edits would come to, also where they would be rejected. Parameters as of `shape`."""
+        text, name = _json.order(edits, settings)
+        return Forecast(_json.loads(self._work(lambda: self._shaper.forecast(text, name), progress)))
+
+    def displacement(self, edits: Edits, *, progress: Optional[Progress] = None) -> NDArray[np.float64]:
+        """Find how far edits move each vertex of the surface: a row for each of `surface.points`.
+
+        An edit ``{"displacement": {"vertices": surface.vertices, "values": ...}}`` takes it again.
+        """
+        text, name = _json.order(edits, {})
+        return self._work(lambda: self._shaper.displacement(text, name), progress)
+
+    def cancel(self) -> None:
+        """Have the work under way given up, from any thread: it raises `RejectedError`."""
+        self._shaper.cancel()
+
+    def _work(self, call: Callable[[], Result], progress: Optional[Progress]) -> Result:
+        """A call on a thread of its own, so that this one can be interrupted."""
+        self._shaper.renew()
+        results: list[Result] = []
+        errors: list[BaseException] = []
+        done = threading.Event()
+
+        def work() -> None:
+            try:
+                results.append(call())
+            except BaseException as error:
+                errors.append(error)
+            finally:
+                done.set()
+
+        begun = clock.monotonic()
+        threading.Thread(target=work, name="tombolo-shaper", daemon=True).start()
+        try:
+            while not done.wait(0.1 if progress is not None else 1.0):
+                if progress is not None:
+                    progress(clock.monotonic() - begun)
+        except BaseException:
+            # It is given up before the mesh can be used again.
+            self._shaper.cancel()
+            done.wait()
+            raise
+        if errors:
+            raise errors[0]
+        return results[0]
+
+    def __repr__(self) -> str:
+        return f"<tombolo.Shaper, features: {', '.join(feature['name'] for feature in self.features)}>"

@@ -1,0 +1,144 @@
+"""What a live view shows at one step, as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal, NamedTuple, Optional
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Surface", "View"]
+
+
+def _of(fields: Mapping[str, NDArray[np.float64]], associations: Mapping[str, str], kind: str) -> dict[str, Any]:
+    return {name: values for name, values in fields.items() if associations[name] == kind}
+
+
+class View(NamedTuple):
+    """A view at one step: triangles and lines, with fields. It does not change any more once it is here.
+
+    Attributes
+    ----------
+    name : str
+        The name of its pipeline.
+    cycle : int
+        The step.
+    time : float
+        The simulated time, in the solver's unit.
+    points : array of shape (n, 3), float64
+        The coordinates of each point.
+    triangles : array of shape (t, 3), uint32
+        Triangles by the numbers of their points.
+    lines : array of shape (l, 2), uint32
+        Lines by the numbers of their points.
+    features : array of shape (t,), uint32, or None
+        The feature of each triangle, where the view has features: an index into `Run.features`.
+    fields : dict of str to array
+        `(n,)` or `(n, k)` at points; of elements a value for each triangle, then for each line. Numbers are within the
+        bound that the view's `stream` stage states.
+    associations : dict of str to {"vertex", "element"}
+        Where the values of each field are.
+    """
+
+    name: str
+    cycle: int
+    time: float
+    points: NDArray[np.float64]
+    triangles: NDArray[np.uint32]
+    lines: NDArray[np.uint32]
+    features: Optional[NDArray[np.uint32]]
+    fields: dict[str, NDArray[np.float64]]
+    associations: dict[str, Literal["vertex", "element"]]
+
+    def to_pyvista(self) -> Any:
+        """The view as a `pyvista.PolyData`, lines before triangles as VTK keeps them; needs PyVista."""
+        import pyvista
+
+        def padded(cells: NDArray[np.uint32]) -> NDArray[np.int64]:
+            sizes = np.full((len(cells), 1), cells.shape[1], np.int64)
+            return np.hstack([sizes, cells.astype(np.int64)]).ravel()
+
+        poly = pyvista.PolyData()
+        poly.points = self.points
+        if len(self.lines):
+            poly.lines = padded(self.lines)
+        if len(self.triangles):
+            poly.faces = padded(self.triangles)
+        for name, values in _of(self.fields, self.associations, "vertex").items():
+            poly.point_data[name] = values
+        for name, values in _of(self.fields, self.associations, "element").items():
+            poly.cell_data[name] = np.concatenate([values[len(self.triangles) :], values[: len(self.triangles)]])
+        if self.features is not None and not len(self.lines):
+            poly.cell_data["features"] = self.features
+        return poly
+
+    def to_meshio(self) -> Any:
+        """The view as a `meshio.Mesh`; needs meshio."""
+        import meshio
+
+        count = len(self.triangles)
+        cells = [("triangle", self.triangles.astype(np.int64)), ("line", self.lines.astype(np.int64))]
+        data = {
+            name: [values[:count], values[count:]]
+            for name, values in _of(self.fields, self.associations, "element").items()
+        }
+        kept = [index for index, (_, rows) in enumerate(cells) if len(rows)]
+        return meshio.Mesh(
+            self.points,
+            [cells[index] for index in kept],
+            point_data=_of(self.fields, self.associations, "vertex"),
+            cell_data={name: [parts[index] for index in kept] for name, parts in data.items()},
+        )
+
+    def __repr__(self) -> str:
+        fields = ", ".join(self.fields) or "none"
+        return (
+            f"<tombolo.View '{self.name}' at cycle {self.cycle}: {len(self.points)} points, "
+            f"{len(self.triangles)} triangles, {len(self.lines)} lines, fields: {fields}>"
+        )
+
+
+class Surface(NamedTuple):
+    """The reference surface: what edits are measured from, every bit of it.
+
+    Attributes
+    ----------
+    points : array of shape (n, 3), float64
+        The coordinates of each of its vertices.
+    vertices : array of shape (n,), uint32
+        Which vertex of the mesh each is.
+    connectivity : array of uint32
+        The vertices of each face, one face after the other, as indices into `points`.
+    offsets : array of shape (f + 1,), int64
+        Where each face begins in `connectivity`, and where the last ends.
+    features : array of shape (f,), uint32
+        The feature of each face, an index into `names`.
+    names : list of str
+        The names of the features.
+    """
+
+    points: NDArray[np.float64]
+    vertices: NDArray[np.uint32]
+    connectivity: NDArray[np.uint32]
+    offsets: NDArray[np.int64]
+    features: NDArray[np.uint32]
+    names: list[str]
+
+    def faces_of(self, feature: str) -> NDArray[np.int64]:
+        """The numbers of a feature's faces, as the region `faces` of an edit takes them."""
+        return np.flatnonzero(self.features == self.names.index(feature))
+
+    def to_pyvista(self) -> Any:
+        """The surface as a `pyvista.PolyData` with the cell array `features`; needs PyVista."""
+        import pyvista
+
+        sizes = np.diff(self.offsets)
+        faces = np.insert(self.connectivity.astype(np.int64), self.offsets[:-1], sizes)
+        poly = pyvista.PolyData(self.points, faces)
+        poly.cell_data["features"] = self.features
+        poly.point_data["vertices"] = self.vertices
+        return poly
+
+    def __repr__(self) -> str:
+        return f"<tombolo.Surface: {len(self.points)} points, features: {', '.join(self.names)}>"

@@ -1,0 +1,441 @@
+//! Meshes and fields of Python, lent to the adaptor for the length of a call.
+
+use numpy::PyUntypedArray;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList, PyMapping, PyString, PyTuple};
+use tombolo::deform::mesh::{CellType, Vector};
+use tombolo::foreign::mesh::{
+    Block, COMPONENTS, Channel, Coordset, Domain, Faces, Field, Lending, Mask, Roles, Rows,
+    Topology,
+};
+use tombolo::foreign::{Array, NumberType, RunError};
+use tombolo::pipelines::extract::{Association, check_field_length};
+use tombolo::pipelines::language::nearest;
+
+use crate::array::{Layout, as_array};
+use crate::error::{argument, of_run};
+
+/// The parts of a mesh, as the class `tombolo.Mesh` and a dict call them.
+const PARTS: [&str; 8] = [
+    "points",
+    "cells",
+    "fields",
+    "faces",
+    "vertex_features",
+    "ghost_cells",
+    "global_vertices",
+    "global_cells",
+];
+/// How cells of several types are given as VTK has them.
+const OF_VTK: [&str; 3] = ["connectivity", "offsets", "types"];
+
+/// Keeps alive whatever of Python's is lent, and the numbers of Rust's that go with it.
+#[derive(Default)]
+pub(crate) struct Lender {
+    owners: Vec<Py<PyAny>>,
+    /// Numbers of features, to each of which an array without a stride points.
+    numbers: Vec<Box<i64>>,
+}
+
+/// The channels of a call, lent while other threads of Python run.
+pub(crate) struct Channels<'call>(pub(crate) Vec<Channel<'call>>);
+
+impl Channels<'_> {
+    /// How many coordinates a vertex of each channel has.
+    pub(crate) fn dimensions(&self) -> Vec<(String, usize)> {
+        let dimension = |channel: &Channel<'_>| {
+            channel.blocks.first().map_or(3, |block| match &block.domain.coordset {
+                Coordset::Explicit { axes } => axes.len(),
+                _ => 3,
+            })
+        };
+        self.0.iter().map(|channel| (channel.name.clone(), dimension(channel))).collect()
+    }
+}
+
+// SAFETY: the addresses within are those of arrays that a `Lender` keeps alive; any thread can read
+// them. Whoever changes a solver's arrays while it shows them breaks the solver's own promise.
+unsafe impl Send for Channels<'_> {}
+
+type Given<'py> = Bound<'py, PyAny>;
+type Read<T> = Result<T, RunError>;
+
+fn kind(given: &Given<'_>) -> String {
+    format!("a {}", given.get_type())
+}
+
+fn python(what: &str) -> impl Fn(PyErr) -> RunError + '_ {
+    move |error| argument(what, error.to_string(), "what can be read")
+}
+
+fn name(given: &Given<'_>, what: &str) -> Read<String> {
+    let name = given.cast::<PyString>().ok().map(|name| name.to_string_lossy().into_owned());
+    name.filter(|name| !name.is_empty() && !name.chars().any(char::is_control)).ok_or_else(|| {
+        let found = given.repr().map_or_else(|_| kind(given), |text| text.to_string());
+        argument(what, found, "a name of one letter or more, on one line")
+    })
+}
+
+/// The entries of a mapping.
+fn entries<'py>(given: &Given<'py>, what: &str, expected: &str) -> Read<Vec<[Given<'py>; 2]>> {
+    if let Ok(dict) = given.cast::<PyDict>() {
+        return Ok(dict.iter().map(|(key, value)| [key, value]).collect());
+    }
+    let mapping = given.cast::<PyMapping>().map_err(|_| argument(what, kind(given), expected))?;
+    let items = mapping.items().map_err(python(what))?;
+    items
+        .iter()
+        .map(|item| {
+            let (key, value) = item.extract().map_err(python(what))?;
+            Ok([key, value])
+        })
+        .collect()
+}
+
+/// A part of a mesh; `None` where it is left out.
+fn part<'py>(mesh: &Given<'py>, what: &str, name: &'static str) -> Read<Option<Given<'py>>> {
+    let found = match mesh.cast::<PyDict>() {
+        Ok(dict) => dict.get_item(name).map_err(python(what))?,
+        Err(_) => Some(mesh.getattr(name).map_err(|_| {
+            argument(what, kind(mesh), "a tombolo.Mesh, or a dict with 'points' and 'cells'")
+        })?),
+    };
+    Ok(found.filter(|found| !found.is_none()))
+}
+
+/// A cell type by VTK's number or by its name.
+fn cell_type(given: &Given<'_>, what: &str) -> Read<(CellType, usize)> {
+    let text = given.to_string();
+    let known = CellType::ALL
+        .into_iter()
+        .filter_map(|cell_type| Some((cell_type, cell_type.vertex_count()?)));
+    let found = match given.extract::<u8>() {
+        Ok(number) => CellType::from_vtk(number),
+        Err(_) => CellType::ALL.into_iter().find(|cell_type| cell_type.name() == text),
+    };
+    let found = found.and_then(|found| Some((found, found.vertex_count()?)));
+    found.ok_or_else(|| {
+        let names: Vec<&str> = known.map(|(cell_type, _)| cell_type.name()).collect();
+        let near = nearest(&text, names.iter().copied());
+        let near = near.map_or_else(String::new, |near| format!(" (did you mean '{near}'?)"));
+        argument(
+            what,
+            format!("cells of type '{text}'"),
+            format!("one of: {}{near}; or VTK's number of one", names.join(", ")),
+        )
+    })
+}
+
+impl Lender {
+    /// Where an array lies; it stays there as long as this lives.
+    fn layout(&mut self, given: &Given<'_>, what: &str) -> Read<Layout> {
+        let array = as_array(given, what)?;
+        let layout = Layout::of(&array, what)?;
+        self.owners.push(array.into_any().unbind());
+        Ok(layout)
+    }
+
+    /// One number for each vertex or cell.
+    fn list<'call>(&mut self, given: &Given<'_>, what: &str) -> Read<Array<'call>> {
+        let layout = self.layout(given, what)?;
+        if layout.axes != 1 {
+            let found = format!("an array of shape {}", layout.shape_text());
+            return Err(argument(what, found, "an array of one axis"));
+        }
+        // SAFETY: this keeps the array alive, and the caller of `Run.execute` leaves it as it is.
+        Ok(unsafe { layout.component(0, 0) })
+    }
+
+    /// The components of tuples: an array of one axis or more, or one array for each component.
+    fn components<'call>(&mut self, given: &Given<'_>, what: &str) -> Read<Vec<Array<'call>>> {
+        let separate: Vec<Given<'_>> = match (given.cast::<PyTuple>(), given.cast::<PyList>()) {
+            (Ok(tuple), _) => tuple.iter().collect(),
+            (_, Ok(list)) => list.iter().take(COMPONENTS + 1).collect(),
+            _ => Vec::new(),
+        };
+        // A list of numbers is an array.
+        let is_separate = separate.iter().all(|one| one.cast::<PyUntypedArray>().is_ok());
+        if is_separate && (1..=COMPONENTS).contains(&separate.len()) {
+            let arrays: Vec<Array<'call>> = separate
+                .iter()
+                .enumerate()
+                .map(|(index, one)| self.list(one, &format!("{what}, component {index}")))
+                .collect::<Read<_>>()?;
+            let first = arrays.first().map_or(0, Array::len);
+            if let Some(other) = arrays.iter().find(|array| array.len() != first) {
+                let found = format!("components of {first} and of {} values", other.len());
+                return Err(argument(what, found, "components of one length"));
+            }
+            return Ok(arrays);
+        }
+        let layout = self.layout(given, what)?;
+        let [_, rows, columns] = layout.shape;
+        if layout.axes == 0 || rows * columns > COMPONENTS {
+            let found = format!("an array of shape {}", layout.shape_text());
+            let expected = format!("(n,), or (n, k) of at most {COMPONENTS} components");
+            return Err(argument(what, found, expected));
+        }
+        let every = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
+        // SAFETY: as in `list`; the components are those of the shape.
+        Ok(every.map(|(row, column)| unsafe { layout.component(row, column) }).collect())
+    }
+
+    /// Cells of one type, a row each.
+    fn uniform<'call>(
+        &mut self,
+        (cell_type, vertices): (CellType, usize),
+        given: &Given<'_>,
+        what: String,
+    ) -> Read<Topology<'call>> {
+        let layout = self.layout(given, &what)?;
+        if layout.axes != 2 || layout.shape[1] != vertices {
+            let found = format!("an array of shape {}", layout.shape_text());
+            let expected = format!("(m, {vertices}), a row for each {cell_type}");
+            return Err(argument(what, found, expected));
+        }
+        if layout.number.is_real() && layout.shape[0] > 0 {
+            let found = format!("an array of {}", layout.number.name());
+            return Err(argument(what, found, "vertex numbers: int32, int64 or another integer"));
+        }
+        // SAFETY: as in `list`.
+        let connectivity = unsafe { layout.table() };
+        Ok(Topology::Uniform { cell_type, connectivity, path: what })
+    }
+
+    /// Cells: by their types, or as VTK has them.
+    fn topology<'call>(
+        &mut self,
+        given: Option<&Given<'_>>,
+        vertices: usize,
+        what: &str,
+    ) -> Read<Topology<'call>> {
+        let Some(given) = given else { return Ok(Topology::Points(vertices)) };
+        let expected = "a dict from cell types to arrays (m, k), such as {'tetra': tets}";
+        let mut entries = entries(given, what, expected)?;
+        let named = |name: &str, entries: &[[Given<'_>; 2]]| {
+            entries.iter().position(|[key, _]| key.eq(name).unwrap_or(false))
+        };
+        if named(OF_VTK[0], &entries).is_some() {
+            let mut arrays = Vec::with_capacity(OF_VTK.len());
+            for name in OF_VTK {
+                let missing = || {
+                    let expected = "'connectivity', 'offsets' and 'types'";
+                    argument(what, format!("cells without '{name}'"), expected)
+                };
+                let [_, value] = &entries[named(name, &entries).ok_or_else(missing)?];
+                arrays.push(self.list(value, &format!("{what}, {name}"))?);
+            }
+            let [connectivity, offsets, types] = arrays[..] else {
+                return Err(argument(what, "other arrays", "three"));
+            };
+            if offsets.len() != types.len() + 1 {
+                let found = format!("{} offsets of {} cells", offsets.len(), types.len());
+                let expected = "one more offset than there are cells, the first of them 0";
+                return Err(argument(what, found, expected));
+            }
+            let map = CellType::ALL.into_iter().filter(|of| *of != CellType::Polyhedron);
+            return Ok(Topology::Mixed {
+                cells: Rows::between(connectivity, offsets, what.to_owned()),
+                shapes: types,
+                map: map.map(|cell_type| (i64::from(cell_type.vtk()), cell_type)).collect(),
+                faces: None,
+                path: format!("{what}, types"),
+            });
+        }
+        if let [[key, value]] = &entries[..] {
+            return self.uniform(cell_type(key, what)?, value, format!("{what}['{key}']"));
+        }
+        let of_types = entries.drain(..).map(|[key, value]| {
+            self.uniform(cell_type(&key, what)?, &value, format!("{what}['{key}']"))
+        });
+        Ok(Topology::Types(of_types.collect::<Read<_>>()?))
+    }
+
+    /// The named parts of the boundary, and the names by their numbers.
+    fn faces<'call>(
+        &mut self,
+        given: &Given<'_>,
+        what: &str,
+    ) -> Read<(Vec<Faces<'call>>, Vec<(i64, String)>)> {
+        let expected = "a dict from names to faces: arrays (m, 3) or (m, 4)";
+        let (mut faces, mut names) = (Vec::new(), Vec::new());
+        for (number, [key, value]) in (0..).zip(entries(given, what, expected)?) {
+            let part = name(&key, what)?;
+            let what = format!("{what}['{part}']");
+            names.push((number, part));
+            let mut topologies = Vec::new();
+            if value.cast::<PyDict>().is_ok() {
+                for [key, value] in entries(&value, &what, expected)? {
+                    let of = cell_type(&key, &what)?;
+                    topologies.push(self.uniform(of, &value, format!("{what}['{key}']"))?);
+                }
+            } else {
+                let layout = Layout::of(&as_array(&value, &what)?, &what)?;
+                let of = match (layout.axes, layout.shape[1]) {
+                    (2, 4) => (CellType::Quad, 4),
+                    _ => (CellType::Triangle, 3),
+                };
+                topologies.push(self.uniform(of, &value, what)?);
+            }
+            let number = Box::new(number);
+            for topology in topologies {
+                let first: *const i64 = &raw const *number;
+                // SAFETY: one number, over and over; this keeps it alive.
+                let tags = unsafe {
+                    Array::new(first.cast(), topology.cell_count(), 0, NumberType::I64, false)
+                };
+                faces.push(Faces { topology, tags });
+            }
+            self.numbers.push(number);
+        }
+        Ok((faces, names))
+    }
+
+    fn field<'call>(
+        &mut self,
+        channel: &str,
+        [key, value]: &[Given<'_>; 2],
+        counts: (usize, usize),
+    ) -> Read<Field<'call>> {
+        let field = name(key, &format!("channel '{channel}', the name of a field"))?;
+        let what = format!("channel '{channel}', field '{field}'");
+        // A `tombolo.Field` states where its values are.
+        let stated = match value.getattr_opt("association").map_err(python(&what))? {
+            Some(association) => {
+                Some((value.getattr("values").map_err(python(&what))?, association))
+            }
+            None => None,
+        };
+        let components =
+            self.components(stated.as_ref().map_or(value, |(values, _)| values), &what)?;
+        let length = components.first().map_or(0, Array::len);
+        let (vertices, cells) = counts;
+        let association = match stated {
+            Some((_, stated)) => match stated.to_string().as_str() {
+                "vertex" => Association::Vertex,
+                "element" => Association::Element,
+                other => {
+                    let found = format!("the association '{other}'");
+                    return Err(argument(what, found, "'vertex' or 'element'"));
+                }
+            },
+            None if length == vertices && length == cells && length > 0 => {
+                let found = format!("{length} values, as many as there are vertices and cells");
+                let expected =
+                    "tombolo.Field(values, 'vertex') or tombolo.Field(values, 'element')";
+                return Err(argument(what, found, expected));
+            }
+            None if length == vertices => Association::Vertex,
+            None if length == cells => Association::Element,
+            None => {
+                let expected = format!("{vertices} for its vertices, or {cells} for its cells");
+                return Err(argument(what, format!("{length} values"), expected));
+            }
+        };
+        check_field_length(channel, (&field, association), length, counts)?;
+        Ok(Field::new(field, association, components))
+    }
+
+    fn channel<'call>(&mut self, channel: String, mesh: &Given<'_>) -> Read<Channel<'call>> {
+        let path = format!("channel '{channel}'");
+        if let Ok(dict) = mesh.cast::<PyDict>() {
+            for key in dict.keys() {
+                let key = key.to_string();
+                if !PARTS.contains(&key.as_str()) {
+                    let near = nearest(&key, PARTS).map_or_else(
+                        || format!("one of: {}", PARTS.join(", ")),
+                        |near| format!("one of: {} (did you mean '{near}'?)", PARTS.join(", ")),
+                    );
+                    return Err(argument(path, format!("the part '{key}'"), near));
+                }
+            }
+        }
+        let points = part(mesh, &path, "points")?;
+        let points = points.ok_or_else(|| argument(&path, "no points", "an array (n, 3)"))?;
+        let what = format!("{path}, points");
+        let axes = self.components(&points, &what)?;
+        if !(2..=3).contains(&axes.len()) {
+            let found = format!("{} coordinate(s) for each vertex", axes.len());
+            return Err(argument(what, found, "2 or 3: an array (n, 2) or (n, 3)"));
+        }
+        let coordset = Coordset::Explicit { axes };
+        let vertices = coordset.vertex_count();
+        let cells = part(mesh, &path, "cells")?;
+        let topology = self.topology(cells.as_ref(), vertices, &format!("{path}, cells"))?;
+        let counts = (vertices, topology.cell_count());
+        let mut fields = Vec::new();
+        if let Some(given) = part(mesh, &path, "fields")? {
+            let what = format!("{path}, fields");
+            for entry in entries(&given, &what, "a dict from names to arrays")? {
+                fields.push(self.field(&channel, &entry, counts)?);
+            }
+        }
+        let (faces, feature_names) = match part(mesh, &path, "faces")? {
+            Some(given) => self.faces(&given, &format!("{path}, faces"))?,
+            None => Default::default(),
+        };
+        let mut list = |name: &'static str| -> Read<Option<Array<'call>>> {
+            let given = part(mesh, &path, name)?;
+            given.map(|given| self.list(&given, &format!("{path}, {name}"))).transpose()
+        };
+        let roles = Roles {
+            ghosts: list("ghost_cells")?,
+            global_vertices: list("global_vertices")?,
+            global_cells: list("global_cells")?,
+            vertex_features: list("vertex_features")?,
+        };
+        let domain = Domain { coordset, topology, fields, faces, roles, path: path.clone() };
+        Ok(Channel {
+            name: channel,
+            blocks: vec![Block { name: String::new(), domain, mask: Mask::default() }],
+            feature_names,
+            path,
+            ..Channel::default()
+        })
+    }
+
+    /// Coordinates, copied; 0 along an axis that is not given.
+    pub(crate) fn points(&mut self, given: &Given<'_>, what: &str) -> Read<Vec<Vector>> {
+        let axes = self.components(given, what)?;
+        if !(2..=3).contains(&axes.len()) {
+            let found = format!("{} coordinate(s) for each vertex", axes.len());
+            return Err(argument(what, found, "2 or 3: an array (n, 2) or (n, 3)"));
+        }
+        let at = |row: usize| {
+            std::array::from_fn(|axis| axes.get(axis).map_or(0.0, |along| along.get(row)))
+        };
+        Ok((0..axes.first().map_or(0, Array::len)).map(at).collect())
+    }
+
+    /// The channels of a step: one mesh, or a dict from names to meshes.
+    pub(crate) fn channels<'call>(&mut self, given: &Given<'_>) -> Read<Channels<'call>> {
+        let is_mesh = match given.cast::<PyDict>() {
+            Ok(dict) => dict.contains("points").unwrap_or(false),
+            Err(_) => given.hasattr("points").unwrap_or(false),
+        };
+        if is_mesh {
+            return Ok(Channels(vec![self.channel("mesh".to_owned(), given)?]));
+        }
+        let expected = "a tombolo.Mesh, or a dict from names to meshes";
+        let channels = entries(given, "channels", expected)?.into_iter().map(|[key, mesh]| {
+            let name = name(&key, "the name of a channel")?;
+            self.channel(name, &mesh)
+        });
+        channels.collect::<Read<_>>().map(Channels)
+    }
+}
+
+/// How the arrays of a mesh are lent: of each its name, its address, the numbers in it, and whether it
+/// is borrowed as it lies there or has to be copied. For tests and for the curious.
+#[pyfunction]
+pub(crate) fn lent(mesh: &Given<'_>) -> PyResult<Vec<(String, usize, usize, bool)>> {
+    let mut lender = Lender::default();
+    let channels = lender.channels(mesh).map_err(of_run)?;
+    let mut found = Vec::new();
+    for block in channels.0.iter().flat_map(|channel| &channel.blocks) {
+        found.extend(block.domain.lending().into_iter().map(
+            |Lending { name, address, count, is_borrowed }| (name, address, count, is_borrowed),
+        ));
+    }
+    Ok(found)
+}

@@ -1,0 +1,285 @@
+//! A run of a solver in Python, on which the class `tombolo.Adaptor` rests.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use tombolo::foreign::{self, RunError, mesh::Channel, ranks};
+use tombolo::pipelines::language;
+use tombolo::{ExecuteError, Parameter, Settings, Stopper};
+
+use crate::error::{CallError, FailedError, guarded, of_run};
+use crate::lender::{Channels, Lender};
+use crate::motion::Motion;
+
+/// How far a run has come.
+enum Stage {
+    UnderWay(Box<foreign::Run>),
+    /// With its report, one JSON object.
+    Ended(String),
+}
+
+struct State {
+    stage: Stage,
+    /// The parameters as Python was told of them.
+    told: BTreeMap<String, f64>,
+}
+
+/// A run under way.
+#[pyclass(frozen, module = "tombolo._native")]
+pub(crate) struct Run {
+    state: Mutex<State>,
+    /// Whose threads serve the run: a fork has none of them.
+    process: u32,
+    links: [Option<String>; 2],
+    stopper: Stopper,
+}
+
+/// Moves what only this call uses to where other threads of Python may run meanwhile.
+struct Call<'a, 'call> {
+    run: &'a mut foreign::Run,
+    given: Result<(tombolo::Step, Vec<Channel<'call>>), RunError>,
+}
+
+// SAFETY: the channels are `Channels`, which may be sent, taken apart; the rest is `Send` by itself.
+unsafe impl Send for Call<'_, '_> {}
+
+impl Call<'_, '_> {
+    fn execute(self) -> Result<bool, RunError> {
+        let _alarm = self.run.alarm();
+        self.run.execute(self.given)
+    }
+}
+
+impl Run {
+    fn hold(&self) -> PyResult<MutexGuard<'_, State>> {
+        if std::process::id() != self.process {
+            return Err(CallError::new_err(
+                "the adaptor was made before this process was forked, and belongs to the other one; make one here",
+            ));
+        }
+        match self.state.try_lock() {
+            Ok(held) => Ok(held),
+            Err(TryLockError::Poisoned(held)) => Ok(held.into_inner()),
+            Err(TryLockError::WouldBlock) => Err(CallError::new_err(
+                "the adaptor is in another call; one thread at a time can use it",
+            )),
+        }
+    }
+}
+
+impl Stage {
+    fn run(&mut self) -> PyResult<&mut foreign::Run> {
+        match self {
+            Stage::UnderWay(run) => Ok(run),
+            Stage::Ended(_) => Err(CallError::new_err(
+                "called after finalize, or after the end of the `with` block; the run has ended",
+            )),
+        }
+    }
+}
+
+/// A configuration or orders as they were given: a text with its name, or the path of a file.
+#[derive(FromPyObject)]
+enum Source {
+    Text(String, String),
+    File(PathBuf),
+}
+
+fn settings(
+    configuration: Option<Source>,
+    orders: Option<Source>,
+    replay: Option<PathBuf>,
+) -> Result<Settings, RunError> {
+    let mut settings = match configuration {
+        Some(Source::File(file)) => Settings::from_file(file)?,
+        Some(Source::Text(text, name)) => {
+            Settings { config: language::check(&text, &name)?, ..Settings::default() }
+        }
+        None => Settings::default(),
+    };
+    settings = match orders {
+        Some(Source::File(file)) => settings.orders_from_file(file)?,
+        Some(Source::Text(text, name)) => {
+            Settings { orders: language::check_orders(&text, &name)?, ..settings }
+        }
+        None => settings,
+    };
+    match replay {
+        Some(journal) => Ok(settings.replay_from_file(journal)?),
+        None => Ok(settings),
+    }
+}
+
+#[pymethods]
+impl Run {
+    #[new]
+    #[pyo3(signature = (configuration, orders, replay, parameters, output, communicator))]
+    fn new(
+        py: Python<'_>,
+        configuration: Option<Source>,
+        orders: Option<Source>,
+        replay: Option<PathBuf>,
+        parameters: Vec<(String, f64, f64, f64)>,
+        output: Option<PathBuf>,
+        communicator: Option<i32>,
+    ) -> PyResult<Self> {
+        let begin = || -> Result<foreign::Run, RunError> {
+            // SAFETY: of a communicator of mpi4py, which is alive during the call.
+            let communicator = unsafe { ranks::communicator(communicator) }?;
+            let settings = settings(configuration, orders, replay);
+            let settings = ranks::agree(&*communicator, settings)?;
+            let parameters = parameters
+                .into_iter()
+                .map(|(name, value, minimum, maximum)| Parameter { name, value, minimum, maximum });
+            foreign::Run::new(Settings {
+                parameters: parameters.collect(),
+                output: output.unwrap_or(settings.output),
+                communicator: Arc::clone(&communicator),
+                ..settings
+            })
+        };
+        let run = guarded(|| py.detach(begin).map_err(of_run))?;
+        Ok(Self {
+            links: [run.link(), run.watching_link()],
+            stopper: run.stopper(),
+            process: std::process::id(),
+            state: Mutex::new(State {
+                told: run.asked().parameters.clone(),
+                stage: Stage::UnderWay(Box::new(run)),
+            }),
+        })
+    }
+
+    /// Shows a step; gives back `(motion, stop, parameters)`, or `None` where nothing is asked and
+    /// nothing has changed.
+    fn execute<'py>(
+        &self,
+        py: Python<'py>,
+        cycle: u64,
+        time: f64,
+        time_step: f64,
+        channels: &Bound<'py, PyAny>,
+    ) -> PyResult<Option<(Option<Motion>, bool, Option<Bound<'py, PyDict>>)>> {
+        let mut state = self.hold()?;
+        let State { stage, told } = &mut *state;
+        let run = stage.run()?;
+        let mut lender = Lender::default();
+        let given = lender.channels(channels);
+        let dimensions = given.as_ref().map_or_else(|_| Vec::new(), Channels::dimensions);
+        let step = tombolo::Step { cycle, time, time_step };
+        let given = given.map(|channels| (step, channels.0));
+        let call = Call { run, given };
+        let shown = guarded(|| py.detach(|| call.execute()).map_err(of_run))?;
+        drop(lender);
+        if !shown {
+            return Err(of_run(ExecuteError::NoChannel { cycle }.into()));
+        }
+        let asked = run.asked();
+        let (motion, stop) = (asked.motion.clone(), asked.stop);
+        let changed = (asked.parameters != *told).then(|| asked.parameters.clone());
+        if motion.is_none() && !stop && changed.is_none() {
+            return Ok(None);
+        }
+        let parameters = match changed {
+            Some(changed) => {
+                let dict = PyDict::new(py);
+                changed.iter().try_for_each(|(name, value)| dict.set_item(name, value))?;
+                *told = changed;
+                Some(dict)
+            }
+            None => None,
+        };
+        let steered = run.steered().0;
+        let dimension = dimensions.iter().find(|(name, _)| name == steered).map_or(3, |of| of.1);
+        Ok(Some((motion.map(|motion| Motion::new(motion, dimension)), stop, parameters)))
+    }
+
+    /// Whether anything is due at a step that looks at the mesh and its fields.
+    fn looks_at(&self, cycle: u64, time: f64, time_step: f64) -> PyResult<bool> {
+        let mut state = self.hold()?;
+        Ok(state.stage.run()?.looks_at(&tombolo::Step { cycle, time, time_step }))
+    }
+
+    #[getter]
+    fn link(&self) -> Option<&str> {
+        self.links[0].as_deref()
+    }
+
+    #[getter]
+    fn watching_link(&self) -> Option<&str> {
+        self.links[1].as_deref()
+    }
+
+    /// What a program prints for a person to open the run.
+    fn invitation(&self, terminal: bool) -> PyResult<Option<String>> {
+        let mut state = self.hold()?;
+        Ok(state.stage.run()?.invitation(terminal)?)
+    }
+
+    /// The parameters and their values now.
+    #[getter]
+    fn parameters(&self) -> PyResult<BTreeMap<String, f64>> {
+        Ok(self.hold()?.told.clone())
+    }
+
+    /// The orders so far, a JSON list.
+    #[getter]
+    fn orders(&self) -> PyResult<String> {
+        let state = self.hold()?;
+        let orders = match &state.stage {
+            Stage::UnderWay(run) => run.orders(),
+            Stage::Ended(_) => return Err(CallError::new_err("the run has ended")),
+        };
+        serde_json::to_string(&orders).map_err(|error| FailedError::new_err(error.to_string()))
+    }
+
+    /// Asks the solver to end, from any thread.
+    fn stop(&self) {
+        self.stopper.stop();
+    }
+
+    #[getter]
+    fn ended(&self) -> PyResult<bool> {
+        Ok(matches!(self.hold()?.stage, Stage::Ended(_)))
+    }
+
+    /// Ends the run; gives back its report, one JSON object.
+    fn finalize(&self, py: Python<'_>) -> PyResult<String> {
+        let mut state = self.hold()?;
+        state.stage.run()?;
+        let stage = std::mem::replace(&mut state.stage, Stage::Ended("{}".to_owned()));
+        let Stage::UnderWay(run) = stage else { return Ok("{}".to_owned()) };
+        let (report, ended) = guarded(|| Ok(py.detach(|| run.finalize())))?;
+        let report = serde_json::to_string(&report).unwrap_or_else(|_| "{}".to_owned());
+        state.stage = Stage::Ended(report.clone());
+        ended.map_err(of_run).map(|()| report)
+    }
+
+    /// The report of a run that has ended.
+    #[getter]
+    fn report(&self) -> PyResult<Option<String>> {
+        Ok(match &self.hold()?.stage {
+            Stage::Ended(report) => Some(report.clone()),
+            Stage::UnderWay(_) => None,
+        })
+    }
+}
+
+impl Drop for Run {
+    fn drop(&mut self) {
+        let state = self.state.get_mut().unwrap_or_else(PoisonError::into_inner);
+        let stage = std::mem::replace(&mut state.stage, Stage::Ended(String::new()));
+        if let Stage::UnderWay(run) = stage {
+            if std::process::id() == self.process {
+                // The run's threads may have something to say to Python's logging.
+                Python::attach(|py| py.detach(|| drop(run)));
+            } else {
+                // A fork has not the threads that it would wait for.
+                std::mem::forget(run);
+            }
+        }
+    }
+}

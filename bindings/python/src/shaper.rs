@@ -1,0 +1,253 @@
+//! Shapes of a mesh without a run, on which the class `tombolo.Shaper` rests.
+
+use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
+
+use numpy::{IntoPyArray, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use serde_json::json;
+use tombolo::deform::cancellation::Cancellation;
+use tombolo::deform::edit::Edit;
+use tombolo::deform::features::FeatureSettings;
+use tombolo::deform::mesh::{Mesh, Vector};
+use tombolo::deform::quality::{quality, scaled_jacobians};
+use tombolo::deform::shape::{Refused, Request};
+use tombolo::deform::skeleton::{Skeleton, SkeletonSettings};
+use tombolo::deform::surface::{Surface, SurfaceError};
+use tombolo::pipelines::files::read_displacements;
+use tombolo::pipelines::language::Change;
+
+use crate::client::{surface, table};
+use crate::error::{CallError, ConfigurationError, MeshError, RejectedError, guarded, of_run};
+use crate::language::order;
+use crate::lender::Lender;
+
+/// What gives a mesh other shapes.
+#[pyclass(frozen, module = "tombolo._native")]
+pub(crate) struct Shaper {
+    shaper: Mutex<tombolo::deform::shape::Shaper>,
+    mesh: Arc<Mesh>,
+    surface: Arc<Surface>,
+    cancellation: Cancellation,
+    /// Coordinates of a vertex as they were given.
+    dimension: usize,
+}
+
+fn mistake(error: impl ToString) -> PyErr {
+    MeshError::new_err(error.to_string())
+}
+
+fn rejected(py: Python<'_>, refused: &Refused) -> PyErr {
+    let report = PyDict::new(py);
+    // A dict of numbers takes them, unless there is no memory.
+    let _ = report.set_item("fraction", refused.feasible_fraction());
+    let _ = report.set_item("min_scaled_jacobian", refused.min_scaled_jacobian());
+    RejectedError::new_err((refused.to_string(), report.unbind()))
+}
+
+impl Shaper {
+    fn hold(&self) -> PyResult<MutexGuard<'_, tombolo::deform::shape::Shaper>> {
+        match self.shaper.try_lock() {
+            Ok(held) => Ok(held),
+            Err(TryLockError::Poisoned(held)) => Ok(held.into_inner()),
+            Err(TryLockError::WouldBlock) => Err(CallError::new_err(
+                "the shaper is in another call; one thread at a time can use it",
+            )),
+        }
+    }
+
+    /// What is asked for by the text of an order or a list of edits.
+    fn asked(&self, text: &str, name: &str) -> PyResult<Request> {
+        let order = order(text, name)?;
+        let mut edits: Vec<Edit> = match order.change {
+            Change::Edits(edits) | Change::Stack(edits) => edits,
+            Change::Undo(_) => {
+                return Err(ConfigurationError::new_err(format!(
+                    "{name}: undo: a mesh by itself has no orders to take back"
+                )));
+            }
+        };
+        read_displacements(&mut edits, &self.surface)
+            .map_err(|error| ConfigurationError::new_err(format!("{name}: {error}")))?;
+        let reference: Arc<[Vector]> = self.mesh.points().into();
+        Ok(Request {
+            deformation: order.deform.unwrap_or_default(),
+            guard: order.guard.unwrap_or_default(),
+            schedule: order.schedule.unwrap_or_default(),
+            ..Request::new(edits, reference)
+        })
+    }
+
+    /// Points of the mesh with as many columns as they were given with.
+    fn columns<'py>(&self, py: Python<'py>, points: &[Vector]) -> PyResult<Bound<'py, PyAny>> {
+        let kept: Vec<f64> =
+            points.iter().flat_map(|point| point.iter().take(self.dimension)).copied().collect();
+        let rows = points.len();
+        Ok(kept.into_pyarray(py).reshape([rows, self.dimension])?.into_any())
+    }
+
+    /// The coordinates that were given in place of the mesh's own.
+    fn points(&self, given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Vector>> {
+        let Some(given) = given else { return Ok(self.mesh.points().to_vec()) };
+        let mut lender = Lender::default();
+        let points = lender.points(given, "points").map_err(of_run)?;
+        if points.len() != self.mesh.points().len() {
+            return Err(MeshError::new_err(format!(
+                "points: found {} rows, expected {}, one for each vertex",
+                points.len(),
+                self.mesh.points().len()
+            )));
+        }
+        Ok(points)
+    }
+}
+
+#[pymethods]
+impl Shaper {
+    #[new]
+    #[pyo3(signature = (mesh, angle))]
+    fn new(py: Python<'_>, mesh: &Bound<'_, PyAny>, angle: Option<f64>) -> PyResult<Self> {
+        let mut lender = Lender::default();
+        let channels = lender.channels(mesh).map_err(of_run)?;
+        let dimension = channels.dimensions().first().map_or(3, |(_, dimension)| *dimension);
+        guarded(|| {
+            py.detach(move || {
+                let channels = channels;
+                let channel =
+                    channels.0.first().ok_or_else(|| mistake("found no mesh, expected one"))?;
+                let mesh = Arc::new(channel.to_mesh().map_err(of_run)?);
+                let surface = Arc::new(of_mesh(&mesh, angle).map_err(mistake)?);
+                let shaper = tombolo::deform::shape::Shaper::new(&mesh, Arc::clone(&surface))
+                    .map_err(mistake)?;
+                let shaper = shaper.with_clock(tombolo::steering::clock);
+                let cancellation = shaper.cancellation().clone();
+                Ok(Self { shaper: Mutex::new(shaper), mesh, surface, cancellation, dimension })
+            })
+        })
+    }
+
+    /// The shape that edits make: its points, and what there is to know of it as JSON.
+    fn shape<'py>(
+        &self,
+        py: Python<'py>,
+        text: &str,
+        name: &str,
+    ) -> PyResult<(Bound<'py, PyAny>, String)> {
+        let request = self.asked(text, name)?;
+        let mut shaper = self.hold()?;
+        let shaper = &mut *shaper;
+        let plan = guarded(|| Ok(py.detach(|| shaper.plan(&request))))?;
+        let plan = plan.map_err(|refused| rejected(py, &refused))?;
+        let target = plan.target();
+        let facts = py.detach(|| {
+            json!({
+                "fraction": target.fraction,
+                "iterations": target.iterations,
+                "sub_steps": target.sub_steps,
+                "min_scaled_jacobian": plan.min_scaled_jacobian(),
+                "largest_displacement": plan.largest_displacement(),
+                "quality": quality(self.mesh.cells(), plan.end()),
+                "seconds": shaper.spent(),
+            })
+        });
+        Ok((self.columns(py, plan.end())?, facts.to_string()))
+    }
+
+    /// What edits would come to, as JSON.
+    fn forecast(&self, py: Python<'_>, text: &str, name: &str) -> PyResult<String> {
+        let request = self.asked(text, name)?;
+        let mut shaper = self.hold()?;
+        let shaper = &mut *shaper;
+        let forecast = guarded(|| Ok(py.detach(|| shaper.forecast(&request))))?;
+        serde_json::to_string(&forecast).map_err(mistake)
+    }
+
+    /// The displacement of each vertex of the surface.
+    fn displacement<'py>(
+        &self,
+        py: Python<'py>,
+        text: &str,
+        name: &str,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let request = self.asked(text, name)?;
+        let mut shaper = self.hold()?;
+        let shaper = &mut *shaper;
+        let moved = guarded(|| {
+            py.detach(|| match shaper.editor() {
+                Some(editor) => editor
+                    .displacement(&request.stack)
+                    .map_err(|error| RejectedError::new_err(error.to_string())),
+                None => Ok(Vec::new()),
+            })
+        })?;
+        self.columns(py, &moved)
+    }
+
+    /// The quality of the mesh, or of one with other points, as JSON.
+    fn quality(&self, py: Python<'_>, points: Option<&Bound<'_, PyAny>>) -> PyResult<String> {
+        let points = self.points(points)?;
+        let found = guarded(|| Ok(py.detach(|| quality(self.mesh.cells(), &points))))?;
+        serde_json::to_string(&found).map_err(mistake)
+    }
+
+    /// The scaled Jacobian of each cell.
+    fn scaled_jacobians<'py>(
+        &self,
+        py: Python<'py>,
+        points: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let points = self.points(points)?;
+        let found = guarded(|| Ok(py.detach(|| scaled_jacobians(self.mesh.cells(), &points))))?;
+        Ok(found.into_pyarray(py).into_any())
+    }
+
+    /// The features, as JSON.
+    fn features(&self) -> PyResult<String> {
+        serde_json::to_string(&self.surface.feature_sizes()).map_err(mistake)
+    }
+
+    /// The surface.
+    fn surface<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        surface(py, &self.surface)
+    }
+
+    /// The curve skeleton of the surface.
+    fn skeleton<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let found = guarded(|| {
+            py.detach(|| {
+                Skeleton::extract(&self.surface, &SkeletonSettings::default()).map_err(mistake)
+            })
+        })?;
+        let dict = PyDict::new(py);
+        dict.set_item("nodes", table(py, found.nodes().as_flattened().to_vec(), 3)?)?;
+        dict.set_item("radii", found.radii(self.surface.points()).into_pyarray(py))?;
+        let curves = PyList::empty(py);
+        for curve in found.curves() {
+            curves.append(curve.nodes().to_vec().into_pyarray(py))?;
+        }
+        dict.set_item("curves", curves)?;
+        dict.set_item("node_of_vertex", found.node_of_vertex().to_vec().into_pyarray(py))?;
+        Ok(dict)
+    }
+
+    /// Has the work under way given up, from any thread.
+    fn cancel(&self) {
+        self.cancellation.cancel();
+    }
+
+    /// Lets work go on that comes next.
+    fn renew(&self) {
+        self.cancellation.renew();
+    }
+}
+
+/// The surface of a mesh; with an angle, its features are those between sharp edges.
+fn of_mesh(mesh: &Mesh, angle: Option<f64>) -> Result<Surface, SurfaceError> {
+    let surface = Surface::extract(mesh, &FeatureSettings::default())?;
+    match angle {
+        Some(sharp_angle_degrees) => {
+            surface.with_sharp_features(&FeatureSettings { sharp_angle_degrees })
+        }
+        None => Ok(surface),
+    }
+}

@@ -1,0 +1,135 @@
+"""A mesh, and a solver that runs on a thread."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+import tombolo
+
+
+def box(count, dtype=float):
+    """The unit cube as tetrahedra, six in each of `count` cubed cubes: points and cells."""
+    axis = np.linspace(0, 1, count + 1)
+    points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3)
+    numbers = np.arange((count + 1) ** 3).reshape((count + 1,) * 3)
+    corner = {
+        (i, j, k): numbers[i : count + i, j : count + j, k : count + k].ravel()
+        for i in (0, 1)
+        for j in (0, 1)
+        for k in (0, 1)
+    }
+    tets = []
+    for order in ((0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)):
+        steps, at = [(0, 0, 0)], [0, 0, 0]
+        for axis_of_step in order:
+            at[axis_of_step] = 1
+            steps.append(tuple(at))
+        sign = np.linalg.det(np.diff(np.array(steps, float), axis=0))
+        chosen = steps if sign > 0 else [steps[0], steps[2], steps[1], steps[3]]
+        tets.append(np.stack([corner[step] for step in chosen], -1))
+    return points.astype(dtype), np.concatenate(tets)
+
+
+def boundary(tets):
+    """The faces of one cell alone."""
+    faces = np.concatenate([tets[:, corners] for corners in ([0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 2, 1])])
+    _, first, counts = np.unique(np.sort(faces, 1), axis=0, return_index=True, return_counts=True)
+    return faces[first[counts == 1]]
+
+
+def ends(points, tets):
+    """The faces of a box at the top and at the bottom."""
+    faces = boundary(tets)
+    heights = points[faces, 2]
+    return {
+        "top": faces[(heights == points[:, 2].max()).all(1)],
+        "bottom": faces[(heights == points[:, 2].min()).all(1)],
+    }
+
+
+SQUEEZE = [{"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, -0.2]}}]
+
+CONFIGURATION = {
+    "version": 1,
+    "stream": {"listen": "127.0.0.1:0"},
+    "pipelines": [
+        {
+            "name": "midplane",
+            "every": {"steps": 1},
+            "stages": [
+                {"slice": {"origin": [0.5, 0.45, 0.5], "normal": [0, 1, 0]}},
+                {"select": {"fields": ["temperature", "material"]}},
+                {"stream": {"error": {"relative": 1e-6}}},
+            ],
+        },
+        {
+            "name": "health",
+            "every": {"steps": 1},
+            "stages": [{"quality": {}}, {"statistics": {"field": "temperature"}}],
+        },
+    ],
+}
+
+
+class Solver:
+    """A solver on a thread of its own, which moves its mesh as it is asked to."""
+
+    def __init__(self, configuration=CONFIGURATION, step=0.002, count=3, **settings):
+        self.points, self.cells = box(count)
+        self.reference = self.points.copy()
+        self.error = None
+        self.heating = []
+        self.stopped = False
+        self.end = threading.Event()
+        self.step = step
+        self.adaptor = tombolo.Adaptor(configuration, parameters={"heating": (1, 0, 10)}, **settings)
+        self.link = self.adaptor.link
+        self.thread = threading.Thread(target=self.solve, daemon=True)
+        self.thread.start()
+
+    def solve(self):
+        try:
+            temperature = np.zeros(len(self.points))
+            faces = ends(self.points, self.cells)
+            mesh = tombolo.Mesh(self.points, {"tetra": self.cells}, faces=faces)
+            mesh.fields["material"] = np.arange(len(self.cells), dtype=np.int32)
+            with self.adaptor:
+                cycle = 0
+                while not self.end.is_set():
+                    temperature = self.reference[:, 2] + 0.01 * cycle
+                    mesh.fields["temperature"] = temperature
+                    steering = self.adaptor.execute(cycle, 0.1 * cycle, 0.1, {"solid": mesh})
+                    if steering.stop:
+                        self.stopped = True
+                        break
+                    if steering.motion is not None:
+                        self.points[:] = steering.motion.coordinates
+                    self.heating.append(steering.parameters["heating"])
+                    time.sleep(self.step)
+                    cycle += 1
+        except Exception as error:
+            self.error = error
+
+    def close(self):
+        self.end.set()
+        self.adaptor.stop()
+        self.thread.join(20)
+        assert not self.thread.is_alive()
+        if self.error is not None:
+            raise self.error
+
+
+@pytest.fixture
+def solver(tmp_path):
+    """A solver under way, which ends with the test."""
+    running = Solver(output=tmp_path)
+    yield running
+    running.close()
+
+
+@pytest.fixture
+def run(solver):
+    """A client of the solver that is under way."""
+    with tombolo.connect(solver.link) as connected:
+        yield connected

@@ -1,0 +1,359 @@
+"""A solver's side, as clumsy callers use it."""
+
+import gc
+import json
+import os
+import subprocess
+import sys
+import threading
+import weakref
+
+import numpy as np
+import pytest
+import tombolo
+from conftest import SQUEEZE, box, ends
+from tombolo import _native
+
+POINTS, TETS = box(2)
+
+
+FACES = ends(POINTS, TETS)
+
+
+def mesh(points=POINTS, cells=None, faces=None, **rest):
+    return tombolo.Mesh(points, {"tetra": TETS} if cells is None else cells, faces=faces or FACES, **rest)
+
+
+def arrays(shown, name):
+    """Address, count, and whether it is borrowed, of each array of this name, as Rust sees it."""
+    return [rest for found, *rest in _native.lent(shown) if found == name]
+
+
+def layouts(values):
+    """The same numbers in many layouts, each with the base address of every column."""
+    wide = np.zeros((len(values), 7), values.dtype)
+    wide[:, 1:6:2] = values
+    frozen = values.copy()
+    frozen.flags.writeable = False
+    return {
+        "rows": values.copy(),
+        "columns": np.asfortranarray(values),
+        "strided": wide[:, 1:6:2],
+        "read only": frozen,
+        "transposed": np.ascontiguousarray(values.T).T,
+    }
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_arrays_of_any_layout_are_borrowed_where_they_lie(dtype):
+    for name, points in layouts(POINTS.astype(dtype)).items():
+        lent = arrays(mesh(points), "points")
+        expected = [points[:, axis].__array_interface__["data"][0] for axis in range(3)]
+        assert [address for address, _, _ in lent] == expected, name
+        assert all(count == len(points) and borrowed for _, count, borrowed in lent), name
+
+
+@pytest.mark.parametrize("dtype", [np.int32, np.int64, np.uint32, np.uint64])
+def test_cells_are_borrowed(dtype):
+    cells = TETS.astype(dtype)
+    assert arrays(mesh(cells={"tetra": cells}), "cells") == [[cells.ctypes.data, cells.size, True]]
+
+
+def test_fields_are_borrowed_by_their_length():
+    pressure, velocity = np.zeros(len(TETS), np.float32), np.zeros((len(POINTS), 3), order="F")
+    shown = mesh(fields={"pressure": pressure, "velocity": velocity, "material": np.zeros(len(TETS), np.int32)})
+    assert arrays(shown, "pressure") == [[pressure.ctypes.data, len(TETS), True]]
+    assert [it[0] for it in arrays(shown, "velocity")] == [velocity[:, axis].ctypes.data for axis in range(3)]
+    separate = tuple(np.ascontiguousarray(velocity[:, axis]) for axis in range(3))
+    lent = arrays(mesh(fields={"velocity": separate}), "velocity")
+    assert [it[0] for it in lent] == [axis.ctypes.data for axis in separate]
+    assert all(it[2] for it in lent)
+
+
+@pytest.mark.parametrize(
+    "strange",
+    [
+        lambda a: a.astype(a.dtype.newbyteorder(">")),
+        lambda a: a[::-1].copy()[::-1],
+        lambda a: np.frombuffer(b"\0" + a.tobytes(), a.dtype, offset=1).reshape(a.shape),
+        lambda a: a.tolist(),
+        lambda a: np.repeat(a, 2, axis=0)[::2],
+    ],
+)
+def test_what_cannot_be_borrowed_is_copied_right(strange):
+    """What is written of a mesh in a strange form is what is written of the plain one."""
+    written = []
+    for points, cells in ((POINTS, TETS), (strange(POINTS), strange(TETS))):
+        pipeline = {
+            "name": "all",
+            "stages": [{"surface": {}}, {"statistics": {"field": "height"}}],
+        }
+        shown = mesh(points, {"tetra": cells}, fields={"height": strange(POINTS[:, 2].copy())})
+        with tombolo.Adaptor({"version": 1, "pipelines": [pipeline]}) as adaptor:
+            adaptor.execute(0, 0.0, 0.1, {"solid": shown})
+        written.append(adaptor.report["pipelines"][0]["monitors"])
+    assert written[0] == written[1] and written[0]
+
+
+def orders():
+    return [{"at": {"cycle": 1}, "order": {"edits": SQUEEZE}}, {"at": {"cycle": 3}, "order": {"undo": 1}}]
+
+
+@pytest.mark.parametrize("form", ["array", "columns", "dict", "vtk", "two types", "float32"])
+def test_a_mesh_is_squeezed_and_restored_to_the_bit(form):
+    points = POINTS.astype(np.float32) if form == "float32" else POINTS.copy()
+    cells = {"tetra": TETS}
+    if form == "columns":
+        points, cells = np.asfortranarray(points), {"tetra": np.asfortranarray(TETS)}
+    if form == "vtk":
+        offsets = np.arange(0, TETS.size + 1, 4)
+        cells = {"connectivity": TETS.ravel(), "offsets": offsets, "types": np.full(len(TETS), 10, np.uint8)}
+    if form == "two types":
+        cells = {10: TETS, "pyramid": np.empty((0, 5), int)}
+    given = {"points": points, "cells": cells, "faces": FACES} if form == "dict" else mesh(points, cells)
+    reference, tops = points.copy(), []
+    with tombolo.Adaptor({"version": 1}, orders=orders()) as adaptor:
+        for cycle in range(5):
+            motion = adaptor.execute(cycle, 0.1 * cycle, 0.1, {"solid": given}).motion
+            if motion is not None:
+                assert motion.shape == (1, 1) and motion.order and not motion.coordinates.flags.writeable
+                np.testing.assert_allclose(motion.displacement, motion.coordinates - points, atol=1e-7)
+                np.testing.assert_allclose(motion.velocity, motion.displacement / 0.1, atol=1e-12)
+                surface = motion.surface
+                assert np.array_equal(surface.coordinates, motion.coordinates[surface.vertices])
+                points[:] = motion.coordinates
+            tops.append(float(points[:, 2].max()))
+    np.testing.assert_allclose(tops, [1, 0.8, 0.8, 1, 1], atol=1e-6)
+    assert np.array_equal(points, reference)
+    assert [order["status"] for order in adaptor.orders] == ["applied", "applied"]
+
+
+def test_named_faces_are_features():
+    points = POINTS.copy()
+    floor = {"triangle": FACES["bottom"].astype(np.int32)}
+    shown = mesh(points, faces={"lid": np.asfortranarray(FACES["top"]), "floor": floor})
+    edits = [{"translate": {"features": ["lid"], "fixed": ["floor"], "by": [0, 0, 0.1]}}]
+    with tombolo.Adaptor(None, orders=[{"order": {"edits": edits}}]) as adaptor:
+        motion = adaptor.execute(0, 0.0, 0.1, shown).motion
+    assert motion is not None and motion.coordinates[:, 2].max() == pytest.approx(1.1)
+
+
+BAD = {
+    "no channel": ({}, tombolo.StepError, "no channel"),
+    "no mesh": (3, tombolo.MeshError, "expected a tombolo.Mesh, or a dict"),
+    "a misspelt part": ({"solid": {"points": POINTS, "cell": {}}}, tombolo.MeshError, "did you mean 'cells'"),
+    "no points": ({"solid": {"cells": {}}}, tombolo.MeshError, "no points"),
+    "one coordinate": (mesh(POINTS[:, :1]), tombolo.MeshError, "2 or 3"),
+    "text": (mesh(np.array([["a", "b", "c"]])), tombolo.MeshError, "channel 'mesh', points"),
+    "objects": (mesh(np.array([[object()] * 3])), tombolo.MeshError, "expected float32"),
+    "ragged": (mesh([[1, 2, 3], [4]]), tombolo.MeshError, "channel 'mesh', points"),
+    "complex": (mesh(POINTS + 0j), tombolo.MeshError, "values.real"),
+    "half": (mesh(POINTS.astype(np.float16)), tombolo.MeshError, "float16"),
+    "no rows": (mesh(cells={"tetra": TETS.ravel()}), tombolo.MeshError, r"\(m, 4\), a row for each tetra"),
+    "five corners": (mesh(cells={"tetra": np.zeros((2, 5), int)}), tombolo.MeshError, r"shape \(2, 5\)"),
+    "real cells": (mesh(cells={"tetra": TETS * 1.0}), tombolo.MeshError, "vertex numbers"),
+    "a misspelt type": (mesh(cells={"tetar": TETS}), tombolo.MeshError, "did you mean 'tetra'"),
+    "a bare array": (mesh(cells=TETS), tombolo.MeshError, "a dict from cell types"),
+    "beyond": (mesh(cells={"tetra": TETS + 1}), tombolo.MeshError, "27"),
+    "below": (mesh(cells={"tetra": TETS - 1}), tombolo.MeshError, "-1"),
+    "beyond, in columns": (mesh(cells={"tetra": np.asfortranarray(TETS + 1)}), tombolo.MeshError, "27"),
+    "not a number": (mesh(POINTS * np.nan), tombolo.TomboloError, "NaN"),
+    "no points at all": (mesh(np.empty((0, 3))), tombolo.MeshError, "27|vertex"),
+    "a short field": (mesh(fields={"p": np.zeros(5)}), tombolo.MeshError, "field 'p': found 5 values"),
+    "ten components": (mesh(fields={"p": np.zeros((len(POINTS), 10))}), tombolo.MeshError, "9 components"),
+    "a field's name": (mesh(fields={"": POINTS[:, 0]}), tombolo.MeshError, "a name"),
+    "a number as a field": (mesh(fields={"p": 3.0}), tombolo.MeshError, "field 'p'"),
+    "an association": (
+        mesh(fields={"p": tombolo.Field(POINTS[:, 0], "vertices")}),
+        tombolo.MeshError,
+        "'vertex' or 'element'",
+    ),
+    "offsets that fall": (
+        mesh(cells={"connectivity": TETS.ravel(), "offsets": [4, 0, 4], "types": [10, 10]}),
+        tombolo.MeshError,
+        "offsets that do not fall",
+    ),
+    "too few offsets": (
+        mesh(cells={"connectivity": TETS.ravel(), "offsets": [0, 4], "types": [10, 10]}),
+        tombolo.MeshError,
+        "one more offset",
+    ),
+    "no types": (mesh(cells={"connectivity": TETS.ravel(), "offsets": [0, 4]}), tombolo.MeshError, "'types'"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_input_is_an_exception_with_its_place(name):
+    given, kind, text = BAD[name]
+    orders = [{"order": {"edits": SQUEEZE}}]
+    with tombolo.Adaptor({"version": 1}, orders=orders) as adaptor:
+        with pytest.raises(kind, match=text):
+            adaptor.execute(0, 0.0, 0.1, given)
+        # Nothing was done: the solver may mend it and call again.
+        assert adaptor.execute(0, 0.0, 0.1, {"solid": mesh()}).motion is not None
+
+
+def test_as_many_cells_as_vertices_have_to_be_told_apart():
+    points = np.zeros((4, 3))
+    points[1:] = np.eye(3)
+    cells = {"tetra": np.array([[0, 1, 2, 3]] * 4)}
+    with tombolo.Adaptor() as adaptor:
+        with pytest.raises(tombolo.MeshError, match=r"tombolo\.Field"):
+            adaptor.execute(0, 0, 1, tombolo.Mesh(points, cells, {"p": np.zeros(4)}))
+        adaptor.execute(0, 0, 1, tombolo.Mesh(points, cells, {"p": tombolo.Field(np.zeros(4), "element")}))
+
+
+@pytest.mark.parametrize("time", [np.nan, np.inf, -np.inf])
+def test_a_time_that_is_none_is_refused(time):
+    with tombolo.Adaptor() as adaptor:
+        with pytest.raises(tombolo.StepError):
+            adaptor.execute(0, time, 0.1, mesh())
+        with pytest.raises(tombolo.StepError):
+            adaptor.execute(0, 0.0, -0.1, mesh())
+        with pytest.raises((OverflowError, TypeError)):
+            adaptor.execute(-1, 0.0, 0.1, mesh())
+
+
+def test_a_configuration_is_a_file_a_dict_or_an_error_with_its_place(tmp_path):
+    file = tmp_path / "pipelines.json"
+    file.write_text('{"version": 1,\n "pipelnes": []}')
+    with pytest.raises(tombolo.ConfigurationError, match=r"pipelines\.json:2:\d+: .*did you mean `pipelines`"):
+        tombolo.Adaptor(file)
+    with pytest.raises(tombolo.ConfigurationError, match=r"configuration:1:\d+: .*pipelnes"):
+        tombolo.Adaptor({"version": 1, "pipelnes": []})
+    with pytest.raises(tombolo.ConfigurationError, match=r"nowhere\.json"):
+        tombolo.Adaptor(str(tmp_path / "nowhere.json"))
+    with pytest.raises(tombolo.ConfigurationError, match="configuration: "):
+        tombolo.Adaptor({"version": 1, "description": object()})
+    with pytest.raises(tombolo.ConfigurationError, match="inflow"):
+        tombolo.Adaptor(parameters={"inflow": (50, 0, 40)})
+    with pytest.raises(tombolo.ConfigurationError, match=r"expected \(value, minimum, maximum\)"):
+        tombolo.Adaptor(parameters={"inflow": 10})
+    with pytest.raises(tombolo.ConfigurationError, match="orders:1:"):
+        tombolo.Adaptor(orders=[{"order": {"edits": [{"translat": {}}]}}])
+    file.write_text(json.dumps({"version": 1}))
+    tombolo.Adaptor(file, orders=orders(), output=tmp_path).finalize()
+
+
+def test_a_closed_adaptor_says_so():
+    with tombolo.Adaptor() as adaptor:
+        adaptor.execute(0, 0.0, 0.1, mesh())
+    with pytest.raises(tombolo.CallError, match="after finalize"):
+        adaptor.execute(1, 0.1, 0.1, mesh())
+    assert adaptor.finalize()["cycles"] == 1
+
+
+def test_an_exception_in_the_block_ends_the_run_and_goes_on():
+    with pytest.raises(ZeroDivisionError), tombolo.Adaptor() as adaptor:
+        adaptor.execute(0, 0.0, 0.1, mesh())
+        _ = 1 / 0
+    assert adaptor.report["cycles"] == 1
+
+
+def test_an_address_in_use_is_a_failure():
+    first = tombolo.Adaptor({"version": 1, "stream": {"listen": "127.0.0.1:0"}})
+    port = first.link.split(":")[2].split("/")[0]
+    with pytest.raises(tombolo.FailedError, match=port):
+        tombolo.Adaptor({"version": 1, "stream": {"listen": f"127.0.0.1:{port}"}})
+    first.finalize()
+
+
+def test_another_thread_is_refused_while_one_is_in_a_call():
+    """Of many threads that call at once each either has its step or an error; none of them crashes."""
+    outcomes = []
+    with tombolo.Adaptor({"version": 1, "pipelines": [{"name": "q", "stages": [{"quality": {}}]}]}) as adaptor:
+
+        def work():
+            for cycle in range(50):
+                try:
+                    adaptor.execute(cycle, 0.0, 0.1, {"solid": mesh()})
+                    outcomes.append("done")
+                except tombolo.CallError as error:
+                    outcomes.append(str(error))
+
+        threads = [threading.Thread(target=work) for _ in range(4)]
+        [thread.start() for thread in threads]
+        [thread.join() for thread in threads]
+    assert len(outcomes) == 200 and "done" in outcomes
+    assert {text for text in outcomes if text != "done"} <= {
+        "the adaptor is in another call; one thread at a time can use it"
+    }
+
+
+def test_other_threads_run_while_rust_works():
+    points, tets = box(16)
+    ticks, end = [], threading.Event()
+
+    def tick():
+        while not end.wait(0.0005):
+            ticks.append(1)
+
+    with tombolo.Adaptor(None, orders=[{"order": {"edits": SQUEEZE}}]) as adaptor:
+        thread = threading.Thread(target=tick)
+        thread.start()
+        try:
+            before = len(ticks)
+            assert adaptor.execute(0, 0.0, 0.1, mesh(points, {"tetra": tets}, ends(points, tets))).motion
+            assert len(ticks) > before + 3
+        finally:
+            end.set()
+            thread.join()
+
+
+def test_arrays_are_let_go_and_motions_keep_theirs():
+    class Tracked(np.ndarray):
+        pass
+
+    points = POINTS.copy().view(Tracked)
+    alive = weakref.ref(points)
+    adaptor = tombolo.Adaptor(None, orders=[{"order": {"edits": SQUEEZE}}])
+    coordinates = adaptor.execute(0, 0.0, 0.1, mesh(points)).motion.coordinates
+    del points
+    gc.collect()
+    assert alive() is None
+    adaptor.finalize()
+    del adaptor
+    gc.collect()
+    assert coordinates[:, 2].max() == pytest.approx(0.8)
+    with pytest.raises(ValueError):
+        coordinates[0] = 0
+
+
+def test_a_fork_is_told_and_ends():
+    program = """
+import os, sys, numpy as np, tombolo
+points = np.eye(4, 3); cells = {"tetra": np.array([[3, 0, 1, 2]])}
+adaptor = tombolo.Adaptor({"version": 1, "stream": {"listen": "127.0.0.1:0"}})
+adaptor.execute(0, 0.0, 0.1, tombolo.Mesh(points, cells))
+child = os.fork()
+if child == 0:
+    try:
+        adaptor.execute(1, 0.0, 0.1, tombolo.Mesh(points, cells))
+    except tombolo.CallError as error:
+        del adaptor
+        sys.exit(7 if "forked" in str(error) else 1)
+    sys.exit(2)
+status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+adaptor.execute(1, 0.0, 0.1, tombolo.Mesh(points, cells))
+adaptor.finalize()
+sys.exit(0 if status == 7 else 1)
+"""
+    if not hasattr(os, "fork"):
+        pytest.skip("no fork")
+    done = subprocess.run(
+        [sys.executable, "-X", "dev", "-W", "error", "-c", program], timeout=60, capture_output=True, check=False
+    )
+    assert done.returncode == 0, done.stderr.decode()
+
+
+def test_points_of_two_coordinates_come_back_so():
+    axis = np.linspace(0, 1, 4)
+    points = np.stack(np.meshgrid(axis, axis, indexing="ij"), -1).reshape(-1, 2)
+    numbers = np.arange(16).reshape(4, 4)
+    quads = np.stack([numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]], -1).reshape(-1, 4)
+    edits = [{"displacement": {"vertices": [15], "values": [[0.1, 0.0, 0.0]]}}]
+    with tombolo.Adaptor(None, orders=[{"order": {"edits": edits}}]) as adaptor:
+        motion = adaptor.execute(0, 0.0, 0.1, tombolo.Mesh(points, {"quad": quads})).motion
+    assert motion.coordinates.shape == (16, 2)
+    points[:] = motion.coordinates
+    assert points[15, 0] == pytest.approx(1.1)

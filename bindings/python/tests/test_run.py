@@ -1,0 +1,380 @@
+"""A run from outside: watched, steered, lost and found again."""
+
+import asyncio
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import tombolo
+from conftest import CONFIGURATION, SQUEEZE, Solver
+
+
+def test_facts(run):
+    assert run.view_names == ["midplane"]
+    assert run.parameters == {"heating": (1, 0, 10)}
+    run.wait_for_cycle(2, 30)
+    run.wait_for(lambda: run.features, 30)
+    assert "top" in {feature["name"] for feature in run.features}
+    assert {field["name"] for field in run.fields} == {"temperature", "material"}
+    assert run.status.step_seconds is None or run.status.step_seconds > 0
+    assert run.pipelines[0]["name"] == "midplane"
+    assert "token" not in repr(run)
+
+
+def test_views_are_arrays(run):
+    view = run.wait_for_view("midplane", timeout=30)
+    later = run.wait_for_view("midplane", after=view.cycle, timeout=30)
+    assert later.cycle > view.cycle
+    np.testing.assert_allclose(later.points[:, 1], 0.45, atol=1e-4)
+    assert later.triangles.max() < len(later.points)
+    heights = later.points[:, 2] + 0.01 * later.cycle
+    np.testing.assert_allclose(later.fields["temperature"], heights, rtol=1e-4, atol=1e-4)
+    assert later.associations == {"temperature": "vertex", "material": "element"}
+    assert len(later.fields["material"]) == len(later.triangles) + len(later.lines)
+    with pytest.raises(KeyError, match="midplane"):
+        run.wait_for_view("midplan", timeout=5)
+
+
+def test_views_for_others(run):
+    view = run.wait_for_view("midplane", timeout=30)
+    meshio = pytest.importorskip("meshio")
+    assert isinstance(view.to_meshio(), meshio.Mesh)
+    assert np.array_equal(view.to_meshio().point_data["temperature"], view.fields["temperature"])
+    pytest.importorskip("pyvista")
+    poly = view.to_pyvista()
+    assert poly.n_points == len(view.points) and poly.n_cells == len(view.triangles)
+    sizes = poly.compute_cell_sizes(length=False, volume=False)
+    assert sizes.cell_data["Area"].sum() == pytest.approx(1, rel=1e-3)
+
+
+def test_monitors_grow(run):
+    table = run.wait_for(lambda: run.monitors.get("health"), 30)
+    run.wait_for(lambda: table.rows >= 5, 30)
+    before = table["cycle"]
+    copy = before.copy()
+    run.wait_for(lambda: table.rows > len(before) + 100, 60)
+    assert np.array_equal(before, copy)
+    cycles = table["cycle"]
+    assert np.array_equal(np.diff(cycles), np.ones(len(cycles) - 1))
+    np.testing.assert_allclose(table["temperature.max"][: len(cycles)], 1 + 0.01 * cycles)
+    pandas = pytest.importorskip("pandas")
+    frame = run.monitors.to_pandas()
+    assert isinstance(frame, pandas.DataFrame) and "health.quality.min" in frame.columns
+    with pytest.raises(KeyError, match="quality"):
+        table["qality"]
+
+
+def test_an_order_is_given_forecast_and_taken_back(solver, run):
+    run.wait_for(lambda: run.features, 30)
+    forecast = run.forecast(SQUEEZE, timeout=60)
+    assert forecast.outcome == "applied" and forecast.min_scaled_jacobian > 0
+    order = run.order(SQUEEZE, schedule={"steps": 3})
+    assert order.wait(60) is order and order.status == "applied" and order.shape == (3, 3)
+    assert order.cycle_applied is not None
+    run.wait_for(lambda: run.status.cycle > order.cycle_applied + 4, 30)
+    assert solver.points[:, 2].max() == pytest.approx(0.8)
+    assert run.stack and run.orders[-1].id == order.id
+    run.undo().wait(60)
+    run.wait_for_cycle(run.status.cycle + 3, 30)
+    assert np.array_equal(solver.points, solver.reference)
+
+
+def test_an_order_that_folds_the_mesh_is_rejected(run):
+    run.wait_for(lambda: run.features, 30)
+    fold = [{"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, -1.5]}}]
+    assert run.forecast(fold, timeout=60).outcome == "rejected"
+    with pytest.raises(tombolo.RejectedError) as refused:
+        run.order(fold).wait(60)
+    assert refused.value.report["status"] == "rejected"
+    with pytest.raises(tombolo.RejectedError, match="tpo"):
+        run.order([{"translate": {"features": ["tpo"], "by": [0, 0, 1]}}]).wait(60)
+
+
+def test_a_misspelt_order_has_its_place(run, tmp_path):
+    with pytest.raises(tombolo.ConfigurationError, match=r"order:1:\d+: .*translat"):
+        run.order([{"translat": {}}])
+    file = tmp_path / "edits.json"
+    file.write_text('[\n {"translate": {"features": ["top"], "bye": [0, 0, 1]}}]')
+    with pytest.raises(tombolo.ConfigurationError, match=r"edits\.json:2:\d+: .*did you mean `by`"):
+        run.order(file)
+    with pytest.raises(tombolo.ConfigurationError):
+        run.order([{"translate": {"features": ["top"], "by": [0, 0, float("nan")]}}])
+
+
+def test_a_displacement_made_elsewhere_is_an_order(solver, run):
+    run.wait_for(lambda: run.features, 30)
+    surface = run.surface
+    assert np.array_equal(surface.points, solver.reference[surface.vertices])
+    assert set(surface.faces_of("top")) <= set(range(len(surface.offsets) - 1))
+    values = np.zeros_like(surface.points)
+    values[:, 0] = 0.05 * np.sin(np.pi * surface.points[:, 2])
+    run.order([{"displacement": {"vertices": surface.vertices, "values": values}}]).wait(60)
+    run.wait_for_cycle(run.status.cycle + 3, 30)
+    moved = solver.points[surface.vertices] - surface.points
+    np.testing.assert_allclose(moved, values, atol=1e-12)
+
+
+def test_commands_take_effect(solver, run):
+    command = run.set("heating", 3, timeout=30)
+    assert command.done and command.cycle is not None
+    run.wait_for_cycle(command.cycle + 2, 30)
+    assert solver.heating[-1] == 3 and run.parameters["heating"].value == 3
+    run.pause(timeout=30)
+    run.wait_for(lambda: run.status.paused, 30)
+    cycle = len(solver.heating)
+    time.sleep(0.1)
+    assert len(solver.heating) <= cycle + 1
+    run.resume(timeout=30)
+    run.wait_for_cycle(run.status.cycle + 2, 30)
+    with pytest.raises(tombolo.RejectedError, match="from 0 to 10"):
+        run.set("heating", 30, timeout=30)
+    with pytest.raises(tombolo.RejectedError, match="heating"):
+        run.set("heatng", 3, timeout=30)
+    with pytest.raises(tombolo.ConfigurationError, match="finite"):
+        run.set("heating", float("inf"))
+
+
+def test_pipelines_change_while_it_runs(run):
+    run.wait_for_cycle(2, 30)
+    cut = {"name": "cut", "stages": [{"slice": {"origin": [0.5, 0.5, 0.5], "normal": [1, 0, 0]}}, {"stream": {}}]}
+    run.change_pipelines({"set": [cut]}, timeout=30)
+    assert len(run.wait_for_view("cut", timeout=30).triangles)
+    with pytest.raises(tombolo.ConfigurationError, match="pipelines:1:"):
+        run.change_pipelines({"set": [{"nme": "x"}]})
+
+
+def test_events_are_iterated_and_called_with(run):
+    seen, called = [], threading.Event()
+    remove = run.on("monitor", lambda event: called.set())
+    run.on("monitor", lambda event: 1 / 0)
+    for event in run.events("monitor", "frame", timeout=30):
+        seen.append(event.kind)
+        if len(seen) > 10:
+            break
+    assert {"monitor", "frame"} >= set(seen)
+    assert called.wait(30)
+    remove()
+    with pytest.raises(tombolo.WaitError):
+        next(run.events("lost", timeout=0.3))
+
+
+def test_the_end_ends_every_wait(solver, run):
+    waits = []
+
+    def wait():
+        try:
+            run.wait_for(lambda: False)
+        except tombolo.EndedError as error:
+            waits.append(str(error))
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    run.wait_for_cycle(2, 30)
+    run.stop(timeout=30)
+    thread.join(30)
+    assert run.wait(30)["how"] == "stopped" and solver.stopped is not None
+    assert waits and "the run has ended" in waits[0]
+    assert [event.kind for event in run.events()] == ["ended"]
+    assert list(run.events("monitor")) == []
+    with pytest.raises(tombolo.TomboloError):
+        run.pause(timeout=30)
+    assert run.monitors["health"].rows
+
+
+def test_one_drives_and_others_watch(solver, run):
+    run.drive()
+    with tombolo.connect(solver.link) as other, pytest.raises(tombolo.NotDriverError):
+        other.pause(timeout=30)
+    with tombolo.connect(solver.adaptor.watching_link, watch=True) as watcher:
+        with pytest.raises(tombolo.NotDriverError, match="watch"):
+            watcher.pause()
+        assert watcher.wait_for_view("midplane", timeout=30).cycle >= 0
+
+
+def closes_at_once(server):
+    server.accept()[0].close()
+
+
+def test_links_that_lead_nowhere():
+    for link, text in (
+        ("127.0.0.1:7070", "expected http://HOST:PORT"),
+        ("http://127.0.0.1:1/?token=abc", "refused"),
+        ("http://nowhere.invalid/?token=abc", "nowhere.invalid"),
+    ):
+        with pytest.raises(tombolo.LinkError, match=text):
+            tombolo.connect(link)
+    assert issubclass(tombolo.LinkError, ConnectionError)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.listen()
+        threading.Thread(target=closes_at_once, args=(server,), daemon=True).start()
+        with pytest.raises(tombolo.LinkError):
+            tombolo.connect(f"http://127.0.0.1:{server.getsockname()[1]}/?token=abc")
+
+
+def test_a_wrong_token_is_told(solver):
+    with pytest.raises(tombolo.LinkError, match="401"):
+        tombolo.connect(solver.link[:-4] + "0000")
+
+
+def test_a_link_is_found_in_the_file_that_the_run_writes(solver, tmp_path):
+    solver.adaptor._run
+    file = tmp_path / "run.link"
+    file.write_text(f"driving {solver.link}\n")
+    with tombolo.connect(file) as run:
+        assert run.status.cycle >= 0
+    file.write_text("nothing")
+    with pytest.raises(tombolo.LinkError, match="without a link"):
+        tombolo.connect(file)
+
+
+class Relay:
+    """Passes bytes on to a server until it is cut."""
+
+    def __init__(self, port):
+        self.port, self.pairs = port, []
+        self.server = socket.create_server(("127.0.0.1", 0))
+        threading.Thread(target=self.serve, daemon=True).start()
+
+    def serve(self):
+        while True:
+            try:
+                client = self.server.accept()[0]
+            except OSError:
+                return
+            other = socket.create_connection(("127.0.0.1", self.port))
+            self.pairs.append((client, other))
+            for one, two in ((client, other), (other, client)):
+                threading.Thread(target=self.copy, args=(one, two), daemon=True).start()
+
+    @staticmethod
+    def copy(one, two):
+        try:
+            while block := one.recv(65536):
+                two.sendall(block)
+        except OSError:
+            pass
+
+    def cut(self):
+        pairs, self.pairs = self.pairs, []
+        for one in (one for pair in pairs for one in pair):
+            one.shutdown(socket.SHUT_RDWR)
+            one.close()
+
+
+def test_a_lost_connection_is_made_again(solver):
+    port = int(solver.link.split(":")[2].split("/")[0])
+    relay = Relay(port)
+    link = solver.link.replace(f":{port}/", f":{relay.server.getsockname()[1]}/")
+    with tombolo.connect(link) as run:
+        run.wait_for(lambda: run.features, 30)
+        run.drive()
+        lost = run.events("lost", timeout=30)
+        relay.cut()
+        assert next(lost).kind == "lost"
+        run.order(SQUEEZE).wait(60)
+        assert run.drives
+        view = run.wait_for_view("midplane", timeout=30)
+        run.wait_for_view("midplane", after=view.cycle, timeout=30)
+    relay.server.close()
+
+
+def test_a_run_in_async(solver, run):
+    async def work():
+        aio = run.aio
+        await aio.wait_for(lambda: run.features, 30)
+        forecast, status = await asyncio.gather(aio.forecast(SQUEEZE, timeout=60), aio.wait_for_cycle(3, 30))
+        assert forecast.outcome == "applied" and status.cycle >= 3
+        order = await aio.order(SQUEEZE)
+        await order.wait(60)
+        assert order.status == "applied"
+        await aio.set("heating", 2, timeout=30)
+        with pytest.raises(tombolo.WaitError):
+            await aio.wait_for(lambda: False, 0.2)
+        task = asyncio.create_task(aio.wait_for(lambda: False))
+        await asyncio.sleep(0.05)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        async for event in aio.events("monitor"):
+            assert event.data["pipeline"] == "health"
+            break
+        await (await aio.undo()).wait(60)
+
+    asyncio.run(work())
+
+
+def test_ctrl_c_ends_a_wait(solver):
+    program = f"""
+import tombolo
+run = tombolo.connect({solver.link!r}, watch=True)
+print("waiting", flush=True)
+try:
+    run.wait_for(lambda: False)
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+"""
+    process = subprocess.Popen([sys.executable, "-X", "dev", "-c", program], stdout=-1, stderr=-1, text=True)
+    assert process.stdout.readline() == "waiting\n"
+    time.sleep(0.3)
+    process.send_signal(signal.SIGINT)
+    out, error = process.communicate(timeout=20)
+    assert out == "interrupted\n" and process.returncode == 0, error
+
+
+def test_a_program_that_forgets_to_close_ends(solver):
+    program = f"import tombolo\nrun = tombolo.connect({solver.link!r}, watch=True)\nrun.on(None, lambda event: None)"
+    done = subprocess.run([sys.executable, "-X", "dev", "-c", program], timeout=30, capture_output=True, check=False)
+    assert done.returncode == 0 and done.stderr == b"", done.stderr.decode()
+
+
+def test_a_closed_run_and_a_fork_are_told(solver):
+    run = tombolo.connect(solver.link)
+    run.close()
+    run.close()
+    with pytest.raises(tombolo.CallError, match="closed"):
+        run.order(SQUEEZE)
+    with tombolo.connect(solver.link) as run:
+        child = os.fork()
+        if child == 0:
+            try:
+                run.pause()
+            except tombolo.CallError:
+                os._exit(7)
+            os._exit(1)
+        assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+
+
+def test_a_run_shows_itself_in_a_notebook(run):
+    assert run.link.split("?")[0] in run._repr_html_()
+
+
+def test_a_monitor_is_plotted(run):
+    from tombolo.jupyter import Plot, _svg
+
+    run.wait_for(lambda: "health" in run.monitors and run.monitors["health"].rows > 5, 30)
+    root = ElementTree.fromstring(Plot(run, "health", "temperature.max")._repr_svg_())
+    (line,) = root.iter("{http://www.w3.org/2000/svg}polyline")
+    heights = [float(pair.split(",")[1]) for pair in line.get("points").split()]
+    assert len(heights) > 5 and heights == sorted(heights, reverse=True)
+    parted = ElementTree.fromstring(_svg("t", np.arange(5), np.array([1, 2, np.nan, 3, 4])))
+    assert len(list(parted.iter("{http://www.w3.org/2000/svg}polyline"))) == 2
+    assert "nothing measured" in _svg("t", np.arange(2), np.full(2, np.nan))
+
+
+def test_a_run_of_frames_only_keeps_the_newest(tmp_path):
+    """A slow reader is shown the newest frame, not each one."""
+    solver = Solver(CONFIGURATION, step=0.0, output=tmp_path)
+    try:
+        with tombolo.connect(solver.link) as run:
+            run.wait_for_cycle(300, 60)
+            view = run.wait_for_view("midplane", after=200, timeout=60)
+            assert view.cycle > 200
+    finally:
+        solver.close()

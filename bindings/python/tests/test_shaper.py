@@ -1,0 +1,185 @@
+"""Shapes without a run, against the program `tombolo` and against closed forms."""
+
+import json
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+import tombolo
+from conftest import SQUEEZE, box, ends
+
+meshio = pytest.importorskip("meshio")
+POINTS, TETS = box(4)
+FACES = ends(POINTS, TETS)
+
+
+def shaper_of(points=POINTS, tets=TETS, faces=FACES):
+    return tombolo.Shaper(points, {"tetra": tets}, faces)
+
+
+def at(shaper, height):
+    """The name of the feature that lies at a height."""
+    (name,) = (it["name"] for it in shaper.features if all(corner[2] == height for corner in it["bounds"]))
+    return name
+
+
+def bend(shaper):
+    parts = {"features": [at(shaper, 1)], "fixed": [at(shaper, 0)]}
+    return [
+        {"translate": {**parts, "by": [0.1, 0, -0.2], "harmonic_order": 2}},
+        {"rotate": {**parts, "axis": [0, 0, 1], "degrees": 10}},
+    ]
+
+
+def program(*arguments):
+    done = subprocess.run(
+        [sys.executable, "-m", "tombolo", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    return done
+
+
+def edits_of(tmp_path, edits):
+    file = tmp_path / "edits.json"
+    file.write_text(json.dumps(edits))
+    return file
+
+
+def mesh_file(tmp_path):
+    file = tmp_path / "box.vtu"
+    meshio.Mesh(POINTS, [("tetra", TETS)]).write(file, binary=True)
+    return file
+
+
+def test_shapes_are_those_of_the_program_to_the_bit(tmp_path):
+    shaper = shaper_of(faces=None)
+    edits = bend(shaper)
+    file = edits_of(tmp_path, edits)
+    done = program(
+        "edit",
+        "--mesh",
+        mesh_file(tmp_path),
+        "--edits",
+        file,
+        "--out",
+        tmp_path / "out.vtu",
+        "--displacement",
+        tmp_path / "moved.txt",
+        "--json",
+    )
+    assert done.returncode == 0, done.stderr
+    outcome = json.loads(done.stdout)
+    shape = shaper.shape(edits)
+    assert np.array_equal(shape.points, meshio.read(tmp_path / "out.vtu").points)
+    assert shape.quality == outcome["after"] and shaper.quality() == outcome["before"]
+    assert (shape.fraction, shape.details["iterations"]) == (outcome["fraction"], outcome["iterations"])
+    assert np.array_equal(shaper.shape(file).points, shape.points)
+    forecast = json.loads(
+        program("edit", "--mesh", mesh_file(tmp_path), "--edits", file, "--forecast", "--json").stdout
+    )
+    forecast.pop("seconds")
+    assert {**shaper.forecast(edits), "seconds": 0} == {**forecast, "seconds": 0}
+    # The displacement is taken again.
+    moved = shaper.displacement(edits)
+    again = [{"displacement": {"vertices": shaper.surface.vertices, "values": moved}}]
+    assert np.array_equal(shaper.shape(again).points, shape.points)
+    assert np.array_equal(shaper.shape([{"displacement": {"file": str(tmp_path / "moved.txt")}}]).points, shape.points)
+
+
+def test_features_and_skeleton_are_those_of_the_program(tmp_path):
+    for angle in (None, 30.0):
+        told = program("features", "--mesh", mesh_file(tmp_path), "--json", *(["--angle", angle] if angle else []))
+        assert tombolo.Shaper(POINTS, {"tetra": TETS}, angle=angle).features == json.loads(told.stdout)["features"]
+    points = POINTS * [1, 1, 5]
+    meshio.Mesh(points, [("tetra", TETS)]).write(tmp_path / "long.vtu")
+    done = program("skeleton", "--mesh", tmp_path / "long.vtu", "--out", tmp_path / "bones.vtu", "--json")
+    assert done.returncode == 0, done.stderr
+    skeleton, summary = tombolo.Shaper(points, {"tetra": TETS}).skeleton(), json.loads(done.stdout)
+    assert (len(skeleton.nodes), len(skeleton.curves)) == (summary["nodes"], summary["curves"])
+    bones = program("skeleton", "--mesh", tmp_path / "long.vtu", "--out", tmp_path / "bones.vtp")
+    assert bones.returncode == 0
+    pyvista = pytest.importorskip("pyvista")
+    read = pyvista.read(tmp_path / "bones.vtp")
+    assert np.array_equal(np.asarray(read.points, float), skeleton.nodes)
+    assert np.array_equal(read.point_data["radius"], skeleton.radii)
+
+
+def test_meshes_of_others_are_taken(tmp_path):
+    shaper = shaper_of(faces=None)
+    edits = bend(shaper)
+    expected = shaper.shape(edits).points
+    surface = np.array([[0, 1, 2]])
+    of_meshio = meshio.Mesh(POINTS, [("tetra", TETS[:50]), ("triangle", surface), ("tetra", TETS[50:])])
+    assert np.array_equal(tombolo.Shaper(of_meshio).shape(edits).points, expected)
+    pyvista = pytest.importorskip("pyvista")
+    grid = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: TETS}, POINTS)
+    shaper = tombolo.Shaper(grid)
+    assert np.array_equal(shaper.shape(edits).points, expected)
+    assert shaper.surface.to_pyvista().area == pytest.approx(6)
+    # The scaled Jacobian that VTK measures.
+    measured = grid.cell_quality("scaled_jacobian").cell_data["scaled_jacobian"]
+    np.testing.assert_allclose(shaper.scaled_jacobians(), measured, atol=1e-12)
+    sphere = pyvista.Sphere()
+    turned = tombolo.Shaper(sphere, angle=170).shape([{"displacement": {"vertices": [0], "values": [[0, 0, 0.05]]}}])
+    assert turned.points.shape == (sphere.n_points, 3)
+
+
+def test_what_would_break_the_mesh_is_rejected_and_forecast():
+    shaper = shaper_of()
+    fold = [{"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, -1.5]}}]
+    with pytest.raises(tombolo.RejectedError) as refused:
+        shaper.shape(fold, guard={"otherwise": "reject"})
+    assert "fraction" in refused.value.report
+    assert shaper.forecast(fold, guard={"otherwise": "reject"}).outcome == "rejected"
+    clamped = shaper.shape(fold, guard={"otherwise": "clamp"})
+    assert 0 < clamped.fraction < 1 and clamped.quality["inverted"] == 0
+    with pytest.raises(tombolo.ConfigurationError, match=r"order:1:\d+: .*did you mean `translate`"):
+        shaper.shape([{"translat": {}}])
+    with pytest.raises(tombolo.ConfigurationError, match="undo"):
+        shaper.shape({"undo": 1})
+    with pytest.raises(tombolo.TomboloError, match="top"):
+        shaper.displacement([{"translate": {"features": ["tpo"], "by": [0, 0, 1]}}])
+
+
+def test_what_is_no_mesh_is_told():
+    for given, text in (
+        ((POINTS, {"tetra": TETS + 1}), "125"),
+        ((POINTS, {"line": TETS[:, :2]}), ""),
+        ((POINTS * np.inf, {"tetra": TETS}), ""),
+        ((3,), "expected a tombolo.Mesh"),
+    ):
+        with pytest.raises(tombolo.MeshError, match=text):
+            tombolo.Shaper(*given)
+    shaper = tombolo.Shaper(POINTS, {"tetra": TETS})
+    with pytest.raises(tombolo.MeshError, match="one for each vertex"):
+        shaper.quality(POINTS[:-1])
+    with pytest.raises(tombolo.MeshError, match="points"):
+        shaper.quality("nonsense")
+
+
+def test_long_work_tells_how_long_and_is_given_up():
+    points, tets = box(24)
+    shaper, seconds = shaper_of(points, tets, ends(points, tets)), []
+    turn = [{"rotate": {"features": ["top"], "fixed": ["bottom"], "axis": [0, 0, 1], "degrees": 80}}]
+
+    def progress(elapsed):
+        seconds.append(elapsed)
+        if len(seconds) == 2:
+            raise KeyboardInterrupt
+
+    begun = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        shaper.shape(turn, progress=progress)
+    assert seconds == sorted(seconds)
+    threading.Timer(0.3, shaper.cancel).start()
+    with pytest.raises(tombolo.RejectedError, match=r"(?i)cancel|given up"):
+        shaper.shape(turn)
+    assert time.monotonic() - begun < 30
+    # It can be used again.
+    assert shaper.displacement(SQUEEZE).shape == shaper.surface.points.shape
