@@ -3,54 +3,29 @@
 //! The library that `cargo test` has built is put beside the package's sources, where Python finds it, so that nothing is
 //! compiled twice.
 
-use std::env;
-use std::ffi::OsString;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
-
-fn python() -> PathBuf {
-    root().join(".venv/bin/python")
-}
+use tombolo_tests::{library, project, succeed};
 
 /// Puts the library beside the package's sources; returns the folder that they are in.
 fn package() -> io::Result<PathBuf> {
-    let test = env::current_exe()?;
-    let built = test.ancestors().nth(2).ok_or(io::ErrorKind::NotFound)?.join("lib_native.so");
     let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("python");
     // Replaced in one piece: another Python may have it loaded.
-    let (new, place) =
-        (sources.join("tombolo/_native.new"), sources.join("tombolo/_native.abi3.so"));
-    fs::copy(built, &new)?;
-    fs::rename(new, place)?;
+    let new = sources.join(format!("tombolo/_native.{:?}", std::thread::current().id()));
+    fs::copy(library("lib_native.so"), &new)?;
+    fs::rename(new, sources.join("tombolo/_native.abi3.so"))?;
     Ok(sources)
-}
-
-fn run(arguments: &[&str]) -> io::Result<Output> {
-    let mut path = OsString::from(package()?);
-    if let Some(others) = env::var_os("PYTHONPATH") {
-        path.push(":");
-        path.push(others);
-    }
-    Command::new(python())
-        .args(["-X", "dev"])
-        .args(arguments)
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .env("PYTHONPATH", path)
-        .output()
 }
 
 #[track_caller]
 fn passes(arguments: &[&str]) {
-    assert!(python().is_file(), "there is no {}; scripts/setup makes it", python().display());
-    let Output { status, stdout, stderr } = run(arguments).expect("Python runs");
-    let [stdout, stderr] = [stdout, stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
-    assert!(status.success(), "{}\n{stdout}\n{stderr}", arguments.join(" "));
+    let package = package().expect("the library lies beside this test");
+    let mut python = Command::new(project().join(".venv/bin/python"));
+    python.args(["-X", "dev"]).args(arguments).current_dir(env!("CARGO_MANIFEST_DIR"));
+    succeed(python.env("PYTHONPATH", package));
 }
 
 #[test]
