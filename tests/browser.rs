@@ -1,10 +1,29 @@
-//! The demo in a headless browser: frames change, the throat is pinched, the order is reported
-//! applied, undo brings it back.
+//! The viewer in a headless browser: the demo, a shape changed by two people, and the end of a run.
 
 use std::path::Path;
 use std::process::Command;
 
-use tombolo_tests::{Run, project};
+use serde_json::json;
+use tombolo_tests::{Run, Small, project};
+
+/// Runs a script of `tests/browser` on a run, and panics with what both said where it fails.
+fn drive(script: &str, run: &mut Run) {
+    let link = run.link();
+    let output = Command::new("node")
+        .current_dir(project())
+        .env("TOMBOLO_URL", link.url())
+        .env("TOMBOLO_PID", run.process().to_string())
+        .arg(Path::new("tests/browser").join(script))
+        .output()
+        .expect("node is installed (scripts/setup)");
+    assert!(
+        output.status.success(),
+        "{}\n{}\nflow said:\n{}",
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr),
+        run.text()
+    );
+}
 
 #[test]
 fn the_demo_in_a_browser() {
@@ -19,19 +38,34 @@ fn the_demo_in_a_browser() {
     }
     let mut run =
         Run::flow(&["--case", "examples/flow/cases/nozzle.json", "--listen", "127.0.0.1:0"]);
-    let link = run.link();
-    let output = Command::new("node")
-        .current_dir(project())
-        .env("TOMBOLO_URL", link.url())
-        .arg("tests/browser/demo.mjs")
-        .output()
-        .expect("node is installed (scripts/setup)");
-    assert!(
-        output.status.success(),
-        "{}\n{}\nflow said:\n{}",
-        String::from_utf8_lossy(&output.stdout),
-        String::from_utf8_lossy(&output.stderr),
-        run.text()
-    );
+    drive("demo.mjs", &mut run);
     assert!(run.is_running(), "the run ended:\n{}", run.text());
+}
+
+/// A small nozzle that is streamed, with these options besides.
+fn small(options: &[&str]) -> (Small, Run) {
+    let small = Small::new();
+    small.write(
+        "pipelines.json",
+        &json!({"version": 1, "stream": {}, "pipelines": [
+            {"name": "surface", "every": {"steps": 2}, "stages": [{"surface": {}}, {"stream": {}}]},
+            {"name": "shape", "on": "order", "stages": [{"deform": {}}, {"schedule": {"steps": 2}}]}
+        ]}),
+    );
+    let mut arguments = vec!["--pipelines", "@pipelines.json", "--listen", "127.0.0.1:0"];
+    arguments.extend(options);
+    let run = Run::flow(&small.arguments(&arguments));
+    (small, run)
+}
+
+#[test]
+fn two_people_change_a_shape() {
+    let (_small, mut run) = small(&[]);
+    drive("shape.mjs", &mut run);
+}
+
+#[test]
+fn the_end_of_a_run_in_a_browser() {
+    let (_small, mut run) = small(&["--steps", "1500"]);
+    drive("ended.mjs", &mut run);
 }

@@ -15,6 +15,7 @@ mod timing;
 pub use stopper::Stopper;
 
 use std::{
+    collections::BTreeMap,
     net::SocketAddr,
     path::Path,
     path::PathBuf,
@@ -41,6 +42,7 @@ use tombolo_pipelines::{
 
 use crate::{
     changes::Changes,
+    condition::Condition,
     error::{ExecuteError, FinalizeError, InitializeError},
     meeting,
     report::Report,
@@ -89,6 +91,8 @@ pub struct Adaptor {
     /// The step of the last call.
     moment: Moment,
     told: Told,
+    /// What the features are to the flow, by name.
+    conditions: BTreeMap<String, Condition>,
     paused: bool,
     stopped: bool,
     /// Whether the run is carried out as a journal says.

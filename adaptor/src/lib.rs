@@ -46,6 +46,7 @@
 mod adaptor;
 mod changes;
 pub mod client;
+mod condition;
 mod error;
 pub mod foreign;
 mod journal;
@@ -68,6 +69,7 @@ mod watch;
 mod writer;
 
 pub use adaptor::{Adaptor, Stopper};
+pub use condition::Condition;
 pub use error::{ExecuteError, FinalizeError, InitializeError};
 pub use journal::JournalError;
 pub use report::{MonitorReport, PipelineReport, Report, Spread};

@@ -1,5 +1,6 @@
 //! What a run is set up with.
 
+use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,7 +14,7 @@ use tombolo_pipelines::{
     limits::{DOCUMENT, WAITING_BYTES},
 };
 
-use crate::steering::Parameter;
+use crate::{condition::Condition, steering::Parameter};
 
 /// Everything that a run is set up with.
 #[derive(Clone)]
@@ -27,6 +28,9 @@ pub struct Settings {
     pub solvers: Arc<dyn Solvers>,
     /// The numbers of the solver that can be steered.
     pub parameters: Vec<Parameter>,
+    /// The conditions on the features of the mesh, by the features' names. Viewers hold inflow and
+    /// outflow still until somebody wants otherwise. A feature that is not named may be anything.
+    pub conditions: BTreeMap<String, Condition>,
     /// Commands known beforehand; read a file of them, or a journal, with
     /// [`language::check_orders`](tombolo_pipelines::language::check_orders). They take effect at
     /// their cycle exactly: the solver waits for their plans.
@@ -67,6 +71,13 @@ impl Settings {
     ) -> Self {
         let (minimum, maximum) = range.into_inner();
         self.parameters.push(Parameter { name: name.into(), value, minimum, maximum });
+        self
+    }
+
+    /// Says which condition the solver imposes on a feature of the mesh.
+    #[must_use]
+    pub fn condition(mut self, feature: impl Into<String>, condition: Condition) -> Self {
+        self.conditions.insert(feature.into(), condition);
         self
     }
 
@@ -123,6 +134,7 @@ impl Default for Settings {
             communicator: Arc::new(Solo),
             solvers: Arc::new(BuiltIn),
             parameters: Vec::new(),
+            conditions: BTreeMap::new(),
             orders: Vec::new(),
             replay: None,
             output: PathBuf::from("."),

@@ -13,7 +13,7 @@ use common::{LINK_TO_ALL, PATIENCE, Solver, Viewer, bits, config, socket_url, sq
 use serde_json::{Value, json};
 use tokio_tungstenite::tungstenite::{Error, Message};
 use tombolo::{
-    Adaptor, InitializeError, OrderStatus, Parameter, Settings,
+    Adaptor, Condition, InitializeError, OrderStatus, Parameter, Settings,
     pipelines::{
         encode::{Decoder, decode_surface},
         language::{self, parse_journal, parse_orders},
@@ -118,6 +118,44 @@ fn a_late_viewer_needs_one_message() {
     assert!(late.frames[1..].iter().all(|frame| decoder.decode(frame).is_ok()));
     let mut decoder = Decoder::new();
     assert!(early.frames.iter().all(|frame| decoder.decode(frame).is_ok()));
+    solver.finish();
+}
+
+#[test]
+fn viewers_know_what_the_features_are_to_the_flow_and_what_can_be_taken_back() {
+    let settings = Settings { config: config(LINK_TO_ALL), ..Settings::default() }
+        .condition("x-min", Condition::Inflow)
+        .condition("x-max", Condition::Outflow)
+        .condition("z-mox", Condition::Wall);
+    let mut solver = Solver::new(settings);
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    solver.step();
+    let error = viewer.wait_for("error", |error| error["id"].is_null());
+    let message = error["message"].as_str().unwrap();
+    assert!(message.contains("no feature 'z-mox' (did you mean 'z-max'?)"), "{message}");
+    let hello = viewer.wait_for("hello", |hello| hello["features"][0].is_object());
+    let conditions: Vec<(&Value, &Value)> = hello["features"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|feature| (&feature["name"], &feature["condition"]))
+        .collect();
+    assert_eq!(
+        conditions[..3],
+        [
+            (&json!("x-min"), &json!("inflow")),
+            (&json!("x-max"), &json!("outflow")),
+            (&json!("y-min"), &Value::Null)
+        ]
+    );
+    assert_eq!(hello["undoable"], 0);
+    viewer.send(&json!({"id": "squeeze", "order": squeeze(0.1)}));
+    solver.step_until_told(&mut viewer, "order", |order| order["status"] == "applied");
+    viewer.send(&json!({"id": "clear", "order": {"stack": []}}));
+    solver.step_until_told(&mut viewer, "hello", |hello| {
+        hello["stack"] == json!([]) && hello["undoable"] == 2
+    });
     solver.finish();
 }
 

@@ -26,13 +26,16 @@ use crate::number::Number;
 pub struct Schedule {
     /// How many shapes lie between the present one (not counted) and the new one (counted). At
     /// least 1.
-    #[schemars(range(max = SHAPES.most))]
+    #[schemars(range(max = SHAPES.most), extend("x-label" = "shapes"))]
     pub steps: NonZeroU32,
     /// The distance between one shape and the next: solver steps, or simulated time.
+    #[schemars(extend("x-label" = "one every"))]
     pub every: Every,
     /// How far apart the shapes lie.
+    #[schemars(extend("x-label" = "pace", "x-advanced" = true))]
     pub ease: Ease,
     /// How the mesh goes from one shape to the next.
+    #[schemars(extend("x-label" = "between shapes", "x-advanced" = true))]
     pub motion: Motion,
 }
 

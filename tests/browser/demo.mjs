@@ -206,7 +206,7 @@ const steps = [
     await picture("picked");
   }],
   ["a mistake in the form is answered in words", async () => {
-    await page.selectOption("#action", { label: "scale direction" });
+    await page.selectOption("#action", "scale_direction");
     await page.fill('.object:not([hidden]) input[aria-label="factors z"]', "half");
     await page.click("#apply");
     const problem = await page.locator("#problem").innerText();
@@ -270,7 +270,7 @@ const steps = [
     await picture("preview-dragged");
     await page.click("#cancel");
     check((await look()).preview.state === "none" && (await page.locator("#preview").isHidden()), "the preview is still there after Cancel");
-    await page.selectOption("#action", { label: "scale direction" });
+    await page.selectOption("#action", "scale_direction");
     await page.click('[data-camera="reset"]');
   }],
   ["the pinch is applied and the throat narrows", async () => {
@@ -363,7 +363,7 @@ const steps = [
     await page.click("#cancel");
     await page.click("#skeleton");
     check((await page.evaluate(() => window.tombolo.skeleton)) === null, "the skeleton is still there");
-    await page.selectOption("#action", { label: "scale direction" });
+    await page.selectOption("#action", "scale_direction");
   }],
   ["pause holds the run, resume lets it go on", async () => {
     await page.click("#pause");

@@ -116,7 +116,7 @@ function takeMessage(message: ServerMessage): void {
   bar.alive();
   switch (message.kind) {
     case "hello": return store.dispatch({ type: "hello", hello: message.body });
-    case "status": return store.dispatch({ type: "status", status: message.body });
+    case "status": return store.dispatch({ type: "status", status: message.body, at: performance.now() });
     case "order": return store.dispatch({ type: "order", status: message.body });
     case "forecast": return forecasts.answer(message.body);
     case "monitor": return takeMonitor(message.body);
@@ -146,7 +146,7 @@ function takeMonitor(monitor: Monitor): void {
 
 function takeFrame(frame: Frame): void {
   if (frame.kind === "topology") scene.setTopology(frame);
-  else if (scene.setData(frame)) store.dispatch({ type: "frame", cycle: frame.cycle });
+  else if (scene.setData(frame)) store.dispatch({ type: "frame", view: frame.view, cycle: frame.cycle });
 }
 
 // A viewer that was here before comes back under its name.

@@ -31,7 +31,7 @@ export function page(hello: Partial<Hello> = {}) {
   const greet = (more: Partial<Hello>): void => store.dispatch({ type: "hello", hello: { ...HELLO, ...hello, ...more } });
   store.dispatch({ type: "connection", state: "connected", explanation: "" });
   greet({});
-  store.dispatch({ type: "status", status: STATUS });
+  store.dispatch({ type: "status", status: STATUS, at: 0 });
   store.dispatch({ type: "schema", form: orderForm(schema), settings: { schedule: defaults.schedule } });
   /** The orders that were sent, without their schedule. */
   const orders = (): Json[] => sent.flatMap(({ order }) => {

@@ -1,10 +1,15 @@
 //! What viewers are told of a run besides its frames.
 
+use std::collections::BTreeMap;
+
 use serde_json::{Value, json};
-use tombolo_deform::{features::FeatureSize, surface::Surface};
+use tombolo_deform::{features::FeatureSize, names::nearest, surface::Surface};
 
 use super::{Adaptor, SteeredMesh};
-use crate::steering::{Defaults, EditStack};
+use crate::{
+    condition::Condition,
+    steering::{Defaults, EditStack},
+};
 
 impl Adaptor {
     /// Brings what `hello` tells up to date.
@@ -27,6 +32,7 @@ impl Adaptor {
             "surface": self.told.surface,
             "fields": list(&self.told.fields),
             "parameters": self.parameters.all(),
+            "undoable": stack.orders(),
             "defaults": {"deform": deform, "guard": guard, "schedule": schedule},
         });
         if let Value::Object(description) = description {
@@ -51,8 +57,34 @@ impl Adaptor {
     }
 }
 
-/// The features of a surface: names, sizes and bounds.
-pub(super) fn features(surface: &Surface) -> Value {
-    let described = |FeatureSize { name, faces, vertices, bounds, .. }: FeatureSize| json!({"name": name, "faces": faces, "vertices": vertices, "bounds": bounds});
+/// The features of a surface: names, sizes, bounds, and the conditions that the solver imposes.
+pub(super) fn features(surface: &Surface, conditions: &BTreeMap<String, Condition>) -> Value {
+    let described = |FeatureSize { name, faces, vertices, bounds, .. }: FeatureSize| {
+        let condition = conditions.get(&name);
+        json!({"name": name, "faces": faces, "vertices": vertices, "bounds": bounds, "condition": condition})
+    };
     surface.feature_sizes().into_iter().map(described).collect()
+}
+
+/// What is said of conditions on features that a surface does not have; `None` for none.
+pub(super) fn unknown_conditions(
+    surface: &Surface,
+    conditions: &BTreeMap<String, Condition>,
+) -> Option<String> {
+    let known = surface.features().names();
+    let unknown: Vec<String> = conditions
+        .keys()
+        .filter(|name| !known.contains(name))
+        .map(|name| match nearest(name, known.iter().map(String::as_str)) {
+            Some(near) => format!("'{name}' (did you mean '{near}'?)"),
+            None => format!("'{name}'"),
+        })
+        .collect();
+    (!unknown.is_empty()).then(|| {
+        format!(
+            "conditions: the mesh has no feature {}; its features are {}",
+            unknown.join(", "),
+            known.join(", ")
+        )
+    })
 }

@@ -29,8 +29,17 @@ use crate::{
 impl Adaptor {
     /// Sets a run up on this rank: what is wrong here alone is not agreed upon yet.
     pub(super) fn set_up(settings: Settings) -> Result<Self, InitializeError> {
-        let Settings { config, communicator, solvers, parameters, orders, replay, output, file } =
-            settings;
+        let Settings {
+            config,
+            communicator,
+            solvers,
+            parameters,
+            conditions,
+            orders,
+            replay,
+            output,
+            file,
+        } = settings;
         // A configuration built in Rust is held to the same rules as one read from a file.
         Problems::none(config.problems()).map_err(InitializeError::Configuration)?;
         Problems::none(orders.problems()).map_err(InitializeError::Orders)?;
@@ -116,6 +125,7 @@ impl Adaptor {
             lent: Lent::default(),
             moment: Moment::default(),
             told: Told::default(),
+            conditions,
             paused: false,
             stopped: false,
             is_replay,

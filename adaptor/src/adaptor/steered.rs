@@ -13,7 +13,10 @@ use tombolo_deform::{
 };
 use tombolo_pipelines::extract::{Channel, ChannelError};
 
-use super::{Adaptor, description::features};
+use super::{
+    Adaptor,
+    description::{features, unknown_conditions},
+};
 use crate::{
     error::ExecuteError,
     steering::{Steerer, clock},
@@ -104,7 +107,10 @@ impl Adaptor {
         self.told.channel = channel.name.to_owned();
         self.told.fields = fields.collect();
         if let SteeredMesh::Steered(steerer, Some(surface)) = &self.mesh {
-            self.told.features = features(surface);
+            self.told.features = features(surface, &self.conditions);
+            if let Some(unknown) = unknown_conditions(surface, &self.conditions) {
+                self.complain(&unknown);
+            }
             if let Some(hub) = &self.hub {
                 if let Some(forecaster) = steerer.forecaster() {
                     let _ = self.forecaster.set(forecaster);

@@ -41,6 +41,8 @@ pub(crate) struct Rejection {
     pub(crate) min_scaled_jacobian: Option<f64>,
     /// The fraction that would have passed.
     pub(crate) fraction: Option<f64>,
+    /// The place at which it failed.
+    pub(crate) place: Option<Vector>,
     pub(crate) seconds: ShapeSeconds,
     /// Whether it was given up, of which nothing follows for the next such order.
     pub(crate) is_cancelled: bool,
@@ -52,6 +54,7 @@ impl<T: ToString> From<T> for Rejection {
             reason: reason.to_string(),
             min_scaled_jacobian: None,
             fraction: None,
+            place: None,
             seconds: ShapeSeconds::default(),
             is_cancelled: false,
         }
@@ -64,7 +67,8 @@ impl Rejection {
         let (min_scaled_jacobian, fraction) =
             (refused.min_scaled_jacobian(), refused.feasible_fraction());
         let is_cancelled = refused.is_cancelled();
-        Self { min_scaled_jacobian, fraction, is_cancelled, ..Self::from(reason) }
+        let place = refused.place();
+        Self { min_scaled_jacobian, fraction, place, is_cancelled, ..Self::from(reason) }
     }
 }
 
@@ -154,8 +158,8 @@ impl Planner {
     pub(crate) fn forecast(&mut self, asked: &PlanRequest) -> Forecast {
         match self.plan(asked) {
             Ok(plan) => self.shaper.forecast_of(&plan),
-            Err(Rejection { reason, min_scaled_jacobian, fraction, seconds, .. }) => {
-                Forecast::rejected(reason, fraction, min_scaled_jacobian, seconds)
+            Err(Rejection { reason, min_scaled_jacobian, fraction, place, seconds, .. }) => {
+                Forecast::rejected(reason, fraction, min_scaled_jacobian, seconds).at(place)
             }
         }
     }

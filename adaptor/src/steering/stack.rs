@@ -95,6 +95,11 @@ impl EditStack {
         self
     }
 
+    /// How many orders made it: so many can be taken back.
+    pub(crate) fn orders(&self) -> usize {
+        self.entries.len()
+    }
+
     /// The edits, the oldest first.
     pub(crate) fn edits(&self) -> Vec<Edit> {
         self.present().cloned().collect()

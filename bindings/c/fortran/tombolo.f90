@@ -29,6 +29,7 @@ module tombolo
 
   integer(c_int), parameter, public :: TOMBOLO_OK = 0, TOMBOLO_WRONG_CALL = 1, TOMBOLO_INVALID = 100, TOMBOLO_FAILED = 102
   integer(c_int), parameter, public :: TOMBOLO_VERTEX = 0, TOMBOLO_CELL = 1
+  integer(c_int), parameter, public :: TOMBOLO_INFLOW = 1, TOMBOLO_OUTFLOW = 2, TOMBOLO_WALL = 3
   integer(c_int), parameter, public :: TOMBOLO_POINT = 1, TOMBOLO_LINE = 3, TOMBOLO_TRIANGLE = 5, TOMBOLO_QUAD = 9, &
     TOMBOLO_TETRA = 10, TOMBOLO_HEXAHEDRON = 12, TOMBOLO_WEDGE = 13, TOMBOLO_PYRAMID = 14
   integer(c_int), parameter, public :: TOMBOLO_LOG_OFF = 0, TOMBOLO_LOG_ERROR = 1, TOMBOLO_LOG_WARNING = 2, &
@@ -71,7 +72,7 @@ module tombolo
 
   public :: tombolo_version, tombolo_message, tombolo_log
   public :: tombolo_open, tombolo_configure, tombolo_orders, tombolo_orders_file, tombolo_output, tombolo_parameter
-  public :: tombolo_start, tombolo_link, tombolo_finalize, tombolo_close, tombolo_report
+  public :: tombolo_condition, tombolo_start, tombolo_link, tombolo_finalize, tombolo_close, tombolo_report
   public :: tombolo_points, tombolo_cells, tombolo_mixed_cells, tombolo_point_cells, tombolo_ghost_cells
   public :: tombolo_faces, tombolo_feature, tombolo_global_vertices, tombolo_global_cells, tombolo_field
   public :: tombolo_execute, tombolo_coordinates, tombolo_displacement, tombolo_velocity
@@ -182,6 +183,13 @@ module tombolo
       real(c_double), value :: value
       real(c_double), value :: minimum
       real(c_double), value :: maximum
+      integer(c_int) :: status
+    end function
+    function c_condition(run, feature, condition) bind(C, name="tombolo_condition") result(status)
+      import :: c_char, c_int, c_ptr
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: feature(*)
+      integer(c_int), value :: condition
       integer(c_int) :: status
     end function
     function c_start(run) bind(C, name="tombolo_start") result(status)
@@ -567,6 +575,13 @@ contains
     character(len=*), intent(in) :: name
     real(c_double), intent(in) :: value, minimum, maximum
     status = c_parameter(run%handle, c_text(name), value, minimum, maximum)
+  end function
+
+  integer(c_int) function tombolo_condition(run, feature, condition) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: feature
+    integer(c_int), intent(in) :: condition
+    status = c_condition(run%handle, c_text(feature), condition)
   end function
 
   integer(c_int) function tombolo_start(run) result(status)

@@ -71,6 +71,13 @@ enum tombolo_type
 };
 
 /* What a field has one value for. */
+enum tombolo_boundary
+{
+  TOMBOLO_INFLOW = 1,
+  TOMBOLO_OUTFLOW = 2,
+  TOMBOLO_WALL = 3
+};
+
 enum tombolo_association
 {
   TOMBOLO_VERTEX = 0,
@@ -129,6 +136,9 @@ int tombolo_orders_file(tombolo* run, const char* file);
 int tombolo_output(tombolo* run, const char* directory);
 /* A number that can be steered, within its bounds. */
 int tombolo_parameter(tombolo* run, const char* name, double value, double minimum, double maximum);
+/* What a feature of the mesh is to the flow: TOMBOLO_INFLOW, TOMBOLO_OUTFLOW or TOMBOLO_WALL. Viewers hold inflow and outflow still until
+ * somebody wants otherwise. */
+int tombolo_condition(tombolo* run, const char* feature, int condition);
 /* Begins; the first tombolo_execute does so where this was not called. */
 int tombolo_start(tombolo* run);
 /* The link that a browser opens, once the run has begun; NULL without a server. Valid until tombolo_close. */

@@ -7,10 +7,15 @@ use std::sync::Arc;
 
 use tombolo::foreign::{Run, RunError, ranks};
 use tombolo::pipelines::language;
-use tombolo::{Parameter, Settings};
+use tombolo::{Condition, Parameter, Settings};
 
 use crate::export::{Out, Text, export};
 use crate::{Fault, Handle, Opened, Stage, c_string, find, hold, register, runs, with};
+
+/// Conditions as the header numbers them.
+const INFLOW: c_int = 1;
+const OUTFLOW: c_int = 2;
+const WALL: c_int = 3;
 
 fn read_settings(file: Text) -> Result<Settings, Fault> {
     Ok(Settings::from_file(file.get("file")?)?)
@@ -78,6 +83,23 @@ export! {
         let name = parameter.name("the parameter's name")?;
         set(run, |settings| {
             settings.parameters.push(Parameter { name, value, minimum, maximum });
+            Ok(())
+        })
+    }
+
+    fn tombolo_condition(run: *mut Handle, feature: Text, condition: c_int) {
+        let feature = feature.name("the feature's name")?;
+        let condition = match condition {
+            INFLOW => Condition::Inflow,
+            OUTFLOW => Condition::Outflow,
+            WALL => Condition::Wall,
+            other => {
+                let expected = "TOMBOLO_INFLOW, TOMBOLO_OUTFLOW or TOMBOLO_WALL";
+                return Err(Fault::invalid("condition", other, expected));
+            }
+        };
+        set(run, |settings| {
+            settings.conditions.insert(feature, condition);
             Ok(())
         })
     }

@@ -148,10 +148,14 @@ static void pointers_and_times(void)
   NONE(tombolo_coordinates(run) != NULL, "called before the run began");
   NONE(tombolo_link(run) != NULL, "called before the run began");
   OK(tombolo_parameter(run, "heating", 2.0, 0.0, 10.0));
+  WRONG(tombolo_condition(run, NULL, TOMBOLO_WALL), "the feature's name is a null pointer");
+  INVALID(tombolo_condition(run, "z-min", 9), "condition: found 9; expected TOMBOLO_INFLOW, TOMBOLO_OUTFLOW or TOMBOLO_WALL");
+  OK(tombolo_condition(run, "z-min", TOMBOLO_INFLOW));
   OK(tombolo_start(run));
   WRONG(tombolo_start(run), "called twice");
   WRONG(tombolo_configure(run, "{\"version\": 1}"), "called after the run began");
   WRONG(tombolo_parameter(run, "late", 0.0, 0.0, 1.0), "called after the run began");
+  WRONG(tombolo_condition(run, "z-min", TOMBOLO_INFLOW), "called after the run began");
   double value = 7.0;
   INVALID(tombolo_parameter_value(run, "heatng", &value), "parameter: found 'heatng'; expected one that tombolo_parameter declared; did you mean 'heating'?");
   WRONG(tombolo_parameter_value(run, "heating", NULL), "value is a null pointer");

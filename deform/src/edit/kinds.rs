@@ -70,19 +70,23 @@ macro_rules! layer {
             /// The part of the reference surface that makes up the handle; with `features`, what of
             /// them lies in it.
             #[serde(default, skip_serializing_if = "Option::is_none")]
+            #[schemars(extend("x-label" = "only in a region", "x-advanced" = true))]
             pub region: Option<Region>,
             /// The features held where they are. A vertex that is also in the handle stays fixed.
             #[serde(default)]
             pub fixed: Vec<String>,
             /// A part of the reference surface that is held where it is, beside the fixed features.
             #[serde(default, skip_serializing_if = "Option::is_none")]
+            #[schemars(extend("x-label" = "hold a region", "x-advanced" = true))]
             pub fixed_region: Option<Region>,
             $($(#[$field_attribute])* pub $field: $type,)*
             /// Whether the edit is passed over.
             #[serde(default, skip_serializing_if = "is_false")]
+            #[schemars(extend("x-hidden" = true))]
             pub muted: bool,
             /// A name for the layer, in reports and lists.
             #[serde(default, skip_serializing_if = "Option::is_none")]
+            #[schemars(extend("x-hidden" = true))]
             pub name: Option<String>,
         }
 
@@ -111,12 +115,14 @@ layer! {
     /// assert_eq!(edit.name(), "translate");
     /// ```
     #[derive(Default)]
-    #[schemars(extend("anyOf" = [{"required": ["features"]}, {"required": ["region"]}]))]
+    #[schemars(extend("anyOf" = [{"required": ["features"]}, {"required": ["region"]}], "x-label" = "Move"))]
     pub struct Translate {
         /// How far the handle moves along x, y and z, in units of the mesh.
+        #[schemars(extend("x-label" = "move by", "x-unit" = "mesh units", "x-neutral" = [0, 0, 0]))]
         pub by: Vector,
         /// How smoothly the surface between handle and fixed parts follows.
         #[serde(default)]
+        #[schemars(extend("x-label" = "smoothness", "x-advanced" = true))]
         pub harmonic_order: HarmonicOrder,
     }
 }
@@ -124,19 +130,23 @@ layer! {
 layer! {
     /// Turns the handle as one rigid body about an axis.
     #[derive(Default)]
-    #[schemars(extend("anyOf" = [{"required": ["features"]}, {"required": ["region"]}]))]
+    #[schemars(extend("anyOf" = [{"required": ["features"]}, {"required": ["region"]}], "x-label" = "Turn"))]
     pub struct Rotate {
         /// The direction of the axis, of any length but 0.
+        #[schemars(extend("x-label" = "about the direction", "x-start" = [0, 0, 1]))]
         pub axis: Vector,
         /// The angle in degrees, counter-clockwise seen against the axis (right-hand rule).
         /// Multiples of 90 are exact.
+        #[schemars(extend("x-label" = "turn by", "x-unit" = "°", "x-neutral" = 0))]
         pub degrees: f64,
         /// A point of the axis. Left out or null, it is the centre of the handle's bounding box in
         /// the shape that the edits before this one have reached.
         #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(extend("x-label" = "about a point", "x-unit" = "mesh units", "x-advanced" = true))]
         pub center: Option<Vector>,
         /// How smoothly the surface between handle and fixed parts follows.
         #[serde(default)]
+        #[schemars(extend("x-label" = "smoothness", "x-advanced" = true))]
         pub harmonic_order: HarmonicOrder,
     }
 }
@@ -144,16 +154,19 @@ layer! {
 layer! {
     /// Scales the handle along the axes about a centre, as one body.
     #[derive(Default)]
-    #[schemars(extend("anyOf" = [{"required": ["features"]}, {"required": ["region"]}]))]
+    #[schemars(extend("anyOf" = [{"required": ["features"]}, {"required": ["region"]}], "x-label" = "Scale"))]
     pub struct ScaleDirection {
         /// The factors along x, y and z; 1 leaves an axis as it is.
+        #[schemars(extend("x-label" = "scale by", "x-unit" = "1 leaves it", "x-neutral" = [1, 1, 1]))]
         pub factors: Vector,
         /// The point that stays in place. Left out or null, it is the centre of the handle's
         /// bounding box in the shape that the edits before this one have reached.
         #[serde(default)]
+        #[schemars(extend("x-label" = "about a point", "x-unit" = "mesh units", "x-advanced" = true))]
         pub center: Option<Vector>,
         /// How smoothly the surface between handle and fixed parts follows.
         #[serde(default)]
+        #[schemars(extend("x-label" = "smoothness", "x-advanced" = true))]
         pub harmonic_order: HarmonicOrder,
     }
 }
@@ -161,14 +174,16 @@ layer! {
 layer! {
     /// Moves the handle along its surface normals: outward for a positive distance.
     #[derive(Default)]
-    #[schemars(extend("anyOf" = [{"required": ["features"]}, {"required": ["region"]}]))]
+    #[schemars(extend("anyOf" = [{"required": ["features"]}, {"required": ["region"]}], "x-label" = "Grow or shrink"))]
     pub struct ScaleNormals {
         /// How far each vertex of the handle moves along its normal, in units of the mesh; negative
         /// moves inward. The normal of a vertex is the area-weighted mean of the normals of the
         /// handle's own faces around it.
+        #[schemars(extend("x-label" = "outward by", "x-unit" = "mesh units", "x-neutral" = 0))]
         pub distance: f64,
         /// How smoothly the surface between handle and fixed parts follows.
         #[serde(default)]
+        #[schemars(extend("x-label" = "smoothness", "x-advanced" = true))]
         pub harmonic_order: HarmonicOrder,
     }
 }
@@ -177,19 +192,23 @@ layer! {
     /// Moves the handle by a matrix about a centre and a translation: `x` goes to
     /// `matrix (x - center) + center + translation`.
     #[derive(Default)]
-    #[schemars(extend("anyOf" = [{"required": ["features"]}, {"required": ["region"]}]))]
+    #[schemars(extend("anyOf" = [{"required": ["features"]}, {"required": ["region"]}], "x-label" = "Apply a matrix"))]
     pub struct Affine {
         /// The rows of the matrix. It may be singular: what is flattened is the guard's business.
+        #[schemars(extend("x-neutral" = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]))]
         pub matrix: [Vector; 3],
         /// The translation after it, in units of the mesh.
         #[serde(default)]
+        #[schemars(extend("x-label" = "then move by", "x-unit" = "mesh units", "x-neutral" = [0, 0, 0]))]
         pub translation: Vector,
         /// The point that the matrix leaves in place. Left out or null, it is the centre of the
         /// handle's bounding box in the shape that the edits before this one have reached.
         #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(extend("x-label" = "about a point", "x-unit" = "mesh units", "x-advanced" = true))]
         pub center: Option<Vector>,
         /// How smoothly the surface between handle and fixed parts follows.
         #[serde(default)]
+        #[schemars(extend("x-label" = "smoothness", "x-advanced" = true))]
         pub harmonic_order: HarmonicOrder,
     }
 }
@@ -199,20 +218,24 @@ layer! {
     ///
     /// An import is exact: vertices that are not named do not move, and nothing follows. Without
     /// `features` and `region` every named vertex moves; with them, those in the handle alone.
+    #[schemars(extend("x-label" = "Import a displacement"))]
     pub struct Displacement {
         /// A file that holds the displacement: `.vtp`, `.vtu` or `.vtk` with the point array
         /// `displacement`, or plain text. A relative one lies beside the JSON file that names it.
         /// Only files name files: an order that comes over the network must hold the numbers.
         #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(extend("x-hidden" = true))]
         pub file: Option<String>,
         /// The vertices that move, by mesh vertex numbers, where no file is given.
         #[serde(default, skip_serializing_if = "is_nothing")]
         pub vertices: Arc<[u32]>,
         /// How far each of them moves along x, y and z, in units of the mesh.
         #[serde(default, skip_serializing_if = "is_nothing")]
+        #[schemars(extend("x-label" = "displacements", "x-unit" = "mesh units"))]
         pub values: Arc<[Vector]>,
         /// A factor for all of them.
         #[serde(default = "one", skip_serializing_if = "is_one")]
+        #[schemars(extend("x-label" = "times", "x-start" = 1, "x-neutral" = 0))]
         pub scale: f64,
     }
 }
@@ -224,20 +247,24 @@ layer! {
     /// Features and region say which vertices follow; without them, all do. What is fixed is held
     /// exactly, and the motion fades out towards it.
     #[derive(Default)]
-    #[schemars(rename = "Skeleton")]
+    #[schemars(rename = "Skeleton", extend("x-label" = "Bend by the skeleton"))]
     pub struct SkeletonEdit {
         /// A point of the reference shape: the node of the reference skeleton nearest to it is
         /// dragged.
         #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(extend("x-hidden" = true))]
         pub at: Option<Vector>,
         /// How far it is dragged along x, y and z, in units of the mesh.
         #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(extend("x-hidden" = true))]
         pub by: Option<Vector>,
         /// Several drags at once, in place of `at` and `by`.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        #[schemars(extend("x-label" = "nodes", "x-hint" = "Show the skeleton and drag its nodes in the picture, one after the other."))]
         pub moves: Vec<SkeletonMove>,
         /// How the surface follows its skeleton.
         #[serde(default)]
+        #[schemars(extend("x-label" = "the surface follows", "x-advanced" = true))]
         pub skinning: Skinning,
     }
 }
@@ -247,8 +274,10 @@ layer! {
 #[serde(deny_unknown_fields)]
 pub struct SkeletonMove {
     /// A point of the reference shape: the node of the reference skeleton nearest to it is dragged.
+    #[schemars(extend("x-label" = "node at", "x-unit" = "mesh units"))]
     pub at: Vector,
     /// How far it is dragged along x, y and z, in units of the mesh.
+    #[schemars(extend("x-label" = "drag by", "x-unit" = "mesh units", "x-neutral" = [0, 0, 0]))]
     pub by: Vector,
 }
 

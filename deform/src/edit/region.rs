@@ -54,6 +54,7 @@ pub struct SphereRegion {
     /// Its centre.
     pub center: Vector,
     /// Its radius, in units of the mesh.
+    #[schemars(extend("x-unit" = "mesh units"))]
     pub radius: f64,
 }
 
@@ -64,6 +65,7 @@ pub struct HalfSpaceRegion {
     /// A point of the plane.
     pub origin: Vector,
     /// The direction from the plane into the region, of any length but 0.
+    #[schemars(extend("x-start" = [0, 0, 1]))]
     pub normal: Vector,
 }
 

@@ -1,5 +1,7 @@
 //! The JSON of edits.
 
+use serde_json::{Value, json};
+
 use super::*;
 
 fn error(json: &str) -> String {
@@ -82,5 +84,60 @@ fn the_schema_shows_defaults_and_bounds() {
     assert_eq!(schema["$defs"]["Translate"]["additionalProperties"], false);
     for (name, field) in fields.as_object().unwrap() {
         assert!(field["description"].is_string(), "{name} has no description");
+    }
+}
+
+/// A form takes a part of an edit by its schema alone: what it knows as amounts is what
+/// [`Edit::scaled`] multiplies.
+#[test]
+fn the_schema_says_what_the_amounts_are() {
+    let schema = schemars::schema_for!(Edit).to_value();
+    let body = |name: &str| {
+        let variants = schema["oneOf"].as_array().unwrap();
+        let reference = variants.iter().find_map(|variant| variant["properties"].get(name)).unwrap();
+        let name = reference["$ref"].as_str().unwrap().rsplit('/').next().unwrap();
+        schema["$defs"][name].clone()
+    };
+    for edit in [
+        json!({"translate": {"features": ["a"], "by": [0.25, 0.0, -1.0]}}),
+        json!({"rotate": {"features": ["a"], "axis": [0.0, 1.0, 0.0], "degrees": 20.0}}),
+        json!({"scale_direction": {"features": ["a"], "factors": [1.0, 2.0, 0.5]}}),
+        json!({"scale_normals": {"features": ["a"], "distance": -0.5}}),
+        json!({"affine": {"features": ["a"], "matrix": [[2.0, 0.0, 0.0], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]], "translation": [1.0, 0.0, 0.0]}}),
+        json!({"displacement": {"vertices": [1], "values": [[0.0, 0.0, 1.0]], "scale": 2.0}}),
+        json!({"skeleton": {"moves": [{"at": [1.0, 1.0, 1.0], "by": [0.0, 0.0, 4.0]}]}}),
+    ] {
+        let edit: Edit = serde_json::from_value(edit).unwrap();
+        let mut scaled = serde_json::to_value(&edit).unwrap();
+        let name = edit.name();
+        scale_by_schema(&mut scaled[name], &body(name), &schema["$defs"], 0.25);
+        assert_eq!(serde_json::from_value::<Edit>(scaled).unwrap(), edit.scaled(0.25), "{name}");
+    }
+}
+
+fn scale_by_schema(value: &mut Value, schema: &Value, definitions: &Value, fraction: f64) {
+    let Some(object) = value.as_object_mut() else { return };
+    for (name, value) in object {
+        let property = &schema["properties"][name];
+        if let Some(neutral) = property.get("x-neutral") {
+            *value = between(neutral, value, fraction);
+        } else if let Some(item) = property["items"]["$ref"].as_str() {
+            let item = &definitions[item.rsplit('/').next().unwrap()];
+            for entry in value.as_array_mut().into_iter().flatten() {
+                scale_by_schema(entry, item, definitions, fraction);
+            }
+        }
+    }
+}
+
+fn between(neutral: &Value, value: &Value, fraction: f64) -> Value {
+    match (neutral, value) {
+        (Value::Array(neutral), Value::Array(values)) => {
+            neutral.iter().zip(values).map(|(neutral, value)| between(neutral, value, fraction)).collect()
+        }
+        _ => {
+            let [neutral, value] = [neutral, value].map(|number| number.as_f64().unwrap());
+            json!(neutral + fraction * (value - neutral))
+        }
     }
 }

@@ -58,8 +58,8 @@ fn displacement(edit: &Displacement) -> Result<(), InvalidEdit> {
     finite("scale", &[edit.scale])?;
     let either_or = |field: &str| InvalidEdit::EitherOr {
         field: field.into(),
-        first: "`file`",
-        second: "both `vertices` and `values`",
+        first: "both `vertices` and `values`",
+        second: "`file`, which only a JSON file can name",
     };
     let numbers = !edit.vertices.is_empty() || !edit.values.is_empty();
     match &edit.file {

@@ -58,6 +58,7 @@ impl JsonSchema for HarmonicOrder {
             "type": "integer",
             "minimum": 1,
             "maximum": 3,
+            "x-titles": ["1, kinks at the handle", "2, a continuous slope", "3, a continuous curvature"],
             "description": "The order of the polyharmonic equation that the free surface solves: 1 is a membrane with kinks at the handles, 2 has a continuous slope, 3 a continuous curvature too."
         })
     }

@@ -11,12 +11,14 @@ pub struct Guard {
     /// The least scaled Jacobian that any cell may have in any shape handed to the solver: 1 is the
     /// ideal cell, 0 a flat one. A mesh with worse cells to begin with may not get worse than it
     /// was. From 0 up to 1.
-    #[schemars(range(min = 0.0, max = 1.0))]
+    #[schemars(range(min = 0.0, max = 1.0), extend("x-label" = "least quality"))]
     pub min_scaled_jacobian: f64,
     /// The answer to a change of shape that does not keep to it.
+    #[schemars(extend("x-label" = "where it is not kept"))]
     pub otherwise: Otherwise,
     /// The answer to a surface that is broken before the volume comes into it: faces that lose
     /// their area, fold over or intersect, where they did not in the reference.
+    #[schemars(extend("x-label" = "a broken surface"))]
     pub surface: SurfaceRule,
 }
 

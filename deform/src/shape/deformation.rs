@@ -45,24 +45,25 @@ impl Deformation {
 #[schemars(rename = "Deform")]
 struct Fields {
     /// The equation that is solved for the displacement, or that there is none.
+    #[schemars(extend("x-label" = "the volume follows"))]
     method: Following,
     /// How much stiffer small cells are than large ones: the stiffness of a cell is (mean volume /
     /// volume) to this power. 0 is a uniform material; 1 keeps thin boundary layers more nearly
     /// rigid and bends the cells about them the more. 0 to 4.
-    #[schemars(range(min = 0.0, max = 4.0))]
+    #[schemars(range(min = 0.0, max = 4.0), extend("x-label" = "stiffer small cells"))]
     stiffening: f64,
     /// Poisson's ratio of the elastic material: how far it resists a change of volume. Above -1 and
     /// below 0.5; for `elasticity` only.
-    #[schemars(extend("exclusiveMinimum" = -1.0, "exclusiveMaximum" = 0.5))]
+    #[schemars(extend("exclusiveMinimum" = -1.0, "exclusiveMaximum" = 0.5, "x-label" = "Poisson's ratio", "x-advanced" = true))]
     poisson_ratio: f64,
     /// The relative residual at which the iterative solve stops. Above 0, at most 0.1.
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 0.1))]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 0.1, "x-advanced" = true))]
     tolerance: f64,
     /// How often the vertices inside are gone through after the solve, at most: each moves to
     /// where its worst cells are more like those of the reference. Vertices whose cells have all
     /// kept 95 % of their scaled Jacobian stay, and all do where moving them would gain nothing. 0
     /// leaves the shape as it was solved for. 0 to 100.
-    #[schemars(range(min = 0, max = 100))]
+    #[schemars(range(min = 0, max = 100), extend("x-label" = "improving sweeps", "x-advanced" = true))]
     improve: u32,
     /// Features whose vertices slide along their surface as it lies in the reference mesh: of the
     /// displacement that the edits make only the part across it is prescribed, and along it the
@@ -71,9 +72,11 @@ struct Fields {
     /// their edge. Exact on flat features; on curved ones a vertex leaves the surface by about the
     /// square of how far it slides over twice the radius.
     #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(extend("x-label" = "features that slide"))]
     sliding: Vec<String>,
     /// Features whose vertices follow the volume without force, whatever the edits make of them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(extend("x-label" = "features that are free"))]
     free: Vec<String>,
 }
 

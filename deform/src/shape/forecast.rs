@@ -1,5 +1,6 @@
 //! The forecast of an order: what it would give, without giving it.
 
+use crate::mesh::Vector;
 use crate::quality::{Change, Quality, change, quality};
 use serde::{Deserialize, Serialize};
 
@@ -29,6 +30,10 @@ pub struct Forecast {
     pub fraction: Option<f64>,
     /// The least scaled Jacobian on the way.
     pub min_scaled_jacobian: Option<f64>,
+    /// The place at which it would fail, where that is known: the worst cell before the change, or
+    /// the first face of the surface that is broken.
+    #[serde(default)]
+    pub place: Option<Vector>,
     /// The part of every mesh on the way that was judged; `None` where the order would be rejected.
     pub judged: Option<Judged>,
     /// The longest way that a vertex of the surface would go, in units of the mesh.
@@ -74,7 +79,8 @@ impl Shaper {
                 refused.feasible_fraction(),
                 refused.min_scaled_jacobian(),
                 self.spent(),
-            ),
+            )
+            .at(refused.place()),
         }
     }
 
@@ -90,6 +96,7 @@ impl Shaper {
             reason: None,
             fraction: Some(target.fraction),
             min_scaled_jacobian: plan.min_scaled_jacobian(),
+            place: None,
             judged: Some(plan.judged()),
             largest_displacement: Some(plan.largest_displacement()),
             shapes: plan.shapes(),
@@ -115,6 +122,7 @@ impl Forecast {
             reason: Some(reason),
             fraction,
             min_scaled_jacobian,
+            place: None,
             judged: None,
             largest_displacement: None,
             shapes: 0,
@@ -123,5 +131,11 @@ impl Forecast {
             change: None,
             seconds,
         }
+    }
+
+    /// The forecast with the place at which it would fail.
+    #[must_use]
+    pub fn at(self, place: Option<Vector>) -> Self {
+        Self { place, ..self }
     }
 }

@@ -7,6 +7,7 @@ use crate::{
     edit::EditError,
     features::UnknownFeature,
     limits::Exceeded,
+    mesh::Vector,
     quality::Refusal,
     surface::BrokenSurface,
     volume::{Impossible, VolumeError},
@@ -159,6 +160,21 @@ impl Refused {
             _ => None,
         }
     }
+
+    /// The place of the worst cell before the change, or of the first face of the surface that is
+    /// broken, where one is the reason.
+    #[must_use]
+    pub fn place(&self) -> Option<Vector> {
+        match self {
+            Refused::Guard(Refusal::Quality(path))
+            | Refused::Stalled { refusal: Refusal::Quality(path), .. } => {
+                path.worst.first().map(|worst| worst.centroid).or(path.folded_at)
+            }
+            Refused::Surface(broken) => broken.report.place(),
+            Refused::Elsewhere(elsewhere) => elsewhere.place,
+            _ => None,
+        }
+    }
 }
 
 /// The refusal of another rank, as far as it matters to the others.
@@ -170,6 +186,7 @@ pub struct Elsewhere {
     pub(super) breaks_down: bool,
     pub(super) feasible_fraction: Option<f64>,
     pub(super) min_scaled_jacobian: Option<f64>,
+    pub(super) place: Option<Vector>,
 }
 
 impl fmt::Display for Elsewhere {
@@ -189,6 +206,7 @@ impl Elsewhere {
             breaks_down: refused.breaks_down(),
             feasible_fraction: refused.feasible_fraction(),
             min_scaled_jacobian: refused.min_scaled_jacobian(),
+            place: refused.place(),
         }
     }
 
@@ -200,6 +218,9 @@ impl Elsewhere {
         let mut bytes = vec![flags];
         bytes.extend(number(self.feasible_fraction));
         bytes.extend(number(self.min_scaled_jacobian));
+        for axis in 0..3 {
+            bytes.extend(number(self.place.map(|place| place[axis])));
+        }
         bytes.extend(self.message.into_bytes());
         bytes
     }
@@ -215,12 +236,13 @@ impl Elsewhere {
             value.filter(|value| !value.is_nan())
         };
         Self {
-            message: String::from_utf8_lossy(rest.get(16..).unwrap_or_default()).into_owned(),
+            message: String::from_utf8_lossy(rest.get(40..).unwrap_or_default()).into_owned(),
             is_surface: flags & 1 != 0,
             is_quality: flags & 2 != 0,
             breaks_down: flags & 4 != 0,
             feasible_fraction: number(0),
             min_scaled_jacobian: number(1),
+            place: number(2).zip(number(3)).zip(number(4)).map(|((x, y), z)| [x, y, z]),
         }
     }
 }

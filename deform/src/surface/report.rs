@@ -69,6 +69,15 @@ impl SurfaceReport {
         [&self.degenerate, &self.flipped, &self.inside_out].iter().all(|flawed| flawed.count == 0)
             && self.intersections.count == 0
     }
+
+    /// The place of the first flaw; `None` where nothing is wrong.
+    #[must_use]
+    pub fn place(&self) -> Option<Vector> {
+        let flawed = [&self.degenerate, &self.flipped, &self.inside_out];
+        let faces = flawed.into_iter().flat_map(|flawed| flawed.first.first());
+        let first = faces.map(|face| face.position).next();
+        first.or_else(|| self.intersections.first.first().map(|pair| pair.position))
+    }
 }
 
 impl std::fmt::Display for SurfaceReport {

@@ -85,6 +85,41 @@ pub struct Patch {
     pub condition: Condition,
 }
 
+impl Patch {
+    /// What the patch is to the flow at time 0: the sign of the flux of a prescribed velocity says
+    /// whether it brings fluid in, takes it out or only drags it along. `points` are those of the
+    /// mesh.
+    #[must_use]
+    pub fn role(&self, points: &[Vector], parameters: &[f64]) -> tombolo::Condition {
+        let velocity = match &self.condition {
+            Condition::NoSlip | Condition::Slip => return tombolo::Condition::Wall,
+            Condition::Pressure(_) => return tombolo::Condition::Outflow,
+            Condition::Velocity(velocity) => velocity,
+        };
+        let (mut flux, mut most) = (0.0, 0.0);
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|vertex| points[vertex as usize]);
+            let position = [0, 1, 2].map(|axis| (a[axis] + b[axis] + c[axis]) / 3.0);
+            let place = Place { position, time: 0.0, parameters };
+            let velocity = [0, 1, 2].map(|axis| velocity[axis].at(&place));
+            // Twice the outward area.
+            let area = cross(subtract(b, a), subtract(c, a));
+            flux += dot(velocity, area);
+            most += length(velocity) * length(area);
+        }
+        if flux.abs() <= TANGENTIAL * most {
+            tombolo::Condition::Wall
+        } else if flux < 0.0 {
+            tombolo::Condition::Inflow
+        } else {
+            tombolo::Condition::Outflow
+        }
+    }
+}
+
+/// How much of a velocity may point through a patch that only drags the fluid along.
+const TANGENTIAL: f64 = 1e-6;
+
 /// How the velocity of a vertex comes about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Rule {

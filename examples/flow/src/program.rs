@@ -183,10 +183,12 @@ impl Run {
         let is_first = communicator.rank() == 0;
         let read = agreed(&*communicator, Read::new(options, is_first))?;
         let Read { case, config, orders, replay, mesh, surface, patches, history } = read;
-        let (share, patches) = Share::of(&communicator, &mesh, &surface, patches, options.dealing)?;
-        let whole = (is_first && options.out.is_some()).then_some(mesh);
         let declared = case.declared_parameters();
         let parameters: Vec<f64> = declared.iter().map(|parameter| parameter.value).collect();
+        let role = |patch: &Patch| (patch.name.clone(), patch.role(mesh.points(), &parameters));
+        let conditions = patches.iter().map(role).collect();
+        let (share, patches) = Share::of(&communicator, &mesh, &surface, patches, options.dealing)?;
+        let whole = (is_first && options.out.is_some()).then_some(mesh);
         let (fluid, settings) = (case.fluid(&parameters), SolverSettings::default());
         let mut solver = Solver::new(&share.mesh, share.shared.halo(), patches, fluid, settings)?;
         solver.set_parameters(&parameters);
@@ -197,6 +199,7 @@ impl Run {
             communicator: Arc::clone(&communicator),
             solvers,
             parameters: declared,
+            conditions,
             orders,
             replay,
             output: options.out.clone().unwrap_or_else(|| PathBuf::from(".")),

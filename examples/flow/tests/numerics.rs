@@ -488,3 +488,21 @@ fn ranks_solve_the_same_equations() {
         }
     }
 }
+
+/// A prescribed velocity brings fluid in, takes it out, or drags it along.
+#[test]
+fn a_patch_knows_what_it_is_to_the_flow() {
+    // The triangle's normal is z.
+    let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let role = |condition| {
+        let patch = Patch { name: "lid".into(), triangles: vec![[0, 1, 2]], condition };
+        patch.role(&points, &[2.0])
+    };
+    let velocity = |velocity: [f64; 3]| role(Condition::Velocity(velocity.map(Value::Uniform)));
+    assert_eq!(velocity([0.0, 0.0, -1.0]), tombolo::Condition::Inflow);
+    assert_eq!(velocity([3.0, 0.0, 0.5]), tombolo::Condition::Outflow);
+    assert_eq!(velocity([3.0, 1.0, 0.0]), tombolo::Condition::Wall);
+    assert_eq!(velocity([0.0; 3]), tombolo::Condition::Wall);
+    assert_eq!(role(Condition::Pressure(Value::Uniform(0.0))), tombolo::Condition::Outflow);
+    assert_eq!(role(Condition::Slip), tombolo::Condition::Wall);
+}

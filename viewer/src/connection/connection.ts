@@ -2,7 +2,7 @@
  * The connection to the running simulation. It comes back by itself, waiting a little longer after each failure, and says
  * in one word how it stands.
  */
-import { parseServerMessage } from "./protocol";
+import { PROTOCOL_VERSION, VersionError, parseServerMessage } from "./protocol";
 import type { ClientMessage, ServerMessage } from "./protocol";
 
 export type ConnectionState = "connecting" | "connected" | "reconnecting" | "refused" | "dismissed" | "ended";
@@ -152,6 +152,13 @@ export class Connection {
       try {
         message = parseServerMessage(event.data);
       } catch (error) {
+        if (error instanceof VersionError) {
+          this.socket = null;
+          socket.close();
+          const older = typeof error.found === "number" && error.found < PROTOCOL_VERSION;
+          return this.change("dismissed", `This page and the simulation do not understand each other: ${error.message}. `
+            + (older ? "The simulation is older than this page: open the page that it serves itself." : "Reload the page to get the one that belongs to the simulation."));
+        }
         this.listener.trouble(error instanceof Error ? error.message : String(error));
         return;
       }

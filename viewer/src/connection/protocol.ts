@@ -8,7 +8,7 @@ export type Role = "driver" | "watcher";
 
 export interface ViewInformation { name: string; kind: string }
 /** What a feature is to the solver; null where it has not said. */
-export type Condition = "inflow" | "outflow" | "wall" | "symmetry";
+export type Condition = "inflow" | "outflow" | "wall";
 export interface FeatureInformation { name: string; faces: number; vertices: number; bounds: [Vector, Vector]; condition?: Condition | null }
 export interface FieldInformation { name: string; association: Association; components: number }
 export interface ParameterInformation { name: string; value: number; minimum?: number | null; maximum?: number | null }
@@ -87,8 +87,8 @@ export interface ForecastAnswer {
     largest_displacement?: number | null;
     shapes?: number | null;
     sub_steps?: number | null;
-    /** Of one that would be rejected: the worst cells, the worst first. */
-    worst?: { cell: number; position: Vector; scaled_jacobian: number }[];
+    /** Where it would fail: the worst cell, or the first face that is broken. */
+    place?: Vector | null;
     quality?: QualitySummary | null;
     seconds?: { surface?: number; volume?: number; guard?: number } | null;
   };
@@ -140,6 +140,13 @@ export class ProtocolError extends Error {
   constructor(message: string) {
     super(message);
     this.name = "ProtocolError";
+  }
+}
+
+/** Raised for a server of another version: nothing that it says can be read. */
+export class VersionError extends ProtocolError {
+  constructor(readonly found: Json | undefined) {
+    super(`the simulation speaks protocol ${JSON.stringify(found) ?? "unknown"}, this page ${PROTOCOL_VERSION}`);
   }
 }
 
@@ -199,9 +206,7 @@ export function parseServerMessage(text: string): ServerMessage {
 }
 
 function completeHello(body: JsonObject): Hello {
-  if (body.protocol !== PROTOCOL_VERSION) {
-    throw new ProtocolError(`the server speaks protocol ${String(body.protocol)}, this viewer ${PROTOCOL_VERSION}`);
-  }
+  if (body.protocol !== PROTOCOL_VERSION) throw new VersionError(body.protocol);
   const list = (key: string): Json[] => (Array.isArray(body[key]) ? body[key] : []);
   const object = (key: string): JsonObject => (isObject(body[key]) ? body[key] : {});
   return {

@@ -21,7 +21,6 @@ interface Naming { label: string; path: string; unit: string; hint: string }
 export type Special = (property: Property) => Control | null;
 
 const AXES = ["x", "y", "z"];
-const HARMONIC = ["1 · harmonic", "2 · biharmonic", "3 · triharmonic"];
 
 export function makeControl(field: Field, label: string, special: Special = () => null, naming: Partial<Naming> = {}): Control {
   return make(field, { label, path: label, unit: "", hint: "", ...naming }, special);
@@ -173,10 +172,7 @@ function matrixControl(field: Field & { kind: "matrix" }, naming: Naming): Contr
 }
 
 function choiceControl(field: Field & { kind: "choice" }, naming: Naming): Control {
-  const select = element("select", {}, ...field.options.map((option, i) => {
-    const title = naming.path === "harmonic order" && typeof option.value === "number" ? HARMONIC[option.value - 1] ?? option.title : option.title;
-    return element("option", { value: i }, title);
-  }));
+  const select = element("select", {}, ...field.options.map((option, i) => element("option", { value: i }, option.title)));
   return {
     root: row(naming, select, wrongText()),
     read: () => field.options[Number(select.value)]?.value,
@@ -297,7 +293,7 @@ export function objectControl(properties: readonly Property[], special: Special 
   const parts = properties.map((property) => {
     const path = within === "" ? words(property.name) : `${within} ${words(property.name)}`;
     const control = special(property) ?? (property.hidden ? keepingControl()
-      : make(property.field, { label: property.label, path, unit: property.unit, hint: property.description }, special));
+      : make(property.field, { label: property.label, path, unit: property.unit, hint: property.hint || property.description }, special));
     control.write(start[property.name]);
     return { property, path, control };
   });

@@ -21,7 +21,6 @@ export class EditForm {
   private edits: Control[] = [];
   private settings: Control = keepingControl();
   private readonly table = element("div", { class: "features", role: "group", "aria-label": "Features" });
-  private readonly description = element("p", { class: "hint" });
   /** What the controls show, as they were last read or written. */
   private shown: { key: string | null; body: Values; settings: Values } = { key: null, body: {}, settings: {} };
 
@@ -80,9 +79,9 @@ export class EditForm {
     }
     const special: Special = (property) => (ROLES[property.name] ? keepingControl() : property.name === FILE ? keepingControl() : null);
     this.edits = form.edits.map((edit) => objectControl(edit.field.kind === "object" ? edit.field.properties : [], special));
-    this.action = element("select", { id: "action" }, ...form.edits.map((edit, i) => element("option", { value: i }, edit.label)));
+    this.action = element("select", { id: "action" }, ...form.edits.map((edit) => element("option", { value: edit.key }, edit.label)));
     this.root.replaceChildren(
-      element("div", { class: "field" }, element("label", { for: "action" }, "action"), this.action), this.description,
+      element("div", { class: "field" }, element("label", { for: "action" }, "action"), this.action),
       this.table, ...this.edits.map((control) => control.root), this.settingsPart(form),
     );
     this.shown = { key: null, body: {}, settings: {} };
@@ -100,6 +99,9 @@ export class EditForm {
     const schedule = objectControl(unwrapped.filter(isSchedule));
     const others = unwrapped.filter((property) => !isSchedule(property));
     const rest = objectControl(others);
+    // The values of the simulation stand ready behind the boxes that are not ticked.
+    rest.write({ ...this.store.state.hello?.defaults });
+    rest.write({});
     const sentence = element("summary", {});
     this.settings = {
       root: element("div"),
@@ -126,11 +128,10 @@ export class EditForm {
     const { draft } = this.store.state;
     const index = Math.max(0, form.edits.findIndex((edit) => edit.key === draft.key));
     const edit = form.edits[index];
-    action.value = String(index);
+    action.value = edit?.key ?? "";
     action.disabled = draft.updating !== null;
     this.edits.forEach((control, i) => { control.root.hidden = i !== index; });
-    write(this.description, edit?.description ?? "");
-    this.description.hidden = this.description.textContent === "";
+    action.title = edit?.description ?? "";
     this.table.hidden = edit?.field.kind !== "object";
     const next = { key: draft.key, body: bodyOf(draft), settings: draft.settings };
     // Where something is wrong, what stands in the input is not in the body: it is not for this to wipe it out.
@@ -143,14 +144,15 @@ export class EditForm {
   private changed(target: HTMLElement): void {
     const { form, action } = this;
     if (!form || !action || this.table.contains(target)) return;
-    const edit = form.edits[Number(action.value)];
+    const index = form.edits.findIndex(({ key }) => key === action.value);
+    const edit = form.edits[index];
     if (!edit) return;
     if (target === action) {
       this.store.dispatch({ type: "action chosen", key: edit.key });
       return;
     }
     const problems: Problem[] = [];
-    const body = (this.edits[Number(action.value)]!.read(problems) ?? {}) as Values;
+    const body = (this.edits[index]!.read(problems) ?? {}) as Values;
     const settings = (this.settings.read(problems) ?? {}) as Values;
     this.shown = { key: edit.key, body, settings };
     this.store.dispatch({ type: "form read", key: edit.key, body, settings, problems, step: `input ${target.id || target.getAttribute("aria-label")}` });

@@ -39,6 +39,10 @@ export interface Presentation {
   advanced: boolean;
   /** Shown elsewhere or nowhere; what is written into it is kept. */
   hidden: boolean;
+  /** What is said in place of a list that is empty. */
+  hint: string;
+  /** The value with which it begins. */
+  start: Json | undefined;
   /** Of an amount: its value where nothing is asked for. */
   neutral: Json | undefined;
 }
@@ -137,7 +141,8 @@ function numberOf(schema: Schema): Field {
   const low = bound("minimum", -Infinity);
   const high = bound("maximum", Infinity);
   if (integer && high - low >= 0 && high - low < 6) {
-    return { kind: "choice", options: Array.from({ length: high - low + 1 }, (_, i) => ({ value: low + i, title: String(low + i) })) };
+    const titles = list(schema["x-titles"]);
+    return { kind: "choice", options: Array.from({ length: high - low + 1 }, (_, i) => ({ value: low + i, title: typeof titles[i] === "string" ? titles[i] : String(low + i) })) };
   }
   const above = bound("exclusiveMinimum", -Infinity);
   const below = bound("exclusiveMaximum", Infinity);
@@ -178,7 +183,7 @@ function presentation(name: string, schema: Schema): Presentation {
   const text = (key: string, otherwise: string): string => (typeof schema[key] === "string" ? schema[key] : otherwise);
   return {
     label: text("x-label", words(name)), unit: text("x-unit", ""), group: text("x-group", ""),
-    advanced: schema["x-advanced"] === true, hidden: schema["x-hidden"] === true, neutral: schema["x-neutral"],
+    advanced: schema["x-advanced"] === true, hidden: schema["x-hidden"] === true, hint: text("x-hint", ""), start: schema["x-start"], neutral: schema["x-neutral"],
   };
 }
 
@@ -189,14 +194,13 @@ const plain = (description: Json | undefined): string =>
 const title = (value: Json): string => (typeof value === "string" ? value.replaceAll("_", " ") : JSON.stringify(value));
 
 /** The value with which a field begins: what the schema says, or what asks for nothing. Undefined where there is none to send. */
-export function startOf(field: Field, property?: Pick<Property, "name" | "initial" | "neutral">): Json | undefined {
+export function startOf(field: Field, property?: Pick<Property, "initial" | "start" | "neutral">): Json | undefined {
+  if (property?.start !== undefined) return property.start;
   if (property?.initial !== undefined && property.initial !== null) return property.initial;
   if (property?.neutral !== undefined) return property.neutral;
   switch (field.kind) {
     case "number": return Number.isFinite(field.minimum) && field.minimum > 0 ? field.minimum : 0;
-    // What changes nothing, or is at least a direction.
-    case "vector": return Array.from({ length: field.length }, (_, i) =>
-      property?.name === "factors" || (["axis", "normal"].includes(property?.name ?? "") && i === field.length - 1) ? 1 : 0);
+    case "vector": return Array.from({ length: field.length }, () => 0);
     case "matrix": return Array.from({ length: field.rows }, (_, i) => Array.from({ length: field.row.length }, (_, k) => (k === i ? 1 : 0)));
     case "choice": return field.options[0]?.value;
     case "boolean": return false;

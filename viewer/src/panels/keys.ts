@@ -1,4 +1,5 @@
-/** The keys that hold everywhere on the page: taking back and bringing back, before and after Apply; Escape ends what is under way. */
+/** The keys that hold everywhere on the page: taking back and bringing back, before Apply and after it; Apply itself; the way to it. */
+import { part } from "../dom";
 import type { Action } from "../store/actions";
 import type { Commands } from "../store/commands";
 import { isRedoable, undoable } from "../store/edits";
@@ -7,8 +8,19 @@ import type { State } from "../store/state";
 import type { Store } from "../store/store";
 
 export function watchKeys(store: Store<State, Action>, commands: Commands): void {
+  // From the head of the page to its foot, without all that stands between.
+  part("to-apply").addEventListener("click", () => {
+    const apply = part("apply") as HTMLButtonElement;
+    (apply.disabled ? part("foot") : apply).focus();
+  });
   window.addEventListener("keydown", (event) => {
-    if (!(event.ctrlKey || event.metaKey) || event.altKey || event.key.toLowerCase() !== "z") return;
+    if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
+    const apply = part("apply") as HTMLButtonElement;
+    if (event.key === "Enter" && !apply.disabled) {
+      event.preventDefault();
+      apply.click();
+    }
+    if (event.key.toLowerCase() !== "z") return;
     const { state } = store;
     // The name of an edit is text: the browser takes back what is typed there.
     if ((event.target as HTMLElement | null)?.closest?.("input.name")) return;

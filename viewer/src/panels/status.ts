@@ -5,7 +5,7 @@ import { part, write } from "../dom";
 import { digits, seconds } from "../number";
 import type { Action } from "../store/actions";
 import type { Commands } from "../store/commands";
-import { runState, whyNotSteering } from "../store/run";
+import { runState, slowLink, whyNotSteering } from "../store/run";
 import type { State } from "../store/state";
 import type { Store } from "../store/store";
 
@@ -81,12 +81,14 @@ export class StatusBar {
   }
 
   private silence(): void {
-    const { connection, status, end } = this.store.state;
-    const note = part("silence");
+    const { state } = this.store;
+    const { connection, status, end } = state;
     const quiet = performance.now() - this.heard;
     const still = status?.stopped === true || status?.paused === true || end !== null;
-    note.hidden = connection.state !== "connected" || still || quiet < Math.max(SILENCE, 10000 * (status?.step_seconds ?? 0));
-    if (!note.hidden) write(note, `no word for ${Math.round(quiet / 1000)} s`);
+    const isSilent = connection.state === "connected" && !still && quiet >= Math.max(SILENCE, 10000 * (status?.step_seconds ?? 0));
+    const words = isSilent ? `The simulation has not said a word for ${Math.round(quiet / 1000)} s. The picture may be old.` : slowLink(state, performance.now());
+    part("silence").hidden = words === "";
+    write(part("silence"), words);
   }
 }
 

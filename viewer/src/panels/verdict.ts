@@ -108,8 +108,9 @@ export class VerdictPanel {
     part("amount-row").hidden = !shown;
     const fraction = amount?.fraction ?? 1;
     if (document.activeElement !== this.slider || Math.abs(Number(this.slider.value) / 100 - fraction) > 0.005) this.slider.value = String(Math.round(100 * fraction));
-    const limit = this.limit < 1 ? ` · up to ${percent(this.limit)} passes` : "";
+    const limit = this.limit < 1 ? ` of ${percent(this.limit)}` : "";
     write(part("amount-text"), `${Math.round(100 * fraction)} %${limit}`);
+    part("amount-row").title = limit === "" ? "How much of it is asked for" : `${percent(this.limit)} of it would pass`;
     this.slider.style.setProperty("--feasible", `${100 * this.limit}%`);
   }
 

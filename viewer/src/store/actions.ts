@@ -9,8 +9,8 @@ export type Action =
   // From the simulation.
   | { type: "connection"; state: ConnectionState; explanation: string }
   | { type: "hello"; hello: Hello }
-  | { type: "status"; status: Status }
-  | { type: "frame"; cycle: number }
+  | { type: "status"; status: Status; at: number }
+  | { type: "frame"; view: string; cycle: number }
   | { type: "order"; status: OrderStatus }
   | { type: "end"; end: RunEnd }
   | { type: "wheel asked"; by: string }

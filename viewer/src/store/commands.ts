@@ -5,6 +5,7 @@ import { missing, wishedOrder } from "./draft";
 import type { State } from "./state";
 import { sameJson } from "./store";
 import type { Store } from "./store";
+import { NOTHING_ASKED } from "./verdict";
 
 export class Commands {
   private sequence = 0;
@@ -36,7 +37,7 @@ export class Commands {
   apply(): string {
     const { state } = this.store;
     const order = wishedOrder(state);
-    if (order === null) return missing(state) || "Nothing is asked for yet: change a value, or drag in the picture.";
+    if (order === null) return missing(state) || NOTHING_ASKED;
     if (this.order(order) !== null) this.store.dispatch({ type: "cleared" });
     return "";
   }

@@ -4,19 +4,29 @@ import { describeOrder } from "../form/describe";
 import { ROLES } from "../form/schema";
 import type { Values } from "../form/schema";
 import type { Action } from "./actions";
-import { bodyOf, isObject, kindOf, openBoundaries, partsOf, scaled, withoutShorthand } from "./draft";
+import { bodyOf, isObject, kindOf, openBoundaries, partsOf, scaled, wishedOrder, withoutShorthand } from "./draft";
 import { orderRefused, orderSent, orderTold, ordersReconciled } from "./orders";
 import { looksOf, withLook } from "./looks";
 import { NO_FORECAST } from "./state";
-import type { Composed, Draft, Part, State } from "./state";
+import type { Composed, Draft, Frames, Part, State } from "./state";
 import { sameJson } from "./store";
 
 /** Steps of the form that can be taken back. */
 const LONGEST_PAST = 100;
 const LONGEST_UNDONE = 50;
 const LONGEST_ERRORS = 50;
+/** Enough to know the time of a picture that is half a minute old, at ten words a second. */
+const LONGEST_PROGRESS = 300;
+const LONGEST_GAPS = 20;
 
 export function reduce(state: State, action: Action): State {
+  const before = wishedOrder(state);
+  const next = after(state, action);
+  // What was told of one order says nothing of another.
+  return next.forecast !== NO_FORECAST && !sameJson(wishedOrder(next), before) ? { ...next, forecast: NO_FORECAST } : next;
+}
+
+function after(state: State, action: Action): State {
   switch (action.type) {
     case "connection": {
       const connected = action.state === "connected";
@@ -26,8 +36,12 @@ export function reduce(state: State, action: Action): State {
       };
     }
     case "hello": return withHello(state, action.hello);
-    case "status": return { ...state, status: action.status };
-    case "frame": return { ...state, frames: { count: state.frames.count + 1, cycle: action.cycle } };
+    case "status": {
+      const { status, at } = action;
+      const isSame = state.progress.at(-1)?.cycle === status.cycle;
+      return { ...state, status, progress: isSame ? state.progress : [...state.progress, { cycle: status.cycle, at }].slice(-LONGEST_PROGRESS) };
+    }
+    case "frame": return { ...state, frames: withFrame(state.frames, action.view, action.cycle) };
     case "order": {
       // What another orders leaves nothing that an undo of ours could bring back.
       const isOurs = state.orders.some((order) => order.id === action.status.id);
@@ -77,6 +91,13 @@ export function reduce(state: State, action: Action): State {
     case "forecast failed": return { ...state, forecast: { state: "failed", answer: null, reason: action.reason } };
     case "forecast cleared": return state.forecast.state === "none" ? state : { ...state, forecast: NO_FORECAST };
   }
+}
+
+function withFrame({ count, cycle: newest, views }: Frames, view: string, cycle: number): Frames {
+  const before = views[view];
+  const gap = before && cycle > before.cycle ? cycle - before.cycle : null;
+  const gaps = gap === null ? before?.gaps ?? [] : [...before!.gaps, gap].slice(-LONGEST_GAPS);
+  return { count: count + 1, cycle: Math.max(newest ?? cycle, cycle), views: { ...views, [view]: { cycle, gaps } } };
 }
 
 function withHello(state: State, hello: Hello): State {

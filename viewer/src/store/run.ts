@@ -10,6 +10,26 @@ export function runState({ connection, status, end }: State): RunState {
   return status.stopped ? "stopping" : status.paused ? "paused" : "running";
 }
 
+/** Milliseconds by which a picture may be behind before that is said. */
+const OLD = 3000;
+
+/** How old the picture is and what was left out of it, where the link is too slow for the run; empty where it keeps up. */
+export function slowLink(state: State, now: number): string {
+  const { frames, progress, status } = state;
+  if (runState(state) !== "running" || frames.cycle === null || !status) return "";
+  const shown = frames.cycle;
+  const reached = progress.find(({ cycle }) => cycle >= shown);
+  const age = reached ? now - reached.at : 0;
+  const gaps = Object.values(frames.views).flatMap((view) => view.gaps);
+  const least = Math.min(...gaps, Infinity);
+  const behind = status.cycle - shown;
+  // A view that is seldom sent is no sign of a slow link.
+  if (age < OLD || !Number.isFinite(least) || behind < 3 * least) return "";
+  const due = gaps.reduce((sum, gap) => sum + Math.round(gap / least), 0);
+  const lost = due > gaps.length ? `; ${due - gaps.length} of the last ${due} frames were left out` : "";
+  return `The link is slow: the picture is ${Math.round(age / 1000)} s old, ${behind} cycles behind${lost}.`;
+}
+
 /** Whether this viewer's commands are obeyed. */
 export const isSteering = (state: State): boolean => whyNotSteering(state) === "";
 

@@ -62,14 +62,18 @@ export interface ForecastState {
   reason: string | null;
 }
 
+/** Data frames taken since the page was opened, the cycle of the newest, and by how many cycles frames of each view were apart lately. */
+export interface Frames { count: number; cycle: number | null; views: Readonly<Record<string, { cycle: number; gaps: readonly number[] }>> }
+
 export interface State {
   connection: { state: ConnectionState; explanation: string; /** Whether there has been a connection before this one. */ known: boolean; fresh: boolean };
   hello: Hello | null;
   status: Status | null;
   /** The last word of a run that has ended. */
   end: RunEnd | null;
-  /** Data frames taken since the page was opened, and the cycle of the newest. */
-  frames: { count: number; cycle: number | null };
+  /** When the run was at which cycle, by this page's clock; the newest last. */
+  progress: readonly { cycle: number; at: number }[];
+  frames: Frames;
   /** How each view looks, and the one whose look is being changed. */
   looks: Looks;
   chosenView: string | null;
@@ -97,7 +101,8 @@ export const NO_FORECAST: ForecastState = { state: "none", answer: null, reason:
 export const INITIAL: State = {
   connection: { state: "connecting", explanation: "", known: false, fresh: false },
   hello: null, status: null, end: null,
-  frames: { count: 0, cycle: null },
+  progress: [],
+  frames: { count: 0, cycle: null, views: {} },
   looks: {}, chosenView: null,
   selection: { parts: {}, hovered: null },
   form: null,

@@ -6,7 +6,7 @@ import { whyNotEditable } from "./edits";
 import { whyNotSteering } from "./run";
 import type { State } from "./state";
 
-export type Tone = "none" | "waiting" | "good" | "warning" | "bad";
+export type Tone = "none" | "waiting" | "plain" | "good" | "warning" | "bad";
 
 /** A line of the verdict, and what unfolds beneath it. */
 export interface Line { tone: Tone; text: string; details: string }
@@ -24,9 +24,9 @@ export function previewLine({ preview }: Pick<State, "preview">): Line {
 
 function shownLine({ largest, size, faults }: State["preview"]): Line {
   if (faults) return { tone: "bad", text: "Preview: the surface would be broken", details: faults };
-  if (!largest) return { tone: "good", text: "Preview: nothing moves", details: "" };
+  if (!largest) return { tone: "plain", text: "Preview: nothing moves", details: "" };
   const part = size ? ` (${digits((100 * largest) / size, 2)} % of its size)` : "";
-  return { tone: "good", text: `Preview: moves the surface by up to ${digits(largest, 3)}${part}`, details: "" };
+  return { tone: "plain", text: `Preview: moves the surface by up to ${digits(largest, 3)}${part}`, details: "" };
 }
 
 export function forecastLine({ forecast: { state, answer, reason }, status }: Pick<State, "forecast" | "status">): Line {
@@ -62,6 +62,8 @@ export function openBoundaryWarning(state: State): string {
   return `${first.name} (${first.condition}) would move by ${digits(first.by, 3)}, ${digits(100 * first.part, 2)} % of the size${others}.`;
 }
 
+export const NOTHING_ASKED = "Nothing is asked for yet: choose a handle and change a value, or drag in the picture.";
+
 /** What the button that gives the order says, and why it cannot be pressed; empty where it can. */
 export function applyButton(state: State): { label: string; why: string; isAnyway: boolean } {
   const { updating } = state.draft;
@@ -69,7 +71,7 @@ export function applyButton(state: State): { label: string; why: string; isAnywa
   const what = updating === null ? "Apply" : `Update edit ${updating + 1}`;
   const label = isAnyway ? `${what} anyway` : what;
   const why = whyNotSteering(state) || (updating === null ? "" : whyNotEditable(state))
-    || (asksNothing(state) && missing(state) === "" ? (updating === null ? "Nothing is asked for yet: change a value, or drag in the picture." : "The edit is as it was.") : "")
+    || (!asksNothing(state) ? "" : updating !== null ? missing(state) || "The edit is as it was." : NOTHING_ASKED)
     || (state.forecast.answer?.outcome === "rejected" ? "It would be refused." : "");
   return { label, why, isAnyway };
 }
@@ -82,5 +84,5 @@ export function remedies({ forecast: { answer }, draft }: Pick<State, "forecast"
   const fraction = typeof answer.fraction === "number" && answer.fraction > 0.001 ? answer.fraction : null;
   const guard = draft.remedy.guard ?? draft.settings.guard;
   const mends = typeof guard === "object" && guard !== null && !Array.isArray(guard) && guard.otherwise === "untangle";
-  return { fraction, untangle: !mends, worst: answer.worst?.[0]?.position ?? null };
+  return { fraction, untangle: !mends, worst: answer.place ?? null };
 }

@@ -34,7 +34,11 @@ describe("the form", () => {
     select.value = [...select.options].find((entry) => entry.textContent === option)!.value;
     select.dispatchEvent(new Event("change", { bubbles: true }));
   };
-  const action = (name: string): void => choose(root.querySelector<HTMLSelectElement>("#action")!, name);
+  const action = (key: string): void => {
+    const select = root.querySelector<HTMLSelectElement>("#action")!;
+    select.value = key;
+    select.dispatchEvent(new Event("change", { bubbles: true }));
+  };
   const edits = (): Json => wishedOrder(store.state)!.edits!;
 
   it("makes the order that the protocol asks for", () => {
@@ -64,8 +68,8 @@ describe("the form", () => {
 
   it("takes a region for a handle", () => {
     action("rotate");
-    type(label("degrees"), "15");
-    check(label("region"));
+    type(label("turn by"), "15");
+    check(label("only in a region"));
     const kind = root.querySelector<HTMLSelectElement>('.object:not([hidden]) select[aria-label="region: kind"]')!;
     choose(kind, "sphere");
     type(label("radius"), "0.2");
@@ -105,7 +109,7 @@ describe("the form", () => {
     expect(wishedOrder(store.state)!.guard).toBeUndefined();
     const guard = [...root.querySelectorAll<HTMLLabelElement>(".settings label")].find((entry) => entry.textContent === "guard")!;
     check(document.getElementById(guard.htmlFor) as HTMLInputElement);
-    expect(wishedOrder(store.state)!.guard).toEqual({ min_scaled_jacobian: 0.02, otherwise: "reject", surface: "reject" });
+    expect(wishedOrder(store.state)!.guard).toEqual({ min_scaled_jacobian: 0.03, otherwise: "reject", surface: "reject" });
     expect(wishedOrder(store.state)!.deform).toBeUndefined();
   });
 
@@ -125,12 +129,26 @@ describe("the form", () => {
     store.dispatch({ type: "step back" });
     expect(input("by x").value).toBe("0.2");
     store.dispatch({ type: "step back" });
-    expect(root.querySelector<HTMLSelectElement>("#action")!.selectedOptions[0]!.textContent).toBe("scale direction");
+    expect(root.querySelector<HTMLSelectElement>("#action")!.selectedOptions[0]!.textContent).toBe("Scale");
     store.dispatch({ type: "step forward" });
     expect(input("by x").value).toBe("0.2");
     by(0.9, "drag 3");
     store.dispatch({ type: "aborted", step: "drag 3" });
     expect(input("by x").value).toBe("0.2");
+  });
+
+  it("speaks to people: labels, units, what is rarely needed folded away, and nothing of JSON", () => {
+    for (const { key } of store.state.form!.edits) {
+      action(key);
+      const shown = [...root.querySelectorAll<HTMLElement>(".object:not([hidden]) label, .object:not([hidden]) .label")].filter((entry) => !entry.closest("[hidden]"));
+      const texts = shown.map((entry) => entry.firstChild?.textContent ?? "");
+      for (const private_ of ["set fixed region", "fixed region", "set at", "moves", "muted", "name", "file", "harmonic order"]) expect(texts, key).not.toContain(private_);
+      expect(texts.every((text) => !text.includes("_"))).toBe(true);
+    }
+    action("rotate");
+    const degrees = label("turn by");
+    expect(degrees.parentElement!.textContent).toBe("°");
+    expect(label("smoothness").closest("details")!.querySelector("summary")!.textContent).toBe("Advanced");
   });
 
   it("says the schedule in one sentence", () => {

@@ -50,7 +50,7 @@ describe("the bar", () => {
   it("lets a watcher ask, where its link allows it", () => {
     expect(at("wheel").hidden).toBe(true);
     made.greet({ role: "watcher" });
-    made.store.dispatch({ type: "status", status: { ...STATUS, driver: "c9" } });
+    made.store.dispatch({ type: "status", status: { ...STATUS, driver: "c9" }, at: 0 });
     expect(at("role").textContent).toBe("watching · viewer c9 steers");
     at("wheel").click();
     expect(made.sent.at(-1)).toMatchObject({ drive: {} });

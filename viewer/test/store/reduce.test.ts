@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import type { Json } from "../../src/connection/protocol";
 import { asksNothing, bodyOf, chosen, openBoundariesMoved, wishedOrder, wishedStack, withMove } from "../../src/store/draft";
 import { isRedoable, provenance, undoable, whyNotEditable } from "../../src/store/edits";
-import { runState, whyNotSteering } from "../../src/store/run";
+import { runState, slowLink, whyNotSteering } from "../../src/store/run";
 import { NO_PREVIEW } from "../../src/store/state";
 import { applyButton, forecastLine, openBoundaryWarning, percent, previewLine, remedies } from "../../src/store/verdict";
 import { STATUS, feature, page } from "../page";
@@ -69,6 +69,22 @@ describe("the form's state", () => {
     expect((wishedStack(store.state)![0] as { skeleton: Json }).skeleton).toMatchObject({ moves: [{ at: [0, 0, 1], by: [0.2, 0, 0] }, { at: [0, 0, 5], by: [0, 0.3, 0] }] });
     store.dispatch({ type: "step back" });
     expect(bodyOf(store.state.draft).moves).toEqual([{ at: [0, 0, 1], by: [0.2, 0, 0] }]);
+  });
+
+  it("takes a part of the amounts, whatever the edit", () => {
+    const { store } = composed();
+    const take = (key: string, values: { [name: string]: Json }, fraction: number): { [name: string]: Json } => {
+      store.dispatch({ type: "composed", key, values, step: key });
+      store.dispatch({ type: "amount", fraction });
+      return bodyOf(store.state.draft);
+    };
+    expect(take("scale_direction", { factors: [1, 1, 0.5] }, 0.47).factors).toEqual([1, 1, 0.765]);
+    store.dispatch({ type: "amount", fraction: 1 });
+    expect(bodyOf(store.state.draft).factors).toEqual([1, 1, 0.5]);
+    expect(take("translate", { by: [0.2, 0, -1] }, 0.5).by).toEqual([0.1, 0, -0.5]);
+    expect(take("rotate", { degrees: 20, axis: [0, 1, 0] }, 0.5)).toMatchObject({ degrees: 10, axis: [0, 1, 0] });
+    expect(take("affine", { matrix: [[3, 0, 0], [0, 1, 0], [0, 2, 1]] }, 0.5).matrix).toEqual([[2, 0, 0], [0, 1, 0], [0, 1, 1]]);
+    expect(take("skeleton", { moves: [{ at: [1, 1, 1], by: [0, 0, 4] }] }, 0.25).moves).toEqual([{ at: [1, 1, 1], by: [0, 0, 1] }]);
   });
 });
 
@@ -153,13 +169,13 @@ describe("taking back", () => {
 });
 
 describe("the verdict", () => {
-  const refused = { outcome: "rejected" as const, reason: "cell 9856 would invert", fraction: 0.479, worst: [{ cell: 9856, position: [1, 2, 3] as [number, number, number], scaled_jacobian: -0.2 }] };
+  const refused = { outcome: "rejected" as const, reason: "cell 9856 would invert", fraction: 0.479, place: [1, 2, 3] as [number, number, number] };
 
   it("is a line each of preview and forecast, with the rest folded", () => {
     const { store } = composed();
     store.dispatch({ type: "preview", preview: { ...NO_PREVIEW, state: "shown", largest: 0.0123456, size: 0.3 } });
-    expect(previewLine(store.state)).toEqual({ tone: "good", text: "Preview: moves the surface by up to 0.0123 (4.1 % of its size)", details: "" });
-    store.dispatch({ type: "status", status: { ...STATUS, quality: { min: 0.25 } } });
+    expect(previewLine(store.state)).toEqual({ tone: "plain", text: "Preview: moves the surface by up to 0.0123 (4.1 % of its size)", details: "" });
+    store.dispatch({ type: "status", status: { ...STATUS, quality: { min: 0.25 } }, at: 0 });
     store.dispatch({ type: "forecast told", answer: { outcome: "applied", shapes: 10, quality: { min: 0.2143, mean: 0.71, inverted: 0 }, seconds: { surface: 0.1, volume: 0.2, guard: 0.05 } } });
     expect(forecastLine(store.state)).toEqual({ tone: "good", text: "Forecast: least quality 0.214 (now 0.25), 0 inverted", details: "mean quality 0.71 · in 10 shapes · computed in 350\u00a0ms" });
     store.dispatch({ type: "forecast told", answer: { outcome: "clamped", fraction: 0.5, quality: { min: 0.02 } } });
@@ -174,9 +190,22 @@ describe("the verdict", () => {
     expect(remedies(store.state)).toEqual({ fraction: 0.479, untangle: true, worst: [1, 2, 3] });
     store.dispatch({ type: "remedy", settings: { guard: { otherwise: "untangle" } } });
     expect(wishedOrder(store.state)!.guard).toEqual({ otherwise: "untangle" });
+    expect(store.state.forecast.state).toBe("none");
+    store.dispatch({ type: "forecast told", answer: refused });
     expect(remedies(store.state)!.untangle).toBe(false);
     store.dispatch({ type: "cleared" });
     expect(store.state.draft.remedy).toEqual({});
+  });
+
+  it("of one order says nothing of the next", () => {
+    const { store } = composed();
+    store.dispatch({ type: "forecast told", answer: refused });
+    store.dispatch({ type: "amount", fraction: 0.479 });
+    expect(store.state.forecast.state).toBe("none");
+    store.dispatch({ type: "forecast told", answer: { outcome: "applied" } });
+    store.dispatch({ type: "amount", fraction: 0.479 });
+    store.dispatch({ type: "hover", feature: "wall" });
+    expect(store.state.forecast.state).toBe("told");
   });
 
   it("never promises more than passes", () => {
@@ -189,7 +218,7 @@ describe("who steers, and how the run stands", () => {
     const { store, greet } = page();
     expect(whyNotSteering(store.state)).toBe("");
     greet({ role: "watcher" });
-    store.dispatch({ type: "status", status: { ...STATUS, driver: "c9" } });
+    store.dispatch({ type: "status", status: { ...STATUS, driver: "c9" }, at: 0 });
     expect(whyNotSteering(store.state)).toMatch(/Viewer c9 steers: ask/);
     greet({ role: "watcher", may_drive: false });
     expect(whyNotSteering(store.state)).toBe("This link is for watching only.");
@@ -215,6 +244,26 @@ describe("who steers, and how the run stands", () => {
     store.dispatch({ type: "end", end: { how: "finished", cycle: 420, time: 1 } });
     expect(runState(store.state)).toBe("ended");
     expect(whyNotSteering(store.state)).toBe("The run has ended.");
+  });
+
+  it("says that the link is slow only where it is", () => {
+    const { store } = page();
+    const at = (seconds: number, shown: number | null): string => {
+      store.dispatch({ type: "status", status: { ...STATUS, cycle: 100 + 10 * seconds }, at: 1000 * seconds });
+      if (shown !== null) store.dispatch({ type: "frame", view: "cut", cycle: shown });
+      return slowLink(store.state, 1000 * seconds);
+    };
+    for (let second = 1; second < 10; second++) expect(at(second, 100 + 10 * second)).toBe("");
+    // Frames come late, and every third of them alone.
+    expect(at(11, 190)).toBe("");
+    expect(at(14, 210)).toMatch(/^The link is slow: the picture is 3 s old, 30 cycles behind; 1 of the last \d+ frames were left out\.$/);
+    // One that comes seldom is not late.
+    const seldom = page().store;
+    seldom.dispatch({ type: "frame", view: "cut", cycle: 0 });
+    seldom.dispatch({ type: "frame", view: "cut", cycle: 1000 });
+    seldom.dispatch({ type: "status", status: { ...STATUS, cycle: 1000 }, at: 0 });
+    seldom.dispatch({ type: "status", status: { ...STATUS, cycle: 1900 }, at: 90_000 });
+    expect(slowLink(seldom.state, 90_000)).toBe("");
   });
 
   it("tells an order that never arrived from one that did", () => {

@@ -1,0 +1,121 @@
+/**
+ * What the tests in a browser share: Debian's Chromium, a page of the viewer, waiting for what it shows, and steps that are run one
+ * after the other until one fails.
+ */
+import { mkdirSync, mkdtempSync } from "node:fs";
+import { createRequire } from "node:module";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+
+const { chromium } = createRequire(new URL("../../viewer/package.json", import.meta.url))("playwright-core");
+
+export class Failure extends Error {}
+export const check = (holds, message) => {
+  if (!holds) throw new Failure(message);
+};
+
+const patience = Number(process.env.TOMBOLO_SECONDS ?? 600) * 1000;
+export const screenshots = process.env.TOMBOLO_SCREENSHOTS ?? mkdtempSync(join(tmpdir(), "tombolo-browser-"));
+mkdirSync(screenshots, { recursive: true });
+
+export const launch = () => chromium.launch({
+  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+  args: ["--headless", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync"],
+});
+
+/** A viewer in a browser of its own, as another person has one. */
+export class Viewer {
+  static async open(browser, name, viewport = { width: 1280, height: 800 }) {
+    const context = await browser.newContext({ viewport });
+    return new Viewer(name, await context.newPage());
+  }
+
+  constructor(name, page) {
+    this.name = name;
+    this.page = page;
+    this.complaints = [];
+    this.pictures = 0;
+    page.setDefaultTimeout(patience);
+    page.on("pageerror", (error) => this.complaints.push(`${name}: the page failed: ${error.message}`));
+    page.on("console", (message) => {
+      if (["error", "warning"].includes(message.type()) && !/WebSocket|ERR_|favicon|GPU stall|GL Driver/.test(message.text())) this.complaints.push(`${name}: ${message.text()}`);
+    });
+  }
+
+  look() {
+    return this.page.evaluate(() => {
+      const { connection, role, cycle, frames, orders, status, quality, stack, selection, preview, forecast, errors, end } = window.tombolo;
+      return { connection, role, cycle, frames, orders, status, quality, stack, selection, preview, forecast, errors, end };
+    });
+  }
+
+  /** Waits until `condition` of what the viewer shows holds. */
+  async until(what, condition) {
+    const end = Date.now() + patience;
+    for (;;) {
+      const seen = await this.look();
+      if (await condition(seen)) return seen;
+      if (Date.now() > end) throw new Failure(`${this.name}: ${what}: not within ${patience / 1000} s. It shows ${JSON.stringify(seen, null, 1)}`);
+      await this.page.waitForTimeout(100);
+    }
+  }
+
+  drawn() {
+    return this.page.evaluate(() => window.tombolo.picture());
+  }
+
+  text(selector) {
+    return this.page.locator(selector).innerText();
+  }
+
+  picture(name) {
+    return this.page.screenshot({ path: join(screenshots, `${this.name}-${String(++this.pictures).padStart(2, "0")}-${name}.png`) });
+  }
+
+  /** A number of the edit that is in the form. */
+  field(label) {
+    return this.page.locator(`.object:not([hidden]) input[aria-label="${label}"]`);
+  }
+
+  /** The extent of a feature along an axis, as it is now. */
+  extent(name, axis) {
+    return this.page.evaluate(([feature, k]) => {
+      const box = window.tombolo.featureBounds(feature);
+      return box && box[1][k] - box[0][k];
+    }, [name, axis]);
+  }
+
+  /** Applies what stands in the form, and waits until the order has come to its end. */
+  async apply() {
+    const known = new Set((await this.look()).orders.map((order) => order.id));
+    await this.page.click("#apply");
+    return this.settled(known);
+  }
+
+  /** Waits until an order that is not known yet has come to its end. */
+  async settled(known) {
+    const seen = await this.until("an order at its end", (now) => now.orders.some((order) => !known.has(order.id) && ["applied", "rejected"].includes(order.status)));
+    return seen.orders.find((order) => !known.has(order.id));
+  }
+}
+
+/** Runs steps; ends the process's exit code with 1 where one fails. */
+export async function run(steps, viewers, close) {
+  for (const [name, step] of steps) {
+    const start = Date.now();
+    try {
+      await step();
+      console.log(`ok      ${name} (${((Date.now() - start) / 1000).toFixed(1)} s)`);
+    } catch (error) {
+      process.exitCode = 1;
+      for (const viewer of viewers()) await viewer.picture("failed").catch(() => {});
+      console.error(`FAILED  ${name}: ${error instanceof Failure ? error.message : error.stack}`);
+      const complaints = viewers().flatMap((viewer) => viewer.complaints);
+      if (complaints.length) console.error(complaints.join("\n"));
+      break;
+    }
+  }
+  await close();
+  console.log(`Screenshots are in ${screenshots}`);
+}

@@ -1,0 +1,218 @@
+/**
+ * Changes the shape of a running nozzle as two people would, in Debian's Chromium: what is safe at first, a refused order and each of
+ * its remedies, an earlier edit changed, taking back by keys, the wheel handed over, and the end of the run.
+ *
+ *     TOMBOLO_URL=http://127.0.0.1:7070/?token=... TOMBOLO_PID=... node tests/browser/shape.mjs
+ *
+ * TOMBOLO_URL          the link that the run printed (needed)
+ * TOMBOLO_PID          the run's process, which is asked to stop at last; without it the run goes on
+ * TOMBOLO_SCREENSHOTS, TOMBOLO_SECONDS, CHROMIUM as for demo.mjs
+ */
+import { Failure, Viewer, check, launch, run } from "./page.mjs";
+
+const link = process.env.TOMBOLO_URL;
+if (!link) {
+  console.error("TOMBOLO_URL is not set: it is the link that the running demo printed");
+  process.exit(2);
+}
+
+const browser = await launch();
+const first = await Viewer.open(browser, "first");
+let second = null;
+const { page } = first;
+const factor = (axis, value) => first.field(`factors ${axis}`).fill(String(value));
+const told = () => first.until("the forecast", ({ forecast }) => {
+  check(forecast.state !== "failed", `there is no forecast: ${forecast.reason}`);
+  return forecast.state === "told";
+});
+const rows = () => page.locator("#stack .title").allInnerTexts();
+/** Whether all of an element is in the window and nothing lies over its middle. */
+const inSight = (viewer, selector) => viewer.page.evaluate((wanted) => {
+  const found = document.querySelector(wanted);
+  const box = found.getBoundingClientRect();
+  const hit = document.elementFromPoint(box.left + box.width / 2, box.top + box.height / 2);
+  return box.width > 0 && box.left >= 0 && box.top >= 0 && box.right <= innerWidth && box.bottom <= innerHeight && (found.contains(hit) || hit === found);
+}, selector);
+
+const steps = [
+  ["what flows in and out is held at first", async () => {
+    await page.goto(link);
+    const { selection, role } = await first.until("a first picture", (now) => now.connection === "connected" && now.frames > 0 && now.selection.fixed.length > 0);
+    check(role === "driver", `the first viewer should steer, it is ${role}`);
+    check(JSON.stringify(selection) === JSON.stringify({ handle: [], fixed: ["inlet", "outlet"] }), `at first ${JSON.stringify(selection)} is chosen`);
+    check(await page.locator("#undo").isDisabled(), "Undo can be pressed though nothing was done");
+    check(await page.locator("#apply").isDisabled() || (await page.locator("#preview").isHidden()), "something is asked for at first");
+    first.whole = await first.extent("throat", 2);
+  }],
+  ["an open boundary does not move without a word", async () => {
+    await page.selectOption("#action", "translate");
+    await page.check('input[aria-label="outlet: handle"]');
+    await first.field("by z").fill("0.04");
+    await page.waitForFunction(() => !document.getElementById("open-moved").hidden);
+    const words = await first.text("#open-moved");
+    check(/outlet \(outflow\) would move by 0\.04/.test(words), `the page says "${words}"`);
+    check((await first.text("#apply")) === "Apply anyway", `the button says "${await first.text("#apply")}"`);
+    await first.picture("open-moved");
+    await page.click("#cancel");
+    check((await first.field("by z").inputValue()) === "0", "Cancel left a value in the form");
+    await page.check('input[aria-label="outlet: fixed"]');
+  }],
+  ["a refusal turns Apply off, and each remedy helps", async () => {
+    await page.selectOption("#action", "scale_direction");
+    await page.check('input[aria-label="throat: handle"]');
+    await factor("z", 0.01);
+    const { forecast } = await told();
+    check(forecast.outcome === "rejected" && forecast.fraction > 0, `the forecast is ${JSON.stringify(forecast)}`);
+    check(await page.locator("#apply").isDisabled(), "Apply can be pressed though it would be refused");
+    for (const selector of ["#preview", "#forecast", "#apply", "#cancel", "#apply-part"]) check(await inSight(first, selector), `${selector} is not in sight at 1280 x 800`);
+    await page.click("#verdict-details summary");
+    check(await inSight(first, "#apply"), "Apply is not in sight once the details are unfolded");
+    await first.picture("refused");
+    const before = await first.drawn();
+    await page.click("#show-worst");
+    check((await first.drawn()).pixels !== before.pixels, "the camera did not go to the worst cell");
+    await first.picture("worst-cell");
+    await page.click('[data-camera="reset"]');
+    const offered = await first.text("#apply-part");
+    check(/^Apply \d+(\.\d+)? %$/.test(offered), `the first button says "${offered}"`);
+    await page.click("#apply-part");
+    const filled = Number(await first.field("factors z").inputValue());
+    check(Math.abs(1 - filled - 0.99 * forecast.fraction) < 0.002, `${offered} fills in ${filled}, ${forecast.fraction} would pass`);
+    const again = await told();
+    check(again.forecast.outcome === "applied" && !(await page.locator("#apply").isDisabled()), `after it the forecast is ${JSON.stringify(again.forecast)}`);
+    // The slider stops at what passes.
+    await page.locator("#amount").fill("100");
+    check(Math.abs(Number(await first.field("factors z").inputValue()) - filled) < 0.011, `the slider went on to ${await first.field("factors z").inputValue()}`);
+    await first.picture("filled-in");
+    await factor("z", 0.01);
+    await told();
+    await page.click("#untangle");
+    const mended = await told();
+    console.log(`    refused at 0.01: ${offered}, filled in ${filled}; untangled: ${mended.forecast.outcome}, quality ${mended.forecast.min}`);
+    check(await page.locator("#untangle").isHidden(), "Untangle is offered again");
+    await page.click("#cancel");
+  }],
+  ["an edit is applied once, however often Apply is pressed", async () => {
+    await factor("z", 0.7);
+    await told();
+    const known = new Set((await first.look()).orders.map((order) => order.id));
+    await page.locator("#apply").dblclick();
+    const order = await first.settled(known);
+    check(order.status === "applied", `the pinch was refused: ${order.reason}`);
+    check((await first.look()).orders.filter(({ id }) => !known.has(id)).length === 1, "two orders were given");
+    check(JSON.stringify(await rows()) === JSON.stringify(["Throat: height × 0.7"]), `the list says ${JSON.stringify(await rows())}`);
+    await first.until("the pinch in the picture", async () => Math.abs((await first.extent("throat", 2)) / first.whole - 0.7) < 0.005);
+    await first.picture("applied");
+  }],
+  ["the first of two edits is changed, and the second follows", async () => {
+    await page.selectOption("#action", "translate");
+    await first.field("by z").fill("0.01");
+    await told();
+    check((await first.apply()).status === "applied", "the second edit was refused");
+    await page.click('#stack [data-edit="0"] [data-act="load"]');
+    check((await first.field("factors z").inputValue()) === "0.7", "the first edit's values are not in the form");
+    check((await first.text("#apply")) === "Update edit 1", `the button says "${await first.text("#apply")}"`);
+    await factor("z", 0.9);
+    await told();
+    await first.picture("update");
+    check((await first.apply()).status === "applied", "the change was refused");
+    check(JSON.stringify(await rows()) === JSON.stringify(["Throat: height × 0.9", "Throat: moved by 0.01 along z"]), `the list says ${JSON.stringify(await rows())}`);
+    await first.until("the throat as changed", async () => Math.abs((await first.extent("throat", 2)) / first.whole - 0.9) < 0.005);
+  }],
+  ["muting keeps the focus, and keys take back and bring back, before Apply and after", async () => {
+    const known = () => first.look().then((now) => new Set(now.orders.map((order) => order.id)));
+    let before = await known();
+    await page.focus('#stack [data-edit="1"] [data-act="mute"]');
+    await page.keyboard.press("Enter");
+    await first.settled(before);
+    await page.waitForFunction(() => document.querySelector('#stack [data-edit="1"]')?.dataset.muted === "true");
+    check(await page.evaluate(() => document.activeElement?.dataset.act === "mute"), "the focus is lost after Mute");
+    // Before Apply.
+    await page.selectOption("#action", "scale_direction");
+    await factor("z", 0.8);
+    await page.keyboard.press("Control+z");
+    check((await first.field("factors z").inputValue()) === "1", `Ctrl+Z left ${await first.field("factors z").inputValue()} in the form`);
+    await page.keyboard.press("Control+Shift+z");
+    check((await first.field("factors z").inputValue()) === "0.8", "Ctrl+Shift+Z did not bring the value back");
+    await page.click("#cancel");
+    // After it.
+    const stack = JSON.stringify((await first.look()).stack);
+    before = await known();
+    await page.focus("#scene");
+    await page.keyboard.press("Control+z");
+    await first.settled(before);
+    await page.waitForFunction(() => document.querySelector('#stack [data-edit="1"]')?.dataset.muted === "false");
+    before = await known();
+    await page.keyboard.press("Control+Shift+z");
+    await first.settled(before);
+    await first.until("the stack of before", (now) => JSON.stringify(now.stack) === stack);
+  }],
+  ["the keyboard reaches Apply, and applies", async () => {
+    await page.selectOption("#action", "scale_direction");
+    await factor("z", 0.95);
+    await told();
+    await page.focus("#pause");
+    await page.keyboard.press("Tab");
+    await page.keyboard.press("Enter");
+    check(await page.evaluate(() => document.activeElement?.id) === "apply", "two keys from Pause are not at Apply");
+    const known = new Set((await first.look()).orders.map((order) => order.id));
+    await page.keyboard.press("Control+Enter");
+    check((await first.settled(known)).status === "applied", "Ctrl+Enter did not apply");
+  }],
+  ["the wheel is asked for, kept, and handed over", async () => {
+    second = await Viewer.open(browser, "second", { width: 1920, height: 1080 });
+    await second.page.goto(link);
+    const seen = await second.until("a picture", (now) => now.connection === "connected" && now.frames > 0);
+    check(seen.role === "watcher", `the second viewer is ${seen.role}`);
+    for (const selector of ["#apply", "#undo", "#pause"]) check(await second.page.locator(selector).isDisabled(), `a watcher can press ${selector}`);
+    check(/ask to steer/.test(await second.page.getAttribute("#pause", "title")), "the reason is not said");
+    await second.page.click("#wheel");
+    await page.waitForFunction(() => !document.getElementById("asked").hidden);
+    await first.picture("asked");
+    check(await inSight(first, "#hand-over"), "Hand over is not in sight");
+    await page.click("#keep");
+    await second.page.click("#wheel");
+    await page.waitForFunction(() => !document.getElementById("asked").hidden);
+    await page.click("#hand-over");
+    await second.until("the wheel", (now) => now.role === "driver");
+    await first.until("watching", (now) => now.role === "watcher");
+    check(!(await second.page.locator("#pause").isDisabled()), "the one who steers cannot pause");
+    check(await second.page.locator("#refusal").isHidden(), `a refusal stays: ${await second.page.locator("#refusal").textContent()}`);
+    check(await page.locator("#pause").isDisabled(), "the one who watches can pause");
+    await second.picture("steers");
+  }],
+  ["it all fits, whatever the window", async () => {
+    for (const [width, height] of [[1280, 800], [1920, 1080], [820, 1180]]) {
+      await second.page.setViewportSize({ width, height });
+      await second.page.waitForTimeout(300);
+      await second.picture(`${width}x${height}`);
+      const small = await second.page.evaluate(() => [...document.querySelectorAll("#right button, #right input, #right select, header button")]
+        .filter((target) => target.offsetParent !== null && !target.closest("details:not([open])"))
+        .filter((target) => { const box = (target.closest("label") ?? target).getBoundingClientRect(); return box.height < 24 || box.width < 24; })
+        .map((target) => `${target.id || target.getAttribute("aria-label") || target.textContent} ${Math.round(target.getBoundingClientRect().width)}x${Math.round(target.getBoundingClientRect().height)}`));
+      check(small.length === 0, `at ${width} x ${height} these are smaller than 24 px: ${small.join(", ")}`);
+    }
+  }],
+  ["the end of the run is said, and nothing more is offered", async () => {
+    if (!process.env.TOMBOLO_PID) return;
+    process.kill(Number(process.env.TOMBOLO_PID), "SIGTERM");
+    for (const viewer of [first, second]) {
+      const { end } = await viewer.until("the end", (now) => now.end !== null);
+      check(end.how === "stopped", `the run ended as ${end.how}`);
+      const words = await viewer.text("#banner");
+      check(words.startsWith(`The run ended at cycle ${end.cycle}: stopped.`) && !/[Tt]rying/.test(words), `the banner says "${words}"`);
+      check(/^ended: stopped$/.test(await viewer.text("#run")), `the run is "${await viewer.text("#run")}"`);
+      check((await viewer.drawn()).cycle !== null, "the picture is gone");
+      await viewer.page.waitForTimeout(3000);
+      check((await viewer.look()).connection === "ended", "the page tries again");
+      for (const selector of ["#apply", "#undo", "#pause"]) check(await viewer.page.locator(selector).isDisabled(), `${selector} can be pressed after the end`);
+      await viewer.picture("ended");
+    }
+  }],
+  ["nothing went wrong on the way", async () => {
+    const complaints = [first, second].flatMap((viewer) => viewer?.complaints ?? []);
+    if (complaints.length > 0) throw new Failure(complaints.join("\n"));
+  }],
+];
+
+await run(steps, () => [first, second].filter(Boolean), () => browser.close());
