@@ -187,7 +187,7 @@ const steps = [
       await second.page.waitForTimeout(300);
       await second.picture(`${width}x${height}`);
       const small = await second.page.evaluate(() => [...document.querySelectorAll("#right button, #right input, #right select, header button")]
-        .filter((target) => target.offsetParent !== null && !target.closest("details:not([open])"))
+        .filter((target) => target.offsetParent !== null && !target.closest("details:not([open]), .skip"))
         .filter((target) => { const box = (target.closest("label") ?? target).getBoundingClientRect(); return box.height < 24 || box.width < 24; })
         .map((target) => `${target.id || target.getAttribute("aria-label") || target.textContent} ${Math.round(target.getBoundingClientRect().width)}x${Math.round(target.getBoundingClientRect().height)}`));
       check(small.length === 0, `at ${width} x ${height} these are smaller than 24 px: ${small.join(", ")}`);

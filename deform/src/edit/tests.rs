@@ -94,7 +94,8 @@ fn the_schema_says_what_the_amounts_are() {
     let schema = schemars::schema_for!(Edit).to_value();
     let body = |name: &str| {
         let variants = schema["oneOf"].as_array().unwrap();
-        let reference = variants.iter().find_map(|variant| variant["properties"].get(name)).unwrap();
+        let reference =
+            variants.iter().find_map(|variant| variant["properties"].get(name)).unwrap();
         let name = reference["$ref"].as_str().unwrap().rsplit('/').next().unwrap();
         schema["$defs"][name].clone()
     };
@@ -132,9 +133,11 @@ fn scale_by_schema(value: &mut Value, schema: &Value, definitions: &Value, fract
 
 fn between(neutral: &Value, value: &Value, fraction: f64) -> Value {
     match (neutral, value) {
-        (Value::Array(neutral), Value::Array(values)) => {
-            neutral.iter().zip(values).map(|(neutral, value)| between(neutral, value, fraction)).collect()
-        }
+        (Value::Array(neutral), Value::Array(values)) => neutral
+            .iter()
+            .zip(values)
+            .map(|(neutral, value)| between(neutral, value, fraction))
+            .collect(),
         _ => {
             let [neutral, value] = [neutral, value].map(|number| number.as_f64().unwrap());
             json!(neutral + fraction * (value - neutral))

@@ -417,7 +417,10 @@ fn what_makes_no_sense_is_named_by_its_field() {
             r#"{"translate": {"by": [0, 0, 1], "features": ["x-max"], "name": " "}}"#,
             "name: expected 1 to 200",
         ),
-        (r#"{"displacement": {}}"#, "vertices: expected either both `vertices` and `values` or `file`, which only a JSON file can name"),
+        (
+            r#"{"displacement": {}}"#,
+            "vertices: expected either both `vertices` and `values` or `file`, which only a JSON file can name",
+        ),
         (
             r#"{"displacement": {"file": "a.txt", "vertices": [1]}}"#,
             "file: expected either both `vertices` and `values` or `file`",
