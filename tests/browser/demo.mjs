@@ -196,7 +196,12 @@ const steps = [
   }],
   ["features are picked in the picture", async () => {
     await pick(HANDLE, []);
-    for (const name of FIXED) await pick(name, ["Shift"]);
+    // What flows in and out is held at first; a click with shift lets it go, another holds it again.
+    const atFirst = (await look()).selection.fixed;
+    check(JSON.stringify(atFirst) === JSON.stringify(FIXED), `fixed at first are ${JSON.stringify(atFirst)}`);
+    await pick(FIXED[0], ["Shift"]);
+    check(!(await look()).selection.fixed.includes(FIXED[0]), "a click with shift does not let go of what was held");
+    await pick(FIXED[0], ["Shift"]);
     const { selection } = await look();
     check(JSON.stringify(selection.handle) === JSON.stringify([HANDLE]), `the handle is ${JSON.stringify(selection.handle)}`);
     check(FIXED.every((name) => selection.fixed.includes(name)) && selection.fixed.length === FIXED.length, `fixed are ${JSON.stringify(selection.fixed)}`);
