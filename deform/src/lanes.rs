@@ -10,19 +10,21 @@
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Sub, SubAssign};
 
 /// How many there are.
-pub(crate) const LANES: usize = 4;
+pub const LANES: usize = 4;
 
 /// Four numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(32))]
-pub(crate) struct Lanes(pub(crate) [f64; LANES]);
+pub struct Lanes(pub [f64; LANES]);
 
 impl Lanes {
-    pub(crate) const ZERO: Self = Self::all(0.0);
+    /// 0 four times.
+    pub const ZERO: Self = Self::all(0.0);
 
     /// One number four times.
     #[inline(always)]
-    pub(crate) const fn all(value: f64) -> Self {
+    #[must_use]
+    pub const fn all(value: f64) -> Self {
         Self([value; LANES])
     }
 
@@ -35,14 +37,17 @@ impl Lanes {
         Self(result)
     }
 
+    /// The square roots.
     #[inline(always)]
-    pub(crate) fn sqrt(self) -> Self {
+    #[must_use]
+    pub fn sqrt(self) -> Self {
         self.zip(self, |value, _| value.sqrt())
     }
 
     /// Its numbers where those of `test` are finite, those of `other` elsewhere.
     #[inline(always)]
-    pub(crate) fn where_finite(self, test: Self, other: Self) -> Self {
+    #[must_use]
+    pub fn where_finite(self, test: Self, other: Self) -> Self {
         let mut result = [0.0; LANES];
         for lane in 0..LANES {
             result[lane] =
@@ -53,50 +58,60 @@ impl Lanes {
 
     /// The smaller ones; that of `self` where one is no number.
     #[inline(always)]
-    pub(crate) fn least(self, other: Self) -> Self {
+    #[must_use]
+    pub fn least(self, other: Self) -> Self {
         self.zip(other, |a, b| if b < a { b } else { a })
     }
 
     /// The larger ones; that of `self` where one is no number.
     #[inline(always)]
-    pub(crate) fn greatest(self, other: Self) -> Self {
+    #[must_use]
+    pub fn greatest(self, other: Self) -> Self {
         self.zip(other, |a, b| if b > a { b } else { a })
     }
 
     /// Without their signs.
     #[inline(always)]
-    pub(crate) fn magnitude(self) -> Self {
+    #[must_use]
+    pub fn magnitude(self) -> Self {
         self.zip(self, |value, _| value.abs())
     }
 
     /// Its numbers where those of `test` are not below `bound`, 0 elsewhere.
     #[inline(always)]
-    pub(crate) fn unless_below(self, test: Self, bound: f64) -> Self {
+    #[must_use]
+    pub fn unless_below(self, test: Self, bound: f64) -> Self {
         self.zip(test, |value, test| if test < bound { 0.0 } else { value })
     }
 
+    /// The first two added, and the last two, and then both.
     #[inline(always)]
-    pub(crate) fn sum(self) -> f64 {
+    #[must_use]
+    pub fn sum(self) -> f64 {
         let [a, b, c, d] = self.0;
         (a + b) + (c + d)
     }
 
     /// The smallest.
     #[inline(always)]
-    pub(crate) fn min(self) -> f64 {
+    #[must_use]
+    pub fn min(self) -> f64 {
         let [a, b, c, d] = self.0;
         a.min(b).min(c.min(d))
     }
 
+    /// The product of all, two and two.
     #[inline(always)]
-    pub(crate) fn product(self) -> f64 {
+    #[must_use]
+    pub fn product(self) -> f64 {
         let [a, b, c, d] = self.0;
         (a * b) * (c * d)
     }
 
     /// Whether all are greater than `bound`; none is that is no number.
     #[inline(always)]
-    pub(crate) fn all_above(self, bound: f64) -> bool {
+    #[must_use]
+    pub fn all_above(self, bound: f64) -> bool {
         let mut above = true;
         for lane in 0..LANES {
             above &= self.0[lane] > bound;
@@ -136,7 +151,7 @@ operator!(Div div /);
 /// Calls `work`, compiled for the widest registers that this processor has. What is to use them
 /// must be inlined into it.
 #[inline(always)]
-pub(crate) fn with_wide_registers<R>(work: impl FnOnce() -> R) -> R {
+pub fn with_wide_registers<R>(work: impl FnOnce() -> R) -> R {
     #[cfg(target_arch = "x86_64")]
     {
         struct Task<F>(F);

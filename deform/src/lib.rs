@@ -123,6 +123,7 @@ pub mod distributed;
 pub mod edit;
 pub mod features;
 pub mod harmonic;
+pub mod lanes;
 pub mod limits;
 pub mod linear;
 pub mod mesh;
@@ -139,5 +140,4 @@ pub mod vector;
 pub mod volume;
 pub mod warps;
 
-mod lanes;
 mod parallel;

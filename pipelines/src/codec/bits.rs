@@ -30,8 +30,9 @@ pub(super) struct Model {
 impl Model {
     pub(super) const NEW: Self = Self { no: 1 << 15, seen: 0 };
 
+    #[inline(always)]
     fn learn(&mut self, bit: bool) {
-        let rate = RATES[usize::from(self.seen)];
+        let rate = RATES[usize::from(self.seen) % RATES.len()];
         let no = u32::from(self.no);
         let no = if bit { no - ((no * rate) >> 16) } else { no + (((65536 - no) * rate) >> 16) };
         self.no = no.clamp(LEAST, 65536 - LEAST) as u16;
@@ -125,6 +126,7 @@ impl Writer {
         self.low = (self.low & 0x00ff_ffff) << 8;
     }
 
+    #[inline]
     fn widen(&mut self) {
         while self.range < NARROW {
             self.range <<= 8;
@@ -154,14 +156,12 @@ impl Writer {
 }
 
 impl Bits for Writer {
+    #[inline]
     fn bit(&mut self, model: &mut Model, bit: bool) -> Result<bool, CodecError> {
         let no = (self.range >> 16) * u32::from(model.no);
-        if bit {
-            self.low += u64::from(no);
-            self.range -= no;
-        } else {
-            self.range = no;
-        }
+        // No branch: what is coded here comes as a surprise.
+        self.low += u64::from(if bit { no } else { 0 });
+        self.range = if bit { self.range - no } else { no };
         self.widen();
         model.learn(bit);
         Ok(bit)

@@ -3,11 +3,10 @@
 use super::CodecError;
 use super::bytes::{Input, put_block, put_count};
 use super::exact::{self, Precision};
-use super::grid::{Grid, MOST_STEPS, two_to};
+use super::grid::{Grid, MOST_STEPS};
 use super::hierarchy::Hierarchy;
 use super::mask::Mask;
-use super::plane::Around;
-use super::temporal::{Modes, SPACE};
+use super::plane::{Around, Wanted, two_to};
 
 /// By how much a finite value may differ after it was coded.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -129,13 +128,8 @@ impl Field {
     fn grid(&mut self, points: usize, values: &[f64], bound: f64) -> Option<(Grid, bool)> {
         let mut offsets = Vec::with_capacity(self.components);
         let mut span = 0.0_f64;
-        for component in 0..self.components {
-            let finite = values.iter().skip(component).step_by(self.components);
-            let finite = finite.filter(|value| value.is_finite());
-            let [least, largest] = finite
-                .fold([f64::INFINITY, f64::NEG_INFINITY], |[least, largest], &value| {
-                    [least.min(value), largest.max(value)]
-                });
+        for (component, [least, largest]) in ranges(values, self.components).into_iter().enumerate()
+        {
             let known = match &self.known {
                 Known::Grid(grid) => Some(grid.offsets[component]),
                 _ => None,
@@ -215,44 +209,21 @@ impl Field {
         }
         grid.mask = mask;
         grid.set_masked();
-        let (unit, per_unit) = (grid.unit(), two_to(-i32::from(grid.exponent)));
         let mask = grid.mask.as_ref().map(|mask| &mask.points[..]);
         let mut exceptions = Vec::new();
-        let mut scaled = vec![0.0; order.len()];
+        let mut ordered = vec![0.0; order.len()];
         for component in 0..components {
-            let offset = grid.offsets[component];
-            for (scaled, &tuple) in scaled.iter_mut().zip(order) {
-                *scaled = (values[tuple as usize * components + component] - offset) * per_unit;
+            for (ordered, &tuple) in ordered.iter_mut().zip(order) {
+                *ordered = values[tuple as usize * components + component];
             }
             let (before, plane) = grid.planes.split_at_mut(component);
-            let plane = &mut plane[0];
-            let step = f32::from(grid.steps);
             let beside = before.last().map(|plane| &plane.nodes[..]);
-            let around = Around { stencils, mask, beside, step };
-            let modes = if follows {
-                for (place, (node, &value)) in plane.nodes.iter_mut().zip(&scaled).enumerate() {
-                    if mask.is_some_and(|mask| mask[place]) {
-                        continue;
-                    }
-                    #[expect(clippy::cast_possible_truncation, reason = "to compare with")]
-                    let value = value as f32;
-                    // Where nothing can be compared, nothing has changed.
-                    node[0] = if value.is_finite() { value } else { node[1] };
-                }
-                Modes::best(&plane.nodes, stencils, mask, step)
-            } else {
-                Modes::uniform(SPACE)
-            };
-            plane.encode(around, &modes, &scaled, message);
-            for (place, (node, &tuple)) in plane.nodes.iter().zip(order).enumerate() {
-                let value = values[tuple as usize * components + component];
-                let coded = offset + f64::from(node[0]) * unit;
-                let is_masked = mask.is_some_and(|mask| mask[place]);
-                let off = (coded - value).abs();
-                if !is_masked && (off.is_nan() || off > bound) {
-                    exceptions.push((place * components + component, value));
-                }
-            }
+            let around = Around { hierarchy, mask, beside, step: f32::from(grid.steps) };
+            let (offset, exponent) = (grid.offsets[component], grid.exponent);
+            let wanted = Wanted { values: &ordered, offset, exponent, bound };
+            let beyond = plane[0].encode(around, follows, wanted, message);
+            let exception = |place| (place * components + component, ordered[place]);
+            exceptions.extend(beyond.into_iter().map(exception));
         }
         if !exceptions.is_empty() {
             message[start] |= EXCEPTIONS;
@@ -391,7 +362,7 @@ impl Field {
         for component in 0..self.components {
             let (before, plane) = grid.planes.split_at_mut(component);
             let beside = before.last().map(|plane| &plane.nodes[..]);
-            let around = Around { stencils, mask, beside, step: f32::from(grid.steps) };
+            let around = Around { hierarchy, mask, beside, step: f32::from(grid.steps) };
             plane[0].decode(around, input)?;
         }
         let mut values = grid.values();
@@ -402,6 +373,51 @@ impl Field {
         self.known = Known::Grid(grid);
         Ok(values)
     }
+}
+
+/// The least and the largest finite value of each component; none is larger than infinity.
+fn ranges(values: &[f64], components: usize) -> Vec<[f64; 2]> {
+    let lanes = match components {
+        1 => ranges_of::<4>(values),
+        2 => ranges_of::<8>(values),
+        3 => ranges_of::<12>(values),
+        _ => values.chunks(components).fold(vec![NO_RANGE; components], |mut ranges, tuple| {
+            ranges.iter_mut().zip(tuple).for_each(|(range, &value)| widen(range, value));
+            ranges
+        }),
+    };
+    let mut ranges = vec![NO_RANGE; components];
+    for (lane, of_lane) in lanes.into_iter().enumerate() {
+        let [least, largest] = &mut ranges[lane % components];
+        *least = least.min(of_lane[0]);
+        *largest = largest.max(of_lane[1]);
+    }
+    ranges
+}
+
+const NO_RANGE: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+
+#[inline(always)]
+fn widen([least, largest]: &mut [f64; 2], value: f64) {
+    let is_finite = value.abs() < f64::INFINITY;
+    *least = if is_finite && value < *least { value } else { *least };
+    *largest = if is_finite && value > *largest { value } else { *largest };
+}
+
+/// The ranges of so many values that stand side by side.
+fn ranges_of<const LANES: usize>(values: &[f64]) -> Vec<[f64; 2]> {
+    let (mut least, mut largest) = ([NO_RANGE[0]; LANES], [NO_RANGE[1]; LANES]);
+    let (rounds, rest) = values.as_chunks::<LANES>();
+    let mut take = |lane: usize, value: f64| {
+        let mut range = [least[lane], largest[lane]];
+        widen(&mut range, value);
+        [least[lane], largest[lane]] = range;
+    };
+    for round in rounds {
+        (0..LANES).for_each(|lane| take(lane, round[lane]));
+    }
+    rest.iter().enumerate().for_each(|(lane, &value)| take(lane, value));
+    least.into_iter().zip(largest).map(|(least, largest)| [least, largest]).collect()
 }
 
 const NOT_KNOWN: CodecError = CodecError::Damaged("the frame goes on from one that is not known");

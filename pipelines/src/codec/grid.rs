@@ -1,7 +1,7 @@
 //! A field in whole steps of a grid: what both sides know of it.
 
 use super::mask::Mask;
-use super::plane::Plane;
+use super::plane::{Plane, two_to};
 
 /// No value is further than this from its offset, in grid steps.
 pub(super) const MOST_STEPS: f64 = 4_194_304.0;
@@ -50,9 +50,8 @@ impl Grid {
             for (component, plane) in self.planes.iter_mut().enumerate() {
                 let value = (tuple[component] - self.offsets[component]) * per_unit;
                 let is_near = value.abs() <= 2.0 * MOST_STEPS;
-                let node = &mut plane.nodes[place];
-                node[0] = if is_near { value.round_ties_even() as f32 } else { 0.0 };
-                node[3] = 0.0;
+                let now = if is_near { value.round_ties_even() as f32 } else { 0.0 };
+                plane.nodes[place].set(0.0, now);
             }
         }
     }
@@ -65,7 +64,7 @@ impl Grid {
             let offset = self.offsets[component];
             let places = values.iter_mut().skip(component).step_by(components);
             for (value, node) in places.zip(&plane.nodes) {
-                *value = offset + f64::from(node[0]) * unit;
+                *value = offset + f64::from(node.now()) * unit;
             }
         }
         for (place, tuple) in self.mask.iter().flat_map(Mask::tuples) {
@@ -73,10 +72,4 @@ impl Grid {
         }
         values
     }
-}
-
-/// Two to the power of a number between -1000 and 1000.
-#[expect(clippy::cast_sign_loss, reason = "the exponent of a double, from 23 on")]
-pub(super) fn two_to(exponent: i32) -> f64 {
-    f64::from_bits(((exponent + 1023) as u64) << 52)
 }

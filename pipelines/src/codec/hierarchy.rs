@@ -1,6 +1,8 @@
 //! The order of points from coarse to fine, and what each is predicted from.
 
-use super::kriging::{NEIGHBOURS, square, weights};
+use tombolo_deform::lanes::{LANES, with_wide_registers};
+
+use super::kriging::{NEIGHBOURS, Neighbours, square, weights};
 
 /// The most neighbours of a point that are looked at.
 const MOST_NEIGHBOURS: usize = 32;
@@ -9,7 +11,9 @@ const COARSEST: usize = 48;
 /// The most levels.
 const LEVELS: usize = 24;
 /// The weights of neighbours in a context, the nearest first.
-pub(super) const CONTEXT: [u8; 6] = [9, 7, 6, 5, 4, 4];
+pub(super) const CONTEXT: [f32; NEIGHBOURS] = [9.0, 7.0, 6.0, 5.0, 4.0, 4.0, 0.0, 0.0];
+/// The number of points that share a way of prediction.
+pub(super) const BLOCK: usize = 256;
 
 /// An order of points from coarse to fine. Each is predicted from up to eight that come earlier,
 /// the nearest in space among those that are near in the mesh, by ordinary kriging.
@@ -18,6 +22,8 @@ pub struct Hierarchy {
     /// The point that stands at each place of the order.
     order: Vec<u32>,
     stencils: Vec<Stencil>,
+    /// For each place, whether it is predicted from one of its own block.
+    leans: Vec<bool>,
 }
 
 /// The points that a value is predicted from, all earlier in the order, the nearest first, with
@@ -113,10 +119,9 @@ impl Hierarchy {
         let mut builder = Builder {
             places,
             place_of: vec![0; count],
-            hierarchy: Self {
-                order: Vec::with_capacity(count),
-                stencils: Vec::with_capacity(count),
-            },
+            order: Vec::with_capacity(count),
+            stencils: Vec::with_capacity(count),
+            counts: Vec::with_capacity(count),
         };
         for (index, &point) in points.iter().enumerate() {
             let earlier = &points[index.saturating_sub(COARSEST)..index];
@@ -129,14 +134,13 @@ impl Hierarchy {
             for (local, &colour) in (0u32..).zip(&level.colours) {
                 by_colour[usize::from(colour)].push(local);
             }
+            let mut last = vec![u32::MAX; level.points.len()];
             for local in by_colour.into_iter().skip(1).flatten() {
-                level.near(local, &mut near);
-                let point = level.points[local as usize];
-                let earlier = near.iter().map(|&other| level.points[other as usize]);
-                builder.push(point, earlier);
+                level.near(local, &mut last, &mut near);
+                builder.push(level.points[local as usize], near.iter().copied());
             }
         }
-        builder.hierarchy
+        builder.finish()
     }
 
     /// How many points there are.
@@ -159,6 +163,11 @@ impl Hierarchy {
 
     pub(super) fn stencils(&self) -> &[Stencil] {
         &self.stencils
+    }
+
+    /// For each place, whether it is predicted from one of its own [`BLOCK`].
+    pub(super) fn leans(&self) -> &[bool] {
+        &self.leans
     }
 }
 
@@ -207,20 +216,20 @@ fn coarsen(graph: Graph, points: Vec<u32>) -> (Level, Graph, Vec<u32>) {
 }
 
 impl Level {
-    /// The points of the level that are coded before this one and no further than two edges away.
-    fn near(&self, point: u32, near: &mut Vec<u32>) {
+    /// The points of the level that are coded before this one and no further than two edges away,
+    /// by their numbers in the whole. `last` is for each point the one that last looked at it.
+    fn near(&self, point: u32, last: &mut [u32], near: &mut Vec<u32>) {
         near.clear();
         let colour = self.colours[point as usize];
-        let is_earlier = |other: u32| self.colours[other as usize] < colour;
+        let mut look = |other: u32| {
+            let is_new = std::mem::replace(&mut last[other as usize], point) != point;
+            if is_new && self.colours[other as usize] < colour {
+                near.push(self.points[other as usize]);
+            }
+        };
         for &other in self.graph.of(point) {
-            if is_earlier(other) {
-                near.push(other);
-            }
-            for &further in self.graph.of(other) {
-                if is_earlier(further) {
-                    near.push(further);
-                }
-            }
+            look(other);
+            self.graph.of(other).iter().for_each(|&further| look(further));
         }
     }
 }
@@ -228,10 +237,14 @@ impl Level {
 struct Builder<'places> {
     places: &'places [[i32; 3]],
     place_of: Vec<u32>,
-    hierarchy: Hierarchy,
+    order: Vec<u32>,
+    stencils: Vec<Stencil>,
+    /// How many neighbours each stencil has.
+    counts: Vec<u8>,
 }
 
 impl Builder<'_> {
+    /// Adds the next point, which is predicted from the nearest of those, all different.
     #[expect(clippy::cast_possible_truncation, reason = "points are numbered with 32 bits")]
     fn push(&mut self, point: u32, earlier: impl Iterator<Item = u32>) {
         let at = self.places[point as usize];
@@ -241,7 +254,7 @@ impl Builder<'_> {
         for other in earlier {
             let new = (square(self.places[other as usize], at), other);
             let is_before = |a: (f64, u32), b: (f64, u32)| a.0 < b.0 || (a.0 == b.0 && a.1 < b.1);
-            if !is_before(new, nearest[NEIGHBOURS - 1]) || nearest[..count].contains(&new) {
+            if !is_before(new, nearest[NEIGHBOURS - 1]) {
                 continue;
             }
             let mut index = count.min(NEIGHBOURS - 1);
@@ -252,19 +265,53 @@ impl Builder<'_> {
             nearest[index] = new;
             count = (count + 1).min(NEIGHBOURS);
         }
-        let mut around = [[0; 3]; NEIGHBOURS];
         // Behind the last stands the nearest again, with no weight.
         let first = nearest[..count].first().map_or(0, |&(_, other)| self.place_of[other as usize]);
-        let (mut squares, mut places) = ([0.0; NEIGHBOURS], [first; NEIGHBOURS]);
-        for (index, &(square, other)) in nearest[..count].iter().enumerate() {
-            around[index] = self.places[other as usize];
-            squares[index] = square;
-            places[index] = self.place_of[other as usize];
+        let mut places = [first; NEIGHBOURS];
+        for (place, &(_, other)) in places.iter_mut().zip(&nearest[..count]) {
+            *place = self.place_of[other as usize];
         }
-        let weights = weights(&around[..count], &squares[..count]);
-        self.place_of[point as usize] = self.hierarchy.order.len() as u32;
-        self.hierarchy.order.push(point);
-        self.hierarchy.stencils.push(Stencil { places, weights });
+        self.place_of[point as usize] = self.order.len() as u32;
+        self.order.push(point);
+        self.stencils.push(Stencil { places, weights: [0.0; NEIGHBOURS] });
+        self.counts.push(count as u8);
+    }
+
+    fn finish(self) -> Hierarchy {
+        let Self { places, order, mut stencils, counts, .. } = self;
+        let places: Vec<[i32; 3]> = order.iter().map(|&point| places[point as usize]).collect();
+        with_wide_registers(
+            #[inline(always)]
+            || set_weights(&places, &counts, &mut stencils),
+        );
+        let leans = |(place, stencil): (usize, &Stencil)| {
+            // All are earlier ones.
+            let newest = stencil.places.iter().fold(0, |newest, &other| newest.max(other)) as usize;
+            newest / BLOCK == place / BLOCK
+        };
+        let leans = stencils.iter().enumerate().map(leans).collect();
+        Hierarchy { order, stencils, leans }
+    }
+}
+
+/// Weighs the neighbours of stencils, four at a time.
+#[inline(always)]
+fn set_weights(places: &[[i32; 3]], counts: &[u8], stencils: &mut [Stencil]) {
+    for (chunk, four) in stencils.chunks_mut(LANES).enumerate() {
+        let mut of = [Neighbours::NONE; LANES];
+        for (lane, of) in of.iter_mut().enumerate() {
+            // Behind the last one stand copies of it.
+            let index = lane.min(four.len() - 1);
+            let place = LANES * chunk + index;
+            of.count = usize::from(counts[place]);
+            for neighbour in 0..NEIGHBOURS {
+                of.places[neighbour] = places[four[index].places[neighbour] as usize];
+                of.squares[neighbour] = square(of.places[neighbour], places[place]);
+            }
+        }
+        for (stencil, weights) in four.iter_mut().zip(weights(&of)) {
+            stencil.weights = weights;
+        }
     }
 }
 

@@ -4,6 +4,8 @@
 //! nugget. All in double precision, in the order written here, without fused operations: the same
 //! bits on every machine.
 
+use tombolo_deform::lanes::{LANES, Lanes};
+
 /// The most neighbours of a point.
 pub(super) const NEIGHBOURS: usize = 8;
 /// The variance of repeated values at one point.
@@ -14,58 +16,98 @@ const SILL: f64 = 64.0;
 const LEAST_PIVOT: f64 = 1e-9;
 
 /// The square of the distance between two places.
+#[inline(always)]
 pub(super) fn square(a: [i32; 3], b: [i32; 3]) -> f64 {
-    let [x, y, z] = [0, 1, 2].map(|axis| f64::from(a[axis]) - f64::from(b[axis]));
+    let x = f64::from(a[0]) - f64::from(b[0]);
+    let y = f64::from(a[1]) - f64::from(b[1]);
+    let z = f64::from(a[2]) - f64::from(b[2]);
     x * x + y * y + z * z
 }
 
-/// The weights of `places` for a value at `at`, in single precision; zero behind the last.
-///
-/// `squares` are the squared distances of the places from `at`.
-pub(super) fn weights(places: &[[i32; 3]], squares: &[f64]) -> [f32; NEIGHBOURS] {
-    let count = places.len();
-    let mut result = [0.0; NEIGHBOURS];
-    let Some(solved) = solve(places, squares) else {
-        #[expect(clippy::cast_possible_truncation, reason = "single precision is enough")]
-        let equal = (1.0 / count.max(1) as f64) as f32;
-        result[..count].fill(equal);
-        return result;
-    };
-    #[expect(clippy::cast_possible_truncation, reason = "single precision is enough")]
-    for (weight, solved) in result[..count].iter_mut().zip(solved) {
-        *weight = solved as f32;
-    }
-    result
+/// The neighbours that a value is predicted from, the nearest first: their places, and the squares of
+/// their distances.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Neighbours {
+    pub(super) places: [[i32; 3]; NEIGHBOURS],
+    pub(super) squares: [f64; NEIGHBOURS],
+    pub(super) count: usize,
 }
 
-/// `None` for fewer than two places, or for places that all coincide.
+impl Neighbours {
+    pub(super) const NONE: Self =
+        Self { places: [[0; 3]; NEIGHBOURS], squares: [0.0; NEIGHBOURS], count: 0 };
+}
+
+/// The weights of four lists of neighbours, in single precision; zero behind the last.
+#[inline(always)]
+pub(super) fn weights(of: &[Neighbours; LANES]) -> [[f32; NEIGHBOURS]; LANES] {
+    let count = of[0].count;
+    if of.iter().all(|neighbours| neighbours.count == count) {
+        return of_as_many(of);
+    }
+    let mut weights = [[0.0; NEIGHBOURS]; LANES];
+    for lane in 0..LANES {
+        weights[lane] = of_as_many(&[of[lane]; LANES])[lane];
+    }
+    weights
+}
+
+/// The weights of four lists of equal length.
+#[inline(always)]
+fn of_as_many(of: &[Neighbours; LANES]) -> [[f32; NEIGHBOURS]; LANES] {
+    let count = of[0].count;
+    let (solved, is_sound) = solve(of, count);
+    let equal = 1.0 / count.max(1) as f64;
+    let mut weights = [[0.0; NEIGHBOURS]; LANES];
+    for lane in 0..LANES {
+        for index in 0..count {
+            let weight = if is_sound[lane] { solved[index].0[lane] } else { equal };
+            #[expect(clippy::cast_possible_truncation, reason = "single precision is enough")]
+            {
+                weights[lane][index] = weight as f32;
+            }
+        }
+    }
+    weights
+}
+
+/// Solves four systems, of which those are not sound that have fewer than two places, or places that
+/// all coincide.
+#[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "the indices of a matrix")]
-fn solve(places: &[[i32; 3]], squares: &[f64]) -> Option<[f64; NEIGHBOURS]> {
-    let count = places.len();
-    if count < 2 {
-        return None;
+fn solve(of: &[Neighbours; LANES], count: usize) -> ([Lanes; NEIGHBOURS], [bool; LANES]) {
+    let mut is_sound = [count >= 2; LANES];
+    let (mut mean, mut squares) = (Lanes::ZERO, [Lanes::ZERO; NEIGHBOURS]);
+    let mut places = [[Lanes::ZERO; 3]; NEIGHBOURS];
+    for row in 0..count {
+        for lane in 0..LANES {
+            squares[row].0[lane] = of[lane].squares[row];
+            for axis in 0..3 {
+                places[row][axis].0[lane] = f64::from(of[lane].places[row][axis]);
+            }
+        }
+        mean += squares[row].sqrt();
     }
-    let mut mean = 0.0;
-    for square in squares {
-        mean += square.sqrt();
+    mean = mean / Lanes::all(count as f64);
+    for lane in 0..LANES {
+        is_sound[lane] &= mean.0[lane] > 0.0;
     }
-    mean /= count as f64;
-    if mean <= 0.0 {
-        return None;
-    }
-    let covariance = |square: f64| {
+    let covariance = |square: Lanes| {
         let distance = square.sqrt() / mean;
-        SILL - distance * distance.sqrt()
+        Lanes::all(SILL) - distance * distance.sqrt()
     };
     // The lower triangle, factored in place: L below the diagonal, the pivots on it. Beside it the
     // two right-hand sides: the covariances with the place sought, and ones.
-    let mut matrix = [[0.0; NEIGHBOURS]; NEIGHBOURS];
-    let (mut right, mut ones) = ([0.0; NEIGHBOURS], [1.0; NEIGHBOURS]);
+    let mut matrix = [[Lanes::ZERO; NEIGHBOURS]; NEIGHBOURS];
+    let (mut right, mut ones) = ([Lanes::ZERO; NEIGHBOURS], [Lanes::all(1.0); NEIGHBOURS]);
     for row in 0..count {
         for column in 0..row {
-            matrix[row][column] = covariance(square(places[row], places[column]));
+            let x = places[row][0] - places[column][0];
+            let y = places[row][1] - places[column][1];
+            let z = places[row][2] - places[column][2];
+            matrix[row][column] = covariance(x * x + y * y + z * z);
         }
-        matrix[row][row] = SILL + NUGGET;
+        matrix[row][row] = Lanes::all(SILL + NUGGET);
         right[row] = covariance(squares[row]);
     }
     for row in 0..count {
@@ -80,24 +122,25 @@ fn solve(places: &[[i32; 3]], squares: &[f64]) -> Option<[f64; NEIGHBOURS]> {
         for inner in 0..row {
             pivot -= matrix[row][inner] * matrix[row][inner];
         }
-        if pivot.is_nan() || pivot < LEAST_PIVOT {
-            return None;
+        for lane in 0..LANES {
+            // NaN, too.
+            is_sound[lane] &= pivot.0[lane] >= LEAST_PIVOT;
         }
         matrix[row][row] = pivot.sqrt();
         for inner in 0..row {
             right[row] -= matrix[row][inner] * right[inner];
             ones[row] -= matrix[row][inner] * ones[inner];
         }
-        right[row] /= matrix[row][row];
-        ones[row] /= matrix[row][row];
+        right[row] = right[row] / matrix[row][row];
+        ones[row] = ones[row] / matrix[row][row];
     }
     // With C = L Lᵀ and 1ᵀ w = 1: w = C⁻¹ (c + m 1).
-    let (mut with, mut without) = (0.0, 0.0);
+    let (mut with, mut without) = (Lanes::ZERO, Lanes::ZERO);
     for row in 0..count {
         with += ones[row] * right[row];
         without += ones[row] * ones[row];
     }
-    let multiplier = (1.0 - with) / without;
+    let multiplier = (Lanes::all(1.0) - with) / without;
     for row in 0..count {
         right[row] += multiplier * ones[row];
     }
@@ -105,9 +148,9 @@ fn solve(places: &[[i32; 3]], squares: &[f64]) -> Option<[f64; NEIGHBOURS]> {
         for inner in row + 1..count {
             right[row] -= matrix[inner][row] * right[inner];
         }
-        right[row] /= matrix[row][row];
+        right[row] = right[row] / matrix[row][row];
     }
-    Some(right)
+    (right, is_sound)
 }
 
 #[cfg(test)]
@@ -115,8 +158,12 @@ mod tests {
     use super::*;
 
     fn of(places: &[[i32; 3]], at: [i32; 3]) -> [f32; NEIGHBOURS] {
-        let squares: Vec<f64> = places.iter().map(|&place| square(place, at)).collect();
-        weights(places, &squares)
+        let mut neighbours = Neighbours { count: places.len(), ..Neighbours::NONE };
+        for (index, &place) in places.iter().enumerate() {
+            neighbours.places[index] = place;
+            neighbours.squares[index] = square(place, at);
+        }
+        weights(&[neighbours; LANES])[0]
     }
 
     #[test]

@@ -55,27 +55,35 @@ impl Mask {
         let tuple = |place: usize| &values[order[place] as usize * components..][..components];
         let mut mask = Self { points: vec![], of: vec![0; order.len()], tuples: vec![] };
         let mut number = 0;
+        // The places that have no tuple yet; at first all of them.
+        let mut left: Option<Vec<usize>> = None;
         while mask.tuples.len() < MOST {
-            let left: Vec<usize> = (0..order.len()).filter(|&place| mask.of[place] == 0).collect();
-            let stride = left.len().div_ceil(SAMPLES).max(1);
-            let sample: Vec<&[f64]> = left.iter().step_by(stride).map(|&at| tuple(at)).collect();
+            let count = left.as_ref().map_or(order.len(), Vec::len);
+            let at = |index: usize| left.as_ref().map_or(index, |left| left[index]);
+            let stride = count.div_ceil(SAMPLES).max(1);
+            let sample: Vec<&[f64]> =
+                (0..count).step_by(stride).map(|index| tuple(at(index))).collect();
             let shares = |of: &[f64]| sample.iter().filter(|other| same(of, other)).count();
             let found = sample.iter().map(|tuple| (shares(tuple), *tuple)).max_by_key(|of| of.0);
             let Some((share, best)) = found else { break };
             if share * 16 < sample.len() || share < 2 {
                 break;
             }
-            let set: Vec<usize> =
-                left.iter().copied().filter(|&at| same(tuple(at), best)).collect();
-            if set.len() * 16 < left.len() || (number > 0 && set.len() < LEAST) {
+            let (set, rest): (Vec<usize>, Vec<usize>) =
+                (0..count).map(at).partition(|&place| same(tuple(place), best));
+            if set.len() * 16 < count || (number > 0 && set.len() < LEAST) {
                 break;
             }
+            left = Some(rest);
             number += 1;
             set.into_iter().for_each(|place| mask.of[place] = number);
             mask.tuples.push(best.to_vec());
         }
+        if number == 0 {
+            return None;
+        }
         mask.points = mask.of.iter().map(|&of| of != 0).collect();
-        (number > 0).then_some(mask)
+        Some(mask)
     }
 
     pub(super) fn is_as(&self, other: &Self) -> bool {

@@ -29,6 +29,7 @@ mod known;
 mod kriging;
 mod mask;
 mod motion;
+mod node;
 mod plane;
 mod prediction;
 mod rans;

@@ -30,12 +30,68 @@ pub(super) struct Table {
     frequencies: [(u32, u32); ESCAPE + 1],
     /// The token of each value below the total.
     slots: Box<[u8; TOTAL as usize]>,
-    /// The bits that each token costs, plain ones among them.
-    costs: [f32; ESCAPE + 1],
+    /// The ways into the state of a lane; where a token has no frequency, that of the escape.
+    steps: Box<[Step; ESCAPE + 1]>,
+}
+
+/// The way of a token into the state of a lane, without a division.
+#[derive(Debug, Clone, Copy)]
+struct Step {
+    /// 2⁶⁴ by the frequency, rounded up.
+    inverse: u64,
+    /// What is added beside the multiple of the quotient.
+    bias: u32,
+    frequency: u16,
+    /// What the frequency lacks to the total.
+    others: u16,
+}
+
+impl Step {
+    #[expect(clippy::cast_possible_truncation, reason = "frequencies have 13 bits")]
+    fn new(frequency: u32, start: u32) -> Self {
+        // With 1 the quotient comes out one too small, which the bias makes good.
+        let (inverse, more) = match frequency {
+            1 => (u64::MAX, TOTAL - 1),
+            _ => ((u64::MAX / u64::from(frequency)) + 1, 0),
+        };
+        let others = (TOTAL - frequency) as u16;
+        Self { inverse, bias: start + more, frequency: frequency as u16, others }
+    }
+
+    /// `state / frequency * TOTAL + state % frequency + start`.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "a quotient of 32 bits")]
+    fn take(self, state: u32) -> u32 {
+        let quotient = ((u128::from(state) * u128::from(self.inverse)) >> 64) as u32;
+        state.wrapping_add(self.bias).wrapping_add(quotient.wrapping_mul(u32::from(self.others)))
+    }
+}
+
+/// Everything about the distributions.
+pub(super) struct Tables {
+    all: Vec<Table>,
+    /// For each token the bits that it costs with each table, plain ones among them.
+    costs: Vec<[f32; TABLES]>,
+}
+
+/// A number with its token and the class whose table codes it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Number {
+    pub(super) number: u32,
+    pub(super) class: u8,
+    token: u8,
+}
+
+impl Number {
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "there are 87 tokens")]
+    pub(super) fn new(number: u32, class: u8) -> Self {
+        Self { number, class, token: token(number).0 as u8 }
+    }
 }
 
 /// The token of a number, and how many plain bits follow it.
-#[inline]
+#[inline(always)]
 fn token(number: u32) -> (usize, u32) {
     if number < SINGLE {
         return (number as usize, 0);
@@ -57,16 +113,18 @@ fn least(token: usize) -> (u32, u32) {
 }
 
 /// All distributions.
-pub(super) fn tables() -> &'static [Table] {
-    static ALL: OnceLock<Vec<Table>> = OnceLock::new();
+pub(super) fn tables() -> &'static Tables {
+    static ALL: OnceLock<Tables> = OnceLock::new();
     ALL.get_or_init(|| {
         let mut width = 1.0 / 256.0;
-        let mut tables = Vec::with_capacity(TABLES);
+        let mut all = Vec::with_capacity(TABLES);
         for _ in 0..TABLES {
-            tables.push(Table::new(width));
+            all.push(Table::new(width));
             width *= std::f64::consts::SQRT_2;
         }
-        tables
+        let cost = |token: usize| std::array::from_fn(|table| all[table].cost(token));
+        let costs = (0..=ESCAPE).map(cost).collect();
+        Tables { all, costs }
     })
 }
 
@@ -138,16 +196,22 @@ impl Table {
             start += frequency;
             (frequency, start - frequency)
         });
-        let costs = std::array::from_fn(|token| {
-            let (frequency, _) = starts[token];
-            let plain = if token == ESCAPE { 32 } else { least(token).1 };
-            let frequency = if frequency == 0 { 2f32.powi(-32) } else { frequency as f32 };
-            BITS as f32 - frequency.log2() + plain as f32
-        });
         for (token, (frequency, start)) in (0u8..).zip(starts) {
             slots[start as usize..(start + frequency) as usize].fill(token);
         }
-        Self { frequencies: starts, slots, costs }
+        let steps = Box::new(starts.map(|(frequency, start)| match frequency {
+            0 => Step::new(1, starts[ESCAPE].1),
+            _ => Step::new(frequency, start),
+        }));
+        Self { frequencies: starts, slots, steps }
+    }
+
+    /// The bits that a token costs, plain ones among them.
+    fn cost(&self, token: usize) -> f32 {
+        let (frequency, _) = self.frequencies[token];
+        let plain = if token == ESCAPE { 32 } else { least(token).1 };
+        let frequency = if frequency == 0 { 2f32.powi(-32) } else { frequency as f32 };
+        BITS as f32 - frequency.log2() + plain as f32
     }
 }
 
@@ -158,25 +222,39 @@ pub(super) struct Histogram([u32; ESCAPE + 1]);
 impl Histogram {
     pub(super) const NEW: Self = Self([0; ESCAPE + 1]);
 
-    pub(super) fn add(&mut self, number: u32) {
-        self.0[token(number).0] += 1;
+    #[inline(always)]
+    pub(super) fn add(&mut self, number: Number) {
+        self.0[usize::from(number.token)] += 1;
     }
 
     pub(super) fn is_empty(&self) -> bool {
         self.0.iter().all(|&count| count == 0)
     }
 
-    /// The bits that all of it costs with a table.
-    fn cost(&self, table: &Table) -> f32 {
-        self.0.iter().zip(&table.costs).map(|(&count, cost)| count as f32 * cost).sum()
+    /// Whether a number needs more than its token, with this table.
+    pub(super) fn has_plain(&self, table: u8) -> bool {
+        let frequencies = &tables().all[usize::from(table)].frequencies;
+        let needs = |token: usize| token >= SINGLE as usize || frequencies[token].0 == 0;
+        self.0.iter().enumerate().any(|(token, &count)| count > 0 && needs(token))
+    }
+
+    /// The bits that all of it costs with each table.
+    fn costs(&self) -> [f32; TABLES] {
+        let mut sums = [0.0; TABLES];
+        let met = self.0.iter().zip(&tables().costs).filter(|(count, _)| **count > 0);
+        for (&count, costs) in met {
+            for (sum, cost) in sums.iter_mut().zip(costs) {
+                *sum += count as f32 * cost;
+            }
+        }
+        sums
     }
 
     /// The table with which it costs least; another only if that saves more bits than `price`.
     pub(super) fn best(&self, otherwise: u8, price: f32) -> u8 {
-        let tables = tables();
-        let (mut best, mut least) = (otherwise, self.cost(&tables[usize::from(otherwise)]) - price);
-        for (index, table) in (0u8..).zip(tables) {
-            let cost = self.cost(table);
+        let costs = self.costs();
+        let (mut best, mut least) = (otherwise, costs[usize::from(otherwise)] - price);
+        for (index, cost) in (0u8..).zip(costs) {
             if cost < least {
                 (best, least) = (index, cost);
             }
@@ -214,41 +292,68 @@ impl PlainWriter {
     }
 }
 
-/// Codes numbers, each with the table of its number; writes `2^lanes` lanes.
-#[expect(clippy::cast_possible_truncation, reason = "states and words have their sizes")]
-pub(super) fn encode(numbers: &[(u8, u32)], lanes: u32, out: &mut Vec<u8>) {
-    let tables = tables();
-    let mask = (1usize << lanes) - 1;
+/// Codes numbers, each with the table that its class has; writes `2^lanes` lanes. `has_plain` says
+/// whether one of them needs more than its token.
+pub(super) fn encode(
+    numbers: &[Number],
+    of_classes: &[u8],
+    has_plain: bool,
+    lanes: u32,
+    out: &mut Vec<u8>,
+) {
+    let all = &tables().all;
+    let of_classes: Vec<&Table> =
+        of_classes.iter().map(|&table| &all[usize::from(table)]).collect();
     let mut plain = PlainWriter::default();
-    for &(table, number) in numbers {
-        let (token, bits) = token(number);
-        if tables[usize::from(table)].frequencies[token].0 == 0 {
+    for &Number { number, class, token } in numbers.iter().filter(|_| has_plain) {
+        let token = usize::from(token);
+        if of_classes[usize::from(class)].frequencies[token].0 == 0 {
             plain.put(number, 32);
-        } else if bits > 0 {
+        } else if token >= SINGLE as usize {
+            let bits = least(token).1;
             plain.put(number & ((1 << bits) - 1), bits);
         }
     }
-    let mut states = [LOW; LANES];
-    let mut words = Vec::with_capacity(numbers.len() / 2);
-    for (index, &(table, number)) in numbers.iter().enumerate().rev() {
-        let frequencies = &tables[usize::from(table)].frequencies;
-        let (mut frequency, mut start) = frequencies[token(number).0];
-        if frequency == 0 {
-            (frequency, start) = frequencies[ESCAPE];
-        }
-        let state = &mut states[index & mask];
-        if u64::from(*state) >= u64::from(frequency) << (32 - BITS) {
-            words.push(*state as u16);
-            *state >>= 16;
-        }
-        *state = ((*state / frequency) << BITS) + *state % frequency + start;
+    match lanes {
+        0 => encode_lanes::<1>(numbers, &of_classes, out),
+        1 => encode_lanes::<2>(numbers, &of_classes, out),
+        2 => encode_lanes::<4>(numbers, &of_classes, out),
+        _ => encode_lanes::<8>(numbers, &of_classes, out),
     }
-    for state in &states[..=mask] {
+    put_block(out, &plain.finish());
+}
+
+/// The states of so many lanes, and the words behind them.
+fn encode_lanes<const LANES: usize>(numbers: &[Number], of_classes: &[&Table], out: &mut Vec<u8>) {
+    let mut states = [LOW; LANES];
+    // One for each number at most, from the last to the first.
+    let mut words = vec![0u16; numbers.len() + 1];
+    let mut at = numbers.len();
+    #[expect(clippy::cast_possible_truncation, reason = "the lowest bits are the word")]
+    let mut take = |state: &mut u32, number: &Number| {
+        let step = of_classes[usize::from(number.class)].steps[usize::from(number.token)];
+        // No branch: whether a word is full comes as a surprise each time.
+        let is_full = u32::from(*state >> (32 - BITS) >= u32::from(step.frequency));
+        words[at] = *state as u16;
+        at -= is_full as usize;
+        *state = step.take(*state >> (16 * is_full));
+    };
+    let (rounds, rest) = numbers.as_chunks::<LANES>();
+    for (state, number) in states.iter_mut().zip(rest).rev() {
+        take(state, number);
+    }
+    for round in rounds.iter().rev() {
+        for lane in (0..LANES).rev() {
+            take(&mut states[lane], &round[lane]);
+        }
+    }
+    for state in states {
         out.extend(state.to_le_bytes());
     }
+    let words = &words[at + 1..];
     put_count(out, words.len());
-    out.extend(words.iter().rev().flat_map(|word| word.to_le_bytes()));
-    put_block(out, &plain.finish());
+    out.reserve(2 * words.len());
+    words.iter().for_each(|word| out.extend_from_slice(&word.to_le_bytes()));
 }
 
 /// Reads numbers one after the other.
@@ -273,11 +378,11 @@ impl<'bytes> Decoder<'bytes> {
         let words = input.take(count.saturating_mul(2))?.as_chunks().0;
         let plain = input.block()?;
         let mask = (1 << lanes) - 1;
-        Ok(Self { tables: tables(), states, mask, index: 0, words, at: 0, plain, bit: 0 })
+        Ok(Self { tables: &tables().all, states, mask, index: 0, words, at: 0, plain, bit: 0 })
     }
 
     /// The next number, which was coded with this table.
-    #[inline]
+    #[inline(always)]
     pub(super) fn next(&mut self, table: u8) -> u32 {
         let state = &mut self.states[self.index & self.mask & (LANES - 1)];
         self.index += 1;
@@ -285,13 +390,12 @@ impl<'bytes> Decoder<'bytes> {
         let slot = *state & (TOTAL - 1);
         let token = usize::from(table.slots[slot as usize]);
         let (frequency, start) = table.frequencies[token];
-        let mut next = frequency.wrapping_mul(*state >> BITS).wrapping_add(slot - start);
-        if next < LOW {
-            let word = self.words.get(self.at).map_or(0, |&word| u16::from_le_bytes(word));
-            next = next << 16 | u32::from(word);
-            self.at += 1;
-        }
-        *state = next;
+        let next = frequency.wrapping_mul(*state >> BITS).wrapping_add(slot - start);
+        // No branch: whether a word is due comes as a surprise each time.
+        let is_due = u32::from(next < LOW);
+        let word = self.words.get(self.at).map_or(0, |&word| u16::from_le_bytes(word));
+        *state = next << (16 * is_due) | u32::from(word) & is_due.wrapping_neg();
+        self.at += is_due as usize;
         #[expect(clippy::cast_possible_truncation, reason = "there are 87 tokens")]
         if token < SINGLE as usize { token as u32 } else { self.long(token) }
     }
@@ -336,8 +440,22 @@ mod tests {
     }
 
     #[test]
+    fn steps_are_what_a_division_gives() {
+        for frequency in (1..=64).chain([1000, 1365, 2047, 2049, 4001, 4095, 4096]) {
+            let step = Step::new(frequency, 0);
+            let most = (u64::from(frequency) << (32 - BITS)) - 1;
+            let states = (0..2000).map(|i| most - i * i * i % (most / 2)).chain([65536, 0, most]);
+            for state in states.map(|state| state as u32) {
+                let expected = ((state / frequency) << BITS).wrapping_add(state % frequency);
+                // Below 2¹⁶ no lane ever is.
+                assert!(state < LOW || step.take(state) == expected, "{frequency} {state}");
+            }
+        }
+    }
+
+    #[test]
     fn tables_are_complete_and_fit_their_distribution() {
-        for (index, table) in tables().iter().enumerate() {
+        for (index, table) in tables().all.iter().enumerate() {
             let sum: u32 = table.frequencies.iter().map(|token| token.0).sum();
             assert_eq!(sum, TOTAL, "table {index}");
             assert!(table.frequencies[0].0 >= table.frequencies[2].0);
@@ -354,20 +472,21 @@ mod tests {
     #[test]
     fn what_is_written_is_read() {
         let mut random = 7u64;
-        let numbers: Vec<(u8, u32)> = (0..50_000)
+        let every: Vec<u8> = (0..TABLES as u8).collect();
+        let numbers: Vec<Number> = (0..50_000)
             .map(|index| {
                 random = random.wrapping_mul(6364136223846793005).wrapping_add(1);
                 let number = (random >> 33) as u32 >> (index % 32);
-                ((random >> 20) as u8 % TABLES as u8, number)
+                Number::new(number, (random >> 20) as u8 % TABLES as u8)
             })
             .collect();
         for (lanes, count) in [(0, 0), (0, 1), (1, 77), (3, 50_000), (3, 5), (2, 1000)] {
             let mut bytes = Vec::new();
-            encode(&numbers[..count], lanes, &mut bytes);
+            encode(&numbers[..count], &every, true, lanes, &mut bytes);
             let mut input = Input(&bytes);
             let mut decoder = Decoder::new(lanes, &mut input).unwrap();
-            for &(table, number) in &numbers[..count] {
-                assert_eq!(decoder.next(table), number);
+            for number in &numbers[..count] {
+                assert_eq!(decoder.next(number.class), number.number);
             }
             decoder.finish().unwrap();
             assert!(input.0.is_empty());
@@ -377,13 +496,13 @@ mod tests {
     #[test]
     fn coding_costs_what_the_table_says() {
         let mut histogram = Histogram::NEW;
-        let numbers: Vec<u32> = (0..20_000u32).map(|i| (i * i % 97) / 12).collect();
+        let number = |i: u32| Number::new((i * i % 97) / 12, 0);
+        let numbers: Vec<Number> = (0..20_000u32).map(number).collect();
         numbers.iter().for_each(|&number| histogram.add(number));
         let best = histogram.best(0, 0.0);
         let mut bytes = Vec::new();
-        let coded: Vec<(u8, u32)> = numbers.iter().map(|&number| (best, number)).collect();
-        encode(&coded, 3, &mut bytes);
-        let expected = f64::from(histogram.cost(&tables()[usize::from(best)])) / 8.0;
+        encode(&numbers, &[best], histogram.has_plain(best), 3, &mut bytes);
+        let expected = f64::from(histogram.costs()[usize::from(best)]) / 8.0;
         assert!((bytes.len() as f64 - expected).abs() < 0.01 * expected + 40.0);
     }
 }

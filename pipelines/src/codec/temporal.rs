@@ -2,14 +2,12 @@
 
 use super::CodecError;
 use super::bytes::Input;
-use super::hierarchy::Stencil;
-use super::prediction::{Coefficients, Node, predict, sums};
+use super::hierarchy::{BLOCK, Stencil};
+use super::node::Node;
+use super::prediction::{Coefficients, sums};
 
-/// The number of points that share a way of prediction.
-pub(super) const BLOCK: usize = 256;
-/// From so many points on, one of so many is asked which way is best: it takes a third less time,
-/// and costs two bits in a hundred.
-const SAMPLED: [usize; 2] = [1 << 16, 3];
+/// The coefficients are fitted to about so many points: they say as much as all.
+const FITTED_TO: usize = 16384;
 /// Neighbours alone.
 pub(super) const SPACE: u8 = 0;
 /// The ways that are fixed: neighbours alone; the last frame alone; the last frame and how the
@@ -31,6 +29,11 @@ impl Modes {
         Self { modes: vec![mode], fitted: [0; 4] }
     }
 
+    /// Adds the way of the next block.
+    pub(super) fn push(&mut self, mode: u8) {
+        self.modes.push(mode);
+    }
+
     fn uses_fit(&self) -> bool {
         self.modes.contains(&FITTED)
     }
@@ -39,7 +42,13 @@ impl Modes {
     #[inline]
     pub(super) fn of(&self, point: usize) -> Coefficients {
         let block = if self.modes.len() == 1 { 0 } else { point / BLOCK };
-        match self.modes.get(block).copied().unwrap_or(SPACE) {
+        self.coefficients(self.modes.get(block).copied().unwrap_or(SPACE))
+    }
+
+    /// The coefficients of a way.
+    #[inline]
+    pub(super) fn coefficients(&self, mode: u8) -> Coefficients {
+        match mode {
             FITTED => self.fitted.map(|part| f32::from(part) / PARTS),
             mode => FIXED[usize::from(mode)],
         }
@@ -83,77 +92,90 @@ impl Modes {
         Ok(Self { modes, fitted: fitted.map(|part| part as i8) })
     }
 
-    /// The best ways for values that stand in the nodes' first place. The neighbours are taken as
-    /// they are, not as they will be coded.
-    pub(super) fn best(
+    /// One for all, where all are the same or there is none.
+    pub(super) fn settle(&mut self) {
+        let first = self.modes.first().copied().unwrap_or(SPACE);
+        if self.modes.iter().all(|&mode| mode == first) {
+            self.modes = vec![first];
+        }
+    }
+}
+
+/// The four ways side by side, to choose from.
+pub(super) struct Ways {
+    /// For each coefficient its value in each way.
+    coefficients: [[f32; 4]; 4],
+    fitted: [i8; 4],
+    per_step: f32,
+}
+
+impl Ways {
+    /// The ways for values that stand in the nodes.
+    #[inline(always)]
+    pub(super) fn new(
         nodes: &[Node],
         stencils: &[Stencil],
         mask: Option<&[bool]>,
         step: f32,
     ) -> Self {
-        let is_masked = |point: usize| mask.is_some_and(|mask| mask[point]);
-        let fitted = fit(nodes, stencils, is_masked);
+        let fitted = fit(nodes, stencils, |point| mask.is_some_and(|mask| mask[point]));
         let fit = fitted.map(|part| f32::from(part) / PARTS);
         let ways = [FIXED[0], FIXED[1], FIXED[2], fit];
-        let per_step = 2.0 / step;
-        let stride = if nodes.len() < SAMPLED[0] { 1 } else { SAMPLED[1] };
-        let mut modes = Vec::with_capacity(nodes.len() / BLOCK + 1);
-        for block in 0..nodes.len().div_ceil(BLOCK) {
-            let mut costs = [0.0f32; 4];
-            let points = block * BLOCK..nodes.len().min((block + 1) * BLOCK);
-            for point in points.step_by(stride) {
-                if is_masked(point) {
-                    continue;
-                }
-                let sums = sums(nodes, &stencils[point]);
-                for (cost, by) in costs.iter_mut().zip(ways) {
-                    let off = (predict(sums, nodes[point], by) - nodes[point][0]).abs();
-                    *cost += logarithm(1.0 + per_step * off);
-                }
+        let coefficients = [0, 1, 2, 3].map(|index| ways.map(|way| way[index]));
+        Self { coefficients, fitted, per_step: 2.0 / step }
+    }
+
+    /// No ways chosen yet.
+    pub(super) fn modes(&self, points: usize) -> Modes {
+        Modes { modes: Vec::with_capacity(points.div_ceil(BLOCK)), fitted: self.fitted }
+    }
+
+    /// Adds about the bits that a node's value costs in each way.
+    #[inline(always)]
+    pub(super) fn add_costs(&self, sums: Node, node: Node, costs: &mut [f32; 4]) {
+        let [_, now, before, earlier] = sums.0;
+        let [_, value, last, second] = node.0;
+        let terms = [now - before, now - last, last - second, before - earlier];
+        let mut off = [last - value; 4];
+        for (term, coefficients) in terms.iter().zip(&self.coefficients) {
+            for way in 0..4 {
+                off[way] += term * coefficients[way];
             }
-            // The fit costs four bytes and other ways than one two bits a block: the last way
-            // first, so that equals are all the same.
-            let best = (0u8..4)
-                .rev()
-                .min_by(|&a, &b| costs[usize::from(a)].total_cmp(&costs[usize::from(b)]));
-            modes.push(best.unwrap_or(SPACE));
         }
-        modes.dedup_if_uniform();
-        Self { modes, fitted }
+        for way in 0..4 {
+            costs[way] += logarithm(1.0 + self.per_step * off[way].abs());
+        }
     }
 }
 
-trait Uniform {
-    fn dedup_if_uniform(&mut self);
-}
-
-impl Uniform for Vec<u8> {
-    /// One entry, where all are the same or there is none.
-    fn dedup_if_uniform(&mut self) {
-        let first = self.first().copied().unwrap_or(SPACE);
-        if self.iter().all(|&mode| mode == first) {
-            *self = vec![first];
-        }
-    }
+/// The way that costs least.
+pub(super) fn cheapest(costs: [f32; 4]) -> u8 {
+    // The fit costs four bytes and other ways than one two bits a block: the last way first, so that
+    // equals are all the same.
+    let least = |&a: &u8, &b: &u8| costs[usize::from(a)].total_cmp(&costs[usize::from(b)]);
+    (0u8..4).rev().min_by(least).unwrap_or(SPACE)
 }
 
 /// About the logarithm to base 2 of a number from 1 on: exact for powers of two, a line between them.
+#[inline(always)]
+#[expect(clippy::cast_possible_wrap, reason = "the sign's bit is not set")]
 fn logarithm(number: f32) -> f32 {
-    (number.to_bits() as f32) * (1.0 / 8_388_608.0) - 127.0
+    (number.to_bits() as i32 as f32) * (1.0 / 8_388_608.0) - 127.0
 }
 
 /// The coefficients with the least squares of what is left.
 #[expect(clippy::needless_range_loop, reason = "the indices of a matrix")]
+#[inline(always)]
 fn fit(nodes: &[Node], stencils: &[Stencil], is_masked: impl Fn(usize) -> bool) -> [i8; 4] {
     let (mut matrix, mut right) = ([[0.0f64; 4]; 4], [0.0f64; 4]);
-    // Some thousand points say as much as all.
-    let stride = nodes.len().div_ceil(16384).max(1);
+    let stride = nodes.len().div_ceil(FITTED_TO).max(1);
     for point in (0..nodes.len()).step_by(stride) {
         if is_masked(point) {
             continue;
         }
-        let [now, before, earlier, _] = sums(nodes, &stencils[point]).map(f64::from);
-        let [value, last, second, _] = nodes[point].map(f64::from);
+        let sums = sums(nodes, &stencils[point]).0;
+        let [_, now, before, earlier] = sums.map(f64::from);
+        let [_, value, last, second] = nodes[point].0.map(f64::from);
         let terms = [now - before, now - last, last - second, before - earlier];
         for row in 0..4 {
             for column in 0..4 {
