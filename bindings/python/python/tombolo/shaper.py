@@ -89,7 +89,9 @@ def _of_meshio(mesh: Any) -> Mesh:
 
 def _of_pyvista(mesh: Any) -> Mesh:
     grid = mesh if hasattr(mesh, "celltypes") else mesh.cast_to_unstructured_grid()
-    cells: Cells = {"connectivity": grid.cell_connectivity, "offsets": grid.offset, "types": grid.celltypes}
+    # Its older name was given up.
+    offsets = grid.cell_offsets if hasattr(type(grid), "cell_offsets") else grid.offset
+    cells: Cells = {"connectivity": grid.cell_connectivity, "offsets": offsets, "types": grid.celltypes}
     return Mesh(grid.points, cells)
 
 
