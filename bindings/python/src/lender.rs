@@ -1,5 +1,7 @@
 //! Meshes and fields of Python, lent to the adaptor for the length of a call.
 
+use std::sync::Arc;
+
 use numpy::PyUntypedArray;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyMapping, PyString, PyTuple};
@@ -34,7 +36,7 @@ const OF_VTK: [&str; 3] = ["connectivity", "offsets", "types"];
 pub(crate) struct Lender {
     owners: Vec<Py<PyAny>>,
     /// Numbers of features, to each of which an array without a stride points.
-    numbers: Vec<Box<i64>>,
+    numbers: Vec<Arc<[i64]>>,
 }
 
 /// The channels of a call, lent while other threads of Python run.
@@ -59,6 +61,8 @@ unsafe impl Send for Channels<'_> {}
 
 type Given<'py> = Bound<'py, PyAny>;
 type Read<T> = Result<T, RunError>;
+/// Faces by the numbers of their features, and the names of those.
+type NamedFaces<'call> = (Vec<Faces<'call>>, Vec<(i64, String)>);
 
 fn kind(given: &Given<'_>) -> String {
     format!("a {}", given.get_type())
@@ -252,17 +256,16 @@ impl Lender {
     }
 
     /// The named parts of the boundary, and the names by their numbers.
-    fn faces<'call>(
-        &mut self,
-        given: &Given<'_>,
-        what: &str,
-    ) -> Read<(Vec<Faces<'call>>, Vec<(i64, String)>)> {
+    fn faces<'call>(&mut self, given: &Given<'_>, what: &str) -> Read<NamedFaces<'call>> {
         let expected = "a dict from names to faces: arrays (m, 3) or (m, 4)";
         let (mut faces, mut names) = (Vec::new(), Vec::new());
-        for (number, [key, value]) in (0..).zip(entries(given, what, expected)?) {
+        let parts = entries(given, what, expected)?;
+        let numbers: Arc<[i64]> = (0..).take(parts.len()).collect();
+        self.numbers.push(Arc::clone(&numbers));
+        for (number, [key, value]) in numbers.iter().zip(parts) {
             let part = name(&key, what)?;
             let what = format!("{what}['{part}']");
-            names.push((number, part));
+            names.push((*number, part));
             let mut topologies = Vec::new();
             if value.cast::<PyDict>().is_ok() {
                 for [key, value] in entries(&value, &what, expected)? {
@@ -277,16 +280,14 @@ impl Lender {
                 };
                 topologies.push(self.uniform(of, &value, what)?);
             }
-            let number = Box::new(number);
             for topology in topologies {
-                let first: *const i64 = &raw const *number;
+                let first: *const i64 = number;
                 // SAFETY: one number, over and over; this keeps it alive.
                 let tags = unsafe {
                     Array::new(first.cast(), topology.cell_count(), 0, NumberType::I64, false)
                 };
                 faces.push(Faces { topology, tags });
             }
-            self.numbers.push(number);
         }
         Ok((faces, names))
     }

@@ -14,6 +14,9 @@ use crate::error::{CallError, FailedError, guarded, of_run};
 use crate::lender::{Channels, Lender};
 use crate::motion::Motion;
 
+/// The motion that is asked for, whether to stop, and the parameters where they have changed.
+type Asked<'py> = (Option<Motion>, bool, Option<Bound<'py, PyDict>>);
+
 /// How far a run has come.
 enum Stage {
     UnderWay(Box<foreign::Run>),
@@ -162,7 +165,7 @@ impl Run {
         time: f64,
         time_step: f64,
         channels: &Bound<'py, PyAny>,
-    ) -> PyResult<Option<(Option<Motion>, bool, Option<Bound<'py, PyDict>>)>> {
+    ) -> PyResult<Option<Asked<'py>>> {
         let mut state = self.hold()?;
         let State { stage, told } = &mut *state;
         let run = stage.run()?;
