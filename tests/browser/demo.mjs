@@ -134,7 +134,9 @@ const picture = (name) => page.screenshot({ path: join(screenshots, `${String(++
 /** How many pixels of the column at `x` the shape covers, all that has come being drawn. */
 async function silhouette(x) {
   await drawn();
-  const clip = { x: Math.round(x), y: 100, width: 1, height: 640 };
+  // Of the picture alone, without the tools over it and the help below.
+  const box = await page.locator("#scene").boundingBox();
+  const clip = { x: Math.round(x), y: Math.round(box.y) + 60, width: 1, height: Math.round(box.height) - 150 };
   const png = (await page.screenshot({ clip })).toString("base64");
   return page.evaluate(async (data) => {
     const image = new Image();

@@ -3,8 +3,9 @@ import type { Vector } from "../connection/protocol";
 import { part, write } from "../dom";
 import type { Action } from "../store/actions";
 import type { Commands } from "../store/commands";
-import { asksNothing, bodyOf, isObject, kindOf, scaled } from "../store/draft";
+import { asksNothing, bodyOf, fieldsBefore, isObject, kindOf, scaled } from "../store/draft";
 import type { State } from "../store/state";
+import { sameJson } from "../store/store";
 import type { Store } from "../store/store";
 import { applyButton, forecastLine, openBoundaryWarning, percent, previewLine, remedies } from "../store/verdict";
 import type { Line } from "../store/verdict";
@@ -104,12 +105,14 @@ export class VerdictPanel {
     this.whole = whole;
     this.limit = Math.min(this.limit, this.allowed(state));
     const kind = kindOf(state, state.draft.key);
-    const shown = kind !== null && !asksNothing(state) && state.draft.problems.length === 0 && JSON.stringify(scaled(kind.field, whole, 0.5)) !== JSON.stringify(whole);
+    const shown = kind !== null && (amount !== null || !asksNothing(state)) && state.draft.problems.length === 0 && !sameJson(scaled(kind.field, whole, 0.5, fieldsBefore(state)), whole);
     part("amount-row").hidden = !shown;
     const fraction = amount?.fraction ?? 1;
-    if (document.activeElement !== this.slider || Math.abs(Number(this.slider.value) / 100 - fraction) > 0.005) this.slider.value = String(Math.round(100 * fraction));
+    // Rounded down, so that what is shown is no more than what passes.
+    const percentShown = Math.floor(100 * fraction + 1e-9);
+    if (document.activeElement !== this.slider || Math.abs(Number(this.slider.value) / 100 - fraction) > 0.005) this.slider.value = String(percentShown);
     const limit = this.limit < 1 ? ` of ${percent(this.limit)}` : "";
-    write(part("amount-text"), `${Math.round(100 * fraction)} %${limit}`);
+    write(part("amount-text"), `${percentShown} %${limit}`);
     part("amount-row").title = limit === "" ? "How much of it is asked for" : `${percent(this.limit)} of it would pass`;
     this.slider.style.setProperty("--feasible", `${100 * this.limit}%`);
   }

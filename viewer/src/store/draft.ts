@@ -96,20 +96,39 @@ function amountsOf(field: Field, value: Json | undefined): Json {
   return Object.fromEntries(chosen.flatMap(({ name }) => (value[name] === undefined ? [] : [[name, value[name]!]])));
 }
 
-/** The fields of an edit with a fraction of its amounts: 0 asks for nothing, 1 is all of them. */
-export function scaled(field: Field, values: Values, fraction: number): Values {
+/**
+ * The fields of an edit with a fraction of its amounts: 1 is all of them, 0 what stood there `before`, or nothing at all where the edit is
+ * a new one.
+ */
+export function scaled(field: Field, values: Values, fraction: number, before: Values = {}): Values {
   if (field.kind !== "object") return values;
   const result = { ...values };
-  for (const property of field.properties) {
-    const value = values[property.name];
+  for (const { name, neutral, field: inner } of field.properties) {
+    const value = values[name];
     if (value === undefined) continue;
-    if (property.neutral !== undefined) result[property.name] = between(property.neutral, value, fraction);
-    else if (property.field.kind === "list" && Array.isArray(value)) {
-      const { item } = property.field;
-      result[property.name] = value.map((entry) => (isObject(entry) ? scaled(item, entry, fraction) : entry));
+    const known = before[name];
+    if (neutral !== undefined) result[name] = between(known ?? neutral, value, fraction);
+    else if (inner.kind === "list" && Array.isArray(value)) {
+      const earlier = (entry: Values): Values => {
+        const same = Array.isArray(known) ? known.find((other) => isObject(other) && sameJson(fixedPart(inner.item, other), fixedPart(inner.item, entry))) : undefined;
+        return isObject(same) ? same : {};
+      };
+      result[name] = value.map((entry) => (isObject(entry) ? scaled(inner.item, entry, fraction, earlier(entry)) : entry));
     }
   }
   return result;
+}
+
+/** What of an entry is no amount: which one it is. */
+function fixedPart(field: Field & { kind: "object" }, entry: Values): Values {
+  return Object.fromEntries(field.properties.flatMap(({ name, neutral }) => (neutral === undefined && entry[name] !== undefined ? [[name, entry[name]]] : [])));
+}
+
+/** The fields of the edit that is being changed, as they are in the stack; of a new one there are none. */
+export function fieldsBefore(state: Pick<State, "hello" | "draft" | "form">): Values {
+  const { key, updating } = state.draft;
+  const [kind, edit] = [kindOf(state, key), updating === null ? null : partsOf(state.hello?.stack[updating])];
+  return kind && edit?.key === key ? withoutShorthand(kind, edit.body) : {};
 }
 
 function between(neutral: Json, value: Json, fraction: number): Json {

@@ -4,7 +4,7 @@ import { describeOrder } from "../form/describe";
 import { ROLES } from "../form/schema";
 import type { Values } from "../form/schema";
 import type { Action } from "./actions";
-import { bodyOf, isObject, kindOf, openBoundaries, partsOf, scaled, wishedOrder, withoutShorthand } from "./draft";
+import { bodyOf, fieldsBefore, isObject, kindOf, openBoundaries, partsOf, scaled, wishedOrder, withoutShorthand } from "./draft";
 import { orderRefused, orderSent, orderTold, ordersReconciled } from "./orders";
 import { looksOf, withLook } from "./looks";
 import { NO_FORECAST } from "./state";
@@ -205,6 +205,6 @@ function withAmount(state: State, fraction: number): State {
   const kind = kindOf(state, state.draft.key);
   if (!kind) return state;
   const whole = state.draft.amount?.whole ?? bodyOf(state.draft);
-  const draft = { ...state.draft, bodies: { ...state.draft.bodies, [kind.key]: scaled(kind.field, whole, fraction) } };
+  const draft = { ...state.draft, bodies: { ...state.draft.bodies, [kind.key]: scaled(kind.field, whole, fraction, fieldsBefore(state)) } };
   return stepped(state, { ...draft, amount: { whole, fraction } }, "amount");
 }

@@ -2,7 +2,7 @@
 import { beforeEach, describe, expect, it } from "vitest";
 import type { ForecastAnswer, Vector } from "../../src/connection/protocol";
 import { VerdictPanel } from "../../src/panels/verdict";
-import { wishedOrder } from "../../src/store/draft";
+import { bodyOf, wishedOrder } from "../../src/store/draft";
 import { page } from "../page";
 import { openDocument } from "./document";
 
@@ -41,6 +41,22 @@ describe("the foot of the form", () => {
     expect(flights).toEqual([[1, 2, 3]]);
     at("untangle").click();
     expect(wishedOrder(made.store.state)!.guard).toMatchObject({ otherwise: "untangle", min_scaled_jacobian: 0.03 });
+  });
+
+  it("has a slider of the amount that stops at what passes, and comes back from nothing", () => {
+    const slide = (percent: number): void => {
+      at("amount").value = String(percent);
+      at("amount").dispatchEvent(new Event("input"));
+    };
+    const z = (): unknown => (bodyOf(made.store.state.draft).factors as number[])[2];
+    made.store.dispatch({ type: "forecast told", answer: REFUSED });
+    expect(at("amount-text").textContent).toBe("100 % of 47 %");
+    slide(80);
+    expect([z(), at("amount").value]).toEqual([0.7605, "47"]);
+    slide(0);
+    expect([z(), at("amount-row").hidden, at("apply").disabled]).toEqual([1, false, true]);
+    slide(20);
+    expect(z()).toBe(0.9);
   });
 
   it("takes Cancel for asking for nothing", () => {

@@ -106,6 +106,20 @@ describe("an earlier edit", () => {
     expect(asksNothing(store.state)).toBe(true);
   });
 
+  it("is changed in part from what it is, as far as that passes", () => {
+    const { store } = page({ stack: [...stack, { skeleton: { at: [0, 0, 1], by: [1, 0, 0], fixed: [], skinning: "linear" } }] });
+    store.dispatch({ type: "edit loaded", index: 0 });
+    store.dispatch({ type: "composed", key: "scale_direction", values: { factors: [1, 1, 0.1] }, step: "typed" });
+    store.dispatch({ type: "amount", fraction: 0.25 });
+    expect(bodyOf(store.state.draft).factors).toEqual([1, 1, 0.4]);
+    store.dispatch({ type: "amount", fraction: 0 });
+    expect(asksNothing(store.state)).toBe(true);
+    store.dispatch({ type: "edit loaded", index: 2 });
+    store.dispatch({ type: "composed", key: "skeleton", values: { moves: [{ at: [0, 0, 1], by: [3, 0, 0] }, { at: [0, 0, 9], by: [0, 4, 0] }] }, step: "drag 1" });
+    store.dispatch({ type: "amount", fraction: 0.5 });
+    expect(bodyOf(store.state.draft).moves).toEqual([{ at: [0, 0, 1], by: [2, 0, 0] }, { at: [0, 0, 9], by: [0, 2, 0] }]);
+  });
+
   it("of a skeleton comes back from its short form", () => {
     const { store } = page({ stack: [{ skeleton: { at: [0, 0, 1], by: [1, 0, 0], fixed: [], skinning: "linear" } }] });
     store.dispatch({ type: "edit loaded", index: 0 });
