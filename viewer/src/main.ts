@@ -17,14 +17,21 @@ import { MonitorPanel } from "./panels/monitors";
 import { ParameterPanel } from "./panels/parameters";
 import { StatusBar } from "./panels/status";
 import { VerdictPanel } from "./panels/verdict";
-import { CameraTools, Theming } from "./panels/tools";
+import { watchDrawers } from "./panels/drawers";
+import { CameraTools, Theming, watchPictureTools } from "./panels/tools";
 import { ViewList } from "./panels/views";
 import { WheelPanel } from "./panels/wheel";
 import { watchDrags } from "./picture/drag";
 import { ScalarBars, fieldText } from "./picture/bars";
 import { Triad, showEmpty } from "./picture/overlay";
+import { Marks } from "./picture/marks";
+import { Pins } from "./picture/pins";
 import { watchPointer } from "./picture/pointer";
+import { readingText } from "./picture/probe";
+import { Ruler } from "./picture/ruler";
+import { save, withBars } from "./picture/screenshot";
 import { Scene } from "./picture/scene";
+import type { Bar } from "./picture/scene";
 import { Forecasts } from "./preview/forecasts";
 import { Previewer } from "./preview/previewer";
 import type { Action } from "./store/actions";
@@ -32,6 +39,7 @@ import { Commands } from "./store/commands";
 import { bodyOf, chosen, withMove } from "./store/draft";
 import { appliedOrders, isShapeUnderWay } from "./store/orders";
 import { Kept } from "./store/kept";
+import { onlyLook } from "./store/looks";
 import { reduce } from "./store/reduce";
 import { Selection } from "./store/selection";
 import { INITIAL } from "./store/state";
@@ -64,13 +72,18 @@ const connection = new Connection(addresses, {
 });
 const commands = new Commands(store, (message) => connection.send(message));
 
+// `?view=NAME` shows that view alone, without panels: for a page of one's own.
+const onlyView = new URLSearchParams(window.location.search).get("view");
+document.body.dataset.embedded = String(onlyView !== null);
+
 // The picture.
 const selection = new Selection(store);
 const triad = new Triad();
-const bars = new ScalarBars(part("bars"), ({ look: { field, component } }) => {
-  const components = store.state.hello?.fields.find((candidate) => candidate.name === field)?.components ?? 1;
-  return { title: fieldText(field ?? "", components, component, FIELD_TITLES[field ?? ""]), unit: null };
-}, (names, [low, high]) => {
+/** A field and its component in words. */
+const fieldTitle = (field: string | null, component: number): string =>
+  fieldText(field ?? "", store.state.hello?.fields.find((candidate) => candidate.name === field)?.components ?? 1, component, FIELD_TITLES[field ?? ""]);
+let shownBars: Bar[] = [];
+const bars = new ScalarBars(part("bars"), ({ look: { field, component } }) => ({ title: fieldTitle(field, component), unit: null }), (names, [low, high]) => {
   for (const view of names) {
     const look = store.state.looks[view];
     if (look) store.dispatch({ type: "look", view, look: { range: { ...look.range, kind: "fixed", low, high } } });
@@ -78,21 +91,56 @@ const bars = new ScalarBars(part("bars"), ({ look: { field, component } }) => {
 });
 const scene = new Scene(part("scene"), selection, {
   bars: (shown) => {
+    shownBars = shown;
     bars.show(shown);
     look.setBars(shown);
   },
-  drawn: (axes) => triad.turn(axes),
+  drawn: (axes) => {
+    triad.turn(axes);
+    marks.draw();
+    if (pins.update()) dock.update();
+  },
   trouble: report,
 });
-watchPointer(part("scene"), scene, selection);
+const marks = new Marks(document.querySelector<SVGElement>("#marks")!, (point) => scene.onPage(point));
+const ruler = new Ruler(marks);
+watchPointer(part("scene"), scene, selection, {
+  reading: (x, y) => {
+    const probe = scene.probe(x, y);
+    const reading = probe && scene.read(probe);
+    return reading ? readingText(reading, fieldTitle(reading.field, reading.component)) : "";
+  },
+  clicked: (x, y) => {
+    if (!ruler.active) return false;
+    const probe = scene.probe(x, y);
+    const reading = probe && scene.read(probe);
+    if (reading) ruler.take(reading.point);
+    return true;
+  },
+});
 
 // What stands around it.
 new ViewList(part("views"), store);
 const look = new LookPanel(part("look"), store);
 new CameraTools(part("tools"), scene);
+watchDrawers();
 new Theming(part("theme") as HTMLButtonElement, kept, (theme) => scene.setTheme(theme));
 const history = new History();
 const dock = new HistoryDock(part("dock"), history, kept.dock, (state) => { kept.dock = state; });
+const pins: Pins = new Pins(history, marks, (probe) => scene.read(probe), ({ field, component }) => fieldTitle(field, component), (key) => dock.choose(key));
+watchPictureTools(part("scene"), part("stage"), {
+  pin: (x, y) => {
+    const probe = scene.probe(x, y);
+    if (probe) pins.add(probe);
+  },
+  unpin: () => pins.clear(),
+  ruler: () => {
+    ruler.toggle();
+    return ruler.active;
+  },
+  save: () => scene.withPicture((canvas) => save(withBars(canvas, shownBars, ({ look: { field, component } }) => fieldTitle(field, component),
+    getComputedStyle(document.body).color), `tombolo-${store.state.frames.cycle ?? 0}.png`)),
+});
 const monitors = new MonitorPanel(part("monitors"));
 const parameters = new ParameterPanel(part("parameters"), store, commands);
 const bar = new StatusBar(store, commands);
@@ -206,7 +254,7 @@ part("retry").addEventListener("click", () => connection.retry());
 window.addEventListener("online", () => { if (connection.state !== "dismissed" && !store.state.end) connection.retry(); });
 
 store.watch((state) => ({ views: state.hello?.views ?? [], looks: state.looks, held: isShapeUnderWay(state.orders) }),
-  ({ views, looks, held }) => scene.setLooks(views, looks, held), sameJson);
+  ({ views, looks, held }) => scene.setLooks(views, onlyView === null ? looks : onlyLook(looks, onlyView), held), sameJson);
 store.watch((state) => state.looks, (looks) => { kept.looks = looks; });
 store.watch((state) => appliedOrders(state.orders), (marks) => dock.setMarks(marks), sameJson);
 

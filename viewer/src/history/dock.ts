@@ -40,7 +40,7 @@ export class HistoryDock {
     this.whole = element("button", { type: "button", class: "small", title: "Show the whole history again", disabled: true, onclick: () => this.zoomTo(null) }, "Whole");
     this.toggle = element("button", { type: "button", class: "small", "aria-controls": "history-body", onclick: () => this.open(!this.state.open) });
     const download = element("button", { type: "button", class: "small", title: "All that is kept of all monitors, as comma-separated values", onclick: () => this.download() }, "CSV");
-    const headings = ["", "now", "at", "before", "difference"].map((text) => element("th", { scope: "col" }, text));
+    const headings = ["", "value", "before", "difference"].map((text) => element("th", { scope: "col" }, text));
     this.body = element("div", { id: "history-body", class: "dock-body" }, this.canvas,
       element("div", { class: "values" }, element("table", {}, element("caption", {}, this.heading), element("thead", {}, element("tr", {}, ...headings)), this.table),
         element("details", {}, element("summary", {}, "Monitors in the plot"), this.choices)));
@@ -214,7 +214,7 @@ export class HistoryDock {
   private values(): void {
     const last = this.cycles.at(-1);
     const cycle = this.row === null ? last : this.cycles[this.row];
-    if (cycle === undefined || last === undefined) return;
+    if (cycle === undefined) return;
     const chosen = this.chosen();
     const all = this.history.series;
     let order: Mark | null = null;
@@ -223,7 +223,7 @@ export class HistoryDock {
       const found = compare(this.history, key, cycle, this.marks);
       order = found.order ?? order;
       const part = found.difference !== null && found.before ? ` (${digits((100 * found.difference) / Math.abs(found.before), 2)} %)` : "";
-      const cells = [digits(this.history.at(key, last)), digits(found.value), digits(found.before), found.difference === null ? "–" : `${found.difference > 0 ? "+" : ""}${digits(found.difference, 3)}${part}`];
+      const cells = [digits(found.value), digits(found.before), found.difference === null ? "–" : `${found.difference > 0 ? "+" : ""}${digits(found.difference, 3)}${part}`];
       const name = element("th", { scope: "row" }, one ? label(one) : "");
       name.style.color = COLOURS[i] ?? "";
       return element("tr", {}, name, ...cells.map((text) => element("td", {}, text)));

@@ -1,5 +1,5 @@
 /** The toolbar over the picture: the camera; and the theme of the page. */
-import { write } from "../dom";
+import { part, write } from "../dom";
 import type { Scene } from "../picture/scene";
 import type { Theme } from "../picture/theme";
 import type { Kept } from "../store/kept";
@@ -55,4 +55,48 @@ export class Theming {
     this.button.title = theme === "dark" ? "A light page" : "A dark page";
     this.applied(theme);
   }
+}
+
+export interface PictureTools {
+  /** Plots the place under a place of the page. */
+  pin(clientX: number, clientY: number): void;
+  unpin(): void;
+  /** Switches the ruler on or off; says which. */
+  ruler(): boolean;
+  save(): void;
+}
+
+/** What else can be done with the picture, by buttons and by keys: plot a place, measure, save, the picture alone, the list of keys. */
+export function watchPictureTools(picture: HTMLElement, stage: HTMLElement, tools: PictureTools): void {
+  let pointer: { x: number; y: number } | null = null;
+  picture.addEventListener("pointermove", (event) => { pointer = { x: event.clientX, y: event.clientY }; });
+  picture.addEventListener("pointerleave", () => { pointer = null; });
+  picture.addEventListener("pointerdown", () => picture.focus({ preventScroll: true }));
+  picture.addEventListener("contextmenu", (event) => event.preventDefault());
+  const keys = part("keys") as HTMLDialogElement;
+  const ruler = (): void => part("ruler").setAttribute("aria-pressed", String(tools.ruler()));
+  const fullScreen = (): void => {
+    if (document.fullscreenElement) void document.exitFullscreen();
+    else void stage.requestFullscreen?.().catch(() => undefined);
+  };
+  part("ruler").addEventListener("click", ruler);
+  part("screenshot").addEventListener("click", () => tools.save());
+  part("full-screen").addEventListener("click", fullScreen);
+  part("keys-button").addEventListener("click", () => keys.showModal());
+  part("keys-close").addEventListener("click", () => keys.close());
+  const actions: Record<string, () => void> = {
+    p: () => { if (pointer) tools.pin(pointer.x, pointer.y); },
+    P: () => tools.unpin(),
+    m: ruler, s: () => tools.save(), f: fullScreen,
+  };
+  window.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const target = event.target as HTMLElement | null;
+    const typing = target?.closest?.("input[type=text], textarea, select, dialog") != null;
+    // A letter is for the picture where the pointer or the focus is there.
+    const action = event.key === "?" ? () => keys.showModal() : pointer || target === picture ? actions[event.key] : undefined;
+    if (typing || !action) return;
+    event.preventDefault();
+    action();
+  });
 }

@@ -5,7 +5,14 @@ import type { Selection } from "../store/selection";
 
 const CLICK_DISTANCE = 4;
 
-export function watchPointer(stage: HTMLElement, scene: Scene, selection: Selection): void {
+export interface PointerListener {
+  /** What stands beside the pointer below the name of the feature; empty for nothing. */
+  reading(clientX: number, clientY: number): string;
+  /** A click at a place of the page; true where it was meant for something else than a feature. */
+  clicked(clientX: number, clientY: number): boolean;
+}
+
+export function watchPointer(stage: HTMLElement, scene: Scene, selection: Selection, listener: PointerListener): void {
   let down: { x: number; y: number } | null = null;
   let dragging = false;
   let last: PointerEvent | null = null;
@@ -17,7 +24,8 @@ export function watchPointer(stage: HTMLElement, scene: Scene, selection: Select
     const feature = scene.featureAt(last.clientX, last.clientY);
     selection.hovered = feature;
     const role = feature ? selection.get(feature) : null;
-    showTip(feature ? `${feature}${role ? ` · ${role}` : ""}` : null, last.clientX, last.clientY);
+    const lines = [feature ? `${feature}${role ? ` · ${role}` : ""}` : "", listener.reading(last.clientX, last.clientY)].filter((line) => line !== "");
+    showTip(lines.length > 0 ? lines.join("\n") : null, last.clientX, last.clientY);
     stage.style.cursor = feature ? "pointer" : "";
   };
   const schedule = (): void => {
@@ -42,7 +50,7 @@ export function watchPointer(stage: HTMLElement, scene: Scene, selection: Select
     const clicked = down !== null && !dragging && event.button === 0;
     down = null;
     dragging = false;
-    if (!clicked) return;
+    if (!clicked || listener.clicked(event.clientX, event.clientY)) return;
     const feature = scene.featureAt(event.clientX, event.clientY);
     if (feature) selection.toggle(feature, event.shiftKey ? "fixed" : "handle");
     last = event;

@@ -1,5 +1,6 @@
 /** What a view has at a place: its value there, wherever the mesh has moved since. */
 import type { DataFrame, TopologyFrame, Vector } from "../connection/protocol";
+import { digits } from "../number";
 import type { Look } from "../store/looks";
 
 /** A place in a view: a point in one of its triangles, by the weights of the corners. It goes where they go. */
@@ -43,4 +44,12 @@ export function readProbe({ triangle, weights: at }: Probe, topology: TopologyFr
   }
   const feature = topology.triangleFeatures?.[triangle] ?? null;
   return { point, feature, field: field?.name ?? null, component, value, cycle: frame.cycle, time: frame.time };
+}
+
+/** A reading in two lines: the value, and the place. */
+export function readingText({ field, value, point }: ProbeReading, title: string): string {
+  // What rounding has left of a zero is a zero.
+  const size = Math.max(...point.map(Math.abs));
+  const place = `(${point.map((part) => digits(Math.abs(part) < 1e-6 * size ? 0 : part, 4)).join(", ")})`;
+  return field === null ? place : `${title} ${digits(value, 4)}\n${place}`;
 }

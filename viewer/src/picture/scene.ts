@@ -127,7 +127,7 @@ export class Scene {
   }
 
   /** The place of the page at which a point is drawn. */
-  private onPage(point: Vector): [number, number] {
+  onPage(point: Vector): [number, number] {
     const box = this.container.getBoundingClientRect();
     const [width, height] = this.canvas.getSize();
     const place = this.canvas.worldToDisplay(...point, this.renderer) as Vector;
@@ -420,6 +420,14 @@ export class Scene {
     }));
   }
 
+  /** Draws all that has come; the canvas holds the picture until the task ends in which `taken` is called. */
+  withPicture(taken: (canvas: HTMLCanvasElement) => void): void {
+    this.request(() => {
+      const canvas = this.canvas.getCanvas();
+      if (canvas) taken(canvas);
+    });
+  }
+
   /** A number made of all pixels (FNV-1a). They are there only in the task that has drawn them. */
   private pixels(): number {
     const [width, height] = this.canvas.getSize();
@@ -500,7 +508,7 @@ export class Scene {
       ArrowLeft: () => camera.azimuth(8), ArrowRight: () => camera.azimuth(-8),
       ArrowUp: () => camera.elevation(-8), ArrowDown: () => camera.elevation(8),
       "+": () => camera.zoom(1.1), "=": () => camera.zoom(1.1), "-": () => camera.zoom(1 / 1.1),
-      r: () => this.reset(), x: () => this.axis(0, 1), y: () => this.axis(1, -1), z: () => this.axis(2, 1),
+      r: () => this.reset(), c: () => this.corner(), x: () => this.axis(0, 1), y: () => this.axis(1, -1), z: () => this.axis(2, 1),
       X: () => this.axis(0, -1), Y: () => this.axis(1, 1), Z: () => this.axis(2, -1),
     };
     const action = actions[event.key];

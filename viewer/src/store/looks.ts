@@ -43,6 +43,11 @@ export function withLook(looks: Looks, view: string | null, look: Partial<Look>)
   return Object.fromEntries(Object.entries(looks).map(([name, before]) => [name, view === null || name === view ? { ...before, ...look } : before]));
 }
 
+/** The looks with one view seen, and no other. */
+export function onlyLook(looks: Looks, view: string): Looks {
+  return Object.fromEntries(Object.entries(looks).map(([name, look]) => [name, { ...look, visible: name === view, opacity: name === view ? 1 : look.opacity }]));
+}
+
 /** The looks that were kept over a reload, as far as they are looks; rubbish is passed over. */
 export function readLooks(kept: unknown): Looks {
   if (typeof kept !== "object" || kept === null || Array.isArray(kept)) return {};

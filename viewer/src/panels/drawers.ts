@@ -1,0 +1,21 @@
+/** The panels at the sides of a narrow page: drawers over the picture, one at a time. */
+import { part } from "../dom";
+
+const SIDES = ["left", "right"] as const;
+type Side = (typeof SIDES)[number];
+
+export function watchDrawers(): void {
+  const open = (side: Side | null): void => {
+    document.body.dataset.drawer = side ?? "";
+    for (const other of SIDES) part(`${other}-drawer`).setAttribute("aria-expanded", String(side === other));
+  };
+  for (const side of SIDES) {
+    part(`${side}-drawer`).addEventListener("click", () => open(document.body.dataset.drawer === side ? null : side));
+    part(side).addEventListener("keydown", (event) => {
+      if (event.key !== "Escape" || (document.body.dataset.drawer ?? "") === "" || event.defaultPrevented) return;
+      open(null);
+      part(`${side}-drawer`).focus();
+    });
+  }
+  open(null);
+}

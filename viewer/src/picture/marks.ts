@@ -1,0 +1,43 @@
+/** Marks over the picture that go with places of it: pinned probes, the ruler, the worst cells. */
+import type { Vector } from "../connection/protocol";
+
+/** A mark: a point, or a line through several, and what is written beside the last. */
+export interface Mark { points: readonly Vector[]; label: string; kind: "probe" | "ruler" | "cell" }
+
+const SVG = "http://www.w3.org/2000/svg";
+
+export class Marks {
+  private readonly groups = new Map<string, readonly Mark[]>();
+
+  /** `place` says where on the page a point of the picture is drawn. */
+  constructor(private readonly root: SVGElement, private readonly place: (point: Vector) => [number, number]) {}
+
+  /** Replaces the marks of one origin. */
+  set(origin: string, marks: readonly Mark[]): void {
+    if (marks.length === 0) this.groups.delete(origin);
+    else this.groups.set(origin, marks);
+    this.draw();
+  }
+
+  /** The camera has moved, or the shape. */
+  draw(): void {
+    if (this.groups.size === 0 && !this.root.hasChildNodes()) return;
+    const box = this.root.getBoundingClientRect();
+    const made: SVGElement[] = [];
+    const make = (tag: string, attributes: Record<string, string | number>, text = ""): void => {
+      const element = document.createElementNS(SVG, tag);
+      for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
+      element.textContent = text;
+      made.push(element);
+    };
+    for (const { points, label, kind } of [...this.groups.values()].flat()) {
+      const places = points.map((point) => this.place(point)).map(([x, y]): [number, number] => [x - box.left, y - box.top]);
+      if (places.some((at) => !at.every(Number.isFinite))) continue;
+      if (places.length > 1) make("polyline", { class: kind, points: places.map((at) => at.join(",")).join(" ") });
+      for (const [x, y] of places) make("circle", { class: kind, cx: x, cy: y, r: kind === "cell" ? 9 : 4 });
+      const last = places.at(-1);
+      if (last && label !== "") make("text", { class: kind, x: last[0] + 12, y: last[1] + 4 }, label);
+    }
+    this.root.replaceChildren(...made);
+  }
+}
