@@ -405,6 +405,38 @@ fn ghosts_are_left_out() {
     assert_eq!((extract.unwrap().points.len(), errors.len()), (1, 1));
 }
 
+/// The cells that hold the most displaced vertex are the worst, and their quality comes along.
+#[test]
+fn the_worst_cells_are_taken_by_their_quality() {
+    let mut mesh = box_of_tets([4; 3], [0.0; 3], [1.0; 3]);
+    let is_middle = |point: &Vector| point.iter().all(|part| (part - 0.5).abs() < 1e-9);
+    let middle = mesh.points().iter().position(is_middle).unwrap();
+    let mut points = mesh.points().to_vec();
+    points[middle][0] += 0.2;
+    mesh = Mesh::new(points, mesh.cells().clone(), FeatureSource::SharpEdges).unwrap();
+    let stages = |least: f64| {
+        format!(
+            r#"{{"threshold": {{"field": "scaled_jacobian", "max": {least}}}}}, {{"select": {{"fields": ["scaled_jacobian"]}}}}, {{"stream": {{}}}}"#
+        )
+    };
+    let worst = once(&stages(0.15), &mesh, &[]);
+    let qualities = &field(&worst, "scaled_jacobian").values;
+    assert!(!qualities.is_empty() && qualities.iter().all(|&quality| quality <= 0.15));
+    let near = |point: &Vector| point.iter().all(|part| (part - 0.5).abs() < 0.26);
+    assert!(worst.points.iter().all(near));
+    let all = once(&stages(1.0), &mesh, &[]);
+    assert!((enclosed(&all) - 1.0).abs() < 1e-12, "{}", enclosed(&all));
+    // One of the solver's own comes first.
+    let own = vec![1.0; mesh.cells().len()];
+    let (extract, _) = step(
+        &mut runner(&stages(0.15), Arc::new(Solo)),
+        0,
+        (&mesh).into(),
+        &[FieldView::element("scaled_jacobian", &own[..])],
+    );
+    assert!(extract.is_none_or(|extract| extract.cells.is_empty()));
+}
+
 /// Hidden cells and copies on three ranks: all is as on one.
 #[test]
 fn ranks_leave_out_the_ghosts_that_one_process_does() {

@@ -135,7 +135,8 @@ pub struct Contour {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Threshold {
-    /// The field: a scalar, or a vector, of which the magnitude is taken.
+    /// The field: a scalar, or a vector, of which the magnitude is taken. `scaled_jacobian` is the
+    /// quality of the cells, measured where the solver has no field of that name.
     pub field: String,
     /// The least value; left out, there is none. At least one of `min` and `max` is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -15,6 +15,7 @@ use std::sync::Arc;
 
 use tombolo_deform::communicator::Communicator;
 use tombolo_deform::edit::Edit;
+use tombolo_deform::mesh::ArrayView;
 
 use super::cost::{Cost, Thinning};
 use super::due::Clock;
@@ -23,8 +24,8 @@ use super::output::{MonitorValues, Output};
 use super::trigger::Trigger;
 use crate::derive::{Basis, derive, follow, wall_shear_stress, with_derived};
 use crate::extract::{
-    Channel, Decimation, Extract, ExtractError, Extracted, Field, Input, Kept, Snapshot, Source,
-    merged, unknown_field,
+    Channel, Decimation, Extract, ExtractError, Extracted, Field, FieldView, Input, Kept, Snapshot,
+    Source, merged, unknown_field,
 };
 use crate::language::{Action, Command, Monitor, Pipeline, Slot, Stage, WallShearStress};
 use prepare::{Names, State, gradient_of};
@@ -342,7 +343,15 @@ impl Prepared {
     }
 
     fn source(&self, stage: &Stage, progress: &mut Progress) {
-        let fields = with_derived(progress.channel, &progress.derived);
+        let mut fields = with_derived(progress.channel, &progress.derived);
+        let is_by_quality =
+            matches!(stage, Stage::Threshold(threshold) if threshold.field == QUALITY_FIELD);
+        // Measured where the solver has no field of that name.
+        let measured = (is_by_quality && fields.iter().all(|field| field.name != QUALITY_FIELD))
+            .then(|| progress.source.scaled_jacobians(progress.channel));
+        if let Some(measured) = &measured {
+            fields.push(FieldView::element(QUALITY_FIELD, ArrayView::scalars(measured)));
+        }
         let channel = Channel { fields: &fields, ..*progress.channel };
         let input = Input {
             channel: &channel,
