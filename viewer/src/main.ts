@@ -1,5 +1,6 @@
 /** Puts the parts together: what arrives becomes an action, what is asked a message, and every panel shows the store. */
 import { Connection, streamAddress } from "./connection/connection";
+import { Pipelines } from "./connection/pipelines";
 import { Decoder } from "./connection/decoder";
 import type { DecodeWorker } from "./connection/decoder";
 import type { Frame, Json, Monitor, ServerMessage } from "./connection/protocol";
@@ -18,6 +19,8 @@ import { ParameterPanel } from "./panels/parameters";
 import { StatusBar } from "./panels/status";
 import { VerdictPanel } from "./panels/verdict";
 import { watchDrawers } from "./panels/drawers";
+import { WorstCells } from "./panels/quality";
+import { SlicePanel } from "./panels/slice";
 import { CameraTools, Theming, watchPictureTools } from "./panels/tools";
 import { ViewList } from "./panels/views";
 import { WheelPanel } from "./panels/wheel";
@@ -40,6 +43,7 @@ import { bodyOf, chosen, withMove } from "./store/draft";
 import { appliedOrders, isShapeUnderWay } from "./store/orders";
 import { Kept } from "./store/kept";
 import { onlyLook } from "./store/looks";
+import { withQuality } from "./store/pipelines";
 import { reduce } from "./store/reduce";
 import { Selection } from "./store/selection";
 import { INITIAL } from "./store/state";
@@ -71,6 +75,11 @@ const connection = new Connection(addresses, {
   trouble: report,
 });
 const commands = new Commands(store, (message) => connection.send(message));
+const pipelines = new Pipelines(() => loadJson(addresses.pipelines), (message) => commands.send(message), (reason) => report(`the pipelines: ${reason}`));
+store.watch((state) => [state.connection.state, state.hello?.pipelines?.changes] as const, ([state, changes]) => {
+  if (state !== "connected") pipelines.forget();
+  else if (changes !== undefined) void pipelines.told(changes);
+}, sameJson);
 
 // `?view=NAME` shows that view alone, without panels: for a page of one's own.
 const onlyView = new URLSearchParams(window.location.search).get("view");
@@ -99,6 +108,7 @@ const scene = new Scene(part("scene"), selection, {
     triad.turn(axes);
     marks.draw();
     if (pins.update()) dock.update();
+    worst.update();
   },
   trouble: report,
 });
@@ -121,7 +131,12 @@ watchPointer(part("scene"), scene, selection, {
 
 // What stands around it.
 new ViewList(part("views"), store);
-const look = new LookPanel(part("look"), store);
+const look = new LookPanel(part("look"), store, (view) => {
+  const pipeline = pipelines.get(view);
+  if (pipeline) pipelines.set(withQuality(pipeline));
+});
+new SlicePanel(part("slice"), store, pipelines, () => scene.bounds());
+const worst = new WorstCells(part("quality"), store, pipelines, scene, marks);
 new CameraTools(part("tools"), scene);
 watchDrawers();
 new Theming(part("theme") as HTMLButtonElement, kept, (theme) => scene.setTheme(theme));
@@ -169,7 +184,9 @@ function takeMessage(message: ServerMessage): void {
     case "forecast": return forecasts.answer(message.body);
     case "monitor": return takeMonitor(message.body);
     // The hello that comes with it says what there is now.
-    case "pipelines": return;
+    case "pipelines":
+      if (message.body.status === "applied") pipelines.answered(message.body.id);
+      return;
     // The status shows what it has changed.
     case "done": return;
     case "wheel": return store.dispatch({ type: "wheel asked", by: message.body.asked_by });
@@ -179,6 +196,7 @@ function takeMessage(message: ServerMessage): void {
       return store.dispatch({ type: "end", end: message.body });
     case "error": {
       const { id, message: text } = message.body;
+      if (pipelines.answered(id)) void pipelines.told(-2);
       if (id && (forecasts.refused(id, text) || parameters.refused(id, text))) return;
       store.dispatch({ type: "refused", id: id ?? null, text });
     }
@@ -210,15 +228,19 @@ store.watch((state) => state.hello, (hello) => {
   if (!store.state.form) void loadSchema(hello.defaults);
 });
 
+async function loadJson(address: string): Promise<Json> {
+  const response = await fetch(address, { cache: "no-store", redirect: "error" });
+  if (!response.ok) throw new Error(response.statusText);
+  return await response.json() as Json;
+}
+
 let isLoadingSchema = false;
 /** Asks for what an order may hold, which no hello says: it is long and stays the same. */
 async function loadSchema(defaults: { schedule?: Json }): Promise<void> {
   if (isLoadingSchema) return;
   isLoadingSchema = true;
   try {
-    const response = await fetch(addresses.schema, { cache: "no-store", redirect: "error" });
-    if (!response.ok) throw new Error(response.statusText);
-    store.dispatch({ type: "schema", form: orderForm(await response.json() as Json), settings: initialSettings(defaults) });
+    store.dispatch({ type: "schema", form: orderForm(await loadJson(addresses.schema)), settings: initialSettings(defaults) });
   } catch (error) {
     report(`what an order may hold: ${String(error)}`);
   } finally {

@@ -27,6 +27,8 @@ export interface Hello {
   channel?: string | null;
   views: ViewInformation[];
   monitors?: MonitorInformation[];
+  /** How often the pipelines have changed. */
+  pipelines?: { changes: number };
   features: FeatureInformation[];
   surface?: SurfaceInformation | null;
   fields: FieldInformation[];

@@ -8,6 +8,8 @@ import type { Bar } from "../picture/scene";
 import type { Action } from "../store/actions";
 import { EDGES } from "../store/looks";
 import type { Look } from "../store/looks";
+import { QUALITY } from "../store/pipelines";
+import { whyNotSteering } from "../store/run";
 import type { State } from "../store/state";
 import { sameJson } from "../store/store";
 import type { Store } from "../store/store";
@@ -29,9 +31,11 @@ export class LookPanel {
   private readonly logarithmic = element("input", { type: "checkbox", onchange: () => this.changeRange({ logarithmic: this.logarithmic.checked, symmetric: false }) });
   private readonly edges = element("select", { onchange: () => this.change({ edges: this.edges.value as Look["edges"] }) }, ...EDGES.map((edges) => option(edges, edges === "none" ? "none" : `of ${edges === "mesh" ? "the mesh" : "features"}`)));
   private readonly rows: HTMLElement;
+  private readonly quality = element("button", { type: "button", class: "small", title: "Has the quality of the cells streamed with this view", onclick: () => this.byQuality() }, "Colour by mesh quality");
   private shown: Range | null = null;
 
-  constructor(root: HTMLElement, private readonly store: Store<State, Action>) {
+  /** `measure` has the quality of its cells streamed with a view. */
+  constructor(root: HTMLElement, private readonly store: Store<State, Action>, private readonly measure: (view: string) => void) {
     const row = (text: string, control: HTMLElement): HTMLElement => {
       control.id = identifier("look");
       return element("div", { class: "field" }, element("label", { for: control.id }, text), control);
@@ -43,8 +47,12 @@ export class LookPanel {
         element("div", { class: "range" }, this.low, element("span", { "aria-hidden": "true" }, "to"), this.high),
         element("div", { class: "checks" }, element("label", {}, this.symmetric, "about 0"), element("label", {}, this.logarithmic, "logarithmic"))),
       row("edges", this.edges),
-      element("button", { type: "button", class: "small", title: "Colour every view like this one", onclick: () => this.spread() }, "Use for all views"));
+      element("button", { type: "button", class: "small", title: "Colour every view like this one", onclick: () => this.spread() }, "Use for all views"), this.quality);
     root.replaceChildren(this.heading, this.rows);
+    store.watch(whyNotSteering, (why) => {
+      this.quality.disabled = why !== "";
+      this.quality.title = why === "" ? "Has the quality of the cells streamed with this view" : why;
+    });
     store.watch((state) => [state.looks, state.chosenView, state.hello?.fields], () => this.show(), sameJson);
   }
 
@@ -71,6 +79,13 @@ export class LookPanel {
   private changeKind(kind: RangeKind): void {
     const [low, high] = this.shown ?? [0, 1];
     this.changeRange(kind === "fixed" ? { kind, low, high } : { kind });
+  }
+
+  private byQuality(): void {
+    const { chosenView } = this.store.state;
+    if (chosenView === null) return;
+    this.measure(chosenView);
+    this.change({ field: QUALITY, component: -1 });
   }
 
   private spread(): void {
@@ -127,7 +142,7 @@ export class LookPanel {
 }
 
 /** What a field that has a name of the library's own is called on the page. */
-export const FIELD_TITLES: Readonly<Record<string, string>> = { scaled_jacobian: "mesh quality" };
+export const FIELD_TITLES: Readonly<Record<string, string>> = { [QUALITY]: "mesh quality" };
 
 function fill(select: HTMLSelectElement, options: readonly [string, string][]): void {
   const key = JSON.stringify(options);

@@ -74,7 +74,8 @@ export class StatusBar {
     write(shown, quality ? digits(quality.min, 3) : "–");
     const inverted = quality?.inverted ?? 0;
     shown.dataset.level = !quality ? "" : inverted > 0 || quality.min <= 0 ? "bad" : quality.min < 0.05 ? "low" : "good";
-    shown.title = quality ? `smallest scaled Jacobian ${digits(quality.min, 4)}, mean ${digits(quality.mean, 3)}, ${inverted} inverted elements` : "";
+    shown.setAttribute("aria-label", quality ? `min quality ${digits(quality.min, 3)}: show the worst cells` : "min quality");
+    shown.title = quality ? `smallest scaled Jacobian ${digits(quality.min, 4)}, mean ${digits(quality.mean, 3)}, ${inverted} inverted elements; a click shows the worst` : "";
     const lost = part("journal");
     lost.hidden = !status.journal_lost;
     write(lost, status.journal_lost ? `no orders are taken: the journal cannot be written (${status.journal_lost})` : "");

@@ -208,6 +208,12 @@ export class Scene {
     return null;
   }
 
+  /** The box around all that is seen. */
+  bounds(): [Vector, Vector] | null {
+    const box = this.box();
+    return box && [[box[0], box[2], box[4]], [box[1], box[3], box[5]]];
+  }
+
   viewBounds(name: string): [Vector, Vector] | null {
     const layer = this.layers.get(name);
     return layer ? bounds(this.pending.get(name)?.points ?? layer.coordinates) : null;

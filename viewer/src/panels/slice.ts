@@ -1,0 +1,82 @@
+/** Where the slice of the chosen view lies: along which axis, and how far. The run is asked to cut elsewhere. */
+import type { Pipelines } from "../connection/pipelines";
+import type { Vector } from "../connection/protocol";
+import { element, identifier, write } from "../dom";
+import { digits, readNumber } from "../number";
+import { atOffset, extent, offsetOf, planeOf, withPlane } from "../store/pipelines";
+import type { Plane } from "../store/pipelines";
+import { whyNotSteering } from "../store/run";
+import type { Action } from "../store/actions";
+import type { State } from "../store/state";
+import type { Store } from "../store/store";
+
+/** Steps of the slider from one end to the other. */
+const STEPS = 200;
+
+export class SlicePanel {
+  private readonly slider = element("input", { type: "range", min: 0, max: STEPS, step: 1, "aria-label": "place of the slice along its normal", oninput: () => this.slide() });
+  private readonly offset: HTMLInputElement = element("input", { type: "text", inputmode: "decimal", autocomplete: "off", id: identifier("offset"), onchange: () => this.typed() });
+  private readonly note = element("p", { class: "hint" });
+  private readonly axes: HTMLButtonElement[];
+  private plane: Plane | null = null;
+
+  /** `bounds` is the box around all that is there. */
+  constructor(private readonly root: HTMLElement, private readonly store: Store<State, Action>, private readonly pipelines: Pipelines, private readonly bounds: () => [Vector, Vector] | null) {
+    this.axes = ["x", "y", "z"].map((name, axis) => element("button", { type: "button", class: "small", title: `Cut across ${name}`, onclick: () => this.across(axis) }, name));
+    root.replaceChildren(element("h2", {}, "Slice"),
+      element("div", { class: "field" }, element("span", { class: "label" }, "across"), element("div", { class: "axes", role: "group", "aria-label": "Cut across" }, ...this.axes)),
+      element("div", { class: "field" }, element("label", { for: this.offset.id }, "offset"), this.offset), this.slider, this.note);
+    pipelines.onChange(() => this.show());
+    store.watch((state) => state.chosenView, () => this.show());
+    store.watch(whyNotSteering, () => this.show());
+  }
+
+  private show(): void {
+    const why = whyNotSteering(this.store.state);
+    this.plane = planeOf(this.pipelines.get(this.store.state.chosenView));
+    this.root.hidden = this.plane === null;
+    for (const control of [this.slider, this.offset, ...this.axes]) control.disabled = why !== "";
+    write(this.note, why === "" ? "" : `The slice is where the run cuts. ${why}`);
+    this.note.hidden = why === "";
+    const { plane } = this;
+    if (!plane) return;
+    const size = Math.max(...plane.normal.map(Math.abs));
+    this.axes.forEach((button, axis) => button.setAttribute("aria-pressed", String(plane.normal.every((part, k) => k === axis || Math.abs(part) < 1e-9 * size))));
+    const offset = offsetOf(plane);
+    if (document.activeElement !== this.offset) this.offset.value = digits(offset, 5);
+    const ends = this.ends(plane);
+    if (ends) this.slider.value = String(Math.round((STEPS * (offset - ends[0])) / (ends[1] - ends[0])));
+  }
+
+  private ends({ normal }: Plane): [number, number] | null {
+    const box = this.bounds();
+    const found = box && extent(box, normal);
+    return found && found[1] > found[0] ? found : null;
+  }
+
+  private across(axis: number): void {
+    const box = this.bounds();
+    if (!box) return;
+    const normal = [0, 1, 2].map((k) => (k === axis ? 1 : 0)) as Vector;
+    this.move({ origin: [0, 1, 2].map((k) => (box[0][k]! + box[1][k]!) / 2) as Vector, normal });
+  }
+
+  private slide(): void {
+    const ends = this.plane && this.ends(this.plane);
+    // The ends themselves are the surface: there is nothing to cut.
+    if (this.plane && ends) this.move(atOffset(this.plane, ends[0] + ((0.5 + Number(this.slider.value)) / (STEPS + 1)) * (ends[1] - ends[0])));
+  }
+
+  private typed(): void {
+    const offset = readNumber(this.offset.value);
+    this.offset.setAttribute("aria-invalid", String(offset === null));
+    if (this.plane && offset !== null) this.move(atOffset(this.plane, offset));
+  }
+
+  private move(plane: Plane): void {
+    const pipeline = this.pipelines.get(this.store.state.chosenView);
+    if (!pipeline) return;
+    this.pipelines.set(withPlane(pipeline, plane));
+    this.show();
+  }
+}

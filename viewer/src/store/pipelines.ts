@@ -1,0 +1,77 @@
+/** What the viewer changes in pipelines: where a slice lies, the quality of cells as a field, a view of the worst cells. Pure functions. */
+import type { Json, QualitySummary, Vector } from "../connection/protocol";
+
+export interface Pipeline { [key: string]: Json; name: string; stages: Json[] }
+export interface Plane { origin: Vector; normal: Vector }
+
+/** The element field that the stage `quality` measures. */
+export const QUALITY = "scaled_jacobian";
+/** The view that shows the worst cells. */
+export const WORST = "worst cells";
+
+type Body = { [key: string]: Json };
+const body = (stage: Json, key: string): Body | null => {
+  const found = typeof stage === "object" && stage !== null && !Array.isArray(stage) ? stage[key] : undefined;
+  return typeof found === "object" && found !== null && !Array.isArray(found) ? found : null;
+};
+const isVector = (value: Json | undefined): value is Vector => Array.isArray(value) && value.length === 3 && value.every((part) => typeof part === "number");
+
+/** The pipelines of an answer; what is none is passed over. */
+export function readPipelines(answer: Json): Pipeline[] {
+  return (Array.isArray(answer) ? answer : []).flatMap((one) => (typeof one === "object" && one !== null && !Array.isArray(one)
+    && typeof one.name === "string" && Array.isArray(one.stages) ? [one as Pipeline] : []));
+}
+
+/** The plane of a pipeline's slice; null where it has none that is given by a point and a direction. */
+export function planeOf(pipeline: Pipeline | undefined): Plane | null {
+  for (const stage of pipeline?.stages ?? []) {
+    const slice = body(stage, "slice");
+    if (slice && isVector(slice.origin) && isVector(slice.normal)) return { origin: slice.origin, normal: slice.normal };
+  }
+  return null;
+}
+
+export function withPlane(pipeline: Pipeline, { origin, normal }: Plane): Pipeline {
+  return { ...pipeline, stages: pipeline.stages.map((stage) => (body(stage, "slice") ? { slice: { origin, normal } } : stage)) };
+}
+
+/** Where a plane lies along its normal, from the origin of coordinates. */
+export function offsetOf({ origin, normal }: Plane): number {
+  const length = Math.hypot(...normal);
+  return origin.reduce((sum, part, k) => sum + (part * normal[k]!) / length, 0);
+}
+
+/** The plane at another offset along its normal. */
+export function atOffset(plane: Plane, offset: number): Plane {
+  const length = Math.hypot(...plane.normal);
+  const by = offset - offsetOf(plane);
+  return { ...plane, origin: plane.origin.map((part, k) => part + (by * plane.normal[k]!) / length) as Vector };
+}
+
+/** The least and largest offset along a direction at which a box is cut. */
+export function extent([low, high]: readonly [Vector, Vector], normal: Vector): [number, number] {
+  const length = Math.hypot(...normal);
+  const ends = normal.map((part, k): [number, number] => [(low[k]! * part) / length, (high[k]! * part) / length]);
+  return [ends.reduce((sum, end) => sum + Math.min(...end), 0), ends.reduce((sum, end) => sum + Math.max(...end), 0)];
+}
+
+/** The pipeline with the quality of the cells among its fields: selected where it selects, measured behind its extract where it takes all. */
+export function withQuality(pipeline: Pipeline): Pipeline {
+  const { stages } = pipeline;
+  const at = stages.findIndex((stage) => body(stage, "select"));
+  const fields = body(stages[at] ?? null, "select")?.fields;
+  if (Array.isArray(fields)) {
+    return fields.includes(QUALITY) ? pipeline : { ...pipeline, stages: stages.with(at, { select: { ...body(stages[at]!, "select"), fields: [...fields, QUALITY] } }) };
+  }
+  if (stages.some((stage) => body(stage, "quality"))) return pipeline;
+  const source = stages.findIndex((stage) => SOURCES.some((name) => body(stage, name)));
+  return { ...pipeline, stages: stages.toSpliced(source + 1, 0, { quality: {} }) };
+}
+
+const SOURCES = ["surface", "slice", "contour", "threshold", "clip", "probe", "streamlines", "glyphs"];
+
+/** A view of the cells that are hardly better than the worst. */
+export function worstCells({ min, mean }: QualitySummary): Pipeline {
+  const most = min + 0.03 * Math.max((mean ?? 1) - min, 1e-6);
+  return { name: WORST, every: { steps: 10 }, stages: [{ threshold: { field: QUALITY, max: most } }, { select: { fields: [QUALITY] } }, { stream: {} }] };
+}
