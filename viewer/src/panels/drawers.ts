@@ -17,5 +17,7 @@ export function watchDrawers(): void {
       part(`${side}-drawer`).focus();
     });
   }
+  // A hidden button cannot have the focus.
+  part("to-apply").addEventListener("click", () => open("right"), true);
   open(null);
 }
