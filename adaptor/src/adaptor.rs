@@ -1,9 +1,11 @@
 //! The three calls.
 
 mod changing;
+mod checkpointing;
 mod commands;
 mod contract;
 mod description;
+mod restarting;
 mod setup;
 mod steered;
 mod stopper;
@@ -26,7 +28,9 @@ use std::{
     time::Instant,
 };
 
+use checkpointing::Given;
 use contract::Lent;
+use restarting::{Continued, Resumed};
 use serde_json::Value;
 use steered::SteeredMesh;
 use timing::Timing;
@@ -65,6 +69,11 @@ pub struct Adaptor {
     defaults: Defaults,
     pipelines: Pipelines,
     timed: Timed,
+    /// The number of the run, by which its journal tells it apart from others.
+    run: String,
+    given: Given,
+    /// What is left of the checkpoint that it goes on from.
+    resumed: Resumed,
     /// The shapes of the journal that is carried out again, until there is a mesh.
     recorded: Option<Vec<HandedShape>>,
     queue: Arc<Queue>,
@@ -88,8 +97,9 @@ pub struct Adaptor {
     output: PathBuf,
     mesh: SteeredMesh,
     lent: Lent,
-    /// The step of the last call.
+    /// The step of the last call, and whether there was one.
     moment: Moment,
+    has_begun: bool,
     told: Told,
     /// What the features are to the flow, by name.
     conditions: BTreeMap<String, Condition>,
@@ -167,11 +177,12 @@ impl Adaptor {
     /// where they were given different configurations.
     ///
     /// Collective, as the other two calls are.
-    pub fn initialize(settings: Settings) -> Result<Self, InitializeError> {
+    pub fn initialize(mut settings: Settings) -> Result<Self, InitializeError> {
         let communicator = Arc::clone(&settings.communicator);
         let _alarm = Alarm::among(&communicator);
         let own = serde_json::to_vec(&(&settings.config, &settings.orders, &settings.replay));
-        let adaptor = Self::set_up(settings);
+        let continued = Continued::of(&mut settings)?;
+        let adaptor = Self::set_up(settings, continued);
         if communicator.size() == 1 {
             return adaptor;
         }
@@ -271,6 +282,7 @@ impl Adaptor {
         self.clock.set(moment.cycle, moment.time);
         let fault = self.check(step, moment, channels).err();
         self.moment = moment;
+        self.has_begun = true;
         let moved = match self.meet(moment, fault, entered)? {
             Some((called, outside)) => {
                 let is_calm = self.is_calm(moment, called);
@@ -319,6 +331,7 @@ impl Adaptor {
             || is_called
             || !self.told_changes.is_empty()
             || self.timed.is_due(moment)
+            || self.resumed.is_due(moment.cycle)
             || self.pipelines.is_due(moment);
         self.is_spared.store(!looks, Ordering::Relaxed);
         looks
@@ -431,6 +444,7 @@ impl Adaptor {
         // is left for the next meeting.
         let under_way = self.paused
             || !self.told_changes.is_empty()
+            || !self.resumed.is_over()
             || matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if !steerer.is_at_rest());
         if !due && !under_way {
             self.meetings.fault = fault;
@@ -452,6 +466,7 @@ impl Adaptor {
             && !called
             && self.told_changes.is_empty()
             && !self.timed.is_due(moment)
+            && !self.resumed.is_due(moment.cycle)
             && !self.pipelines.is_due(moment)
     }
 
@@ -476,6 +491,7 @@ impl Adaptor {
                 self.timing.paused.add(begun.elapsed());
             }
         }
+        let mut commands = Vec::new();
         if self.pipelines.is_due(moment) {
             let begun = Instant::now();
             let parameters = self.parameters.all();
@@ -485,14 +501,16 @@ impl Adaptor {
                 self.complain(&fault);
             }
             // A replay has the commands from the journal.
-            let commands = if self.is_replay { Vec::new() } else { asked.commands };
-            for (pipeline, command) in commands {
-                self.accept(None, Source::Pipeline(pipeline), command, moment);
-            }
+            commands = if self.is_replay { Vec::new() } else { asked.commands };
+        }
+        self.obey_again(moment, false);
+        for (pipeline, command) in commands {
+            self.accept(None, Source::Pipeline(pipeline), command, moment);
         }
         for timed in self.timed.take_due(moment) {
             self.accept(timed.id, Source::File, timed.command, moment);
         }
+        self.obey_again(moment, true);
         let begun = Instant::now();
         self.serve(moment, channels);
         self.timing.steering.add(begun.elapsed());

@@ -3,7 +3,10 @@
 use tombolo_deform::{communicator::RankError, number::Number};
 use tombolo_pipelines::{extract::ChannelError, language::Problems};
 
-use crate::{journal::JournalError, report::Report, steering::ParameterError, stream::StreamError};
+use crate::{
+    checkpoint::CheckpointError, journal::JournalError, report::Report, steering::ParameterError,
+    stream::StreamError,
+};
 
 /// Why a run could not be set up.
 #[derive(Debug, thiserror::Error)]
@@ -29,6 +32,9 @@ pub enum InitializeError {
         /// The system's reason.
         source: std::io::Error,
     },
+    /// The checkpoint cannot be gone on from.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
     /// One of the commands given beforehand makes no sense.
     #[error("the orders given beforehand: {0}")]
     Orders(Problems),
@@ -88,6 +94,18 @@ pub enum ExecuteError {
         found: usize,
         /// How many there were.
         expected: usize,
+    },
+    /// The run goes on from a checkpoint of another mesh.
+    #[error(
+        "cycle {cycle}: channel '{channel}' is not the mesh of the checkpoint that the run goes on from: {reason}"
+    )]
+    Restart {
+        /// The step.
+        cycle: u64,
+        /// The channel.
+        channel: String,
+        /// What is different.
+        reason: String,
     },
     /// Something is wrong on one rank. All ranks have this error, that of the lowest rank on which
     /// something is wrong.

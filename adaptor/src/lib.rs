@@ -45,6 +45,7 @@
 
 mod adaptor;
 mod changes;
+mod checkpoint;
 pub mod client;
 mod condition;
 mod error;
@@ -69,6 +70,7 @@ mod watch;
 mod writer;
 
 pub use adaptor::{Adaptor, Stopper};
+pub use checkpoint::{Checkpoint, CheckpointError, Restart};
 pub use condition::Condition;
 pub use error::{ExecuteError, FinalizeError, InitializeError};
 pub use journal::JournalError;

@@ -14,7 +14,11 @@ use tombolo_pipelines::{
     limits::{DOCUMENT, WAITING_BYTES},
 };
 
-use crate::{condition::Condition, steering::Parameter};
+use crate::{
+    checkpoint::{Checkpoint, Restart},
+    condition::Condition,
+    steering::Parameter,
+};
 
 /// Everything that a run is set up with.
 #[derive(Clone)]
@@ -40,6 +44,11 @@ pub struct Settings {
     /// same, with the same configuration, is handed the same shapes at the same cycles, to the bit.
     /// What pipelines order meanwhile is passed over, because the journal holds it.
     pub replay: Option<Recording>,
+    /// Where the run goes on from: the checkpoint of an earlier one, made with the same mesh and on as
+    /// many ranks. With the same configuration and `orders` it goes on as that one would have; other
+    /// pipelines or orders take the place of those that it had. The first call of `execute` is the one
+    /// that would have come next.
+    pub restart: Option<Restart>,
     /// The directory of the files that pipelines write and of the journal, where their names are
     /// relative.
     pub output: PathBuf,
@@ -110,6 +119,19 @@ impl Settings {
         Ok(Self { replay: Some(recording), ..self })
     }
 
+    /// Goes on from a checkpoint: see [`Settings::restart`](Settings#structfield.restart).
+    #[must_use]
+    pub fn restart(self, checkpoint: Checkpoint) -> Self {
+        Self { restart: Some(Restart::Checkpoint(Box::new(checkpoint))), ..self }
+    }
+
+    /// Goes on from the file that [`Adaptor::write_checkpoint`](crate::Adaptor::write_checkpoint) has
+    /// written. It is read when the run starts.
+    #[must_use]
+    pub fn restart_from_file(self, file: impl Into<PathBuf>) -> Self {
+        Self { restart: Some(Restart::File(file.into())), ..self }
+    }
+
     /// Distributes the run over the processes of a communicator.
     #[must_use]
     pub fn on(self, communicator: Arc<dyn Communicator>) -> Self {
@@ -137,6 +159,7 @@ impl Default for Settings {
             conditions: BTreeMap::new(),
             orders: Vec::new(),
             replay: None,
+            restart: None,
             output: PathBuf::from("."),
             file: None,
         }

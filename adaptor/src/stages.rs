@@ -7,7 +7,7 @@ use std::{
 };
 
 use serde_json::{Map, Value, json};
-use tombolo_deform::communicator::Communicator;
+use tombolo_deform::communicator::{self, Communicator};
 use tombolo_deform::surface::Surface;
 use tombolo_pipelines::{
     encode::Encoder,
@@ -17,6 +17,7 @@ use tombolo_pipelines::{
 };
 
 use crate::{
+    checkpoint::CheckpointError,
     error::InitializeError,
     lock::lock,
     report::PipelineReport,
@@ -182,6 +183,16 @@ impl Pipelines {
             return Err(format!("a run that has begun {TABLES} tables begins no more"));
         }
         Ok(())
+    }
+
+    /// Writes down what the pipelines have come to.
+    pub(crate) fn save(&self, writer: &mut communicator::Writer) {
+        self.runner.save(writer);
+    }
+
+    /// Goes on from what was written down.
+    pub(crate) fn restore(&mut self, saved: &[u8]) -> Result<(), CheckpointError> {
+        Ok(self.runner.restore(&mut communicator::Reader::new(0, saved))?)
     }
 
     /// The description of the views in `hello`.

@@ -14,6 +14,8 @@ use crate::results::RESERVED;
 const PIPELINES: &str = "TOMBOLO_PIPELINES";
 /// The variable that names a file of orders.
 const ORDERS: &str = "TOMBOLO_ORDERS";
+/// The variable that names a checkpoint to go on from.
+const RESTART: &str = "TOMBOLO_RESTART";
 /// The variable that names the directory of what is written.
 const OUTPUT: &str = "TOMBOLO_OUTPUT";
 
@@ -35,6 +37,8 @@ pub(crate) struct Configuration {
     pub(crate) output: PathBuf,
     /// The file that is watched.
     pub(crate) file: Option<PathBuf>,
+    /// The checkpoint that the run goes on from.
+    pub(crate) restart: Option<String>,
     /// The Fortran handle of the communicator.
     pub(crate) communicator: Option<i32>,
     /// Requests that are not carried out, for the log.
@@ -61,6 +65,7 @@ impl Configuration {
     pub(crate) fn read(root: &Node<'_, '_>) -> Result<Self, RunError> {
         let mut found = Found::default();
         let (mut parameters, mut communicator, mut orders) = (Vec::new(), None, Vec::new());
+        let mut restart = variable(RESTART);
         if let Some(catalyst) = root.child(c"catalyst") {
             if let Some(scripts) = catalyst.child(c"scripts") {
                 each(&scripts, |child| script(child, &mut found))?;
@@ -70,6 +75,9 @@ impl Configuration {
             }
             if let Some(node) = catalyst.child(c"parameters") {
                 each(&node, |child| parameter(child, &mut parameters))?;
+            }
+            if let Some(file) = catalyst.child(c"restart") {
+                restart = Some(file.text()?.into_owned());
             }
             if let Some(handle) = catalyst.child(c"mpi_comm") {
                 let expected = "the Fortran handle of a communicator";
@@ -100,6 +108,7 @@ impl Configuration {
             orders,
             output: variable(OUTPUT).map_or_else(|| PathBuf::from("."), PathBuf::from),
             file,
+            restart,
             communicator,
             notes: found.notes,
         })

@@ -13,9 +13,11 @@
 //!   end in `.json`; the type `io` writes files), `catalyst/parameters/<name>/{value, minimum,
 //!   maximum}`, `catalyst/mpi_comm`. Where the node names no file the variable `TOMBOLO_PIPELINES`
 //!   may; else the surface of every channel is streamed besides. `TOMBOLO_ORDERS` names a file of
-//!   orders, `TOMBOLO_OUTPUT` the directory of what is written, `TOMBOLO_REPORT` the file of the
+//!   orders, `catalyst/restart` or `TOMBOLO_RESTART` a checkpoint to go on from, `TOMBOLO_OUTPUT` the directory of what is written, `TOMBOLO_REPORT` the file of the
 //!   report at the end.
-//! - `catalyst_execute`: `catalyst/state/{timestep | cycle, time, time_step}`, and each of
+//! - `catalyst_execute`: `catalyst/state/{timestep | cycle, time, time_step}`,
+//!   `catalyst/state/checkpoint` (a file: the state of the run at the end of the coming step is saved
+//!   in it, to be gone on from with the state that the solver saves then), and each of
 //!   `catalyst/channels`: `mesh`, `multimesh`, `amrmesh`, all topologies and shapes of the
 //!   Blueprint. Arrays are lent to the adaptor as they lie in memory wherever it reads their type.
 //!   The first channel's mesh is the one that orders change, or that of the `channel` of the

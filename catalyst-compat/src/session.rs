@@ -7,7 +7,7 @@ use tombolo::deform::linear::BuiltIn;
 use tombolo::foreign::mesh::Channel;
 use tombolo::foreign::{Asked, Run, RunError, ranks};
 use tombolo::pipelines::language::nearest;
-use tombolo::{InitializeError, Settings, Step};
+use tombolo::{InitializeError, Restart, Settings, Step};
 
 use crate::configuration::{self, Configuration, Groups, with_default_views};
 use crate::mesh;
@@ -47,6 +47,7 @@ impl Session {
             orders,
             output,
             file,
+            restart,
             notes,
             ..
         } = ranks::agree(&*communicator, configuration)?;
@@ -59,6 +60,7 @@ impl Session {
             orders,
             output,
             file,
+            restart: restart.map(|file| Restart::File(file.into())),
         };
         let stage = if is_default {
             let asked = Asked::of(&settings.parameters);
@@ -118,7 +120,12 @@ impl Session {
             given = self.read(node).map(|(_, channels)| (step, channels));
         }
         match &mut self.stage {
-            Stage::UnderWay(run) => run.execute(given).map(|_| ()).map_err(at_path),
+            Stage::UnderWay(run) => {
+                let checkpoint = checkpoint_file(node);
+                run.execute(given).map_err(at_path)?;
+                let checkpoint = ranks::agree(&*self.communicator, checkpoint)?;
+                checkpoint.map_or(Ok(()), |file| run.checkpoint(&file))
+            }
             Stage::Waiting { .. } => Ok(()),
         }
     }
@@ -235,6 +242,13 @@ impl Session {
         // No rank goes on before the files are there.
         ranks::agree(&*self.communicator, ended.and(told))
     }
+}
+
+/// The file that the state of the run is to be saved in at the end of the coming step.
+fn checkpoint_file(node: &Node<'_, '_>) -> Result<Option<String>, RunError> {
+    let state = node.child(c"catalyst").and_then(|catalyst| catalyst.child(c"state"));
+    let file = state.and_then(|state| state.child(c"checkpoint"));
+    file.map(|file| Ok(file.text()?.into_owned())).transpose()
 }
 
 /// Names the path of what chooses the pipelines.

@@ -6,11 +6,12 @@ use serde_json::json;
 use tombolo_deform::communicator::agree;
 use tombolo_pipelines::{
     extract::Channel,
-    language::{Action, Config, Deformation, Pipeline, PipelineChange, Problem, Stage},
+    language::{Action, Command, Config, Deformation, Pipeline, PipelineChange, Problem, Stage},
 };
 
 use super::{Adaptor, SteeredMesh};
 use crate::{
+    checkpoint::SavedCommand,
     stages::Changed,
     steering::{Defaults, Source},
     step::Moment,
@@ -21,6 +22,17 @@ pub(super) struct Told {
     id: String,
     source: Source,
     change: PipelineChange,
+}
+
+impl Told {
+    /// The command as it is saved.
+    pub(super) fn saved(&self) -> SavedCommand {
+        SavedCommand {
+            id: self.id.clone(),
+            by: (&self.source).into(),
+            command: Command::Pipelines(self.change.clone()),
+        }
+    }
 }
 
 impl Adaptor {

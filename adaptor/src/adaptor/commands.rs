@@ -160,11 +160,11 @@ impl Adaptor {
         }
     }
 
-    fn obey(&mut self, id: String, source: &Source, command: Command, moment: Moment) {
+    pub(super) fn obey(&mut self, id: String, source: &Source, command: Command, moment: Moment) {
         let outcome = match command {
             Command::Order(order) => {
-                let background =
-                    self.config.steering.background && matches!(source, Source::Viewer(_));
+                let background = self.config.steering.background
+                    && matches!(source, Source::Viewer(_) | Source::Earlier(_, false));
                 match &mut self.mesh {
                     SteeredMesh::Steered(steerer, _) => steerer.take(id, order, background),
                     SteeredMesh::Refused(reason) => self.log.reject(&id, moment, &reason.into()),

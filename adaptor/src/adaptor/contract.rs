@@ -35,6 +35,11 @@ impl Lent {
         }
     }
 
+    /// The fingerprint of the cells that all shapes have, and how many there are.
+    pub(super) fn reference(&self) -> Option<(u64, usize)> {
+        self.reference
+    }
+
     /// Notes the cells that all shapes have.
     pub(super) fn take_reference(&mut self, channel: &Channel<'_>) {
         self.reference = Some((channel.mesh.cells.fingerprint(), channel.mesh.cells.len()));
@@ -119,7 +124,7 @@ impl Adaptor {
     fn uses_steered(&self, moment: Moment) -> bool {
         let is_busy =
             matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if !steerer.is_at_rest());
-        is_busy || self.timed.is_due(moment)
+        is_busy || self.timed.is_due(moment) || self.resumed.is_due(moment.cycle)
     }
 
     /// Refuses coordinates of the steered mesh that are not finite, where rank 0 was called to look

@@ -8,27 +8,36 @@ use std::{
 
 use serde_json::json;
 use tombolo_pipelines::language::{
-    self, JournalNote, Problem, Problems, Recording, RunHeader, Validate,
+    self, JournalNote, Problem, Problems, Recording, RestartedFrom, RunHeader, Validate,
 };
 
 use super::{
-    Adaptor, Meetings, SteeredMesh, Told, commands::Intake, contract::Lent, timing::Timing,
+    Adaptor, Meetings, SteeredMesh, Told,
+    checkpointing::{Given, hash_of, random_name},
+    commands::Intake,
+    contract::Lent,
+    restarting::Continued,
+    timing::Timing,
 };
 use crate::{
     changes::Changes,
+    checkpoint::Checkpoint,
     error::InitializeError,
     journal::{Journal, JournalError},
     settings::Settings,
     stages::Pipelines,
     steering::{Defaults, Log, Parameters, Queue, Timed},
     step::Moment,
-    stream::{Hub, Server},
+    stream::{Clock, Hub, Server},
     watch::Watch,
 };
 
 impl Adaptor {
     /// Sets a run up on this rank: what is wrong here alone is not agreed upon yet.
-    pub(super) fn set_up(settings: Settings) -> Result<Self, InitializeError> {
+    pub(super) fn set_up(
+        settings: Settings,
+        continued: Option<Continued>,
+    ) -> Result<Self, InitializeError> {
         let Settings {
             config,
             communicator,
@@ -39,31 +48,60 @@ impl Adaptor {
             replay,
             output,
             file,
+            restart: _,
         } = settings;
         // A configuration built in Rust is held to the same rules as one read from a file.
         Problems::none(config.problems()).map_err(InitializeError::Configuration)?;
         Problems::none(orders.problems()).map_err(InitializeError::Orders)?;
-        let parameters = Parameters::new(parameters)?;
+        let mut parameters = Parameters::new(parameters)?;
         let known: Vec<&str> = parameters.all().iter().map(|known| &*known.name).collect();
         language::check_parameters(&config, &known).map_err(InitializeError::Configuration)?;
         let first = communicator.rank() == 0;
         let is_replay = replay.is_some();
         let Recording { run, commands, shapes, .. } = replay.unwrap_or_default();
         let orders = if is_replay { commands } else { orders };
-        let defaults = run.map_or_else(|| Defaults::of(&config), Defaults::from);
+        let mut defaults = run.map_or_else(|| Defaults::of(&config), Defaults::from);
+        let known: Vec<String> = known.into_iter().map(str::to_owned).collect();
+        let mut given = Given { pipelines: config.pipelines.clone(), orders: hash_of(&orders) };
+        let (mut orders, mut moment) = (orders, Moment::default());
+        if let Some(Continued { checkpoint: Checkpoint { run, .. }, .. }) = &continued {
+            moment = Moment { cycle: run.cycle, time: run.time };
+            if config.pipelines == run.pipelines[1] {
+                given.pipelines.clone_from(&run.pipelines[0]);
+                defaults.clone_from(&run.defaults);
+            }
+            // The commands of another file take the place of those that were to come.
+            if given.orders == run.timed.0 {
+                orders.clone_from(&run.timed.1);
+            }
+            for (name, value) in &run.parameters {
+                if let Err(reason) = parameters.resume(name, *value) {
+                    log::warn!("of the checkpoint: {reason}");
+                }
+            }
+        }
+        let run = random_name();
         let queue = Arc::new(Queue::default());
         let hub = config.stream.as_ref().filter(|_| first).map(|_| Arc::new(Hub::default()));
         if let Some(hub) = &hub {
             hub.offer_pipelines(&config.pipelines);
         }
         let journal = match config.journal.as_ref().filter(|_| first) {
-            Some(path) => open_journal(&output.join(path), &defaults, hub.clone())?,
+            Some(path) => {
+                let restart = continued.as_ref().map(Continued::restarted_from);
+                open_journal(&output.join(path), &run, restart, &defaults, hub.clone())?
+            }
             None => Journal::none(),
         };
         let log = Arc::new(Log::new(journal, hub.clone()));
-        let clock = hub.as_ref().map(|hub| Arc::clone(&hub.clock)).unwrap_or_default();
+        let clock: Arc<Clock> = hub.as_ref().map(|hub| Arc::clone(&hub.clock)).unwrap_or_default();
+        clock.set(moment.cycle, moment.time);
         let config = Arc::new(config);
-        let known: Vec<String> = known.into_iter().map(str::to_owned).collect();
+        let mut pipelines = Pipelines::new(&config, Arc::clone(&communicator), &output)?;
+        if let Some(Continued { checkpoint, .. }) = &continued {
+            log.resume(checkpoint.run.known.clone());
+            pipelines.restore(&checkpoint.pipelines)?;
+        }
         let changes = Arc::new(Changes::new(
             Arc::clone(&config),
             known.clone(),
@@ -102,12 +140,16 @@ impl Adaptor {
         };
         let adaptor = Self {
             defaults,
-            pipelines: Pipelines::new(&config, Arc::clone(&communicator), &output)?,
+            pipelines,
             config,
             communicator,
             solvers,
             parameters,
             timed: Timed::new(orders),
+            run,
+            given,
+            has_begun: continued.as_ref().is_some_and(|it| it.checkpoint.run.has_begun),
+            resumed: continued.map(Continued::into_resumed).unwrap_or_default(),
             recorded: is_replay.then_some(shapes),
             queue,
             log,
@@ -123,7 +165,7 @@ impl Adaptor {
             output,
             mesh: SteeredMesh::Unknown,
             lent: Lent::default(),
-            moment: Moment::default(),
+            moment,
             told: Told::default(),
             conditions,
             paused: false,
@@ -132,6 +174,7 @@ impl Adaptor {
             meetings: Meetings::default(),
             timing: Timing::default(),
         };
+        adaptor.announce_resumed();
         adaptor.describe();
         adaptor.tell_conditions();
         Ok(adaptor)
@@ -142,21 +185,21 @@ impl Adaptor {
 /// written.
 fn open_journal(
     path: &Path,
+    run: &str,
+    restart: Option<RestartedFrom>,
     defaults: &Defaults,
     hub: Option<Arc<Hub>>,
 ) -> Result<Journal, JournalError> {
-    let mut number = [0; 8];
-    // Without random numbers the moment tells runs apart well enough.
-    let _ = getrandom::fill(&mut number);
     let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     let Defaults { deform, guard, schedule } = defaults.clone();
     let header = RunHeader {
-        id: format!("{:016x}", u64::from_le_bytes(number)),
+        id: run.into(),
         version: env!("CARGO_PKG_VERSION").into(),
         began: since.as_secs(),
         deform,
         guard,
         schedule,
+        restart,
     };
     let file = path.to_owned();
     Journal::open(path, &JournalNote::Run(header), move |lost| {

@@ -7,7 +7,7 @@ use tombolo_deform::{
     communicator::{Communicator, RankError, agree},
     distributed::{DistributedError, Part, domain},
     features::FeatureSettings,
-    mesh::{Cells, MeshError},
+    mesh::{ArrayView, Cells, MeshError, MeshView, Vector},
     shape::Shaper,
     surface::Surface,
 };
@@ -78,29 +78,31 @@ impl Adaptor {
         } else {
             agree(&*self.communicator, checked)?;
         }
-        self.mesh =
-            if self.config.stream.is_none() && self.timed.is_empty() && !self.pipelines.can_order()
-            {
-                SteeredMesh::Unsteered
-            } else {
-                match self.take_over(cycle, channel)? {
-                    Ok(steerer) => {
-                        self.lent.take_reference(channel);
-                        let surface = steerer.surface();
-                        if let Some(surface) =
-                            surface.as_ref().filter(|_| self.communicator.size() == 1)
-                        {
-                            self.pipelines.share_surface(channels, channel.name, surface);
-                        }
-                        SteeredMesh::Steered(Box::new(steerer), surface)
+        self.mesh = if self.config.stream.is_none()
+            && self.timed.is_empty()
+            && !self.pipelines.can_order()
+            && !self.resumed.has_mesh()
+        {
+            SteeredMesh::Unsteered
+        } else {
+            match self.take_over(cycle, channel)? {
+                Ok(steerer) => {
+                    self.lent.take_reference(channel);
+                    let surface = steerer.surface();
+                    if let Some(surface) =
+                        surface.as_ref().filter(|_| self.communicator.size() == 1)
+                    {
+                        self.pipelines.share_surface(channels, channel.name, surface);
                     }
-                    Err(reason) => {
-                        let reason = format!("the shape of this mesh cannot be changed: {reason}");
-                        self.complain(&reason);
-                        SteeredMesh::Refused(reason)
-                    }
+                    SteeredMesh::Steered(Box::new(steerer), surface)
                 }
-            };
+                Err(reason) => {
+                    let reason = format!("the shape of this mesh cannot be changed: {reason}");
+                    self.complain(&reason);
+                    SteeredMesh::Refused(reason)
+                }
+            }
+        };
         let fields = channel.fields.iter().map(
             |field| json!({"name": field.name, "association": field.association, "components": field.values.components()}),
         );
@@ -134,6 +136,27 @@ impl Adaptor {
         }
     }
 
+    /// The coordinates of the reference, where the run goes on from a checkpoint.
+    fn saved_points(
+        &self,
+        cycle: u64,
+        channel: &Channel<'_>,
+    ) -> Result<Option<Arc<[Vector]>>, ExecuteError> {
+        let Some((saved, points)) = self.resumed.mesh() else { return Ok(None) };
+        let (cells, vertices) = (&channel.mesh.cells, channel.mesh.points.len());
+        let (found, expected) = ((cells.fingerprint(), cells.len()), saved.cells);
+        let reason = if found.1 != expected.1 {
+            format!("found {} cells, expected {}", found.1, expected.1)
+        } else if vertices != points.reference().len() {
+            format!("found {vertices} vertices, expected {}", points.reference().len())
+        } else if found != expected {
+            "its cells have other vertices, or stand in another order".into()
+        } else {
+            return Ok(Some(Arc::clone(points.reference())));
+        };
+        Err(ExecuteError::Restart { cycle, channel: channel.name.into(), reason })
+    }
+
     /// Takes over a mesh, or this rank's part of one; the inner error says why its shape cannot be
     /// changed. Collective.
     fn take_over(
@@ -143,15 +166,23 @@ impl Adaptor {
     ) -> Result<Result<Steerer, String>, ExecuteError> {
         let refused = |error| of_channel(cycle, channel, error);
         let settings = FeatureSettings::default();
-        let shaper = if self.communicator.size() > 1 || !channel.mesh.is_plain() {
-            let part = agree(&*self.communicator, Part::of(&channel.mesh).map_err(refused))?;
+        let saved = self.saved_points(cycle, channel);
+        let saved =
+            if self.communicator.size() == 1 { saved? } else { agree(&*self.communicator, saved)? };
+        // All shapes are measured from the reference, wherever the solver's mesh has come to.
+        let mesh = match &saved {
+            Some(points) => MeshView { points: ArrayView::vectors(points), ..channel.mesh.clone() },
+            None => channel.mesh.clone(),
+        };
+        let shaper = if self.communicator.size() > 1 || !mesh.is_plain() {
+            let part = agree(&*self.communicator, Part::of(&mesh).map_err(refused))?;
             self.tell_handedness(&part.cells);
             domain(&self.communicator, &part, &settings)
                 .and_then(|(domain, boundary)| Shaper::new(domain, boundary))
                 .map(|shaper| shaper.with_solvers(Arc::clone(&self.solvers)))
                 .map_err(|error| error.to_string())
         } else {
-            let mesh = channel.mesh.to_mesh().map_err(refused)?;
+            let mesh = mesh.to_mesh().map_err(refused)?;
             self.tell_handedness(mesh.cells());
             let surface = Surface::extract(&mesh, &settings).map_err(DistributedError::from);
             surface
@@ -163,10 +194,12 @@ impl Adaptor {
             || self.timed.drags_skeleton()
             || self.pipelines.drags_skeleton();
         let (log, queue) = (Arc::clone(&self.log), Arc::clone(&self.queue));
+        let resumed = &mut self.resumed;
         Ok(shaper.and_then(|shaper| {
             let shaper = shaper.with_clock(clock);
             let mut steerer = Steerer::new(shaper, self.defaults.clone(), log, queue, skeleton)
                 .map_err(|error| format!("a thread could not be started: {error}"))?;
+            resumed.hand_over(&mut steerer)?;
             if let Some(shapes) = self.recorded.take() {
                 steerer.repeat(shapes);
             }

@@ -4,7 +4,7 @@ use tombolo_deform::mesh::MeshError;
 use tombolo_pipelines::extract::ChannelError;
 use tombolo_pipelines::language::{LanguageErrors, ReadError};
 
-use crate::{ExecuteError, FinalizeError, InitializeError};
+use crate::{CheckpointError, ExecuteError, FinalizeError, InitializeError};
 
 /// Why a run did not begin, or a call of it was refused.
 #[derive(Debug, thiserror::Error)]
@@ -67,6 +67,9 @@ pub enum RunError {
     /// The adaptor could not be set up.
     #[error(transparent)]
     Initialize(#[from] InitializeError),
+    /// The state of the run could not be saved.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
     /// A channel's arrays do not fit together.
     #[error(transparent)]
     Channel(#[from] ChannelError),
@@ -106,7 +109,7 @@ impl RunError {
     pub fn is_failure(&self) -> bool {
         match self {
             RunError::Rank { is_failure, .. } => *is_failure,
-            RunError::Initialize(_) | RunError::Finalize(_) => true,
+            RunError::Initialize(_) | RunError::Finalize(_) | RunError::Checkpoint(_) => true,
             _ => false,
         }
     }

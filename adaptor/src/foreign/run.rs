@@ -44,13 +44,14 @@ impl Run {
         let asked = Asked::of(&settings.parameters);
         let communicator = Arc::clone(&settings.communicator);
         let adaptor = Adaptor::initialize(settings)?;
+        let last_time = adaptor.last_moment().map(|moment| moment.time);
         Ok(Self {
             adaptor,
             communicator,
             kept: HashMap::new(),
             steered: String::new(),
             blocks: Vec::new(),
-            last_time: None,
+            last_time,
             time_step: 0.0,
             asked,
             choice: 0,
@@ -86,6 +87,14 @@ impl Run {
     #[must_use]
     pub fn looks_at(&self, step: &Step) -> bool {
         self.adaptor.looks_at(step)
+    }
+
+    /// Saves the state of the run in a file: see [`Adaptor::write_checkpoint`]. Collective.
+    ///
+    /// # Errors
+    /// [`RunError::Checkpoint`].
+    pub fn checkpoint(&mut self, file: &str) -> Result<(), RunError> {
+        Ok(self.adaptor.write_checkpoint(file)?)
     }
 
     /// The link that a viewer opens, with the secret of those who may drive.

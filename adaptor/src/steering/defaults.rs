@@ -1,5 +1,6 @@
 //! The settings of orders that bring none.
 
+use serde::{Deserialize, Serialize};
 use tombolo_deform::{
     quality::Guard,
     schedule::Schedule,
@@ -10,7 +11,7 @@ use tombolo_pipelines::language::{Config, Deformation, Due, Order, RunHeader, St
 use super::stack::{EditStack, ShapeSettings, StackError};
 
 /// The settings of orders that bring none.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Defaults {
     pub(crate) deform: Deformation,
     pub(crate) guard: Guard,

@@ -5,6 +5,7 @@ use std::{
     hash::{DefaultHasher, Hash, Hasher},
 };
 
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use tombolo_pipelines::language::Order;
 
@@ -17,8 +18,9 @@ const ORDERS_TOLD: usize = 100;
 const TOLD_WHOLE: usize = 16 << 10;
 
 /// The commands that were given, as far as they are kept.
-#[derive(Default)]
-pub(super) struct KnownCommands {
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct KnownCommands {
     orders: VecDeque<OrderReport>,
     /// The newest orders as they were given, by their names.
     given: VecDeque<(String, Value)>,
@@ -71,6 +73,16 @@ impl KnownCommands {
         self.names.insert(id.clone(), digest);
         self.named.push_back(id.clone());
         Ok(Named::New(id))
+    }
+
+    /// Keeps the name of a command of an earlier run from others; whether it is an order that is
+    /// known.
+    pub(super) fn reserve(&mut self, id: &str) -> bool {
+        if !self.names.contains_key(id) {
+            self.names.insert(id.to_owned(), None);
+            self.named.push_back(id.to_owned());
+        }
+        self.order(id).is_some()
     }
 
     /// Lets go of the name of a command that was not taken.

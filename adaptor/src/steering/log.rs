@@ -29,6 +29,8 @@ pub(crate) enum Source {
     Configuration,
     /// The program that the adaptor is linked into.
     Program,
+    /// Somebody in the run that this one goes on from; whether that run had come to it.
+    Earlier(CommandAuthor, bool),
 }
 
 impl From<&Source> for CommandAuthor {
@@ -39,6 +41,7 @@ impl From<&Source> for CommandAuthor {
             Source::Pipeline(name) => CommandAuthor::Pipeline(name.clone()),
             Source::Configuration => CommandAuthor::Configuration,
             Source::Program => CommandAuthor::Program,
+            Source::Earlier(author, _) => author.clone(),
         }
     }
 }
@@ -53,6 +56,36 @@ pub(crate) struct Log {
 impl Log {
     pub(crate) fn new(journal: Journal, hub: Option<Arc<Hub>>) -> Self {
         Self { state: Mutex::default(), journal, hub }
+    }
+
+    /// Goes on from the commands of an earlier run.
+    pub(crate) fn resume(&self, known: KnownCommands) {
+        *lock(&self.state) = known;
+    }
+
+    /// The commands so far.
+    pub(crate) fn known(&self) -> KnownCommands {
+        lock(&self.state).clone()
+    }
+
+    /// Keeps the name of a command of an earlier run from others.
+    pub(crate) fn reserve(&self, id: &str) {
+        lock(&self.state).reserve(id);
+    }
+
+    /// Takes a command in that an earlier run has accepted, under its name.
+    pub(crate) fn accept_again(
+        &self,
+        id: &str,
+        source: &Source,
+        command: &Command,
+        moment: Moment,
+    ) {
+        let is_known = lock(&self.state).reserve(id);
+        self.journal.write(&accepted(id, source, command, moment));
+        if !is_known {
+            self.admit(id, command);
+        }
     }
 
     /// Takes a command in that no viewer sent: gives it a name unless it has one, hands it to the

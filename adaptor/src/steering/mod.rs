@@ -31,6 +31,7 @@ use std::{sync::LazyLock, time::Instant};
 
 pub(crate) use defaults::Defaults;
 pub(crate) use forecaster::Forecaster;
+pub(crate) use known::KnownCommands;
 pub use lent::NotFollowed;
 pub(crate) use log::{Log, Source};
 pub use motion::{MeshMotion, Steering, SurfaceMotion};
@@ -39,7 +40,7 @@ pub(crate) use parameters::Parameters;
 pub use parameters::{Parameter, ParameterError};
 pub(crate) use queue::{Asked, Queue, Received};
 pub(crate) use stack::EditStack;
-pub(crate) use steerer::Steerer;
+pub(crate) use steerer::{SavedSteering, Steerer};
 pub(crate) use timed::Timed;
 
 /// Seconds since the first call of this function: the clock of a

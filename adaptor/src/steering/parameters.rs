@@ -99,6 +99,13 @@ impl Parameters {
         Ok(())
     }
 
+    /// Goes on with a value that an earlier run has come to; the solver is told of one that is not the
+    /// one it declares.
+    pub(crate) fn resume(&mut self, name: &str, value: f64) -> Result<(), ParameterError> {
+        let is_declared = |it: &Parameter| it.name == name && it.value.to_bits() == value.to_bits();
+        if self.all.iter().any(is_declared) { Ok(()) } else { self.set(name, value) }
+    }
+
     /// The changes that the solver is about to read.
     pub(crate) fn take_changed(&mut self) -> &[(String, f64)] {
         self.forget_read();

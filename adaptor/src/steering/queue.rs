@@ -112,6 +112,11 @@ impl Queue {
         std::mem::take(&mut *waiting)
     }
 
+    /// Does something with all that waits, and leaves it there.
+    pub(crate) fn look(&self, look: impl FnMut(&Received)) {
+        lock(&self.waiting).iter().for_each(look);
+    }
+
     /// Returns once there was a call.
     pub(crate) fn wait(&self) {
         let mut waiting = lock(&self.waiting);

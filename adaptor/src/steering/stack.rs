@@ -2,6 +2,7 @@
 
 use std::{num::NonZeroU32, sync::Arc};
 
+use serde::{Deserialize, Serialize};
 use tombolo_deform::{edit::Edit, quality::Guard, shape::check_stack};
 use tombolo_pipelines::{
     language::{Change, Deformation},
@@ -9,7 +10,7 @@ use tombolo_pipelines::{
 };
 
 /// The change that one order made to the stack.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Entry {
     replaces: bool,
     edits: Vec<Edit>,
@@ -17,14 +18,14 @@ struct Entry {
 }
 
 /// The settings that the shape of a stack depends on besides its edits.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ShapeSettings {
     pub(crate) deform: Deformation,
     pub(crate) guard: Guard,
 }
 
 /// The edits that make the present shape, and how they came there.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct EditStack {
     entries: Vec<Arc<Entry>>,
 }

@@ -35,6 +35,11 @@ impl Timed {
         self.commands.is_empty()
     }
 
+    /// Those that were not given yet.
+    pub(crate) fn left(&self) -> &[TimedCommand] {
+        &self.commands
+    }
+
     /// The next order, as far as that can be known.
     pub(crate) fn next_order(&self) -> Option<&Order> {
         let cycle = |command: &TimedCommand| match command.at {

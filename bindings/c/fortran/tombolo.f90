@@ -72,6 +72,7 @@ module tombolo
 
   public :: tombolo_version, tombolo_message, tombolo_log
   public :: tombolo_open, tombolo_configure, tombolo_orders, tombolo_orders_file, tombolo_output, tombolo_parameter
+  public :: tombolo_checkpoint, tombolo_restart
   public :: tombolo_condition, tombolo_start, tombolo_link, tombolo_finalize, tombolo_close, tombolo_report
   public :: tombolo_points, tombolo_cells, tombolo_mixed_cells, tombolo_point_cells, tombolo_ghost_cells
   public :: tombolo_faces, tombolo_feature, tombolo_global_vertices, tombolo_global_cells, tombolo_field
@@ -174,6 +175,18 @@ module tombolo
       import :: c_char, c_int, c_ptr
       type(c_ptr), value :: run
       character(kind=c_char), intent(in) :: directory(*)
+      integer(c_int) :: status
+    end function
+    function c_restart(run, file) bind(C, name="tombolo_restart") result(status)
+      import :: c_char, c_int, c_ptr
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: file(*)
+      integer(c_int) :: status
+    end function
+    function c_checkpoint(run, file) bind(C, name="tombolo_checkpoint") result(status)
+      import :: c_char, c_int, c_ptr
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: file(*)
       integer(c_int) :: status
     end function
     function c_parameter(run, name, value, minimum, maximum) bind(C, name="tombolo_parameter") result(status)
@@ -568,6 +581,18 @@ contains
     type(tombolo_run), intent(in) :: run
     character(len=*), intent(in) :: directory
     status = c_output(run%handle, c_text(directory))
+  end function
+
+  integer(c_int) function tombolo_restart(run, file) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: file
+    status = c_restart(run%handle, c_text(file))
+  end function
+
+  integer(c_int) function tombolo_checkpoint(run, file) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: file
+    status = c_checkpoint(run%handle, c_text(file))
   end function
 
   integer(c_int) function tombolo_parameter(run, name, value, minimum, maximum) result(status)

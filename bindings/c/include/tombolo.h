@@ -139,6 +139,9 @@ int tombolo_parameter(tombolo* run, const char* name, double value, double minim
 /* What a feature of the mesh is to the flow: TOMBOLO_INFLOW, TOMBOLO_OUTFLOW or TOMBOLO_WALL. Viewers hold inflow and outflow still until
  * somebody wants otherwise. */
 int tombolo_condition(tombolo* run, const char* feature, int condition);
+/* Goes on from the state that tombolo_checkpoint has saved, with the same mesh on as many ranks: the next tombolo_execute is the one
+ * that would have come next. Before the run begins. */
+int tombolo_restart(tombolo* run, const char* file);
 /* Begins; the first tombolo_execute does so where this was not called. */
 int tombolo_start(tombolo* run);
 /* The link that a browser opens, once the run has begun; NULL without a server. Valid until tombolo_close. */
@@ -205,6 +208,10 @@ int tombolo_field_strided(tombolo* run, const char* channel, const char* name, e
 
 /* Shows the state before the step from `time` to `time + time_step` (0 in a steady solver). */
 int tombolo_execute(tombolo* run, uint64_t cycle, double time, double time_step);
+/* Saves the state of the run in a file, which is there whole or not at all: the shape, the schedule under way, the orders that wait, the
+ * parameters. To be called with the solver's own state at the end of the step that the last tombolo_execute has begun, on all ranks; an
+ * error leaves an older file as it was. */
+int tombolo_checkpoint(tombolo* run, const char* file);
 /* Where the vertices of the channel that orders change are to be at the end of the step, x y z for each; NULL where the mesh
  * stays. Valid until the next tombolo_execute or the end. */
 const double* tombolo_coordinates(tombolo* run);

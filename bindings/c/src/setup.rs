@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use tombolo::foreign::{Run, RunError, ranks};
 use tombolo::pipelines::language;
-use tombolo::{Condition, Parameter, Settings};
+use tombolo::{Condition, Parameter, Restart, Settings};
 
 use crate::export::{Out, Text, export};
 use crate::{Fault, Handle, Opened, Stage, c_string, find, hold, register, runs, with};
@@ -100,6 +100,14 @@ export! {
         };
         set(run, |settings| {
             settings.conditions.insert(feature, condition);
+            Ok(())
+        })
+    }
+
+    fn tombolo_restart(run: *mut Handle, file: Text) {
+        let file = file.get("file")?;
+        set(run, |settings| {
+            settings.restart = Some(Restart::File(PathBuf::from(file)));
             Ok(())
         })
     }

@@ -55,6 +55,17 @@ export! {
         })
     }
 
+    fn tombolo_checkpoint(run: *mut Handle, file: Text) {
+        let file = file.get("file")?;
+        with(run, |run| {
+            run.not_ended()?;
+            match &mut run.stage {
+                Stage::UnderWay(under_way) => Ok(under_way.checkpoint(&file)?),
+                _ => Err(Fault::Call("called before the run began, by tombolo_start or the first tombolo_execute".into())),
+            }
+        })
+    }
+
     fn tombolo_coordinates(run: *mut Handle) -> (*const f64 = ptr::null()) {
         motion(run, ptr::null(), |motion, _| first(&motion.coordinates))
     }

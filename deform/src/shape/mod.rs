@@ -8,6 +8,7 @@ mod mend;
 mod plan;
 mod refused;
 mod request;
+mod saved;
 mod surface_only;
 // Ranks are threads, which WebAssembly does not have.
 #[cfg(all(test, not(target_family = "wasm")))]
@@ -35,6 +36,7 @@ use mend::Mended;
 pub use plan::{CurrentShape, Judged, Plan};
 pub use refused::{Elsewhere, Refused};
 pub use request::Request;
+pub use saved::{SavedPlan, SavedPoints, SavedShape};
 
 /// Whether a stack may hold all of these edits.
 ///

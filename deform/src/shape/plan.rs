@@ -40,9 +40,9 @@ impl From<Arc<[Vector]>> for CurrentShape {
 
 /// One shape of a plan: how far along which straight piece of the way.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Shape {
-    piece: usize,
-    fraction: f64,
+pub(super) struct Shape {
+    pub(super) piece: usize,
+    pub(super) fraction: f64,
 }
 
 /// A way from one shape to another, every mesh of which has been judged.
@@ -54,17 +54,17 @@ struct Shape {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// From the start to the end, both among them.
-    way: Vec<Arc<[Vector]>>,
-    shapes: Vec<Shape>,
-    asked: Schedule,
-    schedule: Schedule,
-    quality: PathQuality,
-    back: Vec<Arc<[Vector]>>,
-    target: Target,
-    largest_displacement: f64,
-    seconds: ShapeSeconds,
+    pub(super) way: Vec<Arc<[Vector]>>,
+    pub(super) shapes: Vec<Shape>,
+    pub(super) asked: Schedule,
+    pub(super) schedule: Schedule,
+    pub(super) quality: PathQuality,
+    pub(super) back: Vec<Arc<[Vector]>>,
+    pub(super) target: Target,
+    pub(super) largest_displacement: f64,
+    pub(super) seconds: ShapeSeconds,
     /// Whether only the surface was judged.
-    surface_only: bool,
+    pub(super) surface_only: bool,
 }
 
 /// The part of every mesh on a way that the guard has judged.
@@ -391,19 +391,28 @@ fn around(
     } else {
         target.way.iter().rev().chain([reference]).collect()
     };
+    // Compared by their numbers: whether a shape was found anew or is known from before, and whether
+    // the run was restarted meanwhile, makes no difference to the way.
+    let mut different: Vec<u64> = (leaving.iter())
+        .flat_map(|from| arriving.iter().map(move |to| u64::from(!is_same(from, to))))
+        .collect();
+    body.communicator().reduce_integers(Reduction::Maximum, &mut different);
+    let same = |from: usize, to: usize| different[from * arriving.len() + to] == 0;
     let join = |from: usize, to: usize| {
         let mut way: Vec<Arc<[Vector]>> =
             leaving[..=from].iter().map(|&shape| Arc::clone(shape)).collect();
-        let same = Arc::ptr_eq(leaving[from], arriving[to]);
         way.extend(
-            arriving[..=to].iter().rev().skip(usize::from(same)).map(|&shape| Arc::clone(shape)),
+            arriving[..=to]
+                .iter()
+                .rev()
+                .skip(usize::from(same(from, to)))
+                .map(|&shape| Arc::clone(shape)),
         );
         way
     };
     // What both ways have in common costs nothing.
-    let common = leaving.iter().enumerate().find_map(|(from, shape)| {
-        arriving.iter().position(|other| Arc::ptr_eq(shape, other)).map(|to| (from, to))
-    });
+    let common = (0..leaving.len())
+        .find_map(|from| (0..arriving.len()).find(|&to| same(from, to)).map(|to| (from, to)));
     // Straight steps between them, the shortest ways first.
     let limit = common.map_or(leaving.len() + arriving.len(), |(from, to)| from + to);
     let mut pairs: Vec<(usize, usize)> = (0..leaving.len())
@@ -416,6 +425,12 @@ fn around(
         .take(SHORTCUTS)
         .find(|&(from, to)| body.keeps(leaving[from], arriving[to], guard));
     straight.or(common).map(|(from, to)| join(from, to)).filter(|way| way.len() > 1)
+}
+
+/// Whether two shapes are the same bits.
+fn is_same(a: &Arc<[Vector]>, b: &Arc<[Vector]>) -> bool {
+    let mut pairs = a.as_flattened().iter().zip(b.as_flattened());
+    Arc::ptr_eq(a, b) || pairs.all(|(a, b)| a.to_bits() == b.to_bits())
 }
 
 /// The plan along a way of several pieces, each of which was judged.

@@ -53,6 +53,11 @@ pub enum SolverError {
         /// Its value.
         value: f64,
     },
+    /// A state that was saved of something else.
+    #[error(
+        "the saved state is not that of this mesh; expected one of the same case on as many ranks"
+    )]
+    Saved,
     /// The pressure equation has no solver.
     #[error("the pressure equation cannot be solved: {0}")]
     Pressure(#[from] LinearError),

@@ -64,6 +64,24 @@ impl History {
         Ok(Self { file: file.into(), lines })
     }
 
+    /// Goes on with the file of a run that is restarted: the lines of later steps are cut off.
+    pub(crate) fn resume(file: &Path, cycle: u64) -> Result<Self, (PathBuf, std::io::Error)> {
+        let before = match std::fs::read_to_string(file) {
+            Ok(before) => before,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
+            Err(error) => return Err((file.to_owned(), error)),
+        };
+        let mut history = Self::create(file)?;
+        let is_kept = |line: &&str| {
+            let number = line.split(',').next().and_then(|number| number.parse::<u64>().ok());
+            number.is_some_and(|number| number <= cycle)
+        };
+        for line in before.lines().skip(1).filter(is_kept) {
+            writeln!(history.lines, "{line}").map_err(|error| (file.to_owned(), error))?;
+        }
+        Ok(history)
+    }
+
     /// Adds what flows through at the end of a step.
     pub(crate) fn add(
         &mut self,

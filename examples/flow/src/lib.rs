@@ -57,6 +57,7 @@ pub mod parts;
 pub mod program;
 mod ranks;
 pub mod report;
+mod saved;
 mod solver;
 mod topology;
 

@@ -2,6 +2,7 @@
 
 use std::io::{IsTerminal, Write};
 use std::net::SocketAddr;
+use std::num::NonZeroU64;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -54,6 +55,15 @@ struct Arguments {
     /// Where viewers connect to, in place of what the pipelines say; port 0 takes any free one
     #[arg(long, value_name = "ADDRESS:PORT", conflicts_with = "headless")]
     listen: Option<SocketAddr>,
+    /// Save the state of the run every so many steps, and when it is stopped
+    #[arg(long, value_name = "N")]
+    checkpoint_every: Option<NonZeroU64>,
+    /// The file of the state; without it flow.state in the folder of the output
+    #[arg(long, value_name = "FILE", requires = "checkpoint_every")]
+    checkpoint: Option<PathBuf>,
+    /// Go on from a state that was saved, with the same case on as many ranks
+    #[arg(long, value_name = "FILE")]
+    restart: Option<PathBuf>,
     /// How many threads each rank uses; without it the cores are shared out evenly
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
@@ -160,7 +170,12 @@ fn run(
     if let Some(threads) = threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
     }
+    let state = || arguments.out.clone().unwrap_or_default().join("flow.state");
     let options = Options {
+        checkpoint: arguments
+            .checkpoint_every
+            .map(|every| (arguments.checkpoint.clone().unwrap_or_else(state), every)),
+        restart: arguments.restart,
         case: arguments.case,
         pipelines: arguments.pipelines,
         orders: arguments.orders,

@@ -1,13 +1,15 @@
 //! The program `flow`: a case, steered through the adaptor.
 
 use std::net::SocketAddr;
+use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
 use tombolo::communicator::{Communicator, RankError, Solo};
 use tombolo::{
-    Adaptor, ExecuteError, FinalizeError, InitializeError, JournalError, Settings, Step, Stopper,
+    Adaptor, CheckpointError, ExecuteError, FinalizeError, InitializeError, JournalError, Restart,
+    Settings, Step, Stopper,
 };
 use tombolo_deform::distributed::DistributedError;
 use tombolo_deform::features::FeatureSettings;
@@ -23,6 +25,7 @@ use crate::history::{History, Through};
 use crate::parts::{Dealing, Share};
 use crate::ranks::agreed;
 use crate::report::{FlowReport, MeshReport, Report};
+use crate::saved::{self, State};
 use crate::solver::{Motion, Settings as SolverSettings, Solver};
 use crate::{Patch, SolverError};
 
@@ -47,6 +50,11 @@ pub struct Options {
     pub out: Option<PathBuf>,
     /// Where the flow is written step by step, as comma-separated values.
     pub history: Option<PathBuf>,
+    /// Where the state of the run is saved, and after how many steps again; at the end of a run that is
+    /// stopped too.
+    pub checkpoint: Option<(PathBuf, NonZeroU64)>,
+    /// The saved state that the run goes on from.
+    pub restart: Option<PathBuf>,
     /// How the mesh is dealt out, where there are several ranks.
     pub dealing: Dealing,
 }
@@ -78,6 +86,9 @@ pub enum ProgramError {
     /// The flow cannot be solved.
     #[error(transparent)]
     Solver(#[from] SolverError),
+    /// The state of the adaptor cannot be gone on from.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
     /// The adaptor could not be set up.
     #[error(transparent)]
     Initialize(#[from] InitializeError),
@@ -107,6 +118,7 @@ pub struct Run {
     communicator: Arc<dyn Communicator>,
     out: Option<PathBuf>,
     steps: Option<u64>,
+    checkpoint: Option<(PathBuf, NonZeroU64)>,
     adaptor: Adaptor,
     solver: Solver,
     share: Share,
@@ -130,11 +142,11 @@ struct Read {
     mesh: Mesh,
     surface: Surface,
     patches: Vec<Patch>,
-    history: Option<History>,
+    state: Option<State>,
 }
 
 impl Read {
-    fn new(options: &Options, is_first: bool) -> Result<Self, ProgramError> {
+    fn new(options: &Options, rank: usize) -> Result<Self, ProgramError> {
         let case = Case::read(&options.case)?;
         let config = config(options, &case)?;
         let orders = orders(options, &case)?;
@@ -142,9 +154,8 @@ impl Read {
         let mesh = files::read_mesh(&case.mesh)?.mesh;
         let surface = Surface::extract(&mesh, &FeatureSettings::default())?;
         let patches = case.patches(&options.case, &surface)?;
-        let history = options.history.as_deref().filter(|_| is_first);
-        let history = history.map(History::create).transpose().map_err(unwritten)?;
-        Ok(Self { case, config, orders, replay, mesh, surface, patches, history })
+        let state = options.restart.as_deref().map(|file| State::read(file, rank)).transpose()?;
+        Ok(Self { case, config, orders, replay, mesh, surface, patches, state })
     }
 }
 
@@ -181,10 +192,10 @@ impl Run {
         options: &Options,
     ) -> Result<Self, ProgramError> {
         let is_first = communicator.rank() == 0;
-        let read = agreed(&*communicator, Read::new(options, is_first))?;
-        let Read { case, config, orders, replay, mesh, surface, patches, history } = read;
+        let read = agreed(&*communicator, Read::new(options, communicator.rank()))?;
+        let Read { case, config, orders, replay, mesh, surface, patches, state } = read;
         let declared = case.declared_parameters();
-        let parameters: Vec<f64> = declared.iter().map(|parameter| parameter.value).collect();
+        let mut parameters: Vec<f64> = declared.iter().map(|parameter| parameter.value).collect();
         let role = |patch: &Patch| (patch.name.clone(), patch.role(mesh.points(), &parameters));
         let conditions = patches.iter().map(role).collect();
         let (share, patches) = Share::of(&communicator, &mesh, &surface, patches, options.dealing)?;
@@ -194,6 +205,17 @@ impl Run {
         solver.set_parameters(&parameters);
         let (velocity, pressure) = case.initial_values();
         solver.initialise(&velocity, &pressure);
+        let mut restart = None;
+        if let Some(state) = &state {
+            let checkpoint = state.restore(&*communicator, &mut solver)?;
+            restart = Some(Restart::Checkpoint(Box::new(checkpoint)));
+            parameters.copy_from_slice(solver.parameters());
+        }
+        let history = options.history.as_deref().filter(|_| is_first).map(|file| match &state {
+            Some(_) => History::resume(file, solver.cycle()),
+            None => History::create(file),
+        });
+        let history = agreed(&*communicator, history.transpose().map_err(unwritten))?;
         let adaptor = Adaptor::initialize(Settings {
             config,
             communicator: Arc::clone(&communicator),
@@ -202,10 +224,11 @@ impl Run {
             conditions,
             orders,
             replay,
+            restart,
             output: options.out.clone().unwrap_or_else(|| PathBuf::from(".")),
             file: options.pipelines.clone().or(case.pipelines.clone()),
         })?;
-        let points = share.mesh.points().to_vec();
+        let points = solver.points();
         // With viewers a run goes on until somebody stops it, unless it was told when to end.
         let steps = options.steps.or_else(|| options.headless.then_some(case.steps));
         Ok(Self {
@@ -216,6 +239,7 @@ impl Run {
             history,
             out: options.out.clone(),
             steps,
+            checkpoint: options.checkpoint.clone(),
             case,
             communicator,
             adaptor,
@@ -303,7 +327,8 @@ impl Run {
             let mesh = self.share.view(&self.points);
             let steering =
                 self.adaptor.execute(&step, &[Channel { name: "fluid", mesh, fields: &fields }])?;
-            if steering.stop {
+            // What the adaptor saves belongs to the end of the step that it was shown.
+            if steering.stop && self.checkpoint.is_none() {
                 break;
             }
             for (name, value) in &steering.parameters {
@@ -345,6 +370,15 @@ impl Run {
             }
             self.solver.velocity_into(&mut velocity);
             self.solver.pressure_into(&mut pressure);
+            if let Some((file, every)) = &self.checkpoint
+                && (steering.stop || self.solver.cycle() % *every == 0)
+            {
+                let checkpoint = self.adaptor.checkpoint();
+                saved::write(&*self.communicator, file, &self.solver, &checkpoint)?;
+            }
+            if steering.stop {
+                break;
+            }
         }
         Ok(())
     }

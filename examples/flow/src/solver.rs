@@ -2,6 +2,7 @@
 
 mod measures;
 mod projection;
+mod saved;
 
 use tombolo_deform::communicator::Halo;
 use tombolo_deform::linear::SparseMatrix;
@@ -448,6 +449,7 @@ impl Solver {
             &self.topology,
             &self.halo,
             &mut self.potential,
+            &self.geometry.points,
             self.settings.pressure_tolerance,
             through,
             self.boundary.is_open(),

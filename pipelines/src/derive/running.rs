@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use tombolo_deform::communicator::{Garbled, Reader, Writer};
 use tombolo_deform::mesh::NumberType;
 
 use super::Basis;
@@ -18,6 +19,9 @@ pub(crate) struct Running {
     last: Option<(f64, Vec<f64>)>,
     /// The oldest first; the last is still growing.
     blocks: VecDeque<Block>,
+    /// The kind of the field that was followed in a run which this one goes on from, until the mesh
+    /// is lent for the first time.
+    restored: Option<(Association, usize)>,
 }
 
 /// A length of time, and what the field did in it: what no measure asks for is empty.
@@ -111,6 +115,63 @@ impl Running {
         (0..last.len()).map(value).map(finite).collect()
     }
 
+    /// Writes down what is kept.
+    pub(crate) fn save(&self, writer: &mut Writer) {
+        let kind = self.of.map(|(_, association, components)| (association, components));
+        let kept = kind.or(self.restored).zip(self.last.as_ref());
+        writer.u8(kept.is_some().into());
+        let Some(((association, components), (time, values))) = kept else { return };
+        writer.u8(match association {
+            Association::Vertex => 0,
+            Association::Element => 1,
+            Association::Mesh => 2,
+        });
+        writer.u64(components as u64);
+        writer.f64s(&[*time]);
+        let mut all = |values: &[f64]| {
+            writer.u64(values.len() as u64);
+            writer.f64s(values);
+        };
+        all(values);
+        all(&self.blocks.iter().map(|block| block.length).collect::<Vec<f64>>());
+        for Block { integral, squares, least, largest, .. } in &self.blocks {
+            [integral, squares, least, largest].iter().for_each(|part| all(part));
+        }
+    }
+
+    /// Goes on from what was written down.
+    pub(crate) fn restore(&mut self, reader: &mut Reader<'_>) -> Result<(), Garbled> {
+        *self = Self::default();
+        if reader.u8()? == 0 {
+            return Ok(());
+        }
+        let association = match reader.u8()? {
+            0 => Association::Vertex,
+            1 => Association::Element,
+            2 => Association::Mesh,
+            _ => return Err(reader.garbled()),
+        };
+        let components = reader.count(0)?;
+        let time = reader.f64s(1)?[0];
+        let mut all = || -> Result<Vec<f64>, Garbled> {
+            let count = reader.count(8)?;
+            reader.f64s(count)
+        };
+        let values = all()?;
+        let count = values.len();
+        for length in all()? {
+            let parts = [all()?, all()?, all()?, all()?];
+            if parts.iter().any(|part| part.len() != count && !part.is_empty()) {
+                return Err(Garbled { rank: 0 });
+            }
+            let [integral, squares, least, largest] = parts;
+            self.blocks.push_back(Block { length, integral, squares, least, largest });
+        }
+        self.last = Some((time, values));
+        self.restored = Some((association, components));
+        Ok(())
+    }
+
     /// Bytes of memory.
     pub(crate) fn bytes(&self) -> usize {
         let last = self.last.as_ref().map_or(0, |(_, values)| values.capacity());
@@ -149,6 +210,14 @@ pub(crate) fn follow(
     let kind = basis.agreed(kind.map_err(Clone::clone))?;
     let Some((association, components)) = kind else { return Ok(Vec::new()) };
     let of = Some((MeshKey::of(&basis.channel.mesh), association, components));
+    if running.restored.take() == Some((association, components)) {
+        let count = match &operand {
+            Ok(Some(operand)) => operand.view.values.len() * components,
+            _ => 0,
+        };
+        let fits = running.last.as_ref().is_some_and(|(_, values)| values.len() == count);
+        running.of = of.filter(|_| fits);
+    }
     if basis.communicator.any(running.of != of) {
         *running = Running { of, ..Running::default() };
     }

@@ -13,7 +13,7 @@ use super::parse::{Document, check_length};
 use super::relative_files::resolve_command_files;
 use super::scan::Member;
 use super::timed::{CommandAuthor, JournalEntry, OrderStatus, TimedCommand, lines, torn_line};
-use super::{At, Deformation, LanguageError, near};
+use super::{At, Deformation, LanguageError, Problem, near};
 use crate::limits::{WAITING, WAITING_BYTES};
 
 /// A line of a journal that is about the run and not about one command.
@@ -30,6 +30,8 @@ pub enum JournalNote {
     Refused(RefusedRequest),
     /// Lines are missing here.
     Lost(LostLines),
+    /// The state of the run was saved, so that another one can go on from here.
+    Checkpoint(CheckpointNote),
     /// The run came to its end.
     End(RunEnd),
 }
@@ -50,6 +52,33 @@ pub struct RunHeader {
     pub guard: Guard,
     /// The schedule of orders that bring none.
     pub schedule: Schedule,
+    /// The checkpoint that the run goes on from, where it is a restart.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub restart: Option<RestartedFrom>,
+}
+
+/// The checkpoint that a run goes on from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RestartedFrom {
+    /// The run that made it.
+    pub run: String,
+    /// The checkpoint.
+    pub checkpoint: String,
+    /// The cycle that it was made after.
+    pub cycle: u64,
+}
+
+/// A checkpoint, made after the lines above it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CheckpointNote {
+    /// The checkpoint, told apart from all others by a random number.
+    pub id: String,
+    /// The cycle of the last call before it.
+    pub cycle: u64,
+    /// The simulated time then.
+    pub time: f64,
 }
 
 /// A shape that the solver was handed.
@@ -115,7 +144,8 @@ pub struct RunEnd {
     pub time: f64,
 }
 
-/// The newest run of a journal, as it is carried out again: the same shapes at the same cycles.
+/// The newest run of a journal, as it is carried out again: the same shapes at the same cycles. Of a
+/// run that was restarted it holds what was before the checkpoint too.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Recording {
     /// Its first line; `None` in a journal without one.
@@ -131,7 +161,8 @@ pub struct Recording {
 
 /// Reads a journal as a recording of its newest run.
 ///
-/// Orders that were rejected, cancelled or still waiting when the run ended are not in it. A last
+/// Orders that were rejected, cancelled or still waiting when the run ended are not in it. A run that
+/// goes on from a checkpoint of an earlier one begins with the lines of that one up to there. A last
 /// line that a killed run left half-written is passed over. Files that edits name lie beside `file`
 /// where they are relative.
 ///
@@ -189,36 +220,97 @@ struct KnownLines {
     lost: u64,
 }
 
+/// A line and its number from 0.
+type Numbered<'a> = (usize, &'a str);
+
+/// The lines of a run, those before its checkpoint among them.
+#[derive(Default)]
+struct RunLines<'a> {
+    lines: Vec<Numbered<'a>>,
+    known: KnownLines,
+    indices: HashMap<String, usize>,
+}
+
 fn read_lines(text: &str, file: &str) -> Result<KnownLines, LanguageError> {
-    let mut known = KnownLines::default();
-    let mut indices: HashMap<String, usize> = HashMap::new();
+    let mut earlier: HashMap<String, Vec<Numbered<'_>>> = HashMap::new();
+    let mut newest = RunLines::default();
+    let mut id = None;
     for (number, content) in lines(text) {
-        let moved =
-            |failure: LanguageError| LanguageError { line: failure.line + number, ..failure };
+        let moved = at_line(number);
         let line = match Document::read(content, file) {
             Err(_) if torn_line(text) == Some(number) => break,
-            line => line.map_err(moved)?,
+            line => line.map_err(&moved)?,
         };
-        if is_note(&line) {
-            match line.value().map_err(moved)? {
-                JournalNote::Run(run) => {
-                    indices.clear();
-                    known = KnownLines { run: Some(run), ..KnownLines::default() };
+        if let [member] = line.root.members()
+            && member.key == "run"
+        {
+            let JournalNote::Run(run) = line.value().map_err(&moved)? else { continue };
+            let RunLines { lines, .. } = std::mem::take(&mut newest);
+            id.replace(run.id.clone()).map(|before| earlier.insert(before, lines));
+            if let Some(from) = &run.restart {
+                let Some(lines) = earlier.get(&from.run) else {
+                    let message = format!(
+                        "the run goes on from a checkpoint of run {}, whose lines are not above; \
+                         expected the journal that both have written",
+                        from.run
+                    );
+                    let problem = Problem::new(message).within("restart").within("run");
+                    return Err(moved(line.locate(problem)));
+                };
+                for (number, content) in before(lines, &from.checkpoint).to_vec() {
+                    newest.add(&Document::read(content, file).map_err(at_line(number))?, number)?;
+                    newest.lines.push((number, content));
                 }
+            }
+        }
+        newest.add(&line, number)?;
+        newest.lines.push((number, content));
+    }
+    Ok(newest.known)
+}
+
+/// Puts a failure in the line of this number, from 0, where it says the first.
+fn at_line(number: usize) -> impl Fn(LanguageError) -> LanguageError {
+    move |failure| LanguageError { line: failure.line + number, ..failure }
+}
+
+/// The lines up to a checkpoint; all where a run was killed before it had written that down.
+fn before<'l, 'a>(lines: &'l [Numbered<'a>], checkpoint: &str) -> &'l [Numbered<'a>] {
+    let is_it = |(_, content): &Numbered<'_>| {
+        let note = || serde_json::from_str(content).ok();
+        content.contains(checkpoint)
+            && matches!(note(), Some(JournalNote::Checkpoint(note)) if note.id == checkpoint)
+    };
+    let end = lines.iter().position(is_it).map_or(lines.len(), |index| index + 1);
+    &lines[..end]
+}
+
+impl RunLines<'_> {
+    /// Takes the next line in.
+    fn add(&mut self, line: &Document<'_>, number: usize) -> Result<(), LanguageError> {
+        let moved = at_line(number);
+        let Self { known, indices, .. } = self;
+        if is_note(line) {
+            match line.value().map_err(moved)? {
+                // The settings of orders are those that the whole run began with.
+                JournalNote::Run(run) => _ = known.run.get_or_insert(run),
                 JournalNote::Shape(shape) => known.shapes.push(shape),
                 JournalNote::Lost(LostLines { lines }) => known.lost += lines,
-                JournalNote::Viewer(_) | JournalNote::Refused(_) | JournalNote::End(_) => {}
+                JournalNote::Viewer(_)
+                | JournalNote::Refused(_)
+                | JournalNote::Checkpoint(_)
+                | JournalNote::End(_) => {}
             }
-            continue;
+            return Ok(());
         }
         WAITING
             .check(known.commands.len() + 1)
             .map_err(|exceeded| moved(line.locate(exceeded.into())))?;
-        if !is_entry(&line) {
+        if !is_entry(line) {
             let timed = line.valid().map_err(moved)?;
             let known_of = Known { timed, by: None, took_effect: number, is_carried_out: true };
             known.commands.push(known_of);
-            continue;
+            return Ok(());
         }
         let entry: JournalEntry = line.valid().map_err(moved)?;
         let at = Some(At::Cycle(entry.cycle));
@@ -248,8 +340,8 @@ fn read_lines(text: &str, file: &str) -> Result<KnownLines, LanguageError> {
             // What became of the mesh; the replaying solver does with it what it does.
             _ => {}
         }
+        Ok(())
     }
-    Ok(known)
 }
 
 /// Whether a line is one of a journal: it holds a status, or is a note.
@@ -261,7 +353,7 @@ fn is_entry(line: &Document<'_>) -> bool {
     line.root.member("status").is_some()
 }
 
-const NOTES: [&str; 6] = ["run", "shape", "viewer", "refused", "lost", "end"];
+const NOTES: [&str; 7] = ["run", "shape", "viewer", "refused", "lost", "checkpoint", "end"];
 
 /// Whether a line is a note.
 pub(super) fn is_note(line: &Document<'_>) -> bool {
@@ -330,6 +422,53 @@ mod tests {
         assert_eq!(recording.run.unwrap().id, "2");
         assert!(is_journal(text) && is_journal("") && is_journal("{\"run\":{\"id\":"));
         assert!(!is_journal("{\"version\": 1}\n") && !is_journal("cycle,time\n"));
+    }
+
+    #[test]
+    fn a_restarted_run_begins_with_the_lines_before_its_checkpoint() {
+        let header = |id: &str, restart: &str| {
+            format!(
+                r#"{{"run":{{"id":"{id}","version":"0","began":0,"deform":{{}},"guard":{{}},"schedule":{{"steps":{}}}{restart}}}}}"#,
+                id.trim_start_matches('r')
+            )
+        };
+        let restart = |run: &str, checkpoint: &str| {
+            format!(r#","restart":{{"run":"{run}","checkpoint":"{checkpoint}","cycle":3}}"#)
+        };
+        let entry = |id: &str, cycle: u64| {
+            format!(
+                r#"{{"id":"{id}","status":"accepted","cycle":{cycle},"time":0,"order":{{"undo":1}}}}
+{{"id":"{id}","status":"applied","cycle":{cycle},"time":0}}
+{{"shape":{{"order":"{id}","shape":1,"cycle":{cycle}}}}}"#
+            )
+        };
+        let checkpoint =
+            |id: &str| format!(r#"{{"checkpoint":{{"id":"{id}","cycle":3,"time":0}}}}"#);
+        let text = [
+            header("r1", ""),
+            entry("a", 2),
+            checkpoint("k1"),
+            entry("gone", 4),
+            header("r2", &restart("r1", "k1")),
+            entry("b", 5),
+            checkpoint("k2"),
+            entry("gone", 6),
+            header("r3", &restart("r2", "k2")),
+            entry("c", 7),
+            // Its line about the checkpoint was lost.
+            header("r4", &restart("r3", "k3")),
+            entry("d", 8),
+        ]
+        .join("\n");
+        let recording = parse_journal(&text, "journal.jsonl").unwrap();
+        let ids: Vec<_> = recording.commands.iter().map(|it| it.id.clone().unwrap()).collect();
+        assert_eq!(ids, ["a", "b", "c", "d"]);
+        let cycles: Vec<u64> = recording.shapes.iter().map(|shape| shape.cycle).collect();
+        assert_eq!(cycles, [2, 5, 7, 8]);
+        assert_eq!(recording.run.unwrap().schedule.steps.get(), 1);
+        let alone = [header("r2", &restart("r1", "k1")), entry("b", 5)].join("\n");
+        let error = parse_journal(&alone, "journal.jsonl").unwrap_err();
+        assert!(error.message.contains("run r1") && error.path == "run.restart", "{error}");
     }
 
     #[test]

@@ -31,6 +31,7 @@ mod extracts;
 mod file_pattern;
 mod glyphs;
 mod journal;
+mod journal_since;
 mod kind;
 mod mend;
 mod message;
@@ -69,9 +70,10 @@ pub use file_pattern::file_pattern;
 pub(crate) use file_pattern::picture_pattern;
 pub use glyphs::{GlyphShape, Glyphs, GlyphsAt};
 pub use journal::{
-    HandedShape, JournalNote, LostLines, Recording, RefusedRequest, RunEnd, RunHeader, ViewerMove,
-    ViewerNote, is_journal, parse_journal,
+    CheckpointNote, HandedShape, JournalNote, LostLines, Recording, RefusedRequest, RestartedFrom,
+    RunEnd, RunHeader, ViewerMove, ViewerNote, is_journal, parse_journal,
 };
+pub use journal_since::{Outcome, Since, SinceError, Taken};
 pub use message::{Message, Wheel, parse_message};
 pub(crate) use monitors::{Condition, Line, Scope, Slot, columns, line, monitors_of};
 pub use monitors::{Monitor, check_parameters, monitors};

@@ -2,6 +2,8 @@
 
 use std::collections::VecDeque;
 
+use tombolo_deform::communicator::{Garbled, Reader, Writer};
+
 use crate::language::Measure;
 use crate::limits::HISTORY;
 
@@ -132,6 +134,39 @@ impl OverTime {
             Measure::Max => whole.largest,
         };
         measures.iter().map(measure).chain([length]).collect()
+    }
+
+    /// Writes down what is kept.
+    pub(crate) fn save(&self, writer: &mut Writer) {
+        let (time, value) = self.last.unwrap_or((f64::NAN, f64::NAN));
+        writer.f64s(&[time, value]);
+        writer.u64(self.pieces.len() as u64);
+        for piece in &self.pieces {
+            let Piece { from, to, line, integral, squares, least, largest } = *piece;
+            let [a, b] = line.unwrap_or([f64::NAN; 2]);
+            writer.f64s(&[from, to, a, b, integral, squares, least, largest]);
+        }
+    }
+
+    /// Goes on from what was written down.
+    pub(crate) fn restore(&mut self, reader: &mut Reader<'_>) -> Result<(), Garbled> {
+        let last = reader.f64s(2)?;
+        self.last = (!last[0].is_nan()).then(|| (last[0], last[1]));
+        self.pieces.clear();
+        for _ in 0..reader.count(64)? {
+            let values = reader.f64s(8)?;
+            let line = (!values[2].is_nan()).then(|| [values[2], values[3]]);
+            self.pieces.push_back(Piece {
+                from: values[0],
+                to: values[1],
+                line,
+                integral: values[4],
+                squares: values[5],
+                least: values[6],
+                largest: values[7],
+            });
+        }
+        HISTORY.check(self.pieces.len()).map_err(|_| reader.garbled())
     }
 
     /// Bytes of memory.

@@ -3,6 +3,8 @@
 use std::collections::VecDeque;
 use std::f64::consts::{PI, TAU};
 
+use tombolo_deform::communicator::{Garbled, Reader, Writer};
+
 /// The last measurements of a number, as many as its periodogram looks at.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Samples {
@@ -33,6 +35,21 @@ impl Samples {
             self.of.pop_front();
         }
         self.of.push_back((time, value));
+    }
+
+    /// Writes down what is kept.
+    pub(crate) fn save(&self, writer: &mut Writer) {
+        writer.u64(self.of.len() as u64);
+        self.of.iter().for_each(|&(time, value)| writer.f64s(&[time, value]));
+    }
+
+    /// Goes on from what was written down.
+    pub(crate) fn restore(&mut self, reader: &mut Reader<'_>) -> Result<(), Garbled> {
+        for _ in 0..reader.count(16)? {
+            let sample = reader.f64s(2)?;
+            self.add(sample[0], sample[1]);
+        }
+        Ok(())
     }
 
     /// The frequency of the strongest part, the resolution, the amplitude of that part, and the

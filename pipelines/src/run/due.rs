@@ -1,5 +1,7 @@
 //! When pipelines run.
 
+use tombolo_deform::communicator::{Garbled, Reader, Writer};
+
 use crate::language::{Cadence, Due};
 
 /// How much of an interval a step may come too early: time steps add up with rounding.
@@ -50,6 +52,21 @@ impl Clock {
     /// Whether it waits for what is not in the step itself.
     pub(super) fn listens(&self) -> bool {
         matches!(self.due, Due::OnViewer | Due::Every(Cadence::Seconds(_)))
+    }
+
+    /// Writes down when the pipeline last ran.
+    pub(super) fn save(&self, writer: &mut Writer) {
+        writer.u64(self.last_cycle.map_or(u64::MAX, |cycle| cycle));
+        writer.f64s(&[self.last_interval.unwrap_or(f64::NAN)]);
+    }
+
+    /// Goes on from what was written down. The seconds and the viewers of another run do not count.
+    pub(super) fn restore(&mut self, reader: &mut Reader<'_>) -> Result<(), Garbled> {
+        self.last_cycle = Some(reader.u64()?).filter(|cycle| *cycle != u64::MAX);
+        let interval = reader.f64s(1)?[0];
+        let counts = !matches!(self.due, Due::Every(Cadence::Seconds(_)));
+        self.last_interval = Some(interval).filter(|interval| counts && !interval.is_nan());
+        Ok(())
     }
 
     /// Notes that the pipeline runs at this step.

@@ -2,6 +2,8 @@
 
 use std::collections::VecDeque;
 
+use tombolo_deform::communicator::{Garbled, Reader, Writer};
+
 use crate::language::{Monitor, Slot};
 use crate::limits::{HISTORY, HISTORY_NUMBERS};
 
@@ -61,6 +63,28 @@ impl History {
         }
         self.measured.push_back(measured);
         self.count += 1;
+    }
+
+    /// Writes down what is kept.
+    pub(super) fn save(&self, writer: &mut Writer) {
+        writer.u64(self.count);
+        writer.u64(self.measured.len() as u64);
+        for Measured { cycle, time, values } in &self.measured {
+            writer.u64(*cycle);
+            writer.f64s(&[*time]);
+            writer.f64s(values);
+        }
+    }
+
+    /// Goes on from what was written down, of as many monitors.
+    pub(super) fn restore(&mut self, reader: &mut Reader<'_>) -> Result<(), Garbled> {
+        let count = reader.u64()?;
+        for _ in 0..reader.count(8 * (2 + self.monitors.len()))? {
+            let (cycle, time) = (reader.u64()?, reader.f64s(1)?[0]);
+            self.push(Measured { cycle, time, values: reader.f64s(self.monitors.len())? });
+        }
+        self.count = count;
+        Ok(())
     }
 
     /// Bytes of memory.

@@ -8,6 +8,7 @@ mod mesh_trial;
 mod output;
 mod pipeline;
 mod replace;
+mod saved;
 mod trigger;
 
 use std::collections::HashMap;

@@ -1,5 +1,6 @@
 //! When the actions of a pipeline are taken: a condition that must last, and may not flap.
 
+use tombolo_deform::communicator::{Garbled, Reader, Writer};
 use tombolo_deform::schedule::Every;
 
 use super::due::SLACK;
@@ -55,6 +56,27 @@ impl Trigger {
     /// Takes over what the same condition has come to.
     pub(super) fn go_on_from(&mut self, before: &Self) {
         (self.since, self.fired, self.is_armed) = (before.since, before.fired, before.is_armed);
+    }
+
+    /// Writes down what became of the condition.
+    pub(super) fn save(&self, writer: &mut Writer) {
+        for moment in [self.since, self.fired] {
+            let (cycle, time) = moment.unwrap_or((u64::MAX, 0.0));
+            writer.u64(cycle);
+            writer.f64s(&[time]);
+        }
+        writer.u8(self.is_armed.into());
+    }
+
+    /// Goes on from what was written down.
+    pub(super) fn restore(&mut self, reader: &mut Reader<'_>) -> Result<(), Garbled> {
+        let mut moment = || -> Result<Option<Moment>, Garbled> {
+            let (cycle, time) = (reader.u64()?, reader.f64s(1)?[0]);
+            Ok((cycle != u64::MAX).then_some((cycle, time)))
+        };
+        (self.since, self.fired) = (moment()?, moment()?);
+        self.is_armed = reader.u8()? != 0;
+        Ok(())
     }
 
     /// Whether the actions are taken now.

@@ -31,13 +31,13 @@ pub(super) struct Motion {
 
 /// The last shape that was handed out, until the next call shows whether the solver went there.
 pub(super) struct Pending {
-    handed: HandedOut,
+    pub(super) handed: HandedOut,
     /// Where the shape was before, and its quality.
-    before: (CurrentShape, Option<(f64, f64)>),
-    reached: f64,
-    id: String,
-    shape: u32,
-    moment: Moment,
+    pub(super) before: (CurrentShape, Option<(f64, f64)>),
+    pub(super) reached: f64,
+    pub(super) id: String,
+    pub(super) shape: u32,
+    pub(super) moment: Moment,
 }
 
 impl Steerer {
@@ -93,12 +93,14 @@ impl Steerer {
         }
         let Some(motion) = self.motion.as_mut() else { return false };
         let position = match &self.recorded {
-            Some(recorded) if !recorded.goes_on(&motion.id, moment.cycle) => {
+            Some(recorded) if recorded.ends(&motion.id, moment.cycle) => {
                 self.give_up("the run that is carried out again went no further");
                 return false;
             }
-            Some(recorded) => recorded.position(&motion.id, moment.cycle).unwrap_or(motion.taken),
-            None => {
+            Some(recorded) if recorded.knows(&motion.id, moment.cycle) => {
+                recorded.position(&motion.id, moment.cycle).unwrap_or(motion.taken)
+            }
+            _ => {
                 let begun = motion.begun;
                 let cycles = moment.cycle.saturating_sub(begun.cycle);
                 let schedule = motion.plan.schedule();

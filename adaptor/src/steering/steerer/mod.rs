@@ -2,6 +2,7 @@
 
 mod handing;
 mod recorded;
+mod saved;
 
 use std::{
     collections::VecDeque,
@@ -10,7 +11,7 @@ use std::{
 };
 
 use tombolo_deform::{
-    mesh::Domain,
+    mesh::{Domain, Vector},
     quality::{Quality, quality},
     shape::{CurrentShape, Forecast, Plan, Shaper},
     surface::Surface,
@@ -28,6 +29,7 @@ use super::{
 use crate::{lock::lock, step::Moment};
 use handing::{Motion, Pending};
 use recorded::Recorded;
+pub(crate) use saved::SavedSteering;
 
 /// An order waiting for its turn.
 struct Task {
@@ -73,6 +75,8 @@ pub(crate) struct Steerer {
     /// The motion that was handed out last.
     handed_out: MeshMotion,
     domain: Domain,
+    /// The coordinates that all shapes are measured from.
+    reference: Arc<[Vector]>,
     rounding: Rounding,
     pending: Option<Pending>,
     /// The mesh as it was lent last, against the shape.
@@ -140,7 +144,8 @@ impl Steerer {
     }
 
     fn of_shaper(shaper: Shaper, defaults: Defaults, log: Arc<Log>) -> Self {
-        let here: CurrentShape = Arc::clone(shaper.reference()).into();
+        let reference = Arc::clone(shaper.reference());
+        let here: CurrentShape = Arc::clone(&reference).into();
         let domain = shaper.domain().clone();
         let boundary = shaper.boundary_vertices().into();
         let rounding = Rounding::of(shaper.reference(), domain.communicator());
@@ -155,6 +160,7 @@ impl Steerer {
         let present = Arc::new(Mutex::new(present));
         Self {
             domain,
+            reference,
             rounding,
             pending: None,
             own: Own::default(),
@@ -184,6 +190,12 @@ impl Steerer {
     /// Hands the shapes of a journal out, each at its cycle, whatever the schedules say.
     pub(crate) fn repeat(&mut self, shapes: Vec<HandedShape>) {
         self.recorded = Some(Recorded::new(shapes));
+    }
+
+    /// Hands the shapes of the end of a journal out again, each at its cycle; behind this cycle the
+    /// schedules count.
+    pub(crate) fn repeat_until(&mut self, shapes: Vec<HandedShape>, cycle: u64) {
+        self.recorded = Some(Recorded::new(shapes).until(cycle));
     }
 
     /// Gives orders that begin from now on other settings where they bring none.
@@ -235,7 +247,11 @@ impl Steerer {
     fn asked(&self, order: &Order) -> Result<(EditStack, PlanRequest), StackError> {
         let (stack, request) = self.defaults.request(&self.stack, self.here.clone(), order)?;
         // A journal holds only what was let through with the motion that the solver had then.
-        let own = self.own.offsets.clone().filter(|_| self.recorded.is_none());
+        let own = self
+            .own
+            .offsets
+            .clone()
+            .filter(|_| self.recorded.as_ref().is_none_or(|it| !it.is_whole()));
         Ok((stack, PlanRequest { request, own }))
     }
 

@@ -8,6 +8,9 @@ use tombolo_pipelines::language::HandedShape;
 #[derive(Debug, Default)]
 pub(super) struct Recorded {
     positions: HashMap<String, BTreeMap<u64, f64>>,
+    /// The last cycle of which the journal tells, where the run goes on by itself behind it; `None`
+    /// where it is all that is carried out.
+    until: Option<u64>,
 }
 
 impl Recorded {
@@ -19,10 +22,27 @@ impl Recorded {
         recorded
     }
 
-    /// Whether an order moved the mesh at this cycle or later.
-    pub(super) fn goes_on(&self, order: &str, cycle: u64) -> bool {
+    /// The positions of the end of a journal, behind which the run goes on by itself.
+    pub(super) fn until(self, cycle: u64) -> Self {
+        Self { until: Some(cycle), ..self }
+    }
+
+    /// Whether an order moved the mesh at no cycle from this one on, and will not.
+    pub(super) fn ends(&self, order: &str, cycle: u64) -> bool {
         let positions = self.positions.get(order);
-        positions.is_some_and(|positions| positions.range(cycle..).next().is_some())
+        let goes_on = positions.is_some_and(|positions| positions.range(cycle..).next().is_some());
+        self.until.is_none() && !goes_on
+    }
+
+    /// Whether it is known where the mesh was at this cycle. In the last cycle of a journal that was
+    /// cut off only what stands there is.
+    pub(super) fn knows(&self, order: &str, cycle: u64) -> bool {
+        self.until.is_none_or(|until| cycle < until) || self.position(order, cycle).is_some()
+    }
+
+    /// Whether a whole run is carried out again.
+    pub(super) fn is_whole(&self) -> bool {
+        self.until.is_none()
     }
 
     /// The position that was handed out at this cycle.

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use tombolo_deform::communicator::Halo;
+use tombolo_deform::communicator::{Garbled, Halo, Reader, Writer};
 use tombolo_deform::linear::{
     LinearError, LinearSolver, Multigrid, MultigridSettings, NullSpace, SparseMatrix, Tolerance,
 };
+use tombolo_deform::mesh::Vector;
 use tombolo_deform::vector::length;
 
 use crate::boundary::Boundary;
@@ -24,6 +25,8 @@ pub(super) struct Projection {
     is_worn: bool,
     /// How many iterations a solve takes at most with a fresh preconditioner.
     usual_iterations: usize,
+    /// Where the mesh lay when the preconditioner was set up; `None` where that was at the beginning.
+    set_up_at: Option<Vec<Vector>>,
     /// Of this rank: zero at the vertices of others.
     pub(super) right: Vec<f64>,
 }
@@ -42,7 +45,14 @@ impl Projection {
         let matrix = pressure_matrix(topology, geometry, boundary);
         let solver = Multigrid::distributed(halo.clone(), matrix, settings)?;
         let right = vec![0.0; topology.vertex_count()];
-        Ok(Self { solver, is_stale: false, is_worn: false, usual_iterations: 0, right })
+        Ok(Self {
+            solver,
+            is_stale: false,
+            is_worn: false,
+            usual_iterations: 0,
+            set_up_at: None,
+            right,
+        })
     }
 
     /// Brings the matrix up to date with the coordinates. Collective.
@@ -58,17 +68,57 @@ impl Projection {
         let matrix = Arc::new(pressure_matrix(topology, geometry, boundary));
         self.is_stale = true;
         if self.is_worn {
-            return self.refresh(matrix);
+            return self.refresh(matrix, &geometry.points);
         }
         self.solver = self.solver.of_similar_matrix(matrix);
         Ok(())
     }
 
     /// Sets the preconditioner up for this matrix. Collective.
-    fn refresh(&mut self, matrix: Arc<SparseMatrix<1>>) -> Result<(), LinearError> {
+    fn refresh(
+        &mut self,
+        matrix: Arc<SparseMatrix<1>>,
+        points: &[Vector],
+    ) -> Result<(), LinearError> {
         self.solver = self.solver.of_like_matrix(matrix)?;
+        self.set_up_at = Some(points.to_vec());
         (self.is_stale, self.is_worn, self.usual_iterations) = (false, false, 0);
         Ok(())
+    }
+
+    /// Writes down what is not in the matrix.
+    pub(super) fn save(&self, writer: &mut Writer) {
+        writer.u8(self.is_stale.into());
+        writer.u8(self.is_worn.into());
+        writer.u64(self.usual_iterations as u64);
+        writer.u8(self.set_up_at.is_some().into());
+        self.set_up_at.iter().for_each(|points| writer.f64s(points.as_flattened()));
+    }
+
+    /// Reads what was written down; where the mesh lay when the preconditioner was set up.
+    pub(super) fn read(
+        &mut self,
+        reader: &mut Reader<'_>,
+        vertices: usize,
+    ) -> Result<Option<Vec<Vector>>, Garbled> {
+        (self.is_stale, self.is_worn) = (reader.u8()? != 0, reader.u8()? != 0);
+        self.usual_iterations = reader.count(0)?;
+        self.set_up_at = match reader.u8()? {
+            0 => None,
+            _ => Some(reader.f64s(3 * vertices)?.as_chunks().0.to_vec()),
+        };
+        Ok(self.set_up_at.clone())
+    }
+
+    /// Sets the preconditioner up for the matrix of an earlier shape. Collective.
+    pub(super) fn prepare(&mut self, matrix: SparseMatrix<1>) -> Result<(), LinearError> {
+        self.solver = self.solver.of_like_matrix(Arc::new(matrix))?;
+        Ok(())
+    }
+
+    /// Takes the matrix of the present shape, with the preconditioner as it is.
+    pub(super) fn take_matrix(&mut self, matrix: Arc<SparseMatrix<1>>) {
+        self.solver = self.solver.of_similar_matrix(matrix);
     }
 
     /// Counts the iterations of a solve, to see whether the preconditioner still serves.
@@ -87,6 +137,7 @@ impl Projection {
         topology: &Topology,
         halo: &Halo,
         potential: &mut [f64],
+        points: &[Vector],
         pressure_tolerance: f64,
         through: f64,
         open: bool,
@@ -108,7 +159,7 @@ impl Projection {
         // The residual is a loss of mass, and as such says alone what is good enough.
         let tolerance =
             Tolerance { relative: 0.0, absolute: (pressure_tolerance * size).max(small) };
-        if self.is_worn && self.refresh(Arc::new(self.solver.matrix().clone())).is_err() {
+        if self.is_worn && self.refresh(Arc::new(self.solver.matrix().clone()), points).is_err() {
             // The old one has served so far, if slowly.
             self.is_worn = false;
         }
@@ -130,7 +181,7 @@ impl Projection {
 }
 
 /// The Laplacian, and at outlets the flux that a potential drives out of each vertex.
-fn pressure_matrix(
+pub(super) fn pressure_matrix(
     topology: &Topology,
     geometry: &Geometry,
     boundary: &Boundary,

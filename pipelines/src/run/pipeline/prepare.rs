@@ -3,6 +3,8 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
+use tombolo_deform::communicator::{Garbled, Reader, Writer};
+
 use super::super::cost::{Cost, Thinning};
 use super::super::due::Clock;
 use super::super::output::Table;
@@ -113,6 +115,32 @@ impl Prepared {
         self.reported = before.reported;
         self.kept = before.kept;
         self.decimation = before.decimation;
+    }
+
+    /// Writes down what it has come to; what it has cost is not among that.
+    pub(crate) fn save(&self, writer: &mut Writer) {
+        self.due.save(writer);
+        self.trigger.save(writer);
+        for state in &self.states {
+            match state {
+                State::None => {}
+                State::OverTime(over_time) => over_time.save(writer),
+                State::Samples(samples) => samples.save(writer),
+                State::Running(running) => running.save(writer),
+            }
+        }
+    }
+
+    /// Goes on from what the same pipeline has written down.
+    pub(crate) fn restore(&mut self, reader: &mut Reader<'_>) -> Result<(), Garbled> {
+        self.due.restore(reader)?;
+        self.trigger.restore(reader)?;
+        self.states.iter_mut().try_for_each(|state| match state {
+            State::None => Ok(()),
+            State::OverTime(over_time) => over_time.restore(reader),
+            State::Samples(samples) => samples.restore(reader),
+            State::Running(running) => running.restore(reader),
+        })
     }
 
     /// The tables that it writes.

@@ -1,0 +1,118 @@
+//! The state of a run, saved.
+
+use std::path::Path;
+
+use tombolo_deform::communicator::{Alarm, Communicator, Writer};
+use tombolo_pipelines::language::{CheckpointNote, JournalNote, TimedCommand};
+
+use super::{Adaptor, SteeredMesh};
+use crate::{
+    checkpoint::{Checkpoint, CheckpointError, SavedCommand, SavedMesh, SavedRun, write_of_ranks},
+    step::Moment,
+};
+
+impl Adaptor {
+    /// The state of the run at the end of the step that the last call of
+    /// [`execute`](Adaptor::execute) has begun, to be saved with the solver's own state at the end of
+    /// that step; [`Settings::restart`](crate::Settings::restart) goes on from it. See
+    /// [`Checkpoint`], which has an example.
+    ///
+    /// It copies no coordinates, and waits for nobody. The journal gets a line that says where it was
+    /// made.
+    ///
+    /// On several ranks it is collective, and each rank has the checkpoint of its own part.
+    #[must_use]
+    pub fn checkpoint(&mut self) -> Checkpoint {
+        let _alarm = Alarm::among(&self.communicator);
+        let Moment { cycle, time } = self.moment;
+        let mut id = random_name().into_bytes();
+        self.communicator.broadcast(0, &mut id);
+        let id = String::from_utf8_lossy(&id).into_owned();
+        // Before anything is looked at: what has a line behind it is not missed, even if it is here
+        // too.
+        self.log.note(&JournalNote::Checkpoint(CheckpointNote { id: id.clone(), cycle, time }));
+        let changes = self.told_changes.iter().map(super::changing::Told::saved);
+        let mut waiting: Vec<SavedCommand> = changes.chain(self.resumed.waiting()).collect();
+        self.queue.look(|received| {
+            waiting.push(SavedCommand {
+                id: received.id.clone(),
+                by: (&received.source).into(),
+                command: received.command.clone(),
+            });
+        });
+        let mut pipelines = Writer::default();
+        self.pipelines.save(&mut pipelines);
+        let (mesh, points) = match (&self.mesh, self.lent.reference()) {
+            (SteeredMesh::Steered(steerer, _), Some(cells)) => {
+                let (steering, points) = steerer.save();
+                (Some(SavedMesh { cells, steering }), Some(points))
+            }
+            // It was not gone on with yet.
+            (SteeredMesh::Unknown, _) => self.resumed.mesh().unzip(),
+            _ => (None, None),
+        };
+        let parameters = self.parameters.all().iter().map(|it| (it.name.clone(), it.value));
+        let run = SavedRun {
+            id,
+            run: self.run.clone(),
+            rank: self.communicator.rank(),
+            ranks: self.communicator.size(),
+            has_begun: self.has_begun,
+            cycle,
+            time,
+            parameters: parameters.collect(),
+            pipelines: [self.given.pipelines.clone(), self.config.pipelines.clone()],
+            timed: (self.given.orders, self.timed.left().to_vec()),
+            defaults: self.defaults.clone(),
+            known: self.log.known(),
+            waiting,
+            mesh,
+        };
+        Checkpoint { run, pipelines: pipelines.into_bytes(), points }
+    }
+
+    /// The step of the last call, of this run or of the one that it goes on from.
+    pub(crate) fn last_moment(&self) -> Option<Moment> {
+        self.has_begun.then_some(self.moment)
+    }
+
+    /// Saves the state of the run, as [`checkpoint`](Adaptor::checkpoint) does, in a file of its own:
+    /// whole, or not at all. On several ranks rank 0 writes what all have, one after the other. It
+    /// waits for the disk.
+    ///
+    /// # Errors
+    /// [`CheckpointError`], the same on all ranks; the run can go on, and an older file is still
+    /// there.
+    pub fn write_checkpoint(&mut self, file: impl AsRef<Path>) -> Result<(), CheckpointError> {
+        let checkpoint = self.checkpoint();
+        let _alarm = Alarm::among(&self.communicator);
+        write_of_ranks(&*self.communicator, file.as_ref(), &checkpoint)
+    }
+}
+
+/// A name that no other run or checkpoint has.
+pub(super) fn random_name() -> String {
+    let mut number = [0; 8];
+    // Without random numbers the moment tells runs apart well enough.
+    let _ = getrandom::fill(&mut number);
+    let since = std::time::SystemTime::now().duration_since(std::time::SystemTime::UNIX_EPOCH);
+    let nanoseconds = since.unwrap_or_default().subsec_nanos();
+    format!("{:016x}", u64::from_le_bytes(number) ^ u64::from(nanoseconds))
+}
+
+/// The pipelines and commands that a run was begun with, by which a restart knows whether it was
+/// given others.
+#[derive(Default)]
+pub(super) struct Given {
+    pub(super) pipelines: Vec<tombolo_pipelines::language::Pipeline>,
+    /// A hash of the commands.
+    pub(super) orders: u64,
+}
+
+/// A hash by which lists of commands are told apart (FNV-1a).
+pub(super) fn hash_of(commands: &[TimedCommand]) -> u64 {
+    let text = serde_json::to_vec(commands).unwrap_or_default();
+    text.iter().fold(0xcbf2_9ce4_8422_2325, |hash: u64, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
+    })
+}

@@ -1,0 +1,281 @@
+//! Runs that go on from a checkpoint.
+//!
+//! What the checkpoint does not hold, because it came after it, is in the journal of the run that made
+//! it: it is done again, each at its cycle, and the shapes are those that the solver was handed then.
+//! Behind the end of that journal the run goes on by itself.
+
+use std::{
+    collections::{HashMap, VecDeque},
+    fs::File,
+    io::BufReader,
+    path::Path,
+};
+
+use serde::{Deserialize, Serialize};
+use tombolo_deform::{
+    communicator::{Communicator, agree},
+    shape::SavedPoints,
+};
+use tombolo_pipelines::language::{
+    Command, CommandAuthor, HandedShape, Outcome, RestartedFrom, Since, Taken,
+};
+
+use super::Adaptor;
+use crate::{
+    checkpoint::{
+        Checkpoint, CheckpointError, Restart, SavedCommand, SavedMesh, SavedRun, read_of_ranks,
+    },
+    settings::Settings,
+    steering::{Source, Steerer},
+    step::Moment,
+};
+
+/// What is left to be gone on from.
+#[derive(Default)]
+pub(super) struct Resumed {
+    mesh: Option<(SavedMesh, SavedPoints)>,
+    again: Again,
+}
+
+/// What is done again after a checkpoint, the same on all ranks.
+#[derive(Default, Serialize, Deserialize)]
+struct Again {
+    commands: VecDeque<CommandAgain>,
+    /// The commands that changed nothing, and why.
+    rejected: Vec<(String, String)>,
+    shapes: Vec<HandedShape>,
+    /// The last cycle of which the journal tells.
+    until: Option<u64>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct CommandAgain {
+    id: String,
+    by: CommandAuthor,
+    command: Command,
+    /// The cycle at which it took effect, or from which on it may.
+    cycle: u64,
+    /// Whether it comes after those of pipelines and files.
+    comes_late: bool,
+    /// Whether it had taken effect.
+    has_settled: bool,
+    /// Whether the journal has it before the checkpoint.
+    is_noted: bool,
+}
+
+/// A checkpoint, and what came after it.
+pub(super) struct Continued {
+    pub(super) checkpoint: Checkpoint,
+    again: Again,
+}
+
+impl Continued {
+    /// Finds out where a run goes on from. Collective.
+    pub(super) fn of(settings: &mut Settings) -> Result<Option<Self>, CheckpointError> {
+        let Some(restart) = settings.restart.take() else { return Ok(None) };
+        let communicator = &*settings.communicator;
+        let checkpoint = match restart {
+            Restart::Checkpoint(checkpoint) => *checkpoint,
+            Restart::File(file) => read_of_ranks(communicator, &file)?,
+        };
+        check_ranks(communicator, &checkpoint.run)?;
+        let is_first = communicator.rank() == 0;
+        let journal = settings.config.journal.as_ref().map(|path| settings.output.join(path));
+        let since = match journal.filter(|_| is_first && settings.replay.is_none()) {
+            Some(file) => read_since(&file, &checkpoint.run),
+            None => Ok(Since::default()),
+        };
+        let since = if communicator.size() == 1 { since? } else { agree(communicator, since)? };
+        let mut told = if is_first {
+            serde_json::to_vec(&Again::of(&checkpoint.run, since)).unwrap_or_default()
+        } else {
+            Vec::new()
+        };
+        communicator.broadcast(0, &mut told);
+        let again = serde_json::from_slice(&told);
+        let again = again.map_err(|error| CheckpointError::Damaged(error.to_string()));
+        let again = if communicator.size() == 1 { again? } else { agree(communicator, again)? };
+        if settings.config.pipelines == checkpoint.run.pipelines[0] {
+            settings.config.pipelines.clone_from(&checkpoint.run.pipelines[1]);
+        }
+        Ok(Some(Self { checkpoint, again }))
+    }
+
+    /// What the journal says of it.
+    pub(super) fn restarted_from(&self) -> RestartedFrom {
+        let SavedRun { id, run, cycle, .. } = &self.checkpoint.run;
+        RestartedFrom { run: run.clone(), checkpoint: id.clone(), cycle: *cycle }
+    }
+
+    /// What is left once a run has been set up.
+    pub(super) fn into_resumed(self) -> Resumed {
+        let Checkpoint { run, points, .. } = self.checkpoint;
+        Resumed { mesh: run.mesh.zip(points), again: self.again }
+    }
+}
+
+fn check_ranks(communicator: &dyn Communicator, run: &SavedRun) -> Result<(), CheckpointError> {
+    let (rank, size) = (communicator.rank(), communicator.size());
+    let mut first = serde_json::to_vec(&(&run.id, run.cycle)).unwrap_or_default();
+    communicator.broadcast(0, &mut first);
+    let (id, first_cycle): (String, u64) = serde_json::from_slice(&first).unwrap_or_default();
+    let checked = if run.ranks != size {
+        Err(CheckpointError::Ranks { found: run.ranks, expected: size })
+    } else if run.id != id || run.rank != rank {
+        Err(CheckpointError::OtherMoment { rank, of: run.rank, cycle: run.cycle, first_cycle })
+    } else {
+        Ok(())
+    };
+    if size == 1 { checked } else { Ok(agree(communicator, checked)?) }
+}
+
+fn read_since(file: &Path, run: &SavedRun) -> Result<Since, CheckpointError> {
+    let error = |reason: String| CheckpointError::Journal { file: file.into(), reason };
+    let journal = match File::open(file) {
+        Ok(journal) => BufReader::new(journal),
+        // It goes on in another place; what was accepted after the checkpoint is not known there.
+        Err(reason) if reason.kind() == std::io::ErrorKind::NotFound => {
+            return Ok(Since::default());
+        }
+        Err(reason) => return Err(error(reason.to_string())),
+    };
+    Since::read(journal, &run.run, &run.id).map_err(|reason| error(reason.to_string()))
+}
+
+impl Again {
+    fn of(run: &SavedRun, since: Since) -> Self {
+        let Since { commands, shapes, until } = since;
+        let open = until.unwrap_or(0);
+        let mut outcomes: HashMap<String, (usize, Taken)> =
+            (0..).zip(commands).map(|(at, taken)| (taken.id.clone(), (at, taken))).collect();
+        let mut again = Self { shapes, until, ..Self::default() };
+        // Those that had taken effect in that order, then those that waited, the oldest first.
+        let (mut settled, mut waiting) = (Vec::new(), Vec::new());
+        let orders = run.mesh.iter().flat_map(|mesh| &mesh.steering.waiting);
+        let orders = orders.map(|(id, order)| SavedCommand {
+            id: id.clone(),
+            by: CommandAuthor::Program,
+            command: Command::Order(order.clone()),
+        });
+        let of_checkpoint = orders.chain(run.waiting.iter().cloned()).map(|saved| {
+            let SavedCommand { id, by, command } = saved;
+            let taken = Taken { id, by, command, outcome: Outcome::Open {}, is_before: true };
+            outcomes.remove(&taken.id).unwrap_or((usize::MAX, taken))
+        });
+        let of_checkpoint: Vec<_> = of_checkpoint.collect();
+        let mut rest: Vec<_> = outcomes.into_values().collect();
+        rest.sort_by_key(|(at, _)| *at);
+        for (at, taken) in of_checkpoint.into_iter().chain(rest) {
+            let Taken { id, by, command, outcome, is_before } = taken;
+            let is_lasting = matches!(
+                command,
+                Command::Order(_) | Command::Parameter(_) | Command::Pipelines(_)
+            );
+            let (cycle, comes_late, has_settled) = match outcome {
+                Outcome::Rejected { reason, .. } => {
+                    again.rejected.push((id, reason));
+                    continue;
+                }
+                Outcome::Applied { cycle, comes_late } => (cycle, comes_late, true),
+                Outcome::Open {} => (open, true, false),
+            };
+            let command = CommandAgain {
+                id,
+                by,
+                command,
+                cycle,
+                comes_late,
+                has_settled,
+                is_noted: is_before,
+            };
+            match () {
+                // What a pause or a stop was for went with the run that was killed.
+                () if !is_lasting => {}
+                () if has_settled => settled.push((at, command)),
+                () => waiting.push(command),
+            }
+        }
+        settled.sort_by_key(|(at, _)| *at);
+        again.commands = settled.into_iter().map(|(_, command)| command).chain(waiting).collect();
+        again
+    }
+}
+
+impl Resumed {
+    /// Whether there is something to be done again at this cycle.
+    #[inline]
+    pub(super) fn is_due(&self, cycle: u64) -> bool {
+        self.again.commands.front().is_some_and(|next| next.cycle <= cycle)
+    }
+
+    pub(super) fn is_over(&self) -> bool {
+        self.again.commands.is_empty()
+    }
+
+    /// Whether there is a mesh to be gone on with, as long as the solver has not shown its own.
+    pub(super) fn has_mesh(&self) -> bool {
+        self.mesh.is_some()
+    }
+
+    /// The mesh to be gone on with.
+    pub(super) fn mesh(&self) -> Option<(SavedMesh, SavedPoints)> {
+        self.mesh.clone()
+    }
+
+    /// The commands that are still to be done again.
+    pub(super) fn waiting(&self) -> impl Iterator<Item = SavedCommand> {
+        self.again.commands.iter().map(|CommandAgain { id, by, command, .. }| SavedCommand {
+            id: id.clone(),
+            by: by.clone(),
+            command: command.clone(),
+        })
+    }
+
+    /// Lets a steerer go on with the shapes that were handed out.
+    ///
+    /// # Errors
+    /// Why its mesh cannot be the one that was saved.
+    pub(super) fn hand_over(&mut self, steerer: &mut Steerer) -> Result<(), String> {
+        let Some((saved, points)) = self.mesh.take() else { return Ok(()) };
+        steerer
+            .resume(&saved.steering, points)
+            .map_err(|_| "the checkpoint's shapes do not go together with the mesh".to_owned())?;
+        if let Some(until) = self.again.until {
+            steerer.repeat_until(std::mem::take(&mut self.again.shapes), until);
+        }
+        Ok(())
+    }
+}
+
+impl Adaptor {
+    /// Keeps the names of commands of the run before, and says what became of those that were
+    /// rejected then.
+    pub(super) fn announce_resumed(&self) {
+        if self.communicator.rank() > 0 {
+            return;
+        }
+        for (id, reason) in &self.resumed.again.rejected {
+            self.log.reserve(id);
+            if self.log.has_order(id) {
+                self.log.reject(id, self.moment, &reason.into());
+            }
+        }
+        self.resumed.again.commands.iter().for_each(|command| self.log.reserve(&command.id));
+    }
+
+    /// Does again what is due of the commands of the run before; first those that were there before
+    /// the commands of pipelines and files, then all. Collective.
+    pub(super) fn obey_again(&mut self, moment: Moment, all: bool) {
+        while self.resumed.is_due(moment.cycle) {
+            let front = self.resumed.again.commands.pop_front_if(|next| all || !next.comes_late);
+            let Some(CommandAgain { id, by, command, has_settled, is_noted, .. }) = front else {
+                return;
+            };
+            let source = Source::Earlier(by, has_settled);
+            if self.communicator.rank() == 0 && !(is_noted && self.log.has_order(&id)) {
+                self.log.accept_again(&id, &source, &command, moment);
+            }
+            self.obey(id, &source, command, moment);
+        }
+    }
+}

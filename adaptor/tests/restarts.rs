@@ -1,0 +1,344 @@
+//! Runs that go on from a checkpoint: to the bit as if nothing had come between.
+
+mod common;
+
+use std::{path::Path, sync::Arc, time::Duration};
+
+use common::{Solver, Viewer, bits, config, squeeze};
+use serde_json::{Value, json};
+use tombolo::{
+    Adaptor, Channel, Checkpoint, OrderStatus, Settings, Step,
+    communicator::{Communicator, threads},
+    deform::{distributed::Part, mesh::Mesh, shapes::box_of_tets},
+    pipelines::language::{parse_journal, parse_orders},
+};
+
+/// Numbers that look random; the same for the same seed.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, count: u64) -> u64 {
+        // Steele, Lea and Flood: SplitMix64.
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut mixed = self.0;
+        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (mixed ^ (mixed >> 31)) % count
+    }
+}
+
+/// Pipelines give orders: every so often, once, and when what they measure over time says so.
+const PIPELINES: &str = r#""pipelines": [
+    {"name": "shape", "on": "order", "stages": [{"schedule": {"steps": 3, "every": {"steps": 2}}}]},
+    {"name": "breathe", "every": {"steps": 17}, "stages": [
+        {"translate": {"features": ["x-max"], "fixed": ["x-min"], "by": [0.01, 0.0, 0.0]}},
+        {"order": {"schedule": {"steps": 2, "every": {"steps": 3}}}}]},
+    {"name": "once", "at": {"time": 0.2}, "stages": [
+        {"translate": {"features": ["y-max"], "fixed": ["y-min"], "by": [0.0, 0.05, 0.0]}}, {"order": {}}]},
+    {"name": "mean", "stages": [{"statistics": {"field": "speed"}},
+        {"time_statistics": {"monitor": "speed.max", "name": "top", "measures": ["mean"]}}],
+     "when": "mean.top.mean > 1.9", "again_after": {"steps": 1000}, "then": [{"set": {"name": "heating", "value": 1.75}}]}]"#;
+
+fn settings(output: &Path, serves: bool) -> Settings {
+    let stream = if serves { r#""stream": {"listen": "127.0.0.1:0"}, "# } else { "" };
+    let text = format!(r#"{{"version": 1, "journal": "journal.jsonl", {stream}{PIPELINES}}}"#);
+    let settings = Settings { config: config(&text), output: output.into(), ..Settings::default() };
+    settings.parameter("heating", 1.0, 0.0..=2.0)
+}
+
+/// The mesh after each cycle, and the value of the parameter.
+type Trace = Vec<(Vec<[u64; 3]>, Option<f64>)>;
+
+fn step(solver: &mut Solver, trace: &mut Trace) {
+    solver.step();
+    trace.push((bits(&solver.mesh), solver.adaptor.parameter("heating")));
+}
+
+fn assert_same(found: &[(Vec<[u64; 3]>, Option<f64>)], expected: &Trace, from: usize, what: &str) {
+    for (index, state) in found.iter().enumerate() {
+        let is_same = *state == expected[from + index];
+        assert!(is_same, "{what}: it differs at cycle {}", from + index);
+    }
+}
+
+/// Overlapping orders, one that folds and is mended, one that is refused, and undoing.
+const ORDERS: &str = r#"[
+    {"at": {"cycle": 3}, "order": {"edits": [{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, -0.2]}}],
+                                   "schedule": {"steps": 4, "every": {"steps": 3}}}},
+    {"at": {"cycle": 9}, "order": {"edits": [{"rotate": {"features": ["z-max"], "fixed": ["z-min"], "axis": [0, 0, 1],
+                                   "center": [0.5, 0.5, 1], "degrees": 60}}],
+                                   "guard": {"otherwise": "clamp"}, "schedule": {"steps": 5, "every": {"steps": 2}}}},
+    {"at": {"cycle": 16}, "order": {"undo": 1, "schedule": {"steps": 3, "every": {"time": 0.025}}}},
+    {"at": {"cycle": 20}, "order": {"edits": [{"translate": {"features": ["nowhere"], "by": [1, 0, 0]}}]}},
+    {"at": {"cycle": 22}, "parameter": {"name": "heating", "value": 1.25}},
+    {"at": {"cycle": 26}, "order": {"edits": [{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.3, 0, -0.55]}}],
+                                    "guard": {"otherwise": "untangle"}, "schedule": {"steps": 3, "every": {"steps": 2}}}},
+    {"at": {"cycle": 34}, "order": {"undo": 1, "schedule": {"steps": 6}}}]"#;
+
+#[test]
+fn a_run_that_was_interrupted_anywhere_ends_as_one_that_was_not() {
+    const CYCLES: u64 = 46;
+    let given = |output: &Path| Settings {
+        orders: parse_orders(ORDERS, "orders.json").unwrap(),
+        ..settings(output, false)
+    };
+    let output = tempfile::tempdir().unwrap();
+    let mut whole = Trace::new();
+    let mut solver = Solver::new(given(output.path()));
+    (0..CYCLES).for_each(|_| step(&mut solver, &mut whole));
+    let orders = solver.finish().orders;
+    assert!(orders.iter().any(|order| order.status == OrderStatus::Rejected), "{orders:?}");
+    assert!(orders.iter().any(|order| order.fraction.is_some_and(|it| it < 1.0)), "{orders:?}");
+    assert!(whole.windows(2).filter(|pair| pair[0].0 != pair[1].0).count() > 25);
+    let mut random = Random(7);
+    for interrupted in (0..CYCLES).step_by(2) {
+        let output = tempfile::tempdir().unwrap();
+        let mut trace = Trace::new();
+        let mut solver = Solver::new(given(output.path()));
+        (0..interrupted).for_each(|_| step(&mut solver, &mut trace));
+        let bytes = solver.adaptor.checkpoint().to_bytes();
+        let mesh = solver.mesh.clone();
+        // It went on for a while before it was killed.
+        let lost = random.below(CYCLES - interrupted);
+        (0..lost).for_each(|_| step(&mut solver, &mut Trace::new()));
+        drop(solver);
+        let checkpoint = Checkpoint::from_bytes(&bytes).unwrap();
+        let mut again = Solver::new(given(output.path()).restart(checkpoint));
+        (again.mesh, again.cycle) = (mesh, interrupted);
+        (interrupted..CYCLES).for_each(|_| step(&mut again, &mut trace));
+        assert_same(&trace, &whole, 0, &format!("after cycle {interrupted}"));
+        let statuses: Vec<_> =
+            again.finish().orders.into_iter().map(|it| (it.id, it.status)).collect();
+        let expected: Vec<_> = orders.iter().map(|it| (it.id.clone(), it.status)).collect();
+        assert_eq!(statuses, expected, "after cycle {interrupted}");
+        // The journal is one of a whole run.
+        let journal = std::fs::read_to_string(output.path().join("journal.jsonl")).unwrap();
+        let recording = parse_journal(&journal, "journal.jsonl").unwrap();
+        let output = tempfile::tempdir().unwrap();
+        let replay = Settings { replay: Some(recording), ..settings(output.path(), false) };
+        let mut replayed = Solver::new(replay);
+        let mut trace = Trace::new();
+        (0..CYCLES).for_each(|_| step(&mut replayed, &mut trace));
+        assert_same(&trace, &whole, 0, &format!("replayed, after cycle {interrupted}"));
+    }
+}
+
+fn random_message(random: &mut Random, sent: u64) -> Value {
+    let amount = 0.05 + 0.01 * random.below(25) as f64;
+    let schedule = json!({"steps": 1 + random.below(5), "every": {"steps": 1 + random.below(4)}});
+    let id = format!("m{sent}");
+    match random.below(10) {
+        0 => json!({"id": id, "order": {"undo": 1 + random.below(2), "schedule": schedule}}),
+        1 => json!({"id": id, "order": {"stack": squeeze(amount)["edits"], "schedule": schedule}}),
+        2 => json!({"id": id, "cancel": {"order": format!("m{}", random.below(sent + 1))}}),
+        3 => json!({"id": id, "order": {"edits": squeeze(1.5)["edits"], "schedule": schedule,
+                    "guard": {"otherwise": "clamp"}}}),
+        4 => json!({"id": id, "parameter": {"name": "heating", "value": amount}}),
+        5 => json!({"id": id, "pipelines": {"set": [{"name": "shape", "on": "order",
+                    "stages": [{"schedule": schedule}]}]}}),
+        _ => json!({"id": id, "order": {"edits": squeeze(amount)["edits"], "schedule": schedule}}),
+    }
+}
+
+/// The cycle of the last whole line that names one.
+fn last_cycle(journal: &str) -> usize {
+    let whole = journal.rsplit_once('\n').map_or("", |(whole, _)| whole);
+    let cycle = |line: &str| {
+        let line: Value = serde_json::from_str(line).ok()?;
+        let is_settled = line["status"] == "applied" || line["status"] == "rejected";
+        let of_command = line["cycle"].as_u64().filter(|_| is_settled);
+        of_command.or(line["shape"]["cycle"].as_u64())
+    };
+    let cycle = whole.lines().rev().find_map(cycle).unwrap_or(0);
+    usize::try_from(cycle).unwrap()
+}
+
+/// What viewers ask for is found in the journal, wherever that was cut off; no order that was
+/// acknowledged is missing, and none is there twice.
+#[test]
+fn what_was_accepted_after_the_checkpoint_is_done_again() {
+    let seeds = std::env::var("TOMBOLO_SEEDS").ok().and_then(|text| text.parse().ok());
+    let mut done_again = 0;
+    for seed in 0..seeds.unwrap_or(10) {
+        let mut random = Random(seed);
+        let output = tempfile::tempdir().unwrap();
+        let file = output.path().join("journal.jsonl");
+        let mut solver = Solver::new(settings(output.path(), true));
+        let mut viewer = Viewer::connect(&solver.adaptor);
+        viewer.hello();
+        let mut trace = Trace::new();
+        let (saved, killed) = (5 + random.below(30), 6 + random.below(30));
+        let mut state = None;
+        let mut sent = 0;
+        for cycle in 0..saved + killed {
+            if random.below(4) == 0 {
+                viewer.send(&random_message(&mut random, sent));
+                sent += 1;
+                if random.below(2) == 0 {
+                    viewer.look_for("order", Duration::from_millis(5), |_| false);
+                }
+            }
+            if cycle == saved {
+                state = Some((solver.adaptor.checkpoint(), solver.mesh.clone()));
+            }
+            step(&mut solver, &mut trace);
+            std::thread::sleep(Duration::from_micros(random.below(3000)));
+        }
+        while viewer.look_for("nothing", Duration::from_millis(1), |_| true).is_some() {}
+        let accepted = |message: &Value| {
+            let order = message.get("order")?;
+            (order["status"] == "accepted").then(|| order["id"].as_str().unwrap().to_owned())
+        };
+        let mut acknowledged: Vec<String> = viewer.seen.iter().filter_map(accepted).collect();
+        drop((solver, viewer));
+        let journal = std::fs::read_to_string(&file).unwrap();
+        // What the disk had when the machine lost its power.
+        let mark = journal.find("{\"checkpoint\":").unwrap();
+        if random.below(2) == 0 {
+            let end = mark + random.below((journal.len() - mark) as u64 + 1) as usize;
+            std::fs::write(&file, &journal[..journal.floor_char_boundary(end)]).unwrap();
+            acknowledged.clear();
+        }
+        let journal = std::fs::read_to_string(&file).unwrap();
+        let known = last_cycle(&journal[mark.min(journal.len())..]);
+        let (checkpoint, mesh) = state.unwrap();
+        let mut again = Solver::new(settings(output.path(), true).restart(checkpoint));
+        (again.mesh, again.cycle) = (mesh, saved);
+        let mut resumed = Trace::new();
+        for _ in saved..saved + killed + 40 {
+            step(&mut again, &mut resumed);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let from = usize::try_from(saved).unwrap();
+        let until = known.saturating_sub(from).min(resumed.len());
+        assert_same(&resumed[..until], &trace, from, &format!("seed {seed}:\n{journal}"));
+        done_again += until;
+        let orders = again.finish().orders;
+        for id in &acknowledged {
+            let count = orders.iter().filter(|order| order.id == *id).count();
+            assert_eq!(count, 1, "seed {seed}: {id} in {orders:?}\n{journal}");
+        }
+        // Both runs in one journal are one run.
+        let journal = std::fs::read_to_string(&file).unwrap();
+        let recording = parse_journal(&journal, "journal.jsonl").unwrap();
+        let output = tempfile::tempdir().unwrap();
+        let mut replayed =
+            Solver::new(Settings { replay: Some(recording), ..settings(output.path(), true) });
+        let mut found = Trace::new();
+        (0..from + resumed.len()).for_each(|_| step(&mut replayed, &mut found));
+        trace.truncate(from);
+        trace.extend(resumed);
+        assert_same(&found, &trace, 0, &format!("seed {seed}, replayed:\n{journal}"));
+    }
+    assert!(done_again > 20, "only {done_again} cycles were done again");
+}
+
+#[test]
+fn several_ranks_go_on_from_one_file() {
+    const RANKS: usize = 3;
+    let mesh = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+    let output = tempfile::tempdir().unwrap();
+    let file = output.path().join("run.checkpoint");
+    let orders = parse_orders(ORDERS, "orders.json").unwrap();
+    let run = |cycles: std::ops::Range<u64>, saved: Option<u64>, restarts: bool, start: &Mesh| {
+        threads::run(RANKS, |ranks| {
+            let cells = mesh.cells().len();
+            let of_cells: Vec<usize> = (0..cells).map(|cell| cell * RANKS / cells).collect();
+            let mut part = Part::cut(start, &of_cells, ranks.rank(), true).unwrap();
+            let text = format!(r#"{{"version": 1, {PIPELINES}}}"#);
+            let settings =
+                Settings { config: config(&text), orders: orders.clone(), ..Settings::default() }
+                    .parameter("heating", 1.0, 0.0..=2.0)
+                    .on(Arc::new(ranks));
+            let settings = if restarts { settings.restart_from_file(&file) } else { settings };
+            let mut adaptor = Adaptor::initialize(settings).unwrap();
+            let mut states = Vec::new();
+            for cycle in cycles.clone() {
+                let step = Step { cycle, time: cycle as f64 * 0.01, time_step: 0.01 };
+                let speed: Vec<f64> =
+                    part.points.iter().map(|[x, y, z]| x + y * z + step.time).collect();
+                let fields = [tombolo::FieldView::vertex("speed", &speed)];
+                let channel = Channel { name: "fluid", mesh: part.view(), fields: &fields };
+                let steering = adaptor.execute(&step, &[channel]).unwrap();
+                if let Some(motion) = steering.motion {
+                    part.points.copy_from_slice(&motion.coordinates);
+                }
+                if saved == Some(cycle) {
+                    adaptor.write_checkpoint(&file).unwrap();
+                }
+                let numbers = part.global_vertices.clone().unwrap_or_default();
+                states.push((numbers, part.points.clone()));
+            }
+            states
+        })
+    };
+    let whole = run(0..40, None, false, &mesh);
+    for saved in [4, 12, 27] {
+        let before = run(0..saved + 1, Some(saved), false, &mesh);
+        // The mesh as the solver has saved it.
+        let mut points = mesh.points().to_vec();
+        for (numbers, values) in before.iter().map(|states| states.last().unwrap()) {
+            for (number, value) in numbers.iter().zip(values) {
+                points[usize::try_from(*number).unwrap()] = *value;
+            }
+        }
+        let moved = mesh.with_points(points).unwrap();
+        let after = run(saved + 1..40, None, true, &moved);
+        for (rank, states) in after.iter().enumerate() {
+            assert!(states[..] == whole[rank][usize::try_from(saved).unwrap() + 1..], "{saved}");
+        }
+    }
+    let refused = Adaptor::initialize(Settings::default().restart_from_file(&file));
+    let refused = refused.err().unwrap().to_string();
+    assert!(refused.contains("not written whole") || refused.contains("3 ranks"), "{refused}");
+}
+
+#[test]
+fn another_mesh_or_file_is_refused() {
+    let output = tempfile::tempdir().unwrap();
+    let orders = parse_orders(ORDERS, "orders.json").unwrap();
+    let given = || Settings { orders: orders.clone(), ..settings(output.path(), false) };
+    let mut solver = Solver::new(given());
+    solver.steps(5);
+    let checkpoint = solver.adaptor.checkpoint();
+    assert_eq!(checkpoint.cycle(), Some(4));
+    drop(solver);
+    let mut other = Solver::of_box([3, 4, 4], given().restart(checkpoint.clone()));
+    let step = Step { cycle: 5, time: 0.05, time_step: 0.01 };
+    let speed = vec![0.0; other.mesh.points().len()];
+    let fields = [tombolo::FieldView::vertex("speed", &speed)];
+    let channel =
+        Channel { name: "fluid", mesh: tombolo::MeshView::from(&other.mesh), fields: &fields };
+    let error = other.adaptor.execute(&step, &[channel]).unwrap_err().to_string();
+    assert!(error.contains("not the mesh of the checkpoint") && error.contains("cells"), "{error}");
+    drop(other);
+    let mut bytes = checkpoint.to_bytes();
+    bytes[100] ^= 1;
+    let file = output.path().join("damaged");
+    std::fs::write(&file, &bytes).unwrap();
+    let error = Adaptor::initialize(given().restart_from_file(&file)).err().unwrap().to_string();
+    assert!(error.contains("damaged"), "{error}");
+    let nowhere = output.path().join("nowhere");
+    let error = Adaptor::initialize(given().restart_from_file(&nowhere)).err().unwrap().to_string();
+    assert!(error.contains("nowhere"), "{error}");
+}
+
+/// A restart with other orders takes those, and one with other pipelines these.
+#[test]
+fn what_a_restart_is_given_anew_takes_the_place_of_what_was() {
+    let output = tempfile::tempdir().unwrap();
+    let orders = parse_orders(ORDERS, "orders.json").unwrap();
+    let mut solver =
+        Solver::new(Settings { orders: orders.clone(), ..settings(output.path(), false) });
+    solver.steps(2);
+    let checkpoint = solver.adaptor.checkpoint();
+    let mesh = solver.mesh.clone();
+    drop(solver);
+    let config = config(r#"{"version": 1}"#);
+    let orders = parse_orders(r#"[{"at": {"cycle": 6}, "stop": {}}]"#, "orders.json").unwrap();
+    let settings = Settings { config, orders, ..Settings::default() }.restart(checkpoint);
+    let mut again = Solver::new(settings.parameter("heating", 1.0, 0.0..=2.0));
+    (again.mesh, again.cycle) = (mesh, 2);
+    again.steps(40);
+    assert!(again.is_at_reference() && again.stopped);
+}

@@ -1,0 +1,82 @@
+//! The state of a run in one file: the flow, and the adaptor's checkpoint beside it.
+
+use std::ffi::OsString;
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::Path;
+
+use tombolo::Checkpoint;
+use tombolo::communicator::{Communicator, Reader, Writer};
+
+use crate::program::ProgramError;
+use crate::ranks::agreed;
+use crate::solver::Solver;
+
+const MAGIC: &[u8] = b"flow state 1\n";
+
+/// Writes the state of all ranks to a file, which is there whole or not at all. Collective.
+pub(crate) fn write(
+    communicator: &dyn Communicator,
+    file: &Path,
+    solver: &Solver,
+    checkpoint: &Checkpoint,
+) -> Result<(), ProgramError> {
+    let mut mine = Writer::default();
+    solver.save(&mut mine);
+    mine.bytes(&checkpoint.to_bytes());
+    let all = communicator.gather(0, &mine.into_bytes());
+    let written = all.map_or(Ok(()), |all| replace(file, &all));
+    let written = written.map_err(|source| ProgramError::File { file: file.into(), source });
+    agreed(communicator, written)
+}
+
+fn replace(file: &Path, states: &[Vec<u8>]) -> io::Result<()> {
+    let mut partial = OsString::from(file);
+    partial.push(".partial");
+    let mut out = File::create(&partial)?;
+    out.write_all(MAGIC)?;
+    for state in states {
+        out.write_all(&(state.len() as u64).to_le_bytes())?;
+        out.write_all(state)?;
+    }
+    out.sync_all()?;
+    std::fs::rename(&partial, file)
+}
+
+/// This rank's state in a file.
+pub(crate) struct State {
+    bytes: Vec<u8>,
+}
+
+impl State {
+    /// Reads the state that this rank has written.
+    pub(crate) fn read(file: &Path, rank: usize) -> Result<Self, ProgramError> {
+        let failed = |source| ProgramError::File { file: file.into(), source };
+        let all = std::fs::read(file).map_err(failed)?;
+        let other = || {
+            failed(io::Error::new(
+                io::ErrorKind::InvalidData,
+                "this is not the whole state of a run of flow on as many ranks",
+            ))
+        };
+        let mut states = Reader::new(0, all.strip_prefix(MAGIC).ok_or_else(other)?);
+        let mut mine = states.bytes();
+        for _ in 0..rank {
+            mine = states.bytes();
+        }
+        Ok(Self { bytes: mine.map_err(|_| other())?.to_vec() })
+    }
+
+    /// Lets a solver go on from it; the adaptor's checkpoint. Collective.
+    pub(crate) fn restore(
+        &self,
+        communicator: &dyn Communicator,
+        solver: &mut Solver,
+    ) -> Result<Checkpoint, ProgramError> {
+        let mut reader = Reader::new(0, &self.bytes);
+        solver.restore(&mut reader)?;
+        let bytes = reader.bytes().map_err(|_| crate::SolverError::Saved.into());
+        let read = bytes.and_then(|bytes| Ok(Checkpoint::from_bytes(bytes)?));
+        agreed(communicator, read)
+    }
+}

@@ -1,0 +1,167 @@
+//! `flow` killed anywhere and restarted ends as if nothing had happened, to the bit.
+
+use std::time::Duration;
+
+use serde_json::{Value, json};
+use tombolo_tests::{PATIENCE, Run, Small};
+
+/// Numbers that look random; the same for the same seed.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, count: u64) -> u64 {
+        // Steele, Lea and Flood: SplitMix64.
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut mixed = self.0;
+        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (mixed ^ (mixed >> 31)) % count
+    }
+}
+
+fn pinch(factor: f64, steps: u32, every: u32) -> Value {
+    json!({"edits": [{"scale_direction": {
+                "features": ["throat"], "fixed": ["inlet", "outlet"], "factors": [1, 1, factor], "harmonic_order": 2}}],
+           "schedule": {"steps": steps, "every": {"steps": every}}})
+}
+
+/// Orders that overlap, are refused and are undone, and one that a pipeline gives.
+fn prepared() -> Small {
+    let small = Small::new();
+    small.write(
+        "pipelines.json",
+        &json!({"version": 1, "journal": "journal.jsonl", "pipelines": [
+            {"name": "last", "at": {"cycle": 38}, "stages": [{"write": {"file": "last.vtu"}}]},
+            {"name": "wide", "at": {"cycle": 21}, "stages": [{"scale_direction": {
+                "features": ["throat"], "fixed": ["inlet", "outlet"], "factors": [1, 1.1, 1]}},
+                {"order": {"schedule": {"steps": 2, "every": {"steps": 2}}}}]}]}),
+    );
+    small.write(
+        "orders.json",
+        &json!([
+            {"at": {"cycle": 4}, "order": pinch(0.8, 4, 3)},
+            {"at": {"cycle": 11}, "order": pinch(1.2, 5, 2)},
+            {"at": {"cycle": 15}, "order": {"undo": 9}},
+            {"at": {"cycle": 28}, "order": {"undo": 1, "schedule": {"steps": 3, "every": {"steps": 2}}}}
+        ]),
+    );
+    small
+}
+
+fn arguments<'a>(more: &[&'a str]) -> Vec<&'a str> {
+    let all = [
+        "--pipelines",
+        "@pipelines.json",
+        "--orders",
+        "@orders.json",
+        "--steps",
+        "40",
+        "--headless",
+    ];
+    all.into_iter().chain(more.iter().copied()).collect()
+}
+
+/// The mesh and the fields at the end, and the shape before it.
+fn results(small: &Small) -> [Vec<u8>; 2] {
+    [small.bytes("out/final.vtu"), small.bytes("out/last.vtu")]
+}
+
+#[test]
+fn a_run_that_is_killed_and_restarted_ends_as_one_that_never_was() {
+    let whole = prepared();
+    let (status, text) = Run::flow(&whole.arguments(&arguments(&[]))).finish(PATIENCE);
+    assert!(status.success(), "{text}");
+    let small = prepared();
+    let state = small.path("out/flow.state");
+    std::fs::create_dir_all(small.path("out")).expect("a folder");
+    let mut random = Random(11);
+    let mut killed = 0;
+    loop {
+        let before = std::fs::read(&state).ok();
+        let mut more = vec!["--checkpoint-every", "3"];
+        let restart = state.display().to_string();
+        if before.is_some() {
+            more.extend(["--restart", &restart]);
+        }
+        let mut run = Run::flow(&small.arguments(&arguments(&more)));
+        // Each piece comes as far as to save its state, and somewhere beyond that.
+        while killed < 5 && run.is_running() && std::fs::read(&state).ok() == before {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        if killed == 5 || !run.is_running() {
+            let (status, text) = run.finish(PATIENCE);
+            assert!(status.success(), "after {killed} kills: {text}");
+            break;
+        }
+        std::thread::sleep(Duration::from_micros(random.below(20_000)));
+        run.signal("KILL");
+        drop(run);
+        killed += 1;
+    }
+    assert!(killed > 0, "it was never killed");
+    assert!(results(&small) == results(&whole), "after {killed} kills it differs");
+    let journal = String::from_utf8(small.bytes("out/journal.jsonl")).expect("UTF-8");
+    assert!(journal.contains("\"checkpoint\""), "{journal}");
+    // The journals of all its pieces are that of one run.
+    let replay = prepared();
+    let journal = small.path("out/journal.jsonl").display().to_string();
+    let all = arguments(&["--replay", &journal]);
+    let more: Vec<&str> = all.into_iter().filter(|it| !it.contains("orders")).collect();
+    let (status, text) = Run::flow(&replay.arguments(&more)).finish(PATIENCE);
+    assert!(status.success(), "{text}");
+    assert!(results(&replay) == results(&whole), "the replay differs");
+}
+
+#[test]
+fn a_run_that_is_asked_to_stop_saves_its_state() {
+    let whole = prepared();
+    let (status, text) = Run::flow(&whole.arguments(&arguments(&[]))).finish(PATIENCE);
+    assert!(status.success(), "{text}");
+    let small = prepared();
+    small.write(
+        "stop.json",
+        &json!([{"at": {"cycle": 4}, "order": pinch(0.8, 4, 3)},
+                {"at": {"cycle": 11}, "order": pinch(1.2, 5, 2)},
+                {"at": {"cycle": 13}, "stop": {}}]),
+    );
+    let stopped = [
+        "--pipelines",
+        "@pipelines.json",
+        "--orders",
+        "@stop.json",
+        "--headless",
+        "--steps",
+        "40",
+        "--checkpoint-every",
+        "1000",
+    ];
+    let (status, text) = Run::flow(&small.arguments(&stopped)).finish(PATIENCE);
+    assert!(status.success(), "{text}");
+    let state = small.path("out/flow.state").display().to_string();
+    // The rest of the orders: other commands take the place of those that were to come.
+    small.write(
+        "rest.json",
+        &json!([{"at": {"cycle": 15}, "order": {"undo": 9}},
+                {"at": {"cycle": 28}, "order": {"undo": 1, "schedule": {"steps": 3, "every": {"steps": 2}}}}]),
+    );
+    let rest = [
+        "--pipelines",
+        "@pipelines.json",
+        "--orders",
+        "@rest.json",
+        "--headless",
+        "--steps",
+        "40",
+        "--restart",
+        &state,
+    ];
+    let (status, text) = Run::flow(&small.arguments(&rest)).finish(PATIENCE);
+    assert!(status.success(), "{text}");
+    assert!(results(&small) == results(&whole));
+    let torn = small.path("torn");
+    std::fs::write(&torn, &small.bytes("out/flow.state")[..1000]).expect("written");
+    let torn = torn.display().to_string();
+    let bad = ["--headless", "--steps", "40", "--restart", &torn];
+    let (status, text) = Run::flow(&small.arguments(&bad)).finish(PATIENCE);
+    assert!(!status.success() && text.contains("not the whole state"), "{text}");
+}
