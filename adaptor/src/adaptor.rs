@@ -49,6 +49,7 @@ use crate::{
     condition::Condition,
     error::{ExecuteError, FinalizeError, InitializeError},
     meeting,
+    recorder::Recorder,
     report::Report,
     settings::Settings,
     stages::Pipelines,
@@ -93,6 +94,8 @@ pub struct Adaptor {
     /// Answers viewers, once there is a mesh.
     forecaster: Arc<OnceLock<Forecaster>>,
     server: Option<Server>,
+    /// Keeps what viewers are told.
+    recorder: Option<Recorder>,
     /// The directory of the output.
     output: PathBuf,
     mesh: SteeredMesh,
@@ -394,6 +397,7 @@ impl Adaptor {
             hub.ends(if self.stopped { End::Stopped } else { End::Finished });
         }
         self.server = None;
+        self.recorder = None;
         self.log.end(self.moment);
         let faults = self.pipelines.finish();
         // Rank 0 writes: what was asked for is there before any rank goes on.

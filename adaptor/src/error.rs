@@ -4,8 +4,8 @@ use tombolo_deform::{communicator::RankError, number::Number};
 use tombolo_pipelines::{extract::ChannelError, language::Problems};
 
 use crate::{
-    checkpoint::CheckpointError, journal::JournalError, report::Report, steering::ParameterError,
-    stream::StreamError,
+    checkpoint::CheckpointError, journal::JournalError, recording::RecordError, report::Report,
+    steering::ParameterError, stream::StreamError,
 };
 
 /// Why a run could not be set up.
@@ -18,6 +18,9 @@ pub enum InitializeError {
     /// The journal could not be created.
     #[error(transparent)]
     Journal(#[from] JournalError),
+    /// The recording could not be begun.
+    #[error(transparent)]
+    Record(#[from] RecordError),
     /// A parameter's declaration makes no sense.
     #[error(transparent)]
     Parameter(#[from] ParameterError),

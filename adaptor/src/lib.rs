@@ -58,7 +58,10 @@ mod meeting;
 pub mod mpi;
 #[cfg(feature = "distributed")]
 pub mod petsc;
+pub mod play;
 pub mod program;
+mod recorder;
+pub mod recording;
 mod report;
 mod settings;
 mod stages;

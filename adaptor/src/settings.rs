@@ -147,6 +147,8 @@ impl Default for Settings {
             description: None,
             stream: None,
             journal: None,
+            record: None,
+            record_megabytes: language::record_megabytes(),
             steering: Default::default(),
             watch: false,
             pipelines: Vec::new(),

@@ -1,5 +1,6 @@
 //! What `catalyst_initialize` says: pipelines, parameters, orders, the ranks.
 
+use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
@@ -178,6 +179,9 @@ fn merged(
     config.pipelines = pipelines;
     config.stream = settings.stream.map(|(stream, _)| stream);
     config.journal = settings.journal.map(|(journal, _)| journal);
+    if let Some(((record, megabytes), _)) = settings.record {
+        (config.record, config.record_megabytes) = (Some(record), megabytes);
+    }
     config.watch = settings.watch.is_some();
     config.steering = settings.steering.map(|(steering, _)| steering).unwrap_or_default();
     // Where there is nothing to choose from, the names are those of another implementation's
@@ -199,6 +203,8 @@ fn merged(
 struct Settings {
     stream: Option<(StreamServer, String)>,
     journal: Option<(String, String)>,
+    /// The recording, and how long it may be.
+    record: Option<((String, NonZeroU32), String)>,
     steering: Option<(Steering, String)>,
     /// The file that is watched.
     watch: Option<String>,
@@ -229,6 +235,8 @@ impl Settings {
         let steering = Some(config.steering).filter(|steering| *steering != Steering::default());
         first(&mut self.stream, config.stream, "stream", file, notes);
         first(&mut self.journal, config.journal, "journal", file, notes);
+        let record = config.record.map(|record| (record, config.record_megabytes));
+        first(&mut self.record, record, "record", file, notes);
         first(&mut self.steering, steering, "steering", file, notes);
         if config.watch {
             match &self.watch {

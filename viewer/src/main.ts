@@ -16,6 +16,7 @@ import { watchKeys } from "./panels/keys";
 import { FIELD_TITLES, LookPanel } from "./panels/look";
 import { MonitorPanel } from "./panels/monitors";
 import { ParameterPanel } from "./panels/parameters";
+import { RecordingPanel } from "./panels/recording";
 import { StatusBar } from "./panels/status";
 import { VerdictPanel } from "./panels/verdict";
 import { watchDrawers } from "./panels/drawers";
@@ -160,6 +161,7 @@ const monitors = new MonitorPanel(part("monitors"));
 const parameters = new ParameterPanel(part("parameters"), store, commands);
 const bar = new StatusBar(store, commands);
 new WheelPanel(store, commands);
+new RecordingPanel(store, commands);
 new EditsPanel(store, commands);
 const form = new EditForm(part("fields"), store);
 const previewer = new Previewer(scene, addresses.surface, kernel, store);
@@ -189,6 +191,7 @@ function takeMessage(message: ServerMessage): void {
       return;
     // The status shows what it has changed.
     case "done": return;
+    case "play": return store.dispatch({ type: "played", played: message.body });
     case "wheel": return store.dispatch({ type: "wheel asked", by: message.body.asked_by });
     case "end":
       // There is nothing to come back to.

@@ -24,6 +24,7 @@ use crate::{
     checkpoint::Checkpoint,
     error::InitializeError,
     journal::{Journal, JournalError},
+    recorder::Recorder,
     settings::Settings,
     stages::Pipelines,
     steering::{Defaults, Log, Parameters, Queue, Timed},
@@ -82,7 +83,8 @@ impl Adaptor {
         }
         let run = random_name();
         let queue = Arc::new(Queue::default());
-        let hub = config.stream.as_ref().filter(|_| first).map(|_| Arc::new(Hub::default()));
+        let is_told = config.stream.is_some() || config.record.is_some();
+        let hub = (is_told && first).then(|| Arc::new(Hub::default()));
         if let Some(hub) = &hub {
             hub.offer_pipelines(&config.pipelines);
         }
@@ -125,6 +127,14 @@ impl Adaptor {
             }
             _ => None,
         };
+        let recorder = match (&config.record, &hub) {
+            (Some(file), Some(hub)) => {
+                let most = u64::from(config.record_megabytes.get()) << 20;
+                let serves = server.is_some();
+                Some(Recorder::start(&output.join(file), most, hub, log.told(), serves)?)
+            }
+            _ => None,
+        };
         let watch = match file {
             Some(file) if config.watch && first && !is_replay => Some(
                 Watch::start(&file, known, Arc::clone(&changes), hub.clone())
@@ -162,6 +172,7 @@ impl Adaptor {
             watch,
             forecaster,
             server,
+            recorder,
             output,
             mesh: SteeredMesh::Unknown,
             lent: Lent::default(),

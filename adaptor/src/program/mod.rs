@@ -4,8 +4,10 @@
 
 mod check;
 mod edit;
+mod export;
 mod features;
 mod mesh;
+mod play;
 mod remote;
 mod skeleton;
 
@@ -49,6 +51,10 @@ enum Task {
     Edit(edit::Options),
     /// Find the curve skeleton of a mesh's surface
     Skeleton(skeleton::Options),
+    /// Show a recording in the viewer
+    Play(play::Options),
+    /// Write files of a recording: VTK, CSV, pictures
+    Export(export::Options),
     #[command(flatten)]
     Remote(remote::Task),
 }
@@ -100,6 +106,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Task::Features(options) => features::features(&options),
         Task::Edit(options) => edit::edit(&options),
         Task::Skeleton(options) => skeleton::skeleton(&options),
+        Task::Play(options) => play::play(&options),
+        Task::Export(options) => export::export(&options),
         Task::Remote(task) => remote::run(&task),
     };
     match done {

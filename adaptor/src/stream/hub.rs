@@ -33,7 +33,7 @@ const LOOK_AGAIN: Duration = Duration::from_millis(20);
 pub(crate) type Encode = Arc<dyn Fn(bool) -> Result<Encoded, String> + Send + Sync>;
 
 /// Writes the stack of edits out.
-type TellStack = Arc<dyn Fn() -> Value + Send + Sync>;
+pub(super) type TellStack = Arc<dyn Fn() -> Value + Send + Sync>;
 
 /// How a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -113,6 +113,8 @@ pub(super) struct HubState {
     pipelines: Arc<str>,
     surface: Option<Arc<ReferenceSurface>>,
     pub(super) clients: BTreeMap<u64, Arc<Client>>,
+    /// Somebody inside the program who is told what viewers are told.
+    pub(super) observer: Option<Arc<Client>>,
     pub(super) wheel: Wheel,
     /// The cost of each pipeline, by name.
     pub(super) costs: Vec<(String, Cost)>,
@@ -200,9 +202,7 @@ impl Hub {
     /// Tells every viewer, one after the other, and drops none of it.
     pub(crate) fn tell(&self, message: &Value) {
         let text: Arc<str> = message.to_string().into();
-        for client in lock(&self.state).clients.values() {
-            client.text(&text);
-        }
+        lock(&self.state).audience().for_each(|client| client.text(&text));
     }
 
     /// Tells one viewer, if it is still there.
@@ -215,20 +215,18 @@ impl Hub {
     /// Tells the values of monitors; a viewer that is behind misses the oldest.
     pub(crate) fn monitor(&self, message: &Value) {
         let state = lock(&self.state);
-        if state.clients.is_empty() {
+        if !state.has_audience() {
             return;
         }
         let text: Arc<str> = message.to_string().into();
-        for client in state.clients.values() {
-            client.monitor(&text);
-        }
+        state.audience().for_each(|client| client.monitor(&text));
     }
 
     /// Hands over the newest extract of a view. The one before it, if nobody came to encode it, is
     /// dropped.
     pub(crate) fn frame(&self, view: usize, encode: Encode) {
         let mut state = lock(&self.state);
-        let watched = !state.clients.is_empty();
+        let watched = state.has_audience();
         if state.views.entry(view).or_default().waiting.replace(encode).is_some() && watched {
             self.counters.dropped.fetch_add(1, Ordering::Relaxed);
         }
@@ -241,9 +239,7 @@ impl Hub {
     pub(crate) fn forget(&self, view: usize) {
         let mut state = lock(&self.state);
         state.views.remove(&view);
-        for client in state.clients.values() {
-            client.forget(view);
-        }
+        state.audience().for_each(|client| client.forget(view));
     }
 
     /// Offers the pipelines as JSON.
@@ -281,14 +277,14 @@ impl Hub {
 /// Done on the encoder's thread.
 impl Hub {
     /// Encodes what waits, as long as anybody looks, until the hub is closed.
-    pub(super) fn encode_until_closed(&self) {
+    pub(crate) fn encode_until_closed(&self) {
         loop {
             let mut state = lock(&self.state);
             let (view, encode, key) = loop {
                 if state.closed {
                     return;
                 }
-                let watched = !state.clients.is_empty();
+                let watched = state.has_audience();
                 let mut views = state.views.iter_mut().filter(|_| watched);
                 let waiting = views.find_map(|(&number, view)| view.due(number));
                 match waiting {
@@ -315,7 +311,7 @@ impl Hub {
             // It was let go of while it was encoded.
             return;
         }
-        for client in state.clients.values() {
+        for client in state.audience() {
             let missed = client.frame(view, frame) as u64;
             self.counters.dropped.fetch_add(missed, Ordering::Relaxed);
         }
@@ -380,7 +376,7 @@ impl Hub {
     }
 
     /// Has the encoder make a key frame of a view, of its newest extract.
-    pub(super) fn want_key(&self, view: usize) {
+    pub(crate) fn want_key(&self, view: usize) {
         if let Some(view) = lock(&self.state).views.get_mut(&view) {
             view.key_wanted = true;
         }
@@ -397,6 +393,17 @@ impl Hub {
 
     pub(super) fn has_view(&self, view: usize) -> bool {
         lock(&self.state).views.contains_key(&view)
+    }
+
+    /// What `hello` tells about the run, and what the stack of edits is.
+    pub(super) fn described(&self) -> (Arc<Map<String, Value>>, Option<TellStack>) {
+        let state = lock(&self.state);
+        (Arc::clone(&state.description), state.stack.clone())
+    }
+
+    /// Has the encoder look whether there is something to do.
+    pub(super) fn look(&self) {
+        self.work.notify_one();
     }
 
     /// The `hello` of a viewer; the first has the orders so far.
@@ -422,10 +429,10 @@ impl Hub {
     }
 
     /// Puts a status into every outbox if anything in it changed. Called a few times a second.
-    pub(super) fn status(&self) {
+    pub(crate) fn status(&self) {
         let (cycle, time) = self.clock.get();
         let mut state = lock(&self.state);
-        if state.clients.is_empty() {
+        if !state.has_audience() {
             state.last_status = None;
             return;
         }
@@ -462,9 +469,7 @@ impl Hub {
         };
         status.insert("pipelines".into(), state.costs.iter().map(pipeline).collect());
         let text: Arc<str> = json!({ "status": status }).to_string().into();
-        for client in state.clients.values() {
-            client.status(&text);
-        }
+        state.audience().for_each(|client| client.status(&text));
     }
 
     pub(super) fn sent(&self, bytes: usize, frame: &Frame) {
@@ -476,8 +481,20 @@ impl Hub {
 
 impl HubState {
     pub(super) fn greet(&self) {
-        for client in self.clients.values() {
-            client.greet();
-        }
+        self.audience().for_each(|client| client.greet());
+    }
+
+    /// All who are told what happens.
+    fn audience(&self) -> impl Iterator<Item = &Arc<Client>> {
+        self.clients.values().chain(&self.observer)
+    }
+
+    fn has_audience(&self) -> bool {
+        self.audience().next().is_some()
+    }
+
+    /// The numbers of the views.
+    pub(super) fn view_numbers(&self) -> impl Iterator<Item = usize> {
+        self.views.keys().copied()
     }
 }

@@ -26,7 +26,9 @@ mod gate;
 mod hub;
 mod invitation;
 mod metrics;
+mod observer;
 mod outbox;
+mod playback;
 mod pool;
 mod seats;
 mod secret;
@@ -37,6 +39,7 @@ mod wheel;
 
 use std::{
     net::{SocketAddr, TcpListener},
+    path::Path,
     sync::{Arc, Mutex},
     thread::JoinHandle,
     time::Duration,
@@ -62,6 +65,7 @@ use tombolo_pipelines::{
 use crate::lock::lock;
 
 pub(crate) use hub::{Clock, End, Hub};
+pub(crate) use observer::{Observer, Told};
 pub(crate) use surface::ReferenceSurface;
 
 use connection::{Connection, Listener};
@@ -175,6 +179,8 @@ struct Shared {
     files: ViewerFiles,
     loopback: bool,
     limits: StreamLimits,
+    /// The recording that is served in place of a run.
+    playback: Option<Arc<playback::Shown>>,
 }
 
 impl Server {
@@ -183,6 +189,21 @@ impl Server {
         settings: &StreamServer,
         hub: Arc<Hub>,
         commands: Arc<dyn CommandSink>,
+    ) -> Result<Self, StreamError> {
+        Self::start_with(settings, hub, commands, None)
+    }
+
+    /// Serves a recording.
+    pub(crate) fn play(settings: &StreamServer, file: &Path) -> Result<Self, StreamError> {
+        let shown = Arc::new(playback::Shown::new(file));
+        Self::start_with(settings, Arc::default(), Arc::new(playback::Nothing), Some(shown))
+    }
+
+    fn start_with(
+        settings: &StreamServer,
+        hub: Arc<Hub>,
+        commands: Arc<dyn CommandSink>,
+        playback: Option<Arc<playback::Shown>>,
     ) -> Result<Self, StreamError> {
         let wanted = settings.listen;
         let socket = TcpListener::bind(wanted).map_err(|source| match source.kind() {
@@ -208,6 +229,7 @@ impl Server {
             files: ViewerFiles::find(),
             loopback: address.ip().is_loopback(),
             limits: settings.limits,
+            playback,
         };
         let (stop, stopped) = oneshot::channel();
         let runtime = tokio::runtime::Builder::new_current_thread()
@@ -380,6 +402,10 @@ async fn upgrade(
     let upgrade = upgrade.max_message_size(MESSAGE_SIZE).max_frame_size(MESSAGE_SIZE);
     upgrade.on_upgrade(move |mut socket| async move {
         connection.upgraded();
+        if let Some(shown) = &shared.playback {
+            let shown = Arc::clone(shown);
+            return shown.serve(socket, shared.limits.viewers.get() as usize).await;
+        }
         let returning = parameter(&uri, "client").zip(parameter(&uri, "back"));
         let limit = shared.limits.viewers.get() as usize;
         let only_watches = parameter(&uri, "role") == Some("watch");

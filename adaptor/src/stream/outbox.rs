@@ -45,6 +45,11 @@ impl Frame {
         self.encoded.raw_bytes as u64
     }
 
+    /// Whether it can be read without those before it.
+    pub(super) fn is_key(&self) -> bool {
+        self.encoded.is_key()
+    }
+
     /// Which topology the frame belongs to.
     pub(super) fn topology_id(&self) -> u64 {
         self.encoded.topology_id

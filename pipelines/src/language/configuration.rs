@@ -25,6 +25,14 @@ pub struct Config {
     /// object a line, below those of earlier runs. A run can be carried out again from it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub journal: Option<String>,
+    /// The file that everything viewers are told is kept in, frames and all, whether anybody watches or
+    /// not; what is in it already stays. `tombolo play` shows it, `tombolo export` writes files of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub record: Option<String>,
+    /// The most that the recording may have, in units of 2^20 bytes: it ends there, and the run goes
+    /// on.
+    #[serde(default = "record_megabytes")]
+    pub record_megabytes: NonZeroU32,
     /// How orders from viewers are carried out.
     #[serde(default)]
     pub steering: Steering,
@@ -35,6 +43,11 @@ pub struct Config {
     /// The pipelines, each with the steps at which it runs.
     #[serde(default)]
     pub pipelines: Vec<Pipeline>,
+}
+
+/// The size of a recording where nothing else is said.
+pub fn record_megabytes() -> NonZeroU32 {
+    NonZeroU32::MIN.saturating_add(4095)
 }
 
 impl Config {

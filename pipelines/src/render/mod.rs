@@ -17,12 +17,14 @@ mod raster;
 mod scene;
 mod text;
 
+use std::sync::Arc;
 use tombolo_deform::bounds::Bounds;
-use tombolo_deform::communicator::{Communicator, Reduction, agree};
+
+use tombolo_deform::communicator::{Communicator, Reduction, Solo, agree};
 use tombolo_deform::mesh::Vector;
 use tombolo_deform::vector::dot;
 
-use crate::extract::{Field, Shown};
+use crate::extract::{Extract, Field, Shown, unknown_field};
 use crate::language::{Camera, Color, Component, Render, Shading, Viewpoint, picture_pattern};
 use annotate::Annotation;
 use camera::View;
@@ -109,6 +111,25 @@ pub(crate) fn render(
         pictures.extend(drawing.picture(name, &camera, caption));
     }
     Ok(pictures)
+}
+
+/// Draws pictures of an extract that is all on this process, one for each camera of a stage.
+///
+/// # Errors
+/// A text where there is no such field, or it cannot colour.
+pub fn draw(
+    stage: &Render,
+    extract: &Arc<Extract>,
+    cycle: u64,
+    time: f64,
+) -> Result<Vec<Picture>, String> {
+    let known = |name: &String| {
+        let found = extract.fields.iter().find(|field| field.name == *name);
+        found.ok_or_else(|| unknown_field(name, extract.fields.iter().map(|it| it.name.as_str())))
+    };
+    let field = stage.field.as_ref().map(known).transpose()?;
+    let shown = Shown { extract: Arc::clone(extract), shared: Vec::new() };
+    render(stage, &Subject { shown: &shown, field, cycle, time }, &Solo)
 }
 
 /// All that the pictures of a step have in common.

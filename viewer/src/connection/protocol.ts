@@ -16,6 +16,9 @@ export interface ParameterInformation { name: string; value: number; minimum?: n
 /** The surface from which shapes are measured; its points are sent on request only. */
 export interface SurfaceInformation { id: string; vertices: number; faces: number }
 
+/** A moment of a recording. */
+export interface RecordedMoment { seconds: number; cycle: number; time: number }
+
 export interface Hello {
   protocol: number;
   client: string | number;
@@ -38,6 +41,8 @@ export interface Hello {
   undoable?: number;
   orders: OrderStatus[];
   defaults: { deform?: Json; guard?: Json; schedule?: Json };
+  /** What is shown is no run but a recording of one, from its first moment to its last. */
+  recording?: { first: RecordedMoment; last: RecordedMoment; lost_bytes?: number } | null;
 }
 
 export interface QualitySummary { min: number; mean?: number; inverted?: number }
@@ -116,6 +121,9 @@ export interface ServerError { message: string; id?: string | null }
 /** Another viewer asks the one that drives for the wheel. */
 export interface WheelAsked { asked_by: string }
 
+/** Where in a recording the viewer is. */
+export interface Played extends RecordedMoment { speed: number; paused: boolean; at_end: boolean }
+
 /** The last word of a run. */
 export interface RunEnd { how: "finished" | "stopped" | "failed"; cycle: number; time: number }
 
@@ -128,12 +136,14 @@ export type ServerMessage =
   | { kind: "pipelines"; body: PipelineChange }
   | { kind: "done"; body: Done }
   | { kind: "wheel"; body: WheelAsked }
+  | { kind: "play"; body: Played }
   | { kind: "end"; body: RunEnd }
   | { kind: "error"; body: ServerError };
 
 export type ClientMessage = { id?: string } & (
   | { order: Json } | { forecast: Json } | { pause: object } | { resume: object } | { stop: object }
   | { parameter: { name: string; value: number } } | { pipelines: Json } | { cancel: { order: string } } | { drive: object }
+  | { play: { seek?: { seconds: number }; speed?: number; paused?: boolean } }
   | { hand_over: { to: string } } | { kick: { client: string } } | { here: object }
 );
 
@@ -197,7 +207,7 @@ export function parseServerMessage(text: string): ServerMessage {
     throw new ProtocolError("a text message that is not JSON");
   }
   if (!isObject(parsed)) throw new ProtocolError("a text message that is not a JSON object");
-  for (const kind of ["hello", "status", "order", "forecast", "monitor", "pipelines", "wheel", "done", "end", "error"] as const) {
+  for (const kind of ["hello", "status", "order", "forecast", "monitor", "pipelines", "wheel", "done", "play", "end", "error"] as const) {
     const body: unknown = parsed[kind];
     if (body === undefined) continue;
     if (!isObject(body)) throw new ProtocolError(`the message "${kind}" is not an object`);

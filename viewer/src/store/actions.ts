@@ -1,6 +1,6 @@
 /** What can happen: from the simulation, or from the person at the page. */
 import type { ConnectionState } from "../connection/connection";
-import type { ForecastAnswer, Hello, Json, OrderStatus, RunEnd, Status } from "../connection/protocol";
+import type { ForecastAnswer, Hello, Json, OrderStatus, Played, RunEnd, Status } from "../connection/protocol";
 import type { OrderForm, Values } from "../form/schema";
 import type { Look } from "./looks";
 import type { Part, PreviewState, Problem } from "./state";
@@ -12,6 +12,7 @@ export type Action =
   | { type: "status"; status: Status; at: number }
   | { type: "frame"; view: string; cycle: number }
   | { type: "order"; status: OrderStatus }
+  | { type: "played"; played: Played }
   | { type: "end"; end: RunEnd }
   | { type: "wheel asked"; by: string }
   | { type: "refused"; id: string | null; text: string }

@@ -48,6 +48,7 @@ function after(state: State, action: Action): State {
       return { ...state, orders: orderTold(state.orders, action.status), undone: isOurs ? state.undone : [] };
     }
     case "order dismissed": return { ...state, orders: state.orders.map((order) => (order.id === action.id ? { ...order, dismissed: true } : order)) };
+    case "played": return { ...state, played: action.played };
     case "end": return { ...state, end: action.end, askedBy: null };
     case "wheel asked": return { ...state, askedBy: action.by };
     case "wheel answered": return { ...state, askedBy: null };

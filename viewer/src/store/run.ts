@@ -36,6 +36,7 @@ export const isSteering = (state: State): boolean => whyNotSteering(state) === "
 /** Why this viewer's commands would not be obeyed, in words; empty where they are. */
 export function whyNotSteering(state: State): string {
   const { connection, hello, status, end } = state;
+  if (hello?.recording) return "This is a recording: it can be watched, and not be steered.";
   if (end) return "The run has ended.";
   if (connection.state !== "connected" || !hello) return "There is no connection to the simulation.";
   if (status?.stopped) return "The run is coming to its end.";

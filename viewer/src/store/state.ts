@@ -1,6 +1,6 @@
 /** What the page knows: of the run, of what is being composed, and of what became of it. */
 import type { ConnectionState } from "../connection/connection";
-import type { ForecastAnswer, Hello, Json, OrderStatus, RunEnd, Status } from "../connection/protocol";
+import type { ForecastAnswer, Hello, Json, OrderStatus, Played, RunEnd, Status } from "../connection/protocol";
 import type { OrderForm, Values } from "../form/schema";
 import type { Looks } from "./looks";
 
@@ -69,6 +69,8 @@ export interface State {
   connection: { state: ConnectionState; explanation: string; /** Whether there has been a connection before this one. */ known: boolean; fresh: boolean };
   hello: Hello | null;
   status: Status | null;
+  /** Where in a recording the viewer is; null of a run. */
+  played: Played | null;
   /** The last word of a run that has ended. */
   end: RunEnd | null;
   /** When the run was at which cycle, by this page's clock; the newest last. */
@@ -100,7 +102,7 @@ export const NO_FORECAST: ForecastState = { state: "none", answer: null, reason:
 
 export const INITIAL: State = {
   connection: { state: "connecting", explanation: "", known: false, fresh: false },
-  hello: null, status: null, end: null,
+  hello: null, status: null, played: null, end: null,
   progress: [],
   frames: { count: 0, cycle: null, views: {} },
   looks: {}, chosenView: null,

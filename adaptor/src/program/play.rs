@@ -1,0 +1,36 @@
+//! `tombolo play`.
+
+use std::{io::IsTerminal, net::SocketAddr, path::PathBuf};
+
+use clap::Args;
+use signal_hook::{
+    consts::{SIGINT, SIGTERM},
+    iterator::Signals,
+};
+use crate::{pipelines::language::StreamServer, play::Playback};
+
+use super::{Failure, say};
+
+#[derive(Debug, Args)]
+pub(crate) struct Options {
+    /// The recording that a run has written
+    file: PathBuf,
+    /// Where viewers connect to; port 0 takes any free one
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    listen: Option<SocketAddr>,
+}
+
+/// Serves a recording until it is interrupted.
+pub(crate) fn play(options: &Options) -> Result<(), Failure> {
+    let mut settings = StreamServer::default();
+    if let Some(listen) = options.listen {
+        settings.listen = listen;
+    }
+    let mut signals = Signals::new([SIGINT, SIGTERM])?;
+    let mut playback = Playback::start(&options.file, &settings)?;
+    let directory = std::env::temp_dir();
+    let invitation = playback.invitation(&directory, std::io::stdout().is_terminal())?;
+    say(&invitation)?;
+    signals.forever().next();
+    Ok(())
+}

@@ -1,0 +1,133 @@
+//! Recordings of runs: what viewers are told, kept in a file.
+//!
+//! With `"record": "run.tombolo"` in its configuration a run writes one, whether anybody watches or
+//! not; `tombolo play` shows it in the viewer, and `tombolo export` writes files for other programs.
+//!
+//! ```no_run
+//! use tombolo::{pipelines::encode::Decoder, recording::{Recording, RecordedMessage}};
+//!
+//! let mut recording = Recording::open("run.tombolo")?;
+//! println!("{} seconds, to cycle {}", recording.last().seconds, recording.last().cycle);
+//! let mut decoder = Decoder::new();
+//! while let Some(recorded) = recording.read_next()? {
+//!     match recorded.message {
+//!         RecordedMessage::Text(text) => println!("{text}"),
+//!         RecordedMessage::Frame { bytes, .. } => {
+//!             let frame = decoder.decode(&bytes)?;
+//!             println!("{} at cycle {}: {} points", frame.view, frame.cycle, frame.points.len());
+//!         }
+//!     }
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod format;
+mod reader;
+
+pub(crate) use format::{HEAD, Head, Kind, MAGIC, read_head, write};
+pub use reader::{Moment, RecordError, Recorded, RecordedMessage, Recording};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A recording of two views: a key frame of each every ten messages.
+    fn bytes() -> Vec<u8> {
+        let mut out = MAGIC.to_vec();
+        for number in 0..60_u64 {
+            let text = format!("{{\"status\":{{\"cycle\":{number}}}}}");
+            let (kind, view, message) = match number % 10 {
+                0 if number == 0 => (Kind::Hello, 0, "{\"hello\":{}}".into()),
+                1 => (Kind::KeyFrame, 0, format!("key {number}")),
+                2 => (Kind::KeyFrame, 1, format!("key {number}")),
+                3 => (Kind::Order, 0, format!("{{\"order\":{{\"id\":\"o{number}\"}}}}")),
+                4..7 => (Kind::NextFrame, u32::from(number % 2 == 0), format!("next {number}")),
+                _ => (Kind::of_text(&text), 0, text),
+            };
+            let moment = (number, 0.1 * number as f64);
+            let head = Head::of(kind, view, moment, 100 * number, message.as_bytes()).unwrap();
+            write(&mut out, &head, message.as_bytes()).unwrap();
+        }
+        out
+    }
+
+    fn opened(bytes: &[u8]) -> Result<Recording, RecordError> {
+        let directory = tempfile::tempdir().unwrap();
+        let file = directory.path().join("run.tombolo");
+        std::fs::write(&file, bytes).unwrap();
+        Recording::open(&file)
+    }
+
+    fn all(recording: &mut Recording) -> Vec<Recorded> {
+        std::iter::from_fn(|| recording.read_next().unwrap()).collect()
+    }
+
+    #[test]
+    fn messages_come_back_in_their_order() {
+        let mut recording = opened(&bytes()).unwrap();
+        assert_eq!(recording.first(), Moment::default());
+        assert_eq!(recording.last(), Moment { cycle: 59, time: 0.1 * 59.0, seconds: 5.9 });
+        assert_eq!(recording.lost_bytes(), 0);
+        let messages = all(&mut recording);
+        assert_eq!(messages.len(), 60);
+        assert!((0..60).zip(&messages).all(|(number, it)| it.moment.cycle == number));
+    }
+
+    #[test]
+    fn it_is_gone_to_the_newest_key_frames_of_all_views() {
+        let mut recording = opened(&bytes()).unwrap();
+        for (seconds, expected) in [(0.0, 0), (0.15, 1), (2.15, 12), (3.9, 31), (100.0, 51)] {
+            recording.seek(seconds);
+            assert_eq!(recording.read_next().unwrap().unwrap().moment.cycle, expected, "{seconds}");
+        }
+        assert_eq!(recording.seconds_of_cycle(22), 2.2);
+        assert_eq!(recording.seconds_of_time(99.0), 5.9);
+        assert_eq!(
+            recording.orders(1.35),
+            ["{\"order\":{\"id\":\"o3\"}}", "{\"order\":{\"id\":\"o13\"}}"]
+        );
+        assert_eq!(recording.hello(0.5).as_deref(), Some("{\"hello\":{}}"));
+    }
+
+    #[test]
+    fn what_was_cut_off_anywhere_is_read_up_to_there() {
+        let whole = bytes();
+        let expected = all(&mut opened(&whole).unwrap());
+        let mut most = 0;
+        for end in 0..whole.len() {
+            match opened(&whole[..end]) {
+                Ok(mut recording) => {
+                    let found = all(&mut recording);
+                    assert!(found[..] == expected[..found.len()] && found.len() >= most, "{end}");
+                    most = found.len();
+                }
+                Err(RecordError::Other { .. } | RecordError::Empty { .. }) => assert_eq!(most, 0),
+                Err(error) => panic!("{end}: {error}"),
+            }
+        }
+        assert_eq!(most, 59);
+    }
+
+    #[test]
+    fn what_was_damaged_anywhere_is_passed_over() {
+        let whole = bytes();
+        let expected = all(&mut opened(&whole).unwrap());
+        for at in 0..whole.len() {
+            let mut damaged = whole.clone();
+            damaged[at] ^= 1 << (at % 8);
+            let Ok(mut recording) = opened(&damaged) else { continue };
+            let found = all(&mut recording);
+            assert!(found.iter().all(|message| expected.contains(message)), "{at}");
+            recording.seek(3.0);
+            let _ = (recording.read_next(), recording.hello(3.0), recording.orders(3.0));
+        }
+    }
+
+    #[test]
+    fn lengths_that_lie_cost_no_memory() {
+        let mut lying = MAGIC.to_vec();
+        let head = Head::of(Kind::Hello, 0, (0, 0.0), 0, b"{\"hello\":{}}").unwrap();
+        write(&mut lying, &Head { length: 1 << 30, ..head }, b"{\"hello\":{}}").unwrap();
+        assert!(matches!(opened(&lying), Err(RecordError::Empty { .. })));
+    }
+}

@@ -1,0 +1,317 @@
+//! Reads recordings.
+
+use std::{
+    fs::File,
+    io::{self, BufReader, Read},
+    path::{Path, PathBuf},
+};
+
+use super::format::{HEAD, Head, Kind, MAGIC, read_head, read_message};
+
+/// Key frames whose places are kept; in a longer recording every other is forgotten, again and again.
+const KEYS: usize = 1 << 18;
+/// Texts about orders whose places are kept, the newest.
+const ORDERS: usize = 1 << 16;
+
+/// Why a recording cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordError {
+    /// The file cannot be read or written.
+    #[error("the recording {}: {source}", file.display())]
+    File {
+        /// The file.
+        file: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// The file is something else.
+    #[error("{} is no recording; expected a file that a run has written for its `record`", file.display())]
+    Other {
+        /// The file.
+        file: PathBuf,
+    },
+    /// There is no whole message in the file.
+    #[error("the recording {} is empty: the run ended before anything was recorded", file.display())]
+    Empty {
+        /// The file.
+        file: PathBuf,
+    },
+}
+
+/// A moment of a run, and of its recording.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Moment {
+    /// The step.
+    pub cycle: u64,
+    /// The simulated time.
+    pub time: f64,
+    /// Seconds since the recording began.
+    pub seconds: f64,
+}
+
+impl Moment {
+    fn of(head: &Head) -> Self {
+        #[expect(clippy::cast_precision_loss, reason = "some years of milliseconds")]
+        let seconds = head.milliseconds as f64 / 1e3;
+        Self { cycle: head.cycle, time: head.time, seconds }
+    }
+}
+
+/// The place of a message.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    at: u64,
+    view: u32,
+    moment: Moment,
+}
+
+/// A message of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recorded {
+    /// When it came.
+    pub moment: Moment,
+    /// The message, as viewers were sent it.
+    pub message: RecordedMessage,
+}
+
+/// What was sent to viewers.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RecordedMessage {
+    /// A text message: JSON.
+    Text(String),
+    /// A frame, and whether it can be read by itself.
+    Frame {
+        /// The frame's message.
+        bytes: Vec<u8>,
+        /// Whether it goes on from no other.
+        is_key: bool,
+    },
+}
+
+/// A recording that is read: what was whole when it was opened.
+///
+/// A last message that a killed run left half-written is passed over, and so is everything behind a
+/// message whose head is damaged; [`Recording::lost_bytes`] says how much. Memory is bounded, however
+/// long the file is.
+#[derive(Debug)]
+pub struct Recording {
+    path: PathBuf,
+    file: BufReader<File>,
+    /// Where the last whole message ends, and how long the file is.
+    end: u64,
+    length: u64,
+    first: Moment,
+    last: Moment,
+    keys: Vec<Place>,
+    hellos: Vec<Place>,
+    orders: Vec<Place>,
+    /// Where the next message to be read lies.
+    next: u64,
+}
+
+impl Recording {
+    /// Opens a file and looks at the heads of all its messages.
+    ///
+    /// # Errors
+    /// [`RecordError`].
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, RecordError> {
+        let path = path.as_ref();
+        let failed = |source| RecordError::File { file: path.into(), source };
+        let file = File::open(path).map_err(failed)?;
+        let length = file.metadata().map_err(failed)?.len();
+        let mut file = BufReader::new(file);
+        let mut magic = [0; MAGIC.len()];
+        match file.read_exact(&mut magic) {
+            Ok(()) if magic == *MAGIC => {}
+            Err(error) if error.kind() != io::ErrorKind::UnexpectedEof => {
+                return Err(failed(error));
+            }
+            _ => return Err(RecordError::Other { file: path.into() }),
+        }
+        let mut recording = Self {
+            path: path.into(),
+            file,
+            end: MAGIC.len() as u64,
+            length,
+            first: Moment::default(),
+            last: Moment::default(),
+            keys: Vec::new(),
+            hellos: Vec::new(),
+            orders: Vec::new(),
+            next: MAGIC.len() as u64,
+        };
+        recording.look_through().map_err(failed)?;
+        if recording.hellos.is_empty() {
+            return Err(RecordError::Empty { file: path.into() });
+        }
+        Ok(recording)
+    }
+
+    fn look_through(&mut self) -> io::Result<()> {
+        let mut is_first = true;
+        // One in so many key frames is kept.
+        let (mut every, mut seen) = (1_usize, 0_usize);
+        while let Some(head) = read_head(&mut self.file, self.end)? {
+            let next = self.end + HEAD as u64 + u64::from(head.length);
+            if next > self.length {
+                break;
+            }
+            let moment = Moment::of(&head);
+            let place = Place { at: self.end, view: head.view, moment };
+            match head.kind {
+                Kind::Hello => self.hellos.push(place),
+                Kind::Order => self.orders.push(place),
+                Kind::KeyFrame => {
+                    if seen.is_multiple_of(every) {
+                        self.keys.push(place);
+                    }
+                    seen += 1;
+                }
+                _ => {}
+            }
+            if self.keys.len() > KEYS {
+                let mut index = 0;
+                self.keys.retain(|_| {
+                    index += 1;
+                    index % 2 == 1
+                });
+                every *= 2;
+            }
+            for kept in [&mut self.hellos, &mut self.orders] {
+                if kept.len() > ORDERS {
+                    kept.drain(..ORDERS / 2);
+                }
+            }
+            if std::mem::take(&mut is_first) {
+                self.first = moment;
+            }
+            self.last = moment;
+            self.end = next;
+        }
+        Ok(())
+    }
+
+    /// The first moment.
+    #[must_use]
+    pub fn first(&self) -> Moment {
+        self.first
+    }
+
+    /// The last moment.
+    #[must_use]
+    pub fn last(&self) -> Moment {
+        self.last
+    }
+
+    /// Bytes at the end of the file that cannot be read.
+    #[must_use]
+    pub fn lost_bytes(&self) -> u64 {
+        self.length - self.end
+    }
+
+    /// The file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The next message, whatever it is; `None` at the end. A message whose bytes are damaged is
+    /// passed over, and the frames that go on from it are of no use until a key frame comes.
+    ///
+    /// # Errors
+    /// [`RecordError::File`].
+    pub fn read_next(&mut self) -> Result<Option<Recorded>, RecordError> {
+        let path = self.path.clone();
+        let failed = |source| RecordError::File { file: path.clone(), source };
+        while self.next < self.end {
+            let at = self.next;
+            let Some(head) = read_head(&mut self.file, at).map_err(failed)? else { break };
+            self.next = at + HEAD as u64 + u64::from(head.length);
+            if let Some(recorded) = self.message(at, &head).map_err(failed)? {
+                return Ok(Some(recorded));
+            }
+        }
+        self.next = self.end;
+        Ok(None)
+    }
+
+    /// When the next message came; `None` at the end.
+    pub fn next_moment(&mut self) -> Option<Moment> {
+        if self.next >= self.end {
+            return None;
+        }
+        let head = read_head(&mut self.file, self.next).ok()??;
+        Some(Moment::of(&head))
+    }
+
+    fn message(&mut self, at: u64, head: &Head) -> io::Result<Option<Recorded>> {
+        let Some(bytes) = read_message(&mut self.file, at, head)? else { return Ok(None) };
+        let message = if head.kind.is_frame() {
+            RecordedMessage::Frame { bytes, is_key: head.kind == Kind::KeyFrame }
+        } else {
+            match String::from_utf8(bytes) {
+                Ok(text) => RecordedMessage::Text(text),
+                Err(_) => return Ok(None),
+            }
+        };
+        Ok(Some(Recorded { moment: Moment::of(head), message }))
+    }
+
+    fn text_at(&mut self, place: Place) -> Option<String> {
+        let head = read_head(&mut self.file, place.at).ok()??;
+        match self.message(place.at, &head).ok()??.message {
+            RecordedMessage::Text(text) => Some(text),
+            RecordedMessage::Frame { .. } => None,
+        }
+    }
+
+    /// Goes to a moment: the next message will be the key frame from which the first view to come can
+    /// be shown, where all views that have one before then can. Texts before the moment are to be
+    /// passed over.
+    pub fn seek(&mut self, seconds: f64) {
+        let upto = self.keys.partition_point(|key| key.moment.seconds <= seconds);
+        let mut newest: Vec<Place> = Vec::new();
+        for key in self.keys[..upto].iter().rev() {
+            if newest.iter().all(|known| known.view != key.view) {
+                newest.push(*key);
+            }
+            // More views than this are not looked for: they begin where they have their next key.
+            if newest.len() >= 64 {
+                break;
+            }
+        }
+        self.next = newest.iter().map(|key| key.at).min().unwrap_or(MAGIC.len() as u64);
+    }
+
+    /// The moment of a cycle: that of the first key frame or greeting of it or a later one.
+    #[must_use]
+    pub fn seconds_of_cycle(&self, cycle: u64) -> f64 {
+        self.seconds_where(|moment| moment.cycle >= cycle)
+    }
+
+    /// The moment of a simulated time.
+    #[must_use]
+    pub fn seconds_of_time(&self, time: f64) -> f64 {
+        self.seconds_where(|moment| moment.time >= time)
+    }
+
+    fn seconds_where(&self, has_come: impl Fn(&Moment) -> bool) -> f64 {
+        let found = self.keys.iter().find(|key| has_come(&key.moment));
+        found.map_or(self.last.seconds, |key| key.moment.seconds)
+    }
+
+    /// The newest greeting up to a moment.
+    pub fn hello(&mut self, seconds: f64) -> Option<String> {
+        let upto = self.hellos.partition_point(|hello| hello.moment.seconds <= seconds).max(1);
+        let place = self.hellos.get(upto - 1).copied()?;
+        self.text_at(place)
+    }
+
+    /// What had become of orders up to a moment: texts about them, the oldest first.
+    pub fn orders(&mut self, seconds: f64) -> Vec<String> {
+        let upto = self.orders.partition_point(|order| order.moment.seconds <= seconds);
+        let places = self.orders[..upto].to_vec();
+        places.into_iter().filter_map(|place| self.text_at(place)).collect()
+    }
+}

@@ -1,0 +1,99 @@
+//! Somebody inside the program who is told what viewers are told.
+
+use std::{io, sync::Arc, time::Duration};
+
+use axum::body::Bytes;
+use serde_json::{Map, Value, json};
+
+use super::{
+    credentials::Access,
+    hub::Hub,
+    outbox::{Client, Message},
+    secret::Secret,
+};
+use crate::lock::lock;
+
+/// A message for somebody inside the program.
+pub(crate) enum Told {
+    /// The run is described anew.
+    Hello,
+    /// A text message.
+    Text(Arc<str>),
+    /// A frame; a key frame with its topology.
+    Frame { view: usize, is_key: bool, bytes: Bytes },
+    /// Frames of a view were missed: a key frame of it is needed.
+    Behind(usize),
+    /// So much was left unread that the rest is not told.
+    TooMuch,
+    /// Nothing comes any more.
+    End,
+}
+
+/// Is told what viewers are told, as long as it is the one that the hub has.
+pub(crate) struct Observer {
+    client: Arc<Client>,
+    runtime: tokio::runtime::Runtime,
+}
+
+impl Observer {
+    /// The observer of a hub, of which it has one.
+    pub(crate) fn of(hub: &Hub) -> io::Result<Self> {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build()?;
+        let secret = Secret::random().map_err(|error| io::Error::other(error.to_string()))?;
+        let mut state = lock(&hub.state);
+        let client = Arc::new(Client::new(0, Access::Watch, secret, state.view_numbers()));
+        state.observer = Some(Arc::clone(&client));
+        drop(state);
+        hub.look();
+        Ok(Self { client, runtime })
+    }
+
+    /// The next message, if there is one.
+    pub(crate) fn next(&self) -> Option<Told> {
+        Some(match self.client.next() {
+            Ok(message) => match message? {
+                Message::Hello { .. } => Told::Hello,
+                Message::Text(text) => Told::Text(text),
+                Message::Frame(view, frame) => {
+                    let is_key = frame.is_key();
+                    let bytes = if is_key { frame.with_topology() } else { frame.message.clone() };
+                    Told::Frame { view, is_key, bytes }
+                }
+                Message::Behind(view) => Told::Behind(view),
+                Message::End => Told::End,
+            },
+            Err(_) => Told::TooMuch,
+        })
+    }
+
+    /// Returns once there may be something, or after this time.
+    pub(crate) fn wait(&self, time: Duration) {
+        let notified = self.client.wake.notified();
+        self.runtime.block_on(async { _ = tokio::time::timeout(time, notified).await });
+    }
+}
+
+impl Hub {
+    /// Tells the observer nothing behind what it was told; how the run ends where that `is_untold`.
+    pub(crate) fn end_observing(&self, is_untold: bool) {
+        let Some(observer) = lock(&self.state).observer.clone() else { return };
+        if is_untold {
+            self.tell_end();
+        }
+        observer.end();
+    }
+
+    /// Tells nothing more to the observer.
+    pub(crate) fn stop_observing(&self) {
+        lock(&self.state).observer = None;
+    }
+
+    /// The description of the run, without anything that is meant for one viewer alone.
+    pub(crate) fn hello_for_all(&self, orders: Option<Value>) -> String {
+        let (description, stack) = self.described();
+        let mut hello = Map::clone(&description);
+        hello.insert("stack".into(), stack.map_or_else(|| json!([]), |stack| stack()));
+        hello.extend(orders.map(|orders| ("orders".into(), orders)));
+        json!({ "hello": hello }).to_string()
+    }
+}

@@ -1,0 +1,145 @@
+//! Recordings: made without anybody watching, read again, and gone through by viewers.
+
+mod common;
+
+use std::{path::Path, time::Duration};
+
+use common::{Solver, Viewer, config, squeeze};
+use serde_json::{Value, json};
+use tombolo::{
+    Settings,
+    pipelines::{encode::Decoder, language::StreamServer},
+    play::Playback,
+    recording::{Recorded, RecordedMessage, Recording},
+};
+
+const PIPELINES: &str = r#""pipelines": [
+    {"name": "boundary", "every": {"steps": 1}, "stages": [{"surface": {}}, {"stream": {}}]},
+    {"name": "middle", "every": {"steps": 3}, "stages": [
+        {"slice": {"origin": [0.5, 0.5, 0.5], "normal": [0, 0, 1]}}, {"stream": {}}]},
+    {"name": "health", "every": {"steps": 2}, "stages": [{"quality": {}}]}]"#;
+
+/// A run of so many steps with an order at cycle 5.
+fn record(output: &Path, more: &str, steps: u64) {
+    let text = format!(r#"{{"version": 1, "record": "run.tombolo", {more}{PIPELINES}}}"#);
+    let orders = json!([{"at": {"cycle": 5}, "order": squeeze(0.2)}]).to_string();
+    let orders = tombolo::pipelines::language::parse_orders(&orders, "orders.json").unwrap();
+    let settings =
+        Settings { config: config(&text), output: output.into(), orders, ..Settings::default() };
+    let mut solver = Solver::new(settings);
+    for _ in 0..steps {
+        solver.step();
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    solver.finish();
+}
+
+fn all(file: &Path) -> Vec<Recorded> {
+    let mut recording = Recording::open(file).unwrap();
+    assert_eq!(recording.lost_bytes(), 0);
+    std::iter::from_fn(|| recording.read_next().unwrap()).collect()
+}
+
+fn texts(recorded: &[Recorded]) -> Vec<Value> {
+    let text = |recorded: &Recorded| match &recorded.message {
+        RecordedMessage::Text(text) => serde_json::from_str(text).ok(),
+        RecordedMessage::Frame { .. } => None,
+    };
+    recorded.iter().filter_map(text).collect()
+}
+
+#[test]
+fn a_run_is_recorded_without_a_viewer_and_without_a_server() {
+    for more in ["", r#""stream": {"listen": "127.0.0.1:0"}, "#] {
+        let output = tempfile::tempdir().unwrap();
+        let file = output.path().join("run.tombolo");
+        record(output.path(), more, 30);
+        let recorded = all(&file);
+        let told = texts(&recorded);
+        let first = told[0].get("hello").expect("it begins with what viewers are greeted with");
+        assert!(first.get("back").is_none() && first.get("client").is_none(), "{first}");
+        assert!(told.iter().any(|it| it["order"]["status"] == "applied"));
+        assert!(told.iter().any(|it| it["monitor"]["pipeline"] == "health"));
+        assert_eq!(told.iter().filter(|it| it.get("end").is_some()).count(), 1, "{more}");
+        assert_eq!(told.last().unwrap()["end"]["how"], "finished");
+        let mut decoder = Decoder::new();
+        let mut cycles = std::collections::BTreeMap::<String, Vec<u64>>::new();
+        for recorded in &recorded {
+            if let RecordedMessage::Frame { bytes, .. } = &recorded.message {
+                let frame = decoder.decode(bytes).expect("every frame can be read");
+                cycles.entry(frame.view).or_default().push(frame.cycle);
+            }
+        }
+        assert!(cycles["boundary"].len() > 10 && cycles["middle"].len() > 3, "{cycles:?}");
+        assert!(cycles.values().all(|cycles| cycles.is_sorted()));
+        // The next run goes on below.
+        let before = std::fs::read(&file).unwrap();
+        std::fs::write(&file, [&before[..], b"half-writ"].concat()).unwrap();
+        record(output.path(), more, 5);
+        let both = std::fs::read(&file).unwrap();
+        assert!(both.starts_with(&before) && all(&file).len() > recorded.len() + 5);
+    }
+}
+
+#[test]
+fn a_recording_has_a_limit_and_the_run_goes_on() {
+    let output = tempfile::tempdir().unwrap();
+    let file = output.path().join("run.tombolo");
+    let text =
+        format!(r#"{{"version": 1, "record": "run.tombolo", "record_megabytes": 1, {PIPELINES}}}"#);
+    let settings =
+        Settings { config: config(&text), output: output.path().into(), ..Settings::default() };
+    let mut solver = Solver::of_box([20, 20, 20], settings);
+    solver.steps(60);
+    let bytes = std::fs::metadata(&file).unwrap().len();
+    solver.steps(60);
+    solver.finish();
+    let after = std::fs::metadata(&file).unwrap().len();
+    assert!(after < 3 << 20, "{bytes} and {after} bytes");
+    all(&file);
+}
+
+#[test]
+fn viewers_go_through_a_recording() {
+    let output = tempfile::tempdir().unwrap();
+    let file = output.path().join("run.tombolo");
+    record(output.path(), "", 60);
+    let last = Recording::open(&file).unwrap().last();
+    let settings =
+        StreamServer { listen: "127.0.0.1:0".parse().unwrap(), ..StreamServer::default() };
+    let playback = Playback::start(&file, &settings).unwrap();
+    let url = playback.link().replacen("http://", "ws://", 1).replacen("/?", "/ws?", 1);
+    let mut viewer = Viewer::try_connect(&url).unwrap();
+    let hello = viewer.hello();
+    assert_eq!((&hello["role"], &hello["may_drive"]), (&json!("watcher"), &json!(false)));
+    assert_eq!(hello["recording"]["last"]["cycle"], last.cycle);
+    // What would steer is refused.
+    viewer.send(&json!({"id": "x", "order": squeeze(0.1)}));
+    let error = viewer.wait_for("error", |error| error["id"] == "x");
+    assert!(error["message"].as_str().unwrap().contains("recording"), "{error}");
+    viewer.send(&json!({"id": "y", "play": {"speed": 0}}));
+    viewer.wait_for("error", |error| error["id"] == "y");
+    // To its end, faster.
+    viewer.send(&json!({"play": {"speed": 100}}));
+    viewer.wait_for("play", |play| play["at_end"] == true);
+    viewer.wait_for("order", |order| order["status"] == "applied");
+    let frames = viewer.decoded();
+    assert!(frames.iter().any(|frame| frame.view == "boundary" && frame.cycle > 40));
+    // Back: the picture is that of the moment, and stays while it is paused.
+    let seconds = 0.4 * last.seconds;
+    viewer.seen.clear();
+    viewer.send(&json!({"play": {"paused": true, "seek": {"seconds": seconds}}}));
+    let hello = viewer.wait_for("hello", |_| true);
+    assert!(hello["orders"].as_array().is_some_and(|orders| orders.len() == 1), "{hello}");
+    let play = viewer.wait_for("play", |play| play["paused"] == true);
+    assert!((play["seconds"].as_f64().unwrap() - seconds).abs() < 1e-9, "{play}");
+    let shown = viewer.decoded();
+    let newest =
+        shown.iter().filter(|frame| frame.view == "boundary").map(|frame| frame.cycle).max();
+    let newest = newest.expect("the view is shown at once");
+    assert!(newest > 5 && newest < 40, "{newest}");
+    viewer.look_for("nothing", Duration::from_millis(600), |_| true);
+    assert!(viewer.decoded().is_empty());
+    viewer.send(&json!({"play": {"seek": {"cycle": 0}, "paused": false, "speed": 100}}));
+    viewer.wait_for("play", |play| play["at_end"] == true);
+}

@@ -1,0 +1,60 @@
+/** The slider of a recording, below the picture: where it is, how fast it goes on, and whether it rests. */
+import { part, write } from "../dom";
+import { digits } from "../number";
+import type { Action } from "../store/actions";
+import type { Commands } from "../store/commands";
+import type { State } from "../store/state";
+import type { Store } from "../store/store";
+
+/** Milliseconds between two messages while the slider is dragged. */
+const DRAG_PERIOD = 150;
+
+export class RecordingPanel {
+  private readonly slider = part("moment") as HTMLInputElement;
+  private readonly button = part("play") as HTMLButtonElement;
+  private readonly speed = part("speed") as HTMLSelectElement;
+  private sentAt = -Infinity;
+  /** The slider is in somebody's hand: what is told of the moment does not move it. */
+  private held = false;
+
+  constructor(private readonly store: Store<State, Action>, private readonly commands: Commands) {
+    store.watch((state) => state.hello?.recording ?? null, (recording) => {
+      part("recording").hidden = recording === null;
+      if (!recording) return;
+      this.slider.min = String(recording.first.seconds);
+      this.slider.max = String(recording.last.seconds);
+      this.show();
+    });
+    store.watch((state) => state.played, () => this.show());
+    this.slider.addEventListener("input", () => {
+      this.held = true;
+      if (performance.now() - this.sentAt >= DRAG_PERIOD) this.seek();
+    });
+    this.slider.addEventListener("change", () => {
+      this.held = false;
+      this.seek();
+    });
+    this.button.addEventListener("click", () => {
+      const { played, hello } = this.store.state;
+      // From its end a recording begins again.
+      const again = played?.at_end ? { seek: { seconds: hello?.recording?.first.seconds ?? 0 } } : {};
+      this.commands.ask({ play: { ...again, paused: played?.at_end ? false : !played?.paused } });
+    });
+    this.speed.addEventListener("change", () => this.commands.ask({ play: { speed: Number(this.speed.value) } }));
+  }
+
+  private seek(): void {
+    this.sentAt = performance.now();
+    this.commands.ask({ play: { seek: { seconds: Number(this.slider.value) } } });
+  }
+
+  private show(): void {
+    const { played } = this.store.state;
+    if (!played) return;
+    if (!this.held) this.slider.value = String(played.seconds);
+    const text = `cycle ${played.cycle}, time ${digits(played.time)}`;
+    write(part("moment-text"), text);
+    this.slider.setAttribute("aria-valuetext", text);
+    write(this.button, played.at_end ? "Again" : played.paused ? "Play" : "Pause");
+  }
+}

@@ -1,0 +1,67 @@
+// @vitest-environment jsdom
+import { beforeEach, describe, expect, it } from "vitest";
+import { parseServerMessage } from "../../src/connection/protocol";
+import type { Played } from "../../src/connection/protocol";
+import { RecordingPanel } from "../../src/panels/recording";
+import { whyNotSteering } from "../../src/store/run";
+import { page } from "../page";
+import { openDocument } from "./document";
+
+const recording = { first: { seconds: 0, cycle: 0, time: 0 }, last: { seconds: 60, cycle: 600, time: 6 } };
+const played = (more: Partial<Played>): Played => ({ seconds: 12, cycle: 120, time: 1.2, speed: 1, paused: false, at_end: false, ...more });
+
+describe("the slider of a recording", () => {
+  let made: ReturnType<typeof page>;
+  const panel = (): HTMLElement => document.getElementById("recording")!;
+  const slider = (): HTMLInputElement => document.querySelector<HTMLInputElement>("#moment")!;
+  const button = (): HTMLButtonElement => document.querySelector<HTMLButtonElement>("#play")!;
+  beforeEach(() => {
+    openDocument();
+    made = page();
+    new RecordingPanel(made.store, made.commands);
+  });
+
+  it("is there for a recording alone", () => {
+    expect(panel().hidden).toBe(true);
+    made.greet({ recording });
+    expect([panel().hidden, slider().min, slider().max]).toEqual([false, "0", "60"]);
+    expect(whyNotSteering(made.store.state)).toContain("recording");
+  });
+
+  it("shows the moment, and does not move in somebody's hand", () => {
+    made.greet({ recording });
+    made.store.dispatch({ type: "played", played: played({}) });
+    expect([slider().value, document.getElementById("moment-text")!.textContent]).toEqual(["12", "cycle 120, time 1.2"]);
+    slider().value = "30";
+    slider().dispatchEvent(new Event("input"));
+    made.store.dispatch({ type: "played", played: played({ seconds: 13 }) });
+    expect(slider().value).toBe("30");
+    slider().dispatchEvent(new Event("change"));
+    expect(made.sent.at(-1)).toMatchObject({ play: { seek: { seconds: 30 } } });
+    made.store.dispatch({ type: "played", played: played({ seconds: 31 }) });
+    expect(slider().value).toBe("31");
+  });
+
+  it("pauses, goes on, and begins again at the end", () => {
+    made.greet({ recording });
+    made.store.dispatch({ type: "played", played: played({}) });
+    button().click();
+    expect(made.sent.at(-1)).toMatchObject({ play: { paused: true } });
+    made.store.dispatch({ type: "played", played: played({ paused: true }) });
+    expect(button().textContent).toBe("Play");
+    button().click();
+    expect(made.sent.at(-1)).toMatchObject({ play: { paused: false } });
+    made.store.dispatch({ type: "played", played: played({ seconds: 60, at_end: true }) });
+    expect(button().textContent).toBe("Again");
+    button().click();
+    expect(made.sent.at(-1)).toMatchObject({ play: { seek: { seconds: 0 }, paused: false } });
+    const speed = document.querySelector<HTMLSelectElement>("#speed")!;
+    speed.value = "16";
+    speed.dispatchEvent(new Event("change"));
+    expect(made.sent.at(-1)).toMatchObject({ play: { speed: 16 } });
+  });
+
+  it("is told by a message of its own", () => {
+    expect(parseServerMessage(JSON.stringify({ play: played({}) }))).toEqual({ kind: "play", body: played({}) });
+  });
+});
