@@ -246,9 +246,10 @@ impl Session {
 
 /// The file that the state of the run is to be saved in at the end of the coming step.
 fn checkpoint_file(node: &Node<'_, '_>) -> Result<Option<String>, RunError> {
-    let state = node.child(c"catalyst").and_then(|catalyst| catalyst.child(c"state"));
-    let file = state.and_then(|state| state.child(c"checkpoint"));
-    file.map(|file| Ok(file.text()?.into_owned())).transpose()
+    let Some(catalyst) = node.child(c"catalyst") else { return Ok(None) };
+    let Some(state) = catalyst.child(c"state") else { return Ok(None) };
+    let Some(file) = state.child(c"checkpoint") else { return Ok(None) };
+    Ok(Some(file.text()?.into_owned()))
 }
 
 /// Names the path of what chooses the pipelines.

@@ -12,12 +12,6 @@ use crate::geometry::Geometry;
 use crate::ranks::agreed;
 
 impl Solver {
-    /// Where the mesh lies now, in the mesh's numbering.
-    #[must_use]
-    pub fn points(&self) -> Vec<Vector> {
-        self.topology.to_mesh(&self.geometry.points)
-    }
-
     /// The parameters that boundary values may depend on.
     #[must_use]
     pub fn parameters(&self) -> &[f64] {
