@@ -9,8 +9,6 @@ use std::{
     sync::Arc,
 };
 
-use clap::Args;
-use serde_json::Value;
 use crate::{
     deform::mesh::{CellType, Cells},
     pipelines::{
@@ -22,6 +20,8 @@ use crate::{
     },
     recording::{RecordedMessage, Recording},
 };
+use clap::Args;
+use serde_json::Value;
 
 use super::{Failure, say};
 

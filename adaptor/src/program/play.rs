@@ -2,12 +2,12 @@
 
 use std::{io::IsTerminal, net::SocketAddr, path::PathBuf};
 
+use crate::{pipelines::language::StreamServer, play::Playback};
 use clap::Args;
 use signal_hook::{
     consts::{SIGINT, SIGTERM},
     iterator::Signals,
 };
-use crate::{pipelines::language::StreamServer, play::Playback};
 
 use super::{Failure, say};
 

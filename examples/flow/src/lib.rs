@@ -57,7 +57,7 @@ pub mod parts;
 pub mod program;
 mod ranks;
 pub mod report;
-mod saved;
+pub mod saved;
 mod solver;
 mod topology;
 

@@ -8,8 +8,8 @@ use std::time::Instant;
 
 use tombolo::communicator::{Communicator, RankError, Solo};
 use tombolo::{
-    Adaptor, CheckpointError, ExecuteError, FinalizeError, InitializeError, JournalError, Restart,
-    Settings, Step, Stopper,
+    Adaptor, ExecuteError, FinalizeError, InitializeError, JournalError, Restart, Settings, Step,
+    Stopper,
 };
 use tombolo_deform::distributed::DistributedError;
 use tombolo_deform::features::FeatureSettings;
@@ -25,7 +25,7 @@ use crate::history::{History, Through};
 use crate::parts::{Dealing, Share};
 use crate::ranks::agreed;
 use crate::report::{FlowReport, MeshReport, Report};
-use crate::saved::{self, State};
+use crate::saved::{self, State, StateError};
 use crate::solver::{Motion, Settings as SolverSettings, Solver};
 use crate::{Patch, SolverError};
 
@@ -86,9 +86,9 @@ pub enum ProgramError {
     /// The flow cannot be solved.
     #[error(transparent)]
     Solver(#[from] SolverError),
-    /// The state of the adaptor cannot be gone on from.
+    /// The state of a run cannot be saved or gone on from.
     #[error(transparent)]
-    Checkpoint(#[from] CheckpointError),
+    State(#[from] StateError),
     /// The adaptor could not be set up.
     #[error(transparent)]
     Initialize(#[from] InitializeError),

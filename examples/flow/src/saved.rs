@@ -3,16 +3,39 @@
 use std::ffi::OsString;
 use std::fs::File;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use tombolo::Checkpoint;
-use tombolo::communicator::{Communicator, Reader, Writer};
+use tombolo::communicator::{Communicator, RankError, Reader, Writer};
+use tombolo::{Checkpoint, CheckpointError};
 
-use crate::program::ProgramError;
+use crate::SolverError;
 use crate::ranks::agreed;
 use crate::solver::Solver;
 
 const MAGIC: &[u8] = b"flow state 1\n";
+
+/// Why a state cannot be written, read or gone on from.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StateError {
+    /// The file cannot be read or written.
+    #[error("{}: {source}", file.display())]
+    File {
+        /// The file.
+        file: PathBuf,
+        /// Why not.
+        source: io::Error,
+    },
+    /// The flow cannot go on from it.
+    #[error(transparent)]
+    Solver(#[from] SolverError),
+    /// The adaptor cannot go on from it.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// Something is wrong on one rank. All ranks have this error.
+    #[error(transparent)]
+    Rank(#[from] RankError),
+}
 
 /// Writes the state of all ranks to a file, which is there whole or not at all. Collective.
 pub(crate) fn write(
@@ -20,13 +43,13 @@ pub(crate) fn write(
     file: &Path,
     solver: &Solver,
     checkpoint: &Checkpoint,
-) -> Result<(), ProgramError> {
+) -> Result<(), StateError> {
     let mut mine = Writer::default();
     solver.save(&mut mine);
     mine.bytes(&checkpoint.to_bytes());
     let all = communicator.gather(0, &mine.into_bytes());
     let written = all.map_or(Ok(()), |all| replace(file, &all));
-    let written = written.map_err(|source| ProgramError::File { file: file.into(), source });
+    let written = written.map_err(|source| StateError::File { file: file.into(), source });
     agreed(communicator, written)
 }
 
@@ -50,8 +73,8 @@ pub(crate) struct State {
 
 impl State {
     /// Reads the state that this rank has written.
-    pub(crate) fn read(file: &Path, rank: usize) -> Result<Self, ProgramError> {
-        let failed = |source| ProgramError::File { file: file.into(), source };
+    pub(crate) fn read(file: &Path, rank: usize) -> Result<Self, StateError> {
+        let failed = |source| StateError::File { file: file.into(), source };
         let all = std::fs::read(file).map_err(failed)?;
         let other = || {
             failed(io::Error::new(
@@ -72,10 +95,10 @@ impl State {
         &self,
         communicator: &dyn Communicator,
         solver: &mut Solver,
-    ) -> Result<Checkpoint, ProgramError> {
+    ) -> Result<Checkpoint, StateError> {
         let mut reader = Reader::new(0, &self.bytes);
         solver.restore(&mut reader)?;
-        let bytes = reader.bytes().map_err(|_| crate::SolverError::Saved.into());
+        let bytes = reader.bytes().map_err(|_| SolverError::Saved.into());
         let read = bytes.and_then(|bytes| Ok(Checkpoint::from_bytes(bytes)?));
         agreed(communicator, read)
     }
