@@ -56,11 +56,11 @@ impl Session {
             communicator: Arc::clone(&communicator),
             solvers: Arc::new(BuiltIn),
             parameters,
-            replay: None,
             orders,
             output,
             file,
             restart: restart.map(|file| Restart::File(file.into())),
+            ..Settings::default()
         };
         let stage = if is_default {
             let asked = Asked::of(&settings.parameters);
