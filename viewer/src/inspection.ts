@@ -44,6 +44,8 @@ export interface Inspection {
   readonly forecast: ForecastInspection;
   /** The skeleton that is drawn, with the places of the page of the nodes that can be dragged; null when there is none. */
   readonly skeleton: { nodes: number; segments: number; places: [number, number][] } | null;
+  /** Places of the page at which the parts of the gizmo can be gripped, such as `arrow z`; none when there is no handle. */
+  readonly gizmo: Readonly<Record<string, [number, number]>>;
   /** What went wrong, newest last: frames or messages that could not be read. */
   readonly errors: readonly string[];
   /** The box around a feature as it is now; null when no view shows it. */

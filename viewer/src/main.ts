@@ -7,6 +7,10 @@ import type { Frame, Json, Monitor, ServerMessage } from "./connection/protocol"
 import { part, write } from "./dom";
 import { EditForm, initialSettings } from "./form/form";
 import { orderForm } from "./form/schema";
+import { Handles } from "./handles/handles";
+import { FaceTools } from "./handles/face-tools";
+import { Overlay } from "./handles/overlay";
+import { ShapeTarget } from "./handles/shape-target";
 import { publish } from "./inspection";
 import { compileKernel } from "./kernel/kernel";
 import { History } from "./history/series";
@@ -25,7 +29,6 @@ import { SlicePanel } from "./panels/slice";
 import { CameraTools, Theming, watchPictureTools } from "./panels/tools";
 import { ViewList } from "./panels/views";
 import { WheelPanel } from "./panels/wheel";
-import { watchDrags } from "./picture/drag";
 import { ScalarBars, fieldText } from "./picture/bars";
 import { Triad, showEmpty } from "./picture/overlay";
 import { Marks } from "./picture/marks";
@@ -40,7 +43,7 @@ import { Forecasts } from "./preview/forecasts";
 import { Previewer } from "./preview/previewer";
 import type { Action } from "./store/actions";
 import { Commands } from "./store/commands";
-import { bodyOf, chosen, withMove } from "./store/draft";
+import { chosen } from "./store/draft";
 import { appliedOrders, isShapeUnderWay } from "./store/orders";
 import { Kept } from "./store/kept";
 import { onlyLook } from "./store/looks";
@@ -110,11 +113,15 @@ const scene = new Scene(part("scene"), selection, {
     marks.draw();
     if (pins.update()) dock.update();
     worst.update();
+    handles.drawn();
   },
   trouble: report,
 });
 const marks = new Marks(document.querySelector<SVGElement>("#marks")!, (point) => scene.onPage(point));
 const ruler = new Ruler(marks);
+const overlay = new Overlay(part("stage"), part("scene").nextElementSibling);
+const faces = new FaceTools(part("stage"), part("scene"), overlay.root, part("faces"), scene, store, (listener) => previewer.watchSurface(listener), () => scene.redraw());
+const handles = new Handles(part("stage"), part("scene"), scene, store, selection, new ShapeTarget(() => store.state, () => scene.shown(), faces), overlay, () => ruler.active);
 watchPointer(part("scene"), scene, selection, {
   reading: (x, y) => {
     const probe = scene.probe(x, y);
@@ -283,14 +290,6 @@ store.watch((state) => ({ views: state.hello?.views ?? [], looks: state.looks, h
 store.watch((state) => state.looks, (looks) => { kept.looks = looks; });
 store.watch((state) => appliedOrders(state.orders), (marks) => dock.setMarks(marks), sameJson);
 
-watchDrags(part("stage"), scene, selection, {
-  moved: (by, node, step) => {
-    const moves = (): Json[] => withMove(bodyOf(store.state.draft).moves, node!, by);
-    store.dispatch(node ? { type: "composed", key: "skeleton", values: store.state.draft.key === "skeleton" ? { moves: moves() } : { moves: [{ at: node, by }] }, step }
-      : { type: "composed", key: "translate", values: { by }, step });
-  },
-  aborted: (step) => store.dispatch({ type: "aborted", step }),
-});
 part("skeleton").addEventListener("click", (event) => {
   const button = event.currentTarget as HTMLButtonElement;
   const shown = button.getAttribute("aria-pressed") !== "true";
@@ -326,11 +325,12 @@ publish({
   get errors() { return [...store.state.errors]; },
   get skeleton() {
     const bones = scene.shownBones;
-    return bones && { nodes: bones.now.length / 3, segments: bones.segments.length / 2, places: scene.nodePlaces() };
+    return bones && { nodes: bones.now.length / 3, segments: bones.segments.length / 2, places: handles.nodePlaces() };
   },
+  get gizmo() { return handles.places(); },
   picture: () => scene.picture(),
   featureBounds: (name) => scene.featureBounds(name),
-  featurePlace: (name) => scene.featurePlace(name),
+  featurePlace: (name) => scene.featurePlace(name, (x, y) => handles.isFree(x, y)),
 });
 
 connection.start();

@@ -4,6 +4,7 @@ import vtkRenderer from "@kitware/vtk.js/Rendering/Core/Renderer";
 import vtkRenderWindowInteractor from "@kitware/vtk.js/Rendering/Core/RenderWindowInteractor";
 import { BonesPicture } from "./bones";
 import { makeCanvas } from "./canvas";
+import { ChosenFaces } from "./chosen-faces";
 import { Ghost } from "./ghost";
 import { Layer } from "./layer";
 import { bounds } from "./picking";
@@ -16,10 +17,10 @@ import { colourKey } from "../store/looks";
 import type { Look, Looks } from "../store/looks";
 import { THEMES } from "./theme";
 import type { Theme } from "./theme";
+import { Projection } from "../handles/projection";
 import type { PreviewSurface } from "../preview/preview";
 import type { DataFrame, TopologyFrame, Vector, ViewInformation } from "../connection/protocol";
 import type { Selection } from "../store/selection";
-import { REACH, nearestWithin } from "./skeleton";
 import type { Bones } from "./skeleton";
 
 /** The longest pause between two pictures of new values, in milliseconds. */
@@ -49,6 +50,7 @@ export class Scene {
   private readonly pending = new Map<string, DataFrame>();
   private readonly ghost: Ghost;
   private readonly bones: BonesPicture;
+  private readonly chosen: ChosenFaces;
   private features: string[] = [];
   private held = false;
   private theme: Theme = "dark";
@@ -76,6 +78,7 @@ export class Scene {
     container.addEventListener("keydown", (event) => this.key(event));
     new ResizeObserver(() => this.resize()).observe(container);
     selection.onChange(() => this.request());
+    this.chosen = new ChosenFaces(this.renderer);
     this.ghost = new Ghost(this.renderer);
     // What lies in the middle of a shape would be hidden by it.
     const above = vtkRenderer.newInstance();
@@ -100,6 +103,12 @@ export class Scene {
     this.request(drawn);
   }
 
+  /** Colours faces that are chosen, by the indices of their corners; none takes them away. */
+  setChosenFaces(points: Float32Array, corners: Uint32Array): void {
+    this.chosen.show(points, corners);
+    this.request();
+  }
+
   /** Shows a skeleton; null takes it away. */
   setBones(bones: Bones | null): void {
     this.bones.show(bones);
@@ -110,34 +119,12 @@ export class Scene {
     return this.bones.shown;
   }
 
-  /** Marks the place that a node is dragged to; null for none. */
-  holdNode(place: Vector | null): void {
-    this.bones.hold(place);
-    this.request();
-  }
-
-  /** The node under a place of the page that can be dragged: where it is now, and where in the reference. Null when there is none. */
-  nodeAt(clientX: number, clientY: number): { now: Vector; reference: Vector } | null {
-    const free = this.bones.shown?.free;
-    if (!free) return null;
-    const places = new Float32Array(2 * free.length);
-    free.forEach((node, i) => places.set(this.onPage(this.bones.node(node)?.now ?? [NaN, NaN, NaN]), 2 * i));
-    const found = nearestWithin(places, clientX, clientY, REACH);
-    return found < 0 ? null : this.bones.node(free[found]!);
-  }
-
   /** The place of the page at which a point is drawn. */
   onPage(point: Vector): [number, number] {
     const box = this.container.getBoundingClientRect();
     const [width, height] = this.canvas.getSize();
     const place = this.canvas.worldToDisplay(...point, this.renderer) as Vector;
     return [box.left + (place[0] / width) * box.width, box.top + (1 - place[1] / height) * box.height];
-  }
-
-  /** The places of the page of the nodes that can be dragged. */
-  nodePlaces(): [number, number][] {
-    const free = this.bones.shown?.free ?? new Uint32Array(0);
-    return Array.from(free, (node) => this.onPage(this.bones.node(node)?.now ?? [NaN, NaN, NaN]));
   }
 
   /** The box around the preview that is drawn; null when there is none. */
@@ -224,6 +211,11 @@ export class Scene {
     return this.pick(clientX, clientY)?.feature ?? null;
   }
 
+  /** The views that are drawn. */
+  *shown(): Iterable<Layer> {
+    for (const layer of this.layers.values()) if (layer.look.visible) yield layer;
+  }
+
   /** A place of the page on the canvas: x and y from its lower left corner, in its own pixels. */
   private onCanvas(clientX: number, clientY: number): [number, number] {
     const box = this.container.getBoundingClientRect();
@@ -231,11 +223,11 @@ export class Scene {
     return [((clientX - box.left) / box.width) * width, (1 - (clientY - box.top) / box.height) * height];
   }
 
-  /** The point at a place of the page that is as deep in the picture as another point. */
-  pointAt(clientX: number, clientY: number, as: Vector): Vector {
-    const [x, y] = this.onCanvas(clientX, clientY);
-    const depth = (this.canvas.worldToDisplay(...as, this.renderer) as Vector)[2];
-    return this.canvas.displayToWorld(x, y, depth, this.renderer) as Vector;
+  /** How the picture is seen now, in CSS pixels from its upper left corner. */
+  projection(): Projection {
+    const { clientWidth, clientHeight } = this.container;
+    const matrix = this.renderer.getActiveCamera().getCompositeProjectionMatrix(clientWidth / Math.max(1, clientHeight), -1, 1);
+    return new Projection(matrix, clientWidth, clientHeight);
   }
 
   /** The line through a place of the page, from the nearest depth of the picture to the farthest. */
@@ -280,8 +272,8 @@ export class Scene {
     return layer?.topology && layer.frame ? readProbe(probe, layer.topology, layer.frame, layer.look) : null;
   }
 
-  /** A place of the page at which this feature is seen and would be picked; null when nothing of it is. */
-  featurePlace(name: string): [number, number] | null {
+  /** A place of the page at which this feature is seen and would be picked, among those that are free; null when nothing of it is. */
+  featurePlace(name: string, isFree: (x: number, y: number) => boolean = () => true): [number, number] | null {
     const number = this.features.indexOf(name);
     for (const { topology, coordinates } of this.layers.values()) {
       if (!topology?.triangleFeatures || coordinates.length !== topology.points * 3) continue;
@@ -291,7 +283,7 @@ export class Scene {
         const corner = (k: number, axis: number): number => coordinates[3 * topology.triangles[3 * own[i]! + k]! + axis]!;
         const middle = [0, 1, 2].map((axis) => (corner(0, axis) + corner(1, axis) + corner(2, axis)) / 3);
         const [x, y] = this.onPage(middle as Vector);
-        if (this.featureAt(x, y) === name && document.elementFromPoint(x, y)?.closest("#scene")) return [x, y];
+        if (isFree(x, y) && this.featureAt(x, y) === name && document.elementFromPoint(x, y)?.closest("#scene")) return [x, y];
       }
     }
     return null;
@@ -398,6 +390,11 @@ export class Scene {
     this.canvas.setSize(Math.max(1, Math.floor(box.width * ratio)), Math.max(1, Math.floor(box.height * ratio)));
     // As much as there is room for: the page has grown or another panel is open.
     if (this.whole?.camera === this.cameraState()) this.reset();
+    this.request();
+  }
+
+  /** Has the picture drawn again, and what lies over it. */
+  redraw(): void {
     this.request();
   }
 

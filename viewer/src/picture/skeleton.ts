@@ -1,13 +1,13 @@
 /** What there is to draw of a curve skeleton, and which of its nodes is meant. */
 
-/** How many pixels from a node the pointer may be to mean it. */
-export const REACH = 12;
-
 /**
- * A skeleton to draw: where its nodes lie in the reference shape and in the shape that is now, the ends of its segments two by two,
- * and the nodes that can be dragged.
+ * A skeleton to draw: where its nodes lie in the reference shape, in the shape that is now and in the one that is previewed; the ends
+ * of its segments two by two, and the nodes that can be dragged; the nodes of each curve, and the feature that it mostly carries.
  */
-export interface Bones { reference: Float64Array; now: Float32Array; segments: Uint32Array; free: Uint32Array }
+export interface Bones {
+  reference: Float64Array; now: Float32Array; preview: Float32Array | null;
+  segments: Uint32Array; free: Uint32Array; curves: Uint32Array[]; features: (string | null)[];
+}
 
 /**
  * The segments of curves, and the nodes between their ends, which are pinned; all of a loop of its own, where nothing is.

@@ -20,15 +20,17 @@ export interface PreviewSurface { triangles: Uint32Array; triangleFeatures: Uint
  * A shape: its points, how far the edits move any of them and each feature, the size of the surface, when it was asked for, and the milliseconds that the kernel took.
  * `newest` says whether nothing newer is wished for already.
  */
-export interface PreviewShape { points: Float32Array; largest: number; moved: number[]; size: number; asked: number; computing: number; newest: boolean }
+export interface PreviewShape { points: Float32Array; /** Those of the skeleton, where it is known. */ nodes: Float32Array | null; largest: number; moved: number[]; size: number; asked: number; computing: number; newest: boolean }
 
 export interface PreviewEvents {
   surface(surface: PreviewSurface): void;
   shape(shape: PreviewShape): void;
-  /** What is wrong with the shape that was shown last; null where it is sound. */
-  checked(faults: ShapeFaults | null): void;
+  /** What is wrong with a shape that was shown; null where it is sound. `isNewest` says whether no other is wished for. */
+  checked(faults: ShapeFaults | null, isNewest: boolean): void;
   /** The skeleton that was asked for; or why there is none. */
   skeleton(bones: Bones | null, reason: string): void;
+  /** The points of the surface that were asked for, in the reference and in the shape that is. */
+  points(reference: Float64Array, now: Float32Array): void;
   /** An edit that cannot be previewed, or nothing to preview it with. */
   failed(kind: FailureKind | "surface-missing", reason: string): void;
   cleared(): void;
@@ -37,6 +39,9 @@ export interface PreviewEvents {
 /** Milliseconds without a new wish after which a shape is looked at. */
 const REST = 120;
 
+/** While the hand goes on, shapes are looked at no more often than so many milliseconds, and for no more than this part of the time. */
+const LOOK = { apart: 250, part: 0.1 };
+
 interface Wish { stack: Json[]; wished: Json[]; at: number }
 
 export class Preview {
@@ -44,6 +49,12 @@ export class Preview {
   private state: "absent" | "fetching" | "ready" = "absent";
   private waiting: Wish | null = null;
   private wanted: Json[] | null = null;
+  private wantedPoints: Json[] | null = null;
+  /** Of the last look at a shape: when it was over, and how long it took. */
+  private looked = { at: 0, took: 0 };
+  private lookedSince = 0;
+  /** Shapes up to this one were taken away. */
+  private forgotten = 0;
   private computing: { number: number; at: number } | null = null;
   private number = 0;
   private resting: ReturnType<typeof setTimeout> | undefined;
@@ -63,6 +74,7 @@ export class Preview {
     this.known = id;
     this.state = "absent";
     this.wanted = null;
+    this.wantedPoints = null;
     this.clear();
   }
 
@@ -70,6 +82,13 @@ export class Preview {
   skeleton(stack: Json[]): void {
     if (this.known === null) return this.events.skeleton(null, "the simulation has no reference surface");
     this.wanted = stack;
+    this.next();
+  }
+
+  /** Asks for the points of the surface, in the reference and in the shape that `stack` has made. */
+  surfacePoints(stack: Json[]): void {
+    if (this.known === null) return;
+    this.wantedPoints = stack;
     this.next();
   }
 
@@ -90,7 +109,7 @@ export class Preview {
   clear(): void {
     clearTimeout(this.resting);
     this.waiting = null;
-    this.number++;
+    this.forgotten = ++this.number;
     this.events.cleared();
   }
 
@@ -102,6 +121,13 @@ export class Preview {
         this.wanted = null;
       }
     }
+    if (this.wantedPoints !== null && this.known !== null) {
+      if (this.state === "absent") return void this.fetch();
+      if (this.state === "ready") {
+        this.worker.postMessage({ shape: this.known, stack: this.wantedPoints }, []);
+        this.wantedPoints = null;
+      }
+    }
     if (this.waiting === null || this.computing !== null) return;
     if (this.state === "absent") void this.fetch();
     if (this.state !== "ready") return;
@@ -111,11 +137,19 @@ export class Preview {
     this.worker.postMessage({ number: this.number, stack, wished }, []);
   }
 
-  /** Looks at a shape at which the hand rests: that may take longer than the shape itself. */
+  /** Looks at a shape, which may take longer than the shape itself: at once now and then, and in any case when the hand rests. */
   private check(shown: { number: number; at: number }): void {
     if (this.computing !== null || shown.number !== this.number) return;
     this.computing = shown;
+    this.lookedSince = performance.now();
     this.worker.postMessage({ check: shown.number }, []);
+  }
+
+  private isLookDue(): boolean {
+    const now = performance.now();
+    // A hand that has just begun waits for nothing.
+    if (this.number <= this.forgotten + 1) this.looked.at = now;
+    return now - this.looked.at > Math.max(LOOK.apart, this.looked.took / LOOK.part);
   }
 
   private async fetch(): Promise<void> {
@@ -136,6 +170,7 @@ export class Preview {
     this.waiting = null;
     if (this.wanted !== null) this.events.skeleton(null, reason);
     this.wanted = null;
+    this.wantedPoints = null;
     this.events.failed(kind, reason);
   }
 
@@ -149,9 +184,15 @@ export class Preview {
       if (answer.skeleton !== this.known) return;
       if ("error" in answer) this.events.skeleton(null, answer.error);
       else this.events.skeleton(answer.bones, "");
+    } else if ("shape" in answer) {
+      if (answer.shape !== this.known) return;
+      if ("error" in answer) this.events.failed(answer.kind, answer.error);
+      else this.events.points(answer.reference, answer.points);
     } else if ("check" in answer) {
       this.computing = null;
-      if (answer.check === this.number && this.waiting === null) this.events.checked(answer.faults);
+      const at = performance.now();
+      this.looked = { at, took: at - this.lookedSince };
+      if (answer.check > this.forgotten) this.events.checked("faults" in answer ? answer.faults : null, this.waiting === null);
     } else {
       const asked = this.computing;
       this.computing = null;
@@ -159,9 +200,10 @@ export class Preview {
       if (asked?.number === this.number) {
         if ("error" in answer) this.events.failed(answer.kind, answer.error);
         else {
-          const { points, largest, moved, size, milliseconds } = answer;
-          this.events.shape({ points, largest, moved, size, asked: asked.at, computing: milliseconds, newest: this.waiting === null });
-          this.resting = setTimeout(() => this.check(asked), REST);
+          const { points, nodes, largest, moved, size, milliseconds } = answer;
+          this.events.shape({ points, nodes, largest, moved, size, asked: asked.at, computing: milliseconds, newest: this.waiting === null });
+          if (this.isLookDue()) this.check(asked);
+          else this.resting = setTimeout(() => this.check(asked), REST);
         }
       }
     }

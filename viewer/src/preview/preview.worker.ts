@@ -16,13 +16,18 @@ export type PreviewRequest =
   /** Whether the shape of the last preview is sound. */
   | { check: number }
   /** The skeleton of the surface that is open, and where these edits have brought it. */
-  | { skeleton: string; stack: Json[] };
+  | { skeleton: string; stack: Json[] }
+  /** Where the points of the surface that is open lie in the reference, and where these edits have brought them. */
+  | { shape: string; stack: Json[] };
 
 export type PreviewAnswer =
   | { id: string; surface: Pick<SurfaceDescription, "triangles" | "triangleFeatures" | "features"> }
-  | { number: number; points: Float32Array; largest: number; moved: number[]; size: number; milliseconds: number }
+  /** `nodes` are those of the skeleton, where it is known. */
+  | { number: number; points: Float32Array; nodes: Float32Array | null; largest: number; moved: number[]; size: number; milliseconds: number }
   | { check: number; faults: ShapeFaults | null }
   | { skeleton: string; bones: Bones }
+  | { shape: string; reference: Float64Array; points: Float32Array }
+  | { shape: string; kind: FailureKind; error: string }
   | { skeleton: string; kind: FailureKind; error: string }
   | { number: number; kind: FailureKind; error: string }
   | { id: string; kind: FailureKind; error: string };
@@ -39,6 +44,9 @@ let reference: Float64Array = new Float64Array(0);
 let size = 0;
 /** The triangles of the reference and the feature of each, to say how far each feature moves. */
 let faces: { triangles: Uint32Array; features: Uint32Array; count: number } = { triangles: new Uint32Array(0), features: new Uint32Array(0), count: 0 };
+let featureNames: string[] = [];
+/** The skeleton of the surface, once it was asked for. */
+let skeleton: SkeletonDescription | null = null;
 /** The displacement that the shape has now, and the stack that it is of. */
 let now: { stack: string; displacement: Float64Array } = { stack: "", displacement: new Float64Array(0) };
 
@@ -49,6 +57,8 @@ async function answer(request: PreviewRequest): Promise<void> {
     surface = (await kernel).openSurface(new Uint8Array(request.surface));
     const { points, triangles, triangleFeatures, features } = surface.describe();
     reference = points;
+    featureNames = features;
+    skeleton = null;
     size = diagonal(points);
     faces = { triangles: triangles.slice(), features: triangleFeatures.slice(), count: features.length };
     now = { stack: "[]", displacement: new Float64Array(points.length) };
@@ -64,8 +74,17 @@ async function answer(request: PreviewRequest): Promise<void> {
   const stack = JSON.stringify(request.stack);
   if (now.stack !== stack) now = { stack, displacement: surface.displacement(request.stack) };
   if ("skeleton" in request) {
-    const bones = bonesOf(surface.skeleton(), now.displacement);
+    skeleton ??= surface.skeleton();
+    const { nodes, curves } = skeleton;
+    const bones: Bones = {
+      reference: nodes, now: nodesOf(skeleton, now.displacement), preview: null, curves, features: featuresOf(skeleton), ...segmentsOf(curves, nodes.length / 3),
+    };
     worker.postMessage({ skeleton: request.skeleton, bones }, []);
+    return;
+  }
+  if ("shape" in request) {
+    const points = Float32Array.from(reference, (value, i) => value + now.displacement[i]!);
+    worker.postMessage({ shape: request.shape, reference: reference.slice(), points }, [points.buffer]);
     return;
   }
   const displacement = surface.displacement(request.wished);
@@ -85,7 +104,8 @@ async function answer(request: PreviewRequest): Promise<void> {
   faces.features.forEach((feature, triangle) => {
     for (let k = 3 * triangle; k < 3 * triangle + 3; k++) moved[feature] = Math.max(moved[feature] ?? 0, ways[faces.triangles[k]!]!);
   });
-  worker.postMessage({ number: request.number, points, largest: Math.sqrt(largest), moved: moved.map(Math.sqrt), size, milliseconds: performance.now() - start }, [points.buffer]);
+  const nodes = skeleton && nodesOf(skeleton, displacement);
+  worker.postMessage({ number: request.number, points, nodes, largest: Math.sqrt(largest), moved: moved.map(Math.sqrt), size, milliseconds: performance.now() - start }, [points.buffer]);
 }
 
 /** The diagonal of the box around points. */
@@ -98,16 +118,30 @@ function diagonal(points: Float64Array): number {
   return points.length === 0 ? 0 : Math.hypot(high[0]! - low[0]!, high[1]! - low[1]!, high[2]! - low[2]!);
 }
 
-/** A skeleton, each node moved by the mean of what the vertices that it carries have moved. */
-function bonesOf({ nodes, curves, nodeOfVertex }: SkeletonDescription, displacement: Float64Array): Bones {
+/** The nodes of a skeleton, each moved by the mean of what the vertices that it carries have moved. */
+function nodesOf({ nodes, nodeOfVertex }: SkeletonDescription, displacement: Float64Array): Float32Array {
   const moved = new Float64Array(nodes.length);
   const carried = new Uint32Array(nodes.length / 3);
   nodeOfVertex.forEach((node, vertex) => {
     carried[node]!++;
     for (let k = 0; k < 3; k++) moved[3 * node + k]! += displacement[3 * vertex + k]!;
   });
-  const now = Float32Array.from(nodes, (value, i) => value + moved[i]! / Math.max(1, carried[Math.floor(i / 3)]!));
-  return { reference: nodes, now, ...segmentsOf(curves, carried.length) };
+  return Float32Array.from(nodes, (value, i) => value + moved[i]! / Math.max(1, carried[Math.floor(i / 3)]!));
+}
+
+/** The feature that most of the triangles which each curve carries belong to. */
+function featuresOf({ nodes, curves, nodeOfVertex }: SkeletonDescription): (string | null)[] {
+  const curveOfNode = new Int32Array(nodes.length / 3).fill(-1);
+  curves.forEach((curve, number) => { for (const node of curve) curveOfNode[node] = number; });
+  const counts = curves.map(() => new Uint32Array(faces.count));
+  faces.features.forEach((feature, triangle) => {
+    const curve = curveOfNode[nodeOfVertex[faces.triangles[3 * triangle]!]!]!;
+    if (curve >= 0) counts[curve]![feature]!++;
+  });
+  return counts.map((count) => {
+    const most = Math.max(0, ...count);
+    return most === 0 ? null : featureNames[count.indexOf(most)] ?? null;
+  });
 }
 
 // One after the other: an answer is there before the next question is looked at.
@@ -122,7 +156,7 @@ worker.onmessage = ({ data }) => {
   last = last.then(() => answer(data)).catch((error: unknown) => {
     const kind = error instanceof KernelError ? error.kind : "trap";
     const which = "number" in data ? { number: data.number } : "check" in data ? { number: data.check }
-      : "skeleton" in data ? { skeleton: data.skeleton } : { id: data.id };
+      : "skeleton" in data ? { skeleton: data.skeleton } : "shape" in data ? { shape: data.shape } : { id: data.id };
     worker.postMessage({ ...which, kind, error: error instanceof Error ? error.message : String(error) }, []);
   });
 };

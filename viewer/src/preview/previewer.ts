@@ -11,12 +11,18 @@ import type { Store } from "../store/store";
 import { Preview } from "./preview";
 import type { PreviewShape, PreviewSurface, PreviewWorker } from "./preview";
 
+/** A surface with its points in the reference and in the shape that is. */
+export interface ShownPoints extends PreviewSurface { reference: Float64Array; points: Float32Array }
+
 export class Previewer {
   private preview: Preview | null = null;
   private wished: Json[] | null = null;
   private features: string[] = [];
   private points: Float32Array = new Float32Array(0);
   private bones = false;
+  private faulty: Uint32Array | undefined;
+  private surfaceListener: ((surface: ShownPoints) => void) | null = null;
+  private shown: PreviewSurface | null = null;
 
   constructor(
     private readonly scene: Scene, private readonly address: string, private readonly module: Promise<WebAssembly.Module>,
@@ -25,9 +31,16 @@ export class Previewer {
     store.watch((state) => state.hello?.surface ?? null, (surface) => this.preview?.offer(surface), sameJson);
     store.watch((state) => state.hello?.stack ?? [], () => {
       if (this.bones) this.showSkeleton(true);
+      if (this.surfaceListener) this.started().surfacePoints(this.stack);
       this.show(this.wished);
     }, sameJson);
     store.watch(wishedStack, (wished) => this.show(wished), sameJson);
+  }
+
+  /** Tells the points of the surface, and of each shape that it takes from now on. */
+  watchSurface(listener: (surface: ShownPoints) => void): void {
+    this.surfaceListener = listener;
+    this.started().surfacePoints(this.stack);
   }
 
   /** Shows the skeleton, by which the shape can be dragged, or takes it away. */
@@ -64,7 +77,8 @@ export class Previewer {
     this.preview = new Preview(worker as unknown as PreviewWorker, () => fetchSurface(this.address), {
       surface: (surface) => this.takeSurface(surface),
       shape: (shape) => this.take(shape),
-      checked: (faults) => this.judge(faults),
+      checked: (faults, isNewest) => this.judge(faults, isNewest),
+      points: (reference, points) => { if (this.shown) this.surfaceListener?.({ ...this.shown, reference, points }); },
       skeleton: (bones, reason) => {
         if (!this.bones) return;
         this.scene.setBones(bones);
@@ -73,6 +87,8 @@ export class Previewer {
       failed: (_, reason) => this.fail(reason),
       cleared: () => {
         this.scene.setPreview(null);
+        this.followBones(null);
+        this.faulty = undefined;
         this.say(NO_PREVIEW);
       },
     });
@@ -83,13 +99,16 @@ export class Previewer {
 
   private takeSurface(surface: PreviewSurface): void {
     this.features = surface.features;
+    this.shown = surface;
+    if (this.surfaceListener) this.preview?.surfacePoints(this.stack);
     this.scene.setPreviewSurface(surface);
   }
 
-  private take({ points, largest, moved, size, asked, computing, newest }: PreviewShape): void {
+  private take({ points, nodes, largest, moved, size, asked, computing, newest }: PreviewShape): void {
     const { wished } = this;
     this.points = points;
-    this.scene.setPreview(points, undefined, () => {
+    this.followBones(nodes);
+    this.scene.setPreview(points, this.faulty, () => {
       // A wish that came while the picture was drawn is answered by a later one.
       if (!newest || wished !== this.wished) return;
       const byName = Object.fromEntries(this.features.map((name, i) => [name, moved[i] ?? 0]));
@@ -98,9 +117,17 @@ export class Previewer {
     });
   }
 
-  private judge(faults: ShapeFaults | null): void {
-    this.say({ ...this.store.state.preview, faults: faults?.text ?? "" });
-    if (faults) this.scene.setPreview(this.points, faults.triangles);
+  /** The skeleton goes with the shape that is previewed; null brings it back to the one that is. */
+  private followBones(preview: Float32Array | null): void {
+    const bones = this.scene.shownBones;
+    if (this.bones && bones && bones.preview !== preview) this.scene.setBones({ ...bones, preview });
+  }
+
+  /** Colours what is wrong with the shape, also while the hand goes on; the verdict waits for the shape at which it rests. */
+  private judge(faults: ShapeFaults | null, isNewest: boolean): void {
+    if (isNewest) this.say({ ...this.store.state.preview, faults: faults?.text ?? "" });
+    if (faults || this.faulty) this.scene.setPreview(this.points, faults?.triangles);
+    this.faulty = faults?.triangles;
   }
 
   private fail(reason: string): void {

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { REACH, nearestWithin, segmentsOf } from "../../src/picture/skeleton";
+import { nearestWithin, segmentsOf } from "../../src/picture/skeleton";
 
 const curves = (...all: number[][]): Uint32Array[] => all.map((nodes) => Uint32Array.from(nodes));
 
@@ -14,9 +14,9 @@ describe("the skeleton in the picture", () => {
 
   it("means the nearest node within reach", () => {
     const places = Float32Array.from([0, 0, 30, 0, 36, 0, NaN, NaN]);
-    expect(nearestWithin(places, 1, 1, REACH)).toBe(0);
-    expect(nearestWithin(places, 34, 2, REACH)).toBe(2);
-    expect(nearestWithin(places, 15, 0, REACH)).toBe(-1);
-    expect(nearestWithin(new Float32Array(0), 0, 0, REACH)).toBe(-1);
+    expect(nearestWithin(places, 1, 1, 12)).toBe(0);
+    expect(nearestWithin(places, 34, 2, 12)).toBe(2);
+    expect(nearestWithin(places, 15, 0, 12)).toBe(-1);
+    expect(nearestWithin(new Float32Array(0), 0, 0, 12)).toBe(-1);
   });
 });

@@ -17,7 +17,7 @@ function setUp(fetchSurface = async () => new ArrayBuffer(8)) {
     return fetchSurface();
   }, {
     surface: () => heard.push("surface"), shape: ({ largest }) => heard.push(`shape ${largest}`),
-    checked: (faults) => heard.push(`checked ${faults?.text ?? "sound"}`),
+    points: (reference) => heard.push(`points ${reference.length / 3}`), checked: (faults) => heard.push(`checked ${faults?.text ?? "sound"}`),
     skeleton: (bones, reason) => heard.push(bones ? `skeleton ${bones.free.length}` : `no skeleton: ${reason}`),
     failed: (kind, reason) => heard.push(`${kind}: ${reason}`), cleared: () => heard.push("cleared"),
   });
@@ -28,7 +28,7 @@ function setUp(fetchSurface = async () => new ArrayBuffer(8)) {
   const work = (): void => {
     const { number, wished } = numbers().at(-1)!;
     const largest = (wished as { translate: { by: number } }[])[0]!.translate.by;
-    answer({ number, points: new Float32Array(0), largest, moved: [], size: 1, milliseconds: 1 });
+    answer({ number, points: new Float32Array(0), nodes: null, largest, moved: [], size: 1, milliseconds: 1 });
   };
   return { preview, asked, heard, answer, opened, numbers, work, fetched: () => fetched };
 }
@@ -90,6 +90,37 @@ describe("the preview", () => {
     expect(heard.slice(-2)).toEqual(["shape 2", "checked it folds"]);
   });
 
+  it("looks at the shape now and then while the hand goes on", async () => {
+    const { preview, heard, asked, answer, opened, work } = setUp();
+    preview.offer(A);
+    preview.show([], edit(1));
+    await settled();
+    opened("a");
+    const end = performance.now() + 600;
+    for (let by = 2; performance.now() < end; by++) {
+      preview.show([], edit(by));
+      if ("check" in asked.at(-1)!) answer({ check: (asked.at(-1) as { check: number }).check, faults: { text: "it folds", triangles: new Uint32Array(0) } });
+      work();
+      await new Promise((resolve) => setTimeout(resolve, 10));
+    }
+    const looks = heard.filter((word) => word === "checked it folds").length;
+    expect(looks).toBeGreaterThanOrEqual(1);
+    expect(looks).toBeLessThanOrEqual(3);
+  });
+
+  it("gives the points of the surface", async () => {
+    const { preview, heard, asked, answer, opened } = setUp();
+    preview.surfacePoints([]);
+    preview.offer(A);
+    preview.surfacePoints(edit(1));
+    await settled();
+    opened("a");
+    expect(asked.at(-1)).toEqual({ shape: "a", stack: edit(1) });
+    answer({ shape: "b", reference: new Float64Array(3), points: new Float32Array(3) });
+    answer({ shape: "a", reference: new Float64Array(12), points: new Float32Array(12) });
+    expect(heard.filter((word) => word.startsWith("points"))).toEqual(["points 4"]);
+  });
+
   it("asks for another surface when the server measures shapes from another one", async () => {
     const { preview, heard, asked, opened, work, fetched } = setUp();
     preview.offer(A);
@@ -141,7 +172,7 @@ describe("the preview", () => {
     expect(asked.at(-1)).toEqual({ skeleton: "a", stack: edit(2) });
     heard.length = 0;
     answer({ skeleton: "b", kind: "skeleton", error: "of another surface" });
-    answer({ skeleton: "a", bones: { reference: new Float64Array(9), now: new Float32Array(9), segments: Uint32Array.of(0, 1, 1, 2), free: Uint32Array.of(1) } });
+    answer({ skeleton: "a", bones: { reference: new Float64Array(9), now: new Float32Array(9), preview: null, segments: Uint32Array.of(0, 1, 1, 2), free: Uint32Array.of(1), curves: [], features: [] } });
     preview.skeleton([]);
     answer({ skeleton: "a", kind: "skeleton", error: "it is flat" });
     expect(heard).toEqual(["skeleton 1", "no skeleton: it is flat"]);
