@@ -113,9 +113,10 @@ fn cell_type(given: &Given<'_>, what: &str) -> Read<(CellType, usize)> {
     let known = CellType::ALL
         .into_iter()
         .filter_map(|cell_type| Some((cell_type, cell_type.vertex_count()?)));
-    let found = match given.extract::<u8>() {
-        Ok(number) => CellType::from_vtk(number),
-        Err(_) => CellType::ALL.into_iter().find(|cell_type| cell_type.name() == text),
+    // A text is no number: to find that out costs more than all else here.
+    let found = match given.cast::<PyString>() {
+        Ok(_) => CellType::ALL.into_iter().find(|cell_type| cell_type.name() == text),
+        Err(_) => given.extract::<u8>().ok().and_then(CellType::from_vtk),
     };
     let found = found.and_then(|found| Some((found, found.vertex_count()?)));
     found.ok_or_else(|| {
@@ -301,7 +302,9 @@ impl Lender {
         let field = name(key, &format!("channel '{channel}', the name of a field"))?;
         let what = format!("channel '{channel}', field '{field}'");
         // A `tombolo.Field` states where its values are.
-        let stated = match value.getattr_opt("association").map_err(python(&what))? {
+        let is_array = value.cast::<PyUntypedArray>().is_ok();
+        let association = if is_array { Ok(None) } else { value.getattr_opt("association") };
+        let stated = match association.map_err(python(&what))? {
             Some(association) => {
                 Some((value.getattr("values").map_err(python(&what))?, association))
             }
