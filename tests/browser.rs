@@ -1,4 +1,5 @@
-//! The viewer in a headless browser: the demo, a shape changed by two people, and the end of a run.
+//! The viewer in a headless browser: the demo, what can be seen and how, a shape changed by two
+//! people, and the end of a run.
 
 use std::path::Path;
 use std::process::Command;
@@ -25,8 +26,8 @@ fn drive(script: &str, run: &mut Run) {
     );
 }
 
-#[test]
-fn the_demo_in_a_browser() {
+/// The nozzle of the demo, running.
+fn nozzle() -> Run {
     let mesh = project().join("meshes/channel-60k.msh");
     if !mesh.exists() {
         let made = Command::new(project().join(".venv/bin/python"))
@@ -36,9 +37,20 @@ fn the_demo_in_a_browser() {
             .expect("gmsh is installed (scripts/setup)");
         assert!(made.success() && Path::new(&mesh).exists(), "scripts/meshes made no mesh");
     }
-    let mut run =
-        Run::flow(&["--case", "examples/flow/cases/nozzle.json", "--listen", "127.0.0.1:0"]);
+    Run::flow(&["--case", "examples/flow/cases/nozzle.json", "--listen", "127.0.0.1:0"])
+}
+
+#[test]
+fn the_demo_in_a_browser() {
+    let mut run = nozzle();
     drive("demo.mjs", &mut run);
+    assert!(run.is_running(), "the run ended:\n{}", run.text());
+}
+
+#[test]
+fn seeing_in_a_browser() {
+    let mut run = nozzle();
+    drive("seeing.mjs", &mut run);
     assert!(run.is_running(), "the run ended:\n{}", run.text());
 }
 

@@ -40,7 +40,7 @@ export class HistoryDock {
     this.whole = element("button", { type: "button", class: "small", title: "Show the whole history again", disabled: true, onclick: () => this.zoomTo(null) }, "Whole");
     this.toggle = element("button", { type: "button", class: "small", "aria-controls": "history-body", onclick: () => this.open(!this.state.open) });
     const download = element("button", { type: "button", class: "small", title: "All that is kept of all monitors, as comma-separated values", onclick: () => this.download() }, "CSV");
-    const headings = ["", "value", "before", "difference"].map((text) => element("th", { scope: "col" }, text));
+    const headings = [element("td"), ...["value", "before", "difference"].map((text) => element("th", { scope: "col" }, text))];
     this.body = element("div", { id: "history-body", class: "dock-body" }, this.canvas,
       element("div", { class: "values" }, element("table", {}, element("caption", {}, this.heading), element("thead", {}, element("tr", {}, ...headings)), this.table),
         element("details", {}, element("summary", {}, "Monitors in the plot"), this.choices)));

@@ -114,7 +114,9 @@ export class LookPanel {
     write(this.heading, chosenView === null ? "Look" : `Look of ${chosenView}`);
     if (!look) return;
     const fields: readonly FieldInformation[] = hello?.fields ?? [];
-    fill(this.field, [...fields.map(({ name }): [string, string] => [name, FIELD_TITLES[name] ?? words(name)]), ["", "none"]]);
+    // One that the library adds to a view is not among those of the solver.
+    const names = [...new Set([...fields.map(({ name }) => name), ...(look.field === null ? [] : [look.field])])];
+    fill(this.field, [...names.map((name): [string, string] => [name, FIELD_TITLES[name] ?? words(name)]), ["", "none"]]);
     this.field.value = look.field ?? "";
     const count = fields.find((field) => field.name === look.field)?.components ?? 1;
     fill(this.component, count > 1 ? [["-1", "magnitude"], ...componentNames(count).map((name, i): [string, string] => [String(i), name])] : []);
