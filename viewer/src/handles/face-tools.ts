@@ -72,7 +72,7 @@ export class FaceTools implements ShapeRegion {
       element("button", { type: "button", title: "The box around the faces in their place", onclick: () => this.asBox() }, "As box"),
       element("button", { type: "button", onclick: () => this.clear() }, "Clear"), this.count,
     );
-    stage.append(this.bar);
+    toggle.parentElement?.append(this.bar);
     toggle.addEventListener("click", () => this.show(this.bar.hidden));
     stage.addEventListener("pointerdown", (event) => this.down(event), true);
     stage.addEventListener("pointermove", (event) => this.move(event), true);
