@@ -58,7 +58,9 @@ export class SlicePanel {
     const box = this.bounds();
     if (!box) return;
     const normal = [0, 1, 2].map((k) => (k === axis ? 1 : 0)) as Vector;
-    this.move({ origin: [0, 1, 2].map((k) => (box[0][k]! + box[1][k]!) / 2) as Vector, normal });
+    // What a view holds is rounded: the middle of a symmetric shape is 0 all the same.
+    const quantum = 1e-4 * Math.max(...[0, 1, 2].map((k) => box[1][k]! - box[0][k]!)) || 1;
+    this.move({ origin: [0, 1, 2].map((k) => Math.round((box[0][k]! + box[1][k]!) / 2 / quantum) * quantum + 0) as Vector, normal });
   }
 
   private slide(): void {
