@@ -99,14 +99,15 @@ impl Changes {
         bytes: usize,
     ) -> Result<String, Problem> {
         self.check(&change)?;
-        self.queue.check_room(bytes).map_err(come_back)?;
         make_absolute(&mut change);
         let (cycle, time) = self.clock.get();
         let command = Command::Pipelines(change.clone());
+        let reservation = self.queue.reserve(&command, bytes).map_err(come_back)?;
         let id =
             self.log.accept(id, &source, &command, Moment { cycle, time }).map_err(Problem::new)?;
         lock(&self.state).under_way.push((id.clone(), Arc::new(change)));
-        self.queue.push(Received { source, id: id.clone(), command, bytes });
+        let reservation = Some(reservation);
+        self.queue.push(Received { source, id: id.clone(), command, reservation });
         Ok(id)
     }
 
@@ -122,8 +123,6 @@ impl Changes {
         change: PipelineChange,
         text: &str,
     ) -> Result<(), Problem> {
-        let bytes = text.len();
-        self.queue.check_room(bytes).map_err(come_back)?;
         let Some(id) = self.log.name(client, id, text).map_err(Problem::new)? else {
             return Ok(());
         };
@@ -135,10 +134,19 @@ impl Changes {
         make_absolute(&mut change);
         let (cycle, time) = self.clock.get();
         let command = Command::Pipelines(change.clone());
+        let reservation = self.queue.reserve(&command, text.len()).map_err(|exceeded| {
+            self.log.forget(&id);
+            come_back(exceeded)
+        })?;
         lock(&self.state).under_way.push((id.clone(), Arc::new(change)));
         let changes = Arc::clone(self);
         let source = Source::Viewer(client);
-        let received = Received { source, id: id.clone(), command: command.clone(), bytes };
+        let received = Received {
+            source,
+            id: id.clone(),
+            command: command.clone(),
+            reservation: Some(reservation),
+        };
         self.log.accept_from(client, id, &command, Moment { cycle, time }, move |is_taken| {
             if is_taken {
                 changes.queue.push(received);

@@ -13,7 +13,7 @@ use super::{Adaptor, SteeredMesh};
 use crate::{
     checkpoint::SavedCommand,
     stages::Changed,
-    steering::{Defaults, Source},
+    steering::{Defaults, Reservation, Source},
     step::Moment,
 };
 
@@ -22,6 +22,8 @@ pub(super) struct Told {
     id: String,
     source: Source,
     change: PipelineChange,
+    /// The room that it takes until it is made.
+    _reservation: Option<Reservation>,
 }
 
 impl Told {
@@ -71,8 +73,14 @@ impl Adaptor {
     }
 
     /// Keeps a change that all ranks were told of for the next safe point.
-    pub(super) fn keep_change(&mut self, id: String, source: Source, change: PipelineChange) {
-        self.told_changes.push(Told { id, source, change });
+    pub(super) fn keep_change(
+        &mut self,
+        id: String,
+        source: Source,
+        change: PipelineChange,
+        reservation: Option<Reservation>,
+    ) {
+        self.told_changes.push(Told { id, source, change, _reservation: reservation });
     }
 
     /// Makes the changes that all ranks were told of, where all have lent the whole mesh with its
@@ -85,7 +93,7 @@ impl Adaptor {
         if self.communicator.any(was_spared) {
             return;
         }
-        for Told { id, source, change } in std::mem::take(&mut self.told_changes) {
+        for Told { id, source, change, .. } in std::mem::take(&mut self.told_changes) {
             let made = self.make_change(&change, moment, channels);
             self.changes.settle(&id, made.is_ok(), &self.config);
             self.settle(&id, &source, moment, made.as_ref().map(|_| ()).map_err(Clone::clone));

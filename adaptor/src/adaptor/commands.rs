@@ -14,7 +14,7 @@ use super::{Adaptor, SteeredMesh};
 use crate::{
     changes::{Changes, make_absolute},
     meeting,
-    steering::{Asked, Forecaster, Log, Queue, Received, Source},
+    steering::{Asked, Forecaster, Log, Queue, Received, Reservation, Source},
     step::Moment,
     stream::{CommandSink, Hub},
 };
@@ -35,7 +35,7 @@ impl Adaptor {
             None
         };
         for (id, command) in self.told_to_all(taken.into_iter().collect()) {
-            self.obey(id, &source, command, moment);
+            self.obey(id, &source, command, None, moment);
         }
     }
 
@@ -95,14 +95,17 @@ impl Adaptor {
     /// Carries out what viewers and others have asked for meanwhile, as far as it can be now.
     pub(super) fn serve(&mut self, moment: Moment, channels: &[Channel<'_>]) {
         let received: Vec<Received> = self.queue.take().into();
-        let (sources, own): (Vec<Source>, _) = received
+        let (whence, own): (Vec<_>, _) = received
             .into_iter()
-            .map(|received| (received.source, (received.id, received.command)))
+            .map(|Received { source, reservation, id, command }| {
+                ((source, reservation), (id, command))
+            })
             .unzip();
-        for (index, (id, command)) in self.told_to_all(own).into_iter().enumerate() {
+        let mut whence = whence.into_iter();
+        for (id, command) in self.told_to_all(own) {
             // Only rank 0 has viewers to answer.
-            let source = sources.get(index).cloned().unwrap_or(Source::Viewer(0));
-            self.obey(id, &source, command, moment);
+            let (source, reservation) = whence.next().unwrap_or((Source::Viewer(0), None));
+            self.obey(id, &source, command, reservation, moment);
         }
         self.make_changes(moment, channels);
         self.make_ready();
@@ -160,13 +163,22 @@ impl Adaptor {
         }
     }
 
-    pub(super) fn obey(&mut self, id: String, source: &Source, command: Command, moment: Moment) {
+    pub(super) fn obey(
+        &mut self,
+        id: String,
+        source: &Source,
+        command: Command,
+        reservation: Option<Reservation>,
+        moment: Moment,
+    ) {
         let outcome = match command {
             Command::Order(order) => {
                 let background = self.config.steering.background
                     && matches!(source, Source::Viewer(_) | Source::Earlier(_, false));
                 match &mut self.mesh {
-                    SteeredMesh::Steered(steerer, _) => steerer.take(id, order, background),
+                    SteeredMesh::Steered(steerer, _) => {
+                        steerer.take(id, order, background, reservation);
+                    }
                     SteeredMesh::Refused(reason) => self.log.reject(&id, moment, &reason.into()),
                     SteeredMesh::Unknown | SteeredMesh::Unsteered => {
                         self.log.reject(&id, moment, &"no reference mesh was taken".into());
@@ -193,7 +205,9 @@ impl Adaptor {
             Command::Parameter(change) => {
                 self.parameters.set(&change.name, change.value).map_err(|error| error.to_string())
             }
-            Command::Pipelines(change) => return self.keep_change(id, source.clone(), change),
+            Command::Pipelines(change) => {
+                return self.keep_change(id, source.clone(), change, reservation);
+            }
         };
         self.settle(&id, source, moment, outcome);
     }
@@ -313,20 +327,21 @@ impl CommandSink for Intake {
             Message::Wheel(_) => return Ok(()),
         };
         check_files(&command)?;
-        let bytes = text.len();
-        self.queue.check_room(bytes).map_err(|exceeded| {
+        // What came before is answered whatever waits.
+        let Some(id) = self.log.name(client, id, text)? else { return Ok(()) };
+        let reservation = self.queue.reserve(&command, text.len()).map_err(|exceeded| {
+            self.log.forget(&id);
             format!(
-                "{exceeded}; the solver has not come to those before this one yet, try again later"
+                "{exceeded}; the turn of those before this one has not come yet, try again later"
             )
         })?;
-        let Some(id) = self.log.name(client, id, text)? else { return Ok(()) };
         let (cycle, time) = self.hub.clock.get();
         let moment = Moment { cycle, time };
         let received = Received {
             source: Source::Viewer(client),
             id: id.clone(),
             command: command.clone(),
-            bytes,
+            reservation: Some(reservation),
         };
         let (queue, forecaster) = (Arc::clone(&self.queue), Arc::clone(&self.forecaster));
         self.log.accept_from(client, id, &command, moment, move |is_taken| {

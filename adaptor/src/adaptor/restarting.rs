@@ -275,7 +275,7 @@ impl Adaptor {
             if self.communicator.rank() == 0 && !(is_noted && self.log.has_order(&id)) {
                 self.log.accept_again(&id, &source, &command, moment);
             }
-            self.obey(id, &source, command, moment);
+            self.obey(id, &source, command, None, moment);
         }
     }
 }

@@ -32,7 +32,7 @@ impl Stopper {
         let command = Command::Stop {};
         // It has no name of its own that could be taken.
         if let Ok(id) = self.log.accept(None, &Source::Program, &command, Moment { cycle, time }) {
-            self.queue.push(Received { source: Source::Program, id, command, bytes: 0 });
+            self.queue.push(Received { source: Source::Program, id, command, reservation: None });
             self.forecaster.get().into_iter().for_each(Forecaster::give_up);
         }
     }

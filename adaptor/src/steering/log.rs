@@ -13,6 +13,7 @@ use super::{
     known::{KnownCommands, Named, told_whole},
     order_report::{OrderReport, OrderStatus},
     planner::Rejection,
+    room::is_urgent,
 };
 use crate::{journal::Journal, lock::lock, step::Moment, stream::Hub};
 
@@ -399,12 +400,4 @@ fn accepted(id: &str, source: &Source, command: &Command, moment: Moment) -> Jou
         min_scaled_jacobian: None,
         fraction: None,
     }
-}
-
-/// Whether a run must hear a command also where the journal cannot be written.
-fn is_urgent(command: &Command) -> bool {
-    matches!(
-        command,
-        Command::Pause {} | Command::Resume {} | Command::Stop {} | Command::Cancel(_)
-    )
 }

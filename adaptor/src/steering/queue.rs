@@ -3,17 +3,20 @@
 use std::{
     collections::VecDeque,
     sync::{
-        Condvar, Mutex,
+        Arc, Condvar, Mutex,
         atomic::{AtomicBool, Ordering},
     },
 };
 
 use tombolo_pipelines::{
     language::{Command, Order},
-    limits::{Exceeded, WAITING, WAITING_BYTES},
+    limits::Exceeded,
 };
 
-use super::Source;
+use super::{
+    Source,
+    room::{Reservation, Room, is_urgent},
+};
 use crate::lock::{lock, wait};
 
 /// A command that was read, found valid and written to the journal.
@@ -22,8 +25,8 @@ pub(crate) struct Received {
     pub(crate) source: Source,
     pub(crate) id: String,
     pub(crate) command: Command,
-    /// How many bytes it came in.
-    pub(crate) bytes: usize,
+    /// The room that it takes while it waits; none for one that no viewer sent.
+    pub(crate) reservation: Option<Reservation>,
 }
 
 /// A forecast that a viewer asks for where only all ranks together can answer.
@@ -41,18 +44,22 @@ pub(crate) struct Queue {
     /// Whether there has been a viewer that may steer.
     driven: AtomicBool,
     waiting: Mutex<VecDeque<Received>>,
+    room: Arc<Room>,
+    /// The room for commands that a run must hear whatever else waits.
+    urgent: Arc<Room>,
     questions: Mutex<Vec<Asked>>,
     arrived: Condvar,
 }
 
 impl Queue {
-    /// Refuses one more of so many bytes where there is no room for it.
-    pub(crate) fn check_room(&self, bytes: usize) -> Result<(), Exceeded> {
-        let waiting = lock(&self.waiting);
-        WAITING.check(waiting.len() + 1)?;
-        WAITING_BYTES.check(
-            waiting.iter().map(|received| received.bytes).sum::<usize>().saturating_add(bytes),
-        )
+    /// Takes room for one more command, which came in so many bytes. It is given back when its turn
+    /// has come.
+    ///
+    /// # Errors
+    /// [`Exceeded`] where too much waits already.
+    pub(crate) fn reserve(&self, command: &Command, bytes: usize) -> Result<Reservation, Exceeded> {
+        let room = if is_urgent(command) { &self.urgent } else { &self.room };
+        room.reserve(bytes)
     }
 
     pub(crate) fn push(&self, received: Received) {

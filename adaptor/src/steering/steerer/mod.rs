@@ -19,7 +19,8 @@ use tombolo_deform::{
 use tombolo_pipelines::language::{HandedShape, Order};
 
 use super::{
-    Defaults, EditStack, Forecaster, Log, MeshMotion, OrderStatus, Queue, SurfaceMotion,
+    Defaults, EditStack, Forecaster, Log, MeshMotion, OrderStatus, Queue, Reservation,
+    SurfaceMotion,
     forecaster::Present,
     lent::{Own, Rounding},
     planner::{PlanRequest, Planner, Rejection},
@@ -36,6 +37,7 @@ struct Task {
     id: String,
     order: Order,
     background: bool,
+    reservation: Option<Reservation>,
 }
 
 /// An order whose plan is being made.
@@ -51,6 +53,8 @@ struct Computing {
     /// Whether the mesh stays where it is until the plan is made, because the one before started
     /// elsewhere.
     resting: bool,
+    /// Given back when its turn has come.
+    _reservation: Option<Reservation>,
 }
 
 /// The shape of one mesh and the orders that change it.
@@ -284,9 +288,16 @@ impl Steerer {
         self.quality.map(|(min, mean)| (min, mean, 0)).or(reference)
     }
 
-    /// Puts an order at the end of the queue.
-    pub(crate) fn take(&mut self, id: String, order: Order, background: bool) {
-        self.waiting.push_back(Task { id, order, background: background && self.worker.is_some() });
+    /// Puts an order at the end of the queue, with the room that it takes there.
+    pub(crate) fn take(
+        &mut self,
+        id: String,
+        order: Order,
+        background: bool,
+        reservation: Option<Reservation>,
+    ) {
+        let background = background && self.worker.is_some();
+        self.waiting.push_back(Task { id, order, background, reservation });
     }
 
     /// Takes an order back that waits or whose plan is being made; the error says that it moves the
@@ -345,15 +356,23 @@ impl Steerer {
     }
 
     fn start(&mut self, task: Task, moment: Moment, step_seconds: Option<f64>) {
-        let Task { id, order, background } = task;
+        let Task { id, order, background, reservation } = task;
         let (stack, asked) = match self.asked(&order) {
             Ok(asked) => asked,
             Err(error) => return self.log.reject(&id, moment, &error.into()),
         };
         self.log.update(&id, |order| order.status = OrderStatus::Computing);
         let defaults = self.defaults.clone();
-        let mut computing =
-            Computing { id, number: 0, order, defaults, stack, asked, resting: false };
+        let mut computing = Computing {
+            id,
+            number: 0,
+            order,
+            defaults,
+            stack,
+            asked,
+            resting: false,
+            _reservation: reservation,
+        };
         match &mut self.worker {
             Some(worker) if background => {
                 computing.number = worker.plan(computing.asked.clone());
