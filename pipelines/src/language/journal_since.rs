@@ -131,7 +131,7 @@ impl Since {
 #[serde(untagged)]
 enum Line {
     Entry(Box<JournalEntry>),
-    Note(JournalNote),
+    Note(Box<JournalNote>),
 }
 
 #[derive(Default)]
@@ -153,17 +153,19 @@ impl Reader {
     fn add(&mut self, line: Line, checkpoint: &str) -> Result<(), Exceeded> {
         self.lines += 1;
         match line {
-            Line::Note(JournalNote::Checkpoint(note)) if note.id == checkpoint => {
-                self.has_checkpoint = true;
-                self.taken.retain(|_, (_, taken)| taken.outcome == Outcome::Open {});
-                self.shapes.clear();
-                (self.until, self.last_given_again) = (None, None);
-            }
-            Line::Note(JournalNote::Shape(shape)) => {
-                self.until = self.until.max(Some(shape.cycle));
-                self.shapes.push(shape);
-            }
-            Line::Note(_) => {}
+            Line::Note(note) => match *note {
+                JournalNote::Checkpoint(note) if note.id == checkpoint => {
+                    self.has_checkpoint = true;
+                    self.taken.retain(|_, (_, taken)| taken.outcome == Outcome::Open {});
+                    self.shapes.clear();
+                    (self.until, self.last_given_again) = (None, None);
+                }
+                JournalNote::Shape(shape) => {
+                    self.until = self.until.max(Some(shape.cycle));
+                    self.shapes.push(shape);
+                }
+                _ => {}
+            },
             Line::Entry(entry) => return self.add_entry(*entry),
         }
         Ok(())
