@@ -44,6 +44,7 @@
 #![warn(missing_docs)]
 
 mod adaptor;
+mod allocator;
 mod changes;
 mod checkpoint;
 pub mod client;

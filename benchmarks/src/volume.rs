@@ -222,7 +222,7 @@ fn elasticity(
         // The solver once more, by itself, to tell its set-up from the assembly.
         let (matrix, _) =
             operator.coupled_equations(motion).ok_or("the operator is not elastic")?;
-        let matrix = Arc::new(matrix.clone());
+        let matrix = Arc::new(matrix);
         set_up.of(|| Multigrid::<3>::new(matrix, MultigridSettings::default()))?;
         kept = Some(operator);
     }
@@ -245,7 +245,7 @@ fn elasticity(
         improvement: improvement.median(),
         updated: updated.median(),
         processor: processor.median(),
-        matrix: matrix.clone(),
+        matrix,
         places: operator.unknown_points().to_vec(),
         right_side,
         solution,
@@ -275,7 +275,7 @@ fn harmonic(mesh: &Mesh, boundary: &[u32], motion: &[Vector]) -> Result<Harmonic
         three.of(|| operator.solve(motion))?;
         // The solver once more, by itself, to tell its set-up from the assembly.
         let matrix = operator.separate_matrix().ok_or("the operator is not harmonic")?;
-        let matrix = Arc::new(matrix.clone());
+        let matrix = Arc::new(matrix);
         set_up.of(|| Multigrid::<1>::new(matrix, MultigridSettings::default()))?;
     }
     let set_up = set_up.median();
@@ -298,7 +298,7 @@ fn small_systems(report: &mut Report) -> Result<(), Box<dyn Error>> {
         let motion = motion(&mesh, surface.vertices());
         let (matrix, right_side) =
             operator.coupled_equations(&motion).ok_or("the operator is not elastic")?;
-        let matrix = Arc::new(matrix.clone());
+        let matrix = Arc::new(matrix);
         let mut solution = vec![[0.0; 3]; right_side.len()];
         let tolerance = Tolerance { relative: 1e-8, absolute: 0.0 };
         let unknowns = 3 * right_side.len();

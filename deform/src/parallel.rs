@@ -23,6 +23,18 @@ pub(crate) fn for_each_chunk<T: Send>(
     }
 }
 
+/// Calls `work` with each part.
+pub(crate) fn for_each<P: Send>(parts: Vec<P>, work: impl Fn(P) + Sync) {
+    #[cfg(feature = "parallel")]
+    if parts.len() > 1 {
+        parts.into_par_iter().for_each(&work);
+        return;
+    }
+    for part in parts {
+        work(part);
+    }
+}
+
 /// The results of `work` for each chunk of `0..count`, in order.
 pub(crate) fn map_chunks<R: Send>(
     count: usize,

@@ -33,7 +33,7 @@ fn we_read_what_vtkio_writes() {
                 .iter()
                 .map(|&vertex| u64::from(vertex))
                 .collect(),
-            offsets: mesh.cells().offsets()[1..].iter().map(|&offset| offset as u64).collect(),
+            offsets: mesh.cells().offsets().skip(1).map(|offset| offset as u64).collect(),
         },
         types: vec![vtkio::model::CellType::Tetra; mesh.cells().len()],
     };

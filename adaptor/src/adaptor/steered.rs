@@ -18,6 +18,7 @@ use super::{
     description::{features, unknown_conditions},
 };
 use crate::{
+    allocator::give_back_freed,
     error::ExecuteError,
     steering::{Steerer, clock},
     step::Step,
@@ -87,6 +88,7 @@ impl Adaptor {
         } else {
             match self.take_over(cycle, channel)? {
                 Ok(steerer) => {
+                    give_back_freed();
                     self.lent.take_reference(channel);
                     let surface = steerer.surface();
                     if let Some(surface) =

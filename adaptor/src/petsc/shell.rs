@@ -9,7 +9,7 @@ use std::{
 };
 
 use mpi::ffi::MPI_Comm;
-use tombolo_deform::linear::{LinearError, Multigrid};
+use tombolo_deform::linear::{LinearError, LinearSolver, Multigrid};
 
 use super::{
     numbering::Numbering,
@@ -67,7 +67,7 @@ pub(super) fn with_context<const B: usize, R>(
     work: impl FnOnce() -> Result<R, LinearError>,
 ) -> Result<R, LinearError> {
     multigrid.with_cycle(scale, |cycle| {
-        let zeros = || vec![[0.0; B]; multigrid.matrix().rows()];
+        let zeros = || vec![[0.0; B]; multigrid.unknowns()];
         let mut context =
             Context::<B> { numbering, multigrid, cycle, values: (zeros(), zeros()), panic: None };
         let set = |context: *mut c_void| {

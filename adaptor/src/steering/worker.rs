@@ -25,7 +25,10 @@ use super::{
     queue::Queue,
 };
 
-use crate::lock::{lock, wait};
+use crate::{
+    allocator::give_back_freed,
+    lock::{lock, wait},
+};
 
 /// A message of the worker.
 pub(crate) enum Done {
@@ -165,7 +168,10 @@ impl Worker {
     /// Runs `work` beside everything else, on one more thread.
     pub(crate) fn beside(&mut self, work: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
         let pool = pool("tombolo-beside", 1)?;
-        let work = move || pool.install(work);
+        let work = move || {
+            pool.install(work);
+            give_back_freed();
+        };
         self.threads.push(std::thread::Builder::new().name("tombolo-ready".into()).spawn(work)?);
         Ok(())
     }
@@ -261,7 +267,10 @@ fn prepare(planner: &Mutex<Planner>, deform: &Deformation) -> Quality {
         planner.prepare(deform);
         planner.shaper().mesh().clone()
     };
-    quality(mesh.cells(), mesh.points())
+    let quality = quality(mesh.cells(), mesh.points());
+    // From here on the run may wait for its first order for ever.
+    give_back_freed();
+    quality
 }
 
 fn pool(name: &'static str, threads: usize) -> std::io::Result<ThreadPool> {

@@ -26,7 +26,7 @@ impl ReferenceSurface {
             coordinate.to_bits().hash(&mut hasher);
         }
         surface.vertices().hash(&mut hasher);
-        surface.faces().offsets().hash(&mut hasher);
+        surface.faces().offsets().for_each(|start| start.hash(&mut hasher));
         surface.faces().connectivity().hash(&mut hasher);
         surface.features().names().hash(&mut hasher);
         surface.features().face_features().hash(&mut hasher);

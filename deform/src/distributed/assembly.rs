@@ -40,8 +40,7 @@ pub(super) fn described(
     let owned_vertices = owned.iter().map(|&index| vertices[index as usize]);
     owned_vertices.for_each(|vertex| message.f64s(&part.points[vertex as usize]));
     let index_of = indices(part.points.len(), vertices);
-    let sizes: Vec<u32> =
-        faces.faces.offsets().windows(2).map(|row| index(row[1] - row[0])).collect();
+    let sizes: Vec<u32> = faces.faces.iter().map(|(_, vertices)| index(vertices.len())).collect();
     let corners: Vec<u32> =
         faces.faces.connectivity().iter().map(|&vertex| index_of[vertex as usize]).collect();
     message.u32s(&faces.cells);

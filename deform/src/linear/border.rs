@@ -2,7 +2,6 @@
 
 use super::SparseMatrix;
 use super::distribution::Distribution;
-use super::gauss_seidel::Pieces;
 use super::real::Real;
 use crate::communicator::Halo;
 
@@ -11,33 +10,28 @@ use crate::communicator::Halo;
 /// Baker, R. Falgout, T. Kolev, U. Yang, Multigrid smoothers for ultraparallel computing, 2011).
 const DAMPING: f64 = 0.5;
 
-/// The couplings of a level between rows of different ranks; vectors are as [`Pieces`] has this
-/// rank's own rows, and then the others.
+/// The couplings of a level between rows of different ranks; vectors have this rank's own rows, and
+/// then the others.
 #[derive(Debug)]
 pub(super) struct Border<T, const B: usize> {
     halo: Halo,
     own: usize,
-    /// The rows of these couplings that this rank has, by their slots.
+    /// The rows of these couplings that this rank has.
     rows: Vec<u32>,
     offsets: Vec<usize>,
     columns: Vec<u32>,
     blocks: Vec<[[T; B]; B]>,
-    /// The slots of own rows that any rank has couplings of, and what is added to their diagonals.
+    /// The own rows that any rank has couplings of, and what is added to their diagonals.
     touched: Vec<(u32, [T; B])>,
 }
 
 impl<T: Real, const B: usize> Border<T, B> {
     /// The border of an assembled part, and what is added to the diagonal of each of its own rows.
     /// Collective.
-    pub(super) fn new(
-        rows: &Distribution,
-        matrix: &SparseMatrix<B>,
-        pieces: Pieces,
-    ) -> (Self, Vec<[f64; B]>) {
+    pub(super) fn new(rows: &Distribution, matrix: &SparseMatrix<B>) -> (Self, Vec<[f64; B]>) {
         let own = rows.own();
-        let slot = |row: u32| crate::number::index(pieces.slot(row as usize));
         let mut border = Self {
-            halo: rows.halo().moved(slot),
+            halo: rows.halo().clone(),
             own,
             rows: Vec::new(),
             offsets: vec![0],
@@ -57,20 +51,20 @@ impl<T: Real, const B: usize> Border<T, B> {
                 continue;
             }
             for (&column, block) in columns.iter().zip(blocks).skip(from) {
-                border.columns.push(slot(column));
+                border.columns.push(column);
                 border.blocks.push(block.map(|entries| entries.map(T::of)));
                 for (added, entries) in added[row as usize].iter_mut().zip(block) {
                     *added += DAMPING * entries.iter().map(|entry| entry.abs()).sum::<f64>();
                 }
             }
-            border.rows.push(slot(row));
+            border.rows.push(row);
             border.offsets.push(border.columns.len());
         }
         rows.halo().sum(B, added.as_flattened_mut());
         added.truncate(own);
         let touched =
             (0..).zip(&added).filter(|(_, added)| added.iter().any(|&value| value != 0.0));
-        border.touched = touched.map(|(row, added)| (slot(row), added.map(T::of))).collect();
+        border.touched = touched.map(|(row, added)| (row, added.map(T::of))).collect();
         (border, added)
     }
 
@@ -92,9 +86,9 @@ impl<T: Real, const B: usize> Border<T, B> {
         residual: &mut [[[T; B]; K]],
     ) {
         residual[self.own..].fill([[T::default(); B]; K]);
-        for (slot, added) in &self.touched {
-            let slot = *slot as usize;
-            for (value, found) in residual[slot].iter_mut().zip(&solution[slot]) {
+        for (row, added) in &self.touched {
+            let row = *row as usize;
+            for (value, found) in residual[row].iter_mut().zip(&solution[row]) {
                 (0..B).for_each(|axis| value[axis] += added[axis] * found[axis]);
             }
         }
@@ -109,15 +103,15 @@ impl<T: Real, const B: usize> Border<T, B> {
         sums: &mut [[[T; B]; K]],
     ) {
         sums[self.own..].fill([[T::default(); B]; K]);
-        self.touched.iter().for_each(|(slot, _)| sums[*slot as usize] = [[T::default(); B]; K]);
+        self.touched.iter().for_each(|(row, _)| sums[*row as usize] = [[T::default(); B]; K]);
         self.multiply(solution, |value, found| *value += found, sums);
         self.sum(sums);
-        for (slot, added) in &self.touched {
-            let slot = *slot as usize;
+        for (row, added) in &self.touched {
+            let row = *row as usize;
             for column in 0..K {
                 for axis in 0..B {
-                    right_side[slot][column][axis] +=
-                        added[axis] * solution[slot][column][axis] - sums[slot][column][axis];
+                    right_side[row][column][axis] +=
+                        added[axis] * solution[row][column][axis] - sums[row][column][axis];
                 }
             }
         }
@@ -130,7 +124,7 @@ impl<T: Real, const B: usize> Border<T, B> {
         put: impl Fn(&mut T, T),
         result: &mut [[[T; B]; K]],
     ) {
-        for (index, &slot) in self.rows.iter().enumerate() {
+        for (index, &row) in self.rows.iter().enumerate() {
             let mut sum = [[T::default(); B]; K];
             let range = self.offsets[index]..self.offsets[index + 1];
             for (&column, block) in self.columns[range.clone()].iter().zip(&self.blocks[range]) {
@@ -143,7 +137,7 @@ impl<T: Real, const B: usize> Border<T, B> {
                     }
                 }
             }
-            let values = result[slot as usize].as_flattened_mut().iter_mut();
+            let values = result[row as usize].as_flattened_mut().iter_mut();
             values.zip(sum.as_flattened()).for_each(|(value, &found)| put(value, found));
         }
     }

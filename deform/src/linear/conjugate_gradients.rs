@@ -63,7 +63,7 @@ impl<const B: usize> ConjugateGradients<B> {
         &self.matrix
     }
 
-    fn sum(&self) -> Sum<'_, B> {
+    fn sum(&self) -> Sum<'_, SparseMatrix<B>, B> {
         Sum { matrix: &self.matrix, halo: &self.halo }
     }
 
@@ -142,7 +142,7 @@ impl<const B: usize> ConjugateGradients<B> {
             };
             let (right_side, solution) = (single_column(right_side), single_column_mut(solution));
             let [convergence] = conjugate_gradients(
-                self.sum(),
+                &self.sum(),
                 apply,
                 right_side,
                 solution,

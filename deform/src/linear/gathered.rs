@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 
 use super::distribution::Distribution;
-use super::gauss_seidel::Pieces;
 use super::null_space::{Constants, NullSpace};
 use super::real::Real;
 use super::{Block, SparseMatrix, add};
@@ -16,25 +15,23 @@ pub(super) struct Gathered {
     /// The constants of the whole system, where it is semi-definite.
     constants: Option<Constants>,
     rows: usize,
-    pieces: Pieces,
+    /// How many of them this rank owns.
+    own: usize,
     spread: Option<Spread>,
 }
 
 /// The rows of one rank.
 #[derive(Debug)]
 struct Spread {
-    /// The halo of vectors, which are in the order of the pieces.
     halo: Halo,
     /// The numbers of the rows among the rows of all ranks.
     numbers: Vec<usize>,
 }
 
 impl Gathered {
-    /// The rows, and the matrix of the whole system. `pieces` is the order of this rank's own rows
-    /// in vectors. Collective over the ranks of a distribution; the matrix is then an assembled one.
+    /// The rows, and the matrix of the whole system. Collective over the ranks of a distribution; the matrix is then an assembled one.
     pub(super) fn new<'a, const B: usize>(
         matrix: &'a SparseMatrix<B>,
-        pieces: Pieces,
         distribution: Option<&Distribution>,
         null_space: NullSpace,
     ) -> (Self, Cow<'a, SparseMatrix<B>>) {
@@ -42,13 +39,13 @@ impl Gathered {
         let (spread, whole) = match distribution {
             None => (None, Cow::Borrowed(matrix)),
             Some(distribution) => {
-                let (spread, whole) = Spread::new(distribution, matrix, pieces);
+                let (spread, whole) = Spread::new(distribution, matrix);
                 (Some(spread), Cow::Owned(whole))
             }
         };
         let constants =
             (null_space == NullSpace::Constants).then(|| Constants::new(&whole, &Halo::none()));
-        (Self { constants, rows, pieces, spread }, whole)
+        (Self { constants, rows, own: distribution.map_or(rows, Distribution::own), spread }, whole)
     }
 
     /// How many rows this rank has in vectors, those of other ranks among them.
@@ -73,10 +70,9 @@ impl Gathered {
         own_solution: &mut [[[T; B]; K]],
         apply: impl FnOnce(&[[[f64; B]; K]], &mut [[[f64; B]; K]]),
     ) {
-        let own = 0..self.pieces.rows();
-        let wide =
-            |row: usize| own_right_side[self.pieces.slot(row)].map(|column| column.map(T::wide));
-        let mut right_side: Vec<[[f64; B]; K]> = own.map(wide).collect();
+        let own = own_right_side.iter().take(self.own);
+        let mut right_side: Vec<[[f64; B]; K]> =
+            own.map(|value| value.map(|column| column.map(T::wide))).collect();
         if let Some(spread) = &self.spread {
             right_side = spread.gathered(&right_side);
         }
@@ -88,9 +84,9 @@ impl Gathered {
         if let Some(constants) = &self.constants {
             constants.remove(&Halo::none(), &mut solution);
         }
-        for row in 0..self.rows {
+        for (row, own) in own_solution.iter_mut().enumerate().take(self.rows) {
             let number = self.spread.as_ref().map_or(row, |spread| spread.numbers[row]);
-            own_solution[self.pieces.slot(row)] = solution[number].map(|column| column.map(T::of));
+            *own = solution[number].map(|column| column.map(T::of));
         }
     }
 }
@@ -100,7 +96,6 @@ impl Spread {
     fn new<const B: usize>(
         distribution: &Distribution,
         matrix: &SparseMatrix<B>,
-        pieces: Pieces,
     ) -> (Self, SparseMatrix<B>) {
         let (communicator, own) = (distribution.communicator(), distribution.own() as u64);
         let counts = communicator.gather_all(&own.to_le_bytes());
@@ -132,8 +127,7 @@ impl Spread {
                 entries.push((index(row), u32::try_from(column).unwrap_or(u32::MAX), block));
             }
         }
-        let slot = |row: u32| crate::number::index(pieces.slot(row as usize));
-        let halo = distribution.halo().moved(slot);
+        let halo = distribution.halo().clone();
         let numbers = numbers.into_iter().map(index).collect();
         (Self { halo, numbers }, summed(index(counts.iter().sum()), entries))
     }

@@ -10,8 +10,10 @@ use super::border::Border;
 use super::cholesky::Factor;
 use super::distribution::{Distribution, Order};
 use super::gathered::Gathered;
-use super::gauss_seidel::{GaussSeidel, Pieces};
+use super::gauss_seidel::{GaussSeidel, Sweep};
+use super::lower::Lower;
 use super::null_space::NullSpace;
+use super::pieces::Pieces;
 use super::real::Real;
 use super::transfer::{Transfer, galerkin};
 use crate::communicator::{Communicator, Halo};
@@ -81,8 +83,8 @@ enum Inverse<T, const B: usize> {
 impl<T: Real, const B: usize> Direct<T, B> {
     /// `None` where there is no inverse. Collective over the ranks of a distribution.
     fn new(system: &System<'_, B>) -> Option<Self> {
-        let System { matrix, distribution, null_space, pieces } = system;
-        let (rows, whole) = Gathered::new(matrix, *pieces, distribution.as_ref(), *null_space);
+        let System { matrix, distribution, null_space, .. } = system;
+        let (rows, whole) = Gathered::new(matrix, distribution.as_ref(), *null_space);
         Some(Self { rows, inverse: Inverse::new(&whole, *null_space)? })
     }
 
@@ -131,12 +133,29 @@ struct Vectors<T, const B: usize, const K: usize> {
     right_side: Vec<[[T; B]; K]>,
     solution: Vec<[[T; B]; K]>,
     residual: Vec<[[T; B]; K]>,
+    /// What sweeps need beside them.
+    beside: Vec<[[T; B]; K]>,
 }
 
 impl<T: Real, const B: usize, const K: usize> Vectors<T, B, K> {
-    fn new(rows: usize) -> Self {
-        let zeros = || vec![[[T::default(); B]; K]; rows];
-        Self { right_side: zeros(), solution: zeros(), residual: zeros() }
+    fn new(rows: usize, beside: usize) -> Self {
+        let zeros = |rows| vec![[[T::default(); B]; K]; rows];
+        Self {
+            right_side: zeros(rows),
+            solution: zeros(rows),
+            residual: zeros(rows),
+            beside: zeros(beside),
+        }
+    }
+
+    /// The vectors of a sweep through the first `rows` rows.
+    fn sweep(&mut self, rows: usize) -> Sweep<'_, T, B, K> {
+        Sweep {
+            right_side: &self.right_side[..rows],
+            solution: &mut self.solution[..rows],
+            residual: &mut self.residual[..rows],
+            beside: &mut self.beside,
+        }
     }
 }
 
@@ -251,15 +270,25 @@ impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
         let coarsest = match &self.coarsest {
             Coarsest::Finest(direct) => {
                 return Workspace {
-                    finest: Vectors::new(direct.rows.count()),
+                    finest: Vectors::new(direct.rows.count(), 0),
                     coarser: Vec::new(),
                 };
             }
-            Coarsest::Coarse(direct) => direct.rows.count(),
+            Coarsest::Coarse(direct) => Vectors::new(direct.rows.count(), 0),
         };
-        let rows = self.coarser.iter().map(|level| level.rows).chain([coarsest]);
-        let finest = self.finest.as_ref().map_or(0, |level| level.rows);
-        Workspace { finest: Vectors::new(finest), coarser: rows.map(Vectors::new).collect() }
+        let coarser = self.coarser.iter().map(Level::vectors).chain([coarsest]);
+        Workspace {
+            finest: self.finest.as_ref().map_or_else(|| Vectors::new(0, 0), Level::vectors),
+            coarser: coarser.collect(),
+        }
+    }
+
+    /// The lower half of the matrix of one process, where there is a level that has it.
+    pub(super) fn lower(&self) -> Option<&Arc<Lower<T, B>>> {
+        match (&self.finest, &self.order) {
+            (Some(level), None) => Some(level.smoother.lower()),
+            _ => None,
+        }
     }
 
     /// One V-cycle: `result` becomes an approximate inverse of the matrix times `vector`, a
@@ -274,28 +303,17 @@ impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
         result: &mut [[[f64; B]; K]],
     ) {
         let Workspace { finest, coarser } = workspace;
-        let pieces =
-            self.finest.as_ref().map_or_else(|| Pieces::whole(vector.len()), |level| level.pieces);
         let narrow = |wide: &[[f64; B]; K]| -> [[T; B]; K] {
             std::array::from_fn(|column| wide[column].map(|entry| T::of(scale[column] * entry)))
         };
         match &self.order {
-            None => pieces.for_each_run(|rows, slots| {
-                parallel::for_each_chunk(
-                    &mut finest.right_side[slots],
-                    ROW_CHUNK,
-                    |chunk, part| {
-                        for (value, wide) in
-                            part.iter_mut().zip(&vector[rows.start + chunk * ROW_CHUNK..rows.end])
-                        {
-                            *value = narrow(wide);
-                        }
-                    },
-                );
+            None => parallel::for_each_chunk(&mut finest.right_side, ROW_CHUNK, |chunk, part| {
+                let vector = &vector[chunk * ROW_CHUNK..];
+                part.iter_mut().zip(vector).for_each(|(value, wide)| *value = narrow(wide));
             }),
             Some(order) => {
                 for (row, &old) in order.old.iter().enumerate() {
-                    finest.right_side[pieces.slot(row)] = narrow(&vector[old as usize]);
+                    finest.right_side[row] = narrow(&vector[old as usize]);
                 }
             }
         }
@@ -315,15 +333,13 @@ impl<T: Real, const B: usize, const C: usize> Hierarchy<T, B, C> {
             std::array::from_fn(|column| value[column].map(|entry| scale[column] * entry.wide()))
         };
         match &self.order {
-            None => pieces.for_each_run(|rows, slots| {
-                parallel::for_each_chunk(&mut result[rows], ROW_CHUNK, |chunk, part| {
-                    let found = &finest.solution[slots.start + chunk * ROW_CHUNK..slots.end];
-                    part.iter_mut().zip(found).for_each(|(wide, value)| *wide = widen(value));
-                });
+            None => parallel::for_each_chunk(result, ROW_CHUNK, |chunk, part| {
+                let found = &finest.solution[chunk * ROW_CHUNK..];
+                part.iter_mut().zip(found).for_each(|(wide, value)| *wide = widen(value));
             }),
             Some(order) => {
                 for (row, &old) in order.old.iter().enumerate() {
-                    result[old as usize] = widen(&finest.solution[pieces.slot(row)]);
+                    result[old as usize] = widen(&finest.solution[row]);
                 }
             }
         }
@@ -389,8 +405,7 @@ fn coarsened<T: Real, const B: usize, const C: usize>(
         return last();
     }
     let couplings = couplings(matrix);
-    let (border, added) =
-        distribution.as_ref().map(|rows| Border::new(rows, matrix, *pieces)).unzip();
+    let (border, added) = distribution.as_ref().map(|rows| Border::new(rows, matrix)).unzip();
     let added = added.unwrap_or_default();
     let reaches =
         |row: usize| added.get(row).is_some_and(|added| added.iter().any(|&value| value != 0.0));
@@ -422,38 +437,30 @@ fn coarsened<T: Real, const B: usize, const C: usize>(
     *positions = bodies.map(Bodies::into_coarse);
     let next = System::new(Cow::Owned(next), coarse, *null_space, None);
     let smoother = system.agreed(GaussSeidel::new(matrix, *pieces, &added))?;
-    let (own, coarse) = (*pieces, next.pieces);
     let level = Level {
         aggregates,
-        pieces: own,
+        pieces: *pieces,
         rows: matrix.rows(),
         smoother,
         border,
-        interpolation: Transfer::interpolation(
-            &interpolation,
-            |slot| own.row(slot),
-            |column| coarse.slot(column),
-        ),
-        restriction: Transfer::restriction(
-            &interpolation,
-            &transposed,
-            |slot| coarse.row(slot),
-            |row| own.slot(row),
-        ),
+        interpolation: Transfer::interpolation(&interpolation),
+        restriction: Transfer::restriction(&interpolation, &transposed),
     };
     Some(Step::Level(Box::new((level, next))))
 }
 
 impl<T: Real, const B: usize> Level<T, B> {
+    fn vectors<const K: usize>(&self) -> Vectors<T, B, K> {
+        Vectors::new(self.rows, self.pieces.odd_rows())
+    }
+
     /// A sweep, and what it leaves to the coarser level.
     fn down<const C: usize, const K: usize>(
         &self,
         own: &mut Vectors<T, B, K>,
         next: &mut Vectors<T, C, K>,
     ) {
-        let count = self.pieces.rows();
-        self.smoother.forward(&own.right_side[..count], &mut own.solution[..count]);
-        self.smoother.residual(&own.solution[..count], &mut own.residual[..count]);
+        self.smoother.forward(own.sweep(self.pieces.rows()));
         if let Some(border) = &self.border {
             border.update(&mut own.solution);
             border.complete(&own.solution, &mut own.residual);
@@ -480,8 +487,7 @@ impl<T: Real, const B: usize> Level<T, B> {
         if let Some(border) = &self.border {
             border.prepare(&own.solution, &mut own.right_side, &mut own.residual);
         }
-        let count = self.pieces.rows();
-        self.smoother.backward(&own.right_side[..count], &mut own.solution[..count]);
+        self.smoother.backward(own.sweep(self.pieces.rows()));
         if let Some(border) = &self.border {
             border.update(&mut own.solution);
         }

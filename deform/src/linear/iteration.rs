@@ -34,15 +34,41 @@ pub(super) fn each_column<const B: usize, const K: usize>(
     Ok(result)
 }
 
+/// A square matrix by its products.
+pub(super) trait Matrix<const B: usize> {
+    /// How many rows it has.
+    fn rows(&self) -> usize;
+
+    /// `result` becomes the product with `K` vectors side by side.
+    fn multiply_columns<const K: usize>(
+        &self,
+        vector: &[Columns<B, K>],
+        result: &mut [Columns<B, K>],
+    );
+}
+
+impl<const B: usize> Matrix<B> for SparseMatrix<B> {
+    fn rows(&self) -> usize {
+        SparseMatrix::rows(self)
+    }
+
+    fn multiply_columns<const K: usize>(
+        &self,
+        vector: &[Columns<B, K>],
+        result: &mut [Columns<B, K>],
+    ) {
+        SparseMatrix::multiply_columns(self, vector, result);
+    }
+}
+
 /// A matrix that is the sum of the ranks'. Vectors are the same on all ranks where these share
 /// entries.
-#[derive(Clone, Copy)]
-pub(super) struct Sum<'a, const B: usize> {
-    pub(super) matrix: &'a SparseMatrix<B>,
+pub(super) struct Sum<'a, M, const B: usize> {
+    pub(super) matrix: &'a M,
     pub(super) halo: &'a Halo,
 }
 
-impl<const B: usize> Sum<'_, B> {
+impl<M: Matrix<B>, const B: usize> Sum<'_, M, B> {
     /// Adds up what the ranks have of a vector.
     pub(super) fn add_up<const K: usize>(&self, vector: &mut [Columns<B, K>]) {
         self.halo.sum(B * K, vector.as_flattened_mut().as_flattened_mut());
@@ -109,8 +135,8 @@ const CORRECTION: f64 = 10.0;
 /// # Errors
 /// The first failure of any column. `solution` then holds the last iterate, which is finite unless
 /// the error is [`LinearError::NotFinite`].
-pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
-    matrix: Sum<'_, B>,
+pub(super) fn conjugate_gradients<M: Matrix<B>, const B: usize, const K: usize>(
+    matrix: &Sum<'_, M, B>,
     mut precondition: impl FnMut(&[Columns<B, K>], &mut [Columns<B, K>]),
     right_side: &[Columns<B, K>],
     solution: &mut [Columns<B, K>],
@@ -233,8 +259,8 @@ pub(super) fn conjugate_gradients<const B: usize, const K: usize>(
 
 /// Which columns are not solved yet; `correction` is what the preconditioner makes of their
 /// residuals.
-fn unfinished<const B: usize, const K: usize>(
-    matrix: Sum<'_, B>,
+fn unfinished<M: Matrix<B>, const B: usize, const K: usize>(
+    matrix: &Sum<'_, M, B>,
     tolerances: [Tolerance; K],
     target: [f64; K],
     reached: [f64; K],

@@ -97,6 +97,13 @@ impl<const B: usize> SparseMatrix<B> {
         (&self.columns[range.clone()], &self.values[range])
     }
 
+    /// The block of a row on the diagonal, if it has one.
+    pub(super) fn diagonal(&self, row: usize) -> Option<Block<B>> {
+        let (columns, blocks) = self.row(row);
+        let found = columns.binary_search_by_key(&row, |&column| column as usize).ok()?;
+        Some(blocks[found])
+    }
+
     /// `result = self * vector`.
     ///
     /// # Panics

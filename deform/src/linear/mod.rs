@@ -17,13 +17,16 @@ mod gathered;
 mod gauss_seidel;
 mod hierarchy;
 mod iteration;
+mod lower;
+#[cfg(test)]
+mod lower_tests;
 mod matrix;
 mod multigrid;
 mod null_space;
 mod ordering;
+mod pieces;
 mod preconditioner;
 mod real;
-mod rows;
 #[cfg(test)]
 mod tests;
 mod transfer;
@@ -65,7 +68,8 @@ pub fn solver<const B: usize>(
     {
         return Ok(Box::new(direct));
     }
-    Ok(Box::new(Multigrid::new(matrix, MultigridSettings::default())?))
+    let settings = MultigridSettings { by_half: true, ..MultigridSettings::default() };
+    Ok(Box::new(Multigrid::new(matrix, settings)?))
 }
 
 /// The choice of solvers for the systems of a volume.

@@ -5,8 +5,9 @@ use std::sync::{Arc, OnceLock};
 
 use super::hierarchy::Hierarchy;
 use super::iteration::{
-    Columns, Sum, conjugate_gradients, each_column, single_column, single_column_mut,
+    Columns, Matrix, Sum, conjugate_gradients, each_column, single_column, single_column_mut,
 };
+use super::lower::Symmetric;
 use super::null_space::{Constants, NullSpace};
 use super::real::Real;
 use super::{
@@ -36,12 +37,20 @@ pub struct MultigridSettings {
     pub max_iterations: usize,
     /// The vectors that the matrix takes to zero.
     pub null_space: NullSpace,
+    /// Whether the matrix of one process is kept by its lower half, to 48 bits of each entry in
+    /// single precision, so that a caller who lets go of it has half the memory.
+    pub by_half: bool,
 }
 
 impl Default for MultigridSettings {
     /// Single precision, 100 iterations, a positive definite matrix.
     fn default() -> Self {
-        Self { precision: Precision::Single, max_iterations: 100, null_space: NullSpace::Zero }
+        Self {
+            precision: Precision::Single,
+            max_iterations: 100,
+            null_space: NullSpace::Zero,
+            by_half: false,
+        }
     }
 }
 
@@ -74,11 +83,73 @@ impl Default for MultigridSettings {
 #[derive(Debug)]
 pub struct Multigrid<const B: usize> {
     halo: Halo,
-    matrix: Arc<SparseMatrix<B>>,
+    matrix: Kept<B>,
     settings: MultigridSettings,
     levels: Arc<Levels<B>>,
     constants: Option<Arc<Constants>>,
     fallback: OnceLock<Result<ConjugateGradients<B>, LinearError>>,
+}
+
+/// The matrix, as products need it.
+#[derive(Debug)]
+enum Kept<const B: usize> {
+    Rows(Arc<SparseMatrix<B>>),
+    /// By the half that the finest level has as well.
+    Single(Symmetric<f32, B>),
+    Double(Symmetric<f64, B>),
+}
+
+impl<const B: usize> Kept<B> {
+    /// The matrix of this rank, by the half that its levels have where they do.
+    fn new(matrix: Arc<SparseMatrix<B>>, levels: &Levels<B>) -> Self {
+        let single = |half| Symmetric::new(half, &matrix).map(Self::Single);
+        let double = |half| Symmetric::new(half, &matrix).map(Self::Double);
+        let kept = match levels {
+            Levels::Single(levels) => levels.lower().and_then(single),
+            Levels::Double(levels) => levels.lower().and_then(double),
+            Levels::Bodies(levels, _) => levels.lower().and_then(single),
+            Levels::None => None,
+        };
+        kept.unwrap_or(Self::Rows(matrix))
+    }
+
+    fn has_pattern_of(&self, other: &SparseMatrix<B>) -> bool {
+        match self {
+            Self::Rows(matrix) => matrix.has_pattern_of(other),
+            Self::Single(matrix) => matrix.has_pattern_of(other),
+            Self::Double(matrix) => matrix.has_pattern_of(other),
+        }
+    }
+
+    fn in_rows(&self) -> Arc<SparseMatrix<B>> {
+        match self {
+            Self::Rows(matrix) => Arc::clone(matrix),
+            Self::Single(matrix) => Arc::new(matrix.whole()),
+            Self::Double(matrix) => Arc::new(matrix.whole()),
+        }
+    }
+}
+
+impl<const B: usize> Matrix<B> for Kept<B> {
+    fn rows(&self) -> usize {
+        match self {
+            Self::Rows(matrix) => matrix.rows(),
+            Self::Single(matrix) => matrix.rows(),
+            Self::Double(matrix) => matrix.rows(),
+        }
+    }
+
+    fn multiply_columns<const K: usize>(
+        &self,
+        vector: &[Columns<B, K>],
+        result: &mut [Columns<B, K>],
+    ) {
+        match self {
+            Self::Rows(matrix) => matrix.multiply_columns(vector, result),
+            Self::Single(matrix) => matrix.multiply_columns(vector, result),
+            Self::Double(matrix) => matrix.multiply_columns(vector, result),
+        }
+    }
 }
 
 #[derive(Debug)]
@@ -195,7 +266,7 @@ impl<const B: usize> Multigrid<B> {
         assert_eq!(matrix.rows(), self.matrix.rows(), "as many rows");
         Self {
             halo: self.halo.clone(),
-            matrix,
+            matrix: Kept::Rows(matrix),
             settings: self.settings,
             levels: Arc::clone(&self.levels),
             constants: self.constants.clone(),
@@ -203,10 +274,11 @@ impl<const B: usize> Multigrid<B> {
         }
     }
 
-    /// The matrix of this rank.
+    /// The matrix of this rank. Where it is kept by its half, which the levels need as well, it is
+    /// made anew, to 48 bits of each entry.
     #[must_use]
-    pub fn matrix(&self) -> &SparseMatrix<B> {
-        &self.matrix
+    pub fn matrix(&self) -> Arc<SparseMatrix<B>> {
+        self.matrix.in_rows()
     }
 
     /// `result` becomes the product of the sum with a vector that all ranks have the same of.
@@ -238,7 +310,7 @@ impl<const B: usize> Multigrid<B> {
         }
     }
 
-    fn sum(&self) -> Sum<'_, B> {
+    fn sum(&self) -> Sum<'_, Kept<B>, B> {
         Sum { matrix: &self.matrix, halo: &self.halo }
     }
 
@@ -253,6 +325,7 @@ impl<const B: usize> Multigrid<B> {
             NullSpace::Zero => None,
             NullSpace::Constants => Some(Arc::new(Constants::new(&matrix, &halo))),
         };
+        let matrix = if settings.by_half { Kept::new(matrix, &levels) } else { Kept::Rows(matrix) };
         let solver = Self { halo, matrix, settings, levels, constants, fallback: OnceLock::new() };
         if matches!(*solver.levels, Levels::None) {
             solver.fallback()?;
@@ -261,7 +334,7 @@ impl<const B: usize> Multigrid<B> {
     }
 
     fn fallback(&self) -> Result<&ConjugateGradients<B>, LinearError> {
-        let made = || ConjugateGradients::distributed(self.halo.clone(), Arc::clone(&self.matrix));
+        let made = || ConjugateGradients::distributed(self.halo.clone(), self.matrix());
         self.fallback.get_or_init(made).as_ref().map_err(|error| *error)
     }
 
@@ -278,7 +351,7 @@ impl<const B: usize> Multigrid<B> {
             hierarchy.apply(&mut workspace, scale, vector, result);
         };
         let limit = self.settings.max_iterations;
-        conjugate_gradients(self.sum(), precondition, right_side, solution, tolerances, limit)
+        conjugate_gradients(&self.sum(), precondition, right_side, solution, tolerances, limit)
     }
 
     fn solve_columns<const K: usize>(

@@ -17,11 +17,16 @@ pub(crate) trait Real:
     + Neg<Output = Self>
     + 'static
 {
+    /// Whether it holds every number of double precision.
+    const IS_EXACT: bool;
+
     fn of(value: f64) -> Self;
     fn wide(self) -> f64;
 }
 
 impl Real for f32 {
+    const IS_EXACT: bool = false;
+
     #[inline(always)]
     fn of(value: f64) -> Self {
         value as Self
@@ -34,6 +39,8 @@ impl Real for f32 {
 }
 
 impl Real for f64 {
+    const IS_EXACT: bool = true;
+
     #[inline(always)]
     fn of(value: f64) -> Self {
         value

@@ -1,5 +1,7 @@
 //! Between a system and the next coarser one.
 
+use std::ops::Range;
+
 use super::real::Real;
 use super::{Block, ROW_CHUNK, SparseMatrix};
 use crate::number::index;
@@ -9,6 +11,9 @@ use crate::vector::{Vector, cross};
 
 /// How many coarse rows are worked on at a time.
 const COARSE_CHUNK: usize = 64;
+
+/// How many coarse rows may need parts of `A P` at a time; whole chunks.
+const COARSE_WINDOW: usize = 16 * COARSE_CHUNK;
 
 /// A column that the present row has no block in.
 const NONE: u32 = u32::MAX;
@@ -65,29 +70,27 @@ pub(super) fn galerkin<const F: usize, const C: usize>(
     sizes: &[f64],
 ) -> SparseMatrix<C> {
     let count = transposed.offsets.len() - 1;
-    let image: Vec<RowsFound<Image<F, C>>> =
-        parallel::map_chunks(matrix.rows(), ROW_CHUNK, |range| {
-            let mut row = Accumulator::new(count, [[0.0; C]; F]);
-            let mut found = RowsFound::default();
-            for index in range {
-                let (columns, blocks) = matrix.row(index);
-                for (&column, block) in columns.iter().zip(blocks) {
-                    let column = column as usize;
-                    for entry in interpolation.offsets[column]..interpolation.offsets[column + 1] {
-                        let sum = row.at(interpolation.columns[entry]);
-                        let (weight, arm) =
-                            (interpolation.weights[entry], interpolation.arm(entry));
-                        for (sum, entries) in sum.iter_mut().zip(block) {
-                            add_row(sum, entries, weight, arm, interpolation.turn);
-                        }
+    let image_of = |chunk: usize| {
+        let mut row = Accumulator::new(count, [[0.0; C]; F]);
+        let mut found: RowsFound<Image<F, C>> = RowsFound::default();
+        for index in chunk * ROW_CHUNK..((chunk + 1) * ROW_CHUNK).min(matrix.rows()) {
+            let (columns, blocks) = matrix.row(index);
+            for (&column, block) in columns.iter().zip(blocks) {
+                let column = column as usize;
+                for entry in interpolation.offsets[column]..interpolation.offsets[column + 1] {
+                    let sum = row.at(interpolation.columns[entry]);
+                    let (weight, arm) = (interpolation.weights[entry], interpolation.arm(entry));
+                    for (sum, entries) in sum.iter_mut().zip(block) {
+                        add_row(sum, entries, weight, arm, interpolation.turn);
                     }
                 }
-                // The sums that follow take the columns in any order.
-                row.finish(&mut found);
             }
-            found
-        });
-    let parts = parallel::map_chunks(count, COARSE_CHUNK, |range| {
+            // The sums that follow take the columns in any order.
+            row.finish(&mut found);
+        }
+        found
+    };
+    let sums_of = |image: &[RowsFound<Image<F, C>>], range: Range<usize>| {
         let mut row = Accumulator::new(count, [[0.0; C]; C]);
         let mut found = RowsFound::default();
         for coarse in range {
@@ -112,7 +115,37 @@ pub(super) fn galerkin<const F: usize, const C: usize>(
             row.finish(&mut found);
         }
         found
-    });
+    };
+    // `A P` is made where the first coarse row needs it, and given up after the last: where rows are
+    // numbered well, little of it is there at a time.
+    let chunks = |coarse: usize| {
+        transposed.of(index(coarse)).iter().map(|&(fine, _)| fine as usize / ROW_CHUNK)
+    };
+    let mut last = vec![None; matrix.rows().div_ceil(ROW_CHUNK)];
+    (0..count).for_each(|coarse| chunks(coarse).for_each(|chunk| last[chunk] = Some(coarse)));
+    let mut image: Vec<RowsFound<Image<F, C>>> = Vec::new();
+    image.resize_with(last.len(), RowsFound::default);
+    let mut is_made = vec![false; last.len()];
+    let mut parts = Vec::with_capacity(count.div_ceil(COARSE_CHUNK));
+    for start in (0..count).step_by(COARSE_WINDOW) {
+        let end = (start + COARSE_WINDOW).min(count);
+        let mut missing = Vec::new();
+        for chunk in (start..end).flat_map(chunks) {
+            if !std::mem::replace(&mut is_made[chunk], true) {
+                missing.push(chunk);
+            }
+        }
+        let made = parallel::map_chunks(missing.len(), 1, |range| image_of(missing[range.start]));
+        missing.into_iter().zip(made).for_each(|(chunk, made)| image[chunk] = made);
+        parts.extend(parallel::map_chunks(end - start, COARSE_CHUNK, |range| {
+            sums_of(&image, start + range.start..start + range.end)
+        }));
+        for (rows, last) in image.iter_mut().zip(&last) {
+            if last.is_none_or(|last| last < end) {
+                *rows = RowsFound::default();
+            }
+        }
+    }
     collected(COARSE_CHUNK, &parts)
 }
 
@@ -277,31 +310,20 @@ pub(super) struct Transfer<T> {
 }
 
 impl<T: Real> Transfer<T> {
-    /// The interpolation with row `rows(slot)` in place of `slot` and `columns(column)` in place of
-    /// a column.
-    pub(super) fn interpolation(
-        from: &Interpolation,
-        rows: impl Fn(usize) -> usize + Sync,
-        columns: impl Fn(usize) -> usize + Sync,
-    ) -> Self {
-        Self::new(from.rows(), from, |slot, push| {
-            let row = rows(slot);
+    /// The interpolation.
+    pub(super) fn interpolation(from: &Interpolation) -> Self {
+        Self::new(from.rows(), from, |row, push| {
             for entry in from.offsets[row]..from.offsets[row + 1] {
-                push(columns(from.columns[entry] as usize), entry);
+                push(from.columns[entry], entry);
             }
         })
     }
 
     /// The restriction: the transpose of an interpolation.
-    pub(super) fn restriction(
-        from: &Interpolation,
-        transposed: &Transposed,
-        rows: impl Fn(usize) -> usize + Sync,
-        columns: impl Fn(usize) -> usize + Sync,
-    ) -> Self {
-        Self::new(transposed.offsets.len() - 1, from, |slot, push| {
-            for &(fine, entry) in transposed.of(index(rows(slot))) {
-                push(columns(fine as usize), entry as usize);
+    pub(super) fn restriction(from: &Interpolation, transposed: &Transposed) -> Self {
+        Self::new(transposed.offsets.len() - 1, from, |row, push| {
+            for &(fine, entry) in transposed.of(index(row)) {
+                push(fine, entry as usize);
             }
         })
     }
@@ -309,12 +331,12 @@ impl<T: Real> Transfer<T> {
     fn new(
         count: usize,
         from: &Interpolation,
-        row: impl Fn(usize, &mut dyn FnMut(usize, usize)) + Sync,
+        row: impl Fn(usize, &mut dyn FnMut(u32, usize)) + Sync,
     ) -> Self {
         let parts = parallel::map_chunks(count, ROW_CHUNK, |range| {
             let (mut ends, mut found) = (Vec::with_capacity(range.len()), Vec::new());
-            for slot in range {
-                row(slot, &mut |column, entry| found.push((column, entry)));
+            for index in range {
+                row(index, &mut |column, entry| found.push((column, entry)));
                 ends.push(found.len());
             }
             (ends, found)
@@ -329,7 +351,7 @@ impl<T: Real> Transfer<T> {
         for (ends, found) in parts {
             let base = result.columns.len();
             result.offsets.extend(ends.into_iter().map(|end| base + end));
-            result.columns.extend(found.iter().map(|&(column, _)| index(column)));
+            result.columns.extend(found.iter().map(|&(column, _)| column));
             result.weights.extend(found.iter().map(|&(_, entry)| T::of(from.weights[entry])));
             if !from.arms.is_empty() {
                 result.arms.extend(found.iter().map(|&(_, entry)| from.arms[entry].map(T::of)));

@@ -1,5 +1,7 @@
 //! Cells of any linear type, owned.
 
+use std::ops::Range;
+
 use super::cell_type::Types;
 use super::{CellType, MeshError};
 
@@ -12,18 +14,65 @@ use super::{CellType, MeshError};
 #[derive(Debug, Clone)]
 pub struct Cells {
     types: Vec<CellType>,
-    offsets: Vec<usize>,
+    starts: Starts,
     connectivity: Vec<u32>,
     polyhedra: Vec<PolyhedronFaces>,
     /// The types whose cells were turned; `None` before any points have told.
     turned: Option<Types>,
 }
 
+/// Where the vertices of each cell begin.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Starts {
+    /// All cells have as many.
+    Equal(usize),
+    /// Of cells of several sizes, with the end of the last one.
+    Listed(Vec<usize>),
+}
+
+impl Default for Starts {
+    fn default() -> Self {
+        Self::Equal(0)
+    }
+}
+
+impl Starts {
+    #[inline]
+    fn of(&self, cell: usize) -> usize {
+        match self {
+            Self::Equal(size) => size * cell,
+            Self::Listed(starts) => starts[cell],
+        }
+    }
+
+    #[inline]
+    fn range(&self, cell: usize) -> Range<usize> {
+        self.of(cell)..self.of(cell + 1)
+    }
+
+    /// Takes one more cell, after `count` of them.
+    fn push(&mut self, count: usize, size: usize) {
+        match self {
+            Self::Equal(known) if count == 0 => *known = size,
+            Self::Equal(known) if *known == size => {}
+            Self::Equal(known) => {
+                let end = *known * count;
+                let before = (0..=count).map(|cell| *known * cell);
+                *self = Self::Listed(before.chain([end + size]).collect());
+            }
+            Self::Listed(starts) => {
+                let end = starts.last().copied().unwrap_or(0);
+                starts.push(end + size);
+            }
+        }
+    }
+}
+
 impl PartialEq for Cells {
     fn eq(&self, other: &Self) -> bool {
         let types = |cells: &Self| cells.turned.unwrap_or_default();
         self.types == other.types
-            && self.offsets == other.offsets
+            && self.starts == other.starts
             && self.connectivity == other.connectivity
             && self.polyhedra == other.polyhedra
             && types(self) == types(other)
@@ -52,7 +101,7 @@ impl Cells {
     pub fn new() -> Self {
         Self {
             types: Vec::new(),
-            offsets: vec![0],
+            starts: Starts::default(),
             connectivity: Vec::new(),
             polyhedra: Vec::new(),
             turned: None,
@@ -80,7 +129,7 @@ impl Cells {
         let count = connectivity.len() / size;
         Ok(Self {
             types: vec![cell_type; count],
-            offsets: (0..=count).map(|cell| cell * size).collect(),
+            starts: if count == 0 { Starts::default() } else { Starts::Equal(size) },
             connectivity,
             polyhedra: Vec::new(),
             turned: None,
@@ -113,9 +162,7 @@ impl Cells {
                 found: vertices.len(),
             });
         }
-        self.types.push(cell_type);
-        self.connectivity.extend_from_slice(vertices);
-        self.offsets.push(self.connectivity.len());
+        self.append(cell_type, vertices.iter().copied());
         Ok(())
     }
 
@@ -137,10 +184,15 @@ impl Cells {
         vertices.sort_unstable();
         vertices.dedup();
         self.polyhedra.push(PolyhedronFaces { cell: self.len(), faces: faces.to_vec() });
-        self.types.push(CellType::Polyhedron);
-        self.connectivity.extend_from_slice(&vertices);
-        self.offsets.push(self.connectivity.len());
+        self.append(CellType::Polyhedron, vertices);
         Ok(())
+    }
+
+    fn append(&mut self, cell_type: CellType, vertices: impl IntoIterator<Item = u32>) {
+        let before = self.connectivity.len();
+        self.connectivity.extend(vertices);
+        self.starts.push(self.types.len(), self.connectivity.len() - before);
+        self.types.push(cell_type);
     }
 
     /// How many cells there are.
@@ -177,19 +229,29 @@ impl Cells {
     /// Where `cell` is not below [`Cells::len`].
     #[must_use]
     pub fn vertices(&self, cell: usize) -> &[u32] {
-        &self.connectivity[self.offsets[cell]..self.offsets[cell + 1]]
+        &self.connectivity[self.starts.range(cell)]
     }
 
-    /// Row starts into [`Cells::connectivity`], `len() + 1` of them.
-    #[must_use]
-    pub fn offsets(&self) -> &[usize] {
-        &self.offsets
+    /// Row starts into [`Cells::connectivity`], `len() + 1` of them. Where all cells have as many
+    /// vertices they are kept nowhere.
+    pub fn offsets(&self) -> impl Iterator<Item = usize> + Clone {
+        (0..=self.len()).map(|cell| self.starts.of(cell))
     }
 
     /// The vertices of all cells, row after row.
     #[must_use]
     pub fn connectivity(&self) -> &[u32] {
         &self.connectivity
+    }
+
+    /// Bytes of memory, but for the faces of polyhedra.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let starts = match &self.starts {
+            Starts::Equal(_) => 0,
+            Starts::Listed(starts) => starts.len(),
+        };
+        self.types.len() + size_of::<usize>() * starts + size_of::<u32>() * self.connectivity.len()
     }
 
     /// Each cell's type and vertices, in order.
@@ -242,21 +304,17 @@ impl Cells {
     pub(super) fn renumbered(&self, order: &[u32], number: &[u32]) -> Self {
         let mut cells = Self {
             types: Vec::with_capacity(order.len()),
-            offsets: Vec::with_capacity(order.len() + 1),
+            starts: Starts::default(),
             connectivity: Vec::with_capacity(self.connectivity.len()),
             polyhedra: Vec::new(),
             turned: self.turned,
         };
-        cells.offsets.push(0);
         let renumbered =
             |vertices: &[u32]| vertices.iter().map(|&vertex| number[vertex as usize]).collect();
         for (index, &cell) in order.iter().enumerate() {
             let cell = cell as usize;
-            cells.types.push(self.types[cell]);
-            cells
-                .connectivity
-                .extend(self.vertices(cell).iter().map(|&vertex| number[vertex as usize]));
-            cells.offsets.push(cells.connectivity.len());
+            let vertices = self.vertices(cell).iter().map(|&vertex| number[vertex as usize]);
+            cells.append(self.types[cell], vertices);
             if self.types[cell] == CellType::Polyhedron {
                 let faces =
                     self.polyhedron_faces(cell).iter().map(|face| renumbered(face)).collect();
@@ -278,9 +336,7 @@ impl Cells {
                 let faces = self.polyhedron_faces(cell).to_vec();
                 subset.polyhedra.push(PolyhedronFaces { cell: subset.len(), faces });
             }
-            subset.types.push(self.types[cell]);
-            subset.connectivity.extend_from_slice(self.vertices(cell));
-            subset.offsets.push(subset.connectivity.len());
+            subset.append(self.types[cell], self.vertices(cell).iter().copied());
         }
         subset
     }
@@ -311,7 +367,7 @@ impl Cells {
 
     /// The vertices of a cell, to be put in another order.
     pub(super) fn vertices_mut(&mut self, cell: usize) -> &mut [u32] {
-        &mut self.connectivity[self.offsets[cell]..self.offsets[cell + 1]]
+        &mut self.connectivity[self.starts.range(cell)]
     }
 
     /// The faces of all polyhedra, whose vertices are to be put in another order.
@@ -336,5 +392,30 @@ impl Cells {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn starts_are_listed_where_cells_differ() {
+        let tets = Cells::uniform(CellType::Tetra, (0..12).collect()).unwrap();
+        let mut cells = Cells::new();
+        assert_eq!(cells.offsets().collect::<Vec<_>>(), [0]);
+        for cell in 0..3 {
+            cells.push(CellType::Tetra, tets.vertices(cell)).unwrap();
+        }
+        assert_eq!(cells.offsets().collect::<Vec<_>>(), [0, 4, 8, 12]);
+        assert_eq!((&cells, cells.bytes()), (&tets, 3 + 12 * 4));
+        cells.push(CellType::Pyramid, &[7, 6, 5, 4, 3]).unwrap();
+        cells.push(CellType::Tetra, &[0, 1, 2, 4]).unwrap();
+        assert_eq!(cells.offsets().collect::<Vec<_>>(), [0, 4, 8, 12, 17, 21]);
+        assert_eq!(cells.vertices(3), [7, 6, 5, 4, 3]);
+        assert_eq!(cells.vertices(4), [0, 1, 2, 4]);
+        assert_eq!(cells.subset([0, 1, 2]), tets);
+        assert_eq!(cells.subset(0..5), cells);
+        assert_ne!(cells.subset([1, 3]), cells.subset([3, 1]));
     }
 }

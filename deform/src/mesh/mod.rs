@@ -46,7 +46,7 @@ pub use view::{CellsView, Indices, MeshView};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
     // Shared with clones, and the cells with meshes of other coordinates.
-    points: Arc<Vec<Vector>>,
+    points: Arc<[Vector]>,
     cells: Arc<Cells>,
     features: Arc<FeatureSource>,
 }
@@ -69,7 +69,7 @@ impl Mesh {
         cells.validate(points.len())?;
         features.validate(points.len())?;
         let cells = cells.of_mesh(&points)?;
-        Ok(Self { points: Arc::new(points), cells: Arc::new(cells), features: Arc::new(features) })
+        Ok(Self { points: points.into(), cells: Arc::new(cells), features: Arc::new(features) })
     }
 
     /// The coordinates of each vertex.
@@ -90,6 +90,11 @@ impl Mesh {
         &self.features
     }
 
+    /// The coordinates of each vertex, to be kept without a copy.
+    pub(crate) fn shared_points(&self) -> &Arc<[Vector]> {
+        &self.points
+    }
+
     /// The cells, to be kept without a copy.
     pub(crate) fn shared_cells(&self) -> &Arc<Cells> {
         &self.cells
@@ -106,7 +111,7 @@ impl Mesh {
         }
         check_finite(&points)?;
         Ok(Self {
-            points: Arc::new(points),
+            points: points.into(),
             cells: Arc::clone(&self.cells),
             features: Arc::clone(&self.features),
         })

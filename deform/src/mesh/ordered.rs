@@ -51,7 +51,7 @@ impl Ordered {
         let indices = indices(count, &vertices);
         let cells = by_first_vertex(mesh, &indices);
         let ordered = Mesh {
-            points: Arc::new(vertices.iter().map(|&vertex| mesh.points[vertex as usize]).collect()),
+            points: vertices.iter().map(|&vertex| mesh.points[vertex as usize]).collect(),
             cells: Arc::new(mesh.cells.renumbered(&cells, &indices)),
             features: Arc::new(FeatureSource::default()),
         };
@@ -67,7 +67,10 @@ impl Ordered {
     /// Another mesh with the same cells, which has finite coordinates, in this order.
     pub(crate) fn like(&self, mesh: &Mesh) -> Mesh {
         Mesh {
-            points: Arc::new(self.numbering.gather(&mesh.points).into_owned()),
+            points: match self.numbering.gather(&mesh.points) {
+                Cow::Borrowed(_) => Arc::clone(&mesh.points),
+                Cow::Owned(points) => points.into(),
+            },
             cells: Arc::clone(&self.mesh.cells),
             features: Arc::clone(&self.mesh.features),
         }

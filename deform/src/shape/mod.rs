@@ -202,7 +202,7 @@ impl Shaper {
         let editor = boundary.surface().map(|surface| Editor::new(Arc::clone(surface))).transpose();
         let ranks = domain.communicator();
         let editor = if ranks.size() == 1 { editor? } else { agree(&**ranks, editor)? };
-        let reference = domain.mesh().points().into();
+        let reference = Arc::clone(domain.mesh().shared_points());
         Ok(Self {
             body: Arc::new(Body {
                 domain,

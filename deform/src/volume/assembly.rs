@@ -121,6 +121,11 @@ pub(super) struct Graph {
     /// The other way round: the vertices of the ordered mesh that are solved for, and those of the
     /// boundary.
     slot_vertices: Vec<u32>,
+}
+
+/// What the equations of a graph are assembled by.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Pattern {
     /// The volume cells at each vertex of the ordered mesh.
     cells_at: Groups<u32>,
     matrix: (Vec<usize>, Vec<u32>),
@@ -144,7 +149,7 @@ impl Graph {
         ordered: Arc<Ordered>,
         boundary: &[u32],
         domain: &Domain,
-    ) -> Result<Self, VolumeError> {
+    ) -> Result<(Self, Pattern), VolumeError> {
         let boundary: Vec<u32> =
             agreed(domain.communicator(), boundary_indices(&ordered, boundary))?;
         let mesh = ordered.mesh();
@@ -192,7 +197,31 @@ impl Graph {
             domain.communicator(),
             check_attached(&vertices, (&matrix.0, &matrix.1), &coupling.0, domain),
         )?;
-        Ok(Self { ordered, vertices, slots, slot_vertices, cells_at, matrix, coupling })
+        let graph = Self { ordered, vertices, slots, slot_vertices };
+        Ok((graph, Pattern { cells_at, matrix, coupling }))
+    }
+
+    /// The pattern of the equations, as it was when the graph was made.
+    pub(super) fn pattern(&self) -> Pattern {
+        let mesh = self.ordered.mesh();
+        let cells_at = volume_cells_at(mesh);
+        let (free, _) = self.slot_vertices.split_at(self.vertices.len());
+        let (offsets, slots) = neighbours(mesh, &cells_at, free, &self.slots);
+        let free_count = index(free.len());
+        let parts = parallel::map_chunks(free.len(), ASSEMBLY_CHUNK, |range| {
+            let (mut inner, mut outer) = ((Vec::new(), Vec::new()), (Vec::new(), Vec::new()));
+            for row in range {
+                let row = &slots[offsets[row]..offsets[row + 1]];
+                let (own, other) = row.split_at(row.partition_point(|&slot| slot < free_count));
+                inner.0.push(own.len());
+                inner.1.extend_from_slice(own);
+                outer.0.push(other.len());
+                outer.1.extend(other.iter().map(|&slot| slot - free_count));
+            }
+            (inner, outer)
+        });
+        let (inner, outer): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+        Pattern { cells_at, matrix: compressed(inner), coupling: compressed(outer) }
     }
 
     /// The unknown of a vertex that is solved for.
@@ -219,14 +248,16 @@ impl Graph {
     /// the order of the graph, and `stiffness` has a factor for each of its cells.
     pub(super) fn assemble<const B: usize, F: Form<B>>(
         &self,
+        pattern: Arc<Pattern>,
         mesh: &Mesh,
         elements: &Elements<'_>,
         form: &F,
         stiffness: &[f64],
     ) -> (SparseMatrix<B>, SparseMatrix<B>) {
-        let mut matrix = SparseMatrix::<B>::zeros(self.matrix.0.clone(), self.matrix.1.clone());
-        let mut coupling =
-            SparseMatrix::<B>::zeros(self.coupling.0.clone(), self.coupling.1.clone());
+        // What nobody else needs becomes the matrices' own.
+        let Pattern { cells_at, matrix, coupling } = Arc::unwrap_or_clone(pattern);
+        let mut matrix = SparseMatrix::<B>::zeros(matrix.0, matrix.1);
+        let mut coupling = SparseMatrix::<B>::zeros(coupling.0, coupling.1);
         let (offsets, columns, values) = matrix.offsets_and_values_mut();
         let (outer_offsets, outer_columns, outer_values) = coupling.offsets_and_values_mut();
         let free_count = self.vertices.len();
@@ -254,7 +285,7 @@ impl Graph {
                     sums.clear();
                     sums.resize(inner_range.len() + outer_range.len(), F::Sum::default());
                     let vertex = self.slot_vertices[row];
-                    for &cell in self.cells_at.of(vertex) {
+                    for &cell in cells_at.of(vertex) {
                         let cell = cell as usize;
                         let vertices = mesh.cells().vertices(cell);
                         let Some(own) = vertices.iter().position(|&other| other == vertex) else {

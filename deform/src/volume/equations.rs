@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::assembly::{Elastic, Graph, Laplace, VectorLaplace};
+use super::assembly::{Elastic, Graph, Laplace, Pattern, VectorLaplace};
 use super::element::Elements;
 use super::sliding::{Constraint, constrain};
 use super::{Deform, Method};
@@ -22,7 +22,6 @@ pub(super) enum Equations {
 /// The equations of the free vertices.
 #[derive(Debug)]
 pub(super) struct System<const B: usize> {
-    pub(super) matrix: Arc<SparseMatrix<B>>,
     /// The blocks that couple them to the boundary.
     pub(super) coupling: SparseMatrix<B>,
     /// The blocks that couple them to the prescribed displacements of sliding vertices.
@@ -39,9 +38,9 @@ impl<const B: usize> System<B> {
     ) -> Result<Self, LinearError> {
         let mut matrix = matrix;
         let sliding = slide(&mut matrix);
-        let matrix = Arc::new(matrix);
-        let solver = set_up(Arc::clone(&matrix))?;
-        Ok(Self { matrix, coupling, sliding, solver })
+        // The solver keeps what it needs of the matrix.
+        let solver = set_up(Arc::new(matrix))?;
+        Ok(Self { coupling, sliding, solver })
     }
 }
 
@@ -65,45 +64,70 @@ impl Start<'_> {
     }
 }
 
+/// The mesh in the order of a graph, with the stiffness of each of its cells.
+pub(super) struct Stiffened<'a> {
+    pub(super) mesh: &'a Mesh,
+    pub(super) elements: Elements<'a>,
+    pub(super) stiffness: Vec<f64>,
+}
+
+/// Assembles the matrix of the equations of a displacement whose components are solved for
+/// together, and that which couples them to the boundary.
+pub(super) fn coupled(
+    graph: &Graph,
+    pattern: Arc<Pattern>,
+    stiffened: &Stiffened<'_>,
+    settings: &Deform,
+) -> (SparseMatrix<3>, SparseMatrix<3>) {
+    let Stiffened { mesh, elements, stiffness } = stiffened;
+    match settings.method {
+        Method::Elasticity => {
+            let form = Elastic::new(settings.poisson_ratio);
+            graph.assemble(pattern, mesh, elements, &form, stiffness)
+        }
+        Method::Harmonic => graph.assemble(pattern, mesh, elements, &VectorLaplace, stiffness),
+    }
+}
+
+/// Assembles the matrix of the equations of each component, and that which couples them to the
+/// boundary.
+pub(super) fn separate(
+    graph: &Graph,
+    pattern: Arc<Pattern>,
+    stiffened: &Stiffened<'_>,
+) -> (SparseMatrix<1>, SparseMatrix<1>) {
+    let Stiffened { mesh, elements, stiffness } = stiffened;
+    graph.assemble(pattern, mesh, elements, &Laplace, stiffness)
+}
+
 /// Assembles the equations and sets up their solver.
 pub(super) fn equations(
     graph: &Graph,
-    mesh: &Mesh,
-    elements: &Elements<'_>,
-    stiffness: &[f64],
+    pattern: Arc<Pattern>,
+    stiffened: &Stiffened<'_>,
     constraints: &[Constraint],
     settings: &Deform,
     start: Start<'_>,
 ) -> Result<Equations, LinearError> {
-    let coupled = |system| {
-        let slide = |matrix: &mut SparseMatrix<3>| constrain(matrix, constraints);
-        let set_up = |matrix: Arc<SparseMatrix<3>>| match start {
-            Start::Like(Equations::Coupled(like)) => like.solver.renewed(matrix),
-            Start::Like(Equations::Separate(_)) => crate::linear::solver(matrix, &Halo::none()),
-            Start::Fresh(solvers, halo, positions) => solvers.vector(matrix, halo, positions),
+    // On one rank that has sliding vertices all ranks must solve for the components together.
+    if settings.method == Method::Harmonic && !start.is_coupled(constraints) {
+        let system = separate(graph, pattern, stiffened);
+        let none = |matrix: &mut SparseMatrix<1>| {
+            SparseMatrix::zeros(vec![0; matrix.rows() + 1], Vec::new())
         };
-        System::new(system, slide, set_up).map(Equations::Coupled)
-    };
-    match settings.method {
-        Method::Elasticity => {
-            let form = Elastic::new(settings.poisson_ratio);
-            coupled(graph.assemble(mesh, elements, &form, stiffness))
-        }
-        // On one rank that has sliding vertices all ranks must solve for the components together.
-        Method::Harmonic if start.is_coupled(constraints) => {
-            coupled(graph.assemble(mesh, elements, &VectorLaplace, stiffness))
-        }
-        Method::Harmonic => {
-            let system = graph.assemble(mesh, elements, &Laplace, stiffness);
-            let none = |matrix: &mut SparseMatrix<1>| {
-                SparseMatrix::zeros(vec![0; matrix.rows() + 1], Vec::new())
-            };
-            let set_up = |matrix: Arc<SparseMatrix<1>>| match start {
-                Start::Like(Equations::Separate(like)) => like.solver.renewed(matrix),
-                Start::Like(Equations::Coupled(_)) => crate::linear::solver(matrix, &Halo::none()),
-                Start::Fresh(solvers, halo, positions) => solvers.scalar(matrix, halo, positions),
-            };
-            System::new(system, none, set_up).map(Equations::Separate)
-        }
+        let set_up = |matrix: Arc<SparseMatrix<1>>| match start {
+            Start::Like(Equations::Separate(like)) => like.solver.renewed(matrix),
+            Start::Like(Equations::Coupled(_)) => crate::linear::solver(matrix, &Halo::none()),
+            Start::Fresh(solvers, halo, positions) => solvers.scalar(matrix, halo, positions),
+        };
+        return System::new(system, none, set_up).map(Equations::Separate);
     }
+    let system = coupled(graph, pattern, stiffened, settings);
+    let slide = |matrix: &mut SparseMatrix<3>| constrain(matrix, constraints);
+    let set_up = |matrix: Arc<SparseMatrix<3>>| match start {
+        Start::Like(Equations::Coupled(like)) => like.solver.renewed(matrix),
+        Start::Like(Equations::Separate(_)) => crate::linear::solver(matrix, &Halo::none()),
+        Start::Fresh(solvers, halo, positions) => solvers.vector(matrix, halo, positions),
+    };
+    System::new(system, slide, set_up).map(Equations::Coupled)
 }

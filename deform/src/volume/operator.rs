@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::assembly::{Graph, stiffness};
+use super::assembly::{Graph, Pattern, stiffness};
 use super::element::Elements;
-use super::equations::{Equations, Start, equations};
-use super::sliding::{Constraint, Sliding, constraints};
+use super::equations::{Equations, Start, Stiffened, coupled, equations, separate};
+use super::sliding::{Constraint, Sliding, constrain, constraints};
 use super::{Deform, VolumeError, agreed};
 use crate::communicator::{Communicator, Halo};
 use crate::linear::{BuiltIn, LinearError, Solvers, SparseMatrix};
@@ -46,6 +46,9 @@ use crate::mesh::{Cells, Domain, Mesh, Ordered, Vector};
 pub struct VolumeOperator {
     /// The graph, which depends on the cells alone.
     pub(super) graph: Arc<Graph>,
+    /// The pattern of the equations, where this operator was made from another: others will be,
+    /// then.
+    pattern: Option<Arc<Pattern>>,
     pub(super) cells: Arc<Cells>,
     pub(super) settings: Deform,
     pub(super) boundary: Vec<u32>,
@@ -84,8 +87,8 @@ impl VolumeOperator {
     /// all that is done with the operator: every rank brings its part of the displacement of the
     /// boundary.
     ///
-    /// Memory: about 150 bytes for each pair of neighbouring vertices (elasticity) or 30
-    /// (harmonic).
+    /// Memory: about 100 bytes for each pair of neighbouring vertices (elasticity) or 25 (harmonic);
+    /// while it is set up, twice as much.
     ///
     /// # Errors
     /// [`VolumeError::Setting`], [`VolumeError::BoundaryVertex`], [`VolumeError::BoundaryTwice`];
@@ -131,7 +134,8 @@ impl VolumeOperator {
         let elements = Elements::new(ordered.mesh());
         let stiffness =
             stiffness(&ordered, ordered.mesh(), &elements, settings.stiffening, &domain)?;
-        let graph = Arc::new(Graph::new(Arc::clone(&ordered), boundary, &domain)?);
+        let (graph, pattern) = Graph::new(Arc::clone(&ordered), boundary, &domain)?;
+        let graph = Arc::new(graph);
         let constraints =
             agreed(domain.communicator(), checked_constraints(mesh, &graph, sliding))?;
         let halo = domain.halo().of(&graph.vertices);
@@ -140,15 +144,9 @@ impl VolumeOperator {
         };
         let unknown_points = positions(&graph.vertices);
         let start = Start::Fresh(solvers, &halo, &unknown_points);
-        let equations = equations(
-            &graph,
-            ordered.mesh(),
-            &elements,
-            &stiffness,
-            &constraints,
-            settings,
-            start,
-        )?;
+        let stiffened = Stiffened { mesh: ordered.mesh(), elements, stiffness };
+        let pattern = Arc::new(pattern);
+        let equations = equations(&graph, pattern, &stiffened, &constraints, settings, start)?;
         let owned = (0..).zip(boundary).filter(|(_, vertex)| domain.owns(**vertex));
         Ok(Self {
             cells: Arc::clone(mesh.shared_cells()),
@@ -162,6 +160,7 @@ impl VolumeOperator {
             own_boundary: owned.map(|(position, _)| position).collect(),
             domain,
             graph,
+            pattern: None,
             equations,
         })
     }
@@ -192,24 +191,22 @@ impl VolumeOperator {
             if same { Ok(()) } else { Err(VolumeError::OtherCells) },
         )?;
         let ordered = self.graph.ordered.like(mesh);
-        let elements = Elements::new(&ordered);
-        let stiffness =
-            stiffness(&self.graph.ordered, &ordered, &elements, stiffening, &self.domain)?;
-        let like = Start::Like(&self.equations);
+        let stiffened = self.stiffened(&ordered, stiffening)?;
+        let pattern = self.pattern();
         let equations = equations(
             &self.graph,
-            &ordered,
-            &elements,
-            &stiffness,
+            Arc::clone(&pattern),
+            &stiffened,
             &self.constraints,
             &settings,
-            like,
+            Start::Like(&self.equations),
         )?;
         let positions = |vertices: &[u32]| {
             vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect()
         };
         Ok(Self {
             graph: Arc::clone(&self.graph),
+            pattern: Some(pattern),
             cells: Arc::clone(&self.cells),
             settings,
             boundary: self.boundary.clone(),
@@ -222,6 +219,22 @@ impl VolumeOperator {
             domain: self.domain.with_mesh(mesh.clone()),
             equations,
         })
+    }
+
+    fn pattern(&self) -> Arc<Pattern> {
+        self.pattern.clone().unwrap_or_else(|| Arc::new(self.graph.pattern()))
+    }
+
+    /// The cells of a mesh in the order of the graph, as stiff as they are.
+    fn stiffened<'a>(
+        &self,
+        ordered: &'a Mesh,
+        stiffening: f64,
+    ) -> Result<Stiffened<'a>, VolumeError> {
+        let elements = Elements::new(ordered);
+        let stiffness =
+            stiffness(&self.graph.ordered, ordered, &elements, stiffening, &self.domain)?;
+        Ok(Stiffened { mesh: ordered, elements, stiffness })
     }
 
     /// The operator with another tolerance: the part of the right side that its solves may leave.
@@ -252,19 +265,20 @@ impl VolumeOperator {
     }
 
     /// Where each component is solved for by itself, as with [`Harmonic`](super::Method::Harmonic)
-    /// unless vertices slide, the matrix of its equations: to try other solvers on.
+    /// unless vertices slide, the matrix of its equations: to try other solvers on. It is assembled
+    /// anew.
     #[must_use]
-    pub fn separate_matrix(&self) -> Option<&SparseMatrix<1>> {
-        match &self.equations {
-            Equations::Separate(system) => Some(&system.matrix),
-            Equations::Coupled(_) => None,
-        }
+    pub fn separate_matrix(&self) -> Option<SparseMatrix<1>> {
+        let Equations::Separate(_) = &self.equations else { return None };
+        let ordered = self.graph.ordered.like(self.domain.mesh());
+        let stiffened = self.stiffened(&ordered, self.settings.stiffening).ok()?;
+        Some(separate(&self.graph, self.pattern(), &stiffened).0)
     }
 
     /// Where the three components are solved for together, as with
     /// [`Elasticity`](super::Method::Elasticity), the matrix and the right side of the equations
     /// that [`VolumeOperator::solve`] solves for these displacements of the boundary, less the
-    /// rigid motion nearest to them: to try other solvers on.
+    /// rigid motion nearest to them: to try other solvers on. The matrix is assembled anew.
     ///
     /// # Panics
     /// Where there is not one displacement for each of [`VolumeOperator::boundary`].
@@ -272,19 +286,23 @@ impl VolumeOperator {
     pub fn coupled_equations(
         &self,
         boundary_displacement: &[Vector],
-    ) -> Option<(&SparseMatrix<3>, Vec<Vector>)> {
+    ) -> Option<(SparseMatrix<3>, Vec<Vector>)> {
         assert_eq!(
             boundary_displacement.len(),
             self.boundary.len(),
             "one displacement for each boundary vertex"
         );
         let Equations::Coupled(system) = &self.equations else { return None };
+        let ordered = self.graph.ordered.like(self.domain.mesh());
+        let stiffened = self.stiffened(&ordered, self.settings.stiffening).ok()?;
+        let mut matrix = coupled(&self.graph, self.pattern(), &stiffened, &self.settings).0;
+        constrain(&mut matrix, &self.constraints);
         let (rigid, rest) = self.less_rigid(boundary_displacement);
         let across = |constraint: &Constraint| {
             constraint.across(rigid.at(self.unknown_points[constraint.row]))
         };
         let rest_sliding: Vec<Vector> = self.constraints.iter().map(across).collect();
-        Some((&system.matrix, self.coupled_right_side(system, &rest, &rest_sliding)))
+        Some((matrix, self.coupled_right_side(system, &rest, &rest_sliding)))
     }
 
     /// The displacement of every vertex for these displacements of the boundary vertices, one for

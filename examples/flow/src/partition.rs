@@ -25,8 +25,7 @@ pub fn partition(mesh: &Mesh, ranks: usize) -> Result<Vec<usize>, PartitionError
     }
     let failed = |error: &dyn std::fmt::Display| PartitionError::Metis(error.to_string());
     let number = |value: usize| metis::Idx::try_from(value).map_err(|error| failed(&error));
-    let starts =
-        cells.offsets().iter().map(|&start| number(start)).collect::<Result<Vec<_>, _>>()?;
+    let starts = cells.offsets().map(number).collect::<Result<Vec<_>, _>>()?;
     let vertices = cells
         .connectivity()
         .iter()

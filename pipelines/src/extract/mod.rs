@@ -236,7 +236,7 @@ impl Extract {
     #[must_use]
     pub fn bytes(&self) -> usize {
         let values: usize = self.fields.iter().map(|field| field.values.len()).sum();
-        let cells = 4 * self.cells.connectivity().len() + 8 * self.cells.offsets().len();
+        let cells = self.cells.bytes();
         size_of::<Vector>() * self.points.len() + cells + 8 * values
     }
 }

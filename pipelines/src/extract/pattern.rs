@@ -83,7 +83,7 @@ impl Pattern {
             Origin::Between(supports) => size_of::<Support>() * supports.len(),
             _ => 0,
         };
-        let cells = 4 * self.cells.connectivity().len() + 8 * self.cells.offsets().len();
+        let cells = self.cells.bytes();
         size_of::<Vector>() * self.points.len() + 4 * self.owners.len() + base + cells + origin
     }
 

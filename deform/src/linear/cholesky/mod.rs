@@ -65,9 +65,9 @@ impl<const B: usize> LinearSolver<B> for Cholesky<B> {
             self.factor.solve(vector, result)
         };
         let (right_side, solution) = (single_column(right_side), single_column_mut(solution));
-        let sum = Sum { matrix: &self.matrix, halo: &Halo::none() };
+        let sum = Sum { matrix: &*self.matrix, halo: &Halo::none() };
         let [mut convergence] =
-            conjugate_gradients(sum, apply, right_side, solution, [tolerance], REFINEMENTS)?;
+            conjugate_gradients(&sum, apply, right_side, solution, [tolerance], REFINEMENTS)?;
         convergence.iterations = 0;
         Ok(convergence)
     }

@@ -148,3 +148,19 @@ fn untangling_and_improving_move_the_same_vertices() {
         assert!(difference < 0.02, "{difference}");
     }
 }
+
+/// An operator gives the pattern of its equations up; those made from it find it again.
+#[test]
+fn the_pattern_of_the_equations_is_found_again() {
+    use std::sync::Arc;
+
+    use crate::mesh::{Domain, Ordered};
+    use crate::volume::assembly::Graph;
+
+    for mesh in [cube(9), mixed(5), shuffled(&jiggled(&cube(8), 0.02)).0] {
+        let (held, _) = split_boundary(&mesh, &[(2, 1.0)]);
+        let ordered = Arc::new(Ordered::new(&mesh));
+        let (graph, pattern) = Graph::new(ordered, &held, &Domain::from(&mesh)).unwrap();
+        assert_eq!(graph.pattern(), pattern);
+    }
+}

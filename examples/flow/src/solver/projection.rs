@@ -159,7 +159,7 @@ impl Projection {
         // The residual is a loss of mass, and as such says alone what is good enough.
         let tolerance =
             Tolerance { relative: 0.0, absolute: (pressure_tolerance * size).max(small) };
-        if self.is_worn && self.refresh(Arc::new(self.solver.matrix().clone()), points).is_err() {
+        if self.is_worn && self.refresh(self.solver.matrix(), points).is_err() {
             // The old one has served so far, if slowly.
             self.is_worn = false;
         }

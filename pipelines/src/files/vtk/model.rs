@@ -172,7 +172,7 @@ fn cells_of(cells: &Cells) -> Result<vtk::Cells, Problem> {
     } else {
         vtk::VertexNumbers::XML {
             connectivity: cells.connectivity().iter().map(|&vertex| u64::from(vertex)).collect(),
-            offsets: cells.offsets().iter().skip(1).map(|&offset| offset as u64).collect(),
+            offsets: cells.offsets().skip(1).map(|offset| offset as u64).collect(),
         }
     };
     Ok(vtk::Cells { cell_verts, types: types? })

@@ -373,7 +373,7 @@ fn polygonal_rows(cells: &Cells, section: &[usize]) -> Vec<Array<'static>> {
 
 fn unstructured_rows(cells: &Cells) -> Vec<Array<'static>> {
     let connectivity = cells.connectivity().iter().map(|&vertex| i64::from(vertex)).collect();
-    let offsets = cells.offsets().iter().skip(1).map(|&offset| offset as i64).collect();
+    let offsets = cells.offsets().skip(1).map(|offset| offset as i64).collect();
     let types = cells.types().iter().map(|cell| cell.vtk()).collect();
     let mut arrays = vec![
         integers("connectivity", connectivity),
