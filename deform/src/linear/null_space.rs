@@ -209,6 +209,7 @@ mod tests {
         precision: Precision::Single,
         max_iterations: 100,
         null_space: NullSpace::Constants,
+        by_half: true,
     };
 
     #[test]
