@@ -40,6 +40,11 @@ fn the_types_hold() {
 
 #[test]
 fn the_sources_are_in_order() {
-    passes(&["-m", "ruff", "check", "--no-cache", "."]);
-    passes(&["-m", "ruff", "format", "--no-cache", "--check", "."]);
+    let sources = [".", "../../examples"];
+    let ruff = |task: &[&str]| {
+        let settings = ["--no-cache", "--config", "pyproject.toml"];
+        passes(&[&["-m", "ruff"], task, &settings, &sources].concat());
+    };
+    ruff(&["check"]);
+    ruff(&["format", "--check"]);
 }

@@ -1,0 +1,84 @@
+"""Solvers that others wrote: an order is carried out, the physics is known, and the undo is exact."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+
+
+def load(file):
+    """An example as a module."""
+    specification = importlib.util.spec_from_file_location(Path(file).stem, EXAMPLES / file)
+    module = importlib.util.module_from_spec(specification)
+    sys.modules[specification.name] = module
+    specification.loader.exec_module(module)
+    return module
+
+
+def commands(edit, schedule, begin, end):
+    """An order at one cycle, and its undo at another."""
+    return [
+        {"at": {"cycle": begin}, "order": {"edits": [edit], "schedule": schedule}},
+        {"at": {"cycle": end}, "order": {"undo": 1}},
+    ]
+
+
+def test_heat_with_scikit_fem(tmp_path):
+    pytest.importorskip("skfem")
+    heat = load("heat/python/heat_skfem.py")
+    fluxes, points = {}, {}
+
+    def seen(cycle, solver, conductivity):
+        fluxes[cycle] = solver.flux(conductivity)
+        points[cycle] = solver.mesh.p.copy()
+
+    squeeze = {"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, -0.2]}}
+    orders = commands(squeeze, {"steps": 5, "every": {"steps": 2}}, 30, 80)
+    report = heat.run(130, cells=4, orders=orders, seen=seen, output=tmp_path)
+
+    assert [order["status"] for order in report["orders"]] == ["applied", "applied"]
+    # Fourier's law: conductivity times area over height.
+    assert points[79][2].max() == pytest.approx(0.8, abs=1e-15)
+    assert fluxes[29] == pytest.approx(1, abs=1e-4)
+    assert fluxes[79] == pytest.approx(1 / 0.8, abs=1e-4)
+    assert fluxes[129] == pytest.approx(1, abs=1e-4)
+    assert np.array_equal(points[0], points[129])
+
+
+def test_a_uniform_temperature_stays_so_on_a_mesh_that_moves():
+    pytest.importorskip("skfem")
+    heat = load("heat/python/heat_skfem.py")
+    solver = heat.Heat(3)
+    solver.temperature[:] = 7
+    inside = solver.mesh.p.min(0) * (1 - solver.mesh.p.max(0)) > 0
+    velocity = np.zeros((inside.size, 3))
+    velocity[inside] = [0.3, -0.2, 0.1]
+    solver.mesh = type(solver.mesh)(solver.mesh.p + 0.1 * velocity.T, solver.mesh.t)
+    solver.step(0.1, 1.0, velocity)
+    assert np.abs(solver.temperature - 7).max() < 1e-12
+
+
+def test_a_flow_around_a_cylinder_with_ngsolve(tmp_path):
+    pytest.importorskip("ngsolve")
+    cylinder = load("ngsolve/cylinder.py")
+    drags, points = {}, {}
+
+    def seen(cycle, flow, at):
+        drags[cycle] = flow.drag()
+        points[cycle] = at.copy()
+
+    held = ["inlet", "outlet", "wall"]
+    thicker = {"scale_direction": {"features": ["cylinder"], "fixed": held, "factors": [1.3, 1, 1.3]}}
+    orders = commands(thicker, {"steps": 3, "every": {"steps": 2}}, 12, 30)
+    report = cylinder.run(48, size=0.14, orders=orders, seen=seen, output=tmp_path)
+
+    assert [order["status"] for order in report["orders"]] == ["applied", "applied"], report["orders"]
+    # A thicker cylinder takes more force; the old one takes the old force, on the old mesh to the bit.
+    assert drags[29] > 1.3 * drags[11]
+    assert drags[47] == pytest.approx(drags[11], rel=0.03)
+    assert np.array_equal(points[0], points[47])
+    assert not np.array_equal(points[0], points[29])
