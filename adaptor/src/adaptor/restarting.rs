@@ -267,7 +267,11 @@ impl Adaptor {
     /// the commands of pipelines and files, then all. Collective.
     pub(super) fn obey_again(&mut self, moment: Moment, all: bool) {
         while self.resumed.is_due(moment.cycle) {
-            let front = self.resumed.again.commands.pop_front_if(|next| all || !next.comes_late);
+            let commands = &mut self.resumed.again.commands;
+            if !all && commands.front().is_some_and(|next| next.comes_late) {
+                return;
+            }
+            let front = commands.pop_front();
             let Some(CommandAgain { id, by, command, has_settled, is_noted, .. }) = front else {
                 return;
             };

@@ -173,8 +173,8 @@ impl Adaptor {
             if self.communicator.size() == 1 { saved? } else { agree(&*self.communicator, saved)? };
         // All shapes are measured from the reference, wherever the solver's mesh has come to.
         let mesh = match &saved {
-            Some(points) => MeshView { points: ArrayView::vectors(points), ..channel.mesh.clone() },
-            None => channel.mesh.clone(),
+            Some(points) => MeshView { points: ArrayView::vectors(points), ..channel.mesh },
+            None => channel.mesh,
         };
         let shaper = if self.communicator.size() > 1 || !mesh.is_plain() {
             let part = agree(&*self.communicator, Part::of(&mesh).map_err(refused))?;

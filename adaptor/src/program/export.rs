@@ -104,14 +104,14 @@ pub(crate) fn export(options: &Options) -> Result<(), Failure> {
         table.write(&options.out.join(format!("{}.csv", file_name(pipeline))))?;
     }
     for (name, view) in &views {
-        say(&format!("{name}: {} of {} frames", view.written, view.seen))?;
+        say(format!("{name}: {} of {} frames", view.written, view.seen))?;
     }
     for (name, table) in &tables {
-        say(&format!("{name}: {} measurements", table.rows.len()))?;
+        say(format!("{name}: {} measurements", table.rows.len()))?;
     }
     if undecoded > 0 || recording.lost_bytes() > 0 {
         let lost = recording.lost_bytes();
-        say(&format!("{undecoded} frames and the last {lost} bytes could not be read"))?;
+        say(format!("{undecoded} frames and the last {lost} bytes could not be read"))?;
     }
     match (&options.view, views.is_empty()) {
         (Some(name), true) if vtk || options.png => {
