@@ -69,7 +69,7 @@ pub(crate) struct Head {
     pub(crate) time: f64,
     /// Milliseconds since the recording began.
     pub(crate) milliseconds: u64,
-    pub(super) checksum: u32,
+    checksum: u32,
 }
 
 impl Head {
