@@ -394,7 +394,7 @@ fn only_the_token_lets_anybody_in() {
     assert!(get(&solver.adaptor, "/?token=0123", "").starts_with("HTTP/1.1 401"));
     let page = get(&solver.adaptor, "/", "");
     assert!(page.starts_with("HTTP/1.1 200") && page.contains("text/html"), "{page}");
-    for header in ["no-store", "nosniff", "content-security-policy"] {
+    for header in ["no-cache", "nosniff", "content-security-policy"] {
         assert!(page.contains(header), "{header}");
     }
     assert!(get(&solver.adaptor, "/no/such/file", "").starts_with("HTTP/1.1 404"));
