@@ -10,6 +10,8 @@ use super::format::{HEAD, Head, Kind, MAGIC, read_head, read_message};
 
 /// Key frames whose places are kept; in a longer recording every other is forgotten, again and again.
 const KEYS: usize = 1 << 18;
+/// The most views whose frames are shown.
+const MOST_VIEWS: usize = 64;
 /// Texts about orders whose places are kept, the newest.
 const ORDERS: usize = 1 << 16;
 
@@ -108,6 +110,8 @@ pub struct Recording {
     orders: Vec<Place>,
     /// Where the next message to be read lies.
     next: u64,
+    /// The views whose frames can be shown: their key frame was read since the last seek.
+    shown: Vec<u32>,
 }
 
 impl Recording {
@@ -140,6 +144,7 @@ impl Recording {
             hellos: Vec::new(),
             orders: Vec::new(),
             next: MAGIC.len() as u64,
+            shown: Vec::new(),
         };
         recording.look_through().map_err(failed)?;
         if recording.hellos.is_empty() {
@@ -216,8 +221,8 @@ impl Recording {
         &self.path
     }
 
-    /// The next message, whatever it is; `None` at the end. A message whose bytes are damaged is
-    /// passed over, and the frames that go on from it are of no use until a key frame comes.
+    /// The next message that can be shown; `None` at the end. A message whose bytes are damaged is
+    /// passed over, and so are frames that go on from one that was not read.
     ///
     /// # Errors
     /// [`RecordError::File`].
@@ -228,7 +233,10 @@ impl Recording {
             let at = self.next;
             let Some(head) = read_head(&mut self.file, at).map_err(failed)? else { break };
             self.next = at + HEAD as u64 + u64::from(head.length);
-            if let Some(recorded) = self.message(at, &head).map_err(failed)? {
+            let recorded = self.message(at, &head).map_err(failed)?;
+            if self.can_be_shown(&head, recorded.is_some())
+                && let Some(recorded) = recorded
+            {
                 return Ok(Some(recorded));
             }
         }
@@ -236,13 +244,32 @@ impl Recording {
         Ok(None)
     }
 
-    /// When the next message came; `None` at the end.
-    pub fn next_moment(&mut self) -> Option<Moment> {
-        if self.next >= self.end {
-            return None;
+    /// Whether a message can be shown: of frames those whose key frame was read since the last seek,
+    /// with nothing damaged in between.
+    fn can_be_shown(&mut self, head: &Head, is_sound: bool) -> bool {
+        if !head.kind.is_frame() {
+            return true;
         }
-        let head = read_head(&mut self.file, self.next).ok()??;
-        Some(Moment::of(&head))
+        let is_key = head.kind == Kind::KeyFrame;
+        if !is_sound || is_key {
+            self.shown.retain(|view| *view != head.view);
+        }
+        if is_sound && is_key && self.shown.len() < MOST_VIEWS {
+            self.shown.push(head.view);
+        }
+        self.shown.contains(&head.view)
+    }
+
+    /// When the next message came that can be shown; `None` at the end.
+    pub fn next_moment(&mut self) -> Option<Moment> {
+        while self.next < self.end {
+            let head = read_head(&mut self.file, self.next).ok()??;
+            if head.kind != Kind::NextFrame || self.shown.contains(&head.view) {
+                return Some(Moment::of(&head));
+            }
+            self.next += HEAD as u64 + u64::from(head.length);
+        }
+        None
     }
 
     fn message(&mut self, at: u64, head: &Head) -> io::Result<Option<Recorded>> {
@@ -277,10 +304,11 @@ impl Recording {
                 newest.push(*key);
             }
             // More views than this are not looked for: they begin where they have their next key.
-            if newest.len() >= 64 {
+            if newest.len() >= MOST_VIEWS {
                 break;
             }
         }
+        self.shown.clear();
         self.next = newest.iter().map(|key| key.at).min().unwrap_or(MAGIC.len() as u64);
     }
 

@@ -132,6 +132,7 @@ impl Projection {
 
     /// Solves for the potential; `through` is the sum of the fluxes through the boundary's parts,
     /// which says what is small.
+    #[expect(clippy::too_many_arguments, reason = "one step's mesh, flux and tolerance")]
     pub(super) fn solve(
         &mut self,
         topology: &Topology,
