@@ -344,7 +344,8 @@ const steps = [
   }],
   ["the shape is bent by a node of its skeleton", async () => {
     await page.click("#skeleton");
-    const bones = await (await page.waitForFunction(() => window.tombolo.skeleton, null, { timeout: patience })).jsonValue();
+    const shown = () => window.tombolo.skeleton?.places.length > 0 && window.tombolo.skeleton;
+    const bones = await (await page.waitForFunction(shown, null, { timeout: patience })).jsonValue();
     check(bones.segments >= bones.nodes - 1 && bones.places.length >= 6 && bones.places.length % 6 === 0, `the skeleton has ${bones.nodes} nodes, ${bones.segments} segments and ${bones.places.length} nodes to drag`);
     await drawn();
     const { messages } = traffic;
