@@ -73,7 +73,7 @@ pub struct Adaptor {
     /// The number of the run, by which its journal tells it apart from others.
     run: String,
     given: Given,
-    /// What is left of the checkpoint that it goes on from.
+    /// The rest of the checkpoint that the run goes on from.
     resumed: Resumed,
     /// The shapes of the journal that is carried out again, until there is a mesh.
     recorded: Option<Vec<HandedShape>>,
@@ -104,7 +104,7 @@ pub struct Adaptor {
     moment: Moment,
     has_begun: bool,
     told: Told,
-    /// What the features are to the flow, by name.
+    /// The flow conditions of the features, by name.
     conditions: BTreeMap<String, Condition>,
     paused: bool,
     stopped: bool,

@@ -327,7 +327,7 @@ impl CommandSink for Intake {
             Message::Wheel(_) => return Ok(()),
         };
         check_files(&command)?;
-        // What came before is answered whatever waits.
+        // A command that came before is answered, however many wait.
         let Some(id) = self.log.name(client, id, text)? else { return Ok(()) };
         let reservation = self.queue.reserve(&command, text.len()).map_err(|exceeded| {
             self.log.forget(&id);

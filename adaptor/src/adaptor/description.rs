@@ -66,7 +66,7 @@ pub(super) fn features(surface: &Surface, conditions: &BTreeMap<String, Conditio
     surface.feature_sizes().into_iter().map(described).collect()
 }
 
-/// What is said of conditions on features that a surface does not have; `None` for none.
+/// The warning about conditions on features that a surface does not have; `None` without any.
 pub(super) fn unknown_conditions(
     surface: &Surface,
     conditions: &BTreeMap<String, Condition>,

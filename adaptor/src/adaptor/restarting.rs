@@ -30,14 +30,14 @@ use crate::{
     step::Moment,
 };
 
-/// What is left to be gone on from.
+/// The state of a checkpoint that a restarted run goes on from.
 #[derive(Default)]
 pub(super) struct Resumed {
     mesh: Option<(SavedMesh, SavedPoints)>,
     again: Again,
 }
 
-/// What is done again after a checkpoint, the same on all ranks.
+/// The commands carried out again after a checkpoint, equal on all ranks.
 #[derive(Default, Serialize, Deserialize)]
 struct Again {
     commands: VecDeque<CommandAgain>,
