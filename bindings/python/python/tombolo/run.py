@@ -468,18 +468,21 @@ class Run:
         return waiting.popleft()
 
     def _iterate(self, waiting: deque[Event], kinds: tuple[str, ...], timeout: Optional[float]) -> Iterator[Event]:
+        until = forever() if timeout is None else clock.monotonic() + timeout
         while True:
             try:
-                event = self._next(waiting, timeout)
+                event = self._next(waiting, None if timeout is None else max(until - clock.monotonic(), 0.0))
             except CallError:
                 return
-            if event.kind == "ended":
-                if kinds and "ended" not in kinds:
-                    return
-                yield event
-                return
+            except WaitError:
+                raise WaitError(f"none came within {timeout} seconds") from None
+            ended = event.kind == "ended"
             if not kinds or event.kind in kinds:
                 yield event
+                # Others in between do not make the wait longer.
+                until = forever() if timeout is None else clock.monotonic() + timeout
+            if ended:
+                return
 
     def on(self, kind: Optional[str], callback: Callable[[Event], object]) -> Callable[[], None]:
         """Have a function called with each event of a kind, or with every one where `kind` is None.

@@ -190,7 +190,7 @@ class Shaper:
         edits : list of dict, dict or path
             The edits, or an order with its settings, or a JSON file of either.
         progress : callable, optional
-            Called about ten times a second with the seconds so far.
+            Called at once, and then about ten times a second, with the seconds so far.
         **settings : dict
             `deform`: how the volume follows; `guard`: what the mesh must keep to; `schedule`: in how many shapes the
             way is looked at.
@@ -242,9 +242,11 @@ class Shaper:
         begun = clock.monotonic()
         threading.Thread(target=work, name="tombolo-shaper", daemon=True).start()
         try:
-            while not done.wait(0.1 if progress is not None else 1.0):
+            while True:
                 if progress is not None:
                     progress(clock.monotonic() - begun)
+                if done.wait(0.1 if progress is not None else 1.0):
+                    break
         except BaseException:
             # It is given up before the mesh can be used again.
             self._shaper.cancel()
