@@ -4,37 +4,13 @@
  *
  *     TOMBOLO_URL=http://127.0.0.1:7070/?token=... node tests/browser/demo.mjs
  *
- * TOMBOLO_URL          the link that the run printed (needed)
- * TOMBOLO_SCREENSHOTS  the directory for the screenshots (default: a new one in the directory for temporary files)
- * TOMBOLO_SECONDS      how long to wait for anything, which only a fault makes it come to (default 600)
- * TOMBOLO_SCHEDULE     steps and cycles between them of the pinch (default 10,1)
- * CHROMIUM             the browser (default /usr/bin/chromium)
- *
- * Needs the packages of viewer/ (`npm ci` there). Exits with 0 when all of it holds.
+ * TOMBOLO_SCHEDULE has the steps of the pinch and the cycles between them (default 10,1); the other variables are those of page.mjs.
  */
-import { mkdirSync, mkdtempSync } from "node:fs";
-import { createRequire } from "node:module";
 import { connect, createServer } from "node:net";
-import { tmpdir } from "node:os";
-import { join } from "node:path";
-
-const { chromium } = createRequire(new URL("../../viewer/package.json", import.meta.url))("playwright-core");
+import { Failure, Viewer, check, launch, link, patience, run } from "./page.mjs";
 
 const HANDLE = "throat", FIXED = ["inlet", "outlet"], FACTOR = 0.5;
-const patience = Number(process.env.TOMBOLO_SECONDS ?? 600) * 1000;
 const [scheduleSteps, scheduleEvery] = (process.env.TOMBOLO_SCHEDULE ?? "10,1").split(",");
-const link = process.env.TOMBOLO_URL;
-if (!link) {
-  console.error("TOMBOLO_URL is not set: it is the link that the running demo printed");
-  process.exit(2);
-}
-const screenshots = process.env.TOMBOLO_SCREENSHOTS ?? mkdtempSync(join(tmpdir(), "tombolo-browser-"));
-mkdirSync(screenshots, { recursive: true });
-
-class Failure extends Error {}
-const check = (holds, message) => {
-  if (!holds) throw new Failure(message);
-};
 
 /** Passes the bytes of the run on, so that the test can cut the connection without touching the run. */
 async function cuttable(target) {
@@ -76,21 +52,9 @@ async function cuttable(target) {
 }
 
 const proxy = await cuttable(new URL(link));
-const browser = await chromium.launch({
-  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-  args: ["--headless", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync"],
-});
-const page = await browser.newPage({ viewport: { width: 1280, height: 800 } });
-page.setDefaultTimeout(patience);
-const complaints = [];
-page.on("pageerror", (error) => complaints.push(`the page failed: ${error.message}`));
-page.on("console", (message) => {
-  // The browser itself reports the connections that this test cuts, and looks for an icon where it is shown plain text.
-  const { pathname } = new URL(message.location().url || "about:blank");
-  if (pathname === "/favicon.ico" || pathname === "/ws") return;
-  if (message.type() === "error" && !/WebSocket|ERR_|status of 401/.test(message.text())) complaints.push(`the page complained: ${message.text()}`);
-});
+const browser = await launch();
+const viewer = await Viewer.open(browser, "demo");
+const { page } = viewer;
 /** What the page has sent beside forecasts and how far its decoder is, and how often it has asked for the reference surface. */
 const traffic = { messages: 0, surfaces: 0, requests: 0 };
 // Forecasts are questions: they change nothing.
@@ -99,37 +63,14 @@ page.on("request", (request) => {
   traffic.requests++;
   if (new URL(request.url()).pathname === "/surface") traffic.surfaces++;
   const { hostname } = new URL(request.url());
-  if (hostname && hostname !== "127.0.0.1") complaints.push(`the page asked another host: ${request.url()}`);
+  if (hostname && hostname !== "127.0.0.1") viewer.complaints.push(`the page asked another host: ${request.url()}`);
 });
 
-const look = () => page.evaluate(() => {
-  const { connection, role, cycle, frames, orders, status, quality, stack, selection, preview, forecast, errors, views } = window.tombolo;
-  return { connection, role, cycle, frames, orders, status, quality, stack, selection, preview, forecast, errors, views };
-});
-const extent = () => page.evaluate((name) => {
-  const box = window.tombolo.featureBounds(name);
-  return box && box[1][2] - box[0][2];
-}, HANDLE);
-
-/** Waits until `condition` of what the viewer shows holds. */
-async function until(what, condition) {
-  const end = Date.now() + patience;
-  for (;;) {
-    const seen = await look();
-    if (await condition(seen)) return seen;
-    if (Date.now() > end) {
-      const { views, ...rest } = seen;
-      throw new Failure(`${what}: not within ${patience / 1000} s. The viewer shows ${JSON.stringify({ ...rest, views: Object.keys(views) }, null, 1)}`);
-    }
-    await page.waitForTimeout(100);
-  }
-}
-
-/** Has all that has come drawn, and returns what was: the newest cycle in it, and a number made of its pixels. */
-const drawn = () => page.evaluate(() => window.tombolo.picture());
-
-let pictures = 0;
-const picture = (name) => page.screenshot({ path: join(screenshots, `${String(++pictures).padStart(2, "0")}-${name}.png`) });
+const look = () => viewer.look();
+const extent = () => viewer.extent(HANDLE, 2);
+const until = (what, condition) => viewer.until(what, condition);
+const drawn = () => viewer.drawn();
+const picture = (name) => viewer.picture(name);
 
 /** How many pixels of the column at `x` the shape covers, all that has come being drawn. */
 async function silhouette(x) {
@@ -415,25 +356,11 @@ const steps = [
     check(/link/.test(text), `the banner says "${text}"`);
     await picture("wrong-token");
   }],
-  ["nothing went wrong on the way", async () => check(complaints.length === 0, complaints.join("\n"))],
+  ["nothing went wrong on the way", async () => check(viewer.complaints.length === 0, viewer.complaints.join("\n"))],
 ];
 
 const shared = {};
-let failed = false;
-for (const [name, run] of steps) {
-  const start = Date.now();
-  try {
-    await run();
-    console.log(`ok      ${name} (${((Date.now() - start) / 1000).toFixed(1)} s)`);
-  } catch (error) {
-    failed = true;
-    await picture("failed").catch(() => {});
-    console.error(`FAILED  ${name}: ${error instanceof Failure ? error.message : error.stack}`);
-    if (complaints.length) console.error(complaints.join("\n"));
-    break;
-  }
-}
-await browser.close();
-proxy.close();
-console.log(`Screenshots are in ${screenshots}`);
-process.exitCode = failed ? 1 : 0;
+await run(steps, () => [viewer], async () => {
+  await browser.close();
+  proxy.close();
+});

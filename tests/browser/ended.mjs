@@ -4,15 +4,15 @@
  *
  *     TOMBOLO_URL=http://127.0.0.1:7070/?token=... node tests/browser/ended.mjs
  *
- * The variables are those of demo.mjs.
+ * The variables are those of page.mjs.
  */
-import { Viewer, check, launch, run } from "./page.mjs";
+import { Viewer, check, launch, link, run } from "./page.mjs";
 
 const browser = await launch();
 const viewer = await Viewer.open(browser, "ended");
 const steps = [
   ["a run that has taken its steps is said to have ended", async () => {
-    await viewer.page.goto(process.env.TOMBOLO_URL);
+    await viewer.page.goto(link);
     await viewer.until("a first picture", (now) => now.frames > 0);
     const { end } = await viewer.until("the end", (now) => now.end !== null);
     await viewer.page.waitForTimeout(5000);

@@ -1,20 +1,33 @@
 /**
  * What the tests in a browser share: Debian's Chromium, a page of the viewer, waiting for what it shows, and steps that are run one
- * after the other until one fails.
+ * after the other until one fails. Needs the packages of viewer/ (`npm ci` there).
+ *
+ * TOMBOLO_URL          the link that the run printed (needed)
+ * TOMBOLO_SCREENSHOTS  the directory for the screenshots (default: a new one in the directory for temporary files)
+ * TOMBOLO_SECONDS      how long to wait for anything, which only a fault makes it come to (default 600)
+ * CHROMIUM             the browser (default /usr/bin/chromium)
  */
-import { mkdirSync, mkdtempSync } from "node:fs";
+import { mkdirSync, mkdtempSync, readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 
-const { chromium } = createRequire(new URL("../../viewer/package.json", import.meta.url))("playwright-core");
+const require = createRequire(new URL("../../viewer/package.json", import.meta.url));
+const { chromium } = require("playwright-core");
+const axe = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
 
 export class Failure extends Error {}
 export const check = (holds, message) => {
   if (!holds) throw new Failure(message);
 };
 
-const patience = Number(process.env.TOMBOLO_SECONDS ?? 600) * 1000;
+/** The link to the run. */
+export const link = process.env.TOMBOLO_URL;
+if (!link) {
+  console.error("TOMBOLO_URL is not set: it is the link that the run printed");
+  process.exit(2);
+}
+export const patience = Number(process.env.TOMBOLO_SECONDS ?? 600) * 1000;
 export const screenshots = process.env.TOMBOLO_SCREENSHOTS ?? mkdtempSync(join(tmpdir(), "tombolo-browser-"));
 mkdirSync(screenshots, { recursive: true });
 
@@ -26,8 +39,9 @@ export const launch = () => chromium.launch({
 
 /** A viewer in a browser of its own, as another person has one. */
 export class Viewer {
-  static async open(browser, name, viewport = { width: 1280, height: 800 }) {
-    const context = await browser.newContext({ viewport });
+  /** `options` are those of a browser context, such as its viewport. */
+  static async open(browser, name, options = {}) {
+    const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, ...options });
     return new Viewer(name, await context.newPage());
   }
 
@@ -39,14 +53,15 @@ export class Viewer {
     page.setDefaultTimeout(patience);
     page.on("pageerror", (error) => this.complaints.push(`${name}: the page failed: ${error.message}`));
     page.on("console", (message) => {
-      if (["error", "warning"].includes(message.type()) && !/WebSocket|ERR_|favicon|GPU stall|GL Driver/.test(message.text())) this.complaints.push(`${name}: ${message.text()}`);
+      // The browser itself reports connections that are cut, and looks for an icon where it is shown plain text.
+      if (["error", "warning"].includes(message.type()) && !/WebSocket|ERR_|favicon|GPU stall|GL Driver|status of 401/.test(`${message.text()} ${message.location().url}`)) this.complaints.push(`${name}: ${message.text()}`);
     });
   }
 
   look() {
     return this.page.evaluate(() => {
-      const { connection, role, cycle, frames, orders, status, quality, stack, selection, preview, forecast, errors, end } = window.tombolo;
-      return { connection, role, cycle, frames, orders, status, quality, stack, selection, preview, forecast, errors, end };
+      const { connection, role, cycle, frames, orders, status, quality, stack, selection, preview, forecast, errors, end, views } = window.tombolo;
+      return { connection, role, cycle, frames, orders, status, quality, stack, selection, preview, forecast, errors, end, views };
     });
   }
 
@@ -71,6 +86,28 @@ export class Viewer {
 
   picture(name) {
     return this.page.screenshot({ path: join(screenshots, `${this.name}-${String(++this.pictures).padStart(2, "0")}-${name}.png`) });
+  }
+
+  /** Waits until something that is evaluated in the page holds; gives back its value. */
+  async holds(what, condition, argument) {
+    const found = await this.page.waitForFunction(condition, argument, { timeout: patience, polling: 100 })
+      .catch(() => { throw new Failure(`${this.name}: ${what}: not within ${patience / 1000} s`); });
+    return found.jsonValue();
+  }
+
+  /** A place of the page at which a feature is seen. */
+  place(feature) {
+    return this.page.evaluate((name) => window.tombolo.featurePlace(name), feature);
+  }
+
+  /** What axe finds wrong with the page as it is. */
+  async violations() {
+    // Evaluated by the debugger, which the page's own policy does not hold back.
+    if (!(await this.page.evaluate(() => "axe" in window))) await this.page.evaluate(axe);
+    return this.page.evaluate(async () => {
+      const { violations } = await window.axe.run(document, { resultTypes: ["violations"] });
+      return violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target.join(" ")).slice(0, 5).join(", ")}`);
+    });
   }
 
   /** A number of the edit that is in the form. */

@@ -4,61 +4,21 @@
  *
  *     TOMBOLO_URL=http://127.0.0.1:7070/?token=... node tests/browser/seeing.mjs
  *
- * TOMBOLO_URL          the link that the run printed (needed)
- * TOMBOLO_SCREENSHOTS  the directory for the screenshots (default: none are taken)
- * TOMBOLO_SECONDS      how long to wait for anything, which only a fault makes it come to (default 600)
- * CHROMIUM             the browser (default /usr/bin/chromium)
- *
- * Needs the packages of viewer/ (`npm ci` there). Exits with 0 when all of it holds.
+ * The variables are those of page.mjs.
  */
-import { readFileSync } from "node:fs";
-import { createRequire } from "node:module";
-import { join } from "node:path";
+import { Viewer, check, launch, link, run } from "./page.mjs";
 
-const require = createRequire(new URL("../../viewer/package.json", import.meta.url));
-const { chromium } = require("playwright-core");
-const axe = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
-
-const link = process.env.TOMBOLO_URL;
-if (!link) {
-  console.error("TOMBOLO_URL is not set: it is the link that the running demo printed");
-  process.exit(2);
-}
-const patience = Number(process.env.TOMBOLO_SECONDS ?? 600) * 1000;
-class Failure extends Error {}
-const check = (holds, message) => {
-  if (!holds) throw new Failure(message);
-};
-
-const browser = await chromium.launch({
-  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-  args: ["--headless", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync"],
-});
-const page = await browser.newPage({ viewport: { width: 1280, height: 800 }, colorScheme: "dark", bypassCSP: true });
-page.setDefaultTimeout(patience);
-const complaints = [];
-page.on("pageerror", (error) => complaints.push(`the page failed: ${error.message}`));
+const browser = await launch();
+const viewer = await Viewer.open(browser, "seeing", { colorScheme: "dark" });
+const { page } = viewer;
 let wire = 0;
 const network = await page.context().newCDPSession(page);
 await network.send("Network.enable");
 network.on("Network.loadingFinished", ({ encodedDataLength }) => { wire += encodedDataLength; });
 
-const until = (what, condition, argument) => page.waitForFunction(condition, argument, { timeout: patience, polling: 100 })
-  .catch(() => { throw new Failure(`${what}: not within ${patience / 1000} s`); });
-const drawn = () => page.evaluate(() => window.tombolo.picture());
-const place = () => page.evaluate(() => window.tombolo.featurePlace("throat"));
-const upstream = () => page.evaluate(() => window.tombolo.featurePlace("upstream"));
-let pictures = 0;
-const picture = async (name) => {
-  if (process.env.TOMBOLO_SCREENSHOTS) await page.screenshot({ path: join(process.env.TOMBOLO_SCREENSHOTS, `seeing-${++pictures}-${name}.png`) });
-};
-/** What axe finds wrong with the page as it is. */
-const violations = () => page.evaluate(async (source) => {
-  if (!window.axe) (0, eval)(source);
-  const { violations: found } = await window.axe.run(document, { resultTypes: ["violations"] });
-  return found.map(({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target.join(" ")).slice(0, 5).join(", ")}`);
-}, axe);
+const until = (what, condition, argument) => viewer.holds(what, condition, argument);
+const drawn = () => viewer.drawn();
+const picture = (name) => viewer.picture(name);
 const bounds = () => page.evaluate(() => window.tombolo.views.midplane.bounds);
 
 const steps = [
@@ -71,7 +31,7 @@ const steps = [
   }],
   ["middle and right drags move the camera, and choose nothing", async () => {
     for (const button of ["middle", "right"]) {
-      const [at, before] = [await place(), await upstream()];
+      const [at, before] = [await viewer.place("throat"), await viewer.place("upstream")];
       check(at && before, "the throat cannot be seen");
       await page.mouse.move(...at);
       await page.mouse.down({ button });
@@ -79,7 +39,7 @@ const steps = [
       await page.mouse.up({ button });
       await drawn();
       // The throat lies in the middle, where zooming moves nothing.
-      const after = await upstream();
+      const after = await viewer.place("upstream");
       check(after && Math.hypot(after[0] - before[0], after[1] - before[1]) > 5, `a ${button} drag left the upstream wall at ${after}`);
       await page.click('[data-camera="reset"]');
     }
@@ -87,7 +47,7 @@ const steps = [
   }],
   ["the place under the pointer is read, and pinned into the plot", async () => {
     await drawn();
-    await page.mouse.move(...(await place()));
+    await page.mouse.move(...(await viewer.place("throat")));
     await until("the value beside the pointer", () => /^throat[\s\S]*velocity magnitude [\d.]+/.test(document.getElementById("tip").textContent));
     await page.keyboard.press("p");
     await until("the pin in the picture", () => document.querySelectorAll("#marks circle.probe").length === 1);
@@ -119,7 +79,7 @@ const steps = [
   }],
   ["nobody is kept out, in light and in dark", async () => {
     for (const theme of ["light", "dark"]) {
-      const found = await violations();
+      const found = await viewer.violations();
       check(found.length === 0, `${theme}: ${found.join("; ")}`);
       await page.click("#theme");
     }
@@ -146,21 +106,7 @@ const steps = [
     check(await page.isVisible("#keys"), "the sheet of keys does not open");
     await page.keyboard.press("Escape");
   }],
-  ["nothing went wrong on the way", async () => check(complaints.length === 0, complaints.join("\n"))],
+  ["nothing went wrong on the way", async () => check(viewer.complaints.length === 0, viewer.complaints.join("\n"))],
 ];
 
-let failed = false;
-for (const [name, run] of steps) {
-  const start = Date.now();
-  try {
-    await run();
-    console.log(`ok      ${name} (${((Date.now() - start) / 1000).toFixed(1)} s)`);
-  } catch (error) {
-    failed = true;
-    console.error(`FAILED  ${name}: ${error instanceof Failure ? error.message : error.stack}`);
-    if (complaints.length) console.error(complaints.join("\n"));
-    if (!process.env.TOMBOLO_GO_ON) break;
-  }
-}
-await browser.close();
-process.exitCode = failed ? 1 : 0;
+await run(steps, () => [viewer], () => browser.close());

@@ -4,17 +4,9 @@
  *
  *     TOMBOLO_URL=http://127.0.0.1:7070/?token=... TOMBOLO_PID=... node tests/browser/shape.mjs
  *
- * TOMBOLO_URL          the link that the run printed (needed)
- * TOMBOLO_PID          the run's process, which is asked to stop at last; without it the run goes on
- * TOMBOLO_SCREENSHOTS, TOMBOLO_SECONDS, CHROMIUM as for demo.mjs
+ * TOMBOLO_PID is the run's process, which is asked to stop at last; without it the run goes on. The other variables are those of page.mjs.
  */
-import { Failure, Viewer, check, launch, run } from "./page.mjs";
-
-const link = process.env.TOMBOLO_URL;
-if (!link) {
-  console.error("TOMBOLO_URL is not set: it is the link that the running demo printed");
-  process.exit(2);
-}
+import { Failure, Viewer, check, launch, link, run } from "./page.mjs";
 
 const browser = await launch();
 const first = await Viewer.open(browser, "first");
@@ -160,7 +152,7 @@ const steps = [
     check((await first.settled(known)).status === "applied", "Ctrl+Enter did not apply");
   }],
   ["the wheel is asked for, kept, and handed over", async () => {
-    second = await Viewer.open(browser, "second", { width: 1920, height: 1080 });
+    second = await Viewer.open(browser, "second", { viewport: { width: 1920, height: 1080 } });
     await second.page.goto(link);
     const seen = await second.until("a picture", (now) => now.connection === "connected" && now.frames > 0);
     check(seen.role === "watcher", `the second viewer is ${seen.role}`);

@@ -121,7 +121,7 @@ const marks = new Marks(document.querySelector<SVGElement>("#marks")!, (point) =
 const ruler = new Ruler(marks);
 const overlay = new Overlay(part("stage"), part("scene").nextElementSibling);
 const faces = new FaceTools(part("stage"), part("scene"), overlay.root, part("faces"), scene, store, (listener) => previewer.watchSurface(listener), () => scene.redraw());
-const handles = new Handles(part("stage"), part("scene"), scene, store, selection, new ShapeTarget(() => store.state, () => scene.shown(), faces), overlay, () => ruler.active);
+const handles = new Handles(part("stage"), part("scene"), scene, store, selection, new ShapeTarget(() => store.state, () => scene.shown(), faces), overlay, part("tools"), () => ruler.active);
 watchPointer(part("scene"), scene, selection, {
   reading: (x, y) => {
     const probe = scene.probe(x, y);

@@ -9,6 +9,7 @@ import type { Bones } from "../picture/skeleton";
 import type { Selection } from "../store/selection";
 import type { State } from "../store/state";
 import type { Store } from "../store/store";
+import { BendTool } from "./bend-tool";
 import { Gesture, amountText } from "./gesture";
 import type { Composer } from "./gesture";
 import { distance, gizmoShapes, partAt, reachOf, samePart } from "./gizmo";
@@ -19,7 +20,7 @@ import { Overlay, ValueBox } from "./overlay";
 import type { Place, Projection } from "./projection";
 import { SkeletonTarget } from "./skeleton-target";
 import type { ShapeTarget } from "./shape-target";
-import { AXIS_NAMES } from "./vector";
+import { AXIS_NAMES, times } from "./vector";
 import type { Axis } from "./vector";
 
 /** What gestures need of the picture. */
@@ -54,6 +55,7 @@ let gestures = 0;
 
 export class Handles {
   private readonly grippable: SkeletonTarget;
+  private readonly bending: BendTool;
   private readonly box: ValueBox;
   private shapes: Shape[] = [];
   private hovered: GizmoPart | null = null;
@@ -67,11 +69,12 @@ export class Handles {
   constructor(
     private readonly stage: HTMLElement, private readonly scene: HTMLElement, private readonly picture: Picture,
     private readonly store: Store<State, Action>, private readonly selection: Selection,
-    private readonly shape: ShapeTarget, private readonly overlay: Overlay,
+    private readonly shape: ShapeTarget, private readonly overlay: Overlay, tools: HTMLElement,
     /** Whether clicks mean something else now, such as a ruler. */
     private readonly isHeldBack: () => boolean = () => false,
   ) {
     this.grippable = new SkeletonTarget(this.overlay.root, () => store.state, picture);
+    this.bending = new BendTool(tools, this.grippable, () => times(picture.projection().direction, -1), store, () => this.drawn());
     this.box = new ValueBox(stage, { typed: (text) => this.typed(text), key: (event) => this.key(event) });
     // Before the camera sees them.
     stage.addEventListener("pointerdown", (event) => this.down(event), true);
@@ -90,6 +93,7 @@ export class Handles {
   /** Draws the gizmo where the picture is now seen from. */
   drawn(): void {
     this.grippable.drawn();
+    this.bending.show();
     const target = this.target();
     const center = target?.center() ?? null;
     this.shapes = target && center ? gizmoShapes(this.picture.projection(), center, target.kinds) : [];
@@ -103,8 +107,10 @@ export class Handles {
     for (const { part, lines, fill } of this.shapes) {
       const line = lines.reduce<Place[]>((longest, other) => (other.length > longest.length ? other : longest), []);
       const points = fill ?? line;
-      const [x, y] = part.kind === "ring" ? line[line.length >> 2] ?? [NaN, NaN]
-        : [points.reduce((total, point) => total + point[0], 0) / points.length, points.reduce((total, point) => total + point[1], 0) / points.length];
+      const middle: Place = [points.reduce((total, point) => total + point[0], 0) / points.length, points.reduce((total, point) => total + point[1], 0) / points.length];
+      const own = part.kind === "ring" ? line : [middle, ...line];
+      // Where another part lies over it, that one would be gripped.
+      const [x, y] = own.find((place) => samePart(partAt(this.shapes, place, reachOf("mouse")), part)) ?? own[0] ?? [NaN, NaN];
       result[`${part.kind} ${AXIS_NAMES[part.axis]}`] = [left + x, top + y];
     }
     return result;

@@ -2,6 +2,8 @@
 import type { Json, Vector } from "../connection/protocol";
 import type { Bones } from "../picture/skeleton";
 import { nearestWithin } from "../picture/skeleton";
+import { digits } from "../number";
+import type { Values } from "../form/schema";
 import { asksNothing, bodyOf, isObject, kindOf, withMove } from "../store/draft";
 import type { State } from "../store/state";
 import { branchNames, controlNodes, neighbours, pointOf } from "./control-nodes";
@@ -15,6 +17,7 @@ import { toStep } from "./rounding";
 import { lengthUnit } from "./shape-target";
 import { vectorOf } from "./shape-composer";
 import { add, length, subtract, transformed, turn, unit } from "./vector";
+import { bent } from "./bend";
 
 const SIZE = { pinned: 3, free: 5, hovered: 8 };
 
@@ -80,7 +83,7 @@ export class SkeletonTarget implements Target {
       this.drawn();
     }
     const node = this.nodes[found];
-    return node ? `${this.names[node.branch] ?? ""} · node ${node.position}` : null;
+    return node ? this.nameOf(node) : null;
   }
 
   grip(place: Place, reach: number, isAdded: boolean): Vector | null {
@@ -91,6 +94,37 @@ export class SkeletonTarget implements Target {
     else this.meant = [...this.meant.filter((other) => other !== found), found];
     this.drawn();
     return this.now(this.nodes[found]!.node);
+  }
+
+  /** The nodes that can be dragged, by the index that `choose` takes. */
+  get choices(): { index: number; name: string }[] {
+    return this.nodes.flatMap((node, index) => (node.isPinned ? [] : [{ index, name: this.nameOf(node) }]));
+  }
+
+  /** The one node that is meant; null where there is none or are several. */
+  get alone(): number | null {
+    return this.meant.length === 1 ? this.meant[0]! : null;
+  }
+
+  choose(index: number): void {
+    this.meant = this.nodes[index]?.isPinned === false ? [index] : [];
+    this.drawn();
+  }
+
+  private nameOf({ branch, position }: ControlNode): string {
+    return `${this.names[branch] ?? ""} · node ${position}`;
+  }
+
+  /** The edit that bends the branch of a node about it; null where there is nothing to bend. */
+  bend(index: number, axis: Vector, degrees: number): { key: string; values: Values } | null {
+    const node = this.nodes[index];
+    if (!node || !this.bones || !kindOf(this.state(), "skeleton")) return null;
+    const branch = this.nodes.filter((other) => other.branch === node.branch).sort((a, b) => a.position - b.position);
+    const held = branch.map((other) => this.held(other));
+    const ways = bent(held.map(({ place }, i) => ({ place, isPinned: branch[i]!.isPinned })), branch.indexOf(node), axis, degrees);
+    if (!ways) return null;
+    const moves = held.reduce<Json[]>((all, { at, by }, i) => (length(ways[i]!) > 0 ? withMove(all, at, add(by, ways[i]!)) : all), this.moves());
+    return { key: "skeleton", values: { moves, name: `Bend by ${digits(degrees, 4)}° at ${this.nameOf(node)}` } };
   }
 
   /** No node is meant any more; returns whether one was. */
@@ -114,12 +148,13 @@ export class SkeletonTarget implements Target {
     const state = this.state();
     const active = this.nodes[this.meant.at(-1) ?? -1];
     if (!active || !kindOf(state, "skeleton")) return null;
-    const held = (node: ControlNode): Held => {
-      const at = pointOf(this.bones!.reference, node.node);
-      return { at, place: this.now(node.node), by: this.dragOf(at) ?? [0, 0, 0] };
-    };
-    const others = this.meant.slice(0, -1).map((index) => held(this.nodes[index]!));
-    return new NodeComposer(this.moves(), held(active), others, neighbours(this.nodes, active).map(held));
+    const others = this.meant.slice(0, -1).map((index) => this.held(this.nodes[index]!));
+    return new NodeComposer(this.moves(), this.held(active), others, neighbours(this.nodes, active).map((node) => this.held(node)));
+  }
+
+  private held({ node }: ControlNode): Held {
+    const at = pointOf(this.bones!.reference, node);
+    return { at, place: this.now(node), by: this.dragOf(at) ?? [0, 0, 0] };
   }
 
   /** The drags that stand in the form. */
@@ -176,6 +211,7 @@ export class NodeComposer implements Composer {
       }
     }
     const moves = drags.reduce<Json[]>((all, [held, by]) => withMove(all, held.at, by), [...this.moves]);
-    return { key: "skeleton", values: { moves } };
+    // What is dragged by hand is no longer what an earlier bend was called after.
+    return { key: "skeleton", values: { moves, name: null } };
   }
 }

@@ -224,8 +224,10 @@ export class HistoryDock {
       order = found.order ?? order;
       const part = found.difference !== null && found.before ? ` (${digits((100 * found.difference) / Math.abs(found.before), 2)} %)` : "";
       const cells = [digits(found.value), digits(found.before), found.difference === null ? "–" : `${found.difference > 0 ? "+" : ""}${digits(found.difference, 3)}${part}`];
-      const name = element("th", { scope: "row" }, one ? label(one) : "");
-      name.style.color = COLOURS[i] ?? "";
+      // Beside the name, which stays as readable as the rest.
+      const colour = element("span", { class: "colour", "aria-hidden": "true" });
+      colour.style.background = COLOURS[i] ?? "";
+      const name = element("th", { scope: "row" }, colour, one ? label(one) : "");
       return element("tr", {}, name, ...cells.map((text) => element("td", {}, text)));
     });
     const { label: text } = (order ?? { label: "" }) as Mark;
