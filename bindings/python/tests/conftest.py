@@ -1,11 +1,21 @@
-"""A mesh, and a solver that runs on a thread."""
+"""A mesh, a solver that runs on a thread, and what the examples need."""
 
+import importlib.util
+import json
+import os
+import subprocess
+import sys
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 import tombolo
+
+PROJECT = Path(__file__).parents[3]
+EXAMPLES = PROJECT / "examples"
+FLOW = Path(os.environ.get("CARGO_TARGET_DIR", PROJECT / "target"), "debug/flow")
 
 
 def box(count, dtype=float):
@@ -133,3 +143,27 @@ def run(solver):
     """A client of the solver that is under way."""
     with tombolo.connect(solver.link) as connected:
         yield connected
+
+
+def load(file):
+    """An example as a module."""
+    specification = importlib.util.spec_from_file_location(Path(file).stem, EXAMPLES / file)
+    module = importlib.util.module_from_spec(specification)
+    sys.modules[specification.name] = module
+    specification.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def small_nozzle(tmp_path):
+    """The case of the nozzle on a coarse mesh."""
+    if not FLOW.exists():
+        pytest.skip("the program flow is not built: cargo build -p tombolo-flow")
+    pytest.importorskip("gmsh")
+    meshes = [sys.executable, PROJECT / "scripts/meshes", "channel-5k", "--out", tmp_path]
+    subprocess.run(meshes, check=True, stdout=subprocess.DEVNULL)
+    case = json.loads((EXAMPLES / "flow/cases/nozzle.json").read_text())
+    case |= {"mesh": "channel-5k.msh", "pipelines": str(EXAMPLES / "flow/pipelines/nozzle.json")}
+    file = tmp_path / "nozzle.json"
+    file.write_text(json.dumps(case))
+    return file

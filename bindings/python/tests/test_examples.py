@@ -1,22 +1,8 @@
 """Solvers that others wrote: an order is carried out, the physics is known, and the undo is exact."""
 
-import importlib.util
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-EXAMPLES = Path(__file__).parents[3] / "examples"
-
-
-def load(file):
-    """An example as a module."""
-    specification = importlib.util.spec_from_file_location(Path(file).stem, EXAMPLES / file)
-    module = importlib.util.module_from_spec(specification)
-    sys.modules[specification.name] = module
-    specification.loader.exec_module(module)
-    return module
+from conftest import FLOW, load
 
 
 def commands(edit, schedule, begin, end):
@@ -82,3 +68,41 @@ def test_a_flow_around_a_cylinder_with_ngsolve(tmp_path):
     assert drags[47] == pytest.approx(drags[11], rel=0.03)
     assert np.array_equal(points[0], points[47])
     assert not np.array_equal(points[0], points[29])
+
+
+def test_a_study_on_a_running_flow_finds_what_one_with_restarts_finds(small_nozzle):
+    pytest.importorskip("scipy")
+    throat = load("study/throat.py")
+
+    def begin(orders=()):
+        return throat.flow(FLOW, small_nozzle, 1, orders)
+
+    wanted, studies, heights = throat.compare(begin, times=1.5, tolerance=5e-3, timeout=60)
+    assert heights[0] == pytest.approx(heights[1], abs=5e-3)
+    for study in studies:
+        assert study.answers[-1][1] == pytest.approx(wanted, rel=0.02)
+    # From a shape nearby the flow settles sooner than from rest.
+    (before, _, _), (height, _, running) = studies[0].answers[-2:]
+    _, _, anew = studies[1].answers[-1]
+    assert abs(height - before) < 0.05
+    assert running < anew
+
+
+def test_heat_in_numpy_alone(tmp_path):
+    heat = load("heat/python/heat_numpy.py")
+    fluxes, points = {}, {}
+
+    def seen(cycle, at, flux):
+        fluxes[cycle] = flux
+        points[cycle] = at.copy()
+
+    squeeze = {"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, -0.2]}}
+    orders = commands(squeeze, {"steps": 5, "every": {"steps": 20}}, 800, 1600)
+    report = heat.run(2600, count=4, orders=orders, seen=seen, output=tmp_path)
+
+    assert [order["status"] for order in report["orders"]] == ["applied", "applied"]
+    # Fourier's law: conductivity times area over height.
+    assert fluxes[799] == pytest.approx(1, abs=1e-3)
+    assert fluxes[1599] == pytest.approx(1 / 0.8, abs=1e-3)
+    assert fluxes[2599] == pytest.approx(1, abs=1e-3)
+    assert np.array_equal(points[0], points[2599])
