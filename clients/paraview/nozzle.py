@@ -1,0 +1,96 @@
+"""Pinches a running nozzle by the filters of the plug-in, forecasts, and takes it back: without an interface.
+
+    flow --case examples/flow/cases/nozzle.json                       # prints its link, and writes it to a file
+    pvpython clients/paraview/nozzle.py tombolo-7070.link
+
+The three orders are the paper's: at once, and in ten shapes; the last one is given as the displacement that two chains
+of edits add up to. With `--out` what is shown after each order is written as `shown-CYCLE.vtp`.
+"""
+
+import argparse
+import time
+from pathlib import Path
+
+from paraview import servermanager, simple
+
+simple.LoadPlugin(str(Path(__file__).with_name("tombolo_paraview.py")), ns=globals())
+
+
+def wait(proxy, found, seconds=60):
+    """Asks for what is new until it is there, as the interface does ten times a second."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        proxy.SMProxy.InvokeCommand("Refresh")
+        proxy.UpdatePipeline()
+        data = servermanager.Fetch(proxy)
+        if found(data):
+            return data
+        time.sleep(0.05)
+    raise TimeoutError("it did not come in time")
+
+
+def cycle(data):
+    """The step that is shown; -1 before the first."""
+    array = data.GetFieldData().GetArray("cycle")
+    return -1 if array is None else int(array.GetValue(0))
+
+
+def rows(table):
+    """A table of two columns as a dict."""
+    return {
+        table.GetValue(row, 0).ToString(): table.GetValue(row, 1).ToString() for row in range(table.GetNumberOfRows())
+    }
+
+
+def main():
+    """The program."""
+    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    arguments.add_argument("link")
+    arguments.add_argument("--view", default="surface")
+    arguments.add_argument("--cycles", type=int, default=200, help="how long it is watched, at least")
+    arguments.add_argument("--out", type=Path)
+    given = arguments.parse_args()
+
+    run = TomboloRun(Link=given.link, View=given.view)  # noqa: F821
+    shown = wait(run, lambda data: cycle(data) >= 0)
+    began = cycle(shown)
+    surface = TomboloSurface(Link=given.link)  # noqa: F821
+    wait(surface, lambda data: data.GetNumberOfPoints() > 0)
+
+    def pinch(factor):
+        handle = {"Features": "throat", "Fixed": "inlet, outlet"}
+        return TomboloScaleDirection(Input=surface, Factors=[1, 1, factor], **handle)  # noqa: F821
+
+    def keep():
+        """What is shown from now on, once."""
+        nonlocal shown
+        run.UpdatePipeline()
+        now = cycle(shown)
+        # The frame on its way may be of before.
+        shown = wait(run, lambda data: cycle(data) > now)
+        now = cycle(shown)
+        shown = wait(run, lambda data: cycle(data) > now)
+        if given.out:
+            simple.SaveData(str(given.out / f"shown-{cycle(shown)}.vtp"), proxy=run)
+
+    both = TomboloCombineDisplacements(First=pinch(0.75), Second=pinch(0.75))  # noqa: F821
+    for edits, steps in ((pinch(0.5), 1), (pinch(0.5), 10), (both, 10)):
+        order = TomboloOrder(Input=edits, Link=given.link, Steps=steps, Every=2)  # noqa: F821
+        order.SMProxy.InvokeCommand("Forecast")
+        told = rows(wait(order, lambda table: rows(table).get("forecast", "asked") != "asked"))
+        print("forecast:", told["forecast"], flush=True)
+        order.SMProxy.InvokeCommand("Give")
+        told = rows(wait(order, lambda table: rows(table).get("status", "").startswith(("applied", "rejected"))))
+        print("order:", told["status"], told.get("reason", ""), flush=True)
+        keep()
+        order.SMProxy.InvokeCommand("Undo")
+        wait(order, lambda table: rows(table).get("stack") == "0 edits")
+        told = rows(wait(order, lambda table: rows(table).get("status", "").startswith("applied")))
+        print("undo:", told["status"], flush=True)
+        keep()
+    shown = wait(run, lambda data: cycle(data) >= began + given.cycles)
+    print(f"watched from cycle {began} to {cycle(shown)}")
+
+
+if __name__ == "__main__":
+    main()
