@@ -4,8 +4,7 @@ use std::{io::IsTerminal, sync::Arc};
 
 use tombolo::communicator::{Alarm, Communicator};
 use tombolo::deform::linear::BuiltIn;
-use tombolo::foreign::mesh::Channel;
-use tombolo::foreign::{Asked, Run, RunError, ranks};
+use tombolo::foreign::{Asked, Run, RunError, Shown, ranks};
 use tombolo::pipelines::language::nearest;
 use tombolo::{InitializeError, Restart, Settings, Step};
 
@@ -93,8 +92,9 @@ impl Session {
         let _alarm = Alarm::among(&self.communicator);
         let mut given = self.read(node);
         if let Stage::Waiting { settings, .. } = &mut self.stage {
-            let (step, channels) = ranks::agree(&*self.communicator, given)?;
-            let own: Vec<&str> = channels.iter().map(|channel| channel.name.as_str()).collect();
+            let shown = ranks::agree(&*self.communicator, given)?;
+            let own: Vec<&str> =
+                shown.channels.iter().map(|channel| channel.name.as_str()).collect();
             let names = ranks::union(&*self.communicator, &own);
             // A solver that shows nothing yet is asked for nothing.
             if names.is_empty() {
@@ -117,7 +117,7 @@ impl Session {
             self.stage = Stage::UnderWay(Box::new(run));
             self.tell_link();
             // Now that there are pipelines, the step may choose among them.
-            given = self.read(node).map(|(_, channels)| (step, channels));
+            given = self.read(node).map(|again| Shown { step: shown.step, ..again });
         }
         match &mut self.stage {
             Stage::UnderWay(run) => {
@@ -130,10 +130,7 @@ impl Session {
         }
     }
 
-    fn read<'call>(
-        &mut self,
-        node: &Node<'_, 'call>,
-    ) -> Result<(Step, Vec<Channel<'call>>), RunError> {
+    fn read<'call>(&mut self, node: &Node<'_, 'call>) -> Result<Shown<'call>, RunError> {
         let catalyst = node.need(c"catalyst", "an object with 'state' and 'channels'")?;
         let state = catalyst.need(c"state", "an object with 'timestep' (or 'cycle') and 'time'")?;
         let cycle = match state.child(c"timestep") {
@@ -172,7 +169,7 @@ impl Session {
                 Ok(())
             })?;
         }
-        Ok((step, channels))
+        Ok(Shown { step, looked_at, channels })
     }
 
     fn under_way(&self) -> Option<&Run> {

@@ -83,16 +83,9 @@ impl Adaptor {
         self.told_changes.push(Told { id, source, change, _reservation: reservation });
     }
 
-    /// Makes the changes that all ranks were told of, where all have lent the whole mesh with its
-    /// fields; otherwise the next call does, for which the solver is asked for them. Collective.
+    /// Makes the changes that all ranks were told of. All have lent the whole mesh with its fields.
+    /// Collective.
     pub(super) fn make_changes(&mut self, moment: Moment, channels: &[Channel<'_>]) {
-        if self.told_changes.is_empty() {
-            return;
-        }
-        let was_spared = *self.is_spared.get_mut();
-        if self.communicator.any(was_spared) {
-            return;
-        }
         for Told { id, source, change, .. } in std::mem::take(&mut self.told_changes) {
             let made = self.make_change(&change, moment, channels);
             self.changes.settle(&id, made.is_ok(), &self.config);

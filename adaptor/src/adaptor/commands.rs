@@ -107,8 +107,14 @@ impl Adaptor {
             let (source, reservation) = whence.next().unwrap_or((Source::Viewer(0), None));
             self.obey(id, &source, command, reservation, moment);
         }
-        self.make_changes(moment, channels);
         self.make_ready();
+        self.forecast();
+        // What came after the solver had asked whether the mesh is looked at is for the next call,
+        // which is lent it whole.
+        if self.communicator.any(*self.is_spared.get_mut()) {
+            return;
+        }
+        self.make_changes(moment, channels);
         let named = self.steered_channel().map(str::to_owned);
         if let (SteeredMesh::Steered(steerer, _), Ok(channel)) =
             (&mut self.mesh, Channel::find(channels, named.as_deref()))
@@ -116,7 +122,6 @@ impl Adaptor {
         {
             steerer.observe(&channel.mesh.points);
         }
-        self.forecast();
         let step_seconds = self.timing.steps.median();
         if let SteeredMesh::Steered(steerer, _) = &mut self.mesh
             && steerer.advance(moment, step_seconds)

@@ -16,4 +16,4 @@ mod run;
 pub use array::{Array, NumberType, conduit_type};
 pub use asked::Asked;
 pub use error::RunError;
-pub use run::Run;
+pub use run::{Run, Shown};

@@ -16,6 +16,17 @@ use crate::{Adaptor, FinalizeError, OrderReport, Report, Settings, Step, Stopper
 /// Why orders are rejected from then on.
 const OTHER_MESH: &str = "the solver has made another mesh: shapes are measured from the mesh of the first step, so its cells must stay the same";
 
+/// A step as the solver shows it.
+pub struct Shown<'call> {
+    /// Its cycle, time and length.
+    pub step: Step,
+    /// The answer of [`Run::looks_at`] for it, by which the channels were read: without fields and
+    /// features where it is no. Commands arrive at any time, so that a second answer may be another.
+    pub looked_at: bool,
+    /// The channels.
+    pub channels: Vec<Channel<'call>>,
+}
+
 /// A run under way: the adaptor, and what it asks of a solver that reads it later.
 pub struct Run {
     adaptor: Adaptor,
@@ -162,12 +173,11 @@ impl Run {
     /// [`RunError::Choices`], and what the adaptor refuses.
     pub fn execute<'call>(
         &mut self,
-        given: Result<(Step, Vec<Channel<'call>>), RunError>,
+        given: Result<Shown<'call>, RunError>,
     ) -> Result<bool, RunError> {
         // What can be wrong here alone is agreed upon before anything that all do together.
         let mut is_other = false;
-        let prepared = self.cover(given).and_then(|(step, channels)| {
-            let looked_at = self.adaptor.looks_at(&step);
+        let prepared = self.cover(given).and_then(|Shown { step, looked_at, channels }| {
             for channel in &channels {
                 let changed = self.update(channel, looked_at)?;
                 is_other |= changed && channel.name == self.steered;
@@ -226,25 +236,25 @@ impl Run {
     /// Leaves out the cells that finer grids of other ranks cover. Collective.
     fn cover<'call>(
         &self,
-        given: Result<(Step, Vec<Channel<'call>>), RunError>,
-    ) -> Result<(Step, Vec<Channel<'call>>), RunError> {
+        given: Result<Shown<'call>, RunError>,
+    ) -> Result<Shown<'call>, RunError> {
         if self.communicator.size() == 1 {
             return given;
         }
         let has_grids = |channels: &[Channel<'_>]| {
             channels.iter().any(|channel| channel.grids().next().is_some())
         };
-        let (mut given, any) = ranks::ask(&*self.communicator, given, |(step, channels)| {
-            self.adaptor.looks_at(step) && has_grids(channels)
+        let (mut given, any) = ranks::ask(&*self.communicator, given, |shown| {
+            shown.looked_at && has_grids(&shown.channels)
         });
         if any {
             let own: Vec<(&str, Vec<Grid>)> = given
                 .iter()
-                .flat_map(|(_, channels)| channels)
+                .flat_map(|shown| &shown.channels)
                 .map(|channel| (channel.name.as_str(), channel.grids().collect()))
                 .collect();
             let all: Vec<(String, Vec<Grid>)> = ranks::gathered(&*self.communicator, &own);
-            for channel in given.iter_mut().flat_map(|(_, channels)| channels) {
+            for channel in given.iter_mut().flat_map(|shown| &mut shown.channels) {
                 let of_channel = all.iter().filter(|(name, _)| *name == channel.name);
                 let grids: Vec<Grid> =
                     of_channel.flat_map(|(_, grids)| grids.iter().copied()).collect();

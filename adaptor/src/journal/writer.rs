@@ -197,12 +197,13 @@ impl Journal {
     pub(crate) fn close(&self) {
         let Some(shared) = &self.shared else { return };
         let Some(thread) = lock(&self.thread).take() else { return };
-        if thread.thread().id() == std::thread::current().id() {
-            return;
-        }
         let mut state = lock(&shared.state);
         state.is_closed = true;
         shared.changed.notify_all();
+        if thread.thread().id() == std::thread::current().id() {
+            // Whoever waited for a line was the last to hold this; the thread ends by itself.
+            return;
+        }
         let until = Instant::now() + END;
         while !state.has_ended {
             let left = until.saturating_duration_since(Instant::now());
@@ -544,5 +545,25 @@ mod tests {
         let (written, _) = desk.finish();
         assert_eq!(written.lines().count(), 1 + 3 + 1);
         assert!(written.ends_with("{\"lost\":{\"lines\":7}}\n"), "{}", &written[..80]);
+    }
+
+    #[test]
+    fn whoever_waits_for_a_line_may_be_the_last_to_hold_the_journal() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("journal.jsonl");
+        let (go, gone) = channel::<()>();
+        let journal = Arc::new(Journal::start(Store::open(&path).unwrap(), |_| {}).unwrap());
+        let last = Arc::clone(&journal);
+        journal.ask(&entry("o1"), move |_| {
+            let _ = gone.recv();
+            drop(last);
+        });
+        drop(journal);
+        drop(go);
+        let until = Instant::now() + Duration::from_secs(20);
+        while let Err(error) = Store::open(&path) {
+            assert!(Instant::now() < until, "{error}");
+            std::thread::sleep(Duration::from_millis(1));
+        }
     }
 }

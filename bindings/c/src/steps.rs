@@ -4,6 +4,7 @@ use std::ffi::{c_char, c_int, c_uint};
 use std::ptr;
 
 use tombolo::deform::mesh::Vector;
+use tombolo::foreign::Shown;
 use tombolo::pipelines::language::nearest;
 use tombolo::{ExecuteError, MeshMotion, OrderReport, Step};
 
@@ -42,7 +43,9 @@ export! {
             let _alarm = under_way.alarm();
             // SAFETY: as the crate's page says: the arrays live while this call runs.
             let channels: Result<Vec<_>, _> = run.channels.iter().map(|named| unsafe { named.channel() }).collect();
-            let given = channels.map(|channels| (Step { cycle, time, time_step }, channels));
+            let step = Step { cycle, time, time_step };
+            let looked_at = under_way.looks_at(&step);
+            let given = channels.map(|channels| Shown { step, looked_at, channels });
             if !under_way.execute(given)? {
                 return Err(ExecuteError::NoChannel { cycle }.into());
             }

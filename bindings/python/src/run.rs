@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tombolo::foreign::{self, RunError, mesh::Channel, ranks};
+use tombolo::foreign::{self, RunError, Shown, ranks};
 use tombolo::pipelines::language;
 use tombolo::{ExecuteError, Parameter, Settings, Stopper};
 
@@ -43,7 +43,7 @@ pub(crate) struct Run {
 /// Moves what only this call uses to where other threads of Python may run meanwhile.
 struct Call<'a, 'call> {
     run: &'a mut foreign::Run,
-    given: Result<(tombolo::Step, Vec<Channel<'call>>), RunError>,
+    given: Result<Shown<'call>, RunError>,
 }
 
 // SAFETY: the channels are `Channels`, which may be sent, taken apart; the rest is `Send` by itself.
@@ -173,7 +173,8 @@ impl Run {
         let given = lender.channels(channels);
         let dimensions = given.as_ref().map_or_else(|_| Vec::new(), Channels::dimensions);
         let step = tombolo::Step { cycle, time, time_step };
-        let given = given.map(|channels| (step, channels.0));
+        let looked_at = run.looks_at(&step);
+        let given = given.map(|channels| Shown { step, looked_at, channels: channels.0 });
         let call = Call { run, given };
         let shown = guarded(|| py.detach(|| call.execute()).map_err(of_run))?;
         drop(lender);
