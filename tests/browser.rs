@@ -1,5 +1,5 @@
-//! The viewer in a headless browser: the demo, what can be seen and how, shaping by hand, a shape
-//! changed by two people, and the end of a run.
+//! The viewer in a headless browser: the demo, what can be seen and how, before and after compared,
+//! shaping by hand, a shape changed by two people, and the end of a run.
 
 use std::path::Path;
 use std::process::Command;
@@ -51,6 +51,13 @@ fn the_demo_in_a_browser() {
 fn seeing_in_a_browser() {
     let mut run = nozzle();
     drive("seeing.mjs", &mut run);
+    assert!(run.is_running(), "the run ended:\n{}", run.text());
+}
+
+#[test]
+fn before_and_after_in_a_browser() {
+    let mut run = nozzle();
+    drive("comparing.mjs", &mut run);
     assert!(run.is_running(), "the run ended:\n{}", run.text());
 }
 

@@ -33,3 +33,10 @@ export function write(target: Element, text: string): void {
 /** A label that is unique in the page. */
 let count = 0;
 export const identifier = (stem: string): string => `${stem}-${++count}`;
+
+/** Hands something to the person as a file. */
+export function download(content: Blob, name: string): void {
+  const address = URL.createObjectURL(content);
+  element("a", { href: address, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(address), 10_000);
+}

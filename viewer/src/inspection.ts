@@ -46,6 +46,8 @@ export interface Inspection {
   readonly skeleton: { nodes: number; segments: number; places: [number, number][] } | null;
   /** Places of the page at which the parts of the gizmo can be gripped, such as `arrow z`; none when there is no handle. */
   readonly gizmo: Readonly<Record<string, [number, number]>>;
+  /** A place of the page at which the slice of the chosen view can be gripped; null where it cannot. */
+  readonly sliceHandle: [number, number] | null;
   /** What went wrong, newest last: frames or messages that could not be read. */
   readonly errors: readonly string[];
   /** The box around a feature as it is now; null when no view shows it. */

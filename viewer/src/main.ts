@@ -14,10 +14,14 @@ import { ShapeTarget } from "./handles/shape-target";
 import { publish } from "./inspection";
 import { compileKernel } from "./kernel/kernel";
 import { History } from "./history/series";
-import { HistoryDock } from "./history/dock";
+import { Dock } from "./history/dock";
+import { HistogramPlot } from "./history/histogram-plot";
+import { LinePlot } from "./history/line-plot";
+import { HistoryPlot } from "./history/plot";
 import { EditsPanel } from "./panels/edits";
 import { watchKeys } from "./panels/keys";
 import { FIELD_TITLES, LookPanel } from "./panels/look";
+import { FilesPanel } from "./panels/files";
 import { MonitorPanel } from "./panels/monitors";
 import { ParameterPanel } from "./panels/parameters";
 import { RecordingPanel } from "./panels/recording";
@@ -35,6 +39,11 @@ import { Marks } from "./picture/marks";
 import { Pins } from "./picture/pins";
 import { watchPointer } from "./picture/pointer";
 import { readingText } from "./picture/probe";
+import { Compare } from "./picture/compare";
+import { Earlier } from "./picture/earlier";
+import type { Content } from "./picture/earlier";
+import { Movie } from "./picture/movie";
+import { SliceHandle } from "./picture/slice-handle";
 import { Ruler } from "./picture/ruler";
 import { save, withBars } from "./picture/screenshot";
 import { Scene } from "./picture/scene";
@@ -47,7 +56,8 @@ import { chosen } from "./store/draft";
 import { appliedOrders, isShapeUnderWay } from "./store/orders";
 import { Kept } from "./store/kept";
 import { onlyLook } from "./store/looks";
-import { withQuality } from "./store/pipelines";
+import type { Look } from "./store/looks";
+import { LINE, withQuality } from "./store/pipelines";
 import { reduce } from "./store/reduce";
 import { Selection } from "./store/selection";
 import { INITIAL } from "./store/state";
@@ -107,21 +117,42 @@ const scene = new Scene(part("scene"), selection, {
     shownBars = shown;
     bars.show(shown);
     look.setBars(shown);
+    compare.setBars(shown);
   },
   drawn: (axes) => {
     triad.turn(axes);
     marks.draw();
-    if (pins.update()) dock.update();
+    if (pins.update()) history.update();
     worst.update();
+    sliceHandle.drawn();
     handles.drawn();
+    compare.follow();
+    linePlot.update();
+    histogramPlot.update();
   },
   trouble: report,
 });
 const marks = new Marks(document.querySelector<SVGElement>("#marks")!, (point) => scene.onPage(point));
 const ruler = new Ruler(marks);
+const line = new Ruler(marks, "line", (from, to) => {
+  sayMeasuring();
+  linePlot.take(from, to);
+  dock.choose(linePlot);
+});
+function sayMeasuring(): void {
+  part("ruler").setAttribute("aria-pressed", String(ruler.active));
+  part("line").setAttribute("aria-pressed", String(line.active));
+}
+/** Switches one of the two that take clicks on or off; the other is off. */
+function measureWith(one: Ruler): void {
+  const other = one === ruler ? line : ruler;
+  if (other.active) other.toggle();
+  one.toggle();
+  sayMeasuring();
+}
 const overlay = new Overlay(part("stage"), part("scene").nextElementSibling);
 const faces = new FaceTools(part("stage"), part("scene"), overlay.root, part("faces"), scene, store, (listener) => previewer.watchSurface(listener), () => scene.redraw());
-const handles = new Handles(part("stage"), part("scene"), scene, store, selection, new ShapeTarget(() => store.state, () => scene.shown(), faces), overlay, part("tools"), () => ruler.active);
+const handles = new Handles(part("stage"), part("scene"), scene, store, selection, new ShapeTarget(() => store.state, () => scene.shown(), faces), overlay, part("tools"), () => ruler.active || line.active);
 watchPointer(part("scene"), scene, selection, {
   reading: (x, y) => {
     const probe = scene.probe(x, y);
@@ -129,10 +160,11 @@ watchPointer(part("scene"), scene, selection, {
     return reading ? readingText(reading, fieldTitle(reading.field, reading.component)) : "";
   },
   clicked: (x, y) => {
-    if (!ruler.active) return false;
+    const measuring = [ruler, line].find(({ active }) => active);
+    if (!measuring) return false;
     const probe = scene.probe(x, y);
     const reading = probe && scene.read(probe);
-    if (reading) ruler.take(reading.point);
+    if (reading) measuring.take(reading.point);
     return true;
   },
 });
@@ -143,24 +175,58 @@ const look = new LookPanel(part("look"), store, (view) => {
   const pipeline = pipelines.get(view);
   if (pipeline) pipelines.set(withQuality(pipeline));
 });
-new SlicePanel(part("slice"), store, pipelines, () => scene.bounds());
+const slice = new SlicePanel(part("slice"), store, pipelines, () => scene.bounds());
+const sliceHandle = new SliceHandle(document.querySelector<SVGElement>("#cut")!, part("scene"), scene, slice);
+const earlier: Earlier = new Earlier(store, () => scene.layers.values(), () => {
+  compare.update();
+  linePlot.update();
+  histogramPlot.update();
+});
+const compare = new Compare(part("before"), part("compare"), scene, earlier, {
+  views: () => store.state.hello?.views ?? [], looks: () => store.state.looks, features: () => store.state.hello?.features ?? [], selection, trouble: report,
+});
+part("compare").addEventListener("click", () => { part("now").hidden = part("before").hidden; });
 const worst = new WorstCells(part("quality"), store, pipelines, scene, marks);
 new CameraTools(part("tools"), scene);
 watchDrawers();
-new Theming(part("theme") as HTMLButtonElement, kept, (theme) => scene.setTheme(theme));
-const history = new History();
-const dock = new HistoryDock(part("dock"), history, kept.dock, (state) => { kept.dock = state; });
-const pins: Pins = new Pins(history, marks, (probe) => scene.read(probe), ({ field, component }) => fieldTitle(field, component), (key) => dock.choose(key));
+new Theming(part("theme") as HTMLButtonElement, kept, (theme) => {
+  scene.setTheme(theme);
+  compare.setTheme(theme);
+});
+/** What a view holds now. */
+function contentOf(view: string): Content | null {
+  const layer = scene.layers.get(view);
+  return layer?.topology && layer.frame ? { topology: layer.topology, frame: layer.frame } : null;
+}
+const monitored = new History();
+const history = new HistoryPlot(monitored, kept.dock.chosen, (chosen) => { kept.dock = { ...kept.dock, chosen }; });
+const lookOf = (view: string | null): Look | null => (view === null ? null : store.state.looks[view] ?? null);
+const linePlot = new LinePlot(store, pipelines, {
+  frame: () => scene.layers.get(LINE)?.frame ?? null, look: () => lookOf(store.state.chosenView), title: ({ field, component }) => fieldTitle(field, component),
+}, earlier, () => dock.update());
+const histogramPlot = new HistogramPlot(store, {
+  content: contentOf, title: ({ field, component }) => fieldTitle(field, component),
+}, earlier);
+const dock = new Dock(part("dock"), kept.dock.open, (open) => { kept.dock = { ...kept.dock, open }; });
+for (const tab of [history, linePlot, histogramPlot]) dock.add(tab);
+store.watch((state) => state.frames.count > 0, () => dock.update());
+const movie = new Movie(() => scene.element, () => `tombolo-${store.state.frames.cycle ?? 0}`, (isRunning) => {
+  part("movie").setAttribute("aria-pressed", String(isRunning));
+  write(part("movie"), isRunning ? "End film" : "Film");
+}, report);
+const pins: Pins = new Pins(monitored, marks, (probe) => scene.read(probe), ({ field, component }) => fieldTitle(field, component), (key) => {
+  history.choose(key);
+  dock.choose(history);
+});
 watchPictureTools(part("scene"), part("stage"), {
   pin: (x, y) => {
     const probe = scene.probe(x, y);
     if (probe) pins.add(probe);
   },
   unpin: () => pins.clear(),
-  ruler: () => {
-    ruler.toggle();
-    return ruler.active;
-  },
+  ruler: () => measureWith(ruler),
+  line: () => measureWith(line),
+  movie: () => movie.toggle(),
   save: () => scene.withPicture((canvas) => save(withBars(canvas, shownBars, ({ look: { field, component } }) => fieldTitle(field, component),
     getComputedStyle(document.body).color), `tombolo-${store.state.frames.cycle ?? 0}.png`)),
 });
@@ -172,8 +238,9 @@ new RecordingPanel(store, commands);
 new EditsPanel(store, commands);
 const form = new EditForm(part("fields"), store);
 const previewer = new Previewer(scene, addresses.surface, kernel, store);
+new FilesPanel(store, commands, { surface: () => previewer.surfaceNow(), content: contentOf });
 const forecasts = new Forecasts(store, (order) => commands.ask({ forecast: order }));
-new VerdictPanel(store, commands, (place) => scene.flyTo(place), () => form.focusProblem());
+new VerdictPanel(store, commands, (place) => scene.camera.flyTo(place), () => form.focusProblem());
 watchKeys(store, commands);
 
 const worker = new Worker(new URL("./connection/decode.worker.ts", import.meta.url), { type: "module" });
@@ -215,8 +282,9 @@ function takeMessage(message: ServerMessage): void {
 
 function takeMonitor(monitor: Monitor): void {
   monitors.update(monitor);
-  history.add(monitor.pipeline, monitor.cycle, monitor.time ?? monitor.cycle, monitor.values);
-  for (const { pipeline, name, unit } of store.state.hello?.monitors ?? []) history.setUnit(pipeline, name, unit ?? null);
+  monitored.add(monitor.pipeline, monitor.cycle, monitor.time ?? monitor.cycle, monitor.values);
+  for (const { pipeline, name, unit } of store.state.hello?.monitors ?? []) monitored.setUnit(pipeline, name, unit ?? null);
+  history.update();
   dock.update();
 }
 
@@ -287,8 +355,11 @@ window.addEventListener("online", () => { if (connection.state !== "dismissed" &
 
 store.watch((state) => ({ views: state.hello?.views ?? [], looks: state.looks, held: isShapeUnderWay(state.orders) }),
   ({ views, looks, held }) => scene.setLooks(views, onlyView === null ? looks : onlyLook(looks, onlyView), held), sameJson);
-store.watch((state) => state.looks, (looks) => { kept.looks = looks; });
-store.watch((state) => appliedOrders(state.orders), (marks) => dock.setMarks(marks), sameJson);
+store.watch((state) => state.looks, (looks) => {
+  kept.looks = looks;
+  compare.update();
+});
+store.watch((state) => appliedOrders(state.orders), (marks) => history.setMarks(marks), sameJson);
 
 part("skeleton").addEventListener("click", (event) => {
   const button = event.currentTarget as HTMLButtonElement;
@@ -328,6 +399,7 @@ publish({
     return bones && { nodes: bones.now.length / 3, segments: bones.segments.length / 2, places: handles.nodePlaces() };
   },
   get gizmo() { return handles.places(); },
+  get sliceHandle() { return sliceHandle.place; },
   picture: () => scene.picture(),
   featureBounds: (name) => scene.featureBounds(name),
   featurePlace: (name) => scene.featurePlace(name, (x, y) => handles.isFree(x, y)),

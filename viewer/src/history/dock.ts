@@ -1,264 +1,89 @@
-/** The history dock: monitors over time below the picture, with orders as marks and what they have changed. */
-import uPlot from "uplot";
-import "uplot/dist/uPlot.min.css";
+/** The dock below the picture: tabs, of which one is seen; folded away it is one line. */
 import "./dock.css";
-import { element, write } from "../dom";
-import { digits, within } from "../number";
-import type { History, Mark, Series } from "./series";
-import { compare, firstChoice } from "./series";
+import { element, identifier, write } from "../dom";
 
-/** Told apart by those who do not tell red from green, too (Okabe and Ito, 2008), light enough for a dark ground. */
-const COLOURS = ["#56b4e9", "#e69f00", "#2fbf96", "#cc79a7", "#f0e442", "#d5763c", "#8f9dff", "#a5adb6"];
-/** The most series that are drawn at once: one for each colour. */
-const DRAWN = COLOURS.length;
-/** The most axes that stand beside the plot. */
-const AXES = 4;
-/** The shortest time between two drawings of new values, in milliseconds. */
-const REST = 250;
-
-export interface DockState { open: boolean; chosen: string[] | null }
-
-export class HistoryDock {
-  private plot: uPlot | null = null;
-  private marks: readonly Mark[] = [];
-  private drawn = "";
-  private listed = "";
-  private waiting: number | null = null;
-  /** The row of the table that the cursor is at; null where it is not over the plot. */
-  private row: number | null = null;
-  private cycles: number[] = [];
-  private zoom: [number, number] | null = null;
-  private readonly canvas = element("div", { class: "plot" });
-  private readonly choices = element("div", { class: "choices", role: "group", "aria-label": "Monitors in the plot" });
-  private readonly table = element("tbody");
-  private readonly heading = element("span", { class: "hint" });
-  private readonly whole: HTMLButtonElement;
-  private readonly body: HTMLElement;
-  private readonly toggle: HTMLButtonElement;
-
-  constructor(private readonly root: HTMLElement, private readonly history: History, private state: DockState, private readonly changed: (state: DockState) => void) {
-    this.whole = element("button", { type: "button", class: "small", title: "Show the whole history again", disabled: true, onclick: () => this.zoomTo(null) }, "Whole");
-    this.toggle = element("button", { type: "button", class: "small", "aria-controls": "history-body", onclick: () => this.open(!this.state.open) });
-    const download = element("button", { type: "button", class: "small", title: "All that is kept of all monitors, as comma-separated values", onclick: () => this.download() }, "CSV");
-    const headings = [element("td"), ...["value", "before", "difference"].map((text) => element("th", { scope: "col" }, text))];
-    this.body = element("div", { id: "history-body", class: "dock-body" }, this.canvas,
-      element("div", { class: "values" }, element("table", {}, element("caption", {}, this.heading), element("thead", {}, element("tr", {}, ...headings)), this.table),
-        element("details", {}, element("summary", {}, "Monitors in the plot"), this.choices)));
-    root.replaceChildren(element("div", { class: "dock-bar" }, this.toggle, element("h2", {}, "History"), element("span", { class: "hint" }, "drag to zoom · double-click for the whole"), this.whole, download), this.body);
-    new ResizeObserver(() => this.resize()).observe(this.canvas);
-    this.open(state.open);
-  }
-
-  /** There are new values. */
-  update(): void {
-    this.root.hidden = this.history.series.length === 0;
-    if (!this.state.open || this.root.hidden) return;
-    this.waiting ??= window.setTimeout(() => {
-      this.waiting = null;
-      this.draw();
-    }, REST);
-  }
-
-  /** The orders that have taken effect. */
-  setMarks(marks: readonly Mark[]): void {
-    if (JSON.stringify(marks) === JSON.stringify(this.marks)) return;
-    this.marks = marks;
-    this.plot?.redraw(false);
-    this.values();
-  }
-
-  /** Draws a series that was not there before: somebody has asked for it. */
-  choose(key: string): void {
-    this.change({ ...this.state, chosen: [...this.chosen().filter((other) => other !== key), key].slice(-DRAWN) });
-    if (!this.state.open) this.open(true);
-  }
-
-  private open(open: boolean): void {
-    this.change({ ...this.state, open });
-    this.body.hidden = !open;
-    this.root.classList.toggle("open", open);
-    this.toggle.setAttribute("aria-expanded", String(open));
-    this.toggle.setAttribute("aria-label", open ? "Fold the history away" : "Show the history");
-    write(this.toggle, open ? "▾" : "▸");
-    if (open) this.draw();
-  }
-
-  private change(state: DockState): void {
-    this.state = state;
-    this.changed(state);
-  }
-
-  private chosen(): string[] {
-    const known = new Set(this.history.series.map(({ key }) => key));
-    return (this.state.chosen ?? firstChoice(this.history.series)).filter((key) => known.has(key)).slice(0, DRAWN);
-  }
-
-  private draw(): void {
-    this.list();
-    const chosen = this.chosen();
-    const series = chosen.flatMap((key) => this.history.series.find((one) => one.key === key) ?? []);
-    const { cycles, columns } = this.history.table(chosen);
-    this.cycles = cycles;
-    const shape = JSON.stringify(series.map(({ key, unit }) => [key, unit]));
-    const data: uPlot.AlignedData = [cycles, ...columns];
-    if (this.plot && shape === this.drawn) {
-      this.plot.setData(data, false);
-      this.range();
-    } else {
-      this.drawn = shape;
-      this.plot?.destroy();
-      this.plot = series.length > 0 ? this.make(series, data) : null;
-    }
-    this.values();
-  }
-
-  /** The boxes by which monitors are put into the plot. */
-  private list(): void {
-    const { series } = this.history;
-    const chosen = this.chosen();
-    const key = JSON.stringify([series.map((one) => [one.key, one.unit]), chosen]);
-    if (key === this.listed) return;
-    this.listed = key;
-    const focused = document.activeElement instanceof HTMLElement ? document.activeElement.dataset.series : undefined;
-    this.choices.replaceChildren(...series.map((one) => {
-      const position = chosen.indexOf(one.key);
-      const box = element("input", {
-        type: "checkbox", "data-series": one.key, disabled: position < 0 && chosen.length >= DRAWN, onchange: () => {
-          this.change({ ...this.state, chosen: box.checked ? [...this.chosen(), one.key] : this.chosen().filter((other) => other !== one.key) });
-          this.draw();
-        },
-      });
-      box.checked = position >= 0;
-      box.style.accentColor = COLOURS[position] ?? "";
-      return element("label", { title: `pipeline ${one.source}` }, box, label(one));
-    }));
-    if (focused) this.choices.querySelector<HTMLElement>(`[data-series="${CSS.escape(focused)}"]`)?.focus();
-  }
-
-  private make(series: readonly Series[], data: uPlot.AlignedData): uPlot {
-    const scales = [...new Set(series.map(scaleOf))];
-    const colour = (at: number): string => COLOURS[at % COLOURS.length]!;
-    const style = getComputedStyle(this.root);
-    const grid = { stroke: style.getPropertyValue("--line"), width: 1 };
-    const axis = { stroke: style.getPropertyValue("--soft"), grid, ticks: grid, font: "11px sans-serif" };
-    const { width, height } = this.size();
-    return new uPlot({
-      width, height, padding: [10, 8, 0, 0],
-      legend: { show: false },
-      cursor: { drag: { x: true, y: false, setScale: false }, points: { size: 5 } },
-      scales: { x: { time: false }, ...Object.fromEntries(scales.map((scale) => [scale, { auto: true, range: padded }])) },
-      series: [{}, ...series.map((one, i) => ({ label: one.name, scale: scaleOf(one), stroke: colour(i), width: 1.5, spanGaps: true, points: { show: false } }))],
-      axes: [
-        { ...axis, size: 30, values: (_, ticks) => ticks.map((tick) => (Number.isInteger(tick) ? String(tick) : "")) },
-        ...scales.slice(0, AXES).map((scale, i) => ({
-          ...axis, scale, side: i % 2 === 0 ? 3 as const : 1 as const, size: 58, grid: i === 0 ? grid : { show: false },
-          stroke: scales.length === 1 ? axis.stroke : colour(series.findIndex((one) => scaleOf(one) === scale)),
-          values: (_: uPlot, ticks: number[]) => ticks.map((tick) => within(tick, [ticks[0] ?? 0, ticks.at(-1) ?? 1])),
-        })),
-      ],
-      hooks: {
-        draw: [(plot) => this.drawMarks(plot)],
-        setCursor: [(plot) => {
-          this.row = plot.cursor.idx ?? null;
-          this.values();
-        }],
-        setSelect: [(plot) => {
-          const { left, width: wide } = plot.select;
-          if (wide > 3) this.zoomTo([plot.posToVal(left, "x"), plot.posToVal(left + wide, "x")]);
-          plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
-        }],
-        ready: [(plot) => {
-          plot.over.addEventListener("dblclick", () => this.zoomTo(null));
-          plot.over.addEventListener("mouseleave", () => {
-            this.row = null;
-            this.values();
-          });
-        }],
-      },
-    }, data, this.canvas);
-  }
-
-  private zoomTo(zoom: [number, number] | null): void {
-    this.zoom = zoom;
-    this.whole.disabled = zoom === null;
-    this.range();
-  }
-
-  private range(): void {
-    const [min, max] = this.zoom ?? [this.cycles[0] ?? 0, this.cycles.at(-1) ?? 1];
-    this.plot?.setScale("x", { min, max: max > min ? max : min + 1 });
-  }
-
-  private drawMarks(plot: uPlot): void {
-    const { ctx, bbox } = plot;
-    ctx.save();
-    ctx.beginPath();
-    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
-    ctx.clip();
-    const style = getComputedStyle(this.root);
-    ctx.strokeStyle = ctx.fillStyle = style.getPropertyValue("--accent");
-    ctx.font = `${11 * devicePixelRatio}px sans-serif`;
-    ctx.setLineDash([4 * devicePixelRatio, 3 * devicePixelRatio]);
-    for (const mark of this.marks) {
-      const x = Math.round(plot.valToPos(mark.cycle, "x", true)) + 0.5;
-      ctx.beginPath();
-      ctx.moveTo(x, bbox.top);
-      ctx.lineTo(x, bbox.top + bbox.height);
-      ctx.stroke();
-      ctx.fillText(mark.label.length > 28 ? `${mark.label.slice(0, 27)}…` : mark.label, x + 4 * devicePixelRatio, bbox.top + 11 * devicePixelRatio);
-    }
-    ctx.restore();
-  }
-
-  /** What stands below the cursor, and beside it how it was before the last order. */
-  private values(): void {
-    const last = this.cycles.at(-1);
-    const cycle = this.row === null ? last : this.cycles[this.row];
-    if (cycle === undefined) return;
-    const chosen = this.chosen();
-    const all = this.history.series;
-    let order: Mark | null = null;
-    const rows = chosen.map((key, i) => {
-      const one = all.find((candidate) => candidate.key === key);
-      const found = compare(this.history, key, cycle, this.marks);
-      order = found.order ?? order;
-      const part = found.difference !== null && found.before ? ` (${digits((100 * found.difference) / Math.abs(found.before), 2)} %)` : "";
-      const cells = [digits(found.value), digits(found.before), found.difference === null ? "–" : `${found.difference > 0 ? "+" : ""}${digits(found.difference, 3)}${part}`];
-      // Beside the name, which stays as readable as the rest.
-      const colour = element("span", { class: "colour", "aria-hidden": "true" });
-      colour.style.background = COLOURS[i] ?? "";
-      const name = element("th", { scope: "row" }, colour, one ? label(one) : "");
-      return element("tr", {}, name, ...cells.map((text) => element("td", {}, text)));
-    });
-    const { label: text } = (order ?? { label: "" }) as Mark;
-    write(this.heading, `cycle ${cycle}${text === "" ? "" : ` · before: ${text}`}`);
-    this.table.replaceChildren(...rows);
-  }
-
-  private size(): { width: number; height: number } {
-    return { width: Math.max(120, this.canvas.clientWidth), height: Math.max(80, this.canvas.clientHeight) };
-  }
-
-  private resize(): void {
-    if (!this.state.open || this.canvas.clientWidth === 0) return;
-    this.plot?.setSize(this.size());
-  }
-
-  private download(): void {
-    const address = URL.createObjectURL(new Blob([this.history.csv()], { type: "text/csv" }));
-    element("a", { href: address, download: "tombolo-history.csv" }).click();
-    setTimeout(() => URL.revokeObjectURL(address), 10_000);
-  }
+export interface Tab {
+  readonly title: string;
+  /** What stands beside the tabs while this one is seen. */
+  readonly tools: readonly HTMLElement[];
+  readonly body: HTMLElement;
+  /** Whether there is nothing in it yet. */
+  readonly isEmpty: boolean;
+  /** It is seen from now on, or no longer. */
+  show(shown: boolean): void;
 }
 
-/** Series of one unit share an axis; one without a unit has its own. */
-const scaleOf = (series: Series): string => (series.unit ? `unit ${series.unit}` : series.key);
+interface Known { tab: Tab; button: HTMLButtonElement; tools: HTMLElement }
 
-const label = ({ name, unit }: Series): string => (unit ? `${name} [${unit}]` : name);
+export class Dock {
+  private readonly tabs: Known[] = [];
+  private readonly list = element("div", { class: "tabs", role: "tablist", "aria-label": "Below the picture", onkeydown: (event) => this.key(event as KeyboardEvent) });
+  private readonly toggle = element("button", { type: "button", class: "small", onclick: () => this.open(!this.isOpen) });
+  private readonly bar = element("div", { class: "dock-bar" }, this.toggle, this.list);
+  private chosen: Tab | null = null;
+  private seen: Tab | null = null;
 
-/** A little room above and below; a line that is level lies in the middle. */
-function padded(_: uPlot, low: number | null, high: number | null): [number, number] {
-  if (low === null || high === null || !Number.isFinite(low) || !Number.isFinite(high)) return [0, 1];
-  const room = high > low ? 0.06 * (high - low) : Math.abs(low) * 0.1 || 1;
-  return [low - room, high + room];
+  /** `changed` is told whether it is open. */
+  constructor(private readonly root: HTMLElement, private isOpen: boolean, private readonly changed: (isOpen: boolean) => void) {
+    root.replaceChildren(this.bar);
+  }
+
+  add(tab: Tab): void {
+    tab.body.id ||= identifier("tab-body");
+    const button = element("button", { type: "button", role: "tab", id: identifier("tab"), "aria-controls": tab.body.id, onclick: () => this.choose(tab) }, tab.title);
+    tab.body.setAttribute("role", "tabpanel");
+    tab.body.setAttribute("aria-labelledby", button.id);
+    tab.body.tabIndex = 0;
+    const tools = element("div", { class: "tab-tools" }, ...tab.tools);
+    this.tabs.push({ tab, button, tools });
+    this.list.append(button);
+    this.bar.append(tools);
+    this.root.append(tab.body);
+    this.chosen ??= tab;
+    this.update();
+  }
+
+  /** Brings a tab to the front, and opens the dock. */
+  choose(tab: Tab): void {
+    this.chosen = tab;
+    this.open(true);
+  }
+
+  /** Something was put into a tab, or the last of it taken away. */
+  update(): void {
+    this.root.hidden = this.tabs.every(({ tab }) => tab.isEmpty);
+    const seen = this.isOpen && !this.root.hidden ? this.chosen : null;
+    this.root.classList.toggle("open", this.isOpen);
+    this.toggle.setAttribute("aria-expanded", String(this.isOpen));
+    this.toggle.setAttribute("aria-label", this.isOpen ? "Fold the plots away" : "Show the plots");
+    write(this.toggle, this.isOpen ? "▾" : "▸");
+    for (const { tab, button, tools } of this.tabs) {
+      const isChosen = tab === this.chosen;
+      button.setAttribute("aria-selected", String(isChosen));
+      button.tabIndex = isChosen ? 0 : -1;
+      tab.body.hidden = tab !== seen;
+      tools.hidden = tab !== seen;
+    }
+    if (seen === this.seen) return;
+    const before = this.seen;
+    this.seen = seen;
+    before?.show(false);
+    seen?.show(true);
+  }
+
+  private open(isOpen: boolean): void {
+    this.isOpen = isOpen;
+    this.changed(isOpen);
+    this.update();
+  }
+
+  private key(event: KeyboardEvent): void {
+    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    const at = this.tabs.findIndex(({ tab }) => tab === this.chosen);
+    if (step === undefined || at < 0) return;
+    event.preventDefault();
+    const next = this.tabs[(at + step + this.tabs.length) % this.tabs.length]!;
+    this.choose(next.tab);
+    next.button.focus();
+  }
 }

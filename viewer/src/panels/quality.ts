@@ -29,7 +29,7 @@ export class WorstCells {
     const [worst] = cells;
     if (!worst || !this.isToFly) return;
     this.isToFly = false;
-    this.scene.flyTo(worst.centroid);
+    this.scene.camera.flyTo(worst.centroid);
   }
 
   private show(): void {
@@ -51,6 +51,6 @@ export class WorstCells {
     this.button.setAttribute("aria-pressed", "false");
     this.marks.set("worst", []);
     if (whyNotSteering(this.store.state) === "") this.pipelines.remove(WORST);
-    this.scene.reset();
+    this.scene.camera.reset();
   }
 }

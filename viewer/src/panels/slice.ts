@@ -5,6 +5,7 @@ import { element, identifier, write } from "../dom";
 import { digits, readNumber } from "../number";
 import { atOffset, extent, offsetOf, planeOf, withPlane } from "../store/pipelines";
 import type { Plane } from "../store/pipelines";
+import type { Sliced } from "../picture/slice-handle";
 import { whyNotSteering } from "../store/run";
 import type { Action } from "../store/actions";
 import type { State } from "../store/state";
@@ -13,11 +14,12 @@ import type { Store } from "../store/store";
 /** Steps of the slider from one end to the other. */
 const STEPS = 200;
 
-export class SlicePanel {
+export class SlicePanel implements Sliced {
   private readonly slider = element("input", { type: "range", min: 0, max: STEPS, step: 1, "aria-label": "place of the slice along its normal", oninput: () => this.slide() });
   private readonly offset: HTMLInputElement = element("input", { type: "text", inputmode: "decimal", autocomplete: "off", id: identifier("offset"), onchange: () => this.typed() });
   private readonly note = element("p", { class: "hint" });
   private readonly axes: HTMLButtonElement[];
+  /** Where the slice of the chosen view lies, as far as is known. */
   private plane: Plane | null = null;
 
   /** `bounds` is the box around all that is there. */
@@ -75,7 +77,12 @@ export class SlicePanel {
     if (this.plane && offset !== null) this.move(atOffset(this.plane, offset));
   }
 
-  private move(plane: Plane): void {
+  get movable(): Plane | null {
+    return whyNotSteering(this.store.state) === "" && this.store.state.looks[this.store.state.chosenView ?? ""]?.visible === true ? this.plane : null;
+  }
+
+  /** Has the run cut there. */
+  move(plane: Plane): void {
     const pipeline = this.pipelines.get(this.store.state.chosenView);
     if (!pipeline) return;
     this.pipelines.set(withPlane(pipeline, plane));

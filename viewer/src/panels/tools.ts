@@ -15,18 +15,18 @@ export class CameraTools {
       const camera = button?.dataset.camera;
       if (!button || !camera) return;
       if (camera === "parallel") {
-        this.scene.parallel = !this.scene.parallel;
-        button.setAttribute("aria-pressed", String(this.scene.parallel));
+        this.scene.camera.parallel = !this.scene.camera.parallel;
+        button.setAttribute("aria-pressed", String(this.scene.camera.parallel));
       } else this.look(camera);
     });
   }
 
   private look(camera: string): void {
-    if (camera === "reset") this.scene.reset();
-    else if (camera === "corner") this.scene.corner();
+    if (camera === "reset") this.scene.camera.reset();
+    else if (camera === "corner") this.scene.camera.corner();
     else {
       this.side = this.looking === camera ? (this.side === 1 ? -1 : 1) : camera === "1" ? -1 : 1;
-      this.scene.axis(Number(camera) as 0 | 1 | 2, this.side);
+      this.scene.camera.axis(Number(camera) as 0 | 1 | 2, this.side);
     }
     this.looking = camera;
   }
@@ -61,9 +61,13 @@ export interface PictureTools {
   /** Plots the place under a place of the page. */
   pin(clientX: number, clientY: number): void;
   unpin(): void;
-  /** Switches the ruler on or off; says which. */
-  ruler(): boolean;
+  /** Switches the ruler on or off. */
+  ruler(): void;
+  /** Begins or leaves the choice of the two ends of a line. */
+  line(): void;
   save(): void;
+  /** Begins a film, or ends it. */
+  movie(): void;
 }
 
 /** What else can be done with the picture, by buttons and by keys: plot a place, measure, save, the picture alone, the list of keys. */
@@ -74,12 +78,13 @@ export function watchPictureTools(picture: HTMLElement, stage: HTMLElement, tool
   picture.addEventListener("pointerdown", () => picture.focus({ preventScroll: true }));
   picture.addEventListener("contextmenu", (event) => event.preventDefault());
   const keys = part("keys") as HTMLDialogElement;
-  const ruler = (): void => part("ruler").setAttribute("aria-pressed", String(tools.ruler()));
   const fullScreen = (): void => {
     if (document.fullscreenElement) void document.exitFullscreen();
     else void stage.requestFullscreen?.().catch(() => undefined);
   };
-  part("ruler").addEventListener("click", ruler);
+  part("ruler").addEventListener("click", () => tools.ruler());
+  part("line").addEventListener("click", () => tools.line());
+  part("movie").addEventListener("click", () => tools.movie());
   part("screenshot").addEventListener("click", () => tools.save());
   part("full-screen").addEventListener("click", fullScreen);
   part("keys-button").addEventListener("click", () => keys.showModal());
@@ -87,7 +92,7 @@ export function watchPictureTools(picture: HTMLElement, stage: HTMLElement, tool
   const actions: Record<string, () => void> = {
     p: () => { if (pointer) tools.pin(pointer.x, pointer.y); },
     P: () => tools.unpin(),
-    m: ruler, s: () => tools.save(), f: fullScreen,
+    m: () => tools.ruler(), l: () => tools.line(), s: () => tools.save(), f: fullScreen,
   };
   window.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;

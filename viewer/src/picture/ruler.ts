@@ -1,4 +1,4 @@
-/** The ruler: two clicks in the picture, and the distance between them. */
+/** Two clicks in the picture and the distance between them: the ruler, and the line of a plot. */
 import type { Vector } from "../connection/protocol";
 import { digits } from "../number";
 import type { Marks } from "./marks";
@@ -7,7 +7,8 @@ export class Ruler {
   private points: Vector[] = [];
   active = false;
 
-  constructor(private readonly marks: Marks) {}
+  /** `origin` names its marks; `done` is told the two points, after which a tool that is for one line only is switched off. */
+  constructor(private readonly marks: Marks, private readonly origin = "ruler", private readonly done?: (from: Vector, to: Vector) => void) {}
 
   toggle(): void {
     this.active = !this.active;
@@ -18,11 +19,15 @@ export class Ruler {
   /** Takes a point; a third begins anew. */
   take(point: Vector): void {
     this.points = this.points.length >= 2 ? [point] : [...this.points, point];
-    this.show();
+    const [from, to] = this.points;
+    if (this.done && from && to) {
+      this.toggle();
+      this.done(from, to);
+    } else this.show();
   }
 
   private show(): void {
-    this.marks.set("ruler", this.points.length === 0 ? [] : [{ points: this.points, kind: "ruler", label: measure(this.points) }]);
+    this.marks.set(this.origin, this.points.length === 0 ? [] : [{ points: this.points, kind: "ruler", label: measure(this.points) }]);
   }
 }
 

@@ -8,6 +8,8 @@ import { ChosenFaces } from "./chosen-faces";
 import { Ghost } from "./ghost";
 import { Layer } from "./layer";
 import { bounds } from "./picking";
+import { Camera } from "./camera";
+import type { Box } from "./camera";
 import { mouse } from "./mouse";
 import { cornersOf, readProbe, weights } from "./probe";
 import type { Probe, ProbeReading } from "./probe";
@@ -46,6 +48,7 @@ export class Scene {
   private readonly renderer = vtkRenderer.newInstance();
   private readonly canvas = makeCanvas().window;
   private readonly interactor = vtkRenderWindowInteractor.newInstance();
+  readonly camera = new Camera(this.renderer, this.canvas, () => this.box(), () => this.request());
   private readonly ranges = new Ranges();
   private readonly pending = new Map<string, DataFrame>();
   private readonly ghost: Ghost;
@@ -60,9 +63,6 @@ export class Scene {
   /** The time before which new values do not ask for a picture. */
   private rested = 0;
   private waiting: number | null = null;
-  private placed = false;
-  /** Whether the whole is in the picture as `reset` has put it there, and nobody has moved the camera since. */
-  private whole: { camera: string } | null = null;
   private recolour = true;
 
   constructor(private readonly container: HTMLElement, private readonly selection: Selection, private readonly events: SceneEvents) {
@@ -75,7 +75,7 @@ export class Scene {
     this.interactor.setInteractorStyle(mouse());
     this.interactor.onRenderEvent(() => this.turned());
     container.addEventListener("keypress", (event) => event.stopImmediatePropagation(), true);
-    container.addEventListener("keydown", (event) => this.key(event));
+    container.addEventListener("keydown", (event) => this.camera.key(event));
     new ResizeObserver(() => this.resize()).observe(container);
     selection.onChange(() => this.request());
     this.chosen = new ChosenFaces(this.renderer);
@@ -289,88 +289,7 @@ export class Scene {
     return null;
   }
 
-  /** The whole in the picture, seen across its flat side. */
-  reset(): void {
-    const box = this.box();
-    if (!box) return;
-    const size = [box[1] - box[0], box[3] - box[2], box[5] - box[4]];
-    const order = [0, 1, 2].sort((a, b) => size[a]! - size[b]!);
-    const direction: Vector = [0, 0, 0];
-    direction[order[0]!] = 1;
-    direction[order[1]!] = 0.32;
-    direction[order[2]!] = order[0] === 1 ? -0.32 : 0.32;
-    this.look(direction, order[0] === 2 ? [0, 1, 0] : [0, 0, 1]);
-    this.whole = { camera: this.cameraState() };
-  }
-
-  private cameraState(): string {
-    return JSON.stringify(this.renderer.getActiveCamera().getPosition());
-  }
-
-  /** Looks along an axis, from its positive side or its negative one. */
-  axis(axis: 0 | 1 | 2, sign: 1 | -1): void {
-    const direction: Vector = [0, 0, 0];
-    direction[axis] = sign;
-    this.look(direction, axis === 2 ? [0, 1, 0] : [0, 0, 1]);
-  }
-
-  /** Takes the camera close to a place, seen from where it is now. */
-  flyTo(place: Vector): void {
-    const box = this.box();
-    if (!box) return;
-    const camera = this.renderer.getActiveCamera();
-    const [from, to] = [camera.getPosition(), camera.getFocalPoint()];
-    const away = [0, 1, 2].map((k) => from[k]! - to[k]!);
-    const length = Math.hypot(...away) || 1;
-    const distance = 0.15 * Math.hypot(box[1] - box[0], box[3] - box[2], box[5] - box[4]);
-    camera.setFocalPoint(...place);
-    camera.setPosition(...([0, 1, 2].map((k) => place[k]! + (distance * away[k]!) / length) as Vector));
-    if (this.parallel) camera.setParallelScale(distance / 3);
-    this.renderer.resetCameraClippingRange();
-    this.request();
-  }
-
-  /** Looks from a corner, so that all three directions are seen. */
-  corner(): void {
-    this.look([1, -1.4, 0.8], [0, 0, 1]);
-  }
-
-  get parallel(): boolean {
-    return this.renderer.getActiveCamera().getParallelProjection();
-  }
-
-  set parallel(parallel: boolean) {
-    this.renderer.getActiveCamera().setParallelProjection(parallel);
-    this.request();
-  }
-
-  private look(direction: Vector, up: Vector): void {
-    const box = this.box();
-    if (!box) return;
-    const camera = this.renderer.getActiveCamera();
-    const center: Vector = [(box[0] + box[1]) / 2, (box[2] + box[3]) / 2, (box[4] + box[5]) / 2];
-    camera.setFocalPoint(...center);
-    camera.setPosition(center[0] + direction[0], center[1] + direction[1], center[2] + direction[2]);
-    camera.setViewUp(...up);
-    camera.orthogonalizeViewUp();
-    this.renderer.resetCamera(box);
-    this.fill(box);
-    this.request();
-  }
-
-  /** Moves closer until the box fills the picture: vtk.js leaves room for a sphere around it. */
-  private fill(box: number[]): void {
-    const camera = this.renderer.getActiveCamera();
-    const [width, height] = this.canvas.getSize();
-    let largest = 0;
-    for (let corner = 0; corner < 8; corner++) {
-      const place = this.canvas.worldToDisplay(box[corner & 1]!, box[2 + ((corner >> 1) & 1)]!, box[4 + (corner >> 2)]!, this.renderer) as Vector;
-      largest = Math.max(largest, Math.abs(place[0] / width - 0.5), Math.abs(place[1] / height - 0.5));
-    }
-    if (largest > 0) camera.zoom(Math.min(6, 0.45 / largest));
-  }
-
-  private box(): [number, number, number, number, number, number] | null {
+  private box(): Box | null {
     const low = [Infinity, Infinity, Infinity];
     const high = [-Infinity, -Infinity, -Infinity];
     for (const layer of this.layers.values()) {
@@ -389,7 +308,7 @@ export class Scene {
     const ratio = window.devicePixelRatio || 1;
     this.canvas.setSize(Math.max(1, Math.floor(box.width * ratio)), Math.max(1, Math.floor(box.height * ratio)));
     // As much as there is room for: the page has grown or another panel is open.
-    if (this.whole?.camera === this.cameraState()) this.reset();
+    this.camera.refit();
     this.request();
   }
 
@@ -421,6 +340,11 @@ export class Scene {
       const cycles = [...this.layers.values()].flatMap((layer) => (layer.frame ? [layer.frame.cycle] : []));
       resolve({ cycle: cycles.length > 0 ? Math.max(...cycles) : null, pixels: this.pixels() });
     }));
+  }
+
+  /** The canvas itself, for what films it. */
+  get element(): HTMLCanvasElement | null {
+    return this.canvas.getCanvas() ?? null;
   }
 
   /** Draws all that has come; the canvas holds the picture until the task ends in which `taken` is called. */
@@ -465,10 +389,7 @@ export class Scene {
       layer.highlight("hover", this.selection.hovered ? [this.selection.hovered] : [], names);
       layer.show();
     }
-    if (!this.placed && this.box()) {
-      this.placed = true;
-      this.reset();
-    }
+    if (!this.camera.isPlaced && this.box()) this.camera.reset();
     this.renderer.resetCameraClippingRange();
     this.window.render();
     this.turned();
@@ -502,23 +423,5 @@ export class Scene {
   private turned(): void {
     const matrix = this.renderer.getActiveCamera().getViewMatrix();
     this.events.drawn([0, 1, 2].map((axis) => [matrix[axis] ?? 0, matrix[4 + axis] ?? 0]));
-  }
-
-  private key(event: KeyboardEvent): void {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const camera = this.renderer.getActiveCamera();
-    const actions: Record<string, () => void> = {
-      ArrowLeft: () => camera.azimuth(8), ArrowRight: () => camera.azimuth(-8),
-      ArrowUp: () => camera.elevation(-8), ArrowDown: () => camera.elevation(8),
-      "+": () => camera.zoom(1.1), "=": () => camera.zoom(1.1), "-": () => camera.zoom(1 / 1.1),
-      r: () => this.reset(), c: () => this.corner(), x: () => this.axis(0, 1), y: () => this.axis(1, -1), z: () => this.axis(2, 1),
-      X: () => this.axis(0, -1), Y: () => this.axis(1, 1), Z: () => this.axis(2, -1),
-    };
-    const action = actions[event.key];
-    if (!action) return;
-    event.preventDefault();
-    action();
-    camera.orthogonalizeViewUp();
-    this.request();
   }
 }

@@ -1,5 +1,5 @@
 /** The picture as a PNG, with the scalar bars beside it. */
-import { element } from "../dom";
+import { download, element } from "../dom";
 import { colourMap } from "./colour";
 import { valueAt } from "./ranges";
 import { within } from "../number";
@@ -36,9 +36,6 @@ export function withBars(picture: HTMLCanvasElement, bars: readonly Bar[], title
 /** Hands a canvas to the person as a file. */
 export function save(canvas: HTMLCanvasElement, name: string): void {
   canvas.toBlob((blob) => {
-    if (!blob) return;
-    const address = URL.createObjectURL(blob);
-    element("a", { href: address, download: name }).click();
-    setTimeout(() => URL.revokeObjectURL(address), 10_000);
+    if (blob) download(blob, name);
   }, "image/png");
 }

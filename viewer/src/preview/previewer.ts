@@ -21,7 +21,7 @@ export class Previewer {
   private points: Float32Array = new Float32Array(0);
   private bones = false;
   private faulty: Uint32Array | undefined;
-  private surfaceListener: ((surface: ShownPoints) => void) | null = null;
+  private readonly surfaceListeners = new Set<(surface: ShownPoints) => void>();
   private shown: PreviewSurface | null = null;
 
   constructor(
@@ -31,7 +31,7 @@ export class Previewer {
     store.watch((state) => state.hello?.surface ?? null, (surface) => this.preview?.offer(surface), sameJson);
     store.watch((state) => state.hello?.stack ?? [], () => {
       if (this.bones) this.showSkeleton(true);
-      if (this.surfaceListener) this.started().surfacePoints(this.stack);
+      if (this.surfaceListeners.size > 0) this.started().surfacePoints(this.stack);
       this.show(this.wished);
     }, sameJson);
     store.watch(wishedStack, (wished) => this.show(wished), sameJson);
@@ -39,8 +39,19 @@ export class Previewer {
 
   /** Tells the points of the surface, and of each shape that it takes from now on. */
   watchSurface(listener: (surface: ShownPoints) => void): void {
-    this.surfaceListener = listener;
+    this.surfaceListeners.add(listener);
     this.started().surfacePoints(this.stack);
+  }
+
+  /** The points of the surface in the shape that is now. */
+  surfaceNow(): Promise<ShownPoints> {
+    return new Promise((resolve) => {
+      const once = (surface: ShownPoints): void => {
+        this.surfaceListeners.delete(once);
+        resolve(surface);
+      };
+      this.watchSurface(once);
+    });
   }
 
   /** Shows the skeleton, by which the shape can be dragged, or takes it away. */
@@ -78,7 +89,7 @@ export class Previewer {
       surface: (surface) => this.takeSurface(surface),
       shape: (shape) => this.take(shape),
       checked: (faults, isNewest) => this.judge(faults, isNewest),
-      points: (reference, points) => { if (this.shown) this.surfaceListener?.({ ...this.shown, reference, points }); },
+      points: (reference, points) => { if (this.shown) for (const listener of [...this.surfaceListeners]) listener({ ...this.shown, reference, points }); },
       skeleton: (bones, reason) => {
         if (!this.bones) return;
         this.scene.setBones(bones);
@@ -100,7 +111,7 @@ export class Previewer {
   private takeSurface(surface: PreviewSurface): void {
     this.features = surface.features;
     this.shown = surface;
-    if (this.surfaceListener) this.preview?.surfacePoints(this.stack);
+    if (this.surfaceListeners.size > 0) this.preview?.surfacePoints(this.stack);
     this.scene.setPreviewSurface(surface);
   }
 

@@ -1,5 +1,4 @@
 /** What the page keeps over a reload: how views look, the history dock, the theme. Nothing of the run, and no secret. */
-import type { DockState } from "../history/dock";
 import type { Theme } from "../picture/theme";
 import { readLooks } from "./looks";
 import type { Looks } from "./looks";
@@ -7,6 +6,9 @@ import type { Looks } from "./looks";
 const KEY = "tombolo-page";
 /** Longer than anything that the page writes. */
 const LONGEST = 100_000;
+
+/** The dock: whether it is open, and which monitors are plotted; null for those of the beginning. */
+export interface DockState { open: boolean; chosen: readonly string[] | null }
 
 interface Content { looks: Looks; dock: DockState; theme: Theme | null }
 

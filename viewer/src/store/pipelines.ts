@@ -68,6 +68,25 @@ export function withQuality(pipeline: Pipeline): Pipeline {
   return { ...pipeline, stages: stages.toSpliced(source + 1, 0, { quality: {} }) };
 }
 
+/** The view that takes the fields along a line. */
+export const LINE = "line";
+/** How many points a line has. */
+const LINE_POINTS = 201;
+
+export function lineBetween(from: Vector, to: Vector): Pipeline {
+  return { name: LINE, every: { steps: 5 }, stages: [{ probe: { line: { from, to, count: LINE_POINTS } } }, { stream: {} }] };
+}
+
+/** The ends of a pipeline's line; null where it takes none. */
+export function lineOf(pipeline: Pipeline | undefined): { from: Vector; to: Vector } | null {
+  for (const stage of pipeline?.stages ?? []) {
+    const line = body(stage, "probe")?.line;
+    const { from, to } = (typeof line === "object" && line !== null && !Array.isArray(line) ? line : {}) as { from?: Json; to?: Json };
+    if (isVector(from) && isVector(to)) return { from, to };
+  }
+  return null;
+}
+
 const SOURCES = ["surface", "slice", "contour", "threshold", "clip", "probe", "streamlines", "glyphs"];
 
 /** A view of the cells that are hardly better than the worst. */

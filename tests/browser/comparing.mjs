@@ -1,0 +1,159 @@
+/**
+ * Compares a running nozzle before and after a pinch as an engineer would, in Debian's Chromium: the pressure along a line, the picture
+ * side by side, how values are spread, a slice dragged in the picture, a film.
+ *
+ *     TOMBOLO_URL=http://127.0.0.1:7070/?token=... node tests/browser/comparing.mjs
+ *
+ * The variables are those of page.mjs.
+ */
+import { readFileSync, statSync } from "node:fs";
+import { Viewer, check, launch, link, run } from "./page.mjs";
+
+const browser = await launch();
+const viewer = await Viewer.open(browser, "comparing", { acceptDownloads: true });
+const { page } = viewer;
+const rows = () => page.locator("#dock .dock-body:not([hidden]) tbody tr").allInnerTexts();
+/** The numbers of a row of the table beside the plot. */
+const numbers = (row) => row.split("\t").slice(1).map((text) => Number(text.trim().replace("−", "-")));
+const clean = async (what) => {
+  const found = await viewer.violations();
+  check(found.length === 0, `${what}: ${found.join("; ")}`);
+};
+const setLook = async (field) => {
+  await page.locator("#look select").first().selectOption(field);
+};
+
+const steps = [
+  ["a slice is dragged along its normal in the picture", async () => {
+    await page.goto(link);
+    await viewer.until("a first picture", (now) => now.connection === "connected" && now.frames > 0);
+    await page.click('[data-camera="corner"]');
+    await viewer.drawn();
+    const grip = await viewer.holds("a handle on the slice", () => window.tombolo.sliceHandle);
+    const [x, y] = grip;
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    for (let step = 1; step <= 5; step++) await page.mouse.move(x - 3 * step, y + step);
+    const offset = Number((await page.locator("#slice input[type=text]").inputValue()).replace("−", "-"));
+    await viewer.picture("slice-dragged");
+    await page.mouse.up();
+    check(offset !== 0 && Math.abs(offset) < 0.025, `the slice was dragged to ${offset}`);
+    await viewer.holds("the cut where it was dragged to", (wanted) => Math.abs(window.tombolo.views.midplane.bounds[0][0] - wanted) < 1e-3, offset);
+    await page.fill("#slice input[type=text]", "0");
+    await page.keyboard.press("Enter");
+    await viewer.holds("the cut in the middle again", () => Math.abs(window.tombolo.views.midplane.bounds[0][0]) < 1e-3);
+  }],
+  ["the pressure is plotted over a line between two clicks", async () => {
+    await page.click('[data-camera="0"]');
+    await setLook("pressure");
+    await viewer.drawn();
+    const box = await page.locator("#scene").boundingBox();
+    const middle = box.y + box.height / 2;
+    await page.click("#line");
+    for (const part of [0.12, 0.88]) await page.mouse.click(box.x + part * box.width, middle);
+    await viewer.until("the view of the line", (now) => now.views.line?.points > 100);
+    await viewer.holds("the profile beside the plot", () => document.querySelectorAll("#dock .dock-body:not([hidden]) tbody tr").length === 1);
+    check((await page.locator('#dock [role="tab"][aria-selected="true"]').innerText()) === "Line", "the plot is not in front");
+    check((await page.locator("#line").getAttribute("aria-pressed")) === "false", "the tool still takes clicks");
+    const [least, mean, largest] = numbers((await rows())[0]);
+    check(least < mean && mean < largest, `the profile says ${least}, ${mean}, ${largest}`);
+    const ends = await page.evaluate(() => [...document.querySelectorAll("#dock .ends input")].map((input) => Number(input.value.replace("−", "-"))));
+    check(Math.abs(ends[1] - ends[4]) > 0.5, `the line goes from and to ${ends}`);
+    await viewer.picture("line");
+    await clean("with the line");
+    // Exactly along the axis, by numbers.
+    for (const [label, value] of [["from x", 0], ["from y", -0.5], ["from z", 0], ["to x", 0], ["to y", 0.5], ["to z", 0]]) {
+      await page.getByLabel(label, { exact: true }).fill(String(value));
+      await page.keyboard.press("Enter");
+    }
+    await viewer.until("the line along the axis", ({ views }) => Math.abs(views.line.bounds[0][1] + 0.5) < 1e-3 && Math.abs(views.line.bounds[1][1] - 0.5) < 1e-3 && Math.abs(views.line.bounds[0][2]) < 1e-3);
+  }],
+  ["after a pinch the line, the histogram and the picture have before and now", async () => {
+    await page.selectOption("#action", "scale_direction");
+    await page.check('input[aria-label="throat: handle"]');
+    await viewer.field("factors z").fill("0.7");
+    await viewer.until("the forecast", ({ forecast }) => forecast.state === "told");
+    const order = await viewer.apply();
+    check(order.status === "applied", `the pinch was refused: ${order.reason}`);
+    await viewer.holds("both profiles", () => document.querySelectorAll("#dock .dock-body:not([hidden]) tbody tr").length === 2);
+    // The throat is narrower, so the flow is faster in it, and more pressure is needed to drive it.
+    await viewer.holds("more pressure than before", () => {
+      const [now, before] = [...document.querySelectorAll("#dock .dock-body:not([hidden]) tbody tr")].map((row) => Number(row.querySelectorAll("td")[2].textContent.replace("−", "-")));
+      return now > 1.05 * before;
+    });
+    const lines = await rows();
+    check(/^before “Throat: height × 0\.7”/.test(lines[1].trim()), `the second row is "${lines[1]}"`);
+    console.log(`    ${lines.map((row) => row.replace(/\s+/g, " ").trim()).join("; ")}`);
+    await viewer.picture("line-before-and-now");
+    await page.getByRole("tab", { name: "Histogram" }).click();
+    await viewer.holds("both histograms", () => document.querySelectorAll("#dock .dock-body:not([hidden]) tbody tr").length === 2);
+    await clean("with the histogram");
+    await page.click("#compare");
+    await viewer.drawn();
+    check(/^before “Throat: height × 0\.7”/.test(await viewer.text("#before .caption")), "the other picture does not say what it came before");
+    await viewer.picture("compared");
+    await clean("side by side");
+    const [left, right] = await page.evaluate(() => ["before", "stage"].map((id) => document.getElementById(id).getBoundingClientRect().width));
+    check(Math.abs(left - right) < 4, `the pictures are ${left} and ${right} wide`);
+  }],
+  ["both pictures are seen from the same place", async () => {
+    // The one of before is dragged, and the one of now turns with it.
+    const first = await viewer.drawn();
+    const box = await page.locator(".before-scene").boundingBox();
+    await page.mouse.move(box.x + 60, box.y + box.height - 80);
+    await page.mouse.down();
+    await page.mouse.move(box.x + 140, box.y + box.height - 120, { steps: 4 });
+    await page.mouse.up();
+    await viewer.until("the picture of now turned", async () => (await viewer.drawn()).pixels !== first.pixels);
+    await viewer.picture("compared-turned");
+    for (const [width, height] of [[1920, 1080], [820, 1180]]) {
+      await page.setViewportSize({ width, height });
+      await viewer.drawn();
+      await viewer.picture(`compared-${width}`);
+    }
+    await page.setViewportSize({ width: 1280, height: 800 });
+    await page.click("#compare");
+    check(await page.isHidden("#before"), "the other picture stays");
+  }],
+  ["the picture is filmed", async () => {
+    await page.click("#movie");
+    const before = await viewer.look();
+    await viewer.until("more frames", (now) => now.frames > before.frames + 4);
+    const waiting = page.waitForEvent("download");
+    await page.click("#movie");
+    const film = await waiting;
+    check(/^tombolo-\d+\.(webm|mp4)$/.test(film.suggestedFilename()), `the film is called ${film.suggestedFilename()}`);
+    const { size } = statSync(await film.path());
+    check(size > 5000, `the film has ${size} bytes`);
+    console.log(`    ${film.suggestedFilename()}, ${size} bytes`);
+  }],
+  ["edits go into a file and come back; the surface and the view go into files", async () => {
+    const saved = async (name) => {
+      const waiting = page.waitForEvent("download");
+      await page.getByRole("button", { name, exact: true }).click();
+      const file = await waiting;
+      return { name: file.suggestedFilename(), path: await file.path() };
+    };
+    await page.click("#files summary");
+    const { stack } = await viewer.look();
+    const edits = await saved("Save edits");
+    check(JSON.stringify(JSON.parse(readFileSync(edits.path, "utf8")).stack) === JSON.stringify(stack), "the file has other edits");
+    const surface = await saved("Surface (STL)");
+    const triangles = readFileSync(surface.path).readUInt32LE(80);
+    check(triangles > 1000 && statSync(surface.path).size === 84 + 50 * triangles, `${surface.name} has ${triangles} triangles`);
+    const view = await saved("View (VTP)");
+    check(/Name="pressure"/.test(readFileSync(view.path, "utf8")), `${view.name} has no pressure`);
+    let known = new Set((await viewer.look()).orders.map((order) => order.id));
+    await page.click("#undo");
+    await viewer.settled(known);
+    await viewer.until("no edits", (now) => now.stack.length === 0);
+    known = new Set((await viewer.look()).orders.map((order) => order.id));
+    await page.setInputFiles("#files input[type=file]", edits.path);
+    check((await viewer.settled(known)).status === "applied", "the edits of the file were refused");
+    await viewer.until("the edits of the file", (now) => JSON.stringify(now.stack) === JSON.stringify(stack));
+    console.log(`    ${edits.name}, ${surface.name} (${triangles} triangles), ${view.name}`);
+  }],
+  ["nothing went wrong on the way", async () => check(viewer.complaints.length === 0, viewer.complaints.join("\n"))],
+];
+
+await run(steps, () => [viewer], () => browser.close());

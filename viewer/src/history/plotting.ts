@@ -1,0 +1,21 @@
+/** What all plots below the picture have in common. */
+import type uPlot from "uplot";
+
+/** Told apart by those who do not tell red from green, too (Okabe and Ito, 2008), light enough for a dark ground. */
+export const COLOURS = ["#56b4e9", "#e69f00", "#2fbf96", "#cc79a7", "#f0e442", "#d5763c", "#8f9dff", "#a5adb6"];
+
+interface Grid { stroke: string; width: number }
+
+/** How axes and their grid look, by the theme of the page. */
+export function axesOf(root: HTMLElement): { grid: Grid; axis: { stroke: string; grid: Grid; ticks: Grid; font: string } } {
+  const style = getComputedStyle(root);
+  const grid = { stroke: style.getPropertyValue("--line"), width: 1 };
+  return { grid, axis: { stroke: style.getPropertyValue("--soft"), grid, ticks: grid, font: "11px sans-serif" } };
+}
+
+/** A little room above and below; a line that is level lies in the middle. */
+export function padded(_: uPlot, low: number | null, high: number | null): [number, number] {
+  if (low === null || high === null || !Number.isFinite(low) || !Number.isFinite(high)) return [0, 1];
+  const room = high > low ? 0.06 * (high - low) : Math.abs(low) * 0.1 || 1;
+  return [low - room, high + room];
+}

@@ -1,0 +1,157 @@
+/** Where the picture is seen from: the whole, along an axis, close to a place; by keys; and linked with another picture. */
+import type vtkOpenGLRenderWindow from "@kitware/vtk.js/Rendering/OpenGL/RenderWindow";
+import type vtkRenderer from "@kitware/vtk.js/Rendering/Core/Renderer";
+import type { Vector } from "../connection/protocol";
+
+/** The box around what is seen: the least and the largest x, then y, then z. */
+export type Box = [number, number, number, number, number, number];
+
+/** How a camera stands. */
+export interface Stand { position: Vector; focalPoint: Vector; viewUp: Vector; parallel: boolean; parallelScale: number; viewAngle: number }
+
+export class Camera {
+  /** Where it stood when `reset` had put the whole into the picture; null where it never did. */
+  private whole: string | null = null;
+  /** Whether it was put anywhere yet. */
+  isPlaced = false;
+
+  /** `box` is around what is seen; `changed` is called when it stands elsewhere. */
+  constructor(
+    private readonly renderer: vtkRenderer, private readonly canvas: vtkOpenGLRenderWindow,
+    private readonly box: () => Box | null, private readonly request: () => void,
+  ) {}
+
+  private place(): string {
+    return JSON.stringify(this.renderer.getActiveCamera().getPosition());
+  }
+
+  /** The picture has another size: as much of it as there is room for, where nobody has moved the camera since `reset`. */
+  refit(): void {
+    if (this.whole === this.place()) this.reset();
+  }
+
+  get stand(): Stand {
+    const camera = this.renderer.getActiveCamera();
+    return {
+      position: [...camera.getPosition()] as Vector, focalPoint: [...camera.getFocalPoint()] as Vector, viewUp: [...camera.getViewUp()] as Vector,
+      parallel: camera.getParallelProjection(), parallelScale: camera.getParallelScale(), viewAngle: camera.getViewAngle(),
+    };
+  }
+
+  set stand({ position, focalPoint, viewUp, parallel, parallelScale, viewAngle }: Stand) {
+    this.isPlaced = true;
+    const camera = this.renderer.getActiveCamera();
+    camera.setPosition(...position);
+    camera.setFocalPoint(...focalPoint);
+    camera.setViewUp(...viewUp);
+    camera.setParallelProjection(parallel);
+    camera.setParallelScale(parallelScale);
+    camera.setViewAngle(viewAngle);
+    this.renderer.resetCameraClippingRange();
+    this.request();
+  }
+
+  /** The whole in the picture, seen across its flat side. */
+  reset(): void {
+    const box = this.box();
+    if (!box) return;
+    const size = [box[1] - box[0], box[3] - box[2], box[5] - box[4]];
+    const order = [0, 1, 2].sort((a, b) => size[a]! - size[b]!);
+    const direction: Vector = [0, 0, 0];
+    direction[order[0]!] = 1;
+    direction[order[1]!] = 0.32;
+    direction[order[2]!] = order[0] === 1 ? -0.32 : 0.32;
+    this.look(direction, order[0] === 2 ? [0, 1, 0] : [0, 0, 1]);
+    this.whole = this.place();
+    this.isPlaced = true;
+  }
+
+  /** As much as there is room for, seen from the same direction. */
+  fit(): void {
+    const camera = this.renderer.getActiveCamera();
+    const [from, to] = [camera.getPosition(), camera.getFocalPoint()];
+    this.look([0, 1, 2].map((k) => from[k]! - to[k]!) as Vector, [...camera.getViewUp()] as Vector);
+  }
+
+  /** Looks along an axis, from its positive side or its negative one. */
+  axis(axis: 0 | 1 | 2, sign: 1 | -1): void {
+    const direction: Vector = [0, 0, 0];
+    direction[axis] = sign;
+    this.look(direction, axis === 2 ? [0, 1, 0] : [0, 0, 1]);
+  }
+
+  /** Takes the camera close to a place, seen from where it is now. */
+  flyTo(place: Vector): void {
+    const box = this.box();
+    if (!box) return;
+    const camera = this.renderer.getActiveCamera();
+    const [from, to] = [camera.getPosition(), camera.getFocalPoint()];
+    const away = [0, 1, 2].map((k) => from[k]! - to[k]!);
+    const length = Math.hypot(...away) || 1;
+    const distance = 0.15 * Math.hypot(box[1] - box[0], box[3] - box[2], box[5] - box[4]);
+    camera.setFocalPoint(...place);
+    camera.setPosition(...([0, 1, 2].map((k) => place[k]! + (distance * away[k]!) / length) as Vector));
+    if (this.parallel) camera.setParallelScale(distance / 3);
+    this.renderer.resetCameraClippingRange();
+    this.request();
+  }
+
+  /** Looks from a corner, so that all three directions are seen. */
+  corner(): void {
+    this.look([1, -1.4, 0.8], [0, 0, 1]);
+  }
+
+  get parallel(): boolean {
+    return this.renderer.getActiveCamera().getParallelProjection();
+  }
+
+  set parallel(parallel: boolean) {
+    this.renderer.getActiveCamera().setParallelProjection(parallel);
+    this.request();
+  }
+
+  private look(direction: Vector, up: Vector): void {
+    const box = this.box();
+    if (!box) return;
+    const camera = this.renderer.getActiveCamera();
+    const center: Vector = [(box[0] + box[1]) / 2, (box[2] + box[3]) / 2, (box[4] + box[5]) / 2];
+    camera.setFocalPoint(...center);
+    camera.setPosition(center[0] + direction[0], center[1] + direction[1], center[2] + direction[2]);
+    camera.setViewUp(...up);
+    camera.orthogonalizeViewUp();
+    this.renderer.resetCamera(box);
+    this.fill(box);
+    this.request();
+  }
+
+  /** Moves closer until the box fills the picture: vtk.js leaves room for a sphere around it. */
+  private fill(box: Box): void {
+    const camera = this.renderer.getActiveCamera();
+    const [width, height] = this.canvas.getSize();
+    let largest = 0;
+    for (let corner = 0; corner < 8; corner++) {
+      const place = this.canvas.worldToDisplay(box[corner & 1]!, box[2 + ((corner >> 1) & 1)]!, box[4 + (corner >> 2)]!, this.renderer) as Vector;
+      largest = Math.max(largest, Math.abs(place[0] / width - 0.5), Math.abs(place[1] / height - 0.5));
+    }
+    if (largest > 0) camera.zoom(Math.min(6, 0.45 / largest));
+  }
+
+  /** A key with the focus on the picture. */
+  key(event: KeyboardEvent): void {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const camera = this.renderer.getActiveCamera();
+    const actions: Record<string, () => void> = {
+      ArrowLeft: () => camera.azimuth(8), ArrowRight: () => camera.azimuth(-8),
+      ArrowUp: () => camera.elevation(-8), ArrowDown: () => camera.elevation(8),
+      "+": () => camera.zoom(1.1), "=": () => camera.zoom(1.1), "-": () => camera.zoom(1 / 1.1),
+      r: () => this.reset(), c: () => this.corner(), x: () => this.axis(0, 1), y: () => this.axis(1, -1), z: () => this.axis(2, 1),
+      X: () => this.axis(0, -1), Y: () => this.axis(1, 1), Z: () => this.axis(2, -1),
+    };
+    const action = actions[event.key];
+    if (!action) return;
+    event.preventDefault();
+    action();
+    camera.orthogonalizeViewUp();
+    this.request();
+  }
+}

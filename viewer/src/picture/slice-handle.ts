@@ -1,0 +1,144 @@
+/** The slice of the chosen view as something to drag: along its normal, in the picture. The panel beside it does the same by number and key. */
+import type { Vector } from "../connection/protocol";
+import { closestAlong } from "../handles/projection";
+import type { Projection } from "../handles/projection";
+import { svg } from "../handles/overlay";
+import { add, across, AXES, dot, length, normalised, times } from "../handles/vector";
+import { toStep } from "../handles/rounding";
+import { atOffset, extent, offsetOf } from "../store/pipelines";
+import type { Plane } from "../store/pipelines";
+
+/** How long the arrow is, in pixels. */
+const ARROW = 46;
+
+export interface Sliced {
+  /** The plane of the chosen view; null where it has none, or it cannot be moved from here. */
+  readonly movable: Plane | null;
+  /** Has the run cut there. */
+  move(plane: Plane): void;
+}
+
+export interface SlicePicture {
+  projection(): Projection;
+  bounds(): [Vector, Vector] | null;
+  redraw(): void;
+}
+
+export class SliceHandle {
+  private readonly outline = svg("polygon", { class: "cut" });
+  private readonly shaft = svg("line", { class: "shaft" });
+  private readonly knob = svg("circle", { class: "knob", r: "7" });
+  private readonly title = svg("title");
+  private drag: { pointer: number; plane: Plane; from: number; start: number; offset: number } | null = null;
+
+  constructor(root: SVGElement, private readonly scene: HTMLElement, private readonly picture: SlicePicture, private readonly slice: Sliced) {
+    this.title.textContent = "Drag the slice along its normal";
+    this.knob.append(this.title);
+    root.append(this.outline, this.shaft, this.knob);
+    this.knob.addEventListener("pointerdown", (event) => this.down(event));
+    this.knob.addEventListener("pointermove", (event) => this.move(event));
+    for (const kind of ["pointerup", "pointercancel"] as const) this.knob.addEventListener(kind, (event) => this.up(event));
+  }
+
+  /** The place of the page at which it can be gripped; null where there is none. */
+  get place(): [number, number] | null {
+    if (this.knob.style.display === "none") return null;
+    const { left, top } = this.scene.getBoundingClientRect();
+    return [left + Number(this.knob.getAttribute("cx")), top + Number(this.knob.getAttribute("cy"))];
+  }
+
+  /** Draws it where the picture is now seen from. */
+  drawn(): void {
+    const plane = this.drag ? atOffset(this.drag.plane, this.drag.offset) : this.slice.movable;
+    const box = this.picture.bounds();
+    const cut = plane && box ? outlineOf(box, plane) : [];
+    const projection = cut.length > 2 ? this.picture.projection() : null;
+    const corners = projection ? cut.map((point) => projection.toPicture(point)) : [];
+    const normal = plane && normalised(plane.normal);
+    // At a corner of the outline, where it hides nothing: the one that is seen farthest to the left.
+    const grip = corners.reduce((best, corner, i) => (corner && (best < 0 || corner[0] < corners[best]![0]) ? i : best), -1);
+    const point = cut[grip];
+    const pixel = projection && point ? projection.pixel(point) : NaN;
+    const tip = projection && point && normal && pixel > 0 ? projection.toPicture(add(point, times(normal, ARROW * pixel))) : null;
+    const from = grip >= 0 ? corners[grip] : null;
+    const isSeen = corners.length > 2 && corners.every((corner) => corner !== null) && tip !== null && from != null;
+    for (const shape of [this.outline, this.shaft, this.knob]) shape.style.display = isSeen ? "" : "none";
+    this.outline.classList.toggle("dragged", this.drag !== null);
+    if (!isSeen) return;
+    // Seen along its normal there is nothing to drag along.
+    const isShort = Math.hypot(tip[0] - from[0], tip[1] - from[1]) < 10;
+    this.knob.style.display = this.shaft.style.display = isShort && !this.drag ? "none" : "";
+    this.outline.setAttribute("points", corners.map((corner) => corner!.map((part) => part.toFixed(1)).join(",")).join(" "));
+    for (const [name, value] of [["x1", from[0]], ["y1", from[1]], ["x2", tip[0]], ["y2", tip[1]]] as const) this.shaft.setAttribute(name, value.toFixed(1));
+    this.knob.setAttribute("cx", tip[0].toFixed(1));
+    this.knob.setAttribute("cy", tip[1].toFixed(1));
+  }
+
+  /** How far along the normal the pointer is, in units of the mesh. */
+  private along(event: PointerEvent, plane: Plane): number | null {
+    const { left, top } = this.scene.getBoundingClientRect();
+    return closestAlong(this.picture.projection().ray([event.clientX - left, event.clientY - top]), plane.origin, normalised(plane.normal));
+  }
+
+  private down(event: PointerEvent): void {
+    const plane = this.slice.movable;
+    if (!plane || event.button !== 0 || this.drag) return;
+    const start = this.along(event, plane);
+    if (start === null) return;
+    event.preventDefault();
+    event.stopPropagation();
+    this.knob.setPointerCapture(event.pointerId);
+    const from = offsetOf(plane);
+    this.drag = { pointer: event.pointerId, plane, from, start, offset: from };
+  }
+
+  private move(event: PointerEvent): void {
+    const { drag } = this;
+    if (!drag || drag.pointer !== event.pointerId) return;
+    event.stopPropagation();
+    const now = this.along(event, drag.plane);
+    const box = this.picture.bounds();
+    if (now === null || !box) return;
+    const [low, high] = extent(box, drag.plane.normal);
+    // The ends themselves are the surface: there is nothing to cut. No more digits than the hand can mean.
+    const room = 0.002 * (high - low), step = 10 ** Math.floor(Math.log10((high - low) / 1000 || 1));
+    const offset = toStep(Math.min(high - room, Math.max(low + room, drag.from + now - drag.start)), step);
+    if (offset === drag.offset) return;
+    drag.offset = offset;
+    this.slice.move(atOffset(drag.plane, offset));
+    this.picture.redraw();
+  }
+
+  private up(event: PointerEvent): void {
+    if (this.drag?.pointer !== event.pointerId) return;
+    event.stopPropagation();
+    this.drag = null;
+    this.picture.redraw();
+  }
+}
+
+/** The corners of the cut of a box by a plane, in order around it; fewer than three where they do not meet. */
+export function outlineOf([low, high]: readonly [Vector, Vector], plane: Plane): Vector[] {
+  const normal = normalised(plane.normal);
+  const offset = dot(plane.origin, normal);
+  const points: Vector[] = [];
+  for (const axis of AXES) {
+    const [u, v] = across(axis);
+    for (const a of [low[u], high[u]]) {
+      for (const b of [low[v], high[v]]) {
+        if (Math.abs(normal[axis]) < 1e-12) continue;
+        const rest = normal[u] * a + normal[v] * b;
+        const at = (offset - rest) / normal[axis];
+        if (at < low[axis] || at > high[axis]) continue;
+        const point: Vector = [0, 0, 0];
+        [point[axis], point[u], point[v]] = [at, a, b];
+        if (!points.some((other) => length(add(other, times(point, -1))) < 1e-9 * length(add(high, times(low, -1))))) points.push(point);
+      }
+    }
+  }
+  const middle = times(points.reduce(add, [0, 0, 0]), 1 / Math.max(1, points.length));
+  const first = points[0] ? normalised(add(points[0], times(middle, -1))) : ([0, 0, 0] as Vector);
+  const second: Vector = [normal[1] * first[2] - normal[2] * first[1], normal[2] * first[0] - normal[0] * first[2], normal[0] * first[1] - normal[1] * first[0]];
+  const angle = (point: Vector): number => Math.atan2(dot(add(point, times(middle, -1)), second), dot(add(point, times(middle, -1)), first));
+  return points.sort((a, b) => angle(a) - angle(b));
+}
