@@ -75,10 +75,10 @@ const picture = (name) => viewer.picture(name);
 /** How many pixels of the column at `x` the shape covers, all that has come being drawn. */
 async function silhouette(x) {
   await drawn();
-  // Of the picture alone, without the tools and the gizmo over it and the help below.
+  // Of the picture alone, without the tools, the gizmo and the edge of the slice over it and the help below.
   const box = await page.locator("#scene").boundingBox();
   const clip = { x: Math.round(x), y: Math.round(box.y) + 60, width: 1, height: Math.round(box.height) - 150 };
-  const png = (await page.screenshot({ clip, style: ".gizmo { visibility: hidden }" })).toString("base64");
+  const png = (await page.screenshot({ clip, style: ".gizmo, #cut, #tools { visibility: hidden }" })).toString("base64");
   return page.evaluate(async (data) => {
     const image = new Image();
     image.src = `data:image/png;base64,${data}`;

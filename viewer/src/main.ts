@@ -30,6 +30,7 @@ import { VerdictPanel } from "./panels/verdict";
 import { watchDrawers } from "./panels/drawers";
 import { WorstCells } from "./panels/quality";
 import { SlicePanel } from "./panels/slice";
+import { Tour } from "./panels/tour";
 import { CameraTools, Theming, watchPictureTools } from "./panels/tools";
 import { ViewList } from "./panels/views";
 import { WheelPanel } from "./panels/wheel";
@@ -188,7 +189,7 @@ const compare = new Compare(part("before"), part("compare"), scene, earlier, {
 part("compare").addEventListener("click", () => { part("now").hidden = part("before").hidden; });
 const worst = new WorstCells(part("quality"), store, pipelines, scene, marks);
 new CameraTools(part("tools"), scene);
-watchDrawers();
+const reveal = watchDrawers();
 new Theming(part("theme") as HTMLButtonElement, kept, (theme) => {
   scene.setTheme(theme);
   compare.setTheme(theme);
@@ -242,6 +243,11 @@ new FilesPanel(store, commands, { surface: () => previewer.surfaceNow(), content
 const forecasts = new Forecasts(store, (order) => commands.ask({ forecast: order }));
 new VerdictPanel(store, commands, (place) => scene.camera.flyTo(place), () => form.focusProblem());
 watchKeys(store, commands);
+new Tour(() => {
+  kept.toured = true;
+  part("tour-button").classList.remove("primary");
+}, reveal);
+part("tour-button").classList.toggle("primary", !kept.toured);
 
 const worker = new Worker(new URL("./connection/decode.worker.ts", import.meta.url), { type: "module" });
 kernel.then((module) => worker.postMessage({ module }), (error: unknown) => report(String(error)));

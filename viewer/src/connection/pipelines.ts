@@ -8,6 +8,8 @@ export class Pipelines {
   private changes = -1;
   private underway: string | null = null;
   private wish: ClientMessage | null = null;
+  /** What was set here last, as long as the run has not answered: until then it counts for more than what the run has. */
+  private wanted: Pipeline | null = null;
   private readonly listeners: (() => void)[] = [];
 
   /** `ask` sends a message and says under what name; null where there is no connection. */
@@ -26,7 +28,8 @@ export class Pipelines {
     if (changes === this.changes) return;
     this.changes = changes;
     try {
-      this.known = readPipelines(await this.load());
+      const loaded = readPipelines(await this.load());
+      this.known = this.wanted ? replaced(loaded, this.wanted) : loaded;
       for (const listener of this.listeners) listener();
     } catch (error) {
       this.changes = -1;
@@ -35,7 +38,8 @@ export class Pipelines {
   }
 
   set(pipeline: Pipeline): void {
-    this.known = [...this.known.filter(({ name }) => name !== pipeline.name), pipeline];
+    this.known = replaced(this.known, pipeline);
+    this.wanted = pipeline;
     this.send({ pipelines: { set: [pipeline] } });
   }
 
@@ -50,12 +54,13 @@ export class Pipelines {
     const { wish } = this;
     this.wish = null;
     if (wish) this.send(wish);
+    else this.wanted = null;
     return true;
   }
 
   /** What was on its way is lost with the connection. */
   forget(): void {
-    this.underway = this.wish = null;
+    this.underway = this.wish = this.wanted = null;
   }
 
   private send(message: ClientMessage): void {
@@ -63,3 +68,5 @@ export class Pipelines {
     else this.underway = this.ask(message);
   }
 }
+
+const replaced = (pipelines: readonly Pipeline[], by: Pipeline): Pipeline[] => [...pipelines.filter(({ name }) => name !== by.name), by];

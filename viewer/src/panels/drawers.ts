@@ -4,7 +4,8 @@ import { part } from "../dom";
 const SIDES = ["left", "right"] as const;
 type Side = (typeof SIDES)[number];
 
-export function watchDrawers(): void {
+/** Gives back what opens the drawer that an element lies in, and closes the other. */
+export function watchDrawers(): (target: HTMLElement) => void {
   const open = (side: Side | null): void => {
     document.body.dataset.drawer = side ?? "";
     for (const other of SIDES) part(`${other}-drawer`).setAttribute("aria-expanded", String(side === other));
@@ -20,4 +21,5 @@ export function watchDrawers(): void {
   // A hidden button cannot have the focus.
   part("to-apply").addEventListener("click", () => open("right"), true);
   open(null);
+  return (target) => open(SIDES.find((side) => part(side).contains(target)) ?? null);
 }

@@ -1,4 +1,4 @@
-/** What the page keeps over a reload: how views look, the history dock, the theme. Nothing of the run, and no secret. */
+/** What the page keeps over a reload: how views look, the dock, the theme, whether the tour was seen. Nothing of the run, and no secret. */
 import type { Theme } from "../picture/theme";
 import { readLooks } from "./looks";
 import type { Looks } from "./looks";
@@ -10,7 +10,7 @@ const LONGEST = 100_000;
 /** The dock: whether it is open, and which monitors are plotted; null for those of the beginning. */
 export interface DockState { open: boolean; chosen: readonly string[] | null }
 
-interface Content { looks: Looks; dock: DockState; theme: Theme | null }
+interface Content { looks: Looks; dock: DockState; theme: Theme | null; toured: boolean }
 
 export class Kept {
   private readonly content: Content;
@@ -26,6 +26,10 @@ export class Kept {
   /** The theme that was chosen here; null for that of the system. */
   get theme(): Theme | null { return this.content.theme; }
   set theme(theme: Theme | null) { this.keep("theme", theme); }
+
+  /** Whether the tour was seen or left. */
+  get toured(): boolean { return this.content.toured; }
+  set toured(toured: boolean) { this.keep("toured", toured); }
 
   private keep<K extends keyof Content>(key: K, value: Content[K]): void {
     this.content[key] = value;
@@ -51,6 +55,6 @@ function read(storage: Pick<Storage, "getItem">): Content {
   const names = Array.isArray(chosen) && chosen.every((key) => typeof key === "string") ? (chosen as string[]) : null;
   return {
     looks: readLooks(found.looks), dock: { open: open !== false, chosen: names },
-    theme: found.theme === "dark" || found.theme === "light" ? found.theme : null,
+    theme: found.theme === "dark" || found.theme === "light" ? found.theme : null, toured: found.toured === true,
   };
 }
