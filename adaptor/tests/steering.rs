@@ -2,7 +2,9 @@
 
 mod common;
 
-use common::{Solver, bits, config, squeeze};
+use std::time::{Duration, Instant};
+
+use common::{PATIENCE, Solver, Viewer, bits, config, squeeze};
 use serde_json::{Value, json};
 use tombolo::{
     Adaptor, ExecuteError, InitializeError, OrderStatus, Parameter, Settings, Step,
@@ -546,4 +548,38 @@ fn the_order_of_a_solvers_vertices_is_its_own() {
         .expect_err("refused")
         .to_string();
     assert!(error.contains("VTK's order is") && error.contains("lexicographic"), "{error}");
+}
+
+/// A solver that copies its coordinates only where they are looked at.
+#[test]
+fn an_order_waits_for_a_solver_that_was_spared_its_coordinates() {
+    let mut solver = Solver::with_config(
+        r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"}, "steering": {"background": false}}"#,
+    );
+    solver.step();
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    let begun = Instant::now();
+    while solver.adaptor.looks_at(&Step { cycle: solver.cycle, time: 0.0, time_step: 0.01 }) {
+        assert!(begun.elapsed() < PATIENCE, "the mesh is looked at for ever");
+        solver.step();
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    // Behind its back.
+    viewer.send(&json!({"id": "o", "order": squeeze(0.2)}));
+    viewer.wait_for("order", |order| order["status"] == "accepted");
+    let stale: Vec<Vector> =
+        solver.mesh.points().iter().map(|[x, y, z]| [x + 9.0, *y, *z]).collect();
+    let mesh = solver.mesh.clone();
+    solver.mesh = mesh.with_points(stale).expect("finite");
+    solver.step();
+    assert!(solver.motions.is_empty());
+    solver.mesh = mesh;
+    solver.step_until("the shape", |solver| !solver.motions.is_empty());
+    solver.steps(1);
+    for (point, reference) in solver.mesh.points().iter().zip(solver.reference.points()) {
+        if reference[2] == 1.0 {
+            assert_eq!(*point, [reference[0], reference[1], reference[2] + -0.2]);
+        }
+    }
 }
