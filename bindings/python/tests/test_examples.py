@@ -1,8 +1,15 @@
 """Solvers that others wrote: an order is carried out, the physics is known, and the undo is exact."""
 
+import json
+import os
+import subprocess
+from pathlib import Path
+
 import numpy as np
 import pytest
-from conftest import FLOW, load
+import tombolo
+from conftest import EXAMPLES, FLOW, load
+from tombolo import _native
 
 
 def commands(edit, schedule, begin, end):
@@ -106,3 +113,47 @@ def test_heat_in_numpy_alone(tmp_path):
     assert fluxes[1599] == pytest.approx(1 / 0.8, abs=1e-3)
     assert fluxes[2599] == pytest.approx(1, abs=1e-3)
     assert np.array_equal(points[0], points[2599])
+
+
+DOLFINX = """
+import json, sys
+sys.path.insert(0, sys.argv[1])
+import heat_dolfinx, numpy
+ranks = heat_dolfinx.MPI.COMM_WORLD
+fluxes, points = {}, {}
+def seen(cycle, heat):
+    fluxes[cycle] = heat.flux()
+    points[cycle] = heat.mesh.geometry.x.copy()
+report = heat_dolfinx.run(110, cells=4, orders=json.loads(sys.argv[2]), seen=seen, output=sys.argv[3])
+moved = ranks.allreduce(not numpy.array_equal(points[0], points[69]), heat_dolfinx.MPI.LOR)
+restored = ranks.allreduce(numpy.array_equal(points[0], points[109]), heat_dolfinx.MPI.LAND)
+if ranks.rank == 0:
+    told = {"ranks": ranks.size, "moved": moved, "restored": restored, "fluxes": [fluxes[at] for at in (29, 69, 109)]}
+    print("told", json.dumps(told | {"orders": [order["status"] for order in report["orders"]]}))
+"""
+
+
+def test_heat_with_dolfinx_on_ranks(tmp_path):
+    # It is Debian's, and so is its Python.
+    paths = [str(Path(tombolo.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])]
+    allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    ours = {"PYTHONPATH": ":".join(paths), "OMPI_MCA_rmaps_base_oversubscribe": "1", "XDG_CACHE_HOME": str(tmp_path)}
+    environment = os.environ | allowed | ours
+
+    def python(*arguments, begin=()):
+        command = [*begin, "/usr/bin/python3", *arguments]
+        return subprocess.run(command, check=False, env=environment, capture_output=True, text=True, timeout=150)
+
+    if not Path("/usr/bin/python3").exists() or python("-c", "import dolfinx").returncode != 0:
+        pytest.skip("there is no dolfinx: scripts/setup --distributed")
+    squeeze = {"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, -0.2]}}
+    orders = json.dumps(commands(squeeze, {"steps": 5, "every": {"steps": 2}}, 30, 70))
+    ranks = 3 if _native.DISTRIBUTED else 1
+    begin = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
+    said = python("-c", DOLFINX, EXAMPLES / "heat/python", orders, tmp_path, begin=begin)
+    assert said.returncode == 0, said.stdout + said.stderr
+    told = json.loads(next(line for line in said.stdout.splitlines() if line.startswith("told"))[5:])
+    assert told["ranks"] == ranks
+    assert told["orders"] == ["applied", "applied"]
+    assert told["moved"] and told["restored"]
+    assert told["fluxes"] == pytest.approx([1, 1 / 0.8, 1], abs=1e-4)
