@@ -265,6 +265,8 @@ class _Algorithm(VTKPythonAlgorithmBase):
         return 1
 
     def _set(self, name, value):
+        # ParaView has None for an empty text.
+        value = "" if value is None else value
         if getattr(self, name) != value:
             setattr(self, name, value)
             self.Modified()
@@ -586,39 +588,33 @@ def _vertices(data):
     return vtk_to_numpy(array)
 
 
-@smproxy.writer(
-    "Displacement for Tombolo",
-    "displacement",
-    name="TomboloExport",
-    label="Tombolo Export Displacement",
-    support_reload=False,
+@smproxy.filter(name="TomboloExport", label="Tombolo Export Displacement", support_reload=False)
+@smproperty.xml(
+    _input()
+    + _text("FileName", "The file, which ends in .txt.")
+    + _button("Write", "Writes the displacement of the input.")
 )
-@smproperty.xml(_input() + _text("FileName", "The file.", domain='<FileListDomain name="files"/>'))
-class TomboloExport(VTKPythonAlgorithmBase):
+class TomboloExport(_Algorithm):
     """Writes a displacement as text: a line `vertex dx dy dz` for each vertex that moves, with every bit."""
 
-    def __init__(self):
-        super().__init__(nInputPorts=1, nOutputPorts=0, inputType="vtkPolyData")
-        self._file = ""
+    file = ""
 
     def SetFileName(self, file):
-        if file != self._file:
-            self._file = file
-            self.Modified()
+        self._set("file", file)
 
-    def RequestData(self, request, inputs, outputs):
-        data = vtkPolyData.GetData(inputs[0], 0)
-        moved, vertices = _displacement(data, "displacement"), _vertices(data)
-        with open(self._file, "w", encoding="utf-8") as file:
-            file.write("# vertex dx dy dz\n")
-            for vertex, (x, y, z) in zip(vertices, moved):
-                if x or y or z:
-                    file.write(f"{vertex} {x!r} {y!r} {z!r}\n".replace("np.float64(", "").replace(")", ""))
-        return 1
+    def run(self, output, surface):
+        output.ShallowCopy(surface)
 
     def Write(self):
-        self.Modified()
-        self.Update()
+        self.GetInputAlgorithm(0, 0).Update()
+        data = self.GetInputDataObject(0, 0)
+        try:
+            rows = zip(_vertices(data).tolist(), _displacement(data, "displacement").tolist())
+            with open(self.file, "w", encoding="utf-8") as file:
+                file.write("# vertex dx dy dz\n")
+                file.writelines(f"{vertex} {x!r} {y!r} {z!r}\n" for vertex, (x, y, z) in rows if x or y or z)
+        except (tombolo.TomboloError, OSError) as error:
+            self.tell(str(error))
 
 
 # ---- Orders.
