@@ -53,7 +53,9 @@ use crate::{
     report::Report,
     settings::Settings,
     stages::Pipelines,
-    steering::{Defaults, Forecaster, Log, Parameters, Queue, Received, Source, Steering, Timed},
+    steering::{
+        Defaults, EditStack, Forecaster, Log, Parameters, Queue, Received, Source, Steering, Timed,
+    },
     step::{Moment, Outside, Step},
     stream::{Clock, End, Hub, Server},
     watch::Watch,
@@ -103,7 +105,9 @@ pub struct Adaptor {
     /// The step of the last call, and whether there was one.
     moment: Moment,
     has_begun: bool,
-    told: Told,
+    told: Arc<Told>,
+    /// The stack of edits that viewers were told of last.
+    told_stack: EditStack,
     /// The flow conditions of the features, by name.
     conditions: BTreeMap<String, Condition>,
     paused: bool,
@@ -241,10 +245,10 @@ impl Adaptor {
         self.server.as_mut().map(invite).transpose()
     }
 
-    /// The address that viewers connect to; `None` without a server.
+    /// The address that viewers connect to; `None` without a server, and where it listens on a path.
     #[must_use]
     pub fn address(&self) -> Option<SocketAddr> {
-        self.server.as_ref().map(Server::address)
+        self.server.as_ref().and_then(Server::address)
     }
 
     /// Shows the solver's present state and says what to do in the step that follows.

@@ -50,6 +50,7 @@ mod checkpoint;
 pub mod client;
 mod condition;
 mod error;
+mod fingerprint;
 pub mod foreign;
 mod journal;
 mod lock;

@@ -59,9 +59,9 @@ impl Playback {
         self.server.watching_link()
     }
 
-    /// The address that viewers connect to.
+    /// The address that viewers connect to; `None` where it listens on a path.
     #[must_use]
-    pub fn address(&self) -> SocketAddr {
+    pub fn address(&self) -> Option<SocketAddr> {
         self.server.address()
     }
 

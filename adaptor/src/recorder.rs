@@ -77,7 +77,7 @@ impl Recorder {
                     writing.path.display()
                 );
                 log::warn!("{message}");
-                writing.hub.tell(&json!({"error": {"message": message}}));
+                writing.hub.tell(move || json!({"error": {"message": message}}));
             }
             done.store(true, Ordering::Release);
         };
@@ -136,10 +136,23 @@ impl Writing {
         loop {
             match self.observer.next() {
                 Some(Told::Hello) => {
-                    let text = self.hub.hello_for_all(self.orders.take());
+                    let orders = self.orders.take();
+                    let is_first = orders.is_some();
+                    let text = self.hub.hello_for_all(orders);
                     self.put(Kind::Hello, 0, text.as_bytes())?;
+                    if is_first {
+                        let text = self.hub.whole_stack(None);
+                        self.put(Kind::Stack, 0, text.as_bytes())?;
+                    }
                 }
-                Some(Told::Text(text)) => self.put(Kind::of_text(&text), 0, text.as_bytes())?,
+                Some(Told::Text(text)) => {
+                    let text = text.written();
+                    self.put(Kind::of_text(&text), 0, text.as_bytes())?;
+                }
+                Some(Told::Stack(change)) => {
+                    let text = self.hub.whole_stack(Some(change));
+                    self.put(Kind::Stack, 0, text.as_bytes())?;
+                }
                 Some(Told::Frame { view, is_key, bytes }) => {
                     let number = u32::try_from(view).unwrap_or(u32::MAX);
                     let kind = if is_key { Kind::KeyFrame } else { Kind::NextFrame };
@@ -149,10 +162,10 @@ impl Writing {
                     if is_key {
                         (*last, *has_asked) = (Instant::now(), false);
                     } else if last.elapsed() > KEY_PERIOD && !std::mem::replace(has_asked, true) {
-                        self.hub.want_key(view);
+                        self.hub.want_key(view, self.observer.level(view));
                     }
                 }
-                Some(Told::Behind(view)) => self.hub.want_key(view),
+                Some(Told::Behind(view, level)) => self.hub.want_key(view, level),
                 Some(Told::End) => return self.out.flush().map_err(|error| error.to_string()),
                 Some(Told::TooMuch) => return Err("the disk is too slow for what is told".into()),
                 None => {

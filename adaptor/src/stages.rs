@@ -12,8 +12,8 @@ use tombolo_deform::surface::Surface;
 use tombolo_pipelines::{
     encode::Encoder,
     extract::{Channel, Snapshot},
-    language::{Command, Config, LogLevel, Monitor, Pipeline, Stage},
-    run::{Cost, Frame, History, MonitorValues, Output, Replacement, Runner},
+    language::{Command, Config, ErrorBound, LogLevel, Monitor, Pipeline, Stage},
+    run::{Cost, Encoding, Frame, History, MonitorValues, Output, Replacement, Runner},
 };
 
 use crate::{
@@ -23,7 +23,7 @@ use crate::{
     report::PipelineReport,
     steering::Parameter,
     step::{Moment, Outside},
-    stream::Hub,
+    stream::{COARSER, Hub, LEVELS},
     writer::{Content, Job, Writer},
 };
 
@@ -35,8 +35,8 @@ pub(crate) struct Pipelines {
     numbers: usize,
     /// The titles of the tables that the run writes or has written, by file.
     tables: BTreeMap<String, Vec<String>>,
-    description: Value,
-    monitors: Value,
+    description: Arc<Value>,
+    monitors: Arc<Value>,
     can_order: bool,
     drags_skeleton: bool,
     listens: bool,
@@ -49,8 +49,8 @@ struct LiveView {
     name: String,
     /// Its number among all that there have been.
     number: usize,
-    /// The encoder of the view's frames.
-    encoder: Arc<Mutex<Encoder>>,
+    /// The encoders of the view's frames, one for each level.
+    encoders: Arc<[Mutex<Encoder>; LEVELS]>,
 }
 
 /// Tables that a run may begin, of which each stays open.
@@ -86,8 +86,8 @@ impl Pipelines {
             views: Vec::new(),
             numbers: 0,
             tables: BTreeMap::new(),
-            description: Value::Null,
-            monitors: Value::Null,
+            description: Arc::default(),
+            monitors: Arc::default(),
             can_order: false,
             drags_skeleton: false,
             listens: false,
@@ -101,14 +101,14 @@ impl Pipelines {
     /// Brings what is told of the pipelines up to date.
     fn describe(&mut self, config: &Config) {
         let views = self.runner.views();
-        self.description = json!(views);
-        self.monitors = monitors(&self.runner, config);
+        self.description = Arc::new(json!(views));
+        self.monitors = Arc::new(monitors(&self.runner, config));
         let mut before = std::mem::take(&mut self.views);
         for view in views {
             let known = before.iter().position(|known| known.name == view.name);
             let view = known.map(|known| before.swap_remove(known)).unwrap_or_else(|| {
                 self.numbers += 1;
-                LiveView { name: view.name, number: self.numbers - 1, encoder: Arc::default() }
+                LiveView { name: view.name, number: self.numbers - 1, encoders: Arc::default() }
             });
             self.views.push(view);
         }
@@ -196,12 +196,12 @@ impl Pipelines {
     }
 
     /// The description of the views in `hello`.
-    pub(crate) fn views(&self) -> &Value {
+    pub(crate) fn views(&self) -> &Arc<Value> {
         &self.description
     }
 
     /// The description of the monitors in `hello`.
-    pub(crate) fn monitors(&self) -> &Value {
+    pub(crate) fn monitors(&self) -> &Arc<Value> {
         &self.monitors
     }
 
@@ -325,7 +325,7 @@ impl Pipelines {
                 }
                 Output::Monitor(values) => {
                     if let Some(hub) = hub {
-                        hub.monitor(&monitor(&values));
+                        hub.monitor(move || monitor(&values));
                     }
                 }
                 Output::Command { pipeline, command } => {
@@ -346,15 +346,29 @@ impl Pipelines {
         let Some(view) = self.views.iter().find(|view| *view.name == *frame.pipeline) else {
             return;
         };
-        let encoder = Arc::clone(&view.encoder);
-        let encode =
-            move |key: bool| lock(&encoder).encode(&frame, key).map_err(|error| error.to_string());
-        hub.frame(view.number, Arc::new(encode));
+        let (encoders, name) = (Arc::clone(&view.encoders), Arc::clone(&frame.pipeline));
+        let encode = move |level: usize, key: bool| {
+            let fields = wider(frame.encoding.fields, COARSER[level]);
+            let encoding = Encoding { fields, ..frame.encoding };
+            let frame = Frame { encoding, ..frame.clone() };
+            lock(&encoders[level]).encode(&frame, key).map_err(|error| error.to_string())
+        };
+        hub.frame(view.number, &name, Arc::new(encode));
     }
 
     /// Waits for files that are still being written; what was wrong with any of the run.
     pub(crate) fn finish(&mut self) -> Vec<String> {
         self.writer.finish()
+    }
+}
+
+/// A bound so many times as wide; in place of none at all, so many thousandths of the range.
+fn wider(bound: ErrorBound, times: f64) -> ErrorBound {
+    match bound {
+        bound if times <= 1.0 => bound,
+        ErrorBound::Relative(part) => ErrorBound::Relative(part * times),
+        ErrorBound::Absolute(bound) => ErrorBound::Absolute(bound * times),
+        ErrorBound::Lossless => ErrorBound::Relative(1e-3 * times),
     }
 }
 

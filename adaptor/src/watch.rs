@@ -144,7 +144,8 @@ impl Watcher {
     fn tell(&self, message: &str) {
         log::warn!("{message}");
         if let Some(hub) = &self.hub {
-            hub.tell(&json!({"error": {"message": message}}));
+            let message = message.to_owned();
+            hub.tell(move || json!({"error": {"message": message}}));
         }
     }
 }

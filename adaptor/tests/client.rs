@@ -20,7 +20,7 @@ use common::{LINK_TO_ALL, PATIENCE, Solver, config, squeeze};
 use serde_json::Value;
 use tombolo::{
     OrderStatus, Parameter, Report,
-    client::{Client, ClientError, Event, Link, Settings, Told},
+    client::{Client, ClientError, Event, Link, Options, Told},
     pipelines::language::{Order, parse_valid},
 };
 
@@ -72,8 +72,8 @@ impl Run {
     }
 }
 
-fn quick() -> Settings {
-    Settings { attempts: 1000, longest_pause: Duration::from_millis(250), ..Settings::default() }
+fn quick() -> Options {
+    Options { attempts: 1000, longest_pause: Duration::from_millis(250), ..Options::default() }
 }
 
 fn order(by: f64) -> Order {
@@ -140,7 +140,7 @@ impl Proxy {
 #[test]
 fn a_client_watches_and_steers() {
     let run = Run::new(MONITORED);
-    let client = Client::connect(&run.link, &Settings::default()).expect("connected");
+    let client = Client::connect(&run.link, &Options::default()).expect("connected");
     client.drive(PATIENCE).expect("the wheel");
     assert_eq!(client.hello().expect("said").parameters[0].name, "inflow");
     until(&client, "monitor", |told| match &told.event {
@@ -176,7 +176,7 @@ fn a_client_watches_and_steers() {
     assert_eq!(client.pipelines().expect("a list")[0]["name"], "boundary");
     assert_eq!(client.surface().expect("a surface").points().len(), 98);
 
-    let other = Client::connect(&run.link, &Settings::default()).expect("connected");
+    let other = Client::connect(&run.link, &Options::default()).expect("connected");
     let refused = other.drive(PATIENCE);
     assert!(matches!(refused, Err(ClientError::NotDriver { .. })), "{refused:?}");
     drop(other);
@@ -195,8 +195,8 @@ fn a_client_watches_and_steers() {
 #[test]
 fn frames_come_decoded_to_those_who_ask_and_hardly_to_others() {
     let run = Run::new(LINK_TO_ALL);
-    let settings = Settings { views: true, ..Settings::default() };
-    let seeing = Client::connect(&run.link, &settings).expect("connected");
+    let options = Options { views: true, ..Options::default() };
+    let seeing = Client::connect(&run.link, &options).expect("connected");
     let mut cycles: Vec<u64> = Vec::new();
     while cycles.len() < 6 {
         cycles.push(until(&seeing, "frame", |told| match &told.event {
@@ -209,7 +209,7 @@ fn frames_come_decoded_to_those_who_ask_and_hardly_to_others() {
     }
     assert!(cycles.is_sorted(), "{cycles:?}");
     drop(seeing);
-    let blind = Client::connect(&run.link, &Settings::default()).expect("connected");
+    let blind = Client::connect(&run.link, &Options::default()).expect("connected");
     let from = blind.wait_for_status(PATIENCE, |_| true).expect("a status").cycle;
     blind.wait_for_status(PATIENCE, |status| status.cycle > from + 300).expect("steps");
     drop(blind);
@@ -263,7 +263,7 @@ fn answered_by(answer: &'static [u8]) -> ClientError {
         }
     });
     let link: Link = format!("http://127.0.0.1:{port}/?token=abc").parse().expect("a link");
-    Client::connect(&link, &Settings::default()).err().expect("no run")
+    Client::connect(&link, &Options::default()).err().expect("no run")
 }
 
 #[test]
@@ -280,13 +280,13 @@ fn what_is_no_run_or_not_this_one_is_told_by_name() {
     }
     let run = Run::new(LINK_TO_ALL);
     let wrong: Link = format!("http://{}/?token=0123", run.address).parse().expect("a link");
-    let error = Client::connect(&wrong, &Settings::default()).err();
+    let error = Client::connect(&wrong, &Options::default()).err();
     assert!(matches!(error, Some(ClientError::WrongToken { .. })), "{error:?}");
     let few = r#"{"version": 1, "stream": {"listen": "127.0.0.1:0", "limits": {"viewers": 2}}}"#;
     let full = Run::new(few);
     let (mut held, mut error) = (Vec::new(), None);
     while error.is_none() && held.len() < 8 {
-        match Client::connect(&full.link, &Settings::default()) {
+        match Client::connect(&full.link, &Options::default()) {
             Ok(client) => held.push(client),
             Err(refused) => error = Some(refused),
         }
@@ -296,7 +296,7 @@ fn what_is_no_run_or_not_this_one_is_told_by_name() {
     full.end();
     let link = run.link.clone();
     run.end();
-    let error = Client::connect(&link, &Settings::default()).err();
+    let error = Client::connect(&link, &Options::default()).err();
     assert!(matches!(error, Some(ClientError::Refused { .. })), "{error:?}");
 }
 
@@ -360,7 +360,7 @@ fn the_program_reaches_a_run() {
     let told = lines(&output);
     assert_eq!((code, &told[4]["step"], &told[4]["ok"]), (2, &"token".into(), &false.into()));
 
-    let held = Client::connect(&run.link, &Settings::default()).expect("connected");
+    let held = Client::connect(&run.link, &Options::default()).expect("connected");
     held.drive(PATIENCE).expect("the wheel");
     let (code, said, _) = call(&["pause", "link.txt"]);
     assert!(code == 1 && said.contains("has the wheel"), "{said}");
@@ -369,7 +369,7 @@ fn the_program_reaches_a_run() {
     let watching = std::thread::scope(|scope| {
         let watching = scope.spawn(|| call(&["watch", "link.txt", "--json"]));
         // Told to stop once the watching program is there.
-        let other = Client::connect(&run.link, &Settings::default()).expect("connected");
+        let other = Client::connect(&run.link, &Options::default()).expect("connected");
         other.wait_for_status(PATIENCE, |status| status.viewers >= 2).expect("a watcher");
         run.over.store(true, Ordering::Relaxed);
         watching.join().expect("no panic")

@@ -15,6 +15,7 @@
 //! cargo run --release -p tombolo-benchmarks -- extract --json
 //! cargo run --release -p tombolo-benchmarks -- viewer --json
 //! cargo run --release -p tombolo-benchmarks -- python --json
+//! cargo run --release -p tombolo-benchmarks -- service --json
 //! cargo run --release -p tombolo-benchmarks --features distributed -- volume --json
 //! ```
 
@@ -30,6 +31,8 @@ mod peer;
 mod python;
 mod report;
 mod scaling;
+mod service;
+mod service_viewers;
 mod skeleton;
 mod stiffening;
 mod surface;
@@ -62,6 +65,12 @@ struct Arguments {
     /// Have that process compute something else beside.
     #[arg(long, hide = true, requires = "cubes")]
     busy: bool,
+    /// Take less of `service`: a look whether it works, and no measurement.
+    #[arg(long)]
+    short: bool,
+    /// Be the viewers of `service`, with this task.
+    #[arg(long, hide = true)]
+    viewers: Option<String>,
     /// Be one of the ranks that `volume` starts for this mesh.
     #[cfg(feature = "distributed")]
     #[arg(long, hide = true, requires = "displacement")]
@@ -103,6 +112,8 @@ enum Name {
     Viewer,
     /// The cost of `execute` from Python when nothing is due, and the memory that lending a mesh takes.
     Python,
+    /// Many viewers, slow ones and deaf ones; many and large orders; how soon the mesh moves.
+    Service,
     /// The time and the memory of an order, from ten thousand cells to five million.
     Growth,
 }
@@ -115,6 +126,9 @@ fn main() -> ExitCode {
     }
     if let Some(cubes) = arguments.cubes {
         return said(growth::one(cubes, arguments.busy).map(|()| String::new()));
+    }
+    if let Some(task) = &arguments.viewers {
+        return said(service_viewers::run(task).map(|()| String::new()));
     }
     let json = arguments.json;
     said(match arguments.name {
@@ -130,6 +144,7 @@ fn main() -> ExitCode {
         Name::Skeleton => text(skeleton::run(), json),
         Name::Volume => text(volume::run(), json),
         Name::Python => text(python::run(), json),
+        Name::Service => text(service::run(arguments.short), json),
         Name::Growth => text(growth::run(), json),
         Name::Extract => text(extract::run(), json),
         Name::Viewer => text(viewer::run(), json),

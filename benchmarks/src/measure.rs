@@ -30,9 +30,16 @@ impl Times {
 
     /// The median of the runs; NaN of none.
     pub fn median(&self) -> f64 {
+        self.percentile(0.5)
+    }
+
+    /// What this part of the runs, from 0 to 1, do not exceed; NaN of none.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index")]
+    pub fn percentile(&self, part: f64) -> f64 {
         let mut sorted = self.0.clone();
         sorted.sort_by(f64::total_cmp);
-        sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
+        let index = (part * sorted.len() as f64) as usize;
+        sorted.get(index.min(sorted.len().saturating_sub(1))).copied().unwrap_or(f64::NAN)
     }
 }
 
@@ -60,11 +67,23 @@ pub fn median<E>(mut run: impl FnMut() -> Result<(), E>) -> Result<f64, E> {
 /// # Errors
 /// Where the system does not say.
 pub fn memory_peak() -> Result<f64, Box<dyn std::error::Error>> {
+    status("VmHWM:")
+}
+
+/// The memory that this process has now, in bytes.
+///
+/// # Errors
+/// Where the system does not say.
+pub fn memory() -> Result<f64, Box<dyn std::error::Error>> {
+    status("VmRSS:")
+}
+
+fn status(key: &str) -> Result<f64, Box<dyn std::error::Error>> {
     let status = std::fs::read_to_string("/proc/self/status")?;
     let line = status
         .lines()
-        .find_map(|line| line.strip_prefix("VmHWM:"))
-        .ok_or("/proc/self/status has no VmHWM")?;
+        .find_map(|line| line.strip_prefix(key))
+        .ok_or_else(|| format!("/proc/self/status has no {key}"))?;
     let kilobytes: f64 = line.trim().trim_end_matches("kB").trim().parse()?;
     Ok(1024.0 * kilobytes)
 }

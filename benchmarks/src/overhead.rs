@@ -30,7 +30,7 @@ use crate::report::{Report, Row, Target};
 const COUNTS: [usize; 3] = [6, 130, 13];
 const LOWER: [f64; 3] = [-0.025, -0.525, -0.05];
 const UPPER: [f64; 3] = [0.025, 0.525, 0.05];
-const TIME_STEP: f64 = 1e-3;
+pub(crate) const TIME_STEP: f64 = 1e-3;
 
 /// Calls of `execute` that are timed together.
 const CALLS: u32 = 200_000;
@@ -104,7 +104,7 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
 const FEATURES: [&str; 5] = ["inlet", "upstream", "throat", "downstream", "outlet"];
 
 /// The channel with the features of the demo.
-fn channel() -> Result<Mesh, Box<dyn Error>> {
+pub(crate) fn channel() -> Result<Mesh, Box<dyn Error>> {
     let mesh = box_of_tets(COUNTS, LOWER, UPPER);
     let FeatureSource::Faces(tagged) = mesh.features() else {
         return Err("a box has tagged faces".into());
@@ -127,7 +127,7 @@ fn channel() -> Result<Mesh, Box<dyn Error>> {
     Ok(Mesh::new(mesh.points().to_vec(), mesh.cells().clone(), features)?)
 }
 
-fn solver(mesh: &Mesh) -> Result<Solver, Box<dyn Error>> {
+pub(crate) fn solver(mesh: &Mesh) -> Result<Solver, Box<dyn Error>> {
     let FeatureSource::Faces(tagged) = mesh.features() else {
         return Err("a box has tagged faces".into());
     };

@@ -402,6 +402,8 @@ fn parameter(node: &Node<'_, '_>, parameters: &mut Vec<Parameter>) -> Result<(),
 
 #[cfg(test)]
 mod tests {
+    use tombolo::pipelines::language::Listen;
+
     use super::*;
 
     #[test]
@@ -460,7 +462,9 @@ mod tests {
             "the second file's steering holds"
         );
         assert_eq!(config.journal.as_deref(), Some("a.jsonl"));
-        assert!(config.stream.as_ref().is_some_and(|stream| stream.listen.port() == 0));
+        assert!(config.stream.as_ref().is_some_and(
+            |stream| matches!(stream.listen, Listen::Address(address) if address.port() == 0)
+        ));
         assert_eq!(
             found.notes,
             [

@@ -5,7 +5,7 @@ use std::{io::IsTerminal, sync::Arc};
 use tombolo::communicator::{Alarm, Communicator};
 use tombolo::deform::linear::BuiltIn;
 use tombolo::foreign::{Asked, Run, RunError, Shown, ranks};
-use tombolo::pipelines::language::nearest;
+use tombolo::pipelines::language::{Listen, nearest};
 use tombolo::{InitializeError, Restart, Settings, Step};
 
 use crate::configuration::{self, Configuration, Groups, with_default_views};
@@ -107,8 +107,10 @@ impl Session {
                 Err(RunError::Initialize(
                     InitializeError::Stream(_) | InitializeError::Rank(_),
                 )) => {
-                    if let Some(stream) = &mut settings.config.stream {
-                        stream.listen.set_port(0);
+                    if let Some(stream) = &mut settings.config.stream
+                        && let Listen::Address(address) = &mut stream.listen
+                    {
+                        address.set_port(0);
                     }
                     Run::new((**settings).clone())?
                 }

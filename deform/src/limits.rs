@@ -84,18 +84,22 @@ pub const LISTED: Limit = limit(
 pub const SHAPES: Limit = limit("shapes", 10_000, "a schedule");
 /// Orders that the stack remembers.
 pub const ORDERS: Limit = limit("orders", 4096, "the stack: those that can be taken back");
-/// Commands that wait.
-pub const WAITING: Limit = limit(
-    "commands",
-    1 << 16,
-    "a file of orders; those of viewers that the solver has not come to",
-);
-/// Bytes of the commands that wait.
-pub const WAITING_BYTES: Limit = limit(
-    "bytes",
+/// Bytes of the edits that the stack remembers.
+pub const ORDERS_BYTES: Limit = limit(
+    "bytes of edits",
     256 << 20,
-    "a file of orders; the commands of viewers that the solver has not come to",
+    "the stack, with the edits that orders have replaced and that can be brought back",
 );
+/// Commands of a file.
+pub const WAITING: Limit = limit("commands", 1 << 16, "a file of orders");
+/// Bytes of a file of commands.
+pub const WAITING_BYTES: Limit = limit("bytes", 256 << 20, "a file of orders, a journal");
+/// Commands of viewers that wait.
+pub const PENDING: Limit =
+    limit("commands that wait", 256, "the commands of viewers whose turn has not come");
+/// Bytes of the commands of viewers that wait.
+pub const PENDING_BYTES: Limit =
+    limit("bytes that wait", 64 << 20, "the commands of viewers whose turn has not come");
 
 /// Surfaces that cut a mesh at once.
 pub const CUTS: Limit = limit("surfaces", 256, "the planes of a slice, or the values of a contour");
@@ -134,7 +138,7 @@ pub const ERRORS: Limit =
     limit("errors", 100, "what is told of one text; of more errors only their number");
 
 /// All of them.
-pub const ALL: [Limit; 28] = [
+pub const ALL: [Limit; 31] = [
     DOCUMENT,
     VALUES,
     DEPTH,
@@ -149,8 +153,11 @@ pub const ALL: [Limit; 28] = [
     LISTED,
     SHAPES,
     ORDERS,
+    ORDERS_BYTES,
     WAITING,
     WAITING_BYTES,
+    PENDING,
+    PENDING_BYTES,
     CUTS,
     PROBES,
     BINS,

@@ -3,7 +3,8 @@ import { Connection, streamAddress } from "./connection/connection";
 import { Pipelines } from "./connection/pipelines";
 import { Decoder } from "./connection/decoder";
 import type { DecodeWorker } from "./connection/decoder";
-import type { Frame, Json, Monitor, ServerMessage } from "./connection/protocol";
+import type { Frame, Json, Monitor, ServerMessage, ToldHello } from "./connection/protocol";
+import { Stack } from "./connection/stack";
 import { part, write } from "./dom";
 import { EditForm, initialSettings } from "./form/form";
 import { orderForm } from "./form/schema";
@@ -89,6 +90,7 @@ const connection = new Connection(addresses, {
   },
   trouble: report,
 });
+const stack = new Stack(addresses.stack, () => store.dispatch({ type: "stack", edits: stack.edits, undoable: stack.told.undoable }), report);
 const commands = new Commands(store, (message) => connection.send(message));
 const pipelines = new Pipelines(() => loadJson(addresses.pipelines), (message) => commands.send(message), (reason) => report(`the pipelines: ${reason}`));
 store.watch((state) => [state.connection.state, state.hello?.pipelines?.changes] as const, ([state, changes]) => {
@@ -260,9 +262,11 @@ const decoder = new Decoder(worker as unknown as DecodeWorker, {
 function takeMessage(message: ServerMessage): void {
   bar.alive();
   switch (message.kind) {
-    case "hello": return store.dispatch({ type: "hello", hello: message.body });
+    case "hello": return takeHello(message.body);
     case "status": return store.dispatch({ type: "status", status: message.body, at: performance.now() });
     case "order": return store.dispatch({ type: "order", status: message.body });
+    case "stack": return stack.change(message.body);
+    case "precision": return store.dispatch({ type: "precision", ...message.body });
     case "forecast": return forecasts.answer(message.body);
     case "monitor": return takeMonitor(message.body);
     // The hello that comes with it says what there is now.
@@ -292,6 +296,12 @@ function takeMonitor(monitor: Monitor): void {
   for (const { pipeline, name, unit } of store.state.hello?.monitors ?? []) monitored.setUnit(pipeline, name, unit ?? null);
   history.update();
   dock.update();
+}
+
+function takeHello({ stack: told, ...hello }: ToldHello): void {
+  // Until the edits of a new connection are here, those of before are shown.
+  if (told) stack.begin(told);
+  store.dispatch({ type: "hello", hello: { ...hello, stack: stack.edits, undoable: stack.told.undoable } });
 }
 
 function takeFrame(frame: Frame): void {

@@ -90,11 +90,14 @@ impl Adaptor {
             let made = self.make_change(&change, moment, channels);
             self.changes.settle(&id, made.is_ok(), &self.config);
             self.settle(&id, &source, moment, made.as_ref().map(|_| ()).map_err(Clone::clone));
-            if let (Ok(Changed { added, replaced, removed }), Some(hub)) = (&made, &self.hub) {
-                hub.tell(&json!({"pipelines": {
-                    "id": id, "status": "applied", "cycle": moment.cycle,
-                    "added": added, "replaced": replaced, "removed": removed,
-                }}));
+            self.describe();
+            if let (Ok(Changed { added, replaced, removed }), Some(hub)) = (made, &self.hub) {
+                hub.tell(move || {
+                    json!({"pipelines": {
+                        "id": id, "status": "applied", "cycle": moment.cycle,
+                        "added": added, "replaced": replaced, "removed": removed,
+                    }})
+                });
             }
         }
     }

@@ -1,6 +1,9 @@
 //! The intake of commands: from viewers, files and pipelines to what they change.
 
-use std::sync::{Arc, OnceLock};
+use std::{
+    sync::{Arc, Mutex, OnceLock},
+    time::{Duration, Instant},
+};
 
 use serde_json::{Value, json};
 use tombolo_deform::communicator::Reduction;
@@ -13,6 +16,7 @@ use tombolo_pipelines::{
 use super::{Adaptor, SteeredMesh};
 use crate::{
     changes::{Changes, make_absolute},
+    lock::lock,
     meeting,
     steering::{Asked, Forecaster, Log, Queue, Received, Reservation, Source},
     step::Moment,
@@ -88,7 +92,8 @@ impl Adaptor {
         }
         log::warn!("{message}");
         if let Some(hub) = &self.hub {
-            hub.tell(&json!({"error": {"message": message}}));
+            let message = message.to_owned();
+            hub.tell(move || json!({"error": {"message": message}}));
         }
     }
 
@@ -126,7 +131,7 @@ impl Adaptor {
         if let SteeredMesh::Steered(steerer, _) = &mut self.mesh
             && steerer.advance(moment, step_seconds)
         {
-            self.describe();
+            self.tell_stack();
             self.tell_conditions();
         }
     }
@@ -163,7 +168,11 @@ impl Adaptor {
             };
             let forecast = steerer.forecast(&order);
             if let (Some(Asked { client, id, .. }), Some(hub)) = (questions.get(index), &self.hub) {
-                hub.tell_client(*client, &json!({"forecast": {"id": id, "order": forecast}}));
+                let id = id.clone();
+                hub.tell_client(
+                    *client,
+                    move || json!({"forecast": {"id": id, "order": forecast}}),
+                );
             }
         }
     }
@@ -208,7 +217,9 @@ impl Adaptor {
             }
             Command::Cancel(cancel) => self.cancel(&cancel.order, source, moment),
             Command::Parameter(change) => {
-                self.parameters.set(&change.name, change.value).map_err(|error| error.to_string())
+                let set = self.parameters.set(&change.name, change.value);
+                self.describe();
+                set.map_err(|error| error.to_string())
             }
             Command::Pipelines(change) => {
                 return self.keep_change(id, source.clone(), change, reservation);
@@ -253,7 +264,6 @@ impl Adaptor {
             self.complain(&format!("command '{id}': {reason}"));
         }
         self.log.settle(id, source, moment, outcome);
-        self.describe();
         self.tell_conditions();
     }
 }
@@ -269,9 +279,38 @@ pub(super) struct Intake {
     pub(super) is_in_parts: bool,
     /// Whether the run is carried out as a journal says.
     pub(super) is_replay: bool,
+    /// How long a paused run waits for somebody who could resume it; without end if `None`.
+    pub(super) resume_after: Option<Duration>,
+    /// Since when it is paused and there is nobody who could.
+    pub(super) abandoned: Mutex<Option<Instant>>,
 }
 
 impl Intake {
+    /// Resumes a paused run that nobody can resume any more, where that is wanted.
+    fn look_for_drivers(&self) {
+        let Some(patience) = self.resume_after else { return };
+        let mut abandoned = lock(&self.abandoned);
+        if !self.hub.is_paused_alone() {
+            *abandoned = None;
+            return;
+        }
+        if abandoned.get_or_insert_with(Instant::now).elapsed() < patience {
+            return;
+        }
+        *abandoned = None;
+        drop(abandoned);
+        let (cycle, time) = self.hub.clock.get();
+        let (source, command) = (Source::Program, Command::Resume {});
+        // It has no name of its own that could be taken.
+        if let Ok(id) = self.log.accept(None, &source, &command, Moment { cycle, time }) {
+            log::warn!(
+                "the run was paused and nobody was there who could resume it for {} seconds: it goes on",
+                patience.as_secs()
+            );
+            self.queue.push(Received { source, id, command, reservation: None });
+        }
+    }
+
     /// Has a viewer told what an order would come to.
     fn forecast(&self, client: u64, id: Option<String>, order: Order) -> Result<(), String> {
         let command = Command::Order(order);
@@ -285,7 +324,7 @@ impl Intake {
             self.forecaster.get().ok_or("there is no mesh yet whose shape could be changed")?;
         let hub = Arc::clone(&self.hub);
         forecaster.ask(client, &order, move |forecast| {
-            hub.tell_client(client, &json!({"forecast": {"id": id, "order": forecast}}));
+            hub.tell_client(client, move || json!({"forecast": {"id": id, "order": forecast}}));
         });
         Ok(())
     }
@@ -363,6 +402,7 @@ impl CommandSink for Intake {
 
     fn look_at_time(&self) {
         self.log.look_at_time();
+        self.look_for_drivers();
     }
 
     fn driven(&self) {

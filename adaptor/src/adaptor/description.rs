@@ -1,8 +1,8 @@
 //! What viewers are told of a run besides its frames.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use tombolo_deform::{features::FeatureSize, names::nearest, surface::Surface};
 
 use super::{Adaptor, SteeredMesh};
@@ -12,32 +12,51 @@ use crate::{
 };
 
 impl Adaptor {
-    /// Brings what `hello` tells up to date.
+    /// Brings what `hello` tells up to date. Whoever reads it writes it out, and not the solver.
     pub(super) fn describe(&self) {
         let Some(hub) = &self.hub else { return };
-        // It may be long: whoever reads it writes it out, and not the solver.
-        let stack = match &self.mesh {
-            SteeredMesh::Steered(steerer, _) => steerer.stack().clone(),
-            _ => EditStack::default(),
-        };
-        let list = |value: &Value| if value.is_null() { json!([]) } else { value.clone() };
-        let Defaults { deform, guard, schedule } = &self.defaults;
-        let description = json!({
-            "protocol": 2,
-            "views": self.pipelines.views(),
-            "monitors": self.pipelines.monitors(),
-            "pipelines": {"changes": self.changed},
-            "channel": self.told.channel,
-            "features": list(&self.told.features),
-            "surface": self.told.surface,
-            "fields": list(&self.told.fields),
-            "parameters": self.parameters.all(),
-            "undoable": stack.orders(),
-            "defaults": {"deform": deform, "guard": guard, "schedule": schedule},
+        let (views, monitors) = (self.pipelines.views(), self.pipelines.monitors());
+        let (views, monitors) = (Arc::clone(views), Arc::clone(monitors));
+        let (changed, told) = (self.changed, Arc::clone(&self.told));
+        let (parameters, defaults) = (self.parameters.all().to_vec(), self.defaults.clone());
+        hub.describe(move || {
+            let list = |value: &Value| if value.is_null() { json!([]) } else { value.clone() };
+            let Defaults { deform, guard, schedule } = &defaults;
+            let description = json!({
+                "protocol": 2,
+                "views": *views,
+                "monitors": *monitors,
+                "pipelines": {"changes": changed},
+                "channel": told.channel,
+                "features": list(&told.features),
+                "surface": told.surface,
+                "fields": list(&told.fields),
+                "parameters": parameters,
+                "defaults": {"deform": deform, "guard": guard, "schedule": schedule},
+            });
+            if let Value::Object(description) = description { description } else { Map::new() }
         });
-        if let Value::Object(description) = description {
-            hub.describe(description, move || json!(stack.edits()));
+    }
+
+    /// Tells how the stack of edits has changed, where it has.
+    pub(super) fn tell_stack(&mut self) {
+        let Some(hub) = &self.hub else { return };
+        let none = EditStack::default();
+        let now = match &self.mesh {
+            SteeredMesh::Steered(steerer, _) => steerer.stack(),
+            _ => &none,
+        };
+        let (before, edits) = (self.told_stack.count(), now.count());
+        let kept = self.told_stack.shared(now);
+        let is_same = (before, edits) == (kept, kept) && self.told_stack.orders() == now.orders();
+        if is_same {
+            return;
         }
+        self.told_stack = now.clone();
+        let stack = now.clone();
+        hub.stack([edits, kept, stack.orders()], move |from, next| {
+            let _all = stack.present().skip(from).all(next);
+        });
     }
 
     /// Tells whether the run is paused or stopped, and how good the mesh is.

@@ -2,8 +2,8 @@
 
 use std::{
     path::Path,
-    sync::{Arc, atomic::AtomicBool},
-    time::SystemTime,
+    sync::{Arc, Mutex, atomic::AtomicBool},
+    time::{Duration, SystemTime},
 };
 
 use serde_json::json;
@@ -12,7 +12,7 @@ use tombolo_pipelines::language::{
 };
 
 use super::{
-    Adaptor, Meetings, SteeredMesh, Told,
+    Adaptor, Meetings, SteeredMesh,
     checkpointing::{Given, hash_of, random_name},
     commands::Intake,
     contract::Lent,
@@ -27,7 +27,7 @@ use crate::{
     recorder::Recorder,
     settings::Settings,
     stages::Pipelines,
-    steering::{Defaults, Log, Parameters, Queue, Timed},
+    steering::{Defaults, EditStack, Log, Parameters, Queue, Timed},
     step::Moment,
     stream::{Clock, Hub, Server},
     watch::Watch,
@@ -122,6 +122,11 @@ impl Adaptor {
                     changes: Arc::clone(&changes),
                     is_in_parts: communicator.size() > 1,
                     is_replay,
+                    resume_after: config
+                        .steering
+                        .resume_after
+                        .map(|seconds| Duration::from_secs(seconds.get().into())),
+                    abandoned: Mutex::default(),
                 };
                 Some(Server::start(stream, Arc::clone(hub), Arc::new(intake))?)
             }
@@ -177,7 +182,8 @@ impl Adaptor {
             mesh: SteeredMesh::Unknown,
             lent: Lent::default(),
             moment,
-            told: Told::default(),
+            told: Arc::default(),
+            told_stack: EditStack::default(),
             conditions,
             paused: false,
             stopped: false,
@@ -225,7 +231,7 @@ fn open_journal(
         if let Some(hub) = &hub {
             hub.journal(lost);
             if lost.is_some() {
-                hub.tell(&json!({"error": {"message": message}}));
+                hub.tell(move || json!({"error": {"message": message}}));
             }
         }
     })

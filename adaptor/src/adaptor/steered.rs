@@ -1,6 +1,6 @@
 //! The mesh that orders change: how it is taken over at the first call, and let go.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use serde_json::json;
 use tombolo_deform::{
@@ -14,7 +14,7 @@ use tombolo_deform::{
 use tombolo_pipelines::extract::{Channel, ChannelError};
 
 use super::{
-    Adaptor,
+    Adaptor, Told,
     description::{features, unknown_conditions},
 };
 use crate::{
@@ -52,7 +52,7 @@ impl Adaptor {
             self.complain(reason);
         }
         self.mesh = SteeredMesh::Refused(reason.to_owned());
-        self.describe();
+        self.tell_stack();
         self.tell_conditions();
     }
 
@@ -108,10 +108,10 @@ impl Adaptor {
         let fields = channel.fields.iter().map(
             |field| json!({"name": field.name, "association": field.association, "components": field.values.components()}),
         );
-        self.told.channel = channel.name.to_owned();
-        self.told.fields = fields.collect();
+        let mut told =
+            Told { channel: channel.name.to_owned(), fields: fields.collect(), ..Told::default() };
         if let SteeredMesh::Steered(steerer, Some(surface)) = &self.mesh {
-            self.told.features = features(surface, &self.conditions);
+            told.features = features(surface, &self.conditions);
             if let Some(unknown) = unknown_conditions(surface, &self.conditions) {
                 self.complain(&unknown);
             }
@@ -120,11 +120,14 @@ impl Adaptor {
                     let _ = self.forecaster.set(forecaster);
                 }
                 let surface = ReferenceSurface::new(Arc::clone(surface));
-                self.told.surface = surface.described();
+                told.surface = surface.described();
                 hub.offer_surface(Arc::new(surface));
             }
         }
+        self.told = Arc::new(told);
         self.describe();
+        // A run that goes on from a checkpoint has one.
+        self.tell_stack();
         self.tell_conditions();
         Ok(())
     }
@@ -202,6 +205,7 @@ impl Adaptor {
             let mut steerer = Steerer::new(shaper, self.defaults.clone(), log, queue, skeleton)
                 .map_err(|error| format!("a thread could not be started: {error}"))?;
             resumed.hand_over(&mut steerer)?;
+            steerer.set_deadline(Duration::from_secs(self.config.steering.deadline.get().into()));
             if let Some(shapes) = self.recorded.take() {
                 steerer.repeat(shapes);
             }

@@ -4,10 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use axum::http::{HeaderValue, header};
 use futures_util::{SinkExt, StreamExt};
-use tokio::{
-    net::TcpStream,
-    time::{Instant, sleep, timeout},
-};
+use tokio::time::{Instant, sleep, timeout};
 use tokio_tungstenite::{
     WebSocketStream, client_async_with_config,
     tungstenite::{
@@ -19,8 +16,8 @@ use tokio_tungstenite::{
 use tombolo_pipelines::{encode::Decoder, limits::DOCUMENT};
 
 use super::{
-    ClientError, Event, Link, Settings,
-    get::{not_tombolo, open, refused, shown},
+    ClientError, Event, Link, Options,
+    get::{Stream, not_tombolo, open, refused, shown},
     state::Shared,
 };
 
@@ -41,7 +38,7 @@ const SETTLE: Duration = Duration::from_millis(200);
 /// The version of the protocol.
 const PROTOCOL: u32 = 2;
 
-type Socket = WebSocketStream<TcpStream>;
+type Socket = WebSocketStream<Box<dyn Stream>>;
 
 /// Why a connection is over.
 enum Over {
@@ -52,19 +49,19 @@ enum Over {
 }
 
 /// Keeps the connection until the run has ended, the owner lets go, or it cannot be made again.
-pub(super) async fn run(link: &Link, settings: &Settings, shared: &Arc<Shared>) -> ClientError {
-    let mut socket = match until_closing(shared, join(link, settings.watches, shared)).await {
+pub(super) async fn run(link: &Link, options: &Options, shared: &Arc<Shared>) -> ClientError {
+    let mut socket = match until_closing(shared, join(link, options.watches, shared)).await {
         Some(Ok(socket)) => socket,
         Some(Err(error)) => return error,
         None => return ClientError::Closed,
     };
     loop {
-        let reason = match session(&mut socket, settings, shared).await {
+        let reason = match session(&mut socket, options, shared).await {
             Over::Ended => return ClientError::Closed,
             Over::Lost(reason) => reason,
         };
         shared.with(|state| state.put(Event::Lost { reason: reason.clone() }, ""));
-        match until_closing(shared, again(link, settings, shared, reason)).await {
+        match until_closing(shared, again(link, options, shared, reason)).await {
             Some(Ok(new)) => socket = new,
             Some(Err(error)) => return error,
             None => return ClientError::Closed,
@@ -88,24 +85,26 @@ async fn until_closing<T>(shared: &Shared, done: impl Future<Output = T>) -> Opt
 /// Connects anew, with growing pauses.
 async fn again(
     link: &Link,
-    settings: &Settings,
+    options: &Options,
     shared: &Shared,
     reason: String,
 ) -> Result<Socket, ClientError> {
-    let (mut pause, mut reason) = (settings.first_pause, reason);
-    for _ in 0..settings.attempts {
+    let (mut pause, mut reason) = (options.first_pause, reason);
+    for _ in 0..options.attempts {
         sleep(pause).await;
-        pause = pause.saturating_mul(2).min(settings.longest_pause);
-        match join(link, settings.watches, shared).await {
+        pause = pause.saturating_mul(2).min(options.longest_pause);
+        match join(link, options.watches, shared).await {
             Ok(socket) => return Ok(socket),
             // Another run listens there now.
-            Err(error @ (ClientError::WrongToken { .. } | ClientError::HostRefused { .. })) => {
-                return Err(error);
-            }
+            Err(
+                error @ (ClientError::WrongToken { .. }
+                | ClientError::HostRefused { .. }
+                | ClientError::Certificate { .. }),
+            ) => return Err(error),
             Err(error) => reason = error.to_string(),
         }
     }
-    Err(ClientError::Lost { address: link.address(), reason, tries: settings.attempts })
+    Err(ClientError::Lost { address: link.address(), reason, tries: options.attempts })
 }
 
 /// Connects and waits for the hello.
@@ -175,7 +174,7 @@ async fn first_text(socket: &mut Socket) -> Result<String, Option<CloseFrame>> {
 }
 
 /// Reads and sends until the connection is over.
-async fn session(socket: &mut Socket, settings: &Settings, shared: &Shared) -> Over {
+async fn session(socket: &mut Socket, options: &Options, shared: &Shared) -> Over {
     let mut decoder = Decoder::new();
     let (mut frames, mut acknowledged) = (0_u64, 0_u64);
     let mut settle = tokio::time::interval(SETTLE);
@@ -185,7 +184,7 @@ async fn session(socket: &mut Socket, settings: &Settings, shared: &Shared) -> O
         // view are on their way to it then.
         let (unsent, taken, closing) =
             shared.with(|state| (state.unsent(), state.taken, state.closing));
-        let count = if settings.views { taken.clamp(1, frames.max(1)) } else { 1 };
+        let count = if options.views { taken.clamp(1, frames.max(1)) } else { 1 };
         let mut messages: Vec<Message> = unsent.into_iter().map(Message::text).collect();
         if frames > 0 && count > acknowledged {
             acknowledged = count;
@@ -225,7 +224,7 @@ async fn session(socket: &mut Socket, settings: &Settings, shared: &Shared) -> O
             },
             Some(Ok(Message::Binary(bytes))) => {
                 frames += 1;
-                if settings.views {
+                if options.views {
                     match decoder.decode(&bytes) {
                         Ok(frame) => shared.with(|state| state.put_frame(frame)),
                         Err(error) => return Over::Lost(format!("a broken frame: {error}")),

@@ -6,7 +6,7 @@
 pub enum ClientError {
     /// A text that is no link.
     #[error(
-        "found the link {found:?}, and {reason}; expected http://HOST:PORT/?token=TOKEN, as the run has printed it"
+        "found the link {found:?}, and {reason}; expected http://HOST:PORT/?token=TOKEN, https:// or unix:/PATH?token=TOKEN, as the run has printed it"
     )]
     Link {
         /// The text, without its token.
@@ -34,6 +34,14 @@ pub enum ClientError {
         /// The host and port.
         address: String,
         /// The system's reason.
+        reason: String,
+    },
+    /// Who answers there cannot be known for sure.
+    #[error("the certificate of {address} is not that of the link, or not trusted: {reason}")]
+    Certificate {
+        /// The host and port.
+        address: String,
+        /// What is wrong with it.
         reason: String,
     },
     /// A run answers there, and the token is not its own (401).

@@ -29,6 +29,10 @@ pub enum Event {
     Status(Box<Status>),
     /// A change in the life of an order.
     Order(Box<OrderReport>),
+    /// A change of the stack of edits; [`Client::stack`](super::Client::stack) gets it.
+    Stack(StackChange),
+    /// How exact the frames of a view are from now on.
+    Precision(Precision),
     /// The values of a pipeline's monitors.
     Monitor(Values),
     /// The answer to [`Client::forecast`](super::Client::forecast).
@@ -47,7 +51,7 @@ pub enum Event {
     Error(Complaint),
     /// The run has ended: nothing comes after it.
     End(End),
-    /// A frame of a view, where [`Settings::views`](super::Settings::views) asks for them.
+    /// A frame of a view, where [`Options::views`](super::Options::views) asks for them.
     Frame(Box<DecodedFrame>),
     /// The connection was lost, and is made again.
     Lost {
@@ -92,15 +96,39 @@ pub struct Hello {
     /// The orders so far, the oldest first; in the first of a connection.
     #[serde(default)]
     pub orders: Vec<OrderReport>,
-    /// The edits that make the shape, the oldest first.
+    /// How many edits make the shape; in the first of a connection.
     #[serde(default)]
-    pub stack: Vec<Value>,
+    pub stack: Option<StackChange>,
     /// The named parts of the surface.
     #[serde(default)]
     pub features: Vec<Value>,
     /// The reference surface; `None` where the shape cannot be changed, or not yet.
     #[serde(default)]
     pub surface: Option<Value>,
+}
+
+/// The stack of edits, in short.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+pub struct StackChange {
+    /// Rises by one with every change.
+    pub revision: u64,
+    /// How many edits there are.
+    pub edits: usize,
+    /// How many of them, from the first on, are those of before.
+    #[serde(default)]
+    pub kept: usize,
+    /// How many orders can be taken back.
+    #[serde(default)]
+    pub undoable: usize,
+}
+
+/// How exact the frames of a view are, where the connection does not carry them as they are.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Precision {
+    /// The view.
+    pub view: String,
+    /// So many times the error that the view asks for; 1 where frames are as it asks.
+    pub coarser: f64,
 }
 
 /// A live view.
@@ -248,6 +276,8 @@ impl Event {
             "hello" => read(value).map(Event::Hello),
             "status" => read(value).map(Event::Status),
             "order" => read(value).map(Event::Order),
+            "stack" => read(value).map(Event::Stack),
+            "precision" => read(value).map(Event::Precision),
             "forecast" => read(value).map(Event::Forecast),
             "monitor" => read(value).map(Event::Monitor),
             "pipelines" => read(value).map(Event::Pipelines),

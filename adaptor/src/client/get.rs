@@ -2,13 +2,17 @@
 
 use std::time::Duration;
 
+use std::sync::Arc;
+
+use rustls::pki_types::ServerName;
 use tokio::{
-    io::{AsyncReadExt, AsyncWriteExt},
+    io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt},
     net::TcpStream,
     time::timeout,
 };
+use tokio_rustls::TlsConnector;
 
-use super::{ClientError, Link};
+use super::{ClientError, Link, link::Way, tls};
 
 /// How long a host may take to take a connection.
 const CONNECT: Duration = Duration::from_secs(10);
@@ -26,8 +30,47 @@ pub(super) struct Answer {
     pub(super) body: Vec<u8>,
 }
 
+/// A connection of any kind.
+pub(super) trait Stream: AsyncRead + AsyncWrite + Send + Unpin {}
+
+impl<S: AsyncRead + AsyncWrite + Send + Unpin> Stream for S {}
+
+/// Connects to where a link leads.
+pub(super) async fn open(link: &Link) -> Result<Box<dyn Stream>, ClientError> {
+    let address = || link.address();
+    let unreachable = |reason: String| ClientError::Unreachable { address: address(), reason };
+    match link.way() {
+        Way::Plain => Ok(Box::new(open_address(link).await?)),
+        Way::Encrypted(pinned) => {
+            let stream = open_address(link).await?;
+            let certificate =
+                |reason: String| ClientError::Certificate { address: address(), reason };
+            let config =
+                tls::config(pinned.as_deref()).map_err(|error| certificate(error.to_string()))?;
+            let name = ServerName::try_from(link.name().to_owned())
+                .map_err(|error| certificate(error.to_string()))?;
+            let shaken = TlsConnector::from(Arc::new(config)).connect(name, stream);
+            match timeout(CONNECT, shaken).await {
+                Ok(Ok(stream)) => Ok(Box::new(stream)),
+                Ok(Err(error)) => Err(certificate(error.to_string())),
+                Err(_) => Err(unreachable("it does not shake hands".into())),
+            }
+        }
+        #[cfg(unix)]
+        Way::Socket(path) => match tokio::net::UnixStream::connect(path).await {
+            Ok(stream) => Ok(Box::new(stream)),
+            Err(error) if error.kind() == std::io::ErrorKind::ConnectionRefused => {
+                Err(ClientError::Refused { address: address() })
+            }
+            Err(error) => Err(unreachable(error.to_string())),
+        },
+        #[cfg(not(unix))]
+        Way::Socket(_) => Err(unreachable("this system has no such sockets".into())),
+    }
+}
+
 /// The addresses that the system knows for a link's host, tried one after the other.
-pub(super) async fn open(link: &Link) -> Result<TcpStream, ClientError> {
+async fn open_address(link: &Link) -> Result<TcpStream, ClientError> {
     let unknown = |reason: String| ClientError::Unknown { host: link.host().into(), reason };
     let addresses = tokio::net::lookup_host((link.name(), link.port())).await;
     let mut failure = unknown("the system names none".into());
@@ -54,11 +97,13 @@ pub(super) async fn open(link: &Link) -> Result<TcpStream, ClientError> {
 pub(super) async fn get(
     link: &Link,
     path: &'static str,
+    query: &str,
     most: usize,
 ) -> Result<Answer, ClientError> {
     let mut stream = open(link).await?;
     let not_tombolo = |found: String| not_tombolo(link, found);
-    let bytes = timeout(ANSWER, exchange(&mut stream, link, path, HEAD.saturating_add(most)));
+    let asked = link.path(path) + query;
+    let bytes = timeout(ANSWER, exchange(&mut *stream, link, &asked, HEAD.saturating_add(most)));
     let bytes = match bytes.await {
         Ok(Ok(bytes)) => bytes,
         Ok(Err(error)) => return Err(not_tombolo(format!("no answer ({error})"))),
@@ -87,7 +132,7 @@ pub(super) async fn get(
 }
 
 async fn exchange(
-    stream: &mut TcpStream,
+    stream: &mut dyn Stream,
     link: &Link,
     path: &str,
     most: usize,
@@ -95,8 +140,8 @@ async fn exchange(
     // HTTP/1.0 is answered in one piece, and the connection closed behind it.
     let request = format!(
         "GET {} HTTP/1.0\r\nHost: {}\r\nAuthorization: Bearer {}\r\nConnection: close\r\n\r\n",
-        link.path(path),
-        link.address(),
+        path,
+        link.authority(),
         link.token()
     );
     stream.write_all(request.as_bytes()).await?;

@@ -2,13 +2,17 @@
 
 use std::{fmt, str::FromStr};
 
+use std::path::{Path, PathBuf};
+
 use super::ClientError;
 
 /// Bytes that a link may have.
 const LENGTH: usize = 4096;
 
 /// The address of a run and the token that lets a client in, as the run prints them:
-/// `http://HOST:PORT/?token=TOKEN`, behind a proxy also with a path before the `?`.
+/// `http://HOST:PORT/?token=TOKEN`, behind a proxy also with a path before the `?`;
+/// `https://HOST:PORT/?token=TOKEN#sha256=FINGERPRINT`, where the certificate of this fingerprint
+/// counts, or without it one that this machine trusts; `unix:PATH?token=TOKEN`.
 ///
 /// It prints with the token, and its `Debug` form without.
 ///
@@ -27,27 +31,59 @@ const LENGTH: usize = 4096;
 pub struct Link {
     host: String,
     port: u16,
+    way: Way,
     /// The path without its last slash: empty, or `/...`.
     prefix: String,
     token: String,
 }
 
+/// How a connection is made.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Way {
+    Plain,
+    /// Encrypted, by the certificate of this fingerprint, or by one that this machine trusts.
+    Encrypted(Option<String>),
+    /// Through a socket at a path of this machine.
+    Socket(PathBuf),
+}
+
 impl Link {
-    /// The host: a name, or an address, that of IPv6 in brackets.
+    pub(super) fn way(&self) -> &Way {
+        &self.way
+    }
+
+    /// The path of the socket that it leads through, where it leads through one.
+    #[must_use]
+    pub fn socket_path(&self) -> Option<&Path> {
+        match &self.way {
+            Way::Socket(path) => Some(path),
+            _ => None,
+        }
+    }
+
+    /// The host: a name, or an address, that of IPv6 in brackets; `localhost` for a socket.
     #[must_use]
     pub fn host(&self) -> &str {
         &self.host
     }
 
-    /// The port; 80 where the link names none.
+    /// The port; 80 or 443 where the link names none, 0 for a socket.
     #[must_use]
     pub fn port(&self) -> u16 {
         self.port
     }
 
-    /// The host and port, as people write them.
+    /// The host and port, or the path of the socket, as people write them.
     #[must_use]
     pub fn address(&self) -> String {
+        match &self.way {
+            Way::Socket(path) => format!("unix:{}", path.display()),
+            _ => self.authority(),
+        }
+    }
+
+    /// The host and port for a request's header.
+    pub(super) fn authority(&self) -> String {
         format!("{}:{}", self.host, self.port)
     }
 
@@ -74,7 +110,7 @@ impl Link {
         if let Some(back) = back {
             client += &format!("&back={back}");
         }
-        format!("ws://{}{}{client}", self.address(), self.path("ws"))
+        format!("ws://{}{}{client}", self.authority(), self.path("ws"))
     }
 }
 
@@ -93,46 +129,77 @@ impl FromStr for Link {
         if !text.chars().all(|c| c.is_ascii_graphic()) {
             return Err(wrong("it holds a character that no link has"));
         }
-        let rest = match text.split_once("://") {
-            Some(("http", rest)) => rest,
-            Some(("https", _)) => return Err(wrong("https is not supported yet")),
-            _ => return Err(wrong("it does not begin with http://")),
+        let (text, fragment) = text.split_once('#').unwrap_or((text, ""));
+        let (place, query) = text.split_once('?').ok_or_else(|| wrong("it has no token"))?;
+        let token = query.split('&').find_map(|pair| pair.strip_prefix("token="));
+        let known = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
+        let token = token.filter(|token| !token.is_empty() && token.chars().all(known));
+        let token = token.ok_or_else(|| wrong("it has no token"))?.to_owned();
+        if let Some(path) = place.strip_prefix("unix:") {
+            if !path.starts_with('/') {
+                return Err(wrong("the path of its socket does not begin with a slash"));
+            }
+            let way = Way::Socket(path.into());
+            return Ok(Self {
+                host: "localhost".into(),
+                port: 0,
+                way,
+                prefix: String::new(),
+                token,
+            });
+        }
+        let (way, usual, rest) = match place.split_once("://") {
+            Some(("http", rest)) => (Way::Plain, 80, rest),
+            Some(("https", rest)) => {
+                let digits =
+                    |text: &&str| text.len() == 64 && text.chars().all(|c| c.is_ascii_hexdigit());
+                let pinned = match fragment.strip_prefix("sha256=") {
+                    None => None,
+                    Some(text) => Some(text).filter(digits).map(str::to_ascii_lowercase),
+                };
+                if fragment.starts_with("sha256=") && pinned.is_none() {
+                    return Err(wrong("its fingerprint has not 64 hexadecimal digits"));
+                }
+                (Way::Encrypted(pinned), 443, rest)
+            }
+            _ => return Err(wrong("it does not begin with http://, https:// or unix:/")),
         };
-        let rest = rest.split('#').next().unwrap_or_default();
-        let (place, query) = rest.split_once('?').ok_or_else(|| wrong("it has no token"))?;
-        let (authority, path) = place.split_once('/').unwrap_or((place, ""));
+        let (authority, path) = rest.split_once('/').unwrap_or((rest, ""));
         let (host, port) = match authority.rsplit_once(':') {
             Some((host, port)) if !port.ends_with(']') => {
                 let port = port.parse().ok().filter(|&port| port != 0);
                 (host, port.ok_or_else(|| wrong("its port is not a number from 1 to 65535"))?)
             }
-            _ => (authority, 80),
+            _ => (authority, usual),
         };
         let is_bracketed = host.starts_with('[') && host.ends_with(']');
         let known = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
         if host.is_empty() || !is_bracketed && !host.chars().all(known) {
             return Err(wrong("it names no host"));
         }
-        let token = query.split('&').find_map(|pair| pair.strip_prefix("token="));
-        let known = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
-        let token = token.filter(|token| !token.is_empty() && token.chars().all(known));
-        let token = token.ok_or_else(|| wrong("it has no token"))?;
         let path = path.trim_matches('/');
         let prefix = if path.is_empty() { String::new() } else { format!("/{path}") };
-        Ok(Self { host: host.into(), port, prefix, token: token.into() })
+        Ok(Self { host: host.into(), port, way, prefix, token })
     }
 }
 
 impl fmt::Display for Link {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "http://{}{}", self.address(), self.path(""))
+        match &self.way {
+            Way::Plain => write!(f, "http://{}{}", self.authority(), self.path("")),
+            Way::Encrypted(pinned) => {
+                write!(f, "https://{}{}", self.authority(), self.path(""))?;
+                pinned.iter().try_for_each(|fingerprint| write!(f, "#sha256={fingerprint}"))
+            }
+            Way::Socket(path) => write!(f, "unix:{}?token={}", path.display(), self.token),
+        }
     }
 }
 
 /// A token is never printed by accident.
 impl fmt::Debug for Link {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Link(http://{}{}/?token=..)", self.address(), self.prefix)
+        write!(f, "Link({}{}/?token=..)", self.address(), self.prefix)
     }
 }
 
@@ -152,6 +219,19 @@ mod tests {
         assert_eq!((link.port(), &*link.path("surface")), (80, "/a/b/surface?token=t-1"));
         assert_eq!(link.socket(false, Some("c3"), None), "ws://host:80/a/b/ws?token=t-1&client=c3");
         assert!(!format!("{link:?}").contains("t-1"));
+        let digits = "0A".repeat(32);
+        let pinned = format!("https://host/?token=t-1#sha256={digits}");
+        let link = read(&pinned).expect("a link");
+        assert_eq!((link.port(), link.way()), (443, &Way::Encrypted(Some(digits.to_lowercase()))));
+        assert_eq!(read(&link.to_string()), Ok(link));
+        let link = read("https://host/?token=t-1#page").expect("a link");
+        assert_eq!(link.way(), &Way::Encrypted(None));
+        let link = read("unix:/run/a b.sock?token=t-1");
+        assert!(link.is_err(), "a space");
+        let link = read("unix:/run/tombolo.sock?token=t-1").expect("a link");
+        assert_eq!(link.socket_path(), Some(Path::new("/run/tombolo.sock")));
+        assert_eq!(link.address(), "unix:/run/tombolo.sock");
+        assert_eq!(read(&link.to_string()), Ok(link));
         for wrong in [
             "",
             "http://",
@@ -161,7 +241,9 @@ mod tests {
             "http://host:99999/?token=a",
             "http://a b/?token=a",
             "http://host/?token=a%0d",
-            "https://host/?token=a",
+            "https://host/?token=a#sha256=12",
+            "unix:tombolo.sock?token=a",
+            "unix:/tombolo.sock",
             "ftp://host/?token=a",
         ] {
             assert!(matches!(read(wrong), Err(ClientError::Link { .. })), "{wrong}");

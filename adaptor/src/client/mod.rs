@@ -6,7 +6,7 @@
 //!
 //! ```
 //! use std::time::Duration;
-//! use tombolo::client::{Client, Event, Link, Settings};
+//! use tombolo::client::{Client, Event, Link, Options};
 //! # use tombolo::{Adaptor, Channel, MeshView, Step, deform::shapes::box_of_tets, pipelines::language};
 //! # let config = language::parse(r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"}}"#, "run.json")?;
 //! # let mut adaptor = Adaptor::initialize(tombolo::Settings { config, ..Default::default() })?;
@@ -26,7 +26,7 @@
 //! # });
 //! // `printed` is the link of a run that goes on elsewhere.
 //! let link: Link = printed.parse()?;
-//! let client = Client::connect(&link, &Settings::default())?;
+//! let client = Client::connect(&link, &Options::default())?;
 //! client.drive(Duration::from_secs(10))?;
 //!
 //! // Squeezes the box from above, and waits until the solver has the new shape.
@@ -53,20 +53,20 @@
 //!
 //! # What it guarantees
 //!
-//! - A connection that is lost is made again with growing pauses ([`Settings::attempts`] of them), under
+//! - A connection that is lost is made again with growing pauses ([`Options::attempts`] of them), under
 //!   the client's old name, so that it has the wheel again. A command that was not answered is sent again
 //!   by its id, which is taken once: an order that the run knows is not given twice.
 //! - What waits to be read is bounded, by number and by bytes. Beyond it the oldest monitors make way,
 //!   then the oldest of all; of `hello` and `status` only the newest waits. [`Client::missed`] counts.
 //! - What comes from the network is no more than it may be, and never a panic: what is not understood is
 //!   passed on as [`Event::Unknown`], and what is no message at all ends the connection.
-//! - One that asks for no [views](Settings::views) is sent two frames of each view at most.
+//! - One that asks for no [views](Options::views) is sent two frames of each view at most.
 //!
 //! # What it does not
 //!
-//! It does not encrypt: see [`stream`](crate::stream). A client that connects to a run that nobody
+//! What goes over a link with `http://` is not encrypted: see [`stream`](crate::stream). A client that connects to a run that nobody
 //! watches is the one that drives, as any first viewer is, unless it [only
-//! watches](Settings::watches).
+//! watches](Options::watches).
 
 mod connection;
 mod error;
@@ -74,6 +74,7 @@ mod event;
 mod get;
 mod link;
 mod state;
+mod tls;
 
 use std::{
     sync::{
@@ -84,18 +85,19 @@ use std::{
     time::{Duration, Instant},
 };
 
+use serde::Deserialize;
 use serde_json::{Value, json};
-use tombolo_deform::surface::Surface;
+use tombolo_deform::{edit::Edit, surface::Surface};
 use tombolo_pipelines::{
     encode::decode_surface,
     language::{Change, Command, Order, Parameter, Question},
-    limits::DOCUMENT,
+    limits::{DOCUMENT, EDITS},
 };
 
 pub use error::ClientError;
 pub use event::{
-    Complaint, Done, End, Event, Foretold, Hello, MonitorName, PipelinesChanged, Role, Status,
-    StatusQuality, Told, Values, View,
+    Complaint, Done, End, Event, Foretold, Hello, MonitorName, PipelinesChanged, Precision, Role,
+    StackChange, Status, StatusQuality, Told, Values, View,
 };
 pub use link::Link;
 use state::{Pending, Shared};
@@ -107,7 +109,7 @@ const ASK_AGAIN: Duration = Duration::from_millis(300);
 
 /// How a client behaves.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Settings {
+pub struct Options {
     /// Whether the frames of the live views are decoded and handed out; `false` if left out.
     pub views: bool,
     /// Whether the client only watches, whatever its link is for: it never has the wheel, also where
@@ -121,7 +123,7 @@ pub struct Settings {
     pub longest_pause: Duration,
 }
 
-impl Default for Settings {
+impl Default for Options {
     /// No views, and ten attempts within about a minute.
     fn default() -> Self {
         Self {
@@ -151,7 +153,7 @@ impl Client {
     ///
     /// # Errors
     /// [`ClientError`] says why there is no connection. The first one is tried once.
-    pub fn connect(link: &Link, settings: &Settings) -> Result<Self, ClientError> {
+    pub fn connect(link: &Link, options: &Options) -> Result<Self, ClientError> {
         let system = |reason: String| ClientError::System { reason };
         let mut mark = [0; 4];
         getrandom::fill(&mut mark).map_err(|error| system(error.to_string()))?;
@@ -160,9 +162,9 @@ impl Client {
             .build()
             .map_err(|error| system(error.to_string()))?;
         let shared = Arc::new(Shared::default());
-        let (on_thread, of, settings) = (Arc::clone(&shared), link.clone(), settings.clone());
+        let (on_thread, of, options) = (Arc::clone(&shared), link.clone(), options.clone());
         let serve = move || {
-            let failure = runtime.block_on(connection::run(&of, &settings, &on_thread));
+            let failure = runtime.block_on(connection::run(&of, &options, &on_thread));
             // A name that is still being looked up is not waited for.
             runtime.shutdown_background();
             on_thread.with(|state| state.failure = Some(failure));
@@ -349,9 +351,41 @@ impl Client {
     /// # Errors
     /// [`ClientError`] where the answer is none.
     pub fn pipelines(&self) -> Result<Value, ClientError> {
-        let body = self.get("pipelines", DOCUMENT.most)?;
+        let body = self.get("pipelines", "", DOCUMENT.most)?;
         serde_json::from_slice(&body)
             .map_err(|error| get::not_tombolo(&self.link, error.to_string()))
+    }
+
+    /// The edits that make the shape now, the oldest first. Long ones come in several answers; where
+    /// the stack changes meanwhile it is asked for anew.
+    ///
+    /// # Errors
+    /// [`ClientError`] where the answer is none.
+    pub fn stack(&self) -> Result<Vec<Edit>, ClientError> {
+        #[derive(Deserialize)]
+        struct Answer {
+            revision: u64,
+            count: usize,
+            edits: Vec<Edit>,
+        }
+        let (mut revision, mut stack) = (None, Vec::new());
+        for _ in 0..EDITS.most {
+            let from = format!("&from={}", stack.len());
+            let body = self.get("stack", &from, 2 * DOCUMENT.most)?;
+            let answer: Answer = serde_json::from_slice(&body)
+                .map_err(|error| get::not_tombolo(&self.link, error.to_string()))?;
+            if revision.is_some_and(|revision| revision != answer.revision) {
+                (revision, stack) = (None, Vec::new());
+                continue;
+            }
+            revision = Some(answer.revision);
+            stack.extend(answer.edits);
+            if stack.len() >= answer.count {
+                return Ok(stack);
+            }
+        }
+        let found = "a stack of edits that has no end".into();
+        Err(get::not_tombolo(&self.link, found))
     }
 
     /// The reference surface, every bit of it: what edits are measured from.
@@ -360,14 +394,15 @@ impl Client {
     /// [`ClientError::Answer`] with the status 404 as long as there is no mesh whose shape could be
     /// changed.
     pub fn surface(&self) -> Result<Surface, ClientError> {
-        let body = self.get("surface", SURFACE)?;
+        let body = self.get("surface", "", SURFACE)?;
         decode_surface(&body).map_err(|error| get::not_tombolo(&self.link, error.to_string()))
     }
 
-    fn get(&self, path: &'static str, most: usize) -> Result<Vec<u8>, ClientError> {
+    /// Asks for a path, with what comes behind the token in its query.
+    fn get(&self, path: &'static str, query: &str, most: usize) -> Result<Vec<u8>, ClientError> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
         let runtime = runtime.map_err(|error| ClientError::System { reason: error.to_string() })?;
-        let answer = runtime.block_on(get::get(&self.link, path, most));
+        let answer = runtime.block_on(get::get(&self.link, path, query, most));
         runtime.shutdown_background();
         let answer = answer?;
         match answer.status {

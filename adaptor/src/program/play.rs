@@ -1,8 +1,11 @@
 //! `tombolo play`.
 
-use std::{io::IsTerminal, net::SocketAddr, path::PathBuf};
+use std::{io::IsTerminal, path::PathBuf};
 
-use crate::{pipelines::language::StreamServer, play::Playback};
+use crate::{
+    pipelines::language::{Listen, StreamServer},
+    play::Playback,
+};
 use clap::Args;
 use signal_hook::{
     consts::{SIGINT, SIGTERM},
@@ -16,15 +19,15 @@ pub(crate) struct Options {
     /// The recording that a run has written
     file: PathBuf,
     /// Where viewers connect to; port 0 takes any free one
-    #[arg(long, value_name = "ADDRESS:PORT")]
-    listen: Option<SocketAddr>,
+    #[arg(long, value_name = "ADDRESS:PORT|unix:/PATH")]
+    listen: Option<Listen>,
 }
 
 /// Serves a recording until it is interrupted.
 pub(crate) fn play(options: &Options) -> Result<(), Failure> {
     let mut settings = StreamServer::default();
-    if let Some(listen) = options.listen {
-        settings.listen = listen;
+    if let Some(listen) = &options.listen {
+        settings.listen = listen.clone();
     }
     let mut signals = Signals::new([SIGINT, SIGTERM])?;
     let mut playback = Playback::start(&options.file, &settings)?;

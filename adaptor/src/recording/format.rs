@@ -23,6 +23,8 @@ pub(crate) enum Kind {
     Order,
     /// Any other text.
     Text,
+    /// The stack of edits, whole.
+    Stack,
     /// A frame that can be read by itself.
     KeyFrame,
     /// A frame that goes on from the one before of its view.
@@ -30,7 +32,7 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    const ALL: [Kind; 7] = [
+    const ALL: [Kind; 8] = [
         Kind::Hello,
         Kind::Status,
         Kind::Monitor,
@@ -38,6 +40,7 @@ impl Kind {
         Kind::Text,
         Kind::KeyFrame,
         Kind::NextFrame,
+        Kind::Stack,
     ];
 
     /// What a text message is, by its beginning.

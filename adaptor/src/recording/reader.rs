@@ -80,7 +80,7 @@ pub struct Recorded {
 /// What was sent to viewers.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RecordedMessage {
-    /// A text message: JSON.
+    /// A text message: JSON. A `stack` has the edits themselves in place of their number.
     Text(String),
     /// A frame, and whether it can be read by itself.
     Frame {
@@ -108,6 +108,7 @@ pub struct Recording {
     keys: Vec<Place>,
     hellos: Vec<Place>,
     orders: Vec<Place>,
+    stacks: Vec<Place>,
     /// Where the next message to be read lies.
     next: u64,
     /// The views whose frames can be shown: their key frame was read since the last seek.
@@ -143,6 +144,7 @@ impl Recording {
             keys: Vec::new(),
             hellos: Vec::new(),
             orders: Vec::new(),
+            stacks: Vec::new(),
             next: MAGIC.len() as u64,
             shown: Vec::new(),
         };
@@ -167,6 +169,7 @@ impl Recording {
             match head.kind {
                 Kind::Hello => self.hellos.push(place),
                 Kind::Order => self.orders.push(place),
+                Kind::Stack => self.stacks.push(place),
                 Kind::KeyFrame => {
                     if seen.is_multiple_of(every) {
                         self.keys.push(place);
@@ -183,7 +186,7 @@ impl Recording {
                 });
                 every *= 2;
             }
-            for kept in [&mut self.hellos, &mut self.orders] {
+            for kept in [&mut self.hellos, &mut self.orders, &mut self.stacks] {
                 if kept.len() > ORDERS {
                     kept.drain(..ORDERS / 2);
                 }
@@ -334,6 +337,27 @@ impl Recording {
         let upto = self.hellos.partition_point(|hello| hello.moment.seconds <= seconds).max(1);
         let place = self.hellos.get(upto - 1).copied()?;
         self.text_at(place)
+    }
+
+    /// The newest stack of edits up to a moment, and its place in the file.
+    pub(crate) fn stack(&mut self, seconds: f64) -> Option<(u64, String)> {
+        let upto = self.stacks.partition_point(|stack| stack.moment.seconds <= seconds);
+        let place = self.stacks.get(upto.checked_sub(1)?).copied()?;
+        Some((place.at, self.text_at(place)?))
+    }
+
+    /// The place in the file of the newest stack of edits among the messages that were read.
+    pub(crate) fn place_of_stack(&self) -> Option<u64> {
+        let upto = self.stacks.partition_point(|stack| stack.at < self.next);
+        Some(self.stacks.get(upto.checked_sub(1)?)?.at)
+    }
+
+    /// The stack of edits that lies at a place in a file; `None` where there is none.
+    pub(crate) fn stack_at(path: &Path, place: u64) -> io::Result<Option<String>> {
+        let mut file = BufReader::new(File::open(path)?);
+        let head = read_head(&mut file, place)?.filter(|head| head.kind == Kind::Stack);
+        let Some(head) = head else { return Ok(None) };
+        Ok(read_message(&mut file, place, &head)?.and_then(|bytes| String::from_utf8(bytes).ok()))
     }
 
     /// What had become of orders up to a moment: texts about them, the oldest first.

@@ -3,10 +3,12 @@
 use std::{
     collections::{HashMap, VecDeque},
     hash::{DefaultHasher, Hash, Hasher},
+    sync::Arc,
 };
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
+use tombolo_deform::edit::Edit;
 use tombolo_pipelines::language::Order;
 
 use super::order_report::{ORDERS_KEPT, OrderReport, OrderStatus};
@@ -22,14 +24,31 @@ const TOLD_WHOLE: usize = 16 << 10;
 #[serde(deny_unknown_fields)]
 pub(crate) struct KnownCommands {
     orders: VecDeque<OrderReport>,
-    /// The newest orders as they were given, by their names.
-    given: VecDeque<(String, Value)>,
+    /// The newest orders as they were given, by their names, but for long ones.
+    given: VecDeque<(String, Arc<Order>)>,
     /// The answers to the newest of the other commands.
     outcomes: VecDeque<(String, Value)>,
     /// The names that are taken, with what their messages say; oldest first in `named`.
     names: HashMap<String, Option<u64>>,
     named: VecDeque<String>,
     counted: u64,
+}
+
+/// An order's report, and what was asked for where it is not long.
+pub(super) struct KnownOrder {
+    pub(super) report: OrderReport,
+    pub(super) given: Option<Arc<Order>>,
+}
+
+impl KnownOrder {
+    /// What viewers are told of it.
+    pub(super) fn told(&self) -> Value {
+        let mut told = json!(self.report);
+        if let Some(given) = self.given.as_ref().and_then(|given| told_whole(given)) {
+            told["order"] = given;
+        }
+        told
+    }
 }
 
 /// A name for a command.
@@ -91,16 +110,24 @@ impl KnownCommands {
         self.named.retain(|named| named != id);
     }
 
-    /// Notes an order, with what it asks for where that is told.
-    pub(super) fn add(&mut self, id: &str, given: Option<Value>) {
+    /// Notes an order, and what it asks for.
+    pub(super) fn add(&mut self, id: &str, order: &Order, cycle: u64) {
         if self.given.len() >= ORDERS_TOLD {
             self.given.pop_front();
         }
-        self.given.extend(given.map(|given| (id.to_owned(), given)));
+        let bytes = order.edits().iter().map(Edit::bytes).fold(0, usize::saturating_add);
+        if bytes <= TOLD_WHOLE {
+            self.given.push_back((id.to_owned(), Arc::new(order.clone())));
+        }
         if self.orders.len() >= ORDERS_KEPT {
             self.orders.pop_front();
         }
-        self.orders.push_back(OrderReport { id: id.to_owned(), ..OrderReport::default() });
+        self.orders.push_back(OrderReport {
+            id: id.to_owned(),
+            cycle_accepted: cycle,
+            waits_for: Some("the solver's next call".into()),
+            ..OrderReport::default()
+        });
     }
 
     /// Notes what the sender of a command that is no order was told.
@@ -112,11 +139,14 @@ impl KnownCommands {
     }
 
     /// The answer to a command, as a message for a viewer; `None` where there is none yet.
-    pub(super) fn outcome(&self, id: &str) -> Option<Value> {
-        match self.order(id) {
-            Some(order) => Some(json!({"order": self.told(order)})),
-            None => self.outcomes.iter().rev().find(|known| known.0 == id).map(|it| it.1.clone()),
-        }
+    pub(super) fn outcome(&self, id: &str) -> Option<impl FnOnce() -> Value + Send + use<>> {
+        let order = self.known(id);
+        let outcome = self.outcomes.iter().rev().find(|known| known.0 == id).map(|it| it.1.clone());
+        let is_known = order.is_some() || outcome.is_some();
+        is_known.then_some(move || match order {
+            Some(order) => json!({"order": order.told()}),
+            None => outcome.unwrap_or_default(),
+        })
     }
 
     pub(super) fn order(&self, id: &str) -> Option<&OrderReport> {
@@ -127,19 +157,20 @@ impl KnownCommands {
         self.orders.iter_mut().rev().find(|order| order.id == id)
     }
 
-    /// An order's report, with what was asked for.
-    pub(super) fn told(&self, order: &OrderReport) -> Value {
-        let mut told = json!(order);
-        if let Some((_, given)) = self.given.iter().rev().find(|(id, _)| *id == order.id) {
-            told["order"] = given.clone();
-        }
-        told
+    /// What is known of an order.
+    pub(super) fn known(&self, id: &str) -> Option<KnownOrder> {
+        self.order(id).map(|order| self.with_given(order))
+    }
+
+    fn with_given(&self, order: &OrderReport) -> KnownOrder {
+        let given = self.given.iter().rev().find(|(id, _)| *id == order.id);
+        KnownOrder { report: order.clone(), given: given.map(|(_, given)| Arc::clone(given)) }
     }
 
     /// The newest orders, for a viewer that connects.
-    pub(super) fn newest(&self) -> Value {
+    pub(super) fn newest(&self) -> Vec<KnownOrder> {
         let skipped = self.orders.len().saturating_sub(ORDERS_TOLD);
-        self.orders.iter().skip(skipped).map(|order| self.told(order)).collect()
+        self.orders.iter().skip(skipped).map(|order| self.with_given(order)).collect()
     }
 
     /// How many of the orders have come to which state.
@@ -173,7 +204,7 @@ impl KnownCommands {
 
 /// An order as JSON, unless it is long; of a long one no more is written than it takes to find that
 /// out.
-pub(super) fn told_whole(order: &Order) -> Option<Value> {
+fn told_whole(order: &Order) -> Option<Value> {
     let mut bytes = [0; TOLD_WHOLE];
     let mut rest = &mut bytes[..];
     serde_json::to_writer(&mut rest, order).ok()?;

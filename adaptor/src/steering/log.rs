@@ -10,7 +10,7 @@ use tombolo_pipelines::language::{
 
 use super::{
     NotFollowed,
-    known::{KnownCommands, Named, told_whole},
+    known::{KnownCommands, KnownOrder, Named},
     order_report::{OrderReport, OrderStatus},
     planner::Rejection,
     room::is_urgent,
@@ -85,7 +85,7 @@ impl Log {
         let is_known = lock(&self.state).reserve(id);
         self.journal.write(&accepted(id, source, command, moment));
         if !is_known {
-            self.admit(id, command);
+            self.admit(id, command, moment);
         }
     }
 
@@ -104,7 +104,7 @@ impl Log {
         let named = lock(&self.state).name(wanted, None)?;
         let (Named::New(id) | Named::Again(id)) = named;
         self.journal.write(&accepted(&id, source, command, moment));
-        self.admit(&id, command);
+        self.admit(&id, command, moment);
         Ok(id)
     }
 
@@ -125,7 +125,7 @@ impl Log {
             Named::Again(id) => {
                 let outcome = lock(&self.state).outcome(&id);
                 if let (Some(outcome), Some(hub)) = (outcome, &self.hub) {
-                    hub.tell_client(client, &outcome);
+                    hub.tell_client(client, outcome);
                 }
                 Ok(None)
             }
@@ -152,13 +152,13 @@ impl Log {
         let entry = accepted(&id, &Source::Viewer(client), command, moment);
         if is_urgent(command) {
             self.journal.write(&entry);
-            self.admit(&id, command);
+            self.admit(&id, command, moment);
             return then(true);
         }
         let (log, command) = (Arc::clone(self), command.clone());
         self.journal.ask(&entry, move |outcome| match outcome {
             Ok(()) => {
-                log.admit(&id, &command);
+                log.admit(&id, &command, moment);
                 then(true);
             }
             Err(reason) => {
@@ -168,23 +168,28 @@ impl Log {
                     let message = format!(
                         "it was not taken, because the journal cannot be written: {reason}; try again once it can"
                     );
-                    hub.tell_client(client, &json!({"error": {"message": message, "id": id}}));
+                    hub.tell_client(
+                        client,
+                        move || json!({"error": {"message": message, "id": id}}),
+                    );
                 }
             }
         });
     }
 
     /// Notes and tells a command that is in the journal.
-    fn admit(&self, id: &str, command: &Command) {
+    fn admit(&self, id: &str, command: &Command, moment: Moment) {
         match command {
             Command::Order(order) => {
-                let given = told_whole(order);
-                lock(&self.state).add(id, given);
+                lock(&self.state).add(id, order, moment.cycle);
                 self.tell(id);
             }
             Command::Pipelines(_) => {
                 if let Some(hub) = &self.hub {
-                    hub.tell(&json!({"pipelines": {"id": id, "status": JournalStatus::Accepted}}));
+                    let id = id.to_owned();
+                    hub.tell(
+                        move || json!({"pipelines": {"id": id, "status": JournalStatus::Accepted}}),
+                    );
                 }
             }
             _ => {}
@@ -205,7 +210,8 @@ impl Log {
             Err(reason) => json!({"error": {"message": reason, "id": id}}),
         };
         if let (Source::Viewer(client), Some(hub)) = (source, &self.hub) {
-            hub.tell_client(*client, &told);
+            let told = told.clone();
+            hub.tell_client(*client, move || told);
         }
         lock(&self.state).settle(id, told);
         match outcome {
@@ -222,6 +228,9 @@ impl Log {
             let mut state = lock(&self.state);
             let Some(order) = state.order_mut(id) else { return };
             change(order);
+            if order.status != OrderStatus::Accepted {
+                order.waits_for = None;
+            }
         }
         self.tell(id);
     }
@@ -320,7 +329,8 @@ impl Log {
         self.journal(id, JournalStatus::NotFollowed, handed_out, Some(reason), [None; 2]);
         log::warn!("{message}");
         if let Some(hub) = &self.hub {
-            hub.tell(&json!({"error": {"message": message, "id": id}}));
+            let id = id.to_owned();
+            hub.tell(move || json!({"error": {"message": message, "id": id}}));
         }
     }
 
@@ -363,22 +373,21 @@ impl Log {
 
     fn tell(&self, id: &str) {
         let Some(hub) = &self.hub else { return };
-        let state = lock(&self.state);
-        if let Some(order) = state.order(id) {
+        let known = lock(&self.state).known(id);
+        if let Some(mut order) = known {
             // The edits of an order are sent once, when it is accepted; a viewer that connects later
             // gets them in its `hello`.
-            let told = if order.status == OrderStatus::Accepted {
-                state.told(order)
-            } else {
-                json!(order)
-            };
-            hub.tell(&json!({ "order": told }));
+            if order.report.status != OrderStatus::Accepted {
+                order.given = None;
+            }
+            hub.tell(move || json!({ "order": order.told() }));
         }
     }
 
     /// The newest orders, for a viewer that connects.
     pub(crate) fn told(&self) -> Value {
-        lock(&self.state).newest()
+        let newest = lock(&self.state).newest();
+        newest.iter().map(KnownOrder::told).collect()
     }
 
     pub(crate) fn reports(&self) -> Vec<OrderReport> {

@@ -15,6 +15,10 @@ pub struct OrderReport {
     pub id: String,
     /// How far it has come.
     pub status: OrderStatus,
+    /// The cycle of the solver's last call when it came in.
+    pub cycle_accepted: u64,
+    /// What it waits for, as long as it is `accepted`.
+    pub waits_for: Option<String>,
     /// Why it was rejected, or what else there is to know.
     pub reason: Option<String>,
     /// The cycle whose step was the first to move the mesh for it.

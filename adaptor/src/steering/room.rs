@@ -1,26 +1,16 @@
 //! Room for the commands that wait, counted from when one comes in until its turn has come.
 
-use std::sync::{Arc, Mutex};
+use std::{
+    sync::{Arc, Mutex},
+    time::{Duration, Instant},
+};
 
 use tombolo_pipelines::{
     language::Command,
-    limits::{Exceeded, Limit},
+    limits::{Exceeded, PENDING, PENDING_BYTES},
 };
 
 use crate::lock::lock;
-
-/// Commands of viewers that wait.
-const PENDING: Limit = Limit {
-    what: "commands that wait",
-    most: 256,
-    of: "the commands of viewers whose turn has not come",
-};
-/// Bytes of the commands of viewers that wait.
-const PENDING_BYTES: Limit = Limit {
-    what: "bytes that wait",
-    most: 64 << 20,
-    of: "the commands of viewers whose turn has not come",
-};
 
 /// Whether a run must hear a command also where the journal cannot be written, or much else waits.
 pub(super) fn is_urgent(command: &Command) -> bool {
@@ -51,7 +41,7 @@ impl Room {
         PENDING_BYTES.check(taken.bytes.saturating_add(bytes))?;
         taken.commands += 1;
         taken.bytes += bytes;
-        Ok(Reservation { room: Arc::clone(self), bytes })
+        Ok(Reservation { room: Arc::clone(self), bytes, since: Instant::now() })
     }
 }
 
@@ -60,6 +50,14 @@ impl Room {
 pub(crate) struct Reservation {
     room: Arc<Room>,
     bytes: usize,
+    since: Instant,
+}
+
+impl Reservation {
+    /// How long it has waited.
+    pub(crate) fn age(&self) -> Duration {
+        self.since.elapsed()
+    }
 }
 
 impl Drop for Reservation {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use tombolo_deform::{edit::Edit, quality::Guard, shape::check_stack};
 use tombolo_pipelines::{
     language::{Change, Deformation},
-    limits::{Exceeded, ORDERS},
+    limits::{Exceeded, ORDERS, ORDERS_BYTES},
 };
 
 /// The change that one order made to the stack.
@@ -14,6 +14,8 @@ use tombolo_pipelines::{
 struct Entry {
     replaces: bool,
     edits: Vec<Edit>,
+    /// About how much memory the edits take.
+    bytes: usize,
     settings: ShapeSettings,
 }
 
@@ -59,6 +61,7 @@ impl EditStack {
             Change::Edits(edits) | Change::Stack(edits) => entries.push(Arc::new(Entry {
                 replaces: matches!(change, Change::Stack(_)),
                 edits: edits.clone(),
+                bytes: edits.iter().map(Edit::bytes).fold(0, usize::saturating_add),
                 settings: own(default),
             })),
             Change::Undo(count) => {
@@ -69,6 +72,7 @@ impl EditStack {
         let settings = own(entries.last().map_or(default, |entry| &entry.settings));
         let stack = Self { entries };
         ORDERS.check(stack.entries.len())?;
+        ORDERS_BYTES.check(stack.entries.iter().map(|entry| entry.bytes).sum())?;
         check_stack(stack.present())?;
         Ok((stack, settings))
     }
@@ -84,7 +88,7 @@ impl EditStack {
     /// The stack with a fraction of the last order's edits, those after the first `kept` edits of
     /// the stack.
     pub(crate) fn clamped(mut self, kept: usize, fraction: f64) -> Self {
-        let count = self.present().count();
+        let count = self.count();
         if let Some(last) = self.entries.last_mut().map(Arc::make_mut) {
             let before = count - last.edits.len();
             for (index, edit) in last.edits.iter_mut().enumerate() {
@@ -106,7 +110,12 @@ impl EditStack {
         self.present().cloned().collect()
     }
 
-    fn present(&self) -> impl Iterator<Item = &Edit> {
+    /// How many edits there are.
+    pub(crate) fn count(&self) -> usize {
+        self.present().count()
+    }
+
+    pub(crate) fn present(&self) -> impl Iterator<Item = &Edit> {
         let from = self.entries.iter().rposition(|entry| entry.replaces).unwrap_or(0);
         self.entries.iter().skip(from).flat_map(|entry| &entry.edits)
     }
@@ -179,6 +188,27 @@ mod tests {
         let replaced = after(&two, Change::Stack(vec![edit(1.0), edit(2.0), edit(8.0)]));
         assert_eq!(two.shared(&replaced), 2);
         assert_eq!(replaced.clamped(2, 0.25).edits(), [edit(1.0), edit(2.0), edit(2.0)]);
+    }
+
+    /// Whole stacks that replace one another are all kept, because undo goes back to them.
+    #[test]
+    fn what_was_replaced_counts_too() {
+        let long: Edit = serde_json::from_value(serde_json::json!({"displacement": {
+            "vertices": (0..100_000).collect::<Vec<u32>>(), "values": vec![[0.0, 0.0, 1.0]; 100_000]}}))
+        .unwrap();
+        let bytes = long.bytes();
+        assert!(bytes > 2_800_000 && bytes < 2_802_000, "{bytes}");
+        let replace = Change::Stack(vec![long]);
+        let mut stack = EditStack::default();
+        let refused = loop {
+            match stack.after(&replace, None, None, &ShapeSettings::default()) {
+                Ok((after, _)) => stack = after,
+                Err(refused) => break refused,
+            }
+        };
+        assert_eq!(stack.entries.len(), ORDERS_BYTES.most / bytes);
+        assert!(refused.to_string().contains("bytes of edits"), "{refused}");
+        assert_eq!(after(&stack, undo(1)).entries.len(), stack.entries.len() - 1);
     }
 
     #[test]

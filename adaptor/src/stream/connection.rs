@@ -4,23 +4,22 @@
 use std::{
     future::Future,
     io,
-    net::{IpAddr, SocketAddr},
+    net::IpAddr,
     pin::Pin,
     sync::{Arc, atomic::Ordering},
     task::{Context, Poll},
     time::Duration,
 };
 
-use axum::{extract::connect_info::Connected, serve::IncomingStream};
 use tokio::{
     io::{AsyncRead, AsyncWrite, ReadBuf},
-    net::{TcpListener, TcpStream},
     time::{Instant, Sleep, sleep_until},
 };
 
 use super::{
     credentials::Access,
     pool::{Guest, Pool},
+    socket::Accepted,
 };
 
 /// How long a connection may go without a request that shows a secret answered.
@@ -33,12 +32,6 @@ const REQUEST_TIME: Duration = Duration::from_secs(15);
 const SILENT_TIME: Duration = Duration::from_secs(30);
 /// How long a write may wait for a client that takes no byte.
 const WRITE_TIME: Duration = Duration::from_secs(20);
-/// Bytes that the system may hold for a client: frames that lie there are not the newest when they
-/// are read.
-const SEND_BUFFER: usize = 64 << 10;
-/// Of these, bytes that are not on their way yet when more are asked for.
-#[cfg(target_os = "linux")]
-const UNSENT: u32 = 16 << 10;
 
 /// The connection that a request came by, as a handler knows it.
 #[derive(Debug, Clone)]
@@ -48,6 +41,11 @@ pub(super) struct Connection {
 }
 
 impl Connection {
+    /// Takes in a connection from an address; where there are too many like it, another makes way.
+    pub(super) fn enter(pool: &Arc<Pool>, address: IpAddr) -> Self {
+        Self { guest: pool.enter(address), pool: Arc::clone(pool) }
+    }
+
     pub(super) fn address(&self) -> IpAddr {
         self.guest.address
     }
@@ -63,80 +61,24 @@ impl Connection {
     }
 }
 
-/// A listening socket whose connections are [`TimedStream`]s, a bounded number of them at once.
-pub(super) struct Listener {
-    socket: TcpListener,
-    pool: Arc<Pool>,
-}
-
-impl Listener {
-    /// `most` connections at once may have shown a secret.
-    pub(super) fn new(socket: TcpListener, most: usize) -> Self {
-        Self { socket, pool: Arc::new(Pool::new(most)) }
-    }
-}
-
-impl axum::serve::Listener for Listener {
-    type Io = TimedStream;
-    type Addr = SocketAddr;
-
-    async fn accept(&mut self) -> (Self::Io, Self::Addr) {
-        loop {
-            match self.socket.accept().await {
-                Ok((stream, address)) => {
-                    set_up(&stream);
-                    let ip = address.ip().to_canonical();
-                    let connection =
-                        Connection { guest: self.pool.enter(ip), pool: Arc::clone(&self.pool) };
-                    return (TimedStream::new(stream, connection), address);
-                }
-                // Out of file descriptors, or a connection that was gone before it was taken: try
-                // again a little later.
-                Err(_) => tokio::time::sleep(Duration::from_millis(100)).await,
-            }
-        }
-    }
-
-    fn local_addr(&self) -> io::Result<Self::Addr> {
-        self.socket.local_addr()
-    }
-}
-
-/// Has small messages (an order's outcome) not wait for more bytes, and little lie in the system's
-/// buffers. A socket that cannot be told so works too.
-fn set_up(stream: &TcpStream) {
-    let _ = stream.set_nodelay(true);
-    let socket = socket2::SockRef::from(stream);
-    let _ = socket.set_send_buffer_size(SEND_BUFFER);
-    #[cfg(target_os = "linux")]
-    let _ = socket.set_tcp_notsent_lowat(UNSENT);
-}
-
 /// Bytes that the client's side has not taken yet, where the system tells.
 #[cfg(target_os = "linux")]
-fn untaken(stream: &TcpStream) -> Option<i32> {
-    use std::os::fd::AsRawFd;
+fn untaken(accepted: &Accepted) -> Option<i32> {
     let mut bytes: libc::c_int = 0;
-    // SAFETY: the descriptor is open as long as `stream` is borrowed, and the request writes one
-    // integer to where `bytes` is.
-    let result = unsafe { libc::ioctl(stream.as_raw_fd(), libc::TIOCOUTQ, &raw mut bytes) };
+    // SAFETY: the descriptor is open as long as the stream is there, which is borrowed with it, and
+    // the request writes one integer to where `bytes` is.
+    let result = unsafe { libc::ioctl(accepted.descriptor, libc::TIOCOUTQ, &raw mut bytes) };
     (result == 0).then_some(bytes)
 }
 
 #[cfg(not(target_os = "linux"))]
-fn untaken(_: &TcpStream) -> Option<i32> {
+fn untaken(_: &Accepted) -> Option<i32> {
     None
 }
 
-impl Connected<IncomingStream<'_, Listener>> for Connection {
-    fn connect_info(stream: IncomingStream<'_, Listener>) -> Self {
-        stream.io().connection.clone()
-    }
-}
-
-/// A TCP stream that fails with [`io::ErrorKind::TimedOut`] instead of waiting for ever.
+/// A stream that fails with [`io::ErrorKind::TimedOut`] instead of waiting for ever.
 pub(super) struct TimedStream {
-    stream: TcpStream,
+    accepted: Accepted,
     connection: Connection,
     read_deadline: Pin<Box<Sleep>>,
     /// When a write that waits is given up, unless fewer bytes than these are untaken then.
@@ -144,13 +86,17 @@ pub(super) struct TimedStream {
 }
 
 impl TimedStream {
-    fn new(stream: TcpStream, connection: Connection) -> Self {
+    pub(super) fn new(accepted: Accepted, connection: Connection) -> Self {
         Self {
-            stream,
+            accepted,
             connection,
             read_deadline: Box::pin(sleep_until(Instant::now() + UNKNOWN_TIME)),
             write_deadline: None,
         }
+    }
+
+    pub(super) fn connection(&self) -> &Connection {
+        &self.connection
     }
 
     fn still_here(&mut self) {
@@ -177,10 +123,10 @@ impl TimedStream {
             return written;
         }
         let (deadline, before) = self.write_deadline.get_or_insert_with(|| {
-            (Box::pin(sleep_until(Instant::now() + WRITE_TIME)), untaken(&self.stream))
+            (Box::pin(sleep_until(Instant::now() + WRITE_TIME)), untaken(&self.accepted))
         });
         while deadline.as_mut().poll(context).is_ready() {
-            let now = untaken(&self.stream);
+            let now = untaken(&self.accepted);
             if now == *before {
                 return Poll::Ready(Err(timed_out("the client does not read")));
             }
@@ -213,7 +159,7 @@ impl AsyncRead for TimedStream {
         if guest.is_cut.load(Ordering::Acquire) {
             return Poll::Ready(Err(timed_out("it makes way for a newer connection")));
         }
-        let read = Pin::new(&mut this.stream).poll_read(context, buffer);
+        let read = Pin::new(&mut this.accepted.stream).poll_read(context, buffer);
         if read.is_ready() {
             // Before the upgrade a byte now and then must not keep a connection open.
             if guest.is_upgraded.load(Ordering::Relaxed) {
@@ -239,7 +185,7 @@ impl AsyncWrite for TimedStream {
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
         let this = self.get_mut();
-        let written = Pin::new(&mut this.stream).poll_write(context, bytes);
+        let written = Pin::new(&mut this.accepted.stream).poll_write(context, bytes);
         this.timed_write(context, written)
     }
 
@@ -249,19 +195,19 @@ impl AsyncWrite for TimedStream {
         slices: &[io::IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
         let this = self.get_mut();
-        let written = Pin::new(&mut this.stream).poll_write_vectored(context, slices);
+        let written = Pin::new(&mut this.accepted.stream).poll_write_vectored(context, slices);
         this.timed_write(context, written)
     }
 
     fn is_write_vectored(&self) -> bool {
-        self.stream.is_write_vectored()
+        self.accepted.stream.is_write_vectored()
     }
 
     fn poll_flush(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.get_mut().stream).poll_flush(context)
+        Pin::new(&mut self.get_mut().accepted.stream).poll_flush(context)
     }
 
     fn poll_shutdown(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.get_mut().stream).poll_shutdown(context)
+        Pin::new(&mut self.get_mut().accepted.stream).poll_shutdown(context)
     }
 }

@@ -215,9 +215,9 @@ fn first<const N: usize>(given: [(&str, Option<String>); N]) -> Result<Secret, S
     }
 }
 
-/// Reads a file of secrets, which nobody but its owner may read.
-fn read(path: &Path) -> Result<SecretsFile, StreamError> {
-    let wrong = |reason: &str| StreamError::Secrets(format!("{}: {reason}", path.display()));
+/// Opens a file that holds a secret, which nobody but its owner may read; the message says why not.
+pub(super) fn open_private(path: &Path) -> Result<File, String> {
+    let wrong = |reason: &str| format!("{}: {reason}", path.display());
     let failed = |error: std::io::Error| wrong(&error.to_string());
     let file = File::open(path).map_err(failed)?;
     let metadata = file.metadata().map_err(failed)?;
@@ -228,6 +228,14 @@ fn read(path: &Path) -> Result<SecretsFile, StreamError> {
     if std::os::unix::fs::PermissionsExt::mode(&metadata.permissions()) & 0o077 != 0 {
         return Err(wrong("others than its owner can get at it; `chmod 600` it"));
     }
+    Ok(file)
+}
+
+/// Reads a file of secrets.
+fn read(path: &Path) -> Result<SecretsFile, StreamError> {
+    let wrong = |reason: &str| StreamError::Secrets(format!("{}: {reason}", path.display()));
+    let failed = |error: std::io::Error| wrong(&error.to_string());
+    let file = open_private(path).map_err(StreamError::Secrets)?;
     let mut text = String::new();
     file.take(FILE).read_to_string(&mut text).map_err(failed)?;
     // The parser's own words could quote a secret.

@@ -154,7 +154,9 @@ fn trade(shared: &Shared, request: &Request) -> Option<Response> {
 fn cookie(shared: &Shared, headers: &HeaderMap, access: Access) -> Option<HeaderValue> {
     let id = shared.credentials.begin(access).ok()?;
     let name = cookie_name(headers);
-    HeaderValue::from_str(&format!("{name}={}; HttpOnly; SameSite=Strict", id.as_str())).ok()
+    let secure = if shared.is_encrypted { "; Secure" } else { "" };
+    let cookie = format!("{name}={}; HttpOnly; SameSite=Strict{secure}", id.as_str());
+    HeaderValue::from_str(&cookie).ok()
 }
 
 /// Why a request is refused for the name or the page that it comes by.

@@ -15,12 +15,16 @@ use std::{
 };
 
 use serde_json::{Map, Value, json};
+use tombolo_deform::edit::Edit;
 use tombolo_pipelines::{encode::Encoded, language::Pipeline, run::Cost};
 
 use super::{
     ReferenceSurface, StreamCounts,
     credentials::Access,
     outbox::{Client, Frame},
+    pace::LEVELS,
+    stack::ToldStack,
+    text::Text,
     wheel::Wheel,
 };
 use crate::lock::{lock, wait};
@@ -28,12 +32,12 @@ use crate::lock::{lock, wait};
 /// How often it is looked for a viewer that is waited for.
 const LOOK_AGAIN: Duration = Duration::from_millis(20);
 
-/// Encodes a frame on the encoder's thread, as a key frame or as the next of its chain; the message
-/// says why it could not be done.
-pub(crate) type Encode = Arc<dyn Fn(bool) -> Result<Encoded, String> + Send + Sync>;
+/// Encodes a frame on the encoder's thread at one of the [`LEVELS`], as a key frame or as the next of
+/// its chain; the message says why it could not be done.
+pub(crate) type Encode = Arc<dyn Fn(usize, bool) -> Result<Encoded, String> + Send + Sync>;
 
-/// Writes the stack of edits out.
-pub(super) type TellStack = Arc<dyn Fn() -> Value + Send + Sync>;
+/// Makes what `hello` says of the run.
+type Describe = Arc<dyn Fn() -> Map<String, Value> + Send + Sync>;
 
 /// How a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -87,12 +91,15 @@ struct Counters {
 
 #[derive(Default)]
 struct View {
+    name: Arc<str>,
     /// The extract that is newer than the last frame.
     waiting: Option<Encode>,
     /// The extract of the last frame.
     newest: Option<Encode>,
-    /// Somebody cannot go on without a key frame.
-    key_wanted: bool,
+    /// The levels at which it is still to be encoded.
+    pending: [bool; LEVELS],
+    /// The levels at which somebody cannot go on without a key frame.
+    key_wanted: [bool; LEVELS],
 }
 
 /// The answer to a viewer that connects.
@@ -104,13 +111,12 @@ pub(super) enum Arrival {
 /// The viewers, and the newest message of each kind for them.
 #[derive(Default)]
 pub(super) struct HubState {
-    description: Arc<Map<String, Value>>,
-    stack: Option<TellStack>,
+    description: Option<Describe>,
+    stack: ToldStack,
     pub(super) conditions: Map<String, Value>,
     /// By their numbers, which no later view gets again.
     views: BTreeMap<usize, View>,
-    /// The pipelines as JSON.
-    pipelines: Arc<str>,
+    pipelines: Option<Arc<[Pipeline]>>,
     surface: Option<Arc<ReferenceSurface>>,
     pub(super) clients: BTreeMap<u64, Arc<Client>>,
     /// Somebody inside the program who is told what viewers are told.
@@ -155,17 +161,32 @@ impl Hub {
         state.status_dirty = true;
     }
 
-    /// Replaces what `hello` tells about the run, and tells it to every viewer again.
-    /// `stack` says what the stack of edits is; it is asked by the stream's thread.
+    /// Replaces what `hello` tells about the run, and has it told to every viewer again. The stream's
+    /// thread asks for it.
     pub(crate) fn describe(
         &self,
-        description: Map<String, Value>,
-        stack: impl Fn() -> Value + Send + Sync + 'static,
+        description: impl Fn() -> Map<String, Value> + Send + Sync + 'static,
     ) {
         let mut state = lock(&self.state);
-        state.description = Arc::new(description);
-        state.stack = Some(Arc::new(stack));
+        state.description = Some(Arc::new(description));
         state.greet();
+    }
+
+    /// Replaces the stack of edits: so many, of which the first `kept` are those of before; so many
+    /// orders can be taken back. `visit` calls back with the edits from one on, until it is told
+    /// that it is enough.
+    pub(crate) fn stack(
+        &self,
+        counts: [usize; 3],
+        visit: impl Fn(usize, &mut dyn FnMut(&Edit) -> bool) + Send + Sync + 'static,
+    ) {
+        let mut state = lock(&self.state);
+        let (stack, change) = state.stack.changed(counts, Arc::new(visit));
+        let before = std::mem::replace(&mut state.stack, stack);
+        state.audience().for_each(|client| client.stack(change));
+        drop(state);
+        // It may be long, and nobody waits for the lock.
+        drop(before);
     }
 
     /// Offers the surface from which shapes are measured.
@@ -199,35 +220,38 @@ impl Hub {
         }
     }
 
-    /// Tells every viewer, one after the other, and drops none of it.
-    pub(crate) fn tell(&self, message: &Value) {
-        let text: Arc<str> = message.to_string().into();
+    /// Tells every viewer, one after the other, and drops none of it. The stream's thread makes the
+    /// message and writes it out.
+    pub(crate) fn tell(&self, message: impl FnOnce() -> Value + Send + 'static) {
+        let text = Text::of(message);
         lock(&self.state).audience().for_each(|client| client.text(&text));
     }
 
     /// Tells one viewer, if it is still there.
-    pub(crate) fn tell_client(&self, client: u64, message: &Value) {
+    pub(crate) fn tell_client(
+        &self,
+        client: u64,
+        message: impl FnOnce() -> Value + Send + 'static,
+    ) {
         if let Some(client) = lock(&self.state).clients.get(&client) {
-            client.text(&message.to_string().into());
+            client.text(&Text::of(message));
         }
     }
 
     /// Tells the values of monitors; a viewer that is behind misses the oldest.
-    pub(crate) fn monitor(&self, message: &Value) {
-        let state = lock(&self.state);
-        if !state.has_audience() {
-            return;
-        }
-        let text: Arc<str> = message.to_string().into();
-        state.audience().for_each(|client| client.monitor(&text));
+    pub(crate) fn monitor(&self, message: impl FnOnce() -> Value + Send + 'static) {
+        let text = Text::of(message);
+        lock(&self.state).audience().for_each(|client| client.monitor(&text));
     }
 
     /// Hands over the newest extract of a view. The one before it, if nobody came to encode it, is
     /// dropped.
-    pub(crate) fn frame(&self, view: usize, encode: Encode) {
+    pub(crate) fn frame(&self, view: usize, name: &Arc<str>, encode: Encode) {
         let mut state = lock(&self.state);
         let watched = state.has_audience();
-        if state.views.entry(view).or_default().waiting.replace(encode).is_some() && watched {
+        let named = || View { name: Arc::clone(name), ..View::default() };
+        let known = state.views.entry(view).or_insert_with(named);
+        if known.waiting.replace(encode).is_some() && watched {
             self.counters.dropped.fetch_add(1, Ordering::Relaxed);
         }
         if watched {
@@ -242,9 +266,10 @@ impl Hub {
         state.audience().for_each(|client| client.forget(view));
     }
 
-    /// Offers the pipelines as JSON.
+    /// Offers the pipelines as they are now.
     pub(crate) fn offer_pipelines(&self, pipelines: &[Pipeline]) {
-        lock(&self.state).pipelines = json!(pipelines).to_string().into();
+        let pipelines: Arc<[Pipeline]> = pipelines.into();
+        lock(&self.state).pipelines = Some(pipelines);
     }
 
     pub(crate) fn counts(&self) -> StreamCounts {
@@ -280,13 +305,14 @@ impl Hub {
     pub(crate) fn encode_until_closed(&self) {
         loop {
             let mut state = lock(&self.state);
-            let (view, encode, key) = loop {
+            let (view, encode, level, key) = loop {
                 if state.closed {
                     return;
                 }
-                let watched = state.has_audience();
-                let mut views = state.views.iter_mut().filter(|_| watched);
-                let waiting = views.find_map(|(&number, view)| view.due(number));
+                let HubState { views, clients, observer, .. } = &mut *state;
+                let audience = || clients.values().chain(&*observer);
+                let mut views = views.iter_mut().filter(|_| audience().next().is_some());
+                let waiting = views.find_map(|(&number, view)| view.due(number, audience()));
                 match waiting {
                     Some(found) => break found,
                     None => state = wait(&self.work, state),
@@ -294,12 +320,13 @@ impl Hub {
             };
             drop(state);
             // A frame that cannot be encoded must not take the others with it.
-            let encoded = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| encode(key)))
-                .unwrap_or_else(|_| Err("the encoder failed".into()));
+            let encoded =
+                std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| encode(level, key)))
+                    .unwrap_or_else(|_| Err("the encoder failed".into()));
             match encoded {
-                Ok(encoded) => self.publish(view, &Arc::new(Frame::new(encoded))),
+                Ok(encoded) => self.publish(view, &Arc::new(Frame::new(encoded, level))),
                 Err(reason) => self.tell(
-                    &json!({"error": {"message": format!("a frame was not encoded: {reason}")}}),
+                    move || json!({"error": {"message": format!("a frame was not encoded: {reason}")}}),
                 ),
             }
         }
@@ -307,27 +334,33 @@ impl Hub {
 
     fn publish(&self, view: usize, frame: &Arc<Frame>) {
         let state = lock(&self.state);
-        if !state.views.contains_key(&view) {
-            // It was let go of while it was encoded.
-            return;
-        }
+        // It may have been let go of while it was encoded.
+        let Some(name) = state.views.get(&view).map(|view| &view.name) else { return };
         for client in state.audience() {
-            let missed = client.frame(view, frame) as u64;
+            let missed = client.frame(view, name, frame) as u64;
             self.counters.dropped.fetch_add(missed, Ordering::Relaxed);
         }
     }
 }
 
 impl View {
-    /// The extract to encode next, and whether as a key frame.
-    fn due(&mut self, index: usize) -> Option<(usize, Encode, bool)> {
-        if let Some(waiting) = self.waiting.take() {
+    /// What is to be encoded, at which level, and whether as a key frame.
+    fn due<'a>(
+        &mut self,
+        index: usize,
+        audience: impl Iterator<Item = &'a Arc<Client>>,
+    ) -> Option<(usize, Encode, usize, bool)> {
+        // Each extract is encoded at every level that somebody is at, so that none is left out.
+        if !self.pending.contains(&true)
+            && let Some(waiting) = self.waiting.take()
+        {
             self.newest = Some(waiting);
-        } else if !self.key_wanted {
-            return None;
+            audience.for_each(|client| self.pending[client.level(index)] = true);
         }
-        let key = std::mem::take(&mut self.key_wanted);
-        self.newest.clone().map(|encode| (index, encode, key))
+        let level = (0..LEVELS).find(|&level| self.pending[level] || self.key_wanted[level])?;
+        self.pending[level] = false;
+        let key = std::mem::take(&mut self.key_wanted[level]);
+        self.newest.clone().map(|encode| (index, encode, level, key))
     }
 }
 
@@ -364,7 +397,7 @@ impl Hub {
         self.status();
         let (cycle, time) = self.clock.get();
         let how = lock(&self.state).end.name();
-        self.tell(&json!({"end": {"how": how, "cycle": cycle, "time": time}}));
+        self.tell(move || json!({"end": {"how": how, "cycle": cycle, "time": time}}));
         for client in lock(&self.state).clients.values() {
             client.end();
         }
@@ -375,10 +408,10 @@ impl Hub {
         !lock(&self.state).clients.is_empty()
     }
 
-    /// Has the encoder make a key frame of a view, of its newest extract.
-    pub(crate) fn want_key(&self, view: usize) {
+    /// Has the encoder make a key frame of a view at a level, of its newest extract.
+    pub(crate) fn want_key(&self, view: usize, level: usize) {
         if let Some(view) = lock(&self.state).views.get_mut(&view) {
-            view.key_wanted = true;
+            view.key_wanted[level] = true;
         }
         self.work.notify_one();
     }
@@ -387,18 +420,24 @@ impl Hub {
         lock(&self.state).surface.clone()
     }
 
-    pub(super) fn pipelines(&self) -> Arc<str> {
-        Arc::clone(&lock(&self.state).pipelines)
+    pub(super) fn told_stack(&self) -> ToldStack {
+        lock(&self.state).stack.clone()
+    }
+
+    /// The pipelines as JSON.
+    pub(super) fn pipelines(&self) -> String {
+        let pipelines = lock(&self.state).pipelines.clone();
+        json!(pipelines.unwrap_or_default()).to_string()
     }
 
     pub(super) fn has_view(&self, view: usize) -> bool {
         lock(&self.state).views.contains_key(&view)
     }
 
-    /// What `hello` tells about the run, and what the stack of edits is.
-    pub(super) fn described(&self) -> (Arc<Map<String, Value>>, Option<TellStack>) {
-        let state = lock(&self.state);
-        (Arc::clone(&state.description), state.stack.clone())
+    /// What `hello` tells about the run.
+    pub(super) fn described(&self) -> Map<String, Value> {
+        let description = lock(&self.state).description.clone();
+        description.map(|describe| describe()).unwrap_or_default()
     }
 
     /// Has the encoder look whether there is something to do.
@@ -406,18 +445,20 @@ impl Hub {
         self.work.notify_one();
     }
 
-    /// The `hello` of a viewer; the first has the orders so far.
-    pub(super) fn hello(&self, client: u64, orders: Option<Value>) -> Arc<str> {
-        // Nothing long is written while the solver could wait for the lock.
-        let (description, stack, is_driver, viewer) = {
+    /// The `hello` of a viewer; the first has the orders so far, and what there is of the stack.
+    pub(super) fn hello(&self, client: u64, orders: Option<Value>) -> String {
+        // Nothing is written while the solver could wait for the lock.
+        let (stack, is_driver, viewer) = {
             let state = lock(&self.state);
             let is_driver = state.wheel.driver() == Some(client);
             let viewer = state.clients.get(&client).cloned();
-            (Arc::clone(&state.description), state.stack.clone(), is_driver, viewer)
+            (state.stack.clone(), is_driver, viewer)
         };
-        let mut hello = Map::clone(&description);
-        hello.insert("stack".into(), stack.map_or_else(|| json!([]), |stack| stack()));
-        hello.extend(orders.map(|orders| ("orders".into(), orders)));
+        let mut hello = self.described();
+        if let Some(orders) = orders {
+            hello.insert("stack".into(), stack.described());
+            hello.insert("orders".into(), orders);
+        }
         hello.insert("client".into(), name(client).into());
         let role = if is_driver { "driver" } else { "watcher" };
         hello.insert("role".into(), role.into());
@@ -425,21 +466,29 @@ impl Hub {
             hello.insert("back".into(), client.back.as_str().into());
             hello.insert("may_drive".into(), (client.access == Access::Drive).into());
         }
-        json!({ "hello": hello }).to_string().into()
+        json!({ "hello": hello }).to_string()
     }
 
     /// Puts a status into every outbox if anything in it changed. Called a few times a second.
     pub(crate) fn status(&self) {
+        // The solver could wait for the lock: what is told is copied under it, and written later.
+        let Some(status) = self.new_status() else { return };
+        let text = Text::of(move || json!({ "status": status() }));
+        lock(&self.state).audience().for_each(|client| client.status(&text));
+    }
+
+    /// The status, where it has changed.
+    fn new_status(&self) -> Option<impl FnOnce() -> Map<String, Value> + Send + use<>> {
         let (cycle, time) = self.clock.get();
         let mut state = lock(&self.state);
         if !state.has_audience() {
             state.last_status = None;
-            return;
+            return None;
         }
         let now = Instant::now();
         let before = state.last_status;
         if before.is_some_and(|(last, _)| last == cycle) && !state.status_dirty {
-            return;
+            return None;
         }
         state.status_dirty = false;
         // Measured over the steps since the last status, so that the solver need not look at a
@@ -453,23 +502,22 @@ impl Hub {
             state.last_status = Some((cycle, now));
         }
         let mut status = state.conditions.clone();
-        status.insert("cycle".into(), cycle.into());
-        status.insert("time".into(), time.into());
-        if let Some(seconds) = step_seconds {
-            status.insert("step_seconds".into(), seconds.into());
-        } else {
-            status.insert("step_seconds".into(), Value::Null);
-        }
-        status.insert("viewers".into(), state.clients.len().into());
-        status.insert("driver".into(), state.wheel.driver().map(name).into());
-        status.insert("journal_lost".into(), state.journal_lost.clone().into());
-        let pipeline = |(name, cost): &(String, Cost)| {
-            json!({"name": name, "runs": cost.runs, "seconds": cost.seconds, "bytes": cost.bytes,
-                   "memory": cost.memory, "every": cost.every})
-        };
-        status.insert("pipelines".into(), state.costs.iter().map(pipeline).collect());
-        let text: Arc<str> = json!({ "status": status }).to_string().into();
-        state.audience().for_each(|client| client.status(&text));
+        let (viewers, driver) = (state.clients.len(), state.wheel.driver());
+        let (journal_lost, costs) = (state.journal_lost.clone(), state.costs.clone());
+        Some(move || {
+            status.insert("cycle".into(), cycle.into());
+            status.insert("time".into(), time.into());
+            status.insert("step_seconds".into(), step_seconds.into());
+            status.insert("viewers".into(), viewers.into());
+            status.insert("driver".into(), driver.map(name).into());
+            status.insert("journal_lost".into(), journal_lost.into());
+            let pipeline = |(name, cost): &(String, Cost)| {
+                json!({"name": name, "runs": cost.runs, "seconds": cost.seconds, "bytes": cost.bytes,
+                       "memory": cost.memory, "every": cost.every})
+            };
+            status.insert("pipelines".into(), costs.iter().map(pipeline).collect());
+            status
+        })
     }
 
     pub(super) fn sent(&self, bytes: usize, frame: &Frame) {

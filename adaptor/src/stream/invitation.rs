@@ -41,7 +41,7 @@ impl Server {
     /// a link itself told: what is printed elsewhere others may read.
     pub(crate) fn invitation(&mut self, directory: &Path, terminal: bool) -> io::Result<String> {
         std::fs::create_dir_all(directory)?;
-        let path = directory.join(format!("tombolo-{}.link", self.address.port()));
+        let path = directory.join(format!("tombolo-{}.link", self.called()));
         let text = format!("drive: {}\nwatch: {}\n", self.link(), self.watching_link());
         // First the old one goes, which may be the same file.
         self.links = None;
@@ -49,11 +49,18 @@ impl Server {
         // Whoever reads it may stand elsewhere.
         let path = std::path::absolute(&path).unwrap_or(path);
         let path = path.display();
-        Ok(match self.browser_link().filter(|_| terminal) {
+        let certificate = self.fingerprint().map_or_else(String::new, |fingerprint| {
+            let pairs: Vec<&str> = (0..fingerprint.len() / 2)
+                .filter_map(|at| fingerprint.get(2 * at..2 * at + 2))
+                .collect();
+            format!("\nits certificate has the SHA-256 fingerprint {}", pairs.join(":"))
+        });
+        let invitation = match self.browser_link().filter(|_| terminal) {
             Some(link) => format!(
                 "open {link}\nIt opens one browser, once; links for others, and to watch only, are in {path}"
             ),
             None => format!("the links to this run are in {path}"),
-        })
+        };
+        Ok(invitation + &certificate)
     }
 }

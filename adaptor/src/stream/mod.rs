@@ -1,7 +1,7 @@
 //! The server that viewers connect to, on a thread of its own.
 //!
 //! It serves the viewer's files at `/`, one WebSocket at `/ws`, the reference surface at `/surface`,
-//! the pipelines at `/pipelines`, the schema of one at `/schema` and that of an order at
+//! the stack of edits at `/stack`, the pipelines at `/pipelines`, the schema of one at `/schema` and that of an order at
 //! `/schema/order`, and `/metrics` (the protocol is in
 //! `docs/protocol.md`). Nothing that a client does reaches the solver but commands that were read
 //! and found valid.
@@ -14,8 +14,8 @@
 //! seconds, or says nothing for 30, is let go; connections that have shown no secret make way for
 //! newer ones.
 //!
-//! What it does not: it does not encrypt. Over an open network use an SSH tunnel to the loopback
-//! address. Who is trusted with what is in `docs/security.md`.
+//! Connections to any address but loopback are encrypted (TLS 1.3), unless the configuration says
+//! that they are not. Who is trusted with what is in `docs/security.md`.
 //!
 //! [`StreamLimits`]: tombolo_pipelines::language::StreamLimits
 
@@ -25,20 +25,27 @@ mod credentials;
 mod gate;
 mod hub;
 mod invitation;
+mod listener;
 mod metrics;
 mod observer;
 mod outbox;
 mod playback;
+mod pace;
 mod pool;
 mod seats;
 mod secret;
+mod secured;
 mod session;
+mod socket;
+mod stack;
 mod surface;
+mod text;
+mod tls;
 mod viewer_files;
 mod wheel;
 
 use std::{
-    net::{SocketAddr, TcpListener},
+    net::SocketAddr,
     path::Path,
     sync::{Arc, Mutex},
     thread::JoinHandle,
@@ -48,17 +55,20 @@ use std::{
 use axum::{
     Extension, Router,
     extract::{
-        ConnectInfo, Request, State, WebSocketUpgrade, ws::rejection::WebSocketUpgradeRejection,
+        ConnectInfo, Query, Request, State, WebSocketUpgrade,
+        ws::rejection::WebSocketUpgradeRejection,
     },
     http::{HeaderName, StatusCode, Uri, header},
     middleware,
     response::{IntoResponse, Response},
     routing::get,
 };
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use tokio::sync::oneshot;
 use tombolo_pipelines::{
-    language::{JournalNote, Message, StreamLimits, StreamServer, order_schema, pipeline_schema},
+    language::{
+        JournalNote, Listen, Message, StreamLimits, StreamServer, order_schema, pipeline_schema,
+    },
     limits::DOCUMENT,
 };
 
@@ -66,12 +76,17 @@ use crate::lock::lock;
 
 pub(crate) use hub::{Clock, End, Hub};
 pub(crate) use observer::{Observer, Told};
+pub(crate) use pace::{COARSER, LEVELS};
 pub(crate) use surface::ReferenceSurface;
 
-use connection::{Connection, Listener};
+use connection::Connection;
 use credentials::{Access, Credentials, Holder, parameter};
 use gate::Refusals;
 use hub::Arrival;
+use listener::Listener;
+use socket::{Place, Socket};
+use tls::Identity;
+use tokio_rustls::TlsAcceptor;
 use viewer_files::ViewerFiles;
 
 /// The largest message that is read at all, in bytes: so much more than a document may have that
@@ -132,17 +147,17 @@ pub struct StreamCounts {
 pub enum StreamError {
     /// Another program listens there already.
     #[error(
-        "stream.listen: {address} is in use by another program; choose another port, or port 0 for any that is free"
+        "stream.listen: {address} is in use by another program; choose another port or path, or port 0 for any that is free"
     )]
     InUse {
-        /// The address.
-        address: SocketAddr,
+        /// The address or path.
+        address: Listen,
     },
     /// The system refuses to listen there.
     #[error("stream.listen: cannot listen on {address}: {source}")]
     Listen {
-        /// The address.
-        address: SocketAddr,
+        /// The address or path.
+        address: Listen,
         /// The system's reason.
         source: std::io::Error,
     },
@@ -152,6 +167,9 @@ pub enum StreamError {
     /// A secret that was given cannot be taken.
     #[error("stream.secrets: {0}")]
     Secrets(String),
+    /// Connections cannot be encrypted as the settings say.
+    #[error("stream.tls: {0}")]
+    Tls(String),
     /// A thread could not be started.
     #[error("the stream's threads could not be started: {0}")]
     Thread(std::io::Error),
@@ -162,7 +180,8 @@ const END_TIME: Duration = Duration::from_secs(1);
 
 /// A running server. Dropping it ends its threads.
 pub(crate) struct Server {
-    address: SocketAddr,
+    place: Place,
+    identity: Option<Identity>,
     credentials: Arc<Credentials>,
     hub: Arc<Hub>,
     links: Option<invitation::LinkFile>,
@@ -178,6 +197,7 @@ struct Shared {
     commands: Arc<dyn CommandSink>,
     files: ViewerFiles,
     loopback: bool,
+    is_encrypted: bool,
     limits: StreamLimits,
     /// The recording that is served in place of a run.
     playback: Option<Arc<playback::Shown>>,
@@ -205,20 +225,15 @@ impl Server {
         commands: Arc<dyn CommandSink>,
         playback: Option<Arc<playback::Shown>>,
     ) -> Result<Self, StreamError> {
-        let wanted = settings.listen;
-        let socket = TcpListener::bind(wanted).map_err(|source| match source.kind() {
-            std::io::ErrorKind::AddrInUse => StreamError::InUse { address: wanted },
-            _ => StreamError::Listen { address: wanted, source },
+        let (socket, place) = Socket::bind(&settings.listen).map_err(|source| {
+            let address = settings.listen.clone();
+            match source.kind() {
+                std::io::ErrorKind::AddrInUse => StreamError::InUse { address },
+                _ => StreamError::Listen { address, source },
+            }
         })?;
-        let listen_error = |source| StreamError::Listen { address: wanted, source };
-        let address = socket.local_addr().map_err(listen_error)?;
-        socket.set_nonblocking(true).map_err(listen_error)?;
-        if !address.ip().is_loopback() {
-            log::warn!(
-                "viewers reach {address} from other machines, and what they send and see can be \
-                 read on the way; an SSH tunnel to a server on 127.0.0.1 keeps it private"
-            );
-        }
+        let identity = identity(settings, &place)?;
+        let loopback = matches!(&place, Place::Address(address) if address.ip().is_loopback());
         let credentials = Arc::new(Credentials::of(settings)?);
         hub.set_driver_silence(Duration::from_secs(settings.limits.driver_silence.get().into()));
         let shared = Shared {
@@ -227,7 +242,8 @@ impl Server {
             hub: Arc::clone(&hub),
             commands,
             files: ViewerFiles::find(),
-            loopback: address.ip().is_loopback(),
+            loopback,
+            is_encrypted: identity.is_some(),
             limits: settings.limits,
             playback,
         };
@@ -236,8 +252,10 @@ impl Server {
             .enable_all()
             .build()
             .map_err(StreamError::Thread)?;
+        let acceptor = identity.as_ref().map(|identity| identity.acceptor.clone());
         let mut server = Self {
-            address,
+            place,
+            identity,
             credentials,
             hub: Arc::clone(&hub),
             links: None,
@@ -245,15 +263,36 @@ impl Server {
             threads: Vec::new(),
         };
         let thread = |name: &str| std::thread::Builder::new().name(name.into());
-        let serving = move || serve_until_stopped(&runtime, &socket, &shared, stopped);
+        let serving = move || {
+            serve_until_stopped(&runtime, (&socket, acceptor.as_ref()), &shared, stopped);
+        };
         server.threads.push(thread("tombolo-stream").spawn(serving).map_err(StreamError::Thread)?);
         let encoding = move || while went_wrong("encoder", || hub.encode_until_closed()) {};
         server.threads.push(thread("tombolo-encode").spawn(encoding).map_err(StreamError::Thread)?);
         Ok(server)
     }
 
-    pub(crate) fn address(&self) -> SocketAddr {
-        self.address
+    /// The address that it listens on; `None` for a socket at a path.
+    pub(crate) fn address(&self) -> Option<SocketAddr> {
+        match self.place {
+            Place::Address(address) => Some(address),
+            Place::Socket(_) => None,
+        }
+    }
+
+    /// SHA-256 of its certificate, where connections are encrypted.
+    fn fingerprint(&self) -> Option<&str> {
+        self.identity.as_ref().map(|identity| &*identity.fingerprint)
+    }
+
+    /// The name of its file of links: the port, or that of its socket.
+    fn called(&self) -> String {
+        match &self.place {
+            Place::Address(address) => address.port().to_string(),
+            Place::Socket(path) => {
+                path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+            }
+        }
     }
 
     /// The link of those who drive, with their secret.
@@ -274,14 +313,48 @@ impl Server {
     }
 
     fn link_with(&self, name: &str, secret: &str) -> String {
-        let port = self.address.port();
-        let host = match self.address.ip() {
-            ip if ip.is_unspecified() => machine(),
-            _ => None,
+        let address = match &self.place {
+            Place::Address(address) => *address,
+            Place::Socket(path) => return format!("unix:{}?{name}={secret}", path.display()),
         };
-        let authority = host.map_or(self.address.to_string(), |name| format!("{name}:{port}"));
-        format!("http://{authority}/?{name}={secret}")
+        let host = machine().filter(|_| address.ip().is_unspecified());
+        let authority =
+            host.map_or(address.to_string(), |name| format!("{name}:{}", address.port()));
+        // What stands behind the `#` no browser sends; programs know the certificate by it.
+        match self.fingerprint() {
+            Some(fingerprint) => {
+                format!("https://{authority}/?{name}={secret}#sha256={fingerprint}")
+            }
+            None => format!("http://{authority}/?{name}={secret}"),
+        }
     }
+}
+
+/// The certificate of a server, where its connections are to be encrypted: always where others than
+/// this machine reach it, unless that was expressly not wanted.
+fn identity(settings: &StreamServer, place: &Place) -> Result<Option<Identity>, StreamError> {
+    let wrong = |reason: &str| Err(StreamError::Tls(reason.into()));
+    let address = match (place, &settings.tls, settings.insecure) {
+        (_, Some(_), true) => return wrong("`insecure` says that nothing is encrypted"),
+        (Place::Socket(_), Some(_), _) => {
+            return wrong("what goes through a socket at a path never leaves the machine");
+        }
+        (Place::Socket(_), None, _) => return Ok(None),
+        (Place::Address(address), _, _) => address,
+    };
+    let is_open = !address.ip().is_loopback();
+    if settings.tls.is_none() && (!is_open || settings.insecure) {
+        if is_open {
+            log::warn!(
+                "viewers reach {address} from other machines, and what they send and see can be \
+                 read on the way, because `stream.insecure` says so"
+            );
+        }
+        return Ok(None);
+    }
+    let names = [Some("localhost".to_owned()), machine(), Some(address.ip().to_string())];
+    let names = names.into_iter().flatten().collect();
+    Identity::of(&settings.tls.clone().unwrap_or_default(), names).map(Some)
 }
 
 /// The machine's name in its network, as far as the system tells it.
@@ -324,34 +397,34 @@ fn went_wrong(what: &'static str, act: impl FnOnce()) -> bool {
 
 fn serve_until_stopped(
     runtime: &tokio::runtime::Runtime,
-    socket: &TcpListener,
+    (socket, acceptor): (&Socket, Option<&TlsAcceptor>),
     shared: &Shared,
     mut stopped: oneshot::Receiver<()>,
 ) {
     while went_wrong("server", || {
-        let socket = socket.try_clone().and_then(|socket| {
+        let listening = {
             let _context = runtime.enter();
-            tokio::net::TcpListener::from_std(socket)
-        });
-        match socket {
-            Ok(socket) => runtime.block_on(serve(socket, shared.clone(), &mut stopped)),
+            socket.listener()
+        };
+        let most = shared.limits.connections.get() as usize;
+        match listening {
+            Ok(listening) => {
+                let listener = Listener::new(listening, acceptor.cloned(), most);
+                runtime.block_on(serve(listener, shared.clone(), &mut stopped));
+            }
             Err(error) => log::error!("the server of the stream cannot go on: {error}"),
         }
     }) && !shared.hub.is_closed()
     {}
 }
 
-async fn serve(
-    socket: tokio::net::TcpListener,
-    shared: Shared,
-    stopped: &mut oneshot::Receiver<()>,
-) {
+async fn serve(listener: Listener, shared: Shared, stopped: &mut oneshot::Receiver<()>) {
     let hub = Arc::clone(&shared.hub);
     let commands = Arc::clone(&shared.commands);
-    let listener = Listener::new(socket, shared.limits.connections.get() as usize);
     let router = Router::new()
         .route("/ws", get(upgrade))
         .route("/surface", get(reference_surface))
+        .route("/stack", get(stack_of_edits))
         .route("/pipelines", get(pipelines))
         .route("/schema", get(schema))
         .route("/schema/order", get(schema_of_order))
@@ -441,11 +514,39 @@ async fn reference_surface(State(shared): State<Shared>) -> Response {
     }
 }
 
+/// The part of an address that says from which edit on; and of a recording, which stack.
+#[derive(Deserialize)]
+struct Wanted {
+    #[serde(default)]
+    from: usize,
+    revision: Option<u64>,
+}
+
+/// The edits that make the shape, from one on: as many as go into one answer.
+async fn stack_of_edits(
+    State(shared): State<Shared>,
+    Query(Wanted { from, revision }): Query<Wanted>,
+) -> Response {
+    // Elsewhere: the others are served while it is written out.
+    let written = move || {
+        let answer = match &shared.playback {
+            Some(shown) => shown.stack(revision, from)?,
+            None => shared.hub.told_stack().answer(from),
+        };
+        Some(serde_json::to_vec(&answer))
+    };
+    match tokio::task::spawn_blocking(written).await {
+        Ok(Some(Ok(answer))) => (JSON, answer).into_response(),
+        Ok(None) => (StatusCode::NOT_FOUND, "there is no such stack of edits\n").into_response(),
+        _ => StatusCode::INTERNAL_SERVER_ERROR.into_response(),
+    }
+}
+
 const JSON: [(HeaderName, &str); 1] = [(header::CONTENT_TYPE, "application/json")];
 
 /// The pipelines as they are now, as JSON.
 async fn pipelines(State(shared): State<Shared>) -> Response {
-    (JSON, shared.hub.pipelines().to_string()).into_response()
+    (JSON, shared.hub.pipelines()).into_response()
 }
 
 /// The JSON Schema of a pipeline.

@@ -3,13 +3,15 @@
 use std::{io, sync::Arc, time::Duration};
 
 use axum::body::Bytes;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::{
     credentials::Access,
     hub::Hub,
     outbox::{Client, Message},
     secret::Secret,
+    stack::StackChange,
+    text::Text,
 };
 use crate::lock::lock;
 
@@ -18,11 +20,13 @@ pub(crate) enum Told {
     /// The run is described anew.
     Hello,
     /// A text message.
-    Text(Arc<str>),
+    Text(Text),
+    /// The stack of edits has changed.
+    Stack(StackChange),
     /// A frame; a key frame with its topology.
     Frame { view: usize, is_key: bool, bytes: Bytes },
-    /// Frames of a view were missed: a key frame of it is needed.
-    Behind(usize),
+    /// Frames of a view were missed: a key frame of it is needed, at this level.
+    Behind(usize, usize),
     /// So much was left unread that the rest is not told.
     TooMuch,
     /// Nothing comes any more.
@@ -54,16 +58,22 @@ impl Observer {
             Ok(message) => match message? {
                 Message::Hello { .. } => Told::Hello,
                 Message::Text(text) => Told::Text(text),
+                Message::Stack(change) => Told::Stack(change),
                 Message::Frame(view, frame) => {
                     let is_key = frame.is_key();
                     let bytes = if is_key { frame.with_topology() } else { frame.message.clone() };
                     Told::Frame { view, is_key, bytes }
                 }
-                Message::Behind(view) => Told::Behind(view),
+                Message::Behind(view, level) => Told::Behind(view, level),
                 Message::End => Told::End,
             },
             Err(_) => Told::TooMuch,
         })
+    }
+
+    /// How exact the frames of a view are.
+    pub(crate) fn level(&self, view: usize) -> usize {
+        self.client.level(view)
     }
 
     /// Returns once there may be something, or after this time.
@@ -90,10 +100,13 @@ impl Hub {
 
     /// The description of the run, without anything that is meant for one viewer alone.
     pub(crate) fn hello_for_all(&self, orders: Option<Value>) -> String {
-        let (description, stack) = self.described();
-        let mut hello = Map::clone(&description);
-        hello.insert("stack".into(), stack.map_or_else(|| json!([]), |stack| stack()));
+        let mut hello = self.described();
         hello.extend(orders.map(|orders| ("orders".into(), orders)));
         json!({ "hello": hello }).to_string()
+    }
+
+    /// The stack of edits with the edits themselves, after a change or from the beginning.
+    pub(crate) fn whole_stack(&self, change: Option<StackChange>) -> String {
+        self.told_stack().whole(change)
     }
 }

@@ -8,10 +8,17 @@ use std::{
 };
 
 use axum::body::Bytes;
+use serde_json::json;
 use tokio::sync::Notify;
 use tombolo_pipelines::encode::Encoded;
 
-use super::{credentials::Access, secret::Secret};
+use super::{
+    credentials::Access,
+    pace::{COARSER, Pace},
+    secret::Secret,
+    stack::StackChange,
+    text::Text,
+};
 use crate::lock::lock;
 
 /// Texts that may wait for a viewer; one that leaves more unread is let go.
@@ -27,17 +34,19 @@ const MONITORS: usize = 256;
 #[derive(Debug)]
 pub(super) struct Frame {
     encoded: Encoded,
+    /// How exact it is.
+    level: usize,
     /// The frame's message.
     pub(super) message: Bytes,
 }
 
 impl Frame {
-    pub(super) fn new(mut encoded: Encoded) -> Self {
+    pub(super) fn new(mut encoded: Encoded, level: usize) -> Self {
         // Key frames are asked for with their topology too, which is put in front of them.
         let is_key = encoded.is_key();
         let message =
             if is_key { encoded.message.clone() } else { std::mem::take(&mut encoded.message) };
-        Self { message: message.into(), encoded }
+        Self { message: message.into(), level, encoded }
     }
 
     /// How many bytes the frame's values are before they are encoded.
@@ -71,36 +80,54 @@ struct Unread {
     is_behind: bool,
     /// The encoder was asked for a key frame.
     has_asked: bool,
+    /// How exact the frames are.
+    pace: Pace,
 }
 
 impl Unread {
-    /// Takes the next frame of the view; returns how many the viewer will miss for it.
-    fn put(&mut self, frame: &Arc<Frame>) -> usize {
+    /// Takes the next frame of the view; returns how many the viewer will miss for it, and whether
+    /// frames are coarser or finer from now on.
+    fn put(&mut self, frame: &Arc<Frame>) -> (usize, bool) {
+        if frame.level != self.pace.level() {
+            return (0, false);
+        }
         let missed = if frame.encoded.is_key() {
             let missed = self.frames.len();
-            *self = Self { in_flight: self.in_flight, ..Self::default() };
+            self.frames.clear();
+            (self.is_behind, self.has_asked) = (false, false);
             missed
         } else if self.is_behind {
-            return 1;
+            return (1, false);
         } else if self.frames.len() >= FRAMES {
-            self.is_behind = true;
             let missed = self.frames.len() + 1;
-            self.frames.clear();
-            return missed;
+            self.begin_anew();
+            return (missed, self.pace.fell_behind());
         } else {
             0
         };
+        if self.pace.carried() {
+            // Those that wait are read, or the viewer would miss them for nothing.
+            self.is_behind = true;
+            return (missed + 1, true);
+        }
         self.frames.push_back(Arc::clone(frame));
-        missed
+        (missed, false)
+    }
+
+    /// Lets go of what waits: the viewer goes on with a key frame.
+    fn begin_anew(&mut self) {
+        self.frames.clear();
+        (self.is_behind, self.has_asked) = (true, false);
     }
 }
 
 /// The messages that a viewer has yet to read.
 #[derive(Default)]
 struct Outbox {
-    texts: VecDeque<Arc<str>>,
-    monitors: VecDeque<Arc<str>>,
-    status: Option<Arc<str>>,
+    texts: VecDeque<Text>,
+    monitors: VecDeque<Text>,
+    stack: Option<StackChange>,
+    status: Option<Text>,
     hello: bool,
     has_been_greeted: bool,
     views: BTreeMap<usize, Unread>,
@@ -131,7 +158,7 @@ impl Outbox {
         let unread = self.views.get_mut(&view)?;
         let Some(frame) = unread.frames.pop_front() else {
             unread.has_asked = true;
-            return Some(Message::Behind(view));
+            return Some(Message::Behind(view, unread.pace.level()));
         };
         self.last_view = view;
         self.sent += 1;
@@ -184,14 +211,16 @@ pub(super) struct Client {
 
 /// A message for a viewer.
 pub(super) enum Message {
-    Text(Arc<str>),
+    Text(Text),
+    /// The stack of edits has changed.
+    Stack(StackChange),
     /// The first of a connection, or one more.
     Hello {
         is_first: bool,
     },
     Frame(usize, Arc<Frame>),
-    /// The viewer is ready for a view of which it missed frames.
-    Behind(usize),
+    /// The viewer is ready for a view of which it missed frames, at this level.
+    Behind(usize, usize),
     /// The run has ended.
     End,
 }
@@ -224,6 +253,9 @@ impl Client {
         if let Some(text) = outbox.texts.pop_front() {
             return Ok(Some(Message::Text(text)));
         }
+        if let Some(change) = outbox.stack.take() {
+            return Ok(Some(Message::Stack(change)));
+        }
         if let Some(text) = outbox.status.take() {
             return Ok(Some(Message::Text(text)));
         }
@@ -253,26 +285,46 @@ impl Client {
         self.put(|outbox| outbox.hello = true);
     }
 
+    /// Has a change of the stack told, with those that were not told yet.
+    pub(super) fn stack(&self, change: StackChange) {
+        self.put(|outbox| outbox.stack = Some(change.after(outbox.stack)));
+    }
+
     /// Puts a status in the place of the last one.
-    pub(super) fn status(&self, text: &Arc<str>) {
-        self.put(|outbox| outbox.status = Some(Arc::clone(text)));
+    pub(super) fn status(&self, text: &Text) {
+        self.put(|outbox| outbox.status = Some(text.clone()));
     }
 
     /// Adds values of monitors; where very many are unread, the oldest make way.
-    pub(super) fn monitor(&self, text: &Arc<str>) {
+    pub(super) fn monitor(&self, text: &Text) {
         self.put(|outbox| {
             if outbox.monitors.len() >= MONITORS {
                 outbox.monitors.pop_front();
             }
-            outbox.monitors.push_back(Arc::clone(text));
+            outbox.monitors.push_back(text.clone());
         });
     }
 
     /// Adds the next frame of a view; returns how many frames the viewer will miss for it.
-    pub(super) fn frame(&self, view: usize, frame: &Arc<Frame>) -> usize {
+    pub(super) fn frame(&self, view: usize, name: &Arc<str>, frame: &Arc<Frame>) -> usize {
         let mut missed = 0;
-        self.put(|outbox| missed = outbox.views.entry(view).or_default().put(frame));
+        self.put(|outbox| {
+            let unread = outbox.views.entry(view).or_default();
+            let is_changed;
+            (missed, is_changed) = unread.put(frame);
+            if is_changed {
+                let (name, coarser) = (Arc::clone(name), COARSER[unread.pace.level()]);
+                outbox.texts.push_back(Text::of(
+                    move || json!({"precision": {"view": *name, "coarser": coarser}}),
+                ));
+            }
+        });
         missed
+    }
+
+    /// How exact the frames of a view are for it.
+    pub(super) fn level(&self, view: usize) -> usize {
+        lock(&self.outbox).views.get(&view).map_or(0, |unread| unread.pace.level())
     }
 
     /// Forgets what is unread of a view.
@@ -291,12 +343,12 @@ impl Client {
     }
 
     /// Adds a text, which is never left out; a viewer that leaves very many unread is let go.
-    pub(super) fn text(&self, text: &Arc<str>) {
+    pub(super) fn text(&self, text: &Text) {
         self.put(|outbox| {
             if outbox.texts.len() >= TEXTS {
                 outbox.closing.get_or_insert((1008, "too much was left unread"));
             } else {
-                outbox.texts.push_back(Arc::clone(text));
+                outbox.texts.push_back(text.clone());
             }
         });
     }

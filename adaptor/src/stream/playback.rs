@@ -17,7 +17,10 @@ use serde_json::{Map, Value, json};
 use tokio::sync::mpsc;
 use tombolo_pipelines::language::{JournalNote, Message, parse_json};
 
-use super::CommandSink;
+use super::{
+    CommandSink,
+    stack::{Answer, recorded as recorded_stack, told as told_stack},
+};
 use crate::recording::{Moment, Recorded, RecordedMessage, Recording};
 
 /// How often a viewer is told where in the recording it is.
@@ -84,6 +87,16 @@ pub(super) struct Shown {
 impl Shown {
     pub(super) fn new(file: &Path) -> Self {
         Self { file: file.into(), viewers: AtomicUsize::new(0) }
+    }
+
+    /// The edits from one on of the stack that lies at a place in the recording, else of the last one;
+    /// `None` where there is none.
+    pub(super) fn stack(&self, place: Option<u64>, from: usize) -> Option<Answer> {
+        let (place, text) = match place {
+            Some(place) => (place, Recording::stack_at(&self.file, place).ok()??),
+            None => Recording::open(&self.file).ok()?.stack(f64::INFINITY)?,
+        };
+        recorded_stack(place, &text, from).ok()
     }
 
     /// Shows it to one viewer until either side ends.
@@ -356,7 +369,10 @@ impl Player {
             "last": told(self.recording.last()),
             "lost_bytes": self.recording.lost_bytes(),
         });
+        let stack = self.recording.stack(seconds);
+        let stack = stack.and_then(|(place, text)| told_stack(place, &text).ok());
         let own = [
+            ("stack", stack.unwrap_or_default().described()),
             ("client", json!("c1")),
             ("role", json!("watcher")),
             ("may_drive", json!(false)),
@@ -385,6 +401,13 @@ impl Player {
                 self.put(Wire::text(hello))
             }
             RecordedMessage::Text(text) if text.starts_with("{\"end\"") => Ok(()),
+            RecordedMessage::Text(text) if text.starts_with("{\"stack\"") => {
+                let place = self.recording.place_of_stack().unwrap_or_default();
+                match told_stack(place, &text) {
+                    Ok(change) => self.put(Wire::Text(change.text().written())),
+                    Err(_) => Ok(()),
+                }
+            }
             RecordedMessage::Text(text) => self.put(Wire::text(text)),
         }
     }

@@ -12,6 +12,7 @@ use super::{
     hub::{Hub, HubState, name},
     outbox::Client,
     secret::Secret,
+    text::Text,
     wheel::{LEFT, WHEEL_KEPT},
 };
 use crate::lock::lock;
@@ -92,6 +93,13 @@ impl Hub {
         state.status_dirty = true;
     }
 
+    /// Whether the run is paused and nobody is connected who could resume it.
+    pub(crate) fn is_paused_alone(&self) -> bool {
+        let state = lock(&self.state);
+        let is_paused = state.conditions.get("paused") == Some(&true.into());
+        is_paused && !state.clients.values().any(|client| client.access == Access::Drive)
+    }
+
     pub(super) fn is_driver(&self, client: u64) -> bool {
         lock(&self.state).wheel.driver == Some(client)
     }
@@ -113,8 +121,7 @@ impl Hub {
             Some(driver) if driver == client => Ok(()),
             Some(driver) if !state.wheel.is_silent() => {
                 if let Some(driver) = state.clients.get(&driver) {
-                    let asked = json!({"wheel": {"asked_by": name(client)}});
-                    driver.text(&asked.to_string().into());
+                    driver.text(&Text::of(move || json!({"wheel": {"asked_by": name(client)}})));
                 }
                 Err(format!(
                     "{} has the wheel and is told that you ask for it; it is free once that viewer \

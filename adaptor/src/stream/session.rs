@@ -21,6 +21,7 @@ use super::{
     credentials::{Access, Holder},
     hub::Hub,
     outbox::{Client, Message},
+    text::Text,
 };
 use crate::lock::lock;
 
@@ -91,9 +92,12 @@ async fn write(
                 topologies.retain(|&view, _| hub.has_view(view));
                 // Of later ones the viewer hears one by one.
                 let orders = is_first.then(|| commands.orders());
-                sink.send(Wire::text(&*hub.hello(client.id, orders))).await
+                sink.send(Wire::text(hub.hello(client.id, orders))).await
             }
-            Ok(Some(Message::Text(text))) => sink.send(Wire::text(&*text)).await,
+            Ok(Some(Message::Text(text))) => sink.send(Wire::Text(text.written())).await,
+            Ok(Some(Message::Stack(change))) => {
+                sink.send(Wire::Text(change.text().written())).await
+            }
             Ok(Some(Message::Frame(view, frame))) => {
                 // One that goes on from another follows a frame of the same topology.
                 let topology = frame.topology_id();
@@ -113,8 +117,8 @@ async fn write(
                     .await;
                 return;
             }
-            Ok(Some(Message::Behind(view))) => {
-                hub.want_key(view);
+            Ok(Some(Message::Behind(view, level))) => {
+                hub.want_key(view, level);
                 Ok(())
             }
             Ok(None) => {
@@ -162,8 +166,7 @@ async fn read(
             )),
         };
         if let Err((id, message)) = answer {
-            let error = json!({"error": {"message": message, "id": id}});
-            client.text(&error.to_string().into());
+            client.text(&Text::of(move || json!({"error": {"message": message, "id": id}})));
         }
     }
 }

@@ -7,14 +7,14 @@ use std::time::Duration;
 use numpy::{IntoPyArray, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use tombolo::client::{self, Event, Link, Settings};
+use tombolo::client::{self, Event, Link, Options};
 use tombolo::deform::surface::Surface;
 use tombolo::pipelines::encode::DecodedFrame;
 use tombolo::pipelines::extract::{Association, Field};
 use tombolo::pipelines::files::read_displacements;
 use tombolo::pipelines::language::{self, Cancel, Command, Order, PipelineChange};
 
-use crate::error::{ConfigurationError, guarded, of_client, of_language};
+use crate::error::{ConfigurationError, FailedError, guarded, of_client, of_language};
 use crate::language::{names_file, order};
 
 /// A connection to a run.
@@ -129,8 +129,8 @@ impl Client {
         attempts: u32,
     ) -> PyResult<Self> {
         let link: Link = link.parse().map_err(of_client)?;
-        let settings = Settings { views, watches, attempts, ..Settings::default() };
-        let connect = || client::Client::connect(&link, &settings).map_err(of_client);
+        let options = Options { views, watches, attempts, ..Options::default() };
+        let connect = || client::Client::connect(&link, &options).map_err(of_client);
         let client = ManuallyDrop::new(guarded(|| py.detach(connect))?);
         Ok(Self { client, process: std::process::id() })
     }
@@ -153,6 +153,8 @@ impl Client {
             Event::Hello(_) => "hello",
             Event::Status(_) => "status",
             Event::Order(_) => "order",
+            Event::Stack(_) => "stack",
+            Event::Precision(_) => "precision",
             Event::Monitor(_) => "monitor",
             Event::Forecast(_) => "forecast",
             Event::Pipelines(_) => "pipelines",
@@ -245,6 +247,12 @@ impl Client {
         guarded(|| {
             py.detach(|| self.client.pipelines().map(|it| it.to_string()).map_err(of_client))
         })
+    }
+
+    /// The edits that make the shape now, a JSON list.
+    fn stack(&self, py: Python<'_>) -> PyResult<String> {
+        let stack = guarded(|| py.detach(|| self.client.stack().map_err(of_client)))?;
+        serde_json::to_string(&stack).map_err(|error| FailedError::new_err(error.to_string()))
     }
 
     /// The reference surface.

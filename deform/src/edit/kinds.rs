@@ -456,6 +456,15 @@ impl Edit {
         own + faces(self.region()) + faces(self.fixed_region())
     }
 
+    /// About how many bytes of memory it takes.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let names = self.features().iter().chain(self.fixed());
+        let names: usize = names.map(|name| size_of::<String>() + name.len()).sum();
+        let listed = self.listed().saturating_mul(size_of::<u32>() + size_of::<Vector>());
+        listed.saturating_add(size_of::<Self>() + names)
+    }
+
     /// Whether an edit without features and region acts on the whole surface.
     pub(super) fn may_take_all(&self) -> bool {
         matches!(self, Edit::Displacement(_) | Edit::Skeleton(_))

@@ -1,7 +1,6 @@
 //! The program `flow`: see `flow --help`.
 
 use std::io::{IsTerminal, Write};
-use std::net::SocketAddr;
 use std::num::NonZeroU64;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -13,6 +12,7 @@ use signal_hook::iterator::Signals;
 use tombolo::Stopper;
 use tombolo::communicator::{Communicator, Solo};
 use tombolo::deform::linear::{BuiltIn, Solvers};
+use tombolo::pipelines::language::Listen;
 use tombolo_flow::parts::{Dealing, Ranks};
 use tombolo_flow::program::{Options, Run};
 
@@ -53,8 +53,8 @@ struct Arguments {
     #[arg(long, value_name = "HISTORY.csv")]
     history: Option<PathBuf>,
     /// Where viewers connect to, in place of what the pipelines say; port 0 takes any free one
-    #[arg(long, value_name = "ADDRESS:PORT", conflicts_with = "headless")]
-    listen: Option<SocketAddr>,
+    #[arg(long, value_name = "ADDRESS:PORT|unix:/PATH", conflicts_with = "headless")]
+    listen: Option<Listen>,
     /// Save the state of the run every so many steps, and when it is stopped
     #[arg(long, value_name = "N")]
     checkpoint_every: Option<NonZeroU64>,

@@ -1,6 +1,5 @@
 //! The program `flow`: a case, steered through the adaptor.
 
-use std::net::SocketAddr;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,7 +17,9 @@ use tombolo_deform::mesh::{Mesh, MeshError, NumberType, Vector};
 use tombolo_deform::surface::{Surface, SurfaceError};
 use tombolo_pipelines::extract::{Association, Channel, Field, FieldView};
 use tombolo_pipelines::files::{self, Compression, FileError};
-use tombolo_pipelines::language::{Config, ReadError, Recording, StreamServer, TimedCommand};
+use tombolo_pipelines::language::{
+    Config, Listen, ReadError, Recording, StreamServer, TimedCommand,
+};
 
 use crate::case::{Case, CaseError};
 use crate::history::{History, Through};
@@ -45,7 +46,7 @@ pub struct Options {
     /// Whether to run without a server for viewers.
     pub headless: bool,
     /// Where the server listens, in place of what the pipelines say.
-    pub listen: Option<SocketAddr>,
+    pub listen: Option<Listen>,
     /// Where the final state is written, and what the pipelines write.
     pub out: Option<PathBuf>,
     /// Where the flow is written step by step, as comma-separated values.
@@ -432,8 +433,8 @@ fn config(options: &Options, case: &Case) -> Result<Config, ProgramError> {
         config.stream = None;
     } else {
         let server = config.stream.get_or_insert_with(StreamServer::default);
-        if let Some(listen) = options.listen {
-            server.listen = listen;
+        if let Some(listen) = &options.listen {
+            server.listen.clone_from(listen);
         }
     }
     Ok(config)

@@ -1,10 +1,13 @@
 //! A configuration: the views to stream, the monitors to watch, and how orders become mesh motion.
 
+use std::fmt;
 use std::net::SocketAddr;
 use std::num::NonZeroU32;
+use std::path::PathBuf;
+use std::str::FromStr;
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::pipeline::{Due, Pipeline};
 
@@ -64,10 +67,19 @@ impl Config {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct StreamServer {
-    /// The address and port to listen on. Port 0 takes any free one. Anything but a loopback
-    /// address is open to the network.
+    /// The address and port to listen on, where port 0 takes any free one, or `unix:/PATH` for a
+    /// socket that its owner alone can connect to. Anything but a loopback address is open to the
+    /// network, and encrypted.
     #[schemars(with = "String")]
-    pub listen: SocketAddr,
+    pub listen: Listen,
+    /// The encryption of connections. An address that is not loopback always has it; left out, its
+    /// certificate is made for the run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tls: Option<Tls>,
+    /// Whether an address that is not loopback goes without encryption, such as behind a proxy that
+    /// encrypts: whoever is on the way reads the secrets and the fields.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub insecure: bool,
     /// The secret of those who may drive: 16 to 128 letters, digits, `-` or `_`. Left out, a new one
     /// is made for each run. A file that others can read is no place for it: see `secrets`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -84,12 +96,83 @@ pub struct StreamServer {
 impl Default for StreamServer {
     fn default() -> Self {
         Self {
-            listen: SocketAddr::from(([127, 0, 0, 1], 7070)),
+            listen: Listen::Address(SocketAddr::from(([127, 0, 0, 1], 7070))),
+            tls: None,
+            insecure: false,
             token: None,
             secrets: None,
             limits: StreamLimits::default(),
         }
     }
+}
+
+/// The place that a server listens on.
+///
+/// ```
+/// use tombolo_pipelines::language::Listen;
+///
+/// let listen: Listen = "unix:/run/user/1000/tombolo.sock".parse()?;
+/// assert_eq!(listen, Listen::Socket("/run/user/1000/tombolo.sock".into()));
+/// assert!(matches!("127.0.0.1:7070".parse()?, Listen::Address(address) if address.port() == 7070));
+/// let error = "localhost".parse::<Listen>().unwrap_err();
+/// assert_eq!(error, "found \"localhost\", expected ADDRESS:PORT, such as 127.0.0.1:7070, or unix:/PATH");
+/// # Ok::<(), String>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Listen {
+    /// An address and port of the network; port 0 takes any free one.
+    Address(SocketAddr),
+    /// A socket at a path of this machine, which its owner alone can connect to.
+    Socket(PathBuf),
+}
+
+impl FromStr for Listen {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || {
+            format!("found {text:?}, expected ADDRESS:PORT, such as 127.0.0.1:7070, or unix:/PATH")
+        };
+        match text.strip_prefix("unix:") {
+            Some(path) if path.starts_with('/') => Ok(Self::Socket(path.into())),
+            Some(_) => Err(wrong()),
+            None => text.parse().map(Self::Address).map_err(|_| wrong()),
+        }
+    }
+}
+
+impl fmt::Display for Listen {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Address(address) => address.fmt(f),
+            Self::Socket(path) => write!(f, "unix:{}", path.display()),
+        }
+    }
+}
+
+impl Serialize for Listen {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for Listen {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        String::deserialize(deserializer)?.parse().map_err(serde::de::Error::custom)
+    }
+}
+
+/// The certificate of a server whose connections are encrypted. Without files, one is made for the run;
+/// the run tells its fingerprint.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Tls {
+    /// A PEM file with the certificate, and those that it was signed by.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub certificate: Option<String>,
+    /// A PEM file with the certificate's key, that only its owner can read (mode 0600).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub key: Option<String>,
 }
 
 /// How many may connect, and how long a driver may be silent.
@@ -132,10 +215,24 @@ pub struct Steering {
     /// between a call returns at once, and what falls due waits for the next such call. While the
     /// mesh moves they come together at every call.
     pub poll_steps: NonZeroU32,
+    /// Seconds that an order of a viewer may wait for its turn, from when it came in: behind others,
+    /// or for the solver. It is rejected then, so that nothing moves the mesh that nobody thinks of
+    /// any more. On several ranks an order waits for the solver alone, without end.
+    pub deadline: NonZeroU32,
+    /// Seconds after which a paused run goes on by itself while nobody is connected who could resume
+    /// it. Left out, it stays paused.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub resume_after: Option<NonZeroU32>,
 }
 
 impl Default for Steering {
     fn default() -> Self {
-        Self { background: true, wait_for_viewer: false, poll_steps: NonZeroU32::MIN }
+        Self {
+            background: true,
+            wait_for_viewer: false,
+            poll_steps: NonZeroU32::MIN,
+            deadline: const { NonZeroU32::new(600).unwrap() },
+            resume_after: None,
+        }
     }
 }

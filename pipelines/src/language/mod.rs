@@ -58,7 +58,9 @@ mod validate_orders;
 
 pub use cameras::{Camera, Orbit, Viewpoint};
 pub use check::{Content, Trial, check, check_content, check_orders};
-pub use configuration::{Config, Steering, StreamLimits, StreamServer, record_megabytes};
+pub use configuration::{
+    Config, Listen, Steering, StreamLimits, StreamServer, Tls, record_megabytes,
+};
 pub use derived::{Derived, Formula};
 pub(crate) use derived::{GIVEN, PARAMETER};
 pub use error::{LanguageError, Problem};

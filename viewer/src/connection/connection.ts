@@ -35,12 +35,15 @@ export function backOff(attempt: number, random: number): number {
 }
 
 /** The addresses of the page's own server. The browser shows its cookie there, which no script can read. */
-export function streamAddress(page: string): { address: string; probe: string; surface: string; schema: string; pipelines: string } {
+export function streamAddress(page: string): { [name in "address" | "probe" | "surface" | "stack" | "schema" | "pipelines"]: string } {
   const place = (name: string): URL => new URL(name, page);
   const stream = place("ws");
   const probe = stream.toString();
   stream.protocol = stream.protocol === "https:" ? "wss:" : "ws:";
-  return { address: stream.toString(), probe, surface: place("surface").toString(), schema: place("schema/order").toString(), pipelines: place("pipelines").toString() };
+  return {
+    address: stream.toString(), probe, surface: place("surface").toString(), stack: place("stack").toString(),
+    schema: place("schema/order").toString(), pipelines: place("pipelines").toString(),
+  };
 }
 
 /** What a viewer is called, and what it shows to come back under that name after its connection was lost. */

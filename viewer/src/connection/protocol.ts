@@ -19,6 +19,12 @@ export interface SurfaceInformation { id: string; vertices: number; faces: numbe
 /** A moment of a recording. */
 export interface RecordedMoment { seconds: number; cycle: number; time: number }
 
+/** How many edits make the shape, of which the first `kept` are those of before, and how many orders can be taken back. */
+export interface StackInformation { revision: number; edits: number; kept?: number; undoable?: number }
+
+/** How exact a view is: its values are within so many times the bound that was asked for, 1 where the link carries it as it is. */
+export interface Precision { view: string; coarser: number }
+
 export interface Hello {
   protocol: number;
   client: string | number;
@@ -38,12 +44,15 @@ export interface Hello {
   parameters: ParameterInformation[];
   stack: Json[];
   /** How many orders can be taken back. */
-  undoable?: number;
+  undoable?: number | undefined;
   orders: OrderStatus[];
   defaults: { deform?: Json; guard?: Json; schedule?: Json };
   /** What is shown is no run but a recording of one, from its first moment to its last. */
   recording?: { first: RecordedMoment; last: RecordedMoment; lost_bytes?: number } | null;
 }
+
+/** The message of the server: the edits themselves are fetched. `stack` is in the first of a connection. */
+export type ToldHello = Omit<Hello, "stack" | "undoable"> & { stack?: StackInformation };
 
 export interface QualitySummary { min: number; mean?: number; inverted?: number }
 
@@ -128,9 +137,11 @@ export interface Played extends RecordedMoment { speed: number; paused: boolean;
 export interface RunEnd { how: "finished" | "stopped" | "failed"; cycle: number; time: number }
 
 export type ServerMessage =
-  | { kind: "hello"; body: Hello }
+  | { kind: "hello"; body: ToldHello }
   | { kind: "status"; body: Status }
   | { kind: "order"; body: OrderStatus }
+  | { kind: "stack"; body: StackInformation }
+  | { kind: "precision"; body: Precision }
   | { kind: "forecast"; body: ForecastAnswer }
   | { kind: "monitor"; body: Monitor }
   | { kind: "pipelines"; body: PipelineChange }
@@ -207,7 +218,7 @@ export function parseServerMessage(text: string): ServerMessage {
     throw new ProtocolError("a text message that is not JSON");
   }
   if (!isObject(parsed)) throw new ProtocolError("a text message that is not a JSON object");
-  for (const kind of ["hello", "status", "order", "forecast", "monitor", "pipelines", "wheel", "done", "play", "end", "error"] as const) {
+  for (const kind of ["hello", "status", "order", "stack", "precision", "forecast", "monitor", "pipelines", "wheel", "done", "play", "end", "error"] as const) {
     const body: unknown = parsed[kind];
     if (body === undefined) continue;
     if (!isObject(body)) throw new ProtocolError(`the message "${kind}" is not an object`);
@@ -217,13 +228,13 @@ export function parseServerMessage(text: string): ServerMessage {
   throw new ProtocolError(`an unknown message: ${Object.keys(parsed).slice(0, 3).join(", ") || "{}"}`);
 }
 
-function completeHello(body: JsonObject): Hello {
+function completeHello(body: JsonObject): ToldHello {
   if (body.protocol !== PROTOCOL_VERSION) throw new VersionError(body.protocol);
   const list = (key: string): Json[] => (Array.isArray(body[key]) ? body[key] : []);
   const object = (key: string): JsonObject => (isObject(body[key]) ? body[key] : {});
   return {
     ...body,
     views: list("views"), features: list("features"), fields: list("fields"), parameters: list("parameters"),
-    stack: list("stack"), orders: list("orders"), defaults: object("defaults"),
-  } as unknown as Hello;
+    orders: list("orders"), defaults: object("defaults"),
+  } as unknown as ToldHello;
 }

@@ -1,6 +1,6 @@
 /** The views that the simulation streams: which are seen, how opaque, and which one is being changed. */
 import type { ViewInformation } from "../connection/protocol";
-import { element, identifier } from "../dom";
+import { element, identifier, write } from "../dom";
 import type { Action } from "../store/actions";
 import type { State } from "../store/state";
 import { sameJson } from "../store/store";
@@ -9,7 +9,7 @@ import type { Store } from "../store/store";
 export class ViewList {
   constructor(private readonly root: HTMLElement, private readonly store: Store<State, Action>) {
     store.watch((state) => state.hello?.views ?? [], (views) => this.list(views), sameJson);
-    store.watch((state) => [state.looks, state.chosenView], () => this.show(), sameJson);
+    store.watch((state) => [state.looks, state.chosenView, state.coarser], () => this.show(), sameJson);
   }
 
   private list(views: readonly ViewInformation[]): void {
@@ -31,12 +31,16 @@ export class ViewList {
       type: "button", class: "choose", title: "Change how this view looks", onclick: () => this.store.dispatch({ type: "view chosen", view: name }),
     }, name, kind === name ? null : element("small", {}, kind));
     visible.setAttribute("aria-label", `${name}: shown`);
-    return element("div", { class: "view", "data-view": name }, visible, chosen, opacity);
+    return element("div", { class: "view", "data-view": name }, visible, chosen, opacity, element("small", { class: "precision", role: "status" }));
   }
 
   private show(): void {
-    const { looks, chosenView } = this.store.state;
+    const { looks, chosenView, coarser } = this.store.state;
     for (const row of this.root.querySelectorAll<HTMLElement>("[data-view]")) {
+      const times = coarser[row.dataset.view ?? ""] ?? 1;
+      const precision = row.querySelector<HTMLElement>(".precision")!;
+      precision.hidden = times <= 1;
+      write(precision, times <= 1 ? "" : `slow connection: values within ${times} times the error`);
       const look = looks[row.dataset.view ?? ""];
       if (!look) continue;
       row.querySelector<HTMLInputElement>('input[type="checkbox"]')!.checked = look.visible;

@@ -9,6 +9,10 @@ export type Action =
   // From the simulation.
   | { type: "connection"; state: ConnectionState; explanation: string }
   | { type: "hello"; hello: Hello }
+  /** All edits that make the shape, and how many orders can be taken back. */
+  | { type: "stack"; edits: Json[]; undoable: number | undefined }
+  /** The values of a view are within so many times the error that was asked for. */
+  | { type: "precision"; view: string; coarser: number }
   | { type: "status"; status: Status; at: number }
   | { type: "frame"; view: string; cycle: number }
   | { type: "order"; status: OrderStatus }

@@ -31,11 +31,13 @@ function after(state: State, action: Action): State {
     case "connection": {
       const connected = action.state === "connected";
       return {
-        ...state, askedBy: connected ? state.askedBy : null,
+        ...state, askedBy: connected ? state.askedBy : null, coarser: connected ? {} : state.coarser,
         connection: { ...state.connection, state: action.state, explanation: action.explanation, fresh: connected },
       };
     }
     case "hello": return withHello(state, action.hello);
+    case "stack": return withStack(state, action.edits, action.undoable);
+    case "precision": return { ...state, coarser: { ...state.coarser, [action.view]: action.coarser } };
     case "status": {
       const { status, at } = action;
       const isSame = state.progress.at(-1)?.cycle === status.cycle;
@@ -117,8 +119,17 @@ function withHello(state: State, hello: Hello): State {
     // Whoever has the wheel now need not know that it was refused before.
     refusal: hello.role !== state.hello?.role ? "" : state.refusal,
   };
+  return withoutLostEdit(state, next);
+}
+
+function withStack(state: State, edits: Json[], undoable: number | undefined): State {
+  return state.hello ? withoutLostEdit(state, { ...state, hello: { ...state.hello, stack: edits, undoable } }) : state;
+}
+
+/** The next state, in which an edit that is not there any more is not changed any more. */
+function withoutLostEdit(state: State, next: State): State {
   const { updating } = state.draft;
-  const isGone = updating !== null && !sameJson(hello.stack[updating], state.hello?.stack[updating]);
+  const isGone = updating !== null && !sameJson(next.hello?.stack[updating], state.hello?.stack[updating]);
   return isGone ? cleared(next) : next;
 }
 

@@ -79,6 +79,8 @@ export interface State {
   /** How each view looks, and the one whose look is being changed. */
   looks: Looks;
   chosenView: string | null;
+  /** By view, within how many times the error that was asked for its values are, where the connection does not carry it as it is. */
+  coarser: { readonly [view: string]: number };
   selection: SelectionState;
   /** The form for an order; null before the schema has come. */
   form: OrderForm | null;
@@ -105,7 +107,7 @@ export const INITIAL: State = {
   hello: null, status: null, played: null, end: null,
   progress: [],
   frames: { count: 0, cycle: null, views: {} },
-  looks: {}, chosenView: null,
+  looks: {}, chosenView: null, coarser: {},
   selection: { parts: {}, hovered: null },
   form: null,
   draft: { key: null, bodies: {}, settings: {}, remedy: {}, problems: [], updating: null, amount: null, step: null, past: [], future: [] },

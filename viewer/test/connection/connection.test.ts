@@ -56,7 +56,7 @@ describe("the address of the stream", () => {
     expect(streamAddress("http://127.0.0.1:7070/").address).toBe("ws://127.0.0.1:7070/ws");
     expect(streamAddress("https://host/run/7/index.html?view=ab#x")).toEqual({
       address: "wss://host/run/7/ws", probe: "https://host/run/7/ws", surface: "https://host/run/7/surface",
-      pipelines: "https://host/run/7/pipelines", schema: "https://host/run/7/schema/order",
+      stack: "https://host/run/7/stack", schema: "https://host/run/7/schema/order", pipelines: "https://host/run/7/pipelines",
     });
   });
 });

@@ -1,6 +1,6 @@
 //! `tombolo doctor`.
 
-use crate::client::{Client, ClientError, Link, Settings};
+use crate::client::{Client, ClientError, Link, Options};
 use serde_json::json;
 
 use super::{Target, read_link};
@@ -19,8 +19,8 @@ pub(crate) fn doctor(target: &Target) -> Result<(), Failure> {
         advice.map_or(Ok(()), |advice| say(format_args!("  {advice}")))
     };
     let link = read_link(&target.link);
-    let settings = Settings { attempts: 0, ..Settings::default() };
-    let connected = link.clone().and_then(|link| Client::connect(&link, &settings));
+    let options = Options { attempts: 0, ..Options::default() };
+    let connected = link.clone().and_then(|link| Client::connect(&link, &options));
     let wrong = connected.as_ref().err().map(|error| (step(error), error));
     for (number, name) in STEPS.iter().enumerate() {
         match wrong {
@@ -58,7 +58,10 @@ fn step(error: &ClientError) -> usize {
 fn well(step: usize, link: &Link) -> String {
     match step {
         0 => format!("it names {}", link.address()),
-        1 => format!("{} has an address", link.host()),
+        1 => match link.socket_path() {
+            Some(path) => format!("{} is a path of this machine", path.display()),
+            None => format!("{} has an address", link.host()),
+        },
         2 => format!("something listens on {}", link.address()),
         3 => "a run of Tombolo answers".into(),
         _ => "it is that of the run".into(),
@@ -79,9 +82,16 @@ fn advice(error: &ClientError, link: Option<&Link>) -> String {
             "The run has ended, or it listens on another port, or the SSH tunnel is not open. A run on another machine that listens \
              on its loopback address is reached by: ssh -L {port}:127.0.0.1:{port} HOST"
         ),
+        ClientError::Unreachable { .. } if link.is_some_and(|link| link.socket_path().is_some()) => {
+            "The run has ended, or it is on another machine, or the socket belongs to another user: only its owner can connect.".into()
+        }
         ClientError::Unreachable { .. } => format!(
             "The machine is off, or a firewall is between: try an SSH tunnel (ssh -L {port}:127.0.0.1:{port} HOST) and the host 127.0.0.1."
         ),
+        ClientError::Certificate { .. } => {
+            "Another program may answer there, or the link is of an earlier run: take the link that this run has printed, with what \
+             stands behind the #. Behind a proxy leave that away, and have the proxy's certificate trusted by this machine.".into()
+        }
         ClientError::HostRefused { .. } => format!(
             "The run listens on its loopback address and answers to 127.0.0.1, localhost and [::1] only: open the link as \
              http://127.0.0.1:{port}/?token=..., at the near end of a tunnel too."

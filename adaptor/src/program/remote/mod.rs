@@ -8,7 +8,7 @@ mod watch;
 
 use std::{io::Read, path::Path, time::Duration};
 
-use crate::client::{Client, ClientError, Event, Link, Settings};
+use crate::client::{Client, ClientError, Event, Link, Options};
 use clap::{Args, Subcommand};
 use serde_json::json;
 
@@ -116,7 +116,7 @@ pub(crate) fn failed(error: ClientError) -> Failure {
 
 /// The link itself, or the first one in a file.
 fn read_link(text: &str) -> Result<Link, ClientError> {
-    if text.contains("://") || !Path::new(text).is_file() {
+    if text.contains("://") || text.starts_with("unix:") || !Path::new(text).is_file() {
         return text.parse();
     }
     let mut bytes = Vec::new();
@@ -127,7 +127,10 @@ fn read_link(text: &str) -> Result<Link, ClientError> {
     let wrong = |reason: String| ClientError::Link { found: text.into(), reason };
     read.map_err(|error| wrong(format!("the file cannot be read ({error})")))?;
     let content = String::from_utf8_lossy(&bytes);
-    match content.split_whitespace().find(|word| word.starts_with("http://")) {
+    match content
+        .split_whitespace()
+        .find(|word| ["http://", "https://", "unix:"].iter().any(|begin| word.starts_with(begin)))
+    {
         Some(link) => link.parse(),
         None => Err(wrong("the file holds none".into())),
     }
@@ -135,7 +138,7 @@ fn read_link(text: &str) -> Result<Link, ClientError> {
 
 pub(crate) fn connect(target: &Target, watches: bool) -> Result<Client, Failure> {
     let link = read_link(&target.link).map_err(failed)?;
-    Client::connect(&link, &Settings { watches, ..Settings::default() }).map_err(failed)
+    Client::connect(&link, &Options { watches, ..Options::default() }).map_err(failed)
 }
 
 /// Connects and takes the wheel.

@@ -74,6 +74,11 @@ fn line(event: &Event) -> Option<String> {
             Some(cycle) => format!("pipelines: {} at cycle {cycle}", change.status),
             None => format!("pipelines: {}", change.status),
         },
+        Event::Precision(precision) if precision.coarser > 1.0 => format!(
+            "{}: the connection is slow, values are within {} times the error",
+            precision.view, precision.coarser
+        ),
+        Event::Precision(precision) => format!("{}: as exact as it asks for", precision.view),
         Event::Error(error) => format!("error: {}", error.message),
         Event::Lost { reason } => format!("connection lost: {reason}"),
         Event::End(end) => format!("{}: cycle {}, time {}", end.how, end.cycle, end.time),

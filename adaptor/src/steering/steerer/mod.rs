@@ -7,7 +7,7 @@ mod saved;
 use std::{
     collections::VecDeque,
     sync::{Arc, Mutex},
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 use tombolo_deform::{
@@ -74,6 +74,8 @@ pub(crate) struct Steerer {
     stack: EditStack,
     here: CurrentShape,
     waiting: VecDeque<Task>,
+    /// How long an order of a viewer may wait.
+    deadline: Duration,
     computing: Option<Computing>,
     motion: Option<Motion>,
     /// The motion that was handed out last.
@@ -179,6 +181,7 @@ impl Steerer {
             stack,
             here,
             waiting: VecDeque::new(),
+            deadline: Duration::MAX,
             computing: None,
             motion: None,
             handed_out: MeshMotion {
@@ -200,6 +203,12 @@ impl Steerer {
     /// schedules count.
     pub(crate) fn repeat_until(&mut self, shapes: Vec<HandedShape>, cycle: u64) {
         self.recorded = Some(Recorded::new(shapes).until(cycle));
+    }
+
+    /// Limits how long an order of a viewer may wait for its turn, where orders are planned beside
+    /// the solver.
+    pub(crate) fn set_deadline(&mut self, deadline: Duration) {
+        self.deadline = deadline;
     }
 
     /// Gives orders that begin from now on other settings where they bring none.
@@ -297,6 +306,12 @@ impl Steerer {
         reservation: Option<Reservation>,
     ) {
         let background = background && self.worker.is_some();
+        let before = self.waiting.back().map(|task| &task.id);
+        let before = before.or(self.computing.as_ref().map(|computing| &computing.id));
+        if let Some(before) = before {
+            let reason = format!("order {before}, which came before it");
+            self.log.update(&id, |order| order.waits_for = Some(reason));
+        }
         self.waiting.push_back(Task { id, order, background, reservation });
     }
 
@@ -324,7 +339,7 @@ impl Steerer {
     /// Brings orders as far as they can come now; says whether anything changed. Called at safe
     /// points only.
     pub(crate) fn advance(&mut self, moment: Moment, step_seconds: Option<f64>) -> bool {
-        let mut changed = false;
+        let mut changed = self.reject_overdue(moment);
         loop {
             changed |= self.collect(moment, step_seconds);
             if self.computing.is_some() {
@@ -343,6 +358,30 @@ impl Steerer {
             self.start(task, moment, step_seconds);
             changed = true;
         }
+    }
+
+    /// Rejects orders that have waited for too long.
+    fn reject_overdue(&mut self, moment: Moment) -> bool {
+        // The clocks of several ranks would not agree.
+        if self.worker.is_none() {
+            return false;
+        }
+        let is_overdue = |task: &Task| {
+            task.reservation.as_ref().is_some_and(|reservation| reservation.age() > self.deadline)
+        };
+        if !self.waiting.iter().any(is_overdue) {
+            return false;
+        }
+        let reason = format!(
+            "it has waited for more than {} seconds (steering.deadline)",
+            self.deadline.as_secs()
+        );
+        let (overdue, waiting) =
+            std::mem::take(&mut self.waiting).into_iter().partition(is_overdue);
+        self.waiting = waiting;
+        let overdue: VecDeque<Task> = overdue;
+        overdue.iter().for_each(|task| self.log.reject(&task.id, moment, &reason.clone().into()));
+        true
     }
 
     /// Takes what the worker has finished.

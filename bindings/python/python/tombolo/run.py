@@ -289,8 +289,9 @@ class Run:
 
     @property
     def stack(self) -> list[dict[str, Any]]:
-        """The edits that make the present shape, the oldest first."""
-        return list(self._hello.get("stack", []))
+        """The edits that make the present shape, the oldest first, as the run answers now."""
+        edits: list[dict[str, Any]] = _json.loads(self._client.stack())
+        return edits
 
     @property
     def orders(self) -> list[Order]:

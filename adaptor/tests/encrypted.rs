@@ -1,0 +1,243 @@
+//! Encrypted connections, and sockets at a path: one server, however it is reached.
+#![cfg(unix)]
+
+mod common;
+
+use std::{
+    io::{Read, Write},
+    net::TcpStream,
+    os::unix::{
+        fs::{FileTypeExt, PermissionsExt},
+        net::UnixStream,
+    },
+    path::Path,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
+
+use common::{Solver, config, squeeze};
+use serde_json::{Value, json};
+use tombolo::{
+    Adaptor, OrderStatus, Settings,
+    client::{Client, ClientError, Event, Link},
+    pipelines::language::parse_valid,
+};
+
+const PATIENCE: Duration = Duration::from_secs(300);
+
+fn settings(stream: Value) -> Settings {
+    let config = config(&json!({"version": 1, "stream": stream}).to_string());
+    Settings { config, ..Settings::default() }
+}
+
+/// A run that goes on by itself.
+struct Run {
+    link: Link,
+    over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Run {
+    fn new(stream: Value) -> Self {
+        let mut solver = Solver::new(settings(stream));
+        let link = solver.adaptor.link().expect("a server").parse().expect("a link");
+        let over = Arc::new(AtomicBool::new(false));
+        let is_over = Arc::clone(&over);
+        let run = move || {
+            while !is_over.load(Ordering::Relaxed) {
+                solver.step();
+                std::thread::sleep(Duration::from_millis(2));
+            }
+            solver.finish();
+        };
+        Self { link, over, thread: Some(std::thread::spawn(run)) }
+    }
+}
+
+impl Drop for Run {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+fn connect(link: &Link) -> Result<Client, ClientError> {
+    Client::connect(link, &tombolo::client::Options::default())
+}
+
+/// Steers a run through its link, and reads what it serves beside its WebSocket.
+fn steer(link: &Link) {
+    let client = connect(link).expect("connected");
+    client.drive(PATIENCE).expect("nobody else drives");
+    let order = parse_valid(&squeeze(0.2).to_string(), "order").expect("an order");
+    let id = client.order(&order).expect("sent");
+    loop {
+        let told = client.next(PATIENCE).expect("connected").expect("something is said");
+        match told.event {
+            Event::Order(order) if order.id == id => match order.status {
+                OrderStatus::Applied => break,
+                OrderStatus::Rejected => panic!("{:?}", order.reason),
+                _ => {}
+            },
+            _ => {}
+        }
+    }
+    assert_eq!(client.stack().expect("an answer").len(), 1);
+    assert_eq!(client.pipelines().expect("an answer"), json!([]));
+}
+
+fn with_fingerprint(link: &Link, fingerprint: &str) -> Link {
+    let text = link.to_string();
+    let (place, _) = text.split_once('#').expect("a fingerprint");
+    format!("{place}{fingerprint}").parse().expect("a link")
+}
+
+#[test]
+fn a_run_is_steered_through_tls_by_those_who_know_its_certificate() {
+    let run = Run::new(json!({"listen": "127.0.0.1:0", "tls": {}}));
+    assert!(run.link.to_string().starts_with("https://127.0.0.1:"), "{:?}", run.link);
+    steer(&run.link);
+    // Neither another certificate's fingerprint nor one that nobody has signed.
+    for fingerprint in [format!("#sha256={}", "0".repeat(64)), String::new()] {
+        let error = connect(&with_fingerprint(&run.link, &fingerprint)).err().expect("refused");
+        assert!(matches!(error, ClientError::Certificate { .. }), "{error}");
+    }
+    // Nothing is said to those who do not encrypt.
+    let plain = run.link.to_string().replacen("https://", "http://", 1).parse().expect("a link");
+    let error = connect(&plain).err().expect("refused");
+    assert!(matches!(error, ClientError::NotTombolo { .. }), "{error}");
+}
+
+#[test]
+fn what_others_can_reach_is_encrypted_unless_it_is_expressly_not() {
+    let link = |stream: Value| settings(stream).start().map(|run| run.link().expect("a server"));
+    let open = link(json!({"listen": "0.0.0.0:0"})).expect("started");
+    assert!(open.starts_with("https://") && open.contains("#sha256="), "{open}");
+    let insecure = link(json!({"listen": "0.0.0.0:0", "insecure": true})).expect("started");
+    assert!(insecure.starts_with("http://"), "{insecure}");
+    let loopback = link(json!({"listen": "127.0.0.1:0"})).expect("started");
+    assert!(loopback.starts_with("http://"), "{loopback}");
+    let both = json!({"listen": "127.0.0.1:0", "insecure": true, "tls": {}});
+    assert!(link(both).expect_err("refused").to_string().contains("stream.tls"));
+}
+
+#[test]
+fn a_certificate_comes_from_files_whose_key_nobody_else_can_read() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let files = ["certificate.pem", "key.pem"].map(|name| directory.path().join(name));
+    let made = rcgen::generate_simple_self_signed(["localhost".into()]).expect("made");
+    let pem = |label: &str, der: &[u8]| {
+        let text = base64(der);
+        let lines: Vec<&str> =
+            (0..text.len()).step_by(64).map(|at| &text[at..(at + 64).min(text.len())]).collect();
+        format!("-----BEGIN {label}-----\n{}\n-----END {label}-----\n", lines.join("\n"))
+    };
+    std::fs::write(&files[0], pem("CERTIFICATE", made.cert.der())).expect("written");
+    std::fs::write(&files[1], pem("PRIVATE KEY", &made.signing_key.serialize_der()))
+        .expect("written");
+    let stream =
+        json!({"listen": "127.0.0.1:0", "tls": {"certificate": files[0], "key": files[1]}});
+    let set =
+        |mode| std::fs::set_permissions(&files[1], PermissionsExt::from_mode(mode)).expect("set");
+    set(0o644);
+    let refused = settings(stream.clone()).start().err().expect("refused").to_string();
+    assert!(refused.contains("chmod 600"), "{refused}");
+    set(0o600);
+    steer(&Run::new(stream).link);
+    let half = json!({"listen": "127.0.0.1:0", "tls": {"certificate": files[0]}});
+    let refused = settings(half).start().err().expect("refused").to_string();
+    assert!(refused.contains("go together"), "{refused}");
+}
+
+fn base64(bytes: &[u8]) -> String {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::new();
+    for chunk in bytes.chunks(3) {
+        let word = (0..3).fold(0, |word, at| word << 8 | u32::from(*chunk.get(at).unwrap_or(&0)));
+        for digit in 0..4 {
+            let value = (word >> (18 - 6 * digit)) & 63;
+            text.push(if digit <= chunk.len() { DIGITS[value as usize] as char } else { '=' });
+        }
+    }
+    text
+}
+
+#[test]
+fn a_socket_at_a_path_is_its_owners_alone_and_goes_with_the_run() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let path = directory.path().join("tombolo.sock");
+    let listen = json!({"listen": format!("unix:{}", path.display())});
+    let run = Run::new(listen.clone());
+    let metadata = std::fs::symlink_metadata(&path).expect("a socket");
+    assert!(metadata.file_type().is_socket());
+    assert_eq!(metadata.permissions().mode() & 0o777, 0o600);
+    assert_eq!(run.link.socket_path(), Some(Path::new(&path)));
+    steer(&run.link);
+    // A secret is asked for here too.
+    let mut stream = UnixStream::connect(&path).expect("connected");
+    stream.write_all(b"GET /pipelines HTTP/1.0\r\nHost: localhost\r\n\r\n").expect("sent");
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).expect("an answer");
+    assert!(answer.starts_with("HTTP/1.0 401"), "{answer}");
+    // Nobody else has it meanwhile.
+    let refused = settings(listen.clone()).start().err().expect("refused").to_string();
+    assert!(refused.contains("in use"), "{refused}");
+    steer_again(&run);
+    drop(run);
+    assert!(!path.exists(), "it goes with the run");
+    // One that was left behind makes way, and any other file does not.
+    drop(std::os::unix::net::UnixListener::bind(&path).expect("bound"));
+    assert!(path.exists());
+    steer(&Run::new(listen.clone()).link);
+    std::fs::write(&path, "precious").expect("written");
+    let refused = settings(listen).start().err().expect("refused").to_string();
+    assert!(refused.contains("another file"), "{refused}");
+    assert_eq!(std::fs::read_to_string(&path).expect("read"), "precious");
+    assert_eq!(std::fs::read_dir(directory.path()).expect("read").count(), 1, "something is left");
+}
+
+fn steer_again(run: &Run) {
+    let client = connect(&run.link).expect("connected");
+    client.wait_for_status(PATIENCE, |_| true).expect("it goes on");
+}
+
+#[test]
+fn who_shakes_no_hands_keeps_nobody_out() {
+    let run = Run::new(json!({"listen": "127.0.0.1:0", "tls": {}}));
+    let flood: Vec<TcpStream> = (0..200)
+        .map(|number: u32| {
+            let mut stream = TcpStream::connect(run.link.address()).expect("taken");
+            // Silence, rubbish, or the first bytes of a handshake that never goes on.
+            let bytes: &[u8] = match number % 3 {
+                0 => b"",
+                1 => b"GET / HTTP/1.1\r\n\r\n",
+                _ => b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03",
+            };
+            let _ = stream.write_all(bytes);
+            stream
+        })
+        .collect();
+    let begun = Instant::now();
+    steer(&run.link);
+    assert!(begun.elapsed() < Duration::from_secs(60), "{:?}", begun.elapsed());
+    drop(flood);
+}
+
+#[test]
+fn the_invitation_tells_the_fingerprint() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let stream = json!({"listen": "127.0.0.1:0", "tls": {}});
+    let settings = Settings { output: directory.path().into(), ..settings(stream) };
+    let mut adaptor = Adaptor::initialize(settings).expect("started");
+    let link = adaptor.link().expect("a server");
+    let (_, digits) = link.split_once("#sha256=").expect("a fingerprint");
+    let told = adaptor.invitation(true).expect("written").expect("a server");
+    let fingerprint = told.lines().last().expect("a line").replace(':', "");
+    assert!(fingerprint.ends_with(digits), "{told}");
+}

@@ -1,0 +1,275 @@
+//! The steering service beside a solver that steps: many viewers, some of them slow or deaf; many
+//! orders and large ones; and how soon the mesh moves.
+//!
+//! The viewers are a process of their own ([`crate::service_viewers`]), so that the memory measured
+//! here is the run's. On a machine of few cores they take processor time from it all the same.
+
+use std::{
+    collections::HashMap,
+    error::Error,
+    process::{Child, Command, Stdio},
+    time::{Duration, Instant, SystemTime},
+};
+
+use serde::Serialize;
+use serde_json::json;
+use tombolo::{
+    Adaptor, Step,
+    deform::mesh::{Mesh, MeshView},
+    pipelines::{
+        extract::{Channel, FieldView},
+        language,
+    },
+};
+use tombolo_flow::{Motion, Solver};
+
+use crate::{
+    measure::{Times, memory},
+    overhead::{TIME_STEP, channel, solver},
+    peer,
+    report::{Line, Report, Target},
+    service_viewers::{Seen, Task},
+};
+
+/// Steps between two frames of a view.
+pub const EVERY: u64 = 5;
+/// What docs/operations.md lets commands, the stack, the views and the viewers take, in MiB, as far as
+/// this run can fill it: commands that wait four times over, the stack, and what the viewers have
+/// not read.
+const BOUND: f64 = 4.0 * 64.0 + 256.0 + 50.0;
+
+/// A figure of one part.
+#[derive(Debug, Serialize)]
+pub struct Row {
+    part: &'static str,
+    what: &'static str,
+    value: f64,
+    unit: &'static str,
+}
+
+impl Line for Row {
+    const HEADINGS: &'static [&'static str] = &["part", "what", "value", "unit"];
+
+    fn cells(&self) -> Vec<String> {
+        let Self { part, what, value, unit } = *self;
+        vec![part.into(), what.into(), format!("{value:.4}"), unit.into()]
+    }
+}
+
+/// A run of the flow solver with its adaptor.
+struct Run {
+    adaptor: Adaptor,
+    solver: Solver,
+    mesh: Mesh,
+    cycle: u64,
+    /// When each order moved the mesh first.
+    moved: HashMap<String, f64>,
+    /// When each cycle was shown.
+    shown: HashMap<u64, f64>,
+}
+
+/// What the steps of a part took.
+struct Steps {
+    /// The whole step, and the part of it inside `execute`.
+    whole: Times,
+    execute: Times,
+    /// The most memory that was seen, in MiB.
+    memory: f64,
+}
+
+impl Run {
+    fn new() -> Result<Self, Box<dyn Error>> {
+        let mesh = channel()?;
+        let view = |name: &str, stage: serde_json::Value| {
+            json!({"name": name, "every": {"steps": EVERY}, "stages": [
+                stage, {"select": {"fields": ["velocity", "pressure"]}}, {"stream": {"error": {"relative": 1e-3}}}]})
+        };
+        let config = json!({"version": 1, "stream": {"listen": "127.0.0.1:0"}, "pipelines": [
+            view("surface", json!({"surface": {}})),
+            view("slice", json!({"slice": {"origin": [0, 0, 0], "normal": [1, 0, 0]}})),
+        ]});
+        let config = language::parse(&config.to_string(), "benchmark")?;
+        let adaptor = Adaptor::initialize(tombolo::Settings { config, ..Default::default() })?;
+        let solver = solver(&mesh)?;
+        let (moved, shown) = (HashMap::new(), HashMap::new());
+        Ok(Self { adaptor, solver, mesh, cycle: 0, moved, shown })
+    }
+
+    /// Steps until something holds, for so long at least and at most.
+    fn steps(
+        &mut self,
+        mut is_over: impl FnMut() -> bool,
+        [least, most]: [Duration; 2],
+    ) -> Result<Steps, Box<dyn Error>> {
+        let begun = Instant::now();
+        let mut steps = Steps { whole: Times::new(), execute: Times::new(), memory: 0.0 };
+        while begun.elapsed() < least || !is_over() {
+            if begun.elapsed() > most {
+                return Err("the viewers do not come to their end".into());
+            }
+            let start = Instant::now();
+            let (velocity, pressure) = (self.solver.velocity(), self.solver.pressure());
+            let fields = [
+                FieldView::vertex("velocity", &velocity),
+                FieldView::vertex("pressure", &pressure),
+            ];
+            let fluid =
+                Channel { name: "fluid", mesh: MeshView::from(&self.mesh), fields: &fields };
+            let time = TIME_STEP * self.cycle as f64;
+            let step = Step { cycle: self.cycle, time, time_step: TIME_STEP };
+            self.shown.insert(self.cycle, now());
+            let begun = Instant::now();
+            let steering = self.adaptor.execute(&step, &[fluid])?;
+            steps.execute.add(begun.elapsed().as_secs_f64());
+            let moved = match &steering.motion {
+                Some(motion) => {
+                    self.moved.entry(motion.order.to_owned()).or_insert_with(now);
+                    self.solver.step(TIME_STEP, Some(Motion { points: &motion.coordinates }))?;
+                    Some(motion.coordinates.to_vec())
+                }
+                None => {
+                    self.solver.step(TIME_STEP, None)?;
+                    None
+                }
+            };
+            if let Some(points) = moved {
+                self.mesh = self.mesh.with_points(points)?;
+            }
+            self.cycle += 1;
+            steps.whole.add(start.elapsed().as_secs_f64());
+            steps.memory = steps.memory.max(memory()? / f64::from(1 << 20));
+        }
+        Ok(steps)
+    }
+
+    /// Steps beside viewers in a process of their own, until that has ended.
+    fn beside(&mut self, task: &Task, most: Duration) -> Result<(Steps, Seen), Box<dyn Error>> {
+        let link = self.adaptor.link().ok_or("a run has a link")?;
+        let mut viewers = Viewers::start(&link, task)?;
+        let steps = self.steps(|| viewers.has_ended(), [Duration::ZERO, most])?;
+        Ok((steps, viewers.seen()?))
+    }
+}
+
+/// The process of the viewers, which ends with this.
+struct Viewers(Option<Child>);
+
+impl Viewers {
+    fn start(link: &str, task: &Task) -> Result<Self, Box<dyn Error>> {
+        let mut command = Command::new(std::env::current_exe()?);
+        let task = serde_json::to_string(task)?;
+        // Not among its arguments: the link is a secret.
+        command.args(["service", "--viewers", &task]).env("TOMBOLO_LINK", link);
+        Ok(Self(Some(command.stdout(Stdio::piped()).spawn()?)))
+    }
+
+    fn has_ended(&mut self) -> bool {
+        self.0.as_mut().is_none_or(|child| !matches!(child.try_wait(), Ok(None)))
+    }
+
+    fn seen(mut self) -> Result<Seen, Box<dyn Error>> {
+        let child = self.0.take().ok_or("the viewers were asked twice")?;
+        let output = child.wait_with_output()?;
+        Ok(serde_json::from_str(peer::answer(&String::from_utf8(output.stdout)?)?)?)
+    }
+}
+
+impl Drop for Viewers {
+    fn drop(&mut self) {
+        if let Some(mut child) = self.0.take() {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+/// Seconds since the epoch, the clock that both processes have.
+pub fn now() -> f64 {
+    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs_f64()
+}
+
+/// Measures all parts; some minutes, or one where it is only to be seen that it works.
+///
+/// # Errors
+/// The first error of a part.
+pub fn run(short: bool) -> Result<Report<Row>, Box<dyn Error>> {
+    let seconds = if short { 15.0 } else { 60.0 };
+    let alone = [Duration::from_secs_f64(seconds / 3.0), Duration::from_secs(600)];
+    let most = Duration::from_secs(3600);
+    let mut rows = Vec::new();
+    let mut targets = Vec::new();
+    let mut push = |part, what, value, unit| rows.push(Row { part, what, value, unit });
+
+    let mut run = Run::new()?;
+    run.steps(|| true, alone)?;
+    let before = run.steps(|| true, alone)?;
+    let task = Task::Watch { fast: 35, slow: 10, deaf: 5, seconds };
+    let (beside, seen) = run.beside(&task, most)?;
+    let after = run.steps(|| true, alone)?;
+    let quiet = f64::midpoint(before.whole.median(), after.whole.median());
+    let quiet_execute = f64::midpoint(before.execute.median(), after.execute.median());
+    push("alone", "step, median", quiet, "s");
+    push("alone", "memory", before.memory, "MiB");
+    push("50 viewers", "step, median", beside.whole.median(), "s");
+    push("50 viewers", "execute, median", beside.execute.median(), "s");
+    push("50 viewers", "memory", beside.memory, "MiB");
+    push("50 viewers", "frames of fast viewers, least part", seen.least_part, "");
+    let ages: Times = seen
+        .slow
+        .iter()
+        .filter_map(|(cycle, at)| run.shown.get(cycle).map(|shown| at - shown))
+        .collect();
+    push("50 viewers", "age of what a 10 kB/s viewer sees, median", ages.median(), "s");
+    push("50 viewers", "the same, 95th percentile", ages.percentile(0.95), "s");
+    let beyond = |steps: &Steps| steps.memory - before.memory;
+    targets.push(Target::at_most(
+        "50 viewers: step, median, against none",
+        beside.whole.median() / quiet,
+        1.01,
+    ));
+    targets.push(Target::at_most("50 viewers: memory beyond [MiB]", beyond(&beside), BOUND));
+    targets.push(Target::at_most(
+        "50 viewers: frames missed by fast ones",
+        1.0 - seen.least_part,
+        0.05,
+    ));
+
+    let count = if short { 20 } else { 200 };
+    let (_, seen) = run.beside(&Task::Latency { count }, most)?;
+    let delays: Times =
+        seen.sent.iter().filter_map(|(id, at)| run.moved.get(id).map(|moved| moved - at)).collect();
+    push("order to first moved mesh", "median", delays.median(), "s");
+    push("order to first moved mesh", "95th percentile", delays.percentile(0.95), "s");
+
+    for (part, task) in [
+        ("small orders", Task::Small { count: if short { 50 } else { 1000 } }),
+        ("orders of 0.94 MB", Task::Large { count: if short { 12 } else { 60 } }),
+    ] {
+        let (steps, seen) = run.beside(&task, most)?;
+        let rejected = seen.rejected.len();
+        if let Some(reason) = seen.rejected.first().filter(|_| rejected * 10 > seen.sent.len()) {
+            return Err(format!(
+                "{rejected} {part} of {} were rejected: {reason}",
+                seen.sent.len()
+            )
+            .into());
+        }
+        push(part, "orders", seen.sent.len() as f64, "");
+        push(part, "step, median", steps.whole.median(), "s");
+        push(part, "execute, median", steps.execute.median(), "s");
+        push(part, "execute, 99th percentile", steps.execute.percentile(0.99), "s");
+        push(part, "memory", steps.memory, "MiB");
+        push(part, "longest text that a viewer was sent", seen.longest as f64, "bytes");
+        // The solver takes longer for a mesh that moves, whoever moves it: what the service costs is
+        // what is spent in its calls.
+        let added = (steps.execute.median() - quiet_execute) / quiet;
+        targets.push(Target::at_most(format!("{part}: added to the median step"), added, 0.05));
+        targets.push(Target::at_most(
+            format!("{part}: memory beyond [MiB]"),
+            beyond(&steps),
+            BOUND,
+        ));
+    }
+    run.adaptor.finalize()?;
+    Ok(Report { rows, targets })
+}
