@@ -8,6 +8,7 @@ use common::{Solver, Viewer, config, squeeze};
 use serde_json::{Value, json};
 use tombolo::{
     Settings,
+    client::{Client, Link, Options},
     pipelines::{encode::Decoder, language::StreamServer},
     play::Playback,
     recording::{Recorded, RecordedMessage, Recording},
@@ -108,11 +109,15 @@ fn viewers_go_through_a_recording() {
     let settings =
         StreamServer { listen: "127.0.0.1:0".parse().unwrap(), ..StreamServer::default() };
     let playback = Playback::start(&file, &settings).unwrap();
+    let link: Link = playback.link().parse().unwrap();
+    let client = Client::connect(&link, &Options::default()).unwrap();
+    assert_eq!(json!(client.stack().unwrap()), squeeze(0.2)["edits"]);
     let url = playback.link().replacen("http://", "ws://", 1).replacen("/?", "/ws?", 1);
     let mut viewer = Viewer::try_connect(&url).unwrap();
     let hello = viewer.hello();
     assert_eq!((&hello["role"], &hello["may_drive"]), (&json!("watcher"), &json!(false)));
     assert_eq!(hello["recording"]["last"]["cycle"], last.cycle);
+    assert_eq!(hello["stack"]["edits"], 0);
     // What would steer is refused.
     viewer.send(&json!({"id": "x", "order": squeeze(0.1)}));
     let error = viewer.wait_for("error", |error| error["id"] == "x");
@@ -123,6 +128,7 @@ fn viewers_go_through_a_recording() {
     viewer.send(&json!({"play": {"speed": 100}}));
     viewer.wait_for("play", |play| play["at_end"] == true);
     viewer.wait_for("order", |order| order["status"] == "applied");
+    let changed = viewer.wait_for("stack", |stack| stack["edits"] == 1);
     let frames = viewer.decoded();
     assert!(frames.iter().any(|frame| frame.view == "boundary" && frame.cycle > 40));
     // Back: the picture is that of the moment, and stays while it is paused.
@@ -131,6 +137,9 @@ fn viewers_go_through_a_recording() {
     viewer.send(&json!({"play": {"paused": true, "seek": {"seconds": seconds}}}));
     let hello = viewer.wait_for("hello", |_| true);
     assert!(hello["orders"].as_array().is_some_and(|orders| orders.len() == 1), "{hello}");
+    // The same as when it went past.
+    let stack = &hello["stack"];
+    assert_eq!((&stack["revision"], &stack["edits"]), (&changed["revision"], &json!(1)));
     let play = viewer.wait_for("play", |play| play["paused"] == true);
     assert!((play["seconds"].as_f64().unwrap() - seconds).abs() < 1e-9, "{play}");
     let shown = viewer.decoded();
