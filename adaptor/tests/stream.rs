@@ -149,12 +149,12 @@ fn viewers_know_what_the_features_are_to_the_flow_and_what_can_be_taken_back() {
             (&json!("y-min"), &Value::Null)
         ]
     );
-    assert_eq!(hello["undoable"], 0);
+    assert_eq!(hello["stack"]["undoable"], 0);
     viewer.send(&json!({"id": "squeeze", "order": squeeze(0.1)}));
     solver.step_until_told(&mut viewer, "order", |order| order["status"] == "applied");
     viewer.send(&json!({"id": "clear", "order": {"stack": []}}));
-    solver.step_until_told(&mut viewer, "hello", |hello| {
-        hello["stack"] == json!([]) && hello["undoable"] == 2
+    solver.step_until_told(&mut viewer, "stack", |stack| {
+        stack["edits"] == 0 && stack["undoable"] == 2
     });
     solver.finish();
 }

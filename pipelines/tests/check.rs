@@ -57,7 +57,7 @@ fn errors_of_all_places_are_told_in_the_order_of_the_file() {
         r#"
 views.json:2:14: version: found "1", expected a whole number from 0 to 4294967295
 views.json:3:3: steam: found the unknown key `steam`, expected `version`, `description`, `stream`, `journal`, `record`, `record_megabytes`, `steering`, `watch` or `pipelines`; did you mean `stream`?
-views.json:3:23: steam.listen: invalid socket address syntax
+views.json:3:23: steam.listen: found "nowhere", expected ADDRESS:PORT, such as 127.0.0.1:7070, or unix:/PATH
 views.json:5:38: pipelines[0].every.steps: found 0, expected a whole number from 1 to 18446744073709551615
 views.json:6:28: pipelines[0].stages[0].slice.origin: found 2 values, expected an array of 3 values
 views.json:7:8: pipelines[0].stages[1].slect: found the unknown name `slect`, expected `surface`, `slice`, `contour`, `threshold`, `clip`, `probe`, `streamlines`, `glyphs`, `gradient`, `vorticity`, `divergence`, `q_criterion`, `magnitude`, `expression`, `select`, `quality`, `statistics`, `integrate`, `histogram`, `force`, `wall_shear_stress`, `difference`, `time_statistics`, `spectrum`, `decimate`, `stream`, `write`, `csv`, `log`, `render`, `translate`, `rotate`, `scale_direction`, `scale_normals`, `affine`, `displacement`, `skeleton`, `order`, `deform`, `guard`, `schedule`, `pause`, `stop` or `set`; did you mean `select`?

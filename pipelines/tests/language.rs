@@ -50,7 +50,7 @@ fn errors_point_at_the_token() {
         (r#"{"pipelines": []}"#, 1, 1, "", "the key `version` is missing", None),
         (r#"[1]"#, 1, 1, "", "found an array of 1, expected an object", None),
         ("{\"version\": 1,\n \"pipeline\": []}", 2, 2, "pipeline", "unknown key `pipeline`", Some("pipelines")),
-        (r#"{"version": 1, "stream": {"listen": "nowhere"}}"#, 1, 37, "stream.listen", "invalid socket address", None),
+        (r#"{"version": 1, "stream": {"listen": "nowhere"}}"#, 1, 37, "stream.listen", "expected ADDRESS:PORT", None),
         (r#"{"version": 1, "stream": {"token": "short"}}"#, 1, 36, "stream.token", "16 to 128", None),
         (r#"{"version": 1, "pipelines": [{"name": "a"}]}"#, 1, 30, "pipelines[0]", "the key `stages` is missing", None),
         (r#"{"version": 1, "pipelines": [{"name": "", "stages": []}]}"#, 1, 39, "pipelines[0].name", "1 to 200", None),
