@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 
 use crate::{
     recording::{HEAD, Head, Kind, MAGIC, RecordError, read_head, write},
-    stream::{Hub, Observer, Told},
+    stream::{EXACT, Hub, Observer, Told},
 };
 
 /// After how long a view is recorded with a key frame again, so that it can be gone to.
@@ -162,10 +162,10 @@ impl Writing {
                     if is_key {
                         (*last, *has_asked) = (Instant::now(), false);
                     } else if last.elapsed() > KEY_PERIOD && !std::mem::replace(has_asked, true) {
-                        self.hub.want_key(view, self.observer.level(view));
+                        self.hub.want_key(view, EXACT);
                     }
                 }
-                Some(Told::Behind(view, level)) => self.hub.want_key(view, level),
+                Some(Told::Behind(view)) => self.hub.want_key(view, EXACT),
                 Some(Told::End) => return self.out.flush().map_err(|error| error.to_string()),
                 Some(Told::TooMuch) => return Err("the disk is too slow for what is told".into()),
                 None => {

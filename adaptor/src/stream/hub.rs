@@ -22,7 +22,7 @@ use super::{
     ReferenceSurface, StreamCounts,
     credentials::Access,
     outbox::{Client, Frame},
-    pace::LEVELS,
+    pace::{LEVELS, Pace},
     stack::ToldStack,
     text::Text,
     wheel::Wheel,
@@ -383,7 +383,8 @@ impl Hub {
             None if state.clients.len() >= place => return Ok(Arrival::Full),
             None => state.wheel.stranger()?,
         };
-        let client = Arc::new(Client::new(id, access, back, state.views.keys().copied()));
+        let client =
+            Arc::new(Client::new(id, access, back, state.views.keys().copied(), Pace::default()));
         state.seat(&client);
         self.arrivals.fetch_add(1, Ordering::Relaxed);
         drop(state);

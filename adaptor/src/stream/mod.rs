@@ -29,8 +29,8 @@ mod listener;
 mod metrics;
 mod observer;
 mod outbox;
-mod playback;
 mod pace;
+mod playback;
 mod pool;
 mod seats;
 mod secret;
@@ -76,7 +76,7 @@ use crate::lock::lock;
 
 pub(crate) use hub::{Clock, End, Hub};
 pub(crate) use observer::{Observer, Told};
-pub(crate) use pace::{COARSER, LEVELS};
+pub(crate) use pace::{COARSER, EXACT, LEVELS};
 pub(crate) use surface::ReferenceSurface;
 
 use connection::Connection;

@@ -9,6 +9,7 @@ use super::{
     credentials::Access,
     hub::Hub,
     outbox::{Client, Message},
+    pace::Pace,
     secret::Secret,
     stack::StackChange,
     text::Text,
@@ -25,15 +26,15 @@ pub(crate) enum Told {
     Stack(StackChange),
     /// A frame; a key frame with its topology.
     Frame { view: usize, is_key: bool, bytes: Bytes },
-    /// Frames of a view were missed: a key frame of it is needed, at this level.
-    Behind(usize, usize),
+    /// Frames of a view were missed: a key frame of it is needed.
+    Behind(usize),
     /// So much was left unread that the rest is not told.
     TooMuch,
     /// Nothing comes any more.
     End,
 }
 
-/// Is told what viewers are told, as long as it is the one that the hub has.
+/// Is told what viewers are told, with exact frames only, as long as it is the one that the hub has.
 pub(crate) struct Observer {
     client: Arc<Client>,
     runtime: tokio::runtime::Runtime,
@@ -45,7 +46,8 @@ impl Observer {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build()?;
         let secret = Secret::random().map_err(|error| io::Error::other(error.to_string()))?;
         let mut state = lock(&hub.state);
-        let client = Arc::new(Client::new(0, Access::Watch, secret, state.view_numbers()));
+        let client =
+            Arc::new(Client::new(0, Access::Watch, secret, state.view_numbers(), Pace::exact()));
         state.observer = Some(Arc::clone(&client));
         drop(state);
         hub.look();
@@ -64,16 +66,11 @@ impl Observer {
                     let bytes = if is_key { frame.with_topology() } else { frame.message.clone() };
                     Told::Frame { view, is_key, bytes }
                 }
-                Message::Behind(view, level) => Told::Behind(view, level),
+                Message::Behind(view, _) => Told::Behind(view),
                 Message::End => Told::End,
             },
             Err(_) => Told::TooMuch,
         })
-    }
-
-    /// How exact the frames of a view are.
-    pub(crate) fn level(&self, view: usize) -> usize {
-        self.client.level(view)
     }
 
     /// Returns once there may be something, or after this time.

@@ -14,7 +14,7 @@ use tombolo_pipelines::encode::Encoded;
 
 use super::{
     credentials::Access,
-    pace::{COARSER, Pace},
+    pace::{COARSER, EXACT, Pace},
     secret::Secret,
     stack::StackChange,
     text::Text,
@@ -131,6 +131,8 @@ struct Outbox {
     hello: bool,
     has_been_greeted: bool,
     views: BTreeMap<usize, Unread>,
+    /// The pace at which a view begins.
+    pace: Pace,
     /// The view that was served last: they take turns.
     last_view: usize,
     /// The view of each frame that was sent and not acknowledged, the oldest first; from the first
@@ -226,16 +228,18 @@ pub(super) enum Message {
 }
 
 impl Client {
-    /// A viewer that is to be greeted, and needs a key frame of each of these views.
+    /// A viewer that is to be greeted, and needs a key frame of each of these views; `pace` is how
+    /// each of its views begins.
     pub(super) fn new(
         id: u64,
         access: Access,
         back: Secret,
         views: impl Iterator<Item = usize>,
+        pace: Pace,
     ) -> Self {
-        let behind = || Unread { is_behind: true, ..Unread::default() };
+        let behind = || Unread { is_behind: true, pace: pace.clone(), ..Unread::default() };
         let views = views.map(|view| (view, behind())).collect();
-        let outbox = Outbox { hello: true, views, ..Outbox::default() };
+        let outbox = Outbox { hello: true, views, pace, ..Outbox::default() };
         Self { id, access, back, wake: Notify::new(), outbox: Mutex::new(outbox) }
     }
 
@@ -309,7 +313,8 @@ impl Client {
     pub(super) fn frame(&self, view: usize, name: &Arc<str>, frame: &Arc<Frame>) -> usize {
         let mut missed = 0;
         self.put(|outbox| {
-            let unread = outbox.views.entry(view).or_default();
+            let begun = || Unread { pace: outbox.pace.clone(), ..Unread::default() };
+            let unread = outbox.views.entry(view).or_insert_with(begun);
             let is_changed;
             (missed, is_changed) = unread.put(frame);
             if is_changed {
@@ -324,7 +329,7 @@ impl Client {
 
     /// How exact the frames of a view are for it.
     pub(super) fn level(&self, view: usize) -> usize {
-        lock(&self.outbox).views.get(&view).map_or(0, |unread| unread.pace.level())
+        lock(&self.outbox).views.get(&view).map_or(EXACT, |unread| unread.pace.level())
     }
 
     /// Forgets what is unread of a view.

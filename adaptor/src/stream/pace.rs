@@ -4,6 +4,8 @@
 pub(crate) const COARSER: [f64; 3] = [1.0, 8.0, 64.0];
 /// The levels, the exact one first.
 pub(crate) const LEVELS: usize = COARSER.len();
+/// The level of exact frames.
+pub(crate) const EXACT: usize = 0;
 /// Frames that a link must carry one after the other, to count as one that keeps up.
 const SOON: u32 = 16;
 /// The most frames that are waited for before a finer level is tried again.
@@ -13,9 +15,11 @@ const LONGEST: u32 = 512;
 ///
 /// A link that falls behind twice, soon one after the other, gets coarser frames; one that has kept up
 /// for a while gets finer ones. Where these are too much again, the next attempt comes later.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Pace {
     level: usize,
+    /// The last level that is tried.
+    coarsest: usize,
     /// Frames since it fell behind or the level changed.
     kept: u32,
     /// Frames after which a finer level is tried.
@@ -26,11 +30,16 @@ pub(super) struct Pace {
 
 impl Default for Pace {
     fn default() -> Self {
-        Self { level: 0, kept: SOON, patience: 2 * SOON, is_tried: false }
+        Self { level: EXACT, coarsest: LEVELS - 1, kept: SOON, patience: 2 * SOON, is_tried: false }
     }
 }
 
 impl Pace {
+    /// Exact frames, or none: for what is kept.
+    pub(super) fn exact() -> Self {
+        Self { coarsest: EXACT, ..Self::default() }
+    }
+
     pub(super) fn level(&self) -> usize {
         self.level
     }
@@ -41,7 +50,7 @@ impl Pace {
         if self.kept >= SOON && std::mem::take(&mut self.is_tried) {
             self.patience = 2 * SOON;
         }
-        if self.level == 0 || self.kept < self.patience {
+        if self.level == EXACT || self.kept < self.patience {
             return false;
         }
         self.level -= 1;
@@ -53,7 +62,7 @@ impl Pace {
     pub(super) fn fell_behind(&mut self) -> bool {
         let is_soon = self.kept < SOON;
         self.kept = 0;
-        if !is_soon || self.level + 1 == LEVELS {
+        if !is_soon || self.level == self.coarsest {
             return false;
         }
         if std::mem::take(&mut self.is_tried) {
@@ -77,6 +86,12 @@ mod tests {
         assert!(pace.fell_behind() && pace.level() == 1);
         assert!(pace.fell_behind() && pace.level() == 2);
         assert!(!pace.fell_behind() && pace.level() == 2, "there is no coarser one");
+    }
+
+    #[test]
+    fn what_is_kept_stays_exact() {
+        let mut pace = Pace::exact();
+        (0..100).for_each(|_| assert!(!pace.fell_behind() && pace.level() == 0));
     }
 
     #[test]
