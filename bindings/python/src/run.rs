@@ -8,9 +8,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tombolo::foreign::{self, RunError, Shown, ranks};
 use tombolo::pipelines::language;
-use tombolo::{ExecuteError, Parameter, Settings, Stopper};
+use tombolo::{Condition, ExecuteError, Parameter, Settings, Stopper};
 
-use crate::error::{CallError, FailedError, guarded, of_run};
+use crate::error::{CallError, ConfigurationError, FailedError, guarded, of_run};
 use crate::lender::{Channels, Lender};
 use crate::motion::Motion;
 
@@ -116,19 +116,35 @@ fn settings(
     }
 }
 
+/// What features are to the flow, as Python names it.
+fn conditions(given: Vec<(String, String)>) -> PyResult<BTreeMap<String, Condition>> {
+    let condition = |(feature, word): (String, String)| match word.as_str() {
+        "inflow" => Ok((feature, Condition::Inflow)),
+        "outflow" => Ok((feature, Condition::Outflow)),
+        "wall" => Ok((feature, Condition::Wall)),
+        other => Err(ConfigurationError::new_err(format!(
+            "condition of '{feature}': found '{other}', expected 'inflow', 'outflow' or 'wall'"
+        ))),
+    };
+    given.into_iter().map(condition).collect()
+}
+
 #[pymethods]
 impl Run {
     #[new]
-    #[pyo3(signature = (configuration, orders, replay, parameters, output, communicator))]
+    #[pyo3(signature = (configuration, orders, replay, parameters, conditions, output, communicator))]
+    #[allow(clippy::too_many_arguments, reason = "Python names each")]
     fn new(
         py: Python<'_>,
         configuration: Option<Source>,
         orders: Option<Source>,
         replay: Option<PathBuf>,
         parameters: Vec<(String, f64, f64, f64)>,
+        conditions: Vec<(String, String)>,
         output: Option<PathBuf>,
         communicator: Option<i32>,
     ) -> PyResult<Self> {
+        let conditions = self::conditions(conditions)?;
         let begin = || -> Result<foreign::Run, RunError> {
             // SAFETY: of a communicator of mpi4py, which is alive during the call.
             let communicator = unsafe { ranks::communicator(communicator) }?;
@@ -139,6 +155,7 @@ impl Run {
                 .map(|(name, value, minimum, maximum)| Parameter { name, value, minimum, maximum });
             foreign::Run::new(Settings {
                 parameters: parameters.collect(),
+                conditions,
                 output: output.unwrap_or(settings.output),
                 communicator: Arc::clone(&communicator),
                 ..settings

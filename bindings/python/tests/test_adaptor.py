@@ -229,6 +229,8 @@ def test_a_configuration_is_a_file_a_dict_or_an_error_with_its_place(tmp_path):
         tombolo.Adaptor(parameters={"inflow": (50, 0, 40)})
     with pytest.raises(tombolo.ConfigurationError, match=r"expected \(value, minimum, maximum\)"):
         tombolo.Adaptor(parameters={"inflow": 10})
+    with pytest.raises(tombolo.ConfigurationError, match="'inlet': found 'inflwo', expected 'inflow'"):
+        tombolo.Adaptor(conditions={"inlet": "inflwo"})
     with pytest.raises(tombolo.ConfigurationError, match="orders:1:"):
         tombolo.Adaptor(orders=[{"order": {"edits": [{"translat": {}}]}}])
     file.write_text(json.dumps({"version": 1}))

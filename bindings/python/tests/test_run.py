@@ -16,6 +16,17 @@ import tombolo
 from conftest import CONFIGURATION, SQUEEZE, Solver
 
 
+def test_what_a_feature_is_to_the_flow(tmp_path):
+    running = Solver(output=tmp_path, conditions={"top": "inflow", "bottom": "outflow"})
+    try:
+        with tombolo.connect(running.link) as run:
+            run.wait_for(lambda: run.features, 30)
+            told = {feature["name"]: feature["condition"] for feature in run.features}
+    finally:
+        running.close()
+    assert told == {"top": "inflow", "bottom": "outflow", "untagged": None}
+
+
 def test_facts(run):
     assert run.view_names == ["midplane"]
     assert run.parameters == {"heating": (1, 0, 10)}

@@ -21,6 +21,7 @@ class Run:
         orders: Optional[Source],
         replay: Optional[str],
         parameters: list[tuple[str, float, float, float]],
+        conditions: list[tuple[str, str]],
         output: Optional[str],
         communicator: Optional[int],
     ) -> Run: ...

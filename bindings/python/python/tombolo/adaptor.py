@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType, TracebackType
-from typing import Any, NamedTuple, Optional, Union
+from typing import Any, Literal, NamedTuple, Optional, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ __all__ = ["Adaptor", "Motion", "Steering", "SurfaceMotion"]
 
 Document = Union[str, "os.PathLike[str]", Mapping[str, Any], Sequence[Any]]
 Range = tuple[float, float, float]
+Condition = Literal["inflow", "outflow", "wall"]
 
 
 class SurfaceMotion:
@@ -173,6 +174,9 @@ class Adaptor:
         nothing is watched.
     parameters : dict, optional
         Numbers of the solver that can be steered, each with its value and its range: ``{"inflow": (10, 0, 40)}``.
+    conditions : dict, optional
+        What features of the mesh are to the flow, `inflow`, `outflow` or `wall`: ``{"inlet": "inflow"}``. Viewers hold
+        inflow and outflow still until somebody wants otherwise.
     orders : path or list, optional
         Orders known beforehand, which take effect at their cycle exactly.
     replay : path, optional
@@ -186,7 +190,8 @@ class Adaptor:
     Raises
     ------
     ConfigurationError
-        Something is wrong with the configuration, the orders or a parameter: the text names each line and column.
+        Something is wrong with the configuration, the orders, a parameter or a condition: the text names each line and
+        column.
     FailedError
         An address is in use, or a file cannot be written.
 
@@ -221,6 +226,7 @@ class Adaptor:
         configuration: Optional[Document] = None,
         *,
         parameters: Optional[Mapping[str, Range]] = None,
+        conditions: Optional[Mapping[str, Condition]] = None,
         orders: Optional[Document] = None,
         replay: Optional[Union[str, os.PathLike[str]]] = None,
         output: Optional[Union[str, os.PathLike[str]]] = None,
@@ -241,6 +247,7 @@ class Adaptor:
             None if orders is None else _json.source(orders, "orders"),
             None if replay is None else os.fspath(replay),
             _ranges(parameters),
+            [(str(feature), str(condition)) for feature, condition in (conditions or {}).items()],
             None if output is None else os.fspath(output),
             handle,
         )
