@@ -1,5 +1,5 @@
 //! The viewer in a headless browser: the demo, what can be seen and how, before and after compared,
-//! shaping by hand, a shape changed by two people, and the end of a run.
+//! shaping by hand, a first day, a shape changed by two people, and the end of a run.
 
 use std::path::Path;
 use std::process::Command;
@@ -28,16 +28,22 @@ fn drive(script: &str, run: &mut Run) {
 
 /// The nozzle of the demo, running.
 fn nozzle() -> Run {
-    let mesh = project().join("meshes/channel-60k.msh");
-    if !mesh.exists() {
+    running("nozzle", "channel-60k")
+}
+
+/// A case of the demos, running, its mesh made where it is not there.
+fn running(case: &str, mesh: &str) -> Run {
+    if !project().join(format!("meshes/{mesh}.msh")).exists() {
         let made = Command::new(project().join(".venv/bin/python"))
             .current_dir(project())
-            .args(["scripts/meshes", "channel-60k"])
+            .args(["scripts/meshes", mesh])
             .status()
             .expect("gmsh is installed (scripts/setup)");
-        assert!(made.success() && Path::new(&mesh).exists(), "scripts/meshes made no mesh");
+        let is_there = project().join(format!("meshes/{mesh}.msh")).exists();
+        assert!(made.success() && is_there, "scripts/meshes made no mesh");
     }
-    Run::flow(&["--case", "examples/flow/cases/nozzle.json", "--listen", "127.0.0.1:0"])
+    let case = format!("examples/flow/cases/{case}.json");
+    Run::flow(&["--case", &case, "--listen", "127.0.0.1:0"])
 }
 
 #[test]
@@ -65,6 +71,13 @@ fn before_and_after_in_a_browser() {
 fn shaping_by_hand_in_a_browser() {
     let mut run = nozzle();
     drive("handles.mjs", &mut run);
+    assert!(run.is_running(), "the run ended:\n{}", run.text());
+}
+
+#[test]
+fn a_first_day_in_a_browser() {
+    let mut run = running("bypass", "bypass-0");
+    drive("tasks.mjs", &mut run);
     assert!(run.is_running(), "the run ended:\n{}", run.text());
 }
 

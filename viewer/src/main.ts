@@ -127,6 +127,7 @@ const scene = new Scene(part("scene"), selection, {
     marks.draw();
     if (pins.update()) history.update();
     worst.update();
+    slice.drawn();
     sliceHandle.drawn();
     handles.drawn();
     compare.follow();
@@ -179,7 +180,10 @@ const look = new LookPanel(part("look"), store, (view) => {
   if (pipeline) pipelines.set(withQuality(pipeline));
 });
 const slice = new SlicePanel(part("slice"), store, pipelines, () => scene.bounds());
-const sliceHandle = new SliceHandle(document.querySelector<SVGElement>("#cut")!, part("scene"), scene, slice);
+const sliceHandle = new SliceHandle(document.querySelector<SVGElement>("#cut")!, part("scene"), {
+  projection: () => scene.projection(), bounds: () => scene.bounds(), redraw: () => scene.redraw(),
+  points: () => scene.layers.get(store.state.chosenView ?? "")?.coordinates ?? new Float32Array(0),
+}, slice);
 const earlier: Earlier = new Earlier(store, () => scene.layers.values(), () => {
   compare.update();
   linePlot.update();

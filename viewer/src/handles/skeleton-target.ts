@@ -2,7 +2,6 @@
 import type { Json, Vector } from "../connection/protocol";
 import type { Bones } from "../picture/skeleton";
 import { nearestWithin } from "../picture/skeleton";
-import { digits } from "../number";
 import type { Values } from "../form/schema";
 import { asksNothing, bodyOf, isObject, kindOf, withMove } from "../store/draft";
 import type { State } from "../store/state";
@@ -124,7 +123,8 @@ export class SkeletonTarget implements Target {
     const ways = bent(held.map(({ place }, i) => ({ place, isPinned: branch[i]!.isPinned })), branch.indexOf(node), axis, degrees);
     if (!ways) return null;
     const moves = held.reduce<Json[]>((all, { at, by }, i) => (length(ways[i]!) > 0 ? withMove(all, at, add(by, ways[i]!)) : all), this.moves());
-    return { key: "skeleton", values: { moves, name: `Bend by ${digits(degrees, 4)}° at ${this.nameOf(node)}` } };
+    // Without the angle: the amount of the edit can be changed.
+    return { key: "skeleton", values: { moves, name: `Bend at ${this.nameOf(node)}` } };
   }
 
   /** No node is meant any more; returns whether one was. */

@@ -12,6 +12,8 @@ import { compare, firstChoice } from "./series";
 const DRAWN = COLOURS.length;
 /** The most axes that stand beside the plot. */
 const AXES = 4;
+/** The lines in which the names of orders stand. */
+const MARK_LINES = 3;
 /** The shortest time between two drawings of new values, in milliseconds. */
 const REST = 250;
 
@@ -192,13 +194,21 @@ export class HistoryPlot implements Tab {
     ctx.strokeStyle = ctx.fillStyle = style.getPropertyValue("--accent");
     ctx.font = `${11 * devicePixelRatio}px sans-serif`;
     ctx.setLineDash([4 * devicePixelRatio, 3 * devicePixelRatio]);
+    ctx.textAlign = "left";
+    ctx.textBaseline = "alphabetic";
+    /** Where the names in each line end: one that finds no room stands in none. */
+    const ends = new Array<number>(MARK_LINES).fill(-Infinity);
     for (const mark of this.marks) {
       const x = Math.round(plot.valToPos(mark.cycle, "x", true)) + 0.5;
       ctx.beginPath();
       ctx.moveTo(x, bbox.top);
       ctx.lineTo(x, bbox.top + bbox.height);
       ctx.stroke();
-      ctx.fillText(mark.label.length > 28 ? `${mark.label.slice(0, 27)}…` : mark.label, x + 4 * devicePixelRatio, bbox.top + 11 * devicePixelRatio);
+      const label = mark.label.length > 28 ? `${mark.label.slice(0, 27)}…` : mark.label;
+      const line = ends.findIndex((end) => end < x);
+      if (line < 0) continue;
+      ends[line] = x + ctx.measureText(label).width + 10 * devicePixelRatio;
+      ctx.fillText(label, x + 4 * devicePixelRatio, bbox.top + (11 + 13 * line) * devicePixelRatio);
     }
     ctx.restore();
   }

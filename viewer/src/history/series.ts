@@ -137,8 +137,10 @@ export function compare(history: History, key: string, cycle: number, marks: rea
 
 /** What a person who asks for nothing wants to see: the pressure, what goes in and out, and the quality of the mesh; at most three. */
 export function firstChoice(series: readonly Series[]): string[] {
-  const wanted = [/quality\.min$/, /pressure|drop/, /mass|flux|balance|flow/];
-  const found = wanted.flatMap((pattern) => series.find(({ source, name }) => pattern.test(name) || pattern.test(source) && !/quality/.test(name)) ?? []);
+  // Of the patterns for one thing the first that any of them meets.
+  const wanted = [[/quality\.min$/], [/drop/, /pressure/], [/mass|flux|balance/]];
+  const met = (pattern: RegExp): Series | undefined => series.find(({ source, name }) => pattern.test(name) || (pattern.test(source) && !/quality/.test(name)));
+  const found = wanted.flatMap((patterns) => patterns.map(met).find((one) => one !== undefined) ?? []);
   const keys = new Set((found.length > 0 ? found : series.slice(0, 2)).map(({ key }) => key));
   return [...keys];
 }

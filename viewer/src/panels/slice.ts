@@ -21,6 +21,8 @@ export class SlicePanel implements Sliced {
   private readonly axes: HTMLButtonElement[];
   /** Where the slice of the chosen view lies, as far as is known. */
   private plane: Plane | null = null;
+  /** Between which offsets the slider was placed. */
+  private reach = "";
 
   /** `bounds` is the box around all that is there. */
   constructor(private readonly root: HTMLElement, private readonly store: Store<State, Action>, private readonly pipelines: Pipelines, private readonly bounds: () => [Vector, Vector] | null) {
@@ -48,6 +50,14 @@ export class SlicePanel implements Sliced {
     if (document.activeElement !== this.offset) this.offset.value = digits(offset, 5);
     const ends = this.ends(plane);
     if (ends) this.slider.value = String(Math.round((STEPS * (offset - ends[0])) / (ends[1] - ends[0])));
+  }
+
+  /** Something else is drawn: how far the slice can go may be another distance. */
+  drawn(): void {
+    const ends = JSON.stringify(this.plane && this.ends(this.plane));
+    if (ends === this.reach) return;
+    this.reach = ends;
+    this.show();
   }
 
   private ends({ normal }: Plane): [number, number] | null {

@@ -105,7 +105,7 @@ export class VerdictPanel {
     this.whole = whole;
     this.limit = Math.min(this.limit, this.allowed(state));
     const kind = kindOf(state, state.draft.key);
-    const shown = kind !== null && (amount !== null || !asksNothing(state)) && state.draft.problems.length === 0 && !sameJson(scaled(kind.field, whole, 0.5, fieldsBefore(state)), whole);
+    const shown = kind !== null && (amount !== null || state.draft.updating !== null || !asksNothing(state)) && state.draft.problems.length === 0 && !sameJson(scaled(kind.field, whole, 0.5, fieldsBefore(state)), whole);
     part("amount-row").hidden = !shown;
     const fraction = amount?.fraction ?? 1;
     // Rounded down, so that what is shown is no more than what passes.

@@ -20,6 +20,8 @@ export interface Sliced {
 
 export interface SlicePicture {
   projection(): Projection;
+  /** The points of the slice, interleaved; none where it is not drawn. */
+  points(): Float32Array;
   bounds(): [Vector, Vector] | null;
   redraw(): void;
 }
@@ -55,13 +57,14 @@ export class SliceHandle {
     const projection = cut.length > 2 ? this.picture.projection() : null;
     const corners = projection ? cut.map((point) => projection.toPicture(point)) : [];
     const normal = plane && normalised(plane.normal);
-    // At a corner of the outline, where it hides nothing: the one that is seen farthest to the left.
-    const grip = corners.reduce((best, corner, i) => (corner && (best < 0 || corner[0] < corners[best]![0]) ? i : best), -1);
-    const point = cut[grip];
+    // At the end of the slice itself that is seen farthest to the left, where it hides little; it goes with the drag.
+    const at = projection ? leftmost(this.picture.points(), projection) : null;
+    const by = this.drag && plane && at ? this.drag.offset - dot(at, normalised(plane.normal)) : 0;
+    const point = at && normal ? add(at, times(normal, by)) : null;
+    const from = point && projection ? projection.toPicture(point) : null;
     const pixel = projection && point ? projection.pixel(point) : NaN;
     const tip = projection && point && normal && pixel > 0 ? projection.toPicture(add(point, times(normal, ARROW * pixel))) : null;
-    const from = grip >= 0 ? corners[grip] : null;
-    const isSeen = corners.length > 2 && corners.every((corner) => corner !== null) && tip !== null && from != null;
+    const isSeen = corners.length > 2 && corners.every((corner) => corner !== null) && tip !== null && from !== null;
     for (const shape of [this.outline, this.shaft, this.knob]) shape.style.display = isSeen ? "" : "none";
     this.outline.classList.toggle("dragged", this.drag !== null);
     if (!isSeen) return;
@@ -115,6 +118,22 @@ export class SliceHandle {
     this.drag = null;
     this.picture.redraw();
   }
+}
+
+/** Of so many points one is looked at for each of these. */
+const LOOKED_AT = 400;
+
+/** The point that is seen farthest to the left, of a part of all; null where none is seen. */
+function leftmost(points: Float32Array, projection: Projection): Vector | null {
+  const stride = 3 * Math.max(1, Math.floor(points.length / 3 / LOOKED_AT));
+  let best: Vector | null = null, least = Infinity;
+  for (let i = 0; i + 2 < points.length; i += stride) {
+    const point: Vector = [points[i]!, points[i + 1]!, points[i + 2]!];
+    const place = projection.toPicture(point);
+    if (!place || place[0] >= least) continue;
+    [best, least] = [point, place[0]];
+  }
+  return best;
 }
 
 /** The corners of the cut of a box by a plane, in order around it; fewer than three where they do not meet. */

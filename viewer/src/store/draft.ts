@@ -124,12 +124,20 @@ function fixedPart(field: Field & { kind: "object" }, entry: Values): Values {
   return Object.fromEntries(field.properties.flatMap(({ name, neutral }) => (neutral === undefined && entry[name] !== undefined ? [[name, entry[name]]] : [])));
 }
 
-/** The fields of the edit that is being changed, as they are in the stack; of a new one there are none. */
+/**
+ * The fields of the edit that is being changed, as they are in the stack: what a part of the change is measured from. Of a new edit there are
+ * none, and of one that was not changed yet neither: a part of it is a part of the edit itself.
+ */
 export function fieldsBefore(state: Pick<State, "hello" | "draft" | "form">): Values {
-  const { key, updating } = state.draft;
+  const { key, updating, amount } = state.draft;
   const [kind, edit] = [kindOf(state, key), updating === null ? null : partsOf(state.hello?.stack[updating])];
-  return kind && edit?.key === key ? withoutShorthand(kind, edit.body) : {};
+  if (!kind || edit?.key !== key) return {};
+  const isUnchanged = sameEdit(kind, { [kind.key]: own(amount?.whole ?? bodyOf(state.draft)) }, { [kind.key]: own(edit.body) });
+  return isUnchanged ? {} : withoutShorthand(kind, edit.body);
 }
+
+/** The fields of an edit without its features, which are the selection. */
+const own = (body: Values): Values => Object.fromEntries(Object.entries(body).filter(([name]) => ROLES[name] === undefined));
 
 function between(neutral: Json, value: Json, fraction: number): Json {
   // What is typed has few digits, and so has a part of it.

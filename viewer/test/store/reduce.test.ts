@@ -120,6 +120,17 @@ describe("an earlier edit", () => {
     expect(bodyOf(store.state.draft).moves).toEqual([{ at: [0, 0, 1], by: [2, 0, 0] }, { at: [0, 0, 9], by: [0, 2, 0] }]);
   });
 
+  it("that was not changed yet is asked for in part", () => {
+    const { store } = page({ stack });
+    store.dispatch({ type: "edit loaded", index: 0 });
+    store.dispatch({ type: "amount", fraction: 0.5 });
+    expect(bodyOf(store.state.draft).factors).toEqual([1, 1, 0.75]);
+    store.dispatch({ type: "amount", fraction: 0.2 });
+    expect(bodyOf(store.state.draft).factors).toEqual([1, 1, 0.9]);
+    store.dispatch({ type: "amount", fraction: 1 });
+    expect(asksNothing(store.state)).toBe(true);
+  });
+
   it("of a skeleton comes back from its short form", () => {
     const { store } = page({ stack: [{ skeleton: { at: [0, 0, 1], by: [1, 0, 0], fixed: [], skinning: "linear" } }] });
     store.dispatch({ type: "edit loaded", index: 0 });

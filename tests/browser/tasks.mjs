@@ -1,0 +1,129 @@
+/**
+ * What an engineer does on a first day, from the page alone, on the bypass, in Debian's Chromium: takes the tour, bends the graft by
+ * 20 degrees, finds where the mesh is worst, compares the pressure drop before and after, changes the first of two edits, hands the wheel
+ * to a colleague, and takes it all back. Each task is a screenshot at three sizes, and axe looks at each state.
+ *
+ *     TOMBOLO_URL=http://127.0.0.1:7070/?token=... node tests/browser/tasks.mjs
+ *
+ * The variables are those of page.mjs.
+ */
+import { Viewer, check, launch, link, run } from "./page.mjs";
+
+const SIZES = [[1920, 1080], [820, 1180], [1280, 800]];
+const browser = await launch();
+const viewer = await Viewer.open(browser, "tasks");
+let colleague = null;
+const { page } = viewer;
+const known = async () => new Set((await viewer.look()).orders.map((order) => order.id));
+const told = () => viewer.until("the forecast", ({ forecast }) => {
+  check(forecast.state !== "failed", `there is no forecast: ${forecast.reason}`);
+  return forecast.state === "told";
+});
+
+/** A task as it looks at each size; nobody is kept out of it. */
+async function filmed(name, drawer = null) {
+  for (const [width, height] of SIZES) {
+    await page.setViewportSize({ width, height });
+    const isNarrow = width <= 1100;
+    if (isNarrow && drawer) await page.click(`#${drawer}-drawer`);
+    await viewer.drawn();
+    await viewer.picture(`${name}-${width}`);
+    if (isNarrow && drawer) await page.click(`#${drawer}-drawer`);
+  }
+  const found = await viewer.violations();
+  check(found.length === 0, `${name}: ${found.join("; ")}`);
+}
+
+const steps = [
+  ["the tour shows the page in six steps", async () => {
+    await page.goto(link);
+    await viewer.until("a first picture", (now) => now.connection === "connected" && now.frames > 0);
+    await page.click("#tour-button");
+    for (let step = 1; step <= 6; step++) {
+      check((await viewer.text("#tour")).includes(`${step} of 6`), `step ${step} says "${await viewer.text("#tour")}"`);
+      if (step === 3) await filmed("tour");
+      await page.locator("#tour button.primary").click();
+    }
+    check(await page.isHidden("#tour"), "the tour does not end");
+  }],
+  ["the graft is bent by 20 degrees", async () => {
+    await page.click("#skeleton");
+    await viewer.holds("the nodes of the skeleton", () => window.tombolo.skeleton?.places.length > 0);
+    await page.getByLabel("bend at").selectOption({ label: "bypass · node 4" });
+    await page.getByLabel("in the plane").selectOption("xy");
+    await page.click("button.bend");
+    await told();
+    await filmed("bend", "right");
+    const order = await viewer.apply();
+    check(order.status === "applied", `the bend was refused: ${order.reason}`);
+    await page.click("#skeleton");
+    check(/^Bend at bypass/.test(await viewer.text("#stack .title")), `the list says "${await viewer.text("#stack .title")}"`);
+    await filmed("bent", "right");
+  }],
+  ["where the mesh is worst is shown", async () => {
+    await page.click("#quality");
+    await viewer.until("the worst cells", (now) => "worst cells" in now.views);
+    await viewer.holds("the rings around them", () => document.querySelectorAll("#marks circle.cell").length > 0);
+    await filmed("worst");
+    await page.click("#quality");
+    await viewer.until("the worst cells gone", (now) => !("worst cells" in now.views));
+  }],
+  ["the pressure before and after stands beside the plot", async () => {
+    await viewer.holds("before and after", () => [...document.querySelectorAll("#dock tbody tr")].some((row) => /pressure/.test(row.textContent) && /%/.test(row.textContent)));
+    await filmed("pressure");
+  }],
+  ["the first of two edits is changed", async () => {
+    await page.selectOption("#action", "translate");
+    await page.check('input[aria-label="bypass: handle"]');
+    await viewer.field("by z").fill("0.001");
+    await told();
+    check((await viewer.apply()).status === "applied", "the second edit was refused");
+    await viewer.until("two edits", (now) => now.stack.length === 2);
+    await page.click('#stack [data-edit="0"] [data-act="load"]');
+    check((await viewer.text("#apply")) === "Update edit 1", `the button says "${await viewer.text("#apply")}"`);
+    // Half the bend, by the amount of the edit itself.
+    const whole = (await viewer.look()).stack[0].skeleton.moves;
+    await page.locator("#amount").fill("50");
+    await told();
+    await filmed("first-edit", "right");
+    check((await viewer.apply()).status === "applied", "the change was refused");
+    const { stack } = await viewer.until("two edits still", (now) => now.stack.length === 2);
+    stack[0].skeleton.moves.forEach(({ by }, i) => by.forEach((part, k) => check(Math.abs(part - 0.5 * whole[i].by[k]) < 1e-9, `node ${i + 1} goes by ${by}, it was ${whole[i].by}`)));
+  }],
+  ["the wheel goes to a colleague", async () => {
+    colleague = await Viewer.open(browser, "colleague");
+    await colleague.page.goto(link);
+    await colleague.until("watching", (now) => now.role === "watcher");
+    await colleague.page.click("#wheel");
+    await viewer.holds("the question", () => !document.getElementById("asked").hidden);
+    await filmed("asked");
+    await page.click("#hand-over");
+    await colleague.until("the wheel", (now) => now.role === "driver");
+    await filmed("handed-over", "right");
+  }],
+  ["all of it is taken back", async () => {
+    for (let left = 3; left > 0; left--) {
+      const before = new Set((await colleague.look()).orders.map((order) => order.id));
+      await colleague.page.click("#undo");
+      await colleague.settled(before);
+    }
+    await colleague.until("no edits", (now) => now.stack.length === 0);
+    await viewer.until("no edits here either", (now) => now.stack.length === 0);
+    await colleague.drawn();
+    await colleague.picture("taken-back");
+  }],
+  ["one view alone, for a page of one's own", async () => {
+    const bare = new URL(page.url());
+    bare.search = "?view=midplane";
+    await page.goto(bare.toString());
+    await viewer.until("a picture", (now) => now.frames > 0);
+    for (const selector of ["header", "#left", "#right", "#dock", "#tools"]) check(await page.isHidden(selector), `${selector} is shown beside the view`);
+    await filmed("alone");
+  }],
+  ["nothing went wrong on the way", async () => {
+    const complaints = [viewer, colleague].flatMap((one) => one?.complaints ?? []);
+    check(complaints.length === 0, complaints.join("\n"));
+  }],
+];
+
+await run(steps, () => [viewer, colleague].filter(Boolean), () => browser.close());
