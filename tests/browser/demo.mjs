@@ -262,7 +262,7 @@ const steps = [
       return Math.abs(pixels / shared.pixels - FACTOR) < 0.12;
     });
     console.log(`    throat: ${shared.extent} to ${await extent()}; on the screen ${shared.pixels} to ${pixels} pixels`);
-    check((await page.locator("#stack li").count()) === 1, "the stack of edits does not show the pinch");
+    await viewer.holds("the pinch in the list of edits", () => document.querySelectorAll("#stack li").length === 1);
     await picture("pinched-side");
     await page.click('[data-camera="reset"]');
     await drawn();

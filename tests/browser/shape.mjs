@@ -17,7 +17,9 @@ const told = () => first.until("the forecast", ({ forecast }) => {
   check(forecast.state !== "failed", `there is no forecast: ${forecast.reason}`);
   return forecast.state === "told";
 });
-const rows = () => page.locator("#stack .title").allInnerTexts();
+/** Waits until the list of edits has these rows: the edits are fetched once the run has told of them. */
+const listed = (...rows) => first.holds(`the list of ${rows.length} edits: ${rows.join("; ")}`, (wanted) =>
+  JSON.stringify([...document.querySelectorAll("#stack .title")].map((title) => title.textContent)) === JSON.stringify(wanted), rows);
 /** Whether all of an element is in the window and nothing lies over its middle. */
 const inSight = (viewer, selector) => viewer.page.evaluate((wanted) => {
   const found = document.querySelector(wanted);
@@ -92,7 +94,7 @@ const steps = [
     const order = await first.settled(known);
     check(order.status === "applied", `the pinch was refused: ${order.reason}`);
     check((await first.look()).orders.filter(({ id }) => !known.has(id)).length === 1, "two orders were given");
-    check(JSON.stringify(await rows()) === JSON.stringify(["Throat: height × 0.7"]), `the list says ${JSON.stringify(await rows())}`);
+    await listed("Throat: height × 0.7");
     await first.until("the pinch in the picture", async () => Math.abs((await first.extent("throat", 2)) / first.whole - 0.7) < 0.005);
     await first.picture("applied");
   }],
@@ -101,6 +103,7 @@ const steps = [
     await first.field("by z").fill("0.01");
     await told();
     check((await first.apply()).status === "applied", "the second edit was refused");
+    await first.until("both edits", (now) => now.stack.length === 2);
     await page.click('#stack [data-edit="0"] [data-act="load"]');
     check((await first.field("factors z").inputValue()) === "0.7", "the first edit's values are not in the form");
     check((await first.text("#apply")) === "Update edit 1", `the button says "${await first.text("#apply")}"`);
@@ -108,7 +111,7 @@ const steps = [
     await told();
     await first.picture("update");
     check((await first.apply()).status === "applied", "the change was refused");
-    check(JSON.stringify(await rows()) === JSON.stringify(["Throat: height × 0.9", "Throat: moved by 0.01 along z"]), `the list says ${JSON.stringify(await rows())}`);
+    await listed("Throat: height × 0.9", "Throat: moved by 0.01 along z");
     await first.until("the throat as changed", async () => Math.abs((await first.extent("throat", 2)) / first.whole - 0.9) < 0.005);
   }],
   ["muting keeps the focus, and keys take back and bring back, before Apply and after", async () => {
