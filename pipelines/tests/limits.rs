@@ -194,7 +194,8 @@ fn limits_are_told_apart() {
     for (index, limit) in ALL.iter().enumerate() {
         limit.check(limit.most).unwrap();
         assert!(limit.check(limit.most + 1).is_err() && !limit.of.is_empty());
-        assert!(ALL[..index].iter().all(|other| other.of != limit.of), "{}", limit.of);
+        let name = (limit.what, limit.of);
+        assert!(ALL[..index].iter().all(|other| (other.what, other.of) != name), "{name:?}");
     }
 }
 

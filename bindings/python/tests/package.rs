@@ -40,7 +40,7 @@ fn the_types_hold() {
 
 #[test]
 fn the_sources_are_in_order() {
-    let sources = [".", "../../examples"];
+    let sources = [".", "../../examples", "../../clients"];
     let ruff = |task: &[&str]| {
         let settings = ["--no-cache", "--config", "pyproject.toml"];
         passes(&[&["-m", "ruff"], task, &settings, &sources].concat());

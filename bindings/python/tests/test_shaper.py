@@ -165,7 +165,7 @@ def test_what_is_no_mesh_is_told():
 def test_long_work_tells_how_long_and_is_given_up():
     points, tets = box(14)
     shaper, seconds = shaper_of(points, tets, ends(points, tets)), []
-    turn = [{"rotate": {"features": ["top"], "fixed": ["bottom"], "axis": [0, 0, 1], "degrees": 170}}]
+    turn = [{"rotate": {"features": ["top"], "fixed": ["bottom"], "axis": [0, 0, 1], "degrees": 45}}]
 
     def progress(elapsed):
         seconds.append(elapsed)
