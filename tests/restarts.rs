@@ -67,7 +67,6 @@ fn results(small: &Small) -> [Vec<u8>; 2] {
 }
 
 #[test]
-#[ignore = "to be run before it counts"]
 fn a_run_that_is_killed_and_restarted_ends_as_one_that_never_was() {
     let whole = prepared();
     let (status, text) = Run::flow(&whole.arguments(&arguments(&[]))).finish(PATIENCE);
@@ -114,7 +113,6 @@ fn a_run_that_is_killed_and_restarted_ends_as_one_that_never_was() {
 }
 
 #[test]
-#[ignore = "to be run before it counts"]
 fn a_run_that_is_asked_to_stop_saves_its_state() {
     let whole = prepared();
     let (status, text) = Run::flow(&whole.arguments(&arguments(&[]))).finish(PATIENCE);

@@ -21,7 +21,13 @@ pub fn programs() -> &'static Path {
     // them: nothing is built twice.
     PROGRAMS.get_or_init(|| {
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-        let output = Command::new(cargo)
+        let mut build = Command::new(cargo);
+        // What cargo says of the test alone: a dependency that looks at it would be built again.
+        let names = std::env::vars_os().filter_map(|(name, _)| name.into_string().ok());
+        names.filter(|name| is_of_package(name)).for_each(|name| {
+            build.env_remove(name);
+        });
+        let output = build
             .current_dir(project())
             .args([
                 "build",
@@ -45,6 +51,12 @@ pub fn programs() -> &'static Path {
         let test = std::env::current_exe().expect("a running test has a path");
         test.ancestors().nth(2).expect("a test lies in target/debug/deps").to_owned()
     })
+}
+
+/// Whether cargo sets this variable for the programs of one package.
+fn is_of_package(variable: &str) -> bool {
+    variable == "OUT_DIR"
+        || ["CARGO_PKG_", "CARGO_MANIFEST_"].iter().any(|prefix| variable.starts_with(prefix))
 }
 
 /// A program by name, ready for arguments, run from the root of the project.

@@ -17,8 +17,9 @@ impl Adaptor {
     /// that step; [`Settings::restart`](crate::Settings::restart) goes on from it. See
     /// [`Checkpoint`], which has an example.
     ///
-    /// It copies no coordinates, and waits for nobody. The journal gets a line that says where it was
-    /// made.
+    /// It copies no coordinates. The journal gets a line that says where it was made, and this waits
+    /// until that line and all before it are on disk, two seconds at most: a run that is killed and
+    /// restarted has lost none of them.
     ///
     /// On several ranks it is collective, and each rank has the checkpoint of its own part.
     #[must_use]
@@ -30,7 +31,8 @@ impl Adaptor {
         let id = String::from_utf8_lossy(&id).into_owned();
         // Before anything is looked at: what has a line behind it is not missed, even if it is here
         // too.
-        self.log.note(&JournalNote::Checkpoint(CheckpointNote { id: id.clone(), cycle, time }));
+        let note = CheckpointNote { id: id.clone(), cycle, time };
+        self.log.note_and_wait(&JournalNote::Checkpoint(note));
         let changes = self.told_changes.iter().map(super::changing::Told::saved);
         let mut waiting: Vec<SavedCommand> = changes.chain(self.resumed.waiting()).collect();
         self.queue.look(|received| {

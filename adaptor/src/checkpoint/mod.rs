@@ -45,7 +45,7 @@ const HEAD: usize = 20;
 /// let run = |mut adaptor: Adaptor, points: &mut Vec<[f64; 3]>, cycles: std::ops::Range<u64>| {
 ///     for cycle in cycles {
 ///         let step = Step { cycle, time: 0.1 * cycle as f64, time_step: 0.1 };
-///         let channel = Channel::new("fluid", MeshView::tets(points, &tets), &[]);
+///         let channel = Channel::new("fluid", MeshView::tets(&*points, &tets), &[]);
 ///         let steering = adaptor.execute(&step, &[channel]).unwrap();
 ///         if let Some(motion) = steering.motion {
 ///             points.copy_from_slice(&motion.coordinates);

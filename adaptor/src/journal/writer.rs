@@ -127,6 +127,32 @@ impl Journal {
         self.push(line(note));
     }
 
+    /// Has a line about the run written, and returns once it and all before it are on disk: after
+    /// two seconds at the latest, and at once while nothing can be written.
+    pub(crate) fn note_and_wait(&self, note: &JournalNote) {
+        let Some(shared) = &self.shared else { return };
+        let (done, written) = std::sync::mpsc::channel();
+        let mut state = lock(&shared.state);
+        if state.trouble.is_some() || state.is_closed {
+            drop(state);
+            return self.note(note);
+        }
+        let settle: Settle = Box::new(move |_| {
+            let _ = done.send(());
+        });
+        // Should it be written after all, it needs no line that takes it back.
+        state.push(Line {
+            text: line(note),
+            asked: Some((settle, Vec::new())),
+            is_withdrawn: false,
+        });
+        shared.changed.notify_all();
+        drop(state);
+        if written.recv_timeout(END).is_err() {
+            log::warn!("the disk does not answer: the journal's last lines are not on it yet");
+        }
+    }
+
     fn push(&self, text: Vec<u8>) {
         let Some(shared) = &self.shared else { return };
         let mut state = lock(&shared.state);

@@ -251,6 +251,12 @@ impl Log {
         self.journal.note(note);
     }
 
+    /// Has a line about the run in the journal, and waits until it and all before it are on disk, two
+    /// seconds at most.
+    pub(crate) fn note_and_wait(&self, note: &JournalNote) {
+        self.journal.note_and_wait(note);
+    }
+
     /// How many orders have come to which state.
     pub(crate) fn order_counts(&self) -> Vec<(&'static str, usize)> {
         lock(&self.state).counts()
