@@ -34,6 +34,8 @@ Found = TypeVar("Found")
 _SLICE = 0.2
 #: How long the wheel is asked for: longer than a server keeps it for a driver that was lost.
 _WHEEL = 8.0
+#: How long a view that nobody knows may take to be announced, in seconds.
+_ANNOUNCED = 2.0
 #: Answers to commands and forecasts that are kept until somebody asks for them.
 _ANSWERS = 4096
 #: Events that wait for one who iterates over them; beyond it the oldest make way.
@@ -401,9 +403,14 @@ class Run:
             view = self._views.get(name)
             return view if view is not None and (after is None or view.cycle > after) else None
 
-        known = self.view_names
-        if known and name not in known:
-            raise KeyError(f"no view '{name}'; there are: {', '.join(known)}")
+        if self.view_names and name not in self.view_names:
+            # A view that was added a moment ago is announced a moment later.
+            try:
+                self.wait_for(
+                    lambda: name in self.view_names, min(_ANNOUNCED, forever() if timeout is None else timeout)
+                )
+            except WaitError:
+                raise KeyError(f"no view '{name}'; there are: {', '.join(self.view_names)}") from None
         view = self.wait_for(found, timeout)
         assert view is not None
         return view
