@@ -290,11 +290,10 @@ impl Adaptor {
         let fault = self.check(step, moment, channels).err();
         self.moment = moment;
         self.has_begun = true;
-        let mut has_acted = false;
         let moved = match self.meet(moment, fault, entered)? {
             Some((called, outside)) => {
-                has_acted = !self.is_calm(moment, called);
-                let moved = has_acted && self.act(step, moment, called, channels)?;
+                let is_calm = self.is_calm(moment, called);
+                let moved = !is_calm && self.act(step, moment, called, channels)?;
                 if self.pipelines.listens() {
                     // All ranks must know before a step begins whether a pipeline is due. The clock
                     // therefore counts from the next step on.
@@ -304,10 +303,7 @@ impl Adaptor {
             }
             None => false,
         };
-        if std::mem::take(self.is_spared.get_mut()) && has_acted && self.communicator.size() == 1 {
-            // The next call is lent the mesh, and goes on with what this one could not look at.
-            self.queue.call();
-        }
+        *self.is_spared.get_mut() = false;
         let left = Instant::now();
         self.timing.execute.add(left - entered);
         self.timing.left = Some(left);

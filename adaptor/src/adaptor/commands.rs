@@ -114,9 +114,11 @@ impl Adaptor {
         }
         self.make_ready();
         self.forecast();
-        // What came after the solver had asked whether the mesh is looked at is for the next call,
-        // which is lent it whole.
-        if self.communicator.any(*self.is_spared.get_mut()) {
+        // A command that came after the solver had asked whether its mesh is looked at is for the next
+        // call, which is lent the mesh whole.
+        let looks = !self.told_changes.is_empty()
+            || matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if steerer.looks_at_mesh());
+        if looks && self.communicator.any(*self.is_spared.get_mut()) {
             return;
         }
         self.make_changes(moment, channels);

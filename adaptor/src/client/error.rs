@@ -41,7 +41,7 @@ pub enum ClientError {
     Certificate {
         /// The host and port.
         address: String,
-        /// What is wrong with it.
+        /// The reason why it is not trusted.
         reason: String,
     },
     /// A run answers there, and the token is not its own (401).

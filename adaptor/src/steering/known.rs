@@ -41,7 +41,7 @@ pub(super) struct KnownOrder {
 }
 
 impl KnownOrder {
-    /// What viewers are told of it.
+    /// The order as viewers see it, in JSON.
     pub(super) fn told(&self) -> Value {
         let mut told = json!(self.report);
         if let Some(given) = self.given.as_ref().and_then(|given| told_whole(given)) {
@@ -157,7 +157,7 @@ impl KnownCommands {
         self.orders.iter_mut().rev().find(|order| order.id == id)
     }
 
-    /// What is known of an order.
+    /// An order by its name, with what it asks for.
     pub(super) fn known(&self, id: &str) -> Option<KnownOrder> {
         self.order(id).map(|order| self.with_given(order))
     }

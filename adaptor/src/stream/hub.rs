@@ -344,7 +344,7 @@ impl Hub {
 }
 
 impl View {
-    /// What is to be encoded, at which level, and whether as a key frame.
+    /// The next frame to encode, its level of precision, and whether it is a key frame.
     fn due<'a>(
         &mut self,
         index: usize,

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Optional, TypeVar
 
 Result = TypeVar("Result")
 
 
-def forever() -> float:
-    """A moment that never comes."""
-    return float("inf")
+def moment_after(timeout: Optional[float]) -> float:
+    """The moment so many seconds from now, on the clock `time.monotonic`; one that never comes for None."""
+    return float("inf") if timeout is None else time.monotonic() + timeout
 
 
 def in_thread(call: Callable[[], Result]) -> Result:

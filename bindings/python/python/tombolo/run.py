@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Optional, TypeVar, Union
 import numpy as np
 
 from . import _json, _native
-from ._waiting import forever, in_thread
+from ._waiting import in_thread, moment_after
 from .errors import CallError, EndedError, LinkError, NotDriverError, RejectedError, TomboloError, WaitError
 from .monitors import Monitors
 from .orders import Command, Forecast, Order
@@ -371,7 +371,7 @@ class Run:
                 return len(flow) == 50 and np.ptp(flow) < 0.01 * abs(flow.mean())
             run.wait_for(settled)
         """
-        until = forever() if timeout is None else clock.monotonic() + timeout
+        until = moment_after(timeout)
         with self._changed:
             while True:
                 self._check()
@@ -407,7 +407,7 @@ class Run:
             # A view that was added a moment ago is announced a moment later.
             try:
                 self.wait_for(
-                    lambda: name in self.view_names, min(_ANNOUNCED, forever() if timeout is None else timeout)
+                    lambda: name in self.view_names, _ANNOUNCED if timeout is None else min(_ANNOUNCED, timeout)
                 )
             except WaitError:
                 raise KeyError(f"no view '{name}'; there are: {', '.join(self.view_names)}") from None
@@ -476,7 +476,7 @@ class Run:
         return waiting.popleft()
 
     def _iterate(self, waiting: deque[Event], kinds: tuple[str, ...], timeout: Optional[float]) -> Iterator[Event]:
-        until = forever() if timeout is None else clock.monotonic() + timeout
+        until = moment_after(timeout)
         while True:
             try:
                 event = self._next(waiting, None if timeout is None else max(until - clock.monotonic(), 0.0))
@@ -488,7 +488,7 @@ class Run:
             if not kinds or event.kind in kinds:
                 yield event
                 # Others in between do not make the wait longer.
-                until = forever() if timeout is None else clock.monotonic() + timeout
+                until = moment_after(timeout)
             if ended:
                 return
 
