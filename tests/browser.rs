@@ -3,9 +3,16 @@
 
 use std::path::Path;
 use std::process::Command;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use serde_json::json;
 use tombolo_tests::{Run, Small, project};
+
+/// A browser that draws without a GPU, and a run, are as much as two cores can do: one at a time.
+fn alone() -> MutexGuard<'static, ()> {
+    static BROWSER: Mutex<()> = Mutex::new(());
+    BROWSER.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// Runs a script of `tests/browser` on a run, and panics with what both said where it fails.
 fn drive(script: &str, run: &mut Run) {
@@ -48,6 +55,7 @@ fn running(case: &str, mesh: &str) -> Run {
 
 #[test]
 fn the_demo_in_a_browser() {
+    let _alone = alone();
     let mut run = nozzle();
     drive("demo.mjs", &mut run);
     assert!(run.is_running(), "the run ended:\n{}", run.text());
@@ -55,6 +63,7 @@ fn the_demo_in_a_browser() {
 
 #[test]
 fn seeing_in_a_browser() {
+    let _alone = alone();
     let mut run = nozzle();
     drive("seeing.mjs", &mut run);
     assert!(run.is_running(), "the run ended:\n{}", run.text());
@@ -62,6 +71,7 @@ fn seeing_in_a_browser() {
 
 #[test]
 fn before_and_after_in_a_browser() {
+    let _alone = alone();
     let mut run = nozzle();
     drive("comparing.mjs", &mut run);
     assert!(run.is_running(), "the run ended:\n{}", run.text());
@@ -69,6 +79,7 @@ fn before_and_after_in_a_browser() {
 
 #[test]
 fn shaping_by_hand_in_a_browser() {
+    let _alone = alone();
     let mut run = nozzle();
     drive("handles.mjs", &mut run);
     assert!(run.is_running(), "the run ended:\n{}", run.text());
@@ -76,6 +87,7 @@ fn shaping_by_hand_in_a_browser() {
 
 #[test]
 fn a_first_day_in_a_browser() {
+    let _alone = alone();
     let mut run = running("bypass", "bypass-0");
     drive("tasks.mjs", &mut run);
     assert!(run.is_running(), "the run ended:\n{}", run.text());
@@ -86,7 +98,7 @@ fn small(options: &[&str]) -> (Small, Run) {
     let small = Small::new();
     small.write(
         "pipelines.json",
-        &json!({"version": 1, "stream": {}, "pipelines": [
+        &json!({"version": 1, "stream": {}, "steering": {"wait_for_viewer": true}, "pipelines": [
             {"name": "surface", "every": {"steps": 2}, "stages": [{"surface": {}}, {"stream": {}}]},
             {"name": "shape", "on": "order", "stages": [{"deform": {}}, {"schedule": {"steps": 2}}]}
         ]}),
@@ -99,12 +111,14 @@ fn small(options: &[&str]) -> (Small, Run) {
 
 #[test]
 fn two_people_change_a_shape() {
+    let _alone = alone();
     let (_small, mut run) = small(&[]);
     drive("shape.mjs", &mut run);
 }
 
 #[test]
 fn the_end_of_a_run_in_a_browser() {
+    let _alone = alone();
     let (_small, mut run) = small(&["--steps", "1500"]);
     drive("ended.mjs", &mut run);
 }

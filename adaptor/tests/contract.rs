@@ -120,7 +120,8 @@ enum Cost {
     Lengths,
     /// Found where a mesh is lent first or replaced.
     Replaced,
-    /// Found where it is used too.
+    /// Found where it is used too. Where nothing is due, that is a matter of chance: what was set
+    /// up on another thread may be taken over in any call.
     Used,
 }
 
@@ -274,15 +275,18 @@ fn each_mistake_is_told_wherever_it_is_made() {
     for mistake in MISTAKES {
         for place in PLACES {
             let said = run(settings(true), 0, true, mistake, place);
-            let is_found = match mistake.cost {
-                Cost::Lengths => true,
-                Cost::Replaced => matches!(place.0, Place::First | Place::Replaced),
-                Cost::Used => place.0 != Place::Idle,
+            let (must_be_found, may_be_found) = match mistake.cost {
+                Cost::Lengths => (true, true),
+                Cost::Replaced => {
+                    let is_replaced = matches!(place.0, Place::First | Place::Replaced);
+                    (is_replaced, is_replaced)
+                }
+                Cost::Used => (place.0 != Place::Idle, true),
             };
             match said {
-                Ok(()) => assert!(!is_found, "{:?} at {place:?}", mistake.says),
+                Ok(()) => assert!(!must_be_found, "{:?} at {place:?}", mistake.says),
                 Err(said) => {
-                    assert!(is_found, "{said} at {place:?}");
+                    assert!(may_be_found, "{said} at {place:?}");
                     assert!(said.starts_with(&format!("cycle {}: ", place.1)), "{said}");
                     assert!(
                         mistake.says.iter().all(|part| said.contains(part)),
