@@ -1,0 +1,341 @@
+//! The readers, the inputs that they are given, and what they promise.
+
+use std::fs;
+
+use serde_json::{Value, json};
+use tombolo::{
+    Adaptor, Checkpoint, Restart, Settings,
+    pipelines::{
+        encode::{DecodedFrame, Decoder, decode_surface},
+        language::{
+            Command, Message, TimedCommand, check, check_orders, parse, parse_journal,
+            parse_message, parse_orders,
+        },
+    },
+    recording::Recording,
+};
+
+use crate::{
+    random::Random,
+    seeds::{Seeds, run, settings},
+};
+
+/// A reader.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Target {
+    /// Files of orders.
+    Orders,
+    /// Messages of viewers, as the WebSocket carries them.
+    Messages,
+    /// Frames and surfaces that are streamed.
+    Frames,
+    /// Configurations.
+    Pipelines,
+    /// Journals.
+    Journal,
+    /// Recordings.
+    Recordings,
+    /// Checkpoints, and runs that go on from them.
+    Checkpoints,
+}
+
+impl Target {
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::Orders,
+        Self::Messages,
+        Self::Frames,
+        Self::Pipelines,
+        Self::Journal,
+        Self::Recordings,
+        Self::Checkpoints,
+    ];
+
+    /// The name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Orders => "orders",
+            Self::Messages => "messages",
+            Self::Frames => "frames",
+            Self::Pipelines => "pipelines",
+            Self::Journal => "journal",
+            Self::Recordings => "recordings",
+            Self::Checkpoints => "checkpoints",
+        }
+    }
+
+    pub(crate) fn is_text(self) -> bool {
+        !matches!(self, Self::Frames | Self::Recordings | Self::Checkpoints)
+    }
+
+    /// The sound inputs.
+    pub(crate) fn seeds(self, seeds: &Seeds) -> Vec<Vec<u8>> {
+        let documents = || seeds.documents.iter().map(|text| text.clone().into_bytes());
+        match self {
+            Self::Orders => documents().chain([seeds.journal.clone().into_bytes()]).collect(),
+            Self::Pipelines => documents().collect(),
+            Self::Messages => documents().chain(messages(seeds)).collect(),
+            Self::Journal => vec![seeds.journal.clone().into_bytes()],
+            Self::Frames => seeds.frames.clone(),
+            Self::Recordings => vec![seeds.recording.clone()],
+            Self::Checkpoints => seeds.checkpoints.clone(),
+        }
+    }
+
+    /// Gives a damaged input checksums that fit, most of the time: else little but the checksums
+    /// would be tried.
+    pub(crate) fn seal(self, input: &mut [u8], random: &mut Random) {
+        if random.below(8) == 0 {
+            return;
+        }
+        match self {
+            Self::Recordings => seal_recording(input),
+            Self::Checkpoints => seal_checkpoint(input),
+            _ => {}
+        }
+    }
+
+    /// Reads an input. What it is told in a few words; the error says which promise is broken.
+    pub(crate) fn check(self, seeds: &Seeds, input: &[u8]) -> Result<String, String> {
+        match self {
+            Self::Orders => with_text(input, orders),
+            Self::Messages => with_text(input, message),
+            Self::Pipelines => with_text(input, pipelines),
+            Self::Journal => with_text(input, journal),
+            Self::Frames => frames(seeds, input),
+            Self::Recordings => recording(seeds, input),
+            Self::Checkpoints => checkpoint(input),
+        }
+    }
+}
+
+/// Messages of viewers.
+fn messages(seeds: &Seeds) -> impl Iterator<Item = Vec<u8>> {
+    let order = json!({"edits": [{"scale": {"features": ["a"], "fixed": [], "by": [1, 1, 2]}}],
+                       "deform": {"method": "elasticity"}, "schedule": {"steps": 4}});
+    let others = [
+        json!({"id": "a", "order": order}),
+        json!({"id": "b", "forecast": order}),
+        json!({"cancel": {"id": "a"}}),
+        json!({"parameter": {"name": "heating", "value": 2.0}}),
+        json!({"pause": {}}),
+        json!({"resume": {}}),
+        json!({"stop": {}}),
+        json!({"drive": {}}),
+        json!({"here": {}}),
+        json!({"hand_over": {"to": "c2"}}),
+        json!({"kick": {"client": "c2"}}),
+    ];
+    let documents = seeds.documents.iter().filter_map(|text| serde_json::from_str(text).ok());
+    let wrapped = documents.map(|document: Value| json!({"id": "c", "order": document}));
+    wrapped
+        .chain(others)
+        .map(|message| message.to_string().into_bytes())
+        .collect::<Vec<_>>()
+        .into_iter()
+}
+
+fn with_text(
+    input: &[u8],
+    check: impl Fn(&str) -> Result<String, String>,
+) -> Result<String, String> {
+    // Where bytes come from, what is no text is refused before.
+    std::str::from_utf8(input).map_or_else(|_| Ok("no text".into()), check)
+}
+
+/// Whether two readings of a text that should agree do, with the outcome.
+fn agreed<T, E: ToString, F: ToString>(
+    text: &str,
+    first: &Result<T, E>,
+    second: &Result<T, F>,
+) -> Result<(), String> {
+    match (first, second) {
+        (Ok(_), Err(error)) => {
+            Err(format!("one reader takes it, the other says: {}: {text}", error.to_string()))
+        }
+        (Err(error), Ok(_)) => {
+            Err(format!("one reader says: {}, the other takes it: {text}", error.to_string()))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A value that was read must be the same when it was written and read again.
+fn returns<T: serde::Serialize + PartialEq>(
+    value: &T,
+    read: impl Fn(&str) -> Result<T, String>,
+) -> Result<(), String> {
+    let text =
+        serde_json::to_string(value).map_err(|error| format!("it cannot be written: {error}"))?;
+    let again =
+        read(&text).map_err(|error| format!("what was written is not read: {error}: {text}"))?;
+    if again != *value {
+        return Err(format!("what was written is read as another: {text}"));
+    }
+    Ok(())
+}
+
+fn orders(text: &str) -> Result<String, String> {
+    let read = parse_orders(text, "orders.json");
+    agreed(text, &read, &check_orders(text, "orders.json"))?;
+    match read {
+        Ok(commands) => {
+            returns(&commands, |text| {
+                parse_orders(text, "orders.json").map_err(|error| error.to_string())
+            })?;
+            Ok(format!("{} commands", commands.len()))
+        }
+        Err(error) => Ok(error.to_string()),
+    }
+}
+
+fn pipelines(text: &str) -> Result<String, String> {
+    let read = parse(text, "pipelines.json");
+    agreed(text, &read, &check(text, "pipelines.json"))?;
+    match read {
+        Ok(config) => {
+            returns(&config, |text| {
+                parse(text, "pipelines.json").map_err(|error| error.to_string())
+            })?;
+            Ok("a configuration".into())
+        }
+        Err(error) => Ok(error.to_string()),
+    }
+}
+
+fn message(text: &str) -> Result<String, String> {
+    match parse_message(text) {
+        (_, Ok(Message::Command(command))) => {
+            let name = json!(command).as_object().and_then(|it| it.keys().next().cloned());
+            returns(&command, |text| match parse_message(text) {
+                (_, Ok(Message::Command(command))) => Ok(command),
+                (_, Ok(_)) => Err("it is no command".into()),
+                (_, Err(error)) => Err(error.to_string()),
+            })?;
+            // It is journaled, and kept in checkpoints.
+            timed(command)?;
+            Ok(name.unwrap_or_default())
+        }
+        (id, Ok(_)) => Ok(format!("no command, {}", id.is_some())),
+        (id, Err(error)) => Ok(format!("{error}, {}", id.is_some())),
+    }
+}
+
+/// A command is the same where it is one of a file.
+fn timed(command: Command) -> Result<(), String> {
+    let timed = vec![TimedCommand { id: None, at: None, command }];
+    returns(&timed, |text| parse_orders(text, "orders.json").map_err(|error| error.to_string()))
+}
+
+fn journal(text: &str) -> Result<String, String> {
+    let read = parse_journal(text, "journal.jsonl");
+    let Ok(recording) = read else { return Ok(format!("{:?}", read.err())) };
+    if text.ends_with('\n') {
+        // A run that was killed leaves part of a line.
+        let torn = format!("{text}{{\"id\":\"torn\",\"status\":\"acc");
+        match parse_journal(&torn, "journal.jsonl") {
+            Ok(again) if again.commands == recording.commands => {}
+            Ok(_) => return Err("half a line at the end changes the commands".into()),
+            Err(error) => return Err(format!("half a line at the end is refused: {error}")),
+        }
+    }
+    Ok(format!("{:?} {}", recording.run.is_some(), recording.commands.len().min(9)))
+}
+
+fn sound(frame: &DecodedFrame) -> bool {
+    frame.view.len() <= 1 << 20
+}
+
+fn frames(seeds: &Seeds, input: &[u8]) -> Result<String, String> {
+    let mut decoder = Decoder::new();
+    let key = seeds.frames.first().ok_or("the run has streamed no frame")?;
+    decoder.decode(key).map_err(|error| format!("a sound frame is refused: {error}"))?;
+    let outcome = match decoder.decode(input) {
+        Ok(frame) if sound(&frame) => "a frame".into(),
+        Ok(_) => return Err("the name of the view is longer than the message".into()),
+        Err(error) => error.to_string(),
+    };
+    decoder.decode(key).map_err(|error| format!("refused after a damaged frame: {error}"))?;
+    let surface =
+        decode_surface(input).map_or_else(|error| error.to_string(), |_| "a surface".into());
+    Ok(format!("{outcome} {surface}"))
+}
+
+fn recording(seeds: &Seeds, input: &[u8]) -> Result<String, String> {
+    let file = seeds.folder.path().join("damaged.tombolo");
+    fs::write(&file, input).map_err(|error| error.to_string())?;
+    let mut recording = match Recording::open(&file) {
+        Ok(recording) => recording,
+        Err(error) => return Ok(error.to_string()),
+    };
+    if recording.lost_bytes() > input.len() as u64 {
+        return Err("more bytes are lost than there are".into());
+    }
+    let mut kinds = [0_u32; 2];
+    let last = recording.last();
+    for seconds in [0.0, last.seconds / 2.0, last.seconds, -1.0, f64::NAN, f64::INFINITY] {
+        recording.seek(seconds);
+        while let Ok(Some(message)) = recording.read_next() {
+            kinds[usize::from(matches!(
+                message.message,
+                tombolo::recording::RecordedMessage::Frame { .. }
+            ))] += 1;
+        }
+        let _ = (recording.hello(seconds), recording.orders(seconds));
+        let _ = (recording.seconds_of_cycle(last.cycle), recording.seconds_of_time(last.time));
+    }
+    Ok(format!("{} texts, {} frames, {} lost", kinds[0], kinds[1], recording.lost_bytes() > 0))
+}
+
+fn checkpoint(input: &[u8]) -> Result<String, String> {
+    let checkpoint = match Checkpoint::from_bytes(input) {
+        Ok(checkpoint) => checkpoint,
+        Err(error) => return Ok(error.to_string()),
+    };
+    let again = checkpoint.to_bytes();
+    let again = Checkpoint::from_bytes(&again)
+        .map_err(|error| format!("what was written is not read: {error}"))?;
+    let begin = again.cycle().map_or(0, |cycle| cycle.saturating_add(1));
+    let output = tempfile::tempdir().map_err(|error| error.to_string())?;
+    let restart = Some(Restart::Checkpoint(Box::new(again)));
+    let adaptor = Adaptor::initialize(Settings { restart, ..settings(output.path())? });
+    let adaptor = match adaptor {
+        Ok(adaptor) => adaptor,
+        Err(error) => return Ok(error.to_string()),
+    };
+    let ran = run(adaptor, begin..begin.saturating_add(3), |_, _| {});
+    Ok(ran.map_or_else(|error| error, |()| "a run".into()))
+}
+
+/// Bytes before what is held in a checkpoint, and before the message in a recording.
+const HEADS: [usize; 2] = [20, 41];
+/// Bytes at the beginning of a recording.
+const MAGIC: usize = 12;
+
+fn seal_checkpoint(input: &mut [u8]) {
+    let length = input.len();
+    if length < HEADS[0] + 4 {
+        return;
+    }
+    let (head, rest) = input.split_at_mut(HEADS[0]);
+    let (held, checksum) = rest.split_at_mut(length - HEADS[0] - 4);
+    head[HEADS[0] - 8..].copy_from_slice(&(held.len() as u64).to_le_bytes());
+    checksum.copy_from_slice(&crc32fast::hash(held).to_le_bytes());
+}
+
+fn seal_recording(input: &mut [u8]) {
+    let mut at = MAGIC;
+    while let Some(head) = input.get(at..at + HEADS[1]) {
+        let length = u32::from_le_bytes([head[0], head[1], head[2], head[3]]) as usize;
+        let begin = at + HEADS[1];
+        let checksum = input.get(begin..begin.saturating_add(length)).map(crc32fast::hash);
+        let head = &mut input[at..begin];
+        if let Some(checksum) = checksum {
+            head[33..37].copy_from_slice(&checksum.to_le_bytes());
+        }
+        let checksum = crc32fast::hash(&head[..37]);
+        head[37..].copy_from_slice(&checksum.to_le_bytes());
+        at = begin.saturating_add(length);
+    }
+}

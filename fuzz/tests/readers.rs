@@ -1,0 +1,36 @@
+//! A short pass of each reader, and of the inputs that once did harm.
+
+use std::time::Duration;
+
+use tombolo_fuzz::{Target, fuzz};
+
+fn passes(target: Target) {
+    let folder = tempfile::tempdir().unwrap();
+    match fuzz(target, 1, Duration::from_secs(5), folder.path()) {
+        Ok(pass) => assert!(pass.inputs > 10 && pass.outcomes > 2, "{pass:?}"),
+        Err(fault) => {
+            // Where it outlives the test.
+            let file = folder.keep().join(fault.file.file_name().unwrap_or_default());
+            panic!("{}: {}", file.display(), fault.reason);
+        }
+    }
+}
+
+macro_rules! readers {
+    ($($name:ident: $target:ident,)*) => {$(
+        #[test]
+        fn $name() {
+            passes(Target::$target);
+        }
+    )*};
+}
+
+readers! {
+    orders: Orders,
+    messages: Messages,
+    frames: Frames,
+    pipelines: Pipelines,
+    journals: Journal,
+    recordings: Recordings,
+    checkpoints: Checkpoints,
+}
