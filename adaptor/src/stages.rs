@@ -8,7 +8,7 @@ use std::{
 
 use serde_json::{Map, Value, json};
 use tombolo_deform::communicator::{self, Communicator};
-use tombolo_deform::surface::Surface;
+use tombolo_deform::{mesh::Mesh, surface::Surface};
 use tombolo_pipelines::{
     encode::Encoder,
     extract::{Channel, Snapshot},
@@ -215,15 +215,10 @@ impl Pipelines {
         self.drags_skeleton
     }
 
-    /// Lets the views use a surface of a channel that is known already.
-    pub(crate) fn share_surface(
-        &mut self,
-        channels: &[Channel<'_>],
-        channel: &str,
-        surface: &Surface,
-    ) {
-        // Where it does not fit, the pipelines work out their own and say what is wrong.
-        let _ = self.runner.set_surface(channels, Some(channel), surface);
+    /// Lets the views use the cells and the surface of a channel that are known already.
+    pub(crate) fn share_mesh(&mut self, channel: &Channel<'_>, mesh: &Mesh, surface: &Surface) {
+        // Where that cannot be, the pipelines work out their own and say what is wrong.
+        let _ = self.runner.share_mesh(channel, mesh, surface);
     }
 
     /// Lets only those run from now on whose names are chosen.

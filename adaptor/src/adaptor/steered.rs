@@ -94,7 +94,7 @@ impl Adaptor {
                     if let Some(surface) =
                         surface.as_ref().filter(|_| self.communicator.size() == 1)
                     {
-                        self.pipelines.share_surface(channels, channel.name, surface);
+                        self.pipelines.share_mesh(channel, &steerer.mesh(), surface);
                     }
                     SteeredMesh::Steered(Box::new(steerer), surface)
                 }

@@ -96,7 +96,8 @@ impl Mesh {
     }
 
     /// The cells, to be kept without a copy.
-    pub(crate) fn shared_cells(&self) -> &Arc<Cells> {
+    #[must_use]
+    pub fn shared_cells(&self) -> &Arc<Cells> {
         &self.cells
     }
 

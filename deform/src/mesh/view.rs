@@ -158,10 +158,12 @@ impl CellsView<'_> {
             CellsView::Owned(cells) => Ok(cells.clone()),
             CellsView::Uniform { cell_type, connectivity } => {
                 let size = cell_type.vertex_count().unwrap_or(1);
-                let vertices: Result<Vec<u32>, _> = (0..connectivity.len())
-                    .map(|index| vertex(index / size, connectivity.get(index)))
-                    .collect();
-                Cells::uniform(cell_type, vertices?)
+                // Not collected: that would set aside up to twice as much, without knowing how much.
+                let mut vertices = Vec::with_capacity(connectivity.len());
+                for index in 0..connectivity.len() {
+                    vertices.push(vertex(index / size, connectivity.get(index))?);
+                }
+                Cells::uniform(cell_type, vertices)
             }
             CellsView::Mixed { types, offsets, connectivity } => {
                 let mut cells = Cells::new();

@@ -288,7 +288,20 @@ impl Source {
     pub fn new(channel: &Channel) -> Result<Self, ExtractError> {
         let cells = channel.mesh.cells.to_cells()?;
         cells.validate(channel.mesh.points.len())?;
-        Ok(Self::of(MeshKey::of(&channel.mesh), cells, OnceLock::new(), None, false))
+        Ok(Self::of(MeshKey::of(&channel.mesh), Arc::new(cells), OnceLock::new(), None, false))
+    }
+
+    /// The cells of a channel that were taken over as this mesh already, without another copy of
+    /// them. The channel has no ghosts.
+    #[must_use]
+    pub fn of_mesh(channel: &Channel, mesh: &Mesh) -> Self {
+        let right_handed = mesh.shared_cells();
+        let given = match right_handed.as_given() {
+            Cow::Borrowed(_) => Arc::clone(right_handed),
+            Cow::Owned(given) => Arc::new(given),
+        };
+        let key = MeshKey::of(&channel.mesh);
+        Self::of(key, given, Arc::clone(right_handed).into(), None, false)
     }
 
     /// The cells of a channel of which each of several ranks has a part, or one process all, ghosts
@@ -337,21 +350,21 @@ impl Source {
             surface,
             no_surface,
         };
-        let given = part.cells.as_given().into_owned();
+        let given = Arc::new(part.cells.as_given().into_owned());
         let key = MeshKey::of(&channel.mesh);
         Ok(Self::of(key, given, Arc::new(part.cells).into(), Some(Box::new(whole)), is_part))
     }
 
     fn of(
         key: MeshKey,
-        cells: Cells,
+        cells: Arc<Cells>,
         right_handed: OnceLock<Arc<Cells>>,
         whole: Option<Box<Whole>>,
         is_part: bool,
     ) -> Self {
         Self {
             key,
-            cells: Arc::new(cells),
+            cells,
             right_handed,
             boundary: None,
             blocks: OnceLock::new(),

@@ -15,7 +15,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Instant;
 
-use tombolo_deform::surface::Surface;
+use tombolo_deform::{mesh::Mesh, surface::Surface};
 
 use crate::extract::{Channel, Snapshot, Source};
 use crate::language::{Config, Due, Pipeline, Problem, Stage, Validate, monitors};
@@ -245,18 +245,25 @@ impl Runner {
         outputs
     }
 
-    /// Lets the pipelines use a surface that was extracted from the same channel elsewhere.
+    /// Lets the pipelines use the cells and the surface of a channel that were taken over elsewhere,
+    /// so that neither is copied or worked out twice. On one process.
     ///
     /// # Errors
-    /// A text that names the channel or what is wrong with its mesh.
-    pub fn set_surface(
+    /// A text that says what is wrong with the channel's ghosts.
+    pub fn share_mesh(
         &mut self,
-        channels: &[Channel],
-        name: Option<&str>,
+        channel: &Channel,
+        mesh: &Mesh,
         surface: &Surface,
     ) -> Result<(), String> {
-        let (_, source) = source(&mut self.sources, channels, name, &self.communicator)?;
+        let mut source = if channel.mesh.is_plain() {
+            Source::of_mesh(channel, mesh)
+        } else {
+            // The mesh is without the ghosts, which pipelines may be asked for.
+            Source::distributed(channel, &self.communicator).map_err(|error| error.to_string())?
+        };
         source.set_surface(surface);
+        self.sources.insert(channel.name.to_owned(), source);
         Ok(())
     }
 }

@@ -11,7 +11,7 @@ use std::{
 };
 
 use tombolo_deform::{
-    mesh::{Domain, Vector},
+    mesh::{Domain, Mesh, Vector},
     quality::{Quality, quality},
     shape::{CurrentShape, Forecast, Plan, Shaper},
     surface::Surface,
@@ -223,6 +223,11 @@ impl Steerer {
     /// The surface of the mesh, where this process has it.
     pub(crate) fn surface(&self) -> Option<Arc<Surface>> {
         lock(&self.planner).shaper().surface().cloned()
+    }
+
+    /// The reference mesh, or this rank's part of it, which shares its arrays.
+    pub(crate) fn mesh(&self) -> Mesh {
+        lock(&self.planner).shaper().mesh().clone()
     }
 
     /// A forecaster for other threads; `None` where the worker has ended.
